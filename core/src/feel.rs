@@ -141,9 +141,7 @@ impl Feel {
                 true => Execution::LockStep,
                 false => Execution::RealTime,
             },
-            ..ContactSettings::REAL_TIME
-                .at_rate(self.rate)
-                .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm))
+            ..ContactSettings::REAL_TIME.at_rate(self.rate)
         };
         self.contact = match landing {
             Some((hip, stretch)) => {
@@ -176,6 +174,7 @@ impl Feel {
     }
 
     /// The force that a HIP wants, N, terrain frame: one tick.
+    #[inline(always)]
     pub(crate) fn step<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -255,6 +254,11 @@ impl Feel {
     /// The same, for the clutch and for tiles that move the surface.
     pub(crate) const fn contact_mut(&mut self) -> &mut Contact {
         &mut self.contact
+    }
+
+    /// Returns true if the scene adds something to the spring's force.
+    pub(crate) const fn has_effects(&self) -> bool {
+        self.effects.is_some()
     }
 
     /// A tile without which the last force is not that of the whole terrain, besides the contact's.

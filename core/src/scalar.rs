@@ -41,6 +41,7 @@ pub(crate) fn root(x: f32) -> f32 {
 /// The result is never longer than `limit` (of normal size), and at most 8 ulp
 /// shorter than it where it was clamped.
 #[must_use]
+#[inline]
 pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
     let squared = v.length_squared();
     // The usual case; not where the square is too small or too large to tell, or
@@ -48,8 +49,18 @@ pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
     if squared.is_normal() && squared <= limit * limit {
         return v;
     }
+    // In the air nothing is felt.
+    if v == Vec3::ZERO {
+        return Vec3::ZERO;
+    }
+    shortened(v, limit)
+}
+
+/// `v`, shortened to `limit`, whatever its numbers are.
+#[inline(never)]
+fn shortened(v: Vec3, limit: f32) -> Vec3 {
     let largest = v.abs().max_element();
-    if !is_finite(v) || largest == 0.0 {
+    if !is_finite(v) {
         return Vec3::ZERO;
     }
     // Scaled first, so that squaring cannot overflow.

@@ -96,7 +96,7 @@ impl<const D: usize> Haptics<'_, D> {
         };
         let wanted_n = self.wanted_n(pose, &mut outcome.sample);
         let force_n = self.guard.limit_force(wanted_n);
-        outcome.drive = self.drive(pose, force_n);
+        self.drive(pose, force_n, &mut outcome.drive);
         self.write_state(force_n, &mut outcome.sample);
     }
 
@@ -120,15 +120,16 @@ impl<const D: usize> Haptics<'_, D> {
         };
         let wanted_n = self.feel.step(&self.window, scene, hip, &arm);
         write_output(hip, &self.feel, sample);
-        if self.feel.created_mj() > 0.0 {
+        if self.feel.has_effects() && self.feel.created_mj() > 0.0 {
             self.guard.says(Limits::ENERGY_TAKEN_BACK);
         }
         wanted_n
     }
 
     /// The currents of a force, A, and of the arm's weight.
-    fn drive(&mut self, pose: &Pose, force_n: Vec3) -> Drive {
-        let mut drive = match &self.mechanism {
+    #[inline]
+    fn drive(&mut self, pose: &Pose, force_n: Vec3, drive: &mut Drive) {
+        *drive = match &self.mechanism {
             Some(mechanism) if self.guard.mode().drives() => {
                 let wanted_a = self.guard.jog_currents_a().unwrap_or_else(|| {
                     let weight = mechanism.gravity_nm(pose) * self.guard.gain();
@@ -142,7 +143,6 @@ impl<const D: usize> Haptics<'_, D> {
         if !drive.enabled {
             drive.held = self.guard.held();
         }
-        drive
     }
 
     /// The same without a calibration: nothing is felt, and nothing driven.
@@ -206,7 +206,9 @@ impl<const D: usize> Haptics<'_, D> {
 /// Writes the contact's output into the sample.
 pub(crate) fn write_output(hip: GridPoint, feel: &Feel, sample: &mut Sample) {
     write_contact(hip, feel.contact().output(), sample);
-    sample.missing_tile = sample.missing_tile.or(feel.missing());
+    if feel.has_effects() {
+        sample.missing_tile = sample.missing_tile.or(feel.missing());
+    }
 }
 
 // A call: it is needed in several places.

@@ -12,33 +12,15 @@ use crate::shared;
 /// When one of them does not open.
 #[must_use]
 pub fn files() -> Vec<(&'static str, Raster)> {
-    named(&[
+    let names = [
         "mt_rainier_90m.tif",
         "SainteHelens.dem",
         "LisbonElevation.tif",
-    ])
-}
-
-/// Five of them, a city seen by lidar among them; none where they are not on this machine.
-///
-/// # Panics
-/// When one of them does not open.
-#[must_use]
-pub fn more_files() -> Vec<(&'static str, Raster)> {
-    named(&[
-        "mt_rainier_90m.tif",
-        "mt_everest_90m.tif",
-        "bigtujunga.tif",
-        "LisbonElevation.tif",
-        "dom1_32_356_5699_1_nw_2020.tif",
-    ])
-}
-
-fn named(names: &[&'static str]) -> Vec<(&'static str, Raster)> {
-    let paths = names
-        .iter()
-        .map(|name| (*name, shared(&format!("dem/real/{name}"))));
-    let there = paths.filter_map(|(name, path)| Some((name, path?)));
+    ];
+    let paths = names.map(|name| (name, shared(&format!("dem/real/{name}"))));
+    let there = paths
+        .into_iter()
+        .filter_map(|(name, path)| Some((name, path?)));
     let open = |path| Raster::open(path, &OpenOptions::default()).expect("opens");
     there.map(|(name, path)| (name, open(path))).collect()
 }

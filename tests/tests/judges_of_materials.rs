@@ -171,11 +171,11 @@ fn friction_of_the_place_after_is_found() {
     assert_eq!(early, Some(Invariant::LocalMinimum), "nothing is held yet");
     assert_eq!(proxy(10, 0.0), None);
     assert_eq!(proxy(10, -0.0075), Some(Invariant::Cone), "one tick early");
-    assert_eq!(proxy(10, 0.0075), Some(Invariant::Cone), "one tick late");
+    assert_eq!(proxy(10, 0.0075), Some(Invariant::Slides), "one tick late");
     // On the way back it is held, and does not move.
     let [stuck, before] = [280, 279].map(|at| way.felt[at].sample.proxy);
     assert_eq!(stuck, before);
-    assert_eq!(way.proxy(280, 1e-4, 0.4), Some(Invariant::Cone));
+    assert_eq!(way.proxy(280, 1e-4, 0.4), Some(Invariant::Stuck));
 }
 
 #[test]

@@ -222,7 +222,9 @@ fn assert_pressed(sample: &Sample, before: &Sample, what: &str) {
 
 fn assert_felt(sample: &Sample, what: &str) {
     assert_eq!(sample.state, ContactState::Touching, "{what}");
-    assert_eq!(sample.limits, Limits::empty(), "{what}");
+    // The controller acts on every scene, and encoders of half a millimetre give it work.
+    let others = sample.limits.difference(Limits::ENERGY_TAKEN_BACK);
+    assert_eq!(others, Limits::empty(), "{what}");
 }
 
 /// How much of its force a press has with a spring, N/mm, of what it has with another. The hand

@@ -7,33 +7,8 @@
 //! Cortex-M4F a unit stands for is measured; the table is
 //! `bench/instructions-m4f.csv`.
 
-use crate::rate::TickRate;
-
-/// Units of work a tick may spend at 1 kHz, and at any rate at most.
-///
-/// A unit is at most 238 instructions of a Cortex-M4F, so a tick is at most 102,000: at 1.5 cycles
-/// each 154,000 of the 168,000 cycles that a NUCLEO-G474RE has for a millisecond.
-pub const WORK_PER_TICK: u32 = 430;
-/// Units of work a second: 86 a tick at 10 kHz.
-const WORK_PER_S: u32 = 860_000;
-
-/// Units of work that a tick may spend at a rate.
-///
-/// ```
-/// use hapterra_core::contact::work_per_tick;
-/// use hapterra_core::rate::TickRate;
-///
-/// let at = |hz| TickRate::new(hz).map(work_per_tick);
-/// assert_eq!([at(1_000), at(4_000), at(10_000)], [Some(430), Some(215), Some(86)]);
-/// ```
-#[must_use]
-pub const fn work_per_tick(rate: TickRate) -> u32 {
-    // A rate of zero is none, but the compiler does not know that.
-    match WORK_PER_S.checked_div(rate.hz()) {
-        Some(fits) if fits < WORK_PER_TICK => fits,
-        _ => WORK_PER_TICK,
-    }
-}
+/// Units of work a tick may spend.
+pub const WORK_PER_TICK: u32 = 86;
 
 /// Units for following the proxy within its patch by the shortcut.
 pub(super) const SHORTCUT: u32 = 2;
@@ -43,14 +18,8 @@ pub(super) const ARRIVAL: u32 = 6;
 pub(super) const CONVEX: u32 = 4;
 /// Units for the closest point of one ruling.
 pub(super) const RULING: u32 = 4;
-/// Units for looking for a crest between two rulings.
-pub(super) const CREST: u32 = 32;
 /// Units for the slope of the distance into one patch.
 pub(super) const SLOPE: u32 = 3;
-/// Units for a look at the cone of friction.
-pub(super) const LOOK: u32 = 1;
-/// Units of a straight way with friction, at most: four patches at its start, and eight looks.
-pub(super) const WAY: u32 = 4 * SLOPE + 8 * LOOK;
 /// Units for asking whether a box is clear.
 pub(super) const BOX: u32 = 4;
 /// Units for halving a path.
@@ -68,11 +37,10 @@ pub(super) const GAP: u32 = 1;
 /// Units for a cell whose patch is intersected with a path.
 pub(super) const INTERSECTION: u32 = 8;
 
-/// Units for arriving at a patch on a border, and asking its four neighbours.
-pub(super) const ON_BORDER: u32 = ARRIVAL + 4 * SLOPE;
-/// Units of the largest piece of work. A tick that put work off has spent more than its budget
-/// less this.
-pub const LARGEST_PIECE: u32 = CREST;
+/// Units of the largest piece of work: arriving at a patch on a border, and asking its four
+/// neighbours; the cone of friction asks as much. A tick that put work off has spent more
+/// than [`WORK_PER_TICK`] less this.
+pub const LARGEST_PIECE: u32 = ARRIVAL + 4 * SLOPE;
 
 /// What a tick has spent, and what it may.
 #[derive(Debug)]

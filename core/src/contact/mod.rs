@@ -20,11 +20,8 @@ mod paper;
 mod proxy;
 mod settings;
 mod shortcut;
-mod straight_way;
 mod tolerance;
 
-#[cfg(test)]
-mod basin_tests;
 #[cfg(test)]
 mod dice;
 #[cfg(test)]
@@ -33,7 +30,7 @@ mod tally;
 #[cfg(test)]
 mod tests;
 
-pub use budget::{LARGEST_PIECE, WORK_PER_TICK, work_per_tick};
+pub use budget::{LARGEST_PIECE, WORK_PER_TICK};
 pub use friction::Friction;
 pub use output::{ContactOutput, ContactState};
 pub use proxy::Contact;

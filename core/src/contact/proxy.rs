@@ -1,11 +1,11 @@
 //! The proxy: what a tick does, and what is remembered from tick to tick.
 
 mod departures;
-mod held_back;
 mod in_air;
 mod landing;
 mod on_ground;
 mod paper_rule;
+mod rubbing;
 
 use glam::Vec3;
 
@@ -21,8 +21,8 @@ use super::sweep::Path;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::Window;
 use departures::Departures;
-use held_back::Rough;
 use landing::Landing;
+use rubbing::Rubbing;
 
 /// What the proxy does, with what has to be remembered while it does so.
 // The path is most of a contact's state, and there is no heap to put it on.
@@ -119,19 +119,19 @@ pub struct Contact {
     felt: Option<(GridPoint, Vec3)>,
     /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
     landing: Option<Landing>,
-    /// What friction remembers, where the surface is rough.
-    rough: Option<Rough>,
+    /// What friction holds of the proxy, where the surface is rough.
+    rubbing: Option<Rubbing>,
 }
 
 impl Contact {
     /// A contact that waits to see the HIP above the surface.
     #[must_use]
     pub fn new(settings: ContactSettings) -> Self {
-        let rough = match settings.rule {
-            Rule::Swept => Rough::on(settings.friction),
+        let rubbing = match settings.rule {
+            Rule::Swept => Rubbing::on(settings.friction),
             Rule::Paper => None,
         };
-        let is_smooth = rough.is_none();
+        let is_smooth = rubbing.is_none();
         Self {
             // A proxy that is held back does not follow the HIP.
             settings: ContactSettings {
@@ -140,7 +140,7 @@ impl Contact {
             },
             phase: Phase::Waiting,
             landing: None,
-            rough,
+            rubbing,
             hip: GridPoint::default(),
             at_rest: false,
             output: ContactOutput::default(),
@@ -201,8 +201,8 @@ impl Contact {
     #[inline(never)]
     pub fn surface_moved<const D: usize>(&mut self, window: &Window<'_, D>) {
         self.at_rest = false;
-        if self.rough.is_some() {
-            return;
+        if let Some(rubbing) = &mut self.rubbing {
+            return rubbing.surface_moved();
         }
         // No work is done before the next step.
         self.redirect(window, self.hip, None, &mut Budget::new(0));
@@ -211,10 +211,10 @@ impl Contact {
     /// How rough the surface is from the next step on. A proxy that was held is judged again. The
     /// paper's rule knows of no friction.
     pub(crate) fn feels_friction(&mut self, friction: Friction) {
-        if let Some(rough) = &mut self.rough {
-            self.at_rest &= !rough.takes(friction);
+        if let Some(rubbing) = &mut self.rubbing {
+            self.at_rest &= !rubbing.takes(friction);
         } else if self.settings.rule == Rule::Swept && !friction.is_none() {
-            self.rough = Rough::on(friction);
+            self.rubbing = Rubbing::on(friction);
             // A proxy that is held back does not follow the HIP.
             self.settings.shortcuts = false;
             self.at_rest = false;
@@ -313,9 +313,9 @@ impl Contact {
         hip: GridPoint,
         known: Option<Place>,
     ) {
-        if self.rough.is_some() {
+        if self.rubbing.is_some() {
             // Nothing was known: with friction no shortcut is taken.
-            return self.step_on_rough_ground(window, hip);
+            return self.rub(window, hip);
         }
         let mut budget = Budget::new(self.settings.work_per_tick);
         self.remembers_what_was_felt();

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::budget::{WORK_PER_TICK, work_per_tick};
+use super::budget::WORK_PER_TICK;
 use super::friction::Friction;
 use crate::rate::TickRate;
 
@@ -40,12 +40,9 @@ pub struct ContactSettings {
     pub execution: Execution,
     /// Ticks a second: fades are bounded in time.
     pub rate: TickRate,
-    /// Units of work a tick may spend: [`work_per_tick`] of the rate, or at least
+    /// Units of work a tick may spend: [`WORK_PER_TICK`], or at least
     /// [`Self::LEAST_WORK`].
     pub work_per_tick: u32,
-    /// Slower than this, in cells a second, a proxy that slides comes to rest:
-    /// [`Self::STICKS_BELOW_MM_S`].
-    pub sticks_below: f32,
     /// How rough the surface is. The paper's rule knows of no friction.
     pub friction: Friction,
     /// Whether the shortcuts are taken: free as before, and sliding within a patch.
@@ -57,17 +54,12 @@ impl ContactSettings {
     /// Fewer units of work might not be enough for one short piece of a path.
     pub const LEAST_WORK: u32 = 80;
 
-    /// Slower than this a proxy that slides comes to rest, mm/s: less than a hand that means
-    /// to move.
-    pub const STICKS_BELOW_MM_S: f32 = 1.0;
-
-    /// The swept rule in real time at 1 kHz, over cells of a millimetre.
+    /// The swept rule in real time at 1 kHz.
     pub const REAL_TIME: Self = Self {
         rule: Rule::Swept,
         execution: Execution::RealTime,
         rate: TickRate::DEFAULT,
         work_per_tick: WORK_PER_TICK,
-        sticks_below: Self::STICKS_BELOW_MM_S,
         friction: Friction::NONE,
         shortcuts: true,
     };
@@ -93,20 +85,7 @@ impl ContactSettings {
     /// The same at another rate.
     #[must_use]
     pub const fn at_rate(self, rate: TickRate) -> Self {
-        Self {
-            rate,
-            work_per_tick: work_per_tick(rate),
-            ..self
-        }
-    }
-
-    /// The same over cells of another size, device millimetres.
-    #[must_use]
-    pub const fn on_cells_of(self, cell_mm: f32) -> Self {
-        Self {
-            sticks_below: Self::STICKS_BELOW_MM_S / cell_mm,
-            ..self
-        }
+        Self { rate, ..self }
     }
 }
 

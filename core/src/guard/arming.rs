@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::flags::Blockers;
 use super::mode::Mode;
 use crate::rate::TickRate;
+use crate::scalar::smaller;
 
 /// How long something may block an arm command before it is refused, ms.
 const BLOCKED_TIMEOUT_MS: u32 = 50;
@@ -158,9 +159,10 @@ impl Arming {
     /// follows what is asked for.
     pub(super) fn next_gain(&self) -> Option<f32> {
         match self.mode {
-            Mode::Ramping => {
-                Some(self.gain + 1.0 / self.rate.ticks(RAMP_MS) as f32).map(|gain| gain.min(1.0))
-            }
+            Mode::Ramping => Some(smaller(
+                self.gain + 1.0 / self.rate.ticks(RAMP_MS) as f32,
+                1.0,
+            )),
             Mode::Armed => Some(self.gain),
             _ => None,
         }

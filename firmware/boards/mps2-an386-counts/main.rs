@@ -42,7 +42,7 @@ use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use hapterra_core::Vec3;
-use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, work_per_tick};
+use hapterra_core::contact::{Contact, ContactOutput, ContactSettings};
 use hapterra_core::force::MaterialTable;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Sense;
@@ -187,11 +187,7 @@ fn fill_material_tile(buffer: &mut Tile, message: &MaterialTile<'_>, count: usiz
 
 /// A contact that has felt nothing yet.
 fn contact_of(scene: &Scene) -> Contact {
-    let settings = ContactSettings {
-        // What a tick has at 10 kHz: there the instructions count.
-        work_per_tick: work_per_tick(TickRate::new(10_000).unwrap_or_default()),
-        ..ContactSettings::REAL_TIME.with_rule(scene.rule)
-    };
+    let settings = ContactSettings::REAL_TIME.with_rule(scene.rule);
     Contact::new(settings.with_friction(scene.law.friction))
 }
 

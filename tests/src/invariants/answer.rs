@@ -1,6 +1,6 @@
 //! What a tick says, by itself.
 
-use hapterra_core::contact::ContactState;
+use hapterra_core::contact::{ContactState, WORK_PER_TICK};
 use hapterra_core::grid::MAX_CELL;
 
 use super::Invariant;
@@ -25,7 +25,7 @@ impl Judge<'_> {
     }
 
     pub(super) fn is_within_work(&self, seen: &Seen) -> Verdict {
-        if seen.felt.work > self.work {
+        if seen.felt.work > WORK_PER_TICK {
             return self.fail(Invariant::Work, format!("{:?}", seen.felt));
         }
         Ok(())

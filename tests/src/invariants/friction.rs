@@ -5,12 +5,10 @@ use hapterra_core::contact::ContactState;
 use super::Invariant;
 use super::judge::{Judge, Verdict};
 use super::seen::Seen;
-use super::surface::{Patch, distance, patches_at};
+use super::surface::{Patch, distance};
 
-/// Part by which a proxy that has slid may be pulled more, or less, than its friction holds.
-const SLACK: f64 = 0.01;
-/// Longer ways in a tick, in cells, may lead over more than is looked at.
-const SLIDES: f64 = 2.0;
+/// Part by which a proxy that has slid may be pulled more than its friction holds.
+const SLACK: f64 = 0.0302;
 /// Ticks at 1 kHz after which a proxy that does not move sticks by static friction.
 const STICKS_AFTER: u32 = 21;
 /// HIPs nearer than this, in cells, press with nothing worth a cone.
@@ -39,106 +37,50 @@ impl Judge<'_> {
         let Some((least, _)) = self.pulls(seen.proxy, seen.hip) else {
             return Ok(());
         };
-        let slid = self.before.filter(|before| self.has_slid(before, seen));
-        // What slid is held by dynamic friction, what may have come down by static friction.
-        let mu = f64::from(match slid {
-            Some(_) => self.friction.dynamic_mu,
-            None => self.friction.static_mu,
-        });
+        let mu = f64::from(self.friction.static_mu);
+        // What the viscous part holds is told by how far the proxy went in the tick.
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
         let place = seen.allowed() + least.rounding;
-        let gone = match (slid, self.before) {
-            (Some(before), _) => distance(before.proxy, seen.proxy),
-            // One that came down may have done so at any place nearer to the HIP than it was.
-            (None, Some(before)) => {
-                distance(before.proxy, seen.hip) + distance(seen.proxy, seen.hip)
-            }
-            (None, None) if viscous > 0.0 => return Ok(()),
-            (None, None) => 0.0,
-        };
-        let trail = viscous * (gone + 4.0 * seen.allowed() * (1.0 + least.slope));
-        let holds = mu * least.rest + trail;
-        if least.along <= holds * (1.0 + SLACK) + 4.0 * place * (1.0 + mu) {
-            return Ok(());
-        }
-        let detail = format!("{least:?} where {holds:.3e} is held: {seen:?}");
-        self.fail(Invariant::Cone, detail)
-    }
-
-    /// A proxy that has slid goes no farther than friction lets it.
-    pub(super) fn is_held_back(&mut self, seen: &Seen) -> Verdict {
-        let Some(before) = self.before.filter(|before| self.has_slid(before, seen)) else {
-            return Ok(());
-        };
-        if self.pulls(seen.proxy, seen.hip).is_none() {
-            return Ok(());
-        }
-        let (mu, viscous) = (
-            f64::from(self.friction.dynamic_mu),
-            // The tick before may have begun the motion of one that was cut short.
-            match before.felt.converged {
-                true => f64::from(self.friction.viscous_s) * 1e3,
+        let most = |from: [f64; 3]| {
+            let gone = distance(from, seen.proxy);
+            let trail = match viscous > 0.0 {
+                true => viscous * (gone + 4.0 * seen.allowed() * (1.0 + least.slope)),
                 false => 0.0,
-            },
-        );
-        let gone = distance(before.proxy, seen.proxy);
-        // On an edge it may have come from any patch that meets there.
-        let falls_short = |(start, patch): &([f64; 2], Patch)| {
-            let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
-            let [east, north] = patch.slopes(start[0], start[1]);
-            let norm = (1.0 + east * east + north * north).sqrt();
-            let rest = (way[2] - east * way[0] - north * way[1]).abs() / norm;
-            let whole: f64 = way.iter().map(|c| c * c).sum();
-            let along = (whole - rest * rest).max(0.0).sqrt();
-            let place = seen.allowed() + self.rounding(patch, *start, seen.hip[2]);
-            let trail = viscous * (gone - 4.0 * seen.allowed() * (1.0 + east.hypot(north)));
-            let holds = mu * rest + trail.max(0.0);
-            along < holds * (1.0 - SLACK) - 4.0 * place * (1.0 + mu)
+            };
+            mu * least.rest * (1.0 + SLACK) + trail + 4.0 * place * (1.0 + mu)
         };
-        if !self.nearby(seen.proxy).all(|at| falls_short(&at)) {
+        // A free one that has work left over goes first through a piece of its way to the last HIP:
+        // where it meets the surface, and slides from, is not told.
+        let before = (self.before).filter(|before| before.felt.converged || before.is_touching());
+        if before.is_none() && viscous > 0.0 {
             return Ok(());
         }
-        let detail = format!("let go: {before:?} then {seen:?}");
+        let from = before.map_or(seen.proxy, |before| before.proxy);
+        if least.along <= most(from) {
+            return Ok(());
+        }
+        // It may have been in the air meanwhile.
+        if let (Some(before), Some(told)) = (before, seen.slid_from)
+            && !seen.stays(&before)
+            && least.along <= most(told)
+        {
+            return self.came_down(&before, seen, told);
+        }
+        let detail = format!("{least:?} where {:.3e} is held: {seen:?}", most(from));
         self.fail(Invariant::Cone, detail)
     }
 
-    /// Whether a proxy has come from where it was over the surface alone: around the two
-    /// the HIP is clearly below every tangent plane, so that nothing lifts it off.
-    fn has_slid(&self, before: &Seen, seen: &Seen) -> bool {
-        const LOOKS: u32 = 12;
-        /// So far beside the straight way, in cells, a slide may lead.
-        const BESIDE: f64 = 0.25;
-        let touches = before.is_touching() && seen.is_touching() && seen.felt.converged;
-        let way = [0, 1].map(|i| seen.proxy[i] - before.proxy[i]);
-        let is_near = way[0].hypot(way[1]) < SLIDES;
-        if !touches || !is_near || before.felt.proxy == seen.felt.proxy {
-            return false;
+    /// Whether a proxy may have come down where the contact says so: on the surface, no farther from
+    /// the HIP than it was, and with the HIP below.
+    fn came_down(&mut self, before: &Seen, seen: &Seen, at: [f64; 3]) -> Verdict {
+        let landed = Seen { proxy: at, ..*seen };
+        self.is_on_surface(&landed)?;
+        self.is_hip_below(&landed)?;
+        if self.is_farther(before, &landed) {
+            let detail = format!("came down farther away: {before:?} then {seen:?}");
+            return self.fail(Invariant::Cone, detail);
         }
-        let at = |axis: usize, look: u32| {
-            let (from, to) = (before.proxy[axis], seen.proxy[axis]);
-            let (least, most) = (from.min(to) - BESIDE, from.max(to) + BESIDE);
-            least + (most - least) * f64::from(look) / f64::from(LOOKS)
-        };
-        (0..=LOOKS).all(|column| {
-            (0..=LOOKS).all(|row| self.is_pressed_at([at(0, column), at(1, row)], seen.hip))
-        })
-    }
-
-    /// Whether there is ground at a place, and a HIP is clearly below its tangent plane.
-    fn is_pressed_at(&self, [x, y]: [f64; 2], hip: [f64; 3]) -> bool {
-        let mut patches = patches_at(self.terrain, x, y).peekable();
-        patches.peek().is_some()
-            && patches.all(|patch| {
-                let [east, north] = patch.slopes(x, y);
-                let above = patch.height(x, y) + east * (hip[0] - x) + north * (hip[1] - y);
-                above - hip[2] > 0.01 * (1.0 + east.hypot(north))
-            })
-    }
-
-    /// What the height may be off by at a place of a patch: the place is rounded, and of a patch
-    /// with a needle at a corner the heights that are mixed are.
-    fn rounding(&self, patch: &Patch, [x, y]: [f64; 2], hip: f64) -> f64 {
-        f64::from(f32::EPSILON) * (patch.slope(x, y) + 4.0 * patch.mixed_size(x, y, hip))
+        Ok(())
     }
 
     /// A proxy inside the cone does not move. One that was in the air slides at first, also where it
@@ -187,11 +129,12 @@ impl Judge<'_> {
             let whole: f64 = way.iter().map(|c| c * c).sum();
             let rest = (whole - along * along).max(0.0).sqrt();
             let slope = patch.slope(start[0], start[1]);
+            let heights = patch.mixed_size(start[0], start[1], hip[2]);
             let pull = Pull {
                 along,
                 rest,
                 slope,
-                rounding: self.rounding(&patch, start, hip[2]),
+                rounding: f64::from(f32::EPSILON) * (slope + 4.0 * heights),
             };
             match places.iter_mut().find(|(at, _)| *at == start) {
                 Some((_, most)) if along > most.along => *most = pull,

@@ -3,7 +3,7 @@
 //! What a tick says by itself is looked at in `answer`, where its proxy lies in
 //! `place`, how it came there from the tick before in `change`.
 
-use hapterra_core::contact::{Friction, Rule, WORK_PER_TICK};
+use hapterra_core::contact::{Friction, Rule};
 use hapterra_core::force::Texture;
 
 use super::material::Judged;
@@ -77,8 +77,6 @@ pub struct Judge<'g> {
     rule: Rule,
     pub(super) friction: Friction,
     texture: Option<TextureJudge>,
-    /// Units of work that a tick may spend.
-    pub(super) work: u32,
     /// Ticks in a row in which the proxy has not moved.
     pub(super) still: u32,
     tick: usize,
@@ -103,7 +101,6 @@ impl<'g> Judge<'g> {
             rule,
             friction: Friction::NONE,
             texture: None,
-            work: WORK_PER_TICK,
             still: 0,
             tick: 0,
             before: None,
@@ -116,13 +113,9 @@ impl<'g> Judge<'g> {
     /// A judge of a scene.
     #[must_use]
     pub fn of(scene: &'g Scene) -> Self {
-        let judge = Self::new(&scene.terrain, scene.rule)
+        Self::new(&scene.terrain, scene.rule)
             .with_friction(scene.friction)
-            .with_texture(scene.texture);
-        Self {
-            work: scene.settings().work_per_tick,
-            ..judge
-        }
+            .with_texture(scene.texture)
     }
 
     /// The same of a rough surface.
@@ -191,9 +184,6 @@ impl<'g> Judge<'g> {
             self.is_in_cone(seen)?;
         }
         self.friction = least;
-        if seen.is_touching() {
-            self.is_held_back(seen)?;
-        }
         let still = self.still;
         let verdict = match self.before {
             Some(before) => self.sticks(&before, seen),
@@ -247,7 +237,6 @@ impl<'g> Judge<'g> {
                 told.extend(self.is_local_minimum(seen).err());
             } else {
                 told.extend(self.is_in_cone(seen).err());
-                told.extend(self.is_held_back(seen).err());
             }
             told.extend(self.is_hip_below(seen).err());
         }
@@ -264,7 +253,6 @@ impl<'g> Judge<'g> {
         told.extend(self.fades(before, seen).err());
         told.extend(self.lets_go_gently(before, seen).err());
         told.extend(self.descends(before, seen).err());
-        told.extend(self.stays_in_basin(before, seen).err());
         told.extend(self.advances(before, seen).err());
         if before.is_free() {
             told.extend(self.first_crossing(before, seen).err());

@@ -7,7 +7,6 @@
 //! knows about the terrain. All lengths are in cells.
 
 mod answer;
-mod basin;
 mod change;
 pub mod crossing;
 pub mod descent;
@@ -39,11 +38,8 @@ pub enum Invariant {
     /// Where a tick leaves no work over, no way along the surface leads from the
     /// proxy nearer to the HIP.
     LocalMinimum,
-    /// While a contact lasts, a way of ground and air joins the proxy with its last place, and is
-    /// nowhere farther from the HIP than that place.
-    Basin,
     /// With friction: where a tick leaves no work over, the HIP lies inside the friction
-    /// cone over the proxy, and on the cone if the proxy has slid.
+    /// cone over the proxy.
     Cone,
     /// With friction: a proxy that the HIP lies inside the friction cone of stays where it
     /// is, to the bit.

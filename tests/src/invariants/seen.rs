@@ -31,6 +31,8 @@ pub struct Seen {
     pub textured: Option<Vec3>,
     /// The proxy, where the terrain was made.
     pub proxy: [f64; 3],
+    /// Where the contact says that it began to slide for the HIP.
+    pub slid_from: Option<[f64; 3]>,
     /// The force that the product's law gives for it, N, by [`CELLS_MM`].
     pub force_n: [[f64; 3]; CELLS_MM.len()],
 }
@@ -61,6 +63,7 @@ impl Seen {
             shaded: None,
             textured: None,
             proxy: unshifted(&felt.proxy, shift),
+            slid_from: None,
             force_n: CELLS_MM.map(|cell_mm| {
                 let force = LAW.spring().force_n(felt.displacement * cell_mm);
                 force.as_dvec3().to_array()

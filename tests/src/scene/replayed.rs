@@ -27,6 +27,8 @@ pub struct Replied {
     pub hip: [f64; 3],
     /// The proxy there.
     pub proxy: [f64; 3],
+    /// Where the contact says that it began to slide there.
+    pub slid_from: Option<[f64; 3]>,
     /// What the loop told of the tick that answered it.
     pub sample: Sample,
 }
@@ -85,6 +87,7 @@ pub fn replay<const D: usize>(
         let replied = Replied {
             hip: *hip,
             proxy: here(&sample.proxy),
+            slid_from: device.haptics.contact().slid_from().map(here),
             sample,
         };
         look(&replied)?;

@@ -1,10 +1,7 @@
 //! A scene by its seed and number, and the run of it, tick by tick.
 
 use hapterra_core::Vec3;
-use hapterra_core::contact::{
-    Contact, ContactOutput, ContactSettings, Execution, Friction, Rule, WORK_PER_TICK,
-    work_per_tick,
-};
+use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, Execution, Friction, Rule};
 use hapterra_core::force::{Pattern, Shader, Shading, Texture, Texturer};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::rate::TickRate;
@@ -16,14 +13,8 @@ use super::supply::{Buffers, SIDE, SuppliedWindow, Supply};
 use super::terrain::{KINDS, Terrain};
 use crate::chance::Chance;
 use crate::field::point;
-use crate::invariants::seen::{Seen, Shaded};
+use crate::invariants::seen::{Seen, Shaded, unshifted};
 use crate::invariants::{Invariant, Violation};
-
-/// Units of work of a tick at 10 kHz.
-const LEAST_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
-    Some(rate) => work_per_tick(rate),
-    None => WORK_PER_TICK,
-};
 
 /// Ticks that one HIP may be repeated for in lock-step.
 const PATIENCE: usize = 20_000;
@@ -231,7 +222,7 @@ impl Scene {
         }
     }
 
-    /// The settings of its contact.
+    /// What its contact is told.
     #[must_use]
     pub const fn settings(&self) -> ContactSettings {
         ContactSettings {
@@ -239,11 +230,6 @@ impl Scene {
             execution: self.execution,
             friction: self.friction,
             shortcuts: self.shortcuts,
-            // Every second scene has what a tick has at 10 kHz.
-            work_per_tick: match self.seed % 2 {
-                0 => WORK_PER_TICK,
-                _ => LEAST_WORK_PER_TICK,
-            },
             ..ContactSettings::REAL_TIME
         }
     }
@@ -398,6 +384,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
                 is_whole: shader.missing().is_none(),
             }),
             textured: self.texturer.as_ref().map(|_| self.textured),
+            slid_from: (self.contact.slid_from()).map(|point| unshifted(point, self.shift)),
             ..Seen::new(hip, felt, self.shift)
         }
     }

@@ -330,11 +330,12 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
     );
 }
 
-/// On walls a tick has most to do. At 1 kHz its work suffices, also after another view: what was
-/// felt live is what a replay, which does all of a tick at once, gives again but for rounding.
+/// On walls the contact has more to do than a tick has units for, also without another view.
+/// Such a tick goes on in the next one, and a replay does all of it at once: the two differ
+/// there, and as soon as the tick is through they are the same again but for rounding.
 #[test]
-fn on_a_steep_saw_a_replay_gives_what_was_felt() {
-    /// What the digits of a file may leave, mm.
+fn on_a_steep_saw_only_ticks_that_ran_out_of_work_are_felt_otherwise() {
+    /// What is left once a tick is through, mm.
     const ROUNDING_MM: f64 = 1e-5;
     let folder = Folder::new();
     write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));
@@ -349,6 +350,7 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
         let [live_text, again_text] = ["felt.csv", "again.csv"].map(|name| folder.read(name));
         let (live, again) = (rows(&live_text), rows(&again_text));
         assert_eq!(live.len(), again.len());
+        let (mut is_behind, mut held_up, mut worst_n) = (false, 0, 0.0_f64);
         for (live, again) in live.iter().zip(&again) {
             if live["limits"].contains("CLUTCH") || live["limits"].contains("TERRAIN") {
                 continue;
@@ -358,12 +360,30 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
                 (live.expect("a number") - again.expect("a number")).abs()
             };
             let work: u32 = live["work"].parse().expect("units");
-            assert!(work <= WORK_PER_TICK - LARGEST_PIECE, "{work} units");
             let proxy_mm = ["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"].map(apart);
             let off = proxy_mm.into_iter().fold(0.0, f64::max);
-            assert!(off <= ROUNDING_MM, "{off} mm off at {} s", live["t_s"]);
-            assert_eq!(live["state"], again["state"], "at {} s", live["t_s"]);
+            if off > ROUNDING_MM || live["state"] != again["state"] {
+                assert!(
+                    work > WORK_PER_TICK - LARGEST_PIECE,
+                    "{off} mm off at {} s with {work} units",
+                    live["t_s"]
+                );
+                held_up += 1;
+            } else {
+                assert!(off == 0.0 || is_behind, "{off} mm off at {} s", live["t_s"]);
+            }
+            is_behind = off > 0.0;
+            if live["mode"] == "armed" && live["limits"].is_empty() && live["contact"] == "1" {
+                let force_n = ["force_x_n", "force_y_n", "force_z_n"].map(apart);
+                worst_n = worst_n.max(force_n.into_iter().fold(0.0, f64::max));
+            }
         }
+        eprintln!("{held_up} ticks were held up by work; forces differ by up to {worst_n:.3} N");
+        // The terrain is one on which that shows.
+        assert!(
+            (2..200).contains(&held_up) && worst_n > 0.1,
+            "{held_up} {worst_n}"
+        );
     }
 }
 

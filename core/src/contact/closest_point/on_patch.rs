@@ -20,7 +20,7 @@
 use super::on_convex_patch::{Convexity, Place};
 use super::on_ruling::Ruling;
 use super::ruling_search::RulingSearch;
-use crate::contact::budget::{Budget, CONVEX, CREST, RULING};
+use crate::contact::budget::{Budget, CONVEX, RULING};
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
 use crate::scalar::smaller;
@@ -180,27 +180,15 @@ impl PatchSearch {
             }
             _ => return None,
         };
-        loop {
-            while let Some(v) = search.next(patch, hip) {
-                if !budget.has(RULING) {
-                    return None;
-                }
-                budget.spend(RULING);
-                self.evaluations += 1;
-                search.look_at(patch, hip, v);
-            }
-            if search.is_plainly_downhill(patch, hip) {
-                return Some(search.best);
-            }
-            if !budget.has(CREST) {
+        while let Some(v) = search.next(patch, hip) {
+            if !budget.has(RULING) {
                 return None;
             }
-            budget.spend(CREST);
-            match search.crest(patch, hip) {
-                Some(v) => search.begin_again_before(v),
-                None => return Some(search.best),
-            }
+            budget.spend(RULING);
+            self.evaluations += 1;
+            search.look_at(patch, hip, v);
         }
+        Some(search.best)
     }
 
     /// The closest point found so far.

@@ -4,7 +4,7 @@
 use super::beyond_border::{Asking, Onward, Start, to_steepest_patch};
 use super::on_convex_patch::Place;
 use super::on_patch::{Nearest, PatchSearch};
-use crate::contact::budget::{ARRIVAL, Budget, CONVEX, ON_BORDER};
+use crate::contact::budget::{ARRIVAL, Budget, CONVEX, LARGEST_PIECE};
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::HEIGHT_NOISE;
@@ -47,9 +47,8 @@ pub(in crate::contact) enum Leave {
 }
 
 impl Leave {
-    /// Whether it may leave at a point.
     #[inline]
-    pub(in crate::contact) fn is_allowed_at(&self, point: &SurfacePoint) -> bool {
+    fn is_allowed_at(&self, point: &SurfacePoint) -> bool {
         match self {
             Self::Anywhere => true,
             Self::ButAt(place) => !point.is_same_place(place),
@@ -239,7 +238,7 @@ impl Descent {
         let is_known = matches!(self.stage, Stage::ArrivedKnowing);
         let border = self.at.border();
         let on_border = !is_known && border != Side::NONE;
-        let units = if on_border { ON_BORDER } else { ARRIVAL };
+        let units = if on_border { LARGEST_PIECE } else { ARRIVAL };
         if !budget.has(units) {
             return Some(Ended::Suspended);
         }

@@ -2,13 +2,10 @@
 //!
 //! F(v), the squared distance to the ruling at v, is continuously differentiable.
 //! A zero of F′ is found by Newton steps inside a shrinking bracket. Each point
-//! accepted is no farther from the HIP than the one before. That alone does not keep a
-//! search in its basin: a step may pass a crest and come down nearer. So the way
-//! from the first ruling to the last is looked at in the end, and where F rises above
-//! its start on it, the search begins again with the bracket that ends there.
+//! accepted is no farther from the HIP than the one before, so the search goes
+//! downhill from where it begins and cannot jump into a worse basin.
 
 use super::on_ruling::Ruling;
-use crate::contact::straight_way::StraightWay;
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
 
@@ -16,8 +13,6 @@ use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
 /// best point so far is then the answer.
 pub const MAX_EVALUATIONS: u32 = 32;
 
-/// Rulings that are looked at for a crest.
-const CREST_LOOKS: u32 = 32;
 /// Steps downhill after which the end of the patch is tried, where halving the
 /// way to it would take as many as a place has bits.
 const DOWNHILL: u32 = 2;
@@ -28,8 +23,6 @@ const STRIDE: f32 = 8.0;
 /// A search under way.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RulingSearch {
-    /// Where it began.
-    first: Ruling,
     /// The closest ruling so far.
     pub(super) best: Ruling,
     pub(super) evaluations: u32,
@@ -54,7 +47,6 @@ impl RulingSearch {
     pub(super) fn from(patch: &Patch, hip: (f32, f32), v: f32) -> Self {
         let best = Ruling::at(patch, hip, v);
         Self {
-            first: best,
             best,
             evaluations: 1,
             wall: if best.slope < 0.0 { 1.0 } else { 0.0 },
@@ -64,47 +56,6 @@ impl RulingSearch {
             downhill: 0,
             back: f32::NAN,
         }
-    }
-
-    /// Begins again where it began, with a minimum before a ruling that is farther.
-    pub(super) fn begin_again_before(&mut self, v: f32) {
-        let first = self.first;
-        *self = Self {
-            first,
-            best: first,
-            evaluations: 1,
-            wall: v,
-            wall_is_end: false,
-            lazy: 0,
-            stride: STRIDE,
-            downhill: 0,
-            back: f32::NAN,
-        };
-    }
-
-    /// Whether the straight way between the closest points of the first ruling and the best one
-    /// is surely nowhere farther from the HIP than its start. A patch that is not twisted has no crest.
-    pub(super) fn is_plainly_downhill(&self, patch: &Patch, hip: (f32, f32)) -> bool {
-        let (first, best) = (&self.first, &self.best);
-        let way = (best.u - first.u, best.v - first.v);
-        patch.a == 0.0
-            || way == (0.0, 0.0)
-            || StraightWay::new(patch, hip, (first.u, first.v), way).never_rises_above_start(0.0)
-    }
-
-    /// The first ruling on the way from the first to the best that is farther from the HIP than
-    /// the first: in between is a crest.
-    #[inline(never)]
-    pub(super) fn crest(&self, patch: &Patch, hip: (f32, f32)) -> Option<f32> {
-        let (first, to) = (&self.first, self.best.v);
-        let noise = first.noise(patch, hip.0).f;
-        let share = 1.0 / CREST_LOOKS as f32;
-        (1..CREST_LOOKS).find_map(|look| {
-            let v = first.v + (to - first.v) * (look as f32 * share);
-            let ruling = Ruling::at(patch, hip, v);
-            let is_farther = first.gain_on(&ruling) > noise + ruling.noise(patch, hip.0).f;
-            is_farther.then_some(v)
-        })
     }
 
     /// Which ruling to look at next; `None` when the best one is as good as it

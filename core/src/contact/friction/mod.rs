@@ -1,18 +1,18 @@
 //! Friction: a rough surface holds the proxy back (Salisbury et al. 1995; the friction
 //! cone: Harwin and Melder 2002).
 //!
-//! A proxy stays where it is while the HIP pulls it from inside the static friction cone over
-//! the surface there. Outside of it the proxy slides: it follows the pull until dynamic and
-//! viscous friction hold it (`walk`). `cone` measures how the HIP pulls, and what friction holds.
+//! A proxy stays where it is while the way to the HIP lies inside the static friction
+//! cone over the surface there. Outside of it the proxy slides: it goes for a point that
+//! is moved from the HIP back along the surface, by as much as the dynamic friction holds. That
+//! point is all the closest-point search hears of it, so whatever holds for a proxy
+//! without friction holds for its way here too. Only the last bit of that way, in one patch, is
+//! gone without a search. `cone` measures how the HIP pulls.
 
 mod cone;
-mod cone_root;
-mod walk;
 
 use serde::{Deserialize, Serialize};
 
-pub(super) use cone::Cone;
-pub(super) use walk::{Rules, Walk, Walked};
+pub(super) use cone::{Came, Pull, Pulled, border};
 
 /// How rough a surface is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

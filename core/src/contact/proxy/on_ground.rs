@@ -53,7 +53,7 @@ impl Contact {
     /// nearest point that is known: that of the patch which was entered, if the proxy
     /// leaves on the border of it.
     #[inline(never)]
-    pub(super) fn leaves<const D: usize>(
+    fn leaves<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         view: &HipView,
@@ -96,7 +96,8 @@ impl Contact {
         };
         let mut may_follow = self.settings.shortcuts && self.settings.rule == Rule::Swept;
         if converged || is_real_time {
-            let target = boundary_fade::target(window, &hip, point.cell);
+            let over = self.rubbing.as_ref().map_or(&hip, |rubbing| &rubbing.hip);
+            let target = boundary_fade::target(window, over, point.cell);
             may_follow &= target.over_patch;
             if let (Some(tile), false) = (target.missing, is_real_time) {
                 (converged, missing_tile) = (false, Some(tile));

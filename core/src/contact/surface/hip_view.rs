@@ -79,12 +79,6 @@ impl HipView {
         self.patch(corners).height(u, v) < 0.0
     }
 
-    /// Height of the HIP above another place, cells.
-    #[inline]
-    pub(in crate::contact) fn above(&self, other: &GridPoint) -> f32 {
-        other.to(&self.hip).z
-    }
-
     /// The position of a point of the surface, `z` cells above the HIP.
     #[inline]
     pub(in crate::contact) fn position(&self, point: &SurfacePoint, z: f32) -> GridPoint {

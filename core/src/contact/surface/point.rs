@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::contact::tolerance::BORDER;
 use crate::grid::{Cell, GridPoint};
+use crate::scalar::smaller;
 
 /// Toward which neighbours of a patch: −1, 0 or 1 eastward and northward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -105,6 +106,23 @@ impl SurfacePoint {
         Cell::new(self.cell.x + side.east, self.cell.y + side.north)
     }
 
+    /// Where a straight way to a place of a neighbouring patch leaves this one.
+    pub(in crate::contact) fn leaves_toward(&self, to: &Self) -> Option<Self> {
+        let [east, north] = [to.cell.x - self.cell.x, to.cell.y - self.cell.y];
+        if (east, north) == (0, 0) || east.abs().max(north.abs()) > 1 {
+            return None;
+        }
+        let way = (east as f32 + to.u - self.u, north as f32 + to.v - self.v);
+        // The share of the way to the border on this side.
+        let share = |side: i32, from: f32, way: f32| match side {
+            0 => 1.0,
+            1.. => (1.0 - from) / way,
+            _ => from / -way,
+        };
+        let share = smaller(share(east, self.u, way.0), share(north, self.v, way.1));
+        Some(self.moved_to(self.u + share * way.0, self.v + share * way.1))
+    }
+
     /// Another place of the same patch.
     pub(in crate::contact) const fn moved_to(&self, u: f32, v: f32) -> Self {
         Self {
@@ -171,5 +189,29 @@ fn beyond(x: f32, patches: i32) -> f32 {
         0 => x,
         1.. => 0.0,
         _ => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_way_to_a_neighbour_leaves_where_it_crosses_the_border() {
+        let point = |x: i32, y: i32, u: f32, v: f32| SurfacePoint {
+            cell: Cell::new(x, y),
+            u,
+            v,
+        };
+        let from = point(5, 7, 0.75, 0.25);
+        let leaves = |to: SurfacePoint| from.leaves_toward(&to).map(|at| (at.cell, at.u, at.v));
+        let at = |u: f32, v: f32| Some((from.cell, u, v));
+        assert_eq!(leaves(point(5, 7, 0.2, 0.2)), None, "it stays");
+        assert_eq!(leaves(point(7, 7, 0.2, 0.2)), None, "not a neighbour");
+        assert_eq!(leaves(point(6, 7, 0.25, 0.75)), at(1.0, 0.5));
+        assert_eq!(leaves(point(5, 6, 0.25, 0.75)), at(0.5, 0.0));
+        assert_eq!(leaves(point(4, 7, 0.75, 0.25)), at(0.0, 0.25));
+        // Over the neighbour in the east to the one in the south-east.
+        assert_eq!(leaves(point(6, 6, 0.75, 0.75)), at(1.0, 0.125));
     }
 }

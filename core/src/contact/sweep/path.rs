@@ -119,6 +119,14 @@ impl Path {
         }
     }
 
+    /// A path that has just begun, to another end.
+    pub(in crate::contact) fn begin_toward(&mut self, to: GridPoint) {
+        self.ends.clear();
+        // Capacity is DEPTH > 1.
+        let _ = self.ends.push(to);
+        self.clear = None;
+    }
+
     /// How far the path is known to be free.
     pub(in crate::contact) const fn at(&self) -> GridPoint {
         self.at

@@ -306,5 +306,8 @@ fn seen(replied: &Replied, shift: [i32; 3]) -> Seen {
         missing_tile: None,
         work,
     };
-    Seen::new(replied.hip, felt, shift)
+    Seen {
+        slid_from: replied.slid_from,
+        ..Seen::new(replied.hip, felt, shift)
+    }
 }
