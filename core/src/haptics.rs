@@ -130,12 +130,13 @@ pub struct Board {
 /// assert_eq!((sample.state, sample.force_n), (ContactState::Touching, Vec3::Z * 0.5));
 /// # Ok::<(), hapterra_core::tick::RefusedScene>(())
 /// ```
+// In this order: what every tick reads lies within reach of its loads. 66 instructions of 1,245.
+#[repr(C)]
 pub struct Haptics<'t, const D: usize> {
-    pub(crate) feel: Feel,
     pub(crate) guard: Guard,
-    pub(crate) scene: Option<Scene>,
     pub(crate) clutch: Clutch,
     pub(crate) mechanism: Option<Mechanism>,
+    pub(crate) scene: Option<Scene>,
     /// Counts in the zero pose, once they are known.
     pub(crate) zero: Option<[i32; 3]>,
     pub(crate) tick: u32,
@@ -143,6 +144,7 @@ pub struct Haptics<'t, const D: usize> {
     /// Number of the view that is felt.
     pub(crate) view: u8,
     pub(crate) point: Option<Point>,
+    pub(crate) feel: Feel,
     pub(crate) window: Window<'t, D>,
 }
 

@@ -8,7 +8,7 @@ use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Sample;
 
 use super::ground::Felt;
-use super::share::Share;
+use super::share::{Share, Shares};
 use super::swing::{MOST_TURNS, Swing};
 
 /// From the beginning of a tick until its force acts, as a part of it
@@ -53,7 +53,7 @@ pub struct FeltWatch {
     pub clutch_ticks: u64,
     share: Share,
     /// The share of the tick before, where it is known.
-    let_through: Option<f32>,
+    let_through: Option<Shares>,
     swing: Swing,
     /// The most turns back of the tip in a quarter of a second.
     pub most_turns: usize,
@@ -110,7 +110,7 @@ impl FeltWatch {
         let is_asked = !sample.limits.intersects(NOT_AS_ASKED);
         if let Some(share) = share.filter(|_| is_asked && sample.state == ContactState::Touching) {
             let way_mm = sample.hip.to(&sample.proxy) * self.cell_mm;
-            self.is_small(sample, way_mm, share)?;
+            self.is_small(sample, way_mm, share.product())?;
             self.never_pulls(sample, way_mm)?;
         }
         self.gives_nothing(last.as_ref(), sample, before.zip(share), is_calm)
@@ -148,6 +148,16 @@ impl FeltWatch {
         }
     }
 
+    /// The energy that the spring which is let through holds at a depth, mJ: the guard clamps what the
+    /// clutch leaves, and the ramp takes its share of that.
+    fn holds_mj(&self, depth_mm: f32, shares: Shares) -> f32 {
+        if shares.clutch == 0.0 {
+            return 0.0;
+        }
+        let most_n = CLAMP_N / shares.clutch;
+        shares.product() * self.felt.stored_mj(depth_mm, most_n)
+    }
+
     fn shading_mj(&self, deepest_mm: f32) -> f32 {
         let way_mm = self.cell_mm + deepest_mm;
         let gives_mj = SHADED_MJ + SHADED_PART * self.felt.most_n(deepest_mm) * way_mm;
@@ -161,7 +171,7 @@ impl FeltWatch {
         &mut self,
         last: Option<&Sample>,
         sample: &Sample,
-        shares: Option<(f32, f32)>,
+        shares: Option<(Shares, Shares)>,
         is_calm: bool,
     ) -> Result<(), String> {
         let before_n =
@@ -180,12 +190,12 @@ impl FeltWatch {
         // A surface that becomes stiffer is meant to give so much at this depth.
         let is_felt = sample.state == ContactState::Touching;
         let meant_mj = match is_felt {
-            true => (now - before) * self.felt.stored_mj(depth_mm, CLAMP_N),
+            true => self.holds_mj(depth_mm, now) - self.holds_mj(depth_mm, before),
             false => 0.0,
         };
         // A force that the guard lets go by and by belongs to the contact before.
-        let begins =
-            last.force_n == Vec3::ZERO && (last.state == ContactState::Free || before == 0.0);
+        let begins = last.force_n == Vec3::ZERO
+            && (last.state == ContactState::Free || before.product() == 0.0);
         self.contact = match begins {
             true => Some(Touched::default()),
             false => self.contact,

@@ -17,6 +17,23 @@ enum Clutch {
     Closing(f32),
 }
 
+/// The shares of a scene's force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shares {
+    /// The clutch's, before the guard's clamp.
+    pub clutch: f32,
+    /// The ramp's, after it.
+    pub ramp: f32,
+}
+
+impl Shares {
+    /// What is let through of a force that the guard does not clamp.
+    #[must_use]
+    pub fn product(self) -> f32 {
+        self.clutch * self.ramp
+    }
+}
+
 /// Follows ramp and clutch from tick to tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Share {
@@ -32,8 +49,8 @@ impl Share {
     };
 
     /// Takes the sample that follows on `last`; none where samples between are missing. Returns the
-    /// share of the force, where it is known and follows what is asked for.
-    pub fn of(&mut self, last: Option<&Sample>, sample: &Sample) -> Option<f32> {
+    /// shares of the force, where they are known and follow what is asked for.
+    pub fn of(&mut self, last: Option<&Sample>, sample: &Sample) -> Option<Shares> {
         self.ramp = match (last.map(|last| last.mode), sample.mode) {
             (_, Mode::Armed) => Some(1.0),
             (Some(Mode::Confirming), Mode::Ramping) => Some(RAMPS),
@@ -56,6 +73,9 @@ impl Share {
             Clutch::Open => 0.0,
             Clutch::Opening(share) | Clutch::Closing(share) => share.clamp(0.0, 1.0),
         };
-        Some(self.ramp?.min(1.0) * clutch)
+        Some(Shares {
+            clutch,
+            ramp: self.ramp?.min(1.0),
+        })
     }
 }
