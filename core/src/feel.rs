@@ -151,6 +151,10 @@ impl Feel {
             None => Contact::new(settings),
         };
         if let Some(scene) = scene {
+            if scene.materials.is_some() {
+                // A proxy that meets its first rough material has to know where it was before.
+                self.contact.feels_friction(self.materials.some_friction());
+            }
             let law = self
                 .effects
                 .as_ref()
