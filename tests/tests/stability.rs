@@ -24,19 +24,21 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
     let output = stability(&[&words[..], &["--picture", to_png]].concat());
     assert!(output.status.success(), "{}", told(&output));
     for part in [
-        "  1000 Hz, no damping:                limp 0.5 / 0.5",
-        "  1000 Hz, controller:                limp 0.5 / 0.5",
+        "  1000 Hz, no damping:                0.1 of the arm's friction: limp 0.5 / 0.5 / none",
+        "  1000 Hz, no damping:                1 of the arm's friction: limp 0.5 / 0.5 / none",
+        "  1000 Hz, controller:                0.1 of the arm's friction: limp 0.5 / 0.5 / 0.5",
+        "  1000 Hz, controller:                1 of the arm's friction: limp 0.5 / 0.5 / 0.5",
         "  2000 Hz, no damping:",
         "Colgate",
     ] {
         assert!(told(&output).contains(part), "{}", told(&output));
     }
     let rows = std::fs::read_to_string(csv).expect("a table");
-    assert_eq!(rows.lines().count(), 1 + 2 * 2 * 3, "{rows}");
+    assert_eq!(rows.lines().count(), 1 + 2 * 2 * 2 * 3, "{rows}");
     assert!(
         rows.lines()
             .nth(1)
-            .is_some_and(|row| row.starts_with("1000,0.0,false,limp,0.5,80,none,0,0,still,"))
+            .is_some_and(|row| row.starts_with("1000,0.0,false,limp,0.5,80,0.1,none,0,0,still,"))
     );
     let picture = std::fs::read(png).expect("a picture");
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);

@@ -11,14 +11,15 @@ use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Mean;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{Controller, Damping, ForceLaw};
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::Sample;
 use hapterra_core::wire::status::Status;
 use hapterra_tests::emulation::emulated_board;
 
 /// Most that a tick in contact may cost on average: kinematics, contact,
-/// guard, torques, and all the loop does around them.
+/// guard, torques, and all the loop does around them. The controller is off; what it adds is in
+/// `bench/instructions-m4f.csv`.
 const IN_CONTACT: f64 = 2_500.0;
 
 /// The demonstration's samples on the emulated board, and how it is afterwards.
@@ -28,7 +29,14 @@ fn felt() -> Option<(Vec<Sample>, Status)> {
         .raster(400, 400)
         .expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
-    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("placed");
+    let law = ForceLaw {
+        damping: Damping {
+            controller: Controller::Off,
+            ..Damping::NONE
+        },
+        ..ForceLaw::PREMIUM
+    };
+    let placed = PlacedTerrain::new(&terrain, law).expect("placed");
     let mut rig = placed.held_phantom();
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let mut plant = lines.plant;

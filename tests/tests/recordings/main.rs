@@ -151,7 +151,13 @@ fn what_run_recorded_is_felt_again_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, record) = (folder.text("hills.tif"), folder.text("run.csv"));
     let words = ["run", &terrain, "--device", "native", "--record", &record];
-    folder.runs(&[&words[..], &["--seconds", "6", "--cell-mm", "0.9"]].concat());
+    folder.runs(
+        &[
+            &words[..],
+            &["--seconds", "6", "--cell-mm", "0.9", "--passivity", "off"],
+        ]
+        .concat(),
+    );
     is_reproduced(&folder, "hills.tif", "run.csv");
 }
 
@@ -160,7 +166,16 @@ fn what_demo_recorded_is_felt_again_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, out) = (folder.text("hills.tif"), folder.text("demo"));
     // No image is named, and no device: it runs in the program itself, and says so.
-    let told = folder.runs(&["demo", &terrain, "--out", &out, "--seconds", "6"]);
+    let told = folder.runs(&[
+        "demo",
+        &terrain,
+        "--out",
+        &out,
+        "--seconds",
+        "6",
+        "--passivity",
+        "off",
+    ]);
     assert!(told.contains("--device native"), "{told}");
     is_reproduced(&folder, "hills.tif", "demo/hills.csv");
 }
@@ -182,7 +197,16 @@ fn a_place_far_from_the_middle_is_felt_again_with_its_own_cells() {
     let folder = Folder::new();
     write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));
     let [terrain, out] = ["hills.asc", "demo"].map(|name| folder.text(name));
-    let words = ["demo", &terrain, "--out", &out, "--seconds", "4"];
+    let words = [
+        "demo",
+        &terrain,
+        "--out",
+        &out,
+        "--seconds",
+        "4",
+        "--passivity",
+        "off",
+    ];
     folder.runs(&[&words[..], &["--at", "13,56", "--exaggeration", "9"]].concat());
     let text = folder.read("demo/hills.csv");
     assert!(text.contains("# measured_at = [13.0, 56.0]"), "{text}");
