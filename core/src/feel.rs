@@ -181,6 +181,11 @@ impl Feel {
             None => Contact::new(settings),
         };
         if let Some(scene) = scene {
+            if scene.materials.is_some() {
+                // A proxy that meets its first rough material has to know where it was before.
+                let friction = self.materials.some_friction();
+                self.felt.contact.feels_friction(friction);
+            }
             let law = self
                 .felt
                 .effects

@@ -172,4 +172,12 @@ impl MaterialTable {
             ..*law
         }
     }
+
+    /// A friction that one of the materials has; none where all are like ice.
+    #[must_use]
+    pub(crate) fn some_friction(&self) -> Friction {
+        let mut all = self.materials.iter().map(|material| material.friction);
+        all.find(|friction| !friction.is_none())
+            .unwrap_or(Friction::NONE)
+    }
 }

@@ -39,7 +39,7 @@ impl Judge<'_> {
         let Some((least, _)) = self.pulls(seen.proxy, seen.hip) else {
             return Ok(());
         };
-        let slid = self.before.filter(|before| self.has_slid(before, seen));
+        let slid = self.slid_from(seen);
         // What slid is held by dynamic friction, what may have come down by static friction.
         let mu = f64::from(match slid {
             Some(_) => self.friction.dynamic_mu,
@@ -48,7 +48,7 @@ impl Judge<'_> {
         let viscous = f64::from(self.friction.viscous_s) * 1e3;
         let place = seen.allowed() + least.rounding;
         let gone = match (slid, self.before) {
-            (Some(before), _) => distance(before.proxy, seen.proxy),
+            (Some(start), _) => distance(start, seen.proxy),
             // One that came down may have done so at any place nearer to the HIP than it was.
             (None, Some(before)) => {
                 distance(before.proxy, seen.hip) + distance(seen.proxy, seen.hip)
@@ -67,21 +67,15 @@ impl Judge<'_> {
 
     /// A proxy that has slid goes no farther than friction lets it.
     pub(super) fn is_held_back(&mut self, seen: &Seen) -> Verdict {
-        let Some(before) = self.before.filter(|before| self.has_slid(before, seen)) else {
+        let Some(start) = self.slid_from(seen) else {
             return Ok(());
         };
         if self.pulls(seen.proxy, seen.hip).is_none() {
             return Ok(());
         }
-        let (mu, viscous) = (
-            f64::from(self.friction.dynamic_mu),
-            // The tick before may have begun the motion of one that was cut short.
-            match before.felt.converged {
-                true => f64::from(self.friction.viscous_s) * 1e3,
-                false => 0.0,
-            },
-        );
-        let gone = distance(before.proxy, seen.proxy);
+        let mu = f64::from(self.friction.dynamic_mu);
+        let viscous = f64::from(self.friction.viscous_s) * 1e3;
+        let gone = distance(start, seen.proxy);
         // On an edge it may have come from any patch that meets there.
         let falls_short = |(start, patch): &([f64; 2], Patch)| {
             let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
@@ -98,30 +92,42 @@ impl Judge<'_> {
         if !self.nearby(seen.proxy).all(|at| falls_short(&at)) {
             return Ok(());
         }
-        let detail = format!("let go: {before:?} then {seen:?}");
+        let detail = format!("let go: {start:?} then {seen:?}");
         self.fail(Invariant::Cone, detail)
     }
 
-    /// Whether a proxy has come from where it was over the surface alone: around the two
-    /// the HIP is clearly below every tangent plane, so that nothing lifts it off.
-    fn has_slid(&self, before: &Seen, seen: &Seen) -> bool {
+    /// Where the proxy was when its motion for this HIP began: ticks that were cut short go on with
+    /// it.
+    pub(super) fn begun_at(&self, before: &Seen, seen: &Seen) -> [f64; 3] {
+        match before.felt.converged || before.hip != seen.hip {
+            true => before.proxy,
+            false => self.began,
+        }
+    }
+
+    /// Where a proxy has come from over the surface alone: around the two the HIP is clearly below
+    /// every tangent plane, so that nothing lifts it off.
+    fn slid_from(&self, seen: &Seen) -> Option<[f64; 3]> {
         const LOOKS: u32 = 12;
         /// So far beside the straight way, in cells, a slide may lead.
         const BESIDE: f64 = 0.25;
+        let before = self.before?;
+        let start = self.begun_at(&before, seen);
         let touches = before.is_touching() && seen.is_touching() && seen.felt.converged;
-        let way = [0, 1].map(|i| seen.proxy[i] - before.proxy[i]);
+        let way = [0, 1].map(|i| seen.proxy[i] - start[i]);
         let is_near = way[0].hypot(way[1]) < SLIDES;
         if !touches || !is_near || before.felt.proxy == seen.felt.proxy {
-            return false;
+            return None;
         }
         let at = |axis: usize, look: u32| {
-            let (from, to) = (before.proxy[axis], seen.proxy[axis]);
+            let (from, to) = (start[axis], seen.proxy[axis]);
             let (least, most) = (from.min(to) - BESIDE, from.max(to) + BESIDE);
             least + (most - least) * f64::from(look) / f64::from(LOOKS)
         };
-        (0..=LOOKS).all(|column| {
+        let is_pressed = (0..=LOOKS).all(|column| {
             (0..=LOOKS).all(|row| self.is_pressed_at([at(0, column), at(1, row)], seen.hip))
-        })
+        });
+        is_pressed.then_some(start)
     }
 
     /// Whether there is ground at a place, and a HIP is clearly below its tangent plane.

@@ -82,6 +82,8 @@ pub struct Judge<'g> {
     pub(super) still: u32,
     tick: usize,
     pub(super) before: Option<Seen>,
+    /// Where the proxy was when its motion for the last HIP began.
+    pub(super) began: [f64; 3],
     /// What was felt, cells, when the proxy began to let go.
     pub(super) let_go_from: f64,
     /// Ticks in a row in which a proxy in the air came no farther.
@@ -105,6 +107,7 @@ impl<'g> Judge<'g> {
             still: 0,
             tick: 0,
             before: None,
+            began: [0.0; 3],
             let_go_from: 0.0,
             stalled: 0,
             measured: Measured::default(),
@@ -173,9 +176,17 @@ impl<'g> Judge<'g> {
         }
         let stays = self.before.is_some_and(|before| seen.stays(&before));
         self.still = if stays { self.still + 1 } else { 0 };
+        self.remembers(seen);
+        Ok(())
+    }
+
+    fn remembers(&mut self, seen: &Seen) {
+        self.began = match self.before {
+            Some(before) => self.begun_at(&before, seen),
+            None => seen.proxy,
+        };
         self.before = Some(*seen);
         self.tick += 1;
-        Ok(())
     }
 
     /// Judges whether the proxy of the next tick is where a friction lets it be that is known to lie
@@ -222,8 +233,7 @@ impl<'g> Judge<'g> {
         if told.is_empty() {
             self.finite(seen, &mut told);
         }
-        self.before = Some(*seen);
-        self.tick += 1;
+        self.remembers(seen);
         told
     }
 

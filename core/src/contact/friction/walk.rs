@@ -113,11 +113,13 @@ impl Walk {
             if excess.is_held() || self.ways == WAYS {
                 return asked.rests();
             }
-            let newton = match self.inside > ACROSS {
+            let newton = match self.inside > ACROSS && self.inside % 2 == 0 {
                 true => newton(&asked, view),
                 false => None,
             };
-            let end = straight(&asked, excess, newton, view, cone, budget);
+            let Some(end) = straight(&asked, excess, newton, view, cone, budget) else {
+                return Walked::Suspended;
+            };
             if end.at == asked.at || end.at == self.point {
                 return asked.rests();
             }
@@ -159,7 +161,8 @@ struct End {
     rests: bool,
 }
 
-/// Goes one straight way, from where the pull is in excess by so much.
+/// Goes one straight way, from where the pull is in excess by so much; `None` where the budget does
+/// not reach for all of it.
 #[inline(never)]
 fn straight(
     start: &Asked,
@@ -168,7 +171,7 @@ fn straight(
     view: &HipView,
     cone: &Cone,
     budget: &mut Budget,
-) -> End {
+) -> Option<End> {
     let Asked {
         pull, at, patch, ..
     } = start;
@@ -197,7 +200,7 @@ fn straight(
     budget.spend(DIRECTION);
     for _ in 0..LOOKS {
         if !budget.has(LOOK) {
-            break;
+            return None;
         }
         budget.spend(LOOK);
         let t = smaller(root.next(), end);
@@ -208,14 +211,14 @@ fn straight(
         to.rests = !pull.is_above && excess.is_small();
         let is_at_end = excess.is_pulled() && t >= end;
         if pull.is_above || is_at_end || to.rests {
-            return to;
+            return Some(to);
         }
         root.look(t, &excess);
     }
     if let Some(t) = root.so_far() {
         to.at = place(t);
     }
-    to
+    Some(to)
 }
 
 /// The border that a way leads along, and over which it can lead nowhere.

@@ -229,10 +229,10 @@ impl Contact {
         }
     }
 
-    /// The answer of a walk that ends here. It is told from the surface, not as the HIP sees it: a
-    /// proxy that is held has the same bits for every HIP.
+    /// The answer of a proxy on a rough surface. Its place is counted from the surface, not from the
+    /// HIP: a proxy that is held has the same bits for every HIP.
     #[inline(never)]
-    fn is_held_at<const D: usize>(
+    pub(super) fn is_held_at<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,

@@ -99,6 +99,9 @@ impl Contact {
         let Some((point, z)) = on.descent.nearest(window, &view) else {
             return Turn::Ends;
         };
+        if self.rough.is_some() {
+            return self.is_held_at(window, hip, point, came, budget);
+        }
         let felt = Felt {
             point,
             proxy: view.position(&point, z),
