@@ -50,7 +50,7 @@ pub fn run(
     measured.on_materials = judge.judged;
     let twin = chance.below(6);
     match twin {
-        0 if is_near(&replied) => windowed(scene, materials, &replied, buffers, &mut chance)?,
+        0 if fits(&replied) => windowed(scene, materials, &replied, buffers, &mut chance)?,
         1 => shifted(scene, materials, buffers, &mut chance)?,
         // Mirrored walls are elsewhere than the judge of walls takes them to be.
         2 if scene.terrain.kind != Kind::Walls => turned(scene, materials, buffers, &mut chance)?,
@@ -78,13 +78,15 @@ fn replay_in(
     }
 }
 
-/// Whether each path from the proxy to the HIP fits into a window of 6 × 6 tiles.
-fn is_near(replied: &[Replied]) -> bool {
+/// Whether each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each point was
+/// felt with all of its terrain: one that needs more tiles than its window holds is not.
+fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {
         let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
         way(0).max(way(1)) <= 4.0 * LEAP
     };
-    replied.windows(2).all(is_near)
+    let is_whole = |replied: &Replied| replied.sample.missing_tile.is_none();
+    replied.iter().all(is_whole) && replied.windows(2).all(is_near)
 }
 
 /// In another window, whose tiles come at other times: the same bits.

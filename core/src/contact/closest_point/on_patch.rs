@@ -19,7 +19,7 @@
 
 use super::on_convex_patch::{Convexity, Place};
 use super::on_ruling::Ruling;
-use super::ruling_search::{MAX_EVALUATIONS, RulingSearch};
+use super::ruling_search::RulingSearch;
 use crate::contact::budget::{Budget, CONVEX, CREST, RULING, SEARCH};
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
@@ -94,14 +94,17 @@ fn by_rulings(patch: &Patch, hip: (f32, f32), start: (f32, f32), budget: &mut Bu
     let transposed = patch.transposed();
     let mut turned = is_steeper_north(patch, hip, start);
     let (mut best, mut evaluations) = (start, 0);
+    let limit = budget.spent() + SEARCH;
     for pass in 1.. {
-        let (found, looks) = match turned {
-            true => pass_over(&transposed, (hip.1, hip.0), best.0, evaluations, budget),
-            false => pass_over(patch, hip, best.1, evaluations, budget),
+        let (patch, hip, start) = match turned {
+            true => (&transposed, (hip.1, hip.0), best.0),
+            false => (patch, hip, best.1),
         };
+        let mut search = RulingSearch::from(patch, hip, start, evaluations + 1);
+        let found = pass_over(&mut search, patch, hip, budget, limit);
         best = exchanged_if(turned, (found.u, found.v));
-        evaluations = looks;
-        if !wants_turning(&found) || pass == MAX_PASSES || evaluations >= MAX_EVALUATIONS {
+        evaluations = search.evaluations;
+        if !wants_turning(&found) || pass == MAX_PASSES || !has_room(budget, limit) {
             let (u, v) = best;
             let z = found.z;
             let nearest = Nearest {
@@ -117,43 +120,35 @@ fn by_rulings(patch: &Patch, hip: (f32, f32), start: (f32, f32), budget: &mut Bu
     Nearest::NONE
 }
 
-/// One pass with u eliminated, from the ruling at `start`: where it ends, and the evaluations
-/// after it, of which there were some before.
+/// Whether a ruling may be looked at, and a crest be looked for after it.
+const fn has_room(budget: &Budget, limit: u32) -> bool {
+    budget.spent() + RULING + CREST <= limit
+}
+
+/// One pass with u eliminated: where it ends.
 fn pass_over(
+    search: &mut RulingSearch,
     patch: &Patch,
     hip: (f32, f32),
-    start: f32,
-    before: u32,
     budget: &mut Budget,
-) -> (Ruling, u32) {
-    let mut search = RulingSearch::from(patch, hip, start, before + 1);
-    let mut crests = 0;
+    limit: u32,
+) -> Ruling {
+    budget.spend(RULING);
     loop {
-        while let Some(v) = search.next(patch, hip) {
+        while has_room(budget, limit)
+            && let Some(v) = search.next(patch, hip)
+        {
+            budget.spend(RULING);
             search.look_at(patch, hip, v);
         }
-        let crest = match search.is_plainly_downhill(patch, hip) {
-            true => None,
-            false => {
-                budget.spend(CREST);
-                crests += 1;
-                search.crest(patch, hip)
-            }
-        };
-        // As long as the search stays within its units.
-        let may_look_again = search.evaluations + CREST * (crests + 1) <= SEARCH;
-        match crest {
-            Some(v) if search.evaluations < MAX_EVALUATIONS && may_look_again => {
-                search.begin_again_before(v);
-            }
-            Some(_) => {
-                budget.spend(RULING * (search.evaluations - before));
-                return (search.first, search.evaluations);
-            }
-            None => {
-                budget.spend(RULING * (search.evaluations - before));
-                return (search.best, search.evaluations);
-            }
+        if search.is_plainly_downhill(patch, hip) {
+            return search.best;
+        }
+        budget.spend(CREST);
+        match search.crest(patch, hip) {
+            Some(v) if has_room(budget, limit) => search.begin_again_before(v),
+            Some(_) => return search.first,
+            None => return search.best,
         }
     }
 }

@@ -50,10 +50,17 @@ impl Pull {
             pulls: along.length_squared(),
             presses: (way - along).length_squared(),
             is_above: su * way.x + sv * way.y - way.z < 0.0,
-            // Of the coordinates, and of the height that the last place of one of them is worth.
-            rounding: RESOLUTION * (1.0 + way.x.abs() + way.y.abs() + su.abs() + sv.abs()),
+            // Of the coordinates, and of the height that the last place of one of them is worth; on
+            // a border it is exact.
+            rounding: RESOLUTION
+                * (1.0 + way.x.abs() + way.y.abs() + off(su, border.east) + off(sv, border.north)),
         }
     }
+}
+
+/// How far a height is off for each cell that the place is, on this side of a patch.
+fn off(slope: f32, side: i32) -> f32 {
+    if side == 0 { slope.abs() } else { 0.0 }
 }
 
 /// What friction holds.

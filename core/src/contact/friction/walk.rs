@@ -254,7 +254,11 @@ fn ask<const D: usize>(
         is_open: false,
     };
     let ended = match border {
-        Side::NONE if asked.pull.is_above => off(leave, point),
+        Side::NONE if asked.pull.is_above => {
+            // Nothing presses a proxy that may not leave here.
+            asked.pull.presses = 0.0;
+            off(leave, point)
+        }
         Side::NONE => None,
         _ => ask_neighbours(window, view, border, &mut asked, leave, budget),
     };
