@@ -99,13 +99,15 @@ struct BegunPoint {
     before: Felt,
     /// How often it lacked another tile.
     lacked: u32,
+    /// The last tile that it lacked.
+    tile: Option<TileIndex>,
 }
 
 /// How far a replay is with its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Progress {
-    /// The point was felt, with all of its terrain.
-    Done,
+    /// The point was felt: without this tile where it needs more than the window holds.
+    Done(Option<TileIndex>),
     /// Work is left for the next tick.
     GoesOn,
     /// A tile is missing: the point will be felt again, from the state before it.
@@ -136,7 +138,7 @@ impl Feel {
                 before: None,
             },
             point: None,
-            progress: Progress::Done,
+            progress: Progress::Done(None),
             rate,
             latency_s,
             materials: MaterialTable::EMPTY,
@@ -172,7 +174,7 @@ impl Feel {
         let settings = ContactSettings::AT_1_KHZ
             .at_rate(self.rate)
             .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm));
-        (self.point, self.progress) = (None, Progress::Done);
+        (self.point, self.progress) = (None, Progress::Done(None));
         self.felt.contact = match landing {
             Some((hip, stretch)) => {
                 let at = GridPoint::new(hip.cell(), hip.frac() + stretch);
@@ -235,6 +237,7 @@ impl Feel {
         let mut point = self.point.take().unwrap_or_else(|| BegunPoint {
             before: self.felt.clone(),
             lacked: 0,
+            tile: None,
         });
         // Where the HIP is follows from the point.
         let _ = self.felt.contact.land(window);
@@ -251,11 +254,11 @@ impl Feel {
             None => self.force_n(window, scene, hip, &Mover::Points),
         };
         let Some(tile) = missing.or_else(|| self.missing().filter(|_| may_lack)) else {
-            self.progress = Progress::Done;
+            self.progress = Progress::Done(point.tile.filter(|_| !may_lack));
             return force_n;
         };
         point.lacked += u32::from(self.progress != Progress::Lacks(tile));
-        self.progress = Progress::Lacks(tile);
+        (self.progress, point.tile) = (Progress::Lacks(tile), Some(tile));
         self.felt = point.before.clone();
         self.point = Some(point);
         Vec3::ZERO
@@ -343,8 +346,8 @@ impl Feel {
     /// The tile that the last tick lacked, of an arm or a point.
     pub(crate) fn missing_tile(&self) -> Option<TileIndex> {
         match self.progress {
-            Progress::Lacks(tile) => Some(tile),
-            Progress::Done | Progress::GoesOn => {
+            Progress::Lacks(tile) | Progress::Done(Some(tile)) => Some(tile),
+            Progress::Done(None) | Progress::GoesOn => {
                 let missing = self.contact().output().missing_tile;
                 missing.or_else(|| self.missing())
             }
@@ -353,7 +356,7 @@ impl Feel {
 
     /// Returns true if a replay's point was felt.
     pub(crate) fn is_done(&self) -> bool {
-        self.progress == Progress::Done
+        matches!(self.progress, Progress::Done(_))
     }
 
     /// The energy that the ticks have created and that was not taken back yet, mJ.

@@ -45,20 +45,19 @@ pub(super) const ARRIVAL: u32 = 6;
 pub(super) const CONVEX: u32 = 4;
 /// Units for the closest point of one ruling.
 pub(super) const RULING: u32 = 1;
+/// Units for beginning a search by rulings.
+pub(super) const RULINGS: u32 = 8;
 /// Units for looking for a crest between two rulings.
 pub(super) const CREST: u32 = 16;
-/// Units that are left where the closest point of a patch is searched by rulings: it is always
-/// searched in one go, and most of the time takes a tenth of them.
-pub(super) const SEARCH: u32 = 56;
+/// Units of a search by rulings at most. One that the budget ends sooner is begun anew in the next
+/// tick; most take a tenth of them.
+pub(super) const SEARCH: u32 = 64;
 /// Units for the slope of the distance into one patch.
 pub(super) const SLOPE: u32 = 3;
 /// Units for a look at the cone of friction.
 pub(super) const LOOK: u32 = 5;
 /// Units for the direction and the end of a straight way with friction.
 pub(super) const DIRECTION: u32 = 3;
-/// Units that a straight way with friction needs: four patches at its start, and two looks. Without
-/// more it ends at the last place where the proxy was still pulled.
-pub(super) const WAY: u32 = 4 * SLOPE + DIRECTION + 2 * LOOK;
 /// Units for asking whether a box is clear.
 pub(super) const BOX: u32 = 4;
 /// Units for a cell whose patch is intersected with a path.
@@ -68,7 +67,7 @@ pub(super) const INTERSECTION: u32 = 8;
 pub(super) const ON_BORDER: u32 = ARRIVAL + 4 * SLOPE;
 /// Units of the largest piece of work. A tick that put work off has spent more than its budget
 /// less this.
-pub const LARGEST_PIECE: u32 = SEARCH;
+pub const LARGEST_PIECE: u32 = ON_BORDER;
 
 /// What a tick has spent, and what it may; and the terrain that it had to do without.
 #[derive(Debug)]
@@ -109,6 +108,11 @@ impl Budget {
     /// The first tile that was looked for and is not here.
     pub(super) const fn missing(&self) -> Option<TileIndex> {
         self.missing
+    }
+
+    /// Units that may be spent.
+    pub(super) const fn limit(&self) -> u32 {
+        self.limit
     }
 
     /// Units spent so far.

@@ -24,7 +24,7 @@ pub struct ContactSettings {
 
 impl ContactSettings {
     /// Fewer units of work might not be enough for one short piece of a path.
-    pub const LEAST_WORK: u32 = 80;
+    pub const LEAST_WORK: u32 = 86;
 
     /// Slower than this a proxy that slides comes to rest, mm/s: less than a hand that means
     /// to move.

@@ -49,7 +49,7 @@ impl StraightWay {
 
     /// Where it meets the borders eastward or westward, and northward or southward.
     #[inline]
-    fn to_borders(&self) -> (f32, f32) {
+    pub(super) fn to_borders(&self) -> (f32, f32) {
         let along = |from: f32, way: f32| match way {
             way if way > 0.0 => (1.0 - from) / way,
             way if way < 0.0 => from / -way,
@@ -57,13 +57,6 @@ impl StraightWay {
         };
         let ((u, v), (du, dv)) = (self.from, self.way);
         (along(u, du), along(v, dv))
-    }
-
-    /// Where it meets the border of the patch.
-    #[inline]
-    pub(super) fn to_border(&self) -> f32 {
-        let (east, north) = self.to_borders();
-        smaller(east, north)
     }
 
     /// The place at `t`, in the patch.
@@ -74,12 +67,11 @@ impl StraightWay {
         (place(u, du), place(v, dv))
     }
 
-    /// The place where it meets the border, exactly on it.
+    /// The place where it meets the nearer of its [`Self::to_borders`], exactly on it.
     #[inline]
-    pub(super) fn on_border(&self) -> (f32, f32) {
-        let end = self.to_border();
+    pub(super) fn on_border(&self, (to_east, to_north): (f32, f32)) -> (f32, f32) {
+        let end = smaller(to_east, to_north);
         let (mut u, mut v) = self.at(end);
-        let (to_east, to_north) = self.to_borders();
         if to_east <= end {
             u = if self.way.0 > 0.0 { 1.0 } else { 0.0 };
         }

@@ -20,7 +20,7 @@
 use super::on_convex_patch::{Convexity, Place};
 use super::on_ruling::Ruling;
 use super::ruling_search::RulingSearch;
-use crate::contact::budget::{Budget, CONVEX, CREST, RULING, SEARCH};
+use crate::contact::budget::{Budget, CONVEX, CREST, RULING, RULINGS, SEARCH};
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
 use crate::scalar::smaller;
@@ -75,26 +75,36 @@ pub(super) fn search(
     start: (f32, f32),
     budget: &mut Budget,
 ) -> Option<Nearest> {
-    if !budget.has(CONVEX) {
+    if !budget.has(CONVEX + RULINGS) {
         return None;
     }
     budget.spend(CONVEX);
     let found = match closest_if_convex(patch, hip, start) {
         Some(place) => place,
-        None if budget.has(SEARCH) => by_rulings(patch, hip, start, budget),
-        None => return None,
+        None => by_rulings(patch, hip, start, budget)?,
     };
     #[cfg(test)]
     crate::contact::tally::searched(found.evaluations);
     Some(found)
 }
 
+/// The search by rulings; `None` where the budget ends it sooner than [`SEARCH`] would.
 #[inline(never)]
-fn by_rulings(patch: &Patch, hip: (f32, f32), start: (f32, f32), budget: &mut Budget) -> Nearest {
+fn by_rulings(
+    patch: &Patch,
+    hip: (f32, f32),
+    start: (f32, f32),
+    budget: &mut Budget,
+) -> Option<Nearest> {
     let transposed = patch.transposed();
     let mut turned = is_steeper_north(patch, hip, start);
     let (mut best, mut evaluations) = (start, 0);
-    let limit = budget.spent() + SEARCH;
+    let whole = budget.spent().saturating_add(SEARCH);
+    let limit = whole.min(budget.limit());
+    budget.spend(RULINGS);
+    if !has_room(budget, limit) {
+        return None;
+    }
     for pass in 1.. {
         let (patch, hip, start) = match turned {
             true => (&transposed, (hip.1, hip.0), best.0),
@@ -113,11 +123,12 @@ fn by_rulings(patch: &Patch, hip: (f32, f32), start: (f32, f32), budget: &mut Bu
                 z,
                 evaluations,
             };
-            return nearest.snapped(patch, hip);
+            let is_cut_short = limit < whole && !has_room(budget, limit);
+            return (!is_cut_short).then(|| nearest.snapped(patch, hip));
         }
         turned = !turned;
     }
-    Nearest::NONE
+    None
 }
 
 /// Whether a ruling may be looked at, and a crest be looked for after it.

@@ -33,6 +33,15 @@ pub(in crate::contact) struct Pull {
 }
 
 impl Pull {
+    /// None.
+    pub(in crate::contact) const NONE: Self = Self {
+        along: Vec3::ZERO,
+        pulls: 0.0,
+        presses: 0.0,
+        is_above: false,
+        rounding: 0.0,
+    };
+
     /// The pull at a point of one patch, in the directions that do not lead over these borders.
     #[inline(never)]
     pub(in crate::contact) fn in_patch(

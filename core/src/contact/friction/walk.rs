@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::cone::{Cone, Excess, Pull, border};
 use super::cone_root::ConeRoot;
-use crate::contact::budget::{Budget, DIRECTION, LOOK, SLOPE, WAY};
+use crate::contact::budget::{Budget, DIRECTION, LOOK, SLOPE};
 use crate::contact::closest_point::Leave;
 use crate::contact::straight_way::StraightWay;
 use crate::contact::surface::patch::Patch;
@@ -42,7 +42,7 @@ pub(in crate::contact) enum Walked {
     Suspended,
 }
 
-/// What is known at a point: the steepest pull, and the patch that offers it.
+/// What is known where a walk is: the steepest pull, and the patch that offers it.
 struct Asked {
     pull: Pull,
     at: SurfacePoint,
@@ -52,6 +52,16 @@ struct Asked {
 }
 
 impl Asked {
+    /// Nothing is known there yet.
+    fn nothing(at: SurfacePoint) -> Self {
+        Self {
+            pull: Pull::NONE,
+            at,
+            patch: Patch::new([0.0; 4]),
+            is_open: false,
+        }
+    }
+
     const fn rests(&self) -> Walked {
         if self.is_open {
             Walked::Missing
@@ -96,40 +106,43 @@ impl Walk {
         leave: &Leave,
         budget: &mut Budget,
     ) -> Walked {
+        let (mut here, mut is_known) = (Asked::nothing(self.point), false);
         loop {
-            if !budget.has(WAY) {
-                return Walked::Suspended;
-            }
-            let asked = match ask(window, view, &self.point, leave, budget) {
-                Ok(asked) => asked,
-                Err(why) => return why,
+            let ended = match is_known {
+                true => here.goes_on(window, view, leave, budget),
+                false => here.asks(window, view, leave, budget),
             };
-            if let Some(mu) = self.at_rest.take()
-                && asked.pull.pulls <= mu * mu * asked.pull.presses
-            {
-                return asked.rests();
+            if let Some(ended) = ended {
+                return ended;
             }
-            let excess = cone.excess(&asked.pull, view, &asked.patch, &asked.at);
+            if let Some(mu) = self.at_rest.take()
+                && here.pull.pulls <= mu * mu * here.pull.presses
+            {
+                return here.rests();
+            }
+            let excess = cone.excess(&here.pull, view, &here.patch, &here.at);
             if excess.is_held() || self.ways == WAYS {
-                return asked.rests();
+                return here.rests();
             }
             let newton = match self.inside > ACROSS && self.inside % 2 == 0 {
-                true => newton(&asked, view),
+                true => newton(&here, view),
                 false => None,
             };
-            let Some(end) = straight(&asked, excess, newton, view, cone, budget) else {
+            let start = here.at;
+            let Some(end) = straight(&mut here, excess, newton, view, cone, budget) else {
                 return Walked::Suspended;
             };
-            if end.at == asked.at || end.at == self.point {
-                return asked.rests();
+            if here.at == start {
+                return here.rests();
             }
-            let is_inside = border(&end.at) == Side::NONE;
+            let is_inside = border(&here.at) == Side::NONE;
             self.inside = if is_inside { self.inside + 1 } else { 0 };
             self.ways += 1;
-            (self.point, self.held) = (end.at, end.held);
+            (self.point, self.held) = (here.at, end.held);
             if is_inside && end.rests {
                 return Walked::Rests;
             }
+            is_known = end.is_known;
         }
     }
 }
@@ -154,71 +167,79 @@ fn newton(at: &Asked, view: &HipView) -> Option<(f32, f32)> {
 
 /// The end of one straight way.
 struct End {
-    at: SurfacePoint,
     /// What friction holds there, cells.
     held: Vec3,
     /// Whether the cone holds there.
     rests: bool,
+    /// Whether the pull is that of the patch there, and the HIP not above.
+    is_known: bool,
 }
 
-/// Goes one straight way, from where the pull is in excess by so much; `None` where the budget does
-/// not reach for all of it.
+/// Goes one straight way, from where the pull is in excess by so much; `None`, and nobody knows how
+/// far, where the budget does not reach for all of it.
 #[inline(never)]
 fn straight(
-    start: &Asked,
+    here: &mut Asked,
     excess: Excess,
     newton: Option<(f32, f32)>,
     view: &HipView,
     cone: &Cone,
     budget: &mut Budget,
 ) -> Option<End> {
-    let Asked {
-        pull, at, patch, ..
-    } = start;
-    let along = newton.unwrap_or((pull.along.x, pull.along.y));
+    if !budget.has(DIRECTION) {
+        return None;
+    }
+    budget.spend(DIRECTION);
+    let (at, patch) = (here.at, &here.patch);
+    let along = newton.unwrap_or((here.pull.along.x, here.pull.along.y));
     let way = StraightWay::new(patch, view.in_patch(at.cell), (at.u, at.v), along);
     // On a plane the foot of the HIP is at 1.
-    let to_border = way.to_border();
+    let borders = way.to_borders();
+    let to_border = smaller(borders.0, borders.1);
     let reach = smaller(to_border, 2.0);
     let least = way.first_minimum(reach);
     let end = least.unwrap_or(reach);
     let ends_on_border = least.is_none() && reach == to_border;
     let place = |t: f32| {
         let (u, v) = match ends_on_border && t >= end {
-            true => way.on_border(),
+            true => way.on_border(borders),
             false => way.at(t),
         };
         at.moved_to(u, v)
     };
-    let edge = runs_along(border(at), along);
+    let edge = runs_along(border(&at), along);
     let mut root = ConeRoot::new(excess, cone.drag);
-    let mut to = End {
-        at: *at,
-        held: Vec3::ZERO,
-        rests: false,
-    };
-    budget.spend(DIRECTION);
+    let mut held = Vec3::ZERO;
     for _ in 0..LOOKS {
         if !budget.has(LOOK) {
             return None;
         }
         budget.spend(LOOK);
         let t = smaller(root.next(), end);
-        to.at = place(t);
-        let pull = Pull::in_patch(patch, view, &to.at, edge);
-        let excess = cone.excess(&pull, view, patch, &to.at);
-        to.held = pull.along * excess.held_share();
-        to.rests = !pull.is_above && excess.is_small();
+        here.at = place(t);
+        here.pull = Pull::in_patch(patch, view, &here.at, edge);
+        let excess = cone.excess(&here.pull, view, patch, &here.at);
+        held = here.pull.along * excess.held_share();
+        let is_known = !here.pull.is_above;
+        let rests = is_known && excess.is_small();
         let is_at_end = excess.is_pulled() && t >= end;
-        if pull.is_above || is_at_end || to.rests {
-            return Some(to);
+        if !is_known || is_at_end || rests {
+            return Some(End {
+                held,
+                rests,
+                is_known,
+            });
         }
         root.look(t, &excess);
     }
     if let Some(t) = root.so_far() {
-        to.at = place(t);
+        here.at = place(t);
     }
-    Some(to)
+    Some(End {
+        held,
+        rests: false,
+        is_known: false,
+    })
 }
 
 /// The border that a way leads along, and over which it can lead nowhere.
@@ -229,85 +250,122 @@ fn runs_along(border: Side, way: (f32, f32)) -> Side {
     }
 }
 
-/// The steepest pull over the patches that meet at a point.
-fn ask<const D: usize>(
-    window: &Window<'_, D>,
-    view: &HipView,
-    point: &SurfacePoint,
-    leave: &Leave,
-    budget: &mut Budget,
-) -> Result<Asked, Walked> {
-    budget.spend(SLOPE);
-    let border = border(point);
-    let patch = match window.ground(point.cell) {
-        Ground::Patch(corners) => view.patch(&corners),
-        Ground::Hole => return Err(Walked::Off),
-        Ground::Missing => {
-            budget.lacks(point.cell);
-            return Err(Walked::Off);
-        }
-    };
-    let mut asked = Asked {
-        pull: Pull::in_patch(&patch, view, point, border),
-        at: *point,
-        patch,
-        is_open: false,
-    };
-    let ended = match border {
-        Side::NONE if asked.pull.is_above => {
-            // Nothing presses a proxy that may not leave here.
-            asked.pull.presses = 0.0;
-            off(leave, point)
-        }
-        Side::NONE => None,
-        _ => ask_neighbours(window, view, border, &mut asked, leave, budget),
-    };
-    ended.map_or(Ok(asked), Err)
-}
-
-/// Asks the patches across a border, too; how the walk ends, if it does. The path to the HIP leads
-/// off the surface if the HIP is above the patch that the path leads into; at a hole nothing
-/// presses a proxy whose HIP is above all patches.
-#[inline(never)]
-fn ask_neighbours<const D: usize>(
-    window: &Window<'_, D>,
-    view: &HipView,
-    border: Side,
-    best: &mut Asked,
-    leave: &Leave,
-    budget: &mut Budget,
-) -> Option<Walked> {
-    let point = best.at;
-    let into = border.toward(view.in_patch(point.cell), (point.u, point.v));
-    let mut leads_off = best.pull.is_above && into == Side::NONE;
-    let (mut all_above, mut has_hole) = (best.pull.is_above, false);
-    for place in 0..3 {
-        let side = border.neighbour(place);
+impl Asked {
+    /// As [`Self::asks`], at the end of a straight way, whose patch and pull are known: where the pull
+    /// leads over one edge, only the patch beyond is asked. It offers all that this one does along the
+    /// edge.
+    fn goes_on<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        leave: &Leave,
+        budget: &mut Budget,
+    ) -> Option<Walked> {
+        let side = border(&self.at);
         if side == Side::NONE {
-            continue;
+            return None;
+        }
+        let along = self.pull.along;
+        let leads_over = along.x * side.east as f32 + along.y * side.north as f32 > 0.0;
+        let beyond = self.at.across(side);
+        if (side.east == 0 || side.north == 0)
+            && leads_over
+            && budget.has(SLOPE)
+            && let Ground::Patch(corners) = window.ground(beyond.cell)
+        {
+            budget.spend(SLOPE);
+            let point = self.at;
+            let into = side.toward(view.in_patch(point.cell), (point.u, point.v));
+            (self.at, self.patch) = (beyond, view.patch(&corners));
+            self.pull = Pull::in_patch(&self.patch, view, &self.at, side.across(side));
+            return match self.pull.is_above && into == side {
+                true => off(leave, &point),
+                false => None,
+            };
+        }
+        self.asks(window, view, leave, budget)
+    }
+
+    /// Finds the steepest pull over the patches that meet at the point; how the walk ends, if it
+    /// does.
+    #[inline(never)]
+    fn asks<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        leave: &Leave,
+        budget: &mut Budget,
+    ) -> Option<Walked> {
+        if !budget.has(4 * SLOPE) {
+            return Some(Walked::Suspended);
         }
         budget.spend(SLOPE);
-        let at = point.across(side);
-        match window.ground(at.cell) {
-            Ground::Patch(corners) => {
-                let patch = view.patch(&corners);
-                let pull = Pull::in_patch(&patch, view, &at, border.across(side));
-                leads_off |= pull.is_above && side == into;
-                all_above &= pull.is_above;
-                if pull.pulls > best.pull.pulls {
-                    (best.pull, best.at, best.patch) = (pull, at, patch);
-                }
-            }
+        self.is_open = false;
+        self.patch = match window.ground(self.at.cell) {
+            Ground::Patch(corners) => view.patch(&corners),
+            Ground::Hole => return Some(Walked::Off),
             Ground::Missing => {
-                budget.lacks(at.cell);
-                best.is_open = true;
+                budget.lacks(self.at.cell);
+                return Some(Walked::Off);
             }
-            Ground::Hole => has_hole = true,
+        };
+        let border = border(&self.at);
+        self.pull = Pull::in_patch(&self.patch, view, &self.at, border);
+        match border {
+            Side::NONE if self.pull.is_above => {
+                // Nothing presses a proxy that may not leave here.
+                self.pull.presses = 0.0;
+                off(leave, &self.at)
+            }
+            Side::NONE => None,
+            _ => self.asks_neighbours(window, view, border, leave, budget),
         }
     }
-    has_hole |= best.is_open;
-    if leads_off && let Some(walked) = off(leave, &point) {
-        return Some(walked);
+
+    /// Asks the patches across a border, too. The path to the HIP leads off the surface if the HIP is
+    /// above the patch that the path leads into; at a hole nothing presses a proxy whose HIP is above
+    /// all patches.
+    #[inline(never)]
+    fn asks_neighbours<const D: usize>(
+        &mut self,
+        window: &Window<'_, D>,
+        view: &HipView,
+        border: Side,
+        leave: &Leave,
+        budget: &mut Budget,
+    ) -> Option<Walked> {
+        let point = self.at;
+        let into = border.toward(view.in_patch(point.cell), (point.u, point.v));
+        let mut leads_off = self.pull.is_above && into == Side::NONE;
+        let (mut all_above, mut has_hole) = (self.pull.is_above, false);
+        for place in 0..3 {
+            let side = border.neighbour(place);
+            if side == Side::NONE {
+                continue;
+            }
+            budget.spend(SLOPE);
+            let at = point.across(side);
+            match window.ground(at.cell) {
+                Ground::Patch(corners) => {
+                    let patch = view.patch(&corners);
+                    let pull = Pull::in_patch(&patch, view, &at, border.across(side));
+                    leads_off |= pull.is_above && side == into;
+                    all_above &= pull.is_above;
+                    if pull.pulls > self.pull.pulls {
+                        (self.pull, self.at, self.patch) = (pull, at, patch);
+                    }
+                }
+                Ground::Missing => {
+                    budget.lacks(at.cell);
+                    self.is_open = true;
+                }
+                Ground::Hole => has_hole = true,
+            }
+        }
+        has_hole |= self.is_open;
+        if leads_off && let Some(walked) = off(leave, &point) {
+            return Some(walked);
+        }
+        (has_hole && all_above).then_some(Walked::Off)
     }
-    (has_hole && all_above).then_some(Walked::Off)
 }
