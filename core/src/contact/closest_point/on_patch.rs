@@ -106,12 +106,12 @@ fn by_rulings(
         return None;
     }
     for pass in 1.. {
-        let (patch, hip, start) = match turned {
+        let (seen, from, start) = match turned {
             true => (&transposed, (hip.1, hip.0), best.0),
             false => (patch, hip, best.1),
         };
-        let mut search = RulingSearch::from(patch, hip, start, evaluations + 1);
-        let found = pass_over(&mut search, patch, hip, budget, limit);
+        let mut search = RulingSearch::from(seen, from, start, evaluations + 1);
+        let found = pass_over(&mut search, seen, from, budget, limit);
         best = exchanged_if(turned, (found.u, found.v));
         evaluations = search.evaluations;
         if !wants_turning(&found) || pass == MAX_PASSES || !has_room(budget, limit) {
