@@ -47,11 +47,6 @@ pub(super) const CONVEX: u32 = 4;
 pub(super) const RULING: u32 = 1;
 /// Units for beginning a search by rulings.
 pub(super) const RULINGS: u32 = 8;
-/// Units for looking for a crest between two rulings.
-pub(super) const CREST: u32 = 16;
-/// Units of a search by rulings at most. One that the budget ends sooner is begun anew in the next
-/// tick; most take a tenth of them.
-pub(super) const SEARCH: u32 = 64;
 /// Units for the slope of the distance into one patch.
 pub(super) const SLOPE: u32 = 3;
 /// Units for a look at the cone of friction.
@@ -110,9 +105,9 @@ impl Budget {
         self.missing
     }
 
-    /// Units that may be spent.
-    pub(super) const fn limit(&self) -> u32 {
-        self.limit
+    /// Units that are left.
+    pub(super) const fn left(&self) -> u32 {
+        self.limit.saturating_sub(self.spent)
     }
 
     /// Units spent so far.

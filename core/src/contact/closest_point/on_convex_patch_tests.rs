@@ -1,8 +1,7 @@
 //! The convex patch's closest point beside the search by rulings, which shares
 //! nothing with it.
 
-use super::super::on_ruling::Ruling;
-use super::super::ruling_search::RulingSearch;
+use super::super::ruling_search::Rulings;
 use super::*;
 use crate::cases::cases;
 use crate::contact::dice::Dice;
@@ -18,12 +17,15 @@ fn convex(heights: [f32; 4], hip: (f32, f32), from: (f32, f32)) -> Option<(f32, 
 
 /// The closest point as the search by rulings finds it, both ways round.
 fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
-    let search = |patch: &Patch, hip, start| -> Ruling {
-        let mut search = RulingSearch::from(patch, hip, start, 1);
-        while let Some(next) = search.next(patch, hip) {
-            search.look_at(patch, hip, next);
+    let search = |patch: &Patch, hip, start| {
+        let (looked, most) = (0, u32::MAX);
+        Rulings {
+            patch,
+            hip,
+            looked,
+            most,
         }
-        search.best
+        .closest_to(start)
     };
     let found = search(patch, hip, v);
     if !found.at_end {

@@ -19,8 +19,8 @@
 
 use super::on_convex_patch::{Convexity, Place};
 use super::on_ruling::Ruling;
-use super::ruling_search::RulingSearch;
-use crate::contact::budget::{Budget, CONVEX, CREST, RULING, RULINGS, SEARCH};
+use super::ruling_search::{MAX_EVALUATIONS, Rulings};
+use crate::contact::budget::{Budget, CONVEX, RULING, RULINGS};
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
 use crate::scalar::smaller;
@@ -75,7 +75,7 @@ pub(super) fn search(
     start: (f32, f32),
     budget: &mut Budget,
 ) -> Option<Nearest> {
-    if !budget.has(CONVEX + RULINGS) {
+    if !budget.has(CONVEX + RULINGS + RULING) {
         return None;
     }
     budget.spend(CONVEX);
@@ -88,7 +88,7 @@ pub(super) fn search(
     Some(found)
 }
 
-/// The search by rulings; `None` where the budget ends it sooner than [`SEARCH`] would.
+/// The search by rulings; `None` where the budget ends it.
 #[inline(never)]
 fn by_rulings(
     patch: &Patch,
@@ -96,72 +96,42 @@ fn by_rulings(
     start: (f32, f32),
     budget: &mut Budget,
 ) -> Option<Nearest> {
+    budget.spend(RULINGS);
     let transposed = patch.transposed();
     let mut turned = is_steeper_north(patch, hip, start);
-    let (mut best, mut evaluations) = (start, 0);
-    let whole = budget.spent().saturating_add(SEARCH);
-    let limit = whole.min(budget.limit());
-    budget.spend(RULINGS);
-    if !has_room(budget, limit) {
-        return None;
-    }
+    let most = budget.left().min(MAX_EVALUATIONS);
+    let (mut best, mut looked) = (start, 0);
     for pass in 1.. {
         let (seen, from, start) = match turned {
             true => (&transposed, (hip.1, hip.0), best.0),
             false => (patch, hip, best.1),
         };
-        let mut search = RulingSearch::from(seen, from, start, evaluations + 1);
-        let found = pass_over(&mut search, seen, from, budget, limit);
+        let mut rulings = Rulings {
+            patch: seen,
+            hip: from,
+            looked,
+            most,
+        };
+        let found = rulings.closest_to(start);
+        let is_spent = rulings.is_spent();
+        budget.spend(RULING * (rulings.looked - looked));
+        looked = rulings.looked;
+        if is_spent && most < MAX_EVALUATIONS {
+            return None;
+        }
         best = exchanged_if(turned, (found.u, found.v));
-        evaluations = search.evaluations;
-        if !wants_turning(&found) || pass == MAX_PASSES || !has_room(budget, limit) {
-            let (u, v) = best;
-            let z = found.z;
+        if is_spent || !wants_turning(&found) || pass == MAX_PASSES {
             let nearest = Nearest {
-                u,
-                v,
-                z,
-                evaluations,
+                u: best.0,
+                v: best.1,
+                z: found.z,
+                evaluations: looked,
             };
-            let is_cut_short = limit < whole && !has_room(budget, limit);
-            return (!is_cut_short).then(|| nearest.snapped(patch, hip));
+            return Some(nearest.snapped(patch, hip));
         }
         turned = !turned;
     }
     None
-}
-
-/// Whether a ruling may be looked at, and a crest be looked for after it.
-const fn has_room(budget: &Budget, limit: u32) -> bool {
-    budget.spent() + RULING + CREST <= limit
-}
-
-/// One pass with u eliminated: where it ends.
-fn pass_over(
-    search: &mut RulingSearch,
-    patch: &Patch,
-    hip: (f32, f32),
-    budget: &mut Budget,
-    limit: u32,
-) -> Ruling {
-    budget.spend(RULING);
-    loop {
-        while has_room(budget, limit)
-            && let Some(v) = search.next(patch, hip)
-        {
-            budget.spend(RULING);
-            search.look_at(patch, hip, v);
-        }
-        if search.is_plainly_downhill(patch, hip) {
-            return search.best;
-        }
-        budget.spend(CREST);
-        match search.crest(patch, hip) {
-            Some(v) if has_room(budget, limit) => search.begin_again_before(v),
-            Some(_) => return search.first,
-            None => return search.best,
-        }
-    }
 }
 
 /// The closest point of a patch that is convex enough for Newton's method.

@@ -1,200 +1,179 @@
 //! Which ruling of a patch has the point closest to the HIP.
 //!
-//! F(v), the squared distance to the ruling at v, is continuously differentiable.
-//! A zero of F′ is found by Newton steps inside a shrinking bracket. Each point
-//! accepted is no farther from the HIP than the one before. That alone does not keep a
-//! search in its basin: a step may pass a crest and come down nearer. So the way
-//! from the first ruling to the last is looked at in the end, and where F rises above
-//! its start on it, the search begins again with the bracket that ends there.
+//! F(v), the squared distance to the ruling at v, is continuously differentiable. From the
+//! first ruling F falls toward one end of the patch. A minimum lies between two rulings of which
+//! F falls from the one and rises at the other, or is higher there: Newton steps from either,
+//! or the middle, bring them together.
+//!
+//! Newton's method may pass a crest on its way and come down lower. So the rulings from the
+//! first to the last are looked at in the end; where F is above its start there, the search
+//! begins again with that ruling as the far one. Looks are taken at even angles: as a patch
+//! twists, the height of a ruling's line over the HIP along its normal is a sine of the angle,
+//! so a crest is about as wide as an angle, however narrow it is in v.
 
 use super::on_ruling::Ruling;
 use crate::contact::straight_way::StraightWay;
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
+use crate::scalar::{larger, smaller};
 
-/// Rulings looked at for one patch, at most; the best point so far is then the answer.
+/// Rulings looked at in one patch before a search ends with the best one, at most. None of ten
+/// million random searches needed as many.
 pub const MAX_EVALUATIONS: u32 = 40;
+/// Of the angle from one ruling to another, parts of either half that are looked at for a crest.
+const HALF: u8 = 4;
 
-/// Rulings that are looked at for a crest.
-pub(super) const CREST_LOOKS: u32 = 16;
-/// Steps downhill after which the end of the patch is tried, where halving the
-/// way to it would take as many as a place has bits.
-const DOWNHILL: u32 = 2;
-/// Newton steps taken at once where single ones gain little; each time again so
-/// many times as many.
-const STRIDE: f32 = 8.0;
-
-/// A search under way.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RulingSearch {
-    /// Where it began.
-    pub(super) first: Ruling,
-    /// The closest ruling so far.
-    pub(super) best: Ruling,
-    pub(super) evaluations: u32,
-    /// How far the side of `best` reaches on which a minimum lies.
-    wall: f32,
-    /// Whether the wall is an end of the patch not yet evaluated.
-    wall_is_end: bool,
-    /// Newton steps in a row that did not halve the slope.
-    lazy: u32,
-    /// Newton steps to take at once next.
-    stride: f32,
-    /// Steps that led on downhill, without a turn.
-    downhill: u32,
-    /// Newton's step back from the wall, where that has not just been tried; not
-    /// a number otherwise.
-    back: f32,
+/// A patch with a HIP in its coordinates, and the rulings of it that have been looked at.
+pub(super) struct Rulings<'p> {
+    pub(super) patch: &'p Patch,
+    pub(super) hip: (f32, f32),
+    /// How many.
+    pub(super) looked: u32,
+    /// How many there may be.
+    pub(super) most: u32,
 }
 
-impl RulingSearch {
-    /// A search downhill from the ruling at `v`, for a HIP at `hip` in patch
-    /// coordinates.
-    pub(super) fn from(patch: &Patch, hip: (f32, f32), v: f32, evaluations: u32) -> Self {
-        Self::at(Ruling::at(patch, hip, v), evaluations)
+/// The far side of a minimum.
+enum Far {
+    /// An end of the patch, not looked at yet.
+    End(f32),
+    /// A ruling at which F rises, or is higher than at the near one.
+    Ruling(Ruling),
+}
+
+impl Far {
+    const fn v(&self) -> f32 {
+        match self {
+            Self::End(v) => *v,
+            Self::Ruling(ruling) => ruling.v,
+        }
+    }
+}
+
+impl Rulings<'_> {
+    /// The closest ruling of those that are joined with the one at `v` by rulings no farther than it.
+    pub(super) fn closest_to(&mut self, v: f32) -> Ruling {
+        let first = self.look_at(v);
+        let end = if first.slope < 0.0 { 1.0 } else { 0.0 };
+        let mut closest = self.minimum(first, Far::End(end));
+        while !self.is_plainly_downhill(&first, &closest) {
+            match self.crest(&first, &closest) {
+                Some(crest) => closest = self.minimum(first, Far::Ruling(crest)),
+                None => break,
+            }
+        }
+        closest
     }
 
-    const fn at(best: Ruling, evaluations: u32) -> Self {
-        Self {
-            first: best,
-            best,
-            evaluations,
-            wall: if best.slope < 0.0 { 1.0 } else { 0.0 },
-            wall_is_end: true,
-            lazy: 0,
-            stride: STRIDE,
-            downhill: 0,
-            back: f32::NAN,
+    /// Whether as many were looked at as there may be.
+    pub(super) const fn is_spent(&self) -> bool {
+        self.looked >= self.most
+    }
+
+    fn look_at(&mut self, v: f32) -> Ruling {
+        self.looked += 1;
+        Ruling::at(self.patch, self.hip, v)
+    }
+
+    /// The minimum between a ruling, from which F falls, and the far side.
+    fn minimum(&mut self, mut near: Ruling, mut far: Far) -> Ruling {
+        let toward = far.v() - near.v;
+        let (mut newest, mut steps) = (near, [f32::INFINITY; 2]);
+        while !self.is_settled(&newest) {
+            let Some(v) = next(&near, &far, steps[1]).filter(|_| !self.is_spent()) else {
+                return match far {
+                    Far::Ruling(far) if far.gain_on(&near) > 0.0 => far,
+                    _ => near,
+                };
+            };
+            newest = self.look_at(v);
+            steps = [(v - near.v).abs(), steps[0]];
+            if newest.slope * toward < 0.0 && !self.is_farther(&newest, &near) {
+                near = newest;
+            } else {
+                far = Far::Ruling(newest);
+            }
+        }
+        newest
+    }
+
+    /// Whether a ruling is one where F has its minimum, as far as can be told.
+    fn is_settled(&self, ruling: &Ruling) -> bool {
+        let step = ruling.slope / ruling.curvature;
+        ruling.curvature > 0.0
+            && step.abs() < DOUBTFUL_STEP
+            && (step.abs() < LEAST_STEP
+                || ruling.slope.abs() <= ruling.noise(self.patch, self.hip.0).slope)
+    }
+
+    /// Whether a ruling is surely farther from the HIP than another.
+    fn is_farther(&self, ruling: &Ruling, other: &Ruling) -> bool {
+        let more = other.gain_on(ruling);
+        more > 0.0 && {
+            let noise = |ruling: &Ruling| ruling.noise(self.patch, self.hip.0).f;
+            more > noise(ruling) + noise(other)
         }
     }
 
-    /// Begins again where it began, with a minimum before a ruling that is farther.
-    pub(super) fn begin_again_before(&mut self, v: f32) {
-        *self = Self {
-            wall: v,
-            wall_is_end: false,
-            ..Self::at(self.first, self.evaluations)
-        };
-    }
-
-    /// Whether the straight way between the closest points of the first ruling and the best one
-    /// is surely nowhere farther from the HIP than its start. A patch that is not twisted has no crest.
-    pub(super) fn is_plainly_downhill(&self, patch: &Patch, hip: (f32, f32)) -> bool {
-        let (first, best) = (&self.first, &self.best);
-        let way = (best.u - first.u, best.v - first.v);
-        patch.a == 0.0
+    /// Whether the straight way between the closest points of two rulings is surely nowhere
+    /// farther from the HIP than its start. A patch that is not twisted has no crest.
+    fn is_plainly_downhill(&self, from: &Ruling, to: &Ruling) -> bool {
+        let way = (to.u - from.u, to.v - from.v);
+        self.patch.a == 0.0
             || way == (0.0, 0.0)
-            || StraightWay::new(patch, hip, (first.u, first.v), way).never_rises_above_start(0.0)
+            || StraightWay::new(self.patch, self.hip, (from.u, from.v), way)
+                .never_rises_above_start(0.0)
     }
 
-    /// The first ruling on the way from the first to the best that is farther from the HIP than
-    /// the first: in between is a crest.
+    /// The first ruling on the way from one to another that is farther from the HIP than the
+    /// first: in between is a crest.
     #[inline(never)]
-    pub(super) fn crest(&self, patch: &Patch, hip: (f32, f32)) -> Option<f32> {
-        let (first, to) = (&self.first, self.best.v);
-        let noise = first.noise(patch, hip.0).f;
-        let share = 1.0 / CREST_LOOKS as f32;
-        (1..CREST_LOOKS).find_map(|look| {
-            let v = first.v + (to - first.v) * (look as f32 * share);
-            let ruling = Ruling::at(patch, hip, v);
-            let is_farther = first.gain_on(&ruling) > noise + ruling.noise(patch, hip.0).f;
-            is_farther.then_some(v)
+    fn crest(&mut self, from: &Ruling, to: &Ruling) -> Option<Ruling> {
+        let cos = |ruling: &Ruling| 1.0 / libm::sqrtf(1.0 + ruling.along * ruling.along);
+        let (first, last) = (cos(from), cos(to));
+        // Half way between two angles is the sum of their unit vectors.
+        let sum = 2.0 + 2.0 * (1.0 + from.along * to.along) * first * last;
+        let middle = (first + last) / libm::sqrtf(larger(sum, f32::EPSILON));
+        let between = from.v + (to.v - from.v) * (last / (first + last));
+        let halves = [
+            (from.v, first, between, middle),
+            (between, middle, to.v, last),
+        ];
+        (1..2 * HALF).find_map(|look| {
+            let (start, first, end, last) = halves[usize::from(look > HALF)];
+            let gone = (look - HALF * u8::from(look > HALF)) as f32;
+            let (before, after) = ((HALF as f32 - gone) * first, gone * last);
+            let v = start + (end - start) * (after / (before + after));
+            let ruling = (!self.is_spent()).then(|| self.look_at(v))?;
+            self.is_farther(&ruling, from).then_some(ruling)
         })
     }
+}
 
-    /// Which ruling to look at next; `None` when the best one is as good as it
-    /// gets.
-    pub(super) fn next(&self, patch: &Patch, hip: (f32, f32)) -> Option<f32> {
-        let best = &self.best;
-        let room = self.wall - best.v;
-        if room.abs() < RESOLUTION || self.evaluations >= MAX_EVALUATIONS {
-            return None; // at a wall, most often an end of the patch
-        }
-        if best.curvature > 0.0 {
-            let step = -best.slope / best.curvature;
-            if step.abs() < DOUBTFUL_STEP {
-                let noise = best.noise(patch, hip.0).slope;
-                if best.slope.abs() <= noise || step.abs() < LEAST_STEP {
-                    return None;
-                }
-            }
-            let inside = step.abs() < room.abs();
-            if inside && self.lazy < 2 {
-                return Some(best.v + step);
-            }
-            if !inside && self.wall_is_end {
-                return Some(self.wall);
-            }
-            // Not to the middle, which may lie beyond a hill.
-            let stride = self.stride * step;
-            if self.wall_is_end && stride.abs() < 0.5 * room.abs() {
-                return Some(best.v + stride);
-            }
-        }
-        if self.wall_is_end && self.downhill >= DOWNHILL {
-            return Some(self.wall);
-        }
-        // Where the eliminated variable reaches its limit F bends sharply, and
-        // only the far side knows how much.
-        let (behind, before) = (self.back - best.v, self.wall - self.back);
-        if behind * before > 0.0 && before.abs() <= behind.abs() {
-            return Some(self.back);
-        }
-        let middle = best.v + 0.5 * room;
-        (middle != best.v && middle != self.wall).then_some(middle)
+/// The next ruling between two to look at; `None` where there is none.
+///
+/// A Newton step that does not halve the last but one is not taken: the middle is.
+fn next(near: &Ruling, far: &Far, before: f32) -> Option<f32> {
+    let room = far.v() - near.v;
+    if room.abs() < RESOLUTION {
+        return None;
     }
-
-    /// Looks at the ruling at `v`: takes it as the best one if it is no farther
-    /// from the HIP, else as the new wall.
-    pub(super) fn look_at(&mut self, patch: &Patch, hip: (f32, f32), v: f32) {
-        let trial = Ruling::at(patch, hip, v);
-        self.evaluations += 1;
-        if !self.is_nearer(&trial, patch, hip) {
-            self.wall = trial.v;
-            self.wall_is_end = false;
-            self.lazy = 2; // not that Newton step again
-            let known = trial.curvature > 0.0 && self.back.is_nan();
-            self.back = if known {
-                trial.v - trial.slope / trial.curvature
-            } else {
-                f32::NAN
-            };
-            return;
-        }
-        self.count_progress(&trial);
-        let turned = (trial.slope < 0.0) != (self.best.slope < 0.0);
-        if turned {
-            self.wall = self.best.v;
-            self.wall_is_end = false;
-        }
-        self.best = trial;
+    let newton = |ruling: &Ruling| match ruling.curvature > 0.0 {
+        true => -ruling.slope / ruling.curvature,
+        false => f32::INFINITY,
+    };
+    let step = newton(near);
+    if step.abs() < smaller(room.abs(), 0.5 * before) {
+        return Some(near.v + step);
     }
-
-    /// Where rounding hides which is nearer, the slope still tells.
-    fn is_nearer(&self, trial: &Ruling, patch: &Patch, hip: (f32, f32)) -> bool {
-        let best = &self.best;
-        let onward = trial.slope * best.slope > 0.0;
-        let better = onward || trial.slope.abs() <= best.slope.abs();
-        let gain = trial.gain_on(best);
-        if (gain > 0.0) == better {
-            return better;
-        }
-        let noise = 2.0 * trial.noise(patch, hip.0).f;
-        gain > noise || (better && gain >= -noise)
-    }
-
-    /// Counts how fast the slope falls, for the steps to come.
-    fn count_progress(&mut self, trial: &Ruling) {
-        self.back = f32::NAN;
-        self.downhill += 1;
-        if trial.slope.abs() <= 0.5 * self.best.slope.abs() {
-            (self.lazy, self.stride) = (0, STRIDE);
-            return;
-        }
-        self.lazy += 1;
-        if self.lazy > 2 {
-            self.lazy = 0; // the middle has been tried, or a stride
-            self.stride *= STRIDE;
-        }
-    }
+    let far = match far {
+        Far::End(end) => return Some(*end),
+        Far::Ruling(far) => far,
+    };
+    let middle = near.v + 0.5 * room;
+    let back = newton(far);
+    let v = far.v + back;
+    let is_between = (v - near.v) * (far.v - v) > 0.0 && back.abs() < 0.5 * before;
+    let v = if is_between { v } else { middle };
+    (v != near.v && v != far.v).then_some(v)
 }
