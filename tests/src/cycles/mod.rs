@@ -24,7 +24,7 @@ const G474_PERIPHERAL: u64 = 4;
 const H743_PERIPHERAL: u64 = 32;
 /// Cycles that a tick of the H743 waits for its data, at most, with nothing of it in the data cache:
 /// [`H743_DATA_LINES`] lines of the AXI SRAM at [`H743_DATA_LINE`] each. Until then every load and
-/// store waits [`H743_MISS`].
+/// store waits `H743_MISS`.
 pub const H743_DATA: u64 = 16_000;
 /// Lines of it: the loop's own data, four for each patch that a tick may look at, and a queue's. A
 /// test holds the images to them.
