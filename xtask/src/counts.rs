@@ -12,18 +12,17 @@ use crate::setup::{qemu, toolchain};
 /// Counts over all scenes, prints the counts beside their targets, and compares them
 /// with the kept table, or writes that anew. About five minutes on two cores.
 pub(crate) fn counts(write: bool) -> Result<()> {
-    replay(&["--nocapture"], if write { "write" } else { "all" })
+    replay(&["--nocapture"], write)
 }
 
 /// Works out the cycles of a tick on the boards' chips, prints them, and compares them with the
 /// kept table, or writes that anew. About twenty minutes on two cores.
 pub(crate) fn cycles(write: bool) -> Result<()> {
-    let words = ["--nocapture", "--ignored"];
-    replay(&words, if write { "write" } else { "all" })
+    replay(&["--nocapture", "--ignored"], write)
 }
 
 /// Runs the program that replays scenes on the counting image.
-fn replay(words: &[&str], wanted: &str) -> Result<()> {
+fn replay(words: &[&str], write: bool) -> Result<()> {
     let qemu = qemu::ready()?;
     let image = image()?;
     let mut command = cargo();
@@ -35,7 +34,7 @@ fn replay(words: &[&str], wanted: &str) -> Result<()> {
         .args(words)
         .env("HAPTERRA_QEMU", qemu)
         .env(image::COUNTS_VARIABLE, image)
-        .env("HAPTERRA_COUNTS", wanted);
+        .env("HAPTERRA_COUNTS", if write { "write" } else { "all" });
     run(&mut command)
 }
 

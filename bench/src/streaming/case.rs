@@ -48,10 +48,11 @@ impl Case {
         }
     }
 
-    const fn virtual_pace(&self) -> Pace {
+    /// The pace at which this case runs in the place of `pace`.
+    const fn pace(&self, pace: Pace) -> Pace {
         match self.stands_while_reading {
             true => Pace::Standing,
-            false => Pace::Virtual,
+            false => pace,
         }
     }
 
@@ -137,16 +138,13 @@ impl Bench<'_> {
         let began = Instant::now();
         let terrain = terrain(&raster)?;
         let scene = self.hand.scene(&terrain, Late::Underlay)?;
-        let pace = match case.stands_while_reading {
-            true => Pace::Standing,
-            false => Pace::Real,
-        };
+        let pace = case.pace(Pace::Real);
         let mut chain = Chain::new(&terrain, scene, board, self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, &self.ways.straight)?;
         let first_force_ms = ms_since(began);
         let mut row = Row::of_opening(case, self.kb_per_s, &terrain, [open_ms, first_force_ms]);
         if case.reading == Reading::Blocks {
-            chain.set_pace(case.virtual_pace());
+            chain.set_pace(case.pace(Pace::Virtual));
             let (way, speed) = (&self.ways.straight, f64::from(USUAL));
             let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, false)?;
             row.set_tiles(&Motion::of(chain, felt, moved));
@@ -221,7 +219,7 @@ impl Bench<'_> {
         let raster = self.case.open()?;
         let terrain = terrain(&raster)?;
         let scene = self.hand.scene(&terrain, late)?;
-        let pace = self.case.virtual_pace();
+        let pace = self.case.pace(Pace::Virtual);
         let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, way)?;
         let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, to_a_hole)?;
