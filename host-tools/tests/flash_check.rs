@@ -44,3 +44,35 @@ fn an_image_fits_its_board_and_no_other() {
         }
     }
 }
+
+/// What a stranger has left around the working folder is not built, which would run it.
+#[cfg(unix)]
+#[test]
+fn own_checkout_is_built_wherever_it_is_run() {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+    use std::path::Path;
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    let manifest = "[package]\nname = \"hapterra-firmware\"\n";
+    fs::create_dir(here.join("firmware")).expect("made");
+    fs::write(here.join("firmware/Cargo.toml"), manifest).expect("written");
+    // In the place of cargo: it says where it was started, and makes no image.
+    let cargo = here.join("cargo");
+    fs::write(&cargo, "#!/bin/sh\npwd -P >&2\nexit 1\n").expect("written");
+    fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).expect("set");
+    let output = Command::new(env!("CARGO_BIN_EXE_hapterra"))
+        .args(["flash", "--check", "--board", "nucleo-g474re"])
+        .current_dir(here.join("firmware"))
+        .env("CARGO", &cargo)
+        .output()
+        .expect("it runs");
+    let said = told(&output);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
+    let root = fs::canonicalize(root.expect("a folder above")).expect("there");
+    let started = format!("\n{}\n", root.display());
+    assert!(format!("\n{said}").contains(&started), "{started}: {said}");
+    assert!(said.contains("source         "), "{said}");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+}

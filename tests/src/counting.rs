@@ -5,7 +5,7 @@
 //! `cargo xtask counts` build it and name it.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -22,6 +22,7 @@ use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::plant::Sensed;
 use serde::Serialize;
 
+use crate::cycles::{Cycles, trace};
 use crate::emulation::{named, qemu};
 use crate::scene::materials::Materials;
 
@@ -40,6 +41,8 @@ const RECORD: usize = 13;
 pub struct CountingBoard {
     qemu: PathBuf,
     image: PathBuf,
+    /// Whether it follows what it executes, for the cycles.
+    follows: bool,
 }
 
 /// What happens in a replay.
@@ -86,6 +89,8 @@ pub struct Replay<'a> {
 pub struct Counted {
     /// Instructions, the call and the return included.
     pub instructions: u32,
+    /// Cycles on the boards' chips, on a board that [follows](CountingBoard::following); else 0.
+    pub cycles: Cycles,
     /// The number of its [`hapterra_core::contact::ContactState`].
     pub state: u32,
     /// Whether all there was to do was done; on materials, whether the point is answered; fed by
@@ -108,7 +113,27 @@ impl CountingBoard {
             return None;
         };
         let qemu = qemu()?;
-        Some(Self { qemu, image })
+        Some(Self {
+            qemu,
+            image,
+            follows: false,
+        })
+    }
+
+    /// The board that follows each instruction and works out the cycles of each tick, at a
+    /// hundredth of its speed.
+    #[must_use]
+    pub fn following(self) -> Self {
+        Self {
+            follows: true,
+            ..self
+        }
+    }
+
+    /// Returns true if it follows what it executes.
+    #[must_use]
+    pub const fn follows(&self) -> bool {
+        self.follows
     }
 
     /// Steps the contact alone, in real time, through one replay after the other;
@@ -233,20 +258,55 @@ impl CountingBoard {
     }
 
     fn run(&self, folder: &Path) -> Vec<Counted> {
-        let ran = Command::new(&self.qemu)
-            .current_dir(folder)
-            .args(["-M", "mps2-an386", "-nographic", "-monitor", "none"])
-            .args(["-serial", "none"])
+        if self.follows {
+            return self.follow(folder);
+        }
+        let ran = self
+            .emulation(folder)
             .args(["-icount", &format!("shift={SHIFT},sleep=off")])
-            .args(["-semihosting-config", "enable=on,target=native"])
-            .arg("-kernel")
-            .arg(&self.image)
-            .stdin(Stdio::null())
             .output()
             .expect("QEMU starts");
         let said = String::from_utf8_lossy(&ran.stderr);
         assert!(ran.status.success(), "{}: {said}", ran.status);
         records(folder, "ticks.bin")
+    }
+
+    /// The same with cycles. A tick begins where the image's `tick` or `step` does; those without
+    /// a record are the first ones, in which the arm is armed.
+    fn follow(&self, folder: &Path) -> Vec<Counted> {
+        let mut emulation = self
+            .emulation(folder)
+            .args(["-d", "in_asm,exec,nochain"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("QEMU starts");
+        let log = emulation.stderr.take().expect("piped");
+        let log = BufReader::with_capacity(1 << 20, log);
+        let names = ["mps2_an386_counts4tick", "mps2_an386_counts4step"];
+        let cycles = trace::ticks(log, "mps2_an386_counts", &names).expect("a log");
+        let status = emulation.wait().expect("it ends");
+        assert!(status.success(), "{status}");
+        let mut counted = records(folder, "ticks.bin");
+        let unrecorded = cycles.len().checked_sub(counted.len());
+        let cycles = cycles.iter().skip(unrecorded.expect("each record's tick"));
+        for (tick, cycles) in counted.iter_mut().zip(cycles) {
+            (tick.cycles, tick.instructions) = (*cycles, cycles.instructions);
+        }
+        counted
+    }
+
+    fn emulation(&self, folder: &Path) -> Command {
+        let mut command = Command::new(&self.qemu);
+        command
+            .current_dir(folder)
+            .args(["-M", "mps2-an386", "-nographic", "-monitor", "none"])
+            .args(["-serial", "none"])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .arg("-kernel")
+            .arg(&self.image)
+            .stdin(Stdio::null());
+        command
     }
 }
 
@@ -271,6 +331,7 @@ fn counted(words: &[u32]) -> Counted {
     let nanoseconds = u64::from(words[0]) * 40;
     Counted {
         instructions: (nanoseconds as f64 / f64::from(1 << SHIFT)).round() as u32,
+        cycles: Cycles::default(),
         state: words[1],
         converged: words[2] != 0,
         work: words[3],

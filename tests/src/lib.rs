@@ -8,6 +8,7 @@ pub mod campaign;
 pub mod chance;
 pub mod conversation;
 pub mod counting;
+pub mod cycles;
 pub mod emulation;
 pub mod faulty;
 pub mod field;

@@ -24,7 +24,13 @@ fn named(page: &str) -> Vec<&str> {
 #[test]
 fn the_tests_that_the_pages_name_exist() {
     let mut source = String::new();
-    for folder in ["core/src", "firmware/src", "host-tools/src", "tests"] {
+    for folder in [
+        "core/src",
+        "firmware/src",
+        "host-tools/src",
+        "host-tools/tests",
+        "tests",
+    ] {
         read_all(&repository().join(folder), &mut source);
     }
     for (page, least) in [("safety", 60), ("hardware", 45), ("bringup", 12)] {

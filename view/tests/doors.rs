@@ -8,7 +8,7 @@ use std::net::TcpStream;
 use hapterra_view_stream::{Hello, Message};
 
 use common::scene::{batch, greeting, layer, scene};
-use common::{PATIENCE, Viewer, asked};
+use common::{HANG, Viewer, asked};
 
 /// A viewer that shows the beginning of a live session, and its port.
 fn live(options: &str) -> (Viewer, u16) {
@@ -78,7 +78,7 @@ fn foreign_hosts_and_origins_are_refused_and_nothing_can_be_sent() {
 /// Opens the stream, and reads so many bytes of it.
 fn reading(port: u16, bytes: usize) -> TcpStream {
     let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
-    line.set_read_timeout(Some(PATIENCE)).expect("a limit");
+    line.set_read_timeout(Some(HANG)).expect("a limit");
     write!(line, "GET /feed HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n").expect("it is read");
     let mut read = vec![0; bytes];
     line.read_exact(&mut read).expect("the stream");
@@ -164,9 +164,7 @@ fn it_ends_by_itself_where_hapterra_was_killed_and_nobody_ever_looked() {
     let (mut viewer, _) = live("");
     // No end is said. Its own patience is 15 s.
     viewer.hang_up();
-    let began = std::time::Instant::now();
     assert!(viewer.end());
-    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
 }
 
 #[cfg(target_os = "linux")]

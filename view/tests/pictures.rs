@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use common::browser::{Browser, Colours, Page, program};
-use common::{Running, folder, hapterra};
+use common::{HANG, Running, folder, hapterra};
 
 const SIZE: [u32; 2] = [1440, 900];
 const TERRAIN: [f64; 4] = [0.0, 0.05, 0.56, 0.88];
@@ -20,7 +20,6 @@ const MARKS: [[u8; 3]; 2] = [[255, 230, 60], [255, 170, 90]];
 /// Pixels of them: arrow and trace are long enough to be seen.
 const ARROW: usize = 120;
 const TRACE: usize = 400;
-const WITHIN: Duration = Duration::from_secs(300);
 /// What is typed for the zoomed picture.
 const ZOOM: &str = "zoom 1.6\nzoom 1.6\n";
 
@@ -39,7 +38,7 @@ impl Shown {
     fn start(name: &str, typed: &str) -> Self {
         let folder = folder(name);
         let mut demo = hapterra().expect("HAPTERRA names a program");
-        demo.args(["demo", "--device", "native", "--rounds", "30", "--view"])
+        demo.args(["demo", "--device", "native", "--rounds", "900", "--view"])
             .args(["--commands", "-", "--out"])
             .arg(&folder)
             .stdin(Stdio::piped());
@@ -69,7 +68,7 @@ impl Shown {
             if is_right(&colours) {
                 return std::fs::write(path, kept).expect("written");
             }
-            assert!(self.began.elapsed() < WITHIN, "{colours:?}");
+            assert!(self.began.elapsed() < HANG, "{colours:?}");
         }
     }
 

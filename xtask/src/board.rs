@@ -54,6 +54,8 @@ pub(crate) struct Board {
     /// Calls to panics, or on the way to one, under an interrupt, that someone
     /// has proven never to happen.
     pub(crate) known_calls: &'static [Exception],
+    /// The interrupt whose code runs from a memory without wait states, where there is one.
+    pub(crate) fast_interrupt: Option<&'static str>,
     /// Its memories. Bytes outside all of them are an error.
     pub(crate) memories: &'static [Memory],
 }
@@ -141,8 +143,10 @@ const H743_MEMORIES: &[Memory] = &[
     // same program takes 8 % more here than on a Cortex-M4.
     memory("flash", 0x0800_0000, 2048 * KIB, 280 * KIB),
     memory("AXI RAM", 0x2400_0000, 512 * KIB, 512 * KIB),
-    // The stack's own; 32 KiB of it at least.
-    memory("DTCM", 0x2000_0000, 128 * KIB, 96 * KIB),
+    // The constants, and the stack with 96 KiB at least.
+    memory("DTCM", 0x2000_0000, 128 * KIB, 32 * KIB),
+    // The tick's code. The linker script says what stays in flash.
+    memory("ITCM", 0x0000_0000, 64 * KIB, 64 * KIB),
 ];
 
 const fn queue(caller: &'static [&'static str]) -> Exception {
@@ -168,6 +172,7 @@ pub(crate) static BOARDS: [Board; 4] = [
         runs_tasks: &["Executor"],
         known_indirect: EMULATED_WAKERS,
         known_calls: EMULATED_CALLS,
+        fast_interrupt: None,
         memories: &[
             // Zero-wait SRAM in the place of flash: held to what the G474 is held to.
             memory("flash", 0x0000_0000, 4096 * KIB, 256 * KIB),
@@ -181,6 +186,7 @@ pub(crate) static BOARDS: [Board; 4] = [
         runs_tasks: &[],
         known_indirect: WAKERS,
         known_calls: G474_CALLS,
+        fast_interrupt: None,
         memories: &[
             // Half of the flash. At 192 KiB the image had 116 bytes left, and its size decided
             // the shape of functions; the other half stays for a second image.
@@ -196,6 +202,7 @@ pub(crate) static BOARDS: [Board; 4] = [
         runs_tasks: &[],
         known_indirect: WAKERS,
         known_calls: H743_CALLS,
+        fast_interrupt: Some("TIM7"),
         memories: H743_MEMORIES,
     },
     Board {
@@ -205,6 +212,7 @@ pub(crate) static BOARDS: [Board; 4] = [
         runs_tasks: &[],
         known_indirect: WAKERS,
         known_calls: H743_CALLS,
+        fast_interrupt: Some("TIM7"),
         memories: H743_MEMORIES,
     },
 ];

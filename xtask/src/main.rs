@@ -47,6 +47,7 @@ cargo xtask COMMAND
   panics [BOARD]         build the images and prove that no interrupt can panic
   counts [--write]       instructions of a tick on the emulated Cortex-M4F, beside their
                          targets and the kept table; --write: keep these
+  cycles [--write]       cycles of a tick on the boards' chips, at most, beside the kept table
   soak MINUTES [--seed N] [--rough]  random scenes on all cores, every tick judged in f64
   soak --seed N --scene K [--rough]  one of them again
   campaign [--seconds N] [--seed S] [--segment K [--effects]]
@@ -64,7 +65,7 @@ cargo xtask COMMAND
 
   HAPTERRA_TOOLCHAIN=rustup|distribution  builds the images only with this one
   HAPTERRA_QEMU=PATH                      the qemu-system-arm to use
-  HAPTERRA_TICK_HZ=1000..10000            haptic ticks a second of the real boards' images
+  HAPTERRA_TICK_HZ=1000..8000             haptic ticks a second of the real boards' images
 ";
 
 fn main() -> ExitCode {
@@ -98,6 +99,7 @@ fn command() -> Result<ExitCode> {
         "test" => test::test(&test_words(&mut words)?)?,
         "soak" => soak::soak(words.raw_args()?.collect())?,
         "counts" => counts::counts(flag(&mut words, "write")?)?,
+        "cycles" => counts::cycles(flag(&mut words, "write")?)?,
         "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
         "panics" => test::check_panics(&test::images(boards(&mut words)?)?)?,
         "campaign" => campaign::campaign(words.raw_args()?)?,

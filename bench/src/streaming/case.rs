@@ -32,6 +32,8 @@ pub(super) struct Case {
     pub(super) latency_ms: u32,
     /// Halvings in the search for the fastest speed.
     pub(super) halvings: u32,
+    /// Whether virtual time stands still while a block is read.
+    pub(super) stands_while_reading: bool,
 }
 
 impl Case {
@@ -43,6 +45,14 @@ impl Case {
                 Reading::Whole => u64::MAX,
             },
             ..OpenOptions::default()
+        }
+    }
+
+    /// The pace at which this case runs in the place of `pace`.
+    const fn pace(&self, pace: Pace) -> Pace {
+        match self.stands_while_reading {
+            true => Pace::Standing,
+            false => pace,
         }
     }
 
@@ -128,12 +138,13 @@ impl Bench<'_> {
         let began = Instant::now();
         let terrain = terrain(&raster)?;
         let scene = self.hand.scene(&terrain, Late::Underlay)?;
-        let mut chain = Chain::new(&terrain, scene, board, self.bytes_a_tick(), Pace::Real);
+        let pace = case.pace(Pace::Real);
+        let mut chain = Chain::new(&terrain, scene, board, self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, &self.ways.straight)?;
         let first_force_ms = ms_since(began);
         let mut row = Row::of_opening(case, self.kb_per_s, &terrain, [open_ms, first_force_ms]);
         if case.reading == Reading::Blocks {
-            chain.set_pace(Pace::Virtual);
+            chain.set_pace(case.pace(Pace::Virtual));
             let (way, speed) = (&self.ways.straight, f64::from(USUAL));
             let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, false)?;
             row.set_tiles(&Motion::of(chain, felt, moved));
@@ -208,7 +219,8 @@ impl Bench<'_> {
         let raster = self.case.open()?;
         let terrain = terrain(&raster)?;
         let scene = self.hand.scene(&terrain, late)?;
-        let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), Pace::Virtual);
+        let pace = self.case.pace(Pace::Virtual);
+        let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, way)?;
         let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, to_a_hole)?;
         Ok(Motion::of(chain, felt, moved))

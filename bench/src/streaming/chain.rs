@@ -26,6 +26,8 @@ use super::line::Line;
 const WINDOW: usize = 16;
 /// A tick.
 const TICK: Duration = Duration::from_millis(1);
+/// Between two looks at whether a block is read.
+const LOOK: Duration = Duration::from_micros(100);
 
 /// A device in this program's memory, which it keeps to its end.
 pub(super) type Board = Device<StoppedClock, WINDOW>;
@@ -58,6 +60,9 @@ pub(super) enum Pace {
     Real,
     /// As fast as this machine goes, but while something is on its way from elsewhere.
     Virtual,
+    /// As fast as this machine goes; it stands still while a block is read. What is counted does
+    /// not depend on the machine.
+    Standing,
 }
 
 /// The host, its line to a device, and the device.
@@ -199,7 +204,11 @@ impl<'t> Chain<'t> {
     fn wait(&mut self) {
         let not_yet = self.terrain.raster().not_yet();
         let awaits = std::mem::replace(&mut self.not_yet, not_yet) != not_yet;
-        if awaits || self.pace == Pace::Real {
+        if self.pace == Pace::Standing {
+            while self.terrain.raster().is_reading() {
+                std::thread::sleep(LOOK);
+            }
+        } else if awaits || self.pace == Pace::Real {
             std::thread::sleep(TICK.saturating_sub(self.began.elapsed()));
         }
         self.began = Instant::now();

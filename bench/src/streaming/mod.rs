@@ -53,4 +53,7 @@ pub struct Plan {
     pub latencies_ms: Vec<u32>,
     /// Halvings in the search for the fastest speed: six tell it to 9 %, four to 40 %.
     pub halvings: u32,
+    /// Whether virtual time stands still while a block of a file is read, so that what is counted
+    /// does not depend on the machine. A web server's latency goes on.
+    pub stands_while_reading: bool,
 }

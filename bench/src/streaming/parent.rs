@@ -123,6 +123,7 @@ impl Subject<'_> {
             reading,
             latency_ms,
             halvings: self.plan.halvings,
+            stands_while_reading: self.plan.stands_while_reading && latency_ms == 0,
         };
         let on_disk = path.display().to_string();
         if samples <= MOST_WHOLE && !is_whole {
@@ -292,6 +293,7 @@ mod tests {
             reading: Reading::Whole,
             latency_ms: 20,
             halvings: 7,
+            stands_while_reading: true,
         };
         let line = written(&case).expect("a line");
         assert_eq!(read::<Case>(&line).expect("a case"), case);

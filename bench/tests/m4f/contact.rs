@@ -110,6 +110,7 @@ fn row(
     let counted = counted.filter(|(step, _)| step.counts);
     let ticks = counted.map(|(_, (index, tick))| Tick {
         instructions: tick.instructions,
+        cycles: tick.cycles,
         units: tick.work,
         scene: None,
         index,

@@ -2,6 +2,7 @@
 
 pub(crate) mod chain;
 pub(crate) mod contact;
+pub(crate) mod cycles;
 pub(crate) mod soak;
 pub(crate) mod table;
 pub(crate) mod tiles;

@@ -10,7 +10,7 @@ use hapterra_tests::scene::recorded::Recorded;
 use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::terrain::{KINDS, Kind};
 
-use super::table::{Row, Target, Tick};
+use super::table::{Row, Table, Target, Tick};
 
 /// The scenes are those of this seed, from number 0.
 const SEED: u64 = 2026;
@@ -22,6 +22,8 @@ pub(crate) const ALL: u64 = 10_000;
 pub(crate) const PART: u64 = 1000;
 /// Scenes that the emulated processor replays at once.
 const BATCH: u64 = 20;
+/// Scenes beside the costliest ones.
+const SOME: u64 = 24;
 /// Scenes of every kind of terrain at least.
 const OF_EACH: usize = 30;
 /// Most instructions that a tick of the contact may take on any scene: with the
@@ -57,6 +59,27 @@ pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
     rows
 }
 
+/// Rows over the scenes whose costliest ticks the kept table names, and some more: for what takes
+/// too long to be done with all of them.
+pub(crate) fn costliest_rows(board: &CountingBoard) -> Vec<Row> {
+    let [smooth, rough]: [Vec<u64>; 2] = Table::kept_scenes();
+    let row = |name: &str, named: Vec<u64>, surface| {
+        let numbers: Vec<u64> = named.into_iter().chain(0..SOME).collect();
+        let batches = numbers.chunks(BATCH as usize);
+        let counted = batches.flat_map(|batch| count_batch(board, batch, surface));
+        let ticks = counted.flat_map(|scene| scene.ticks);
+        Row::new(name, Target::default(), ticks.collect())
+    };
+    vec![
+        row("soak, costliest scenes", smooth, Surface::Smooth),
+        row(
+            "soak, rough surfaces, costliest scene",
+            rough,
+            Surface::Rough,
+        ),
+    ]
+}
+
 /// A row over scenes with friction, a fourth as many.
 fn rough_row(board: &CountingBoard, scenes: u64) -> Row {
     let counted = count(board, scenes, Surface::Rough);
@@ -82,7 +105,8 @@ fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedSce
         if first >= scenes {
             return;
         }
-        let batch = count_batch(board, first..scenes.min(first + BATCH), surface);
+        let numbers: Vec<u64> = (first..scenes.min(first + BATCH)).collect();
+        let batch = count_batch(board, &numbers, surface);
         counted.lock().expect("no panic inside").extend(batch);
     };
     thread::scope(|scope| {
@@ -96,16 +120,12 @@ fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedSce
 
 /// Replays so many scenes in one run of the emulated processor, which must answer
 /// as this one does.
-fn count_batch(
-    board: &CountingBoard,
-    numbers: std::ops::Range<u64>,
-    surface: Surface,
-) -> Vec<CountedScene> {
+fn count_batch(board: &CountingBoard, numbers: &[u64], surface: Surface) -> Vec<CountedScene> {
     let random = |number| Recorded::random(SEED, number, surface);
-    let recorded: Vec<_> = numbers.clone().map(random).collect();
+    let recorded: Vec<_> = numbers.iter().copied().map(random).collect();
     let replays: Vec<_> = recorded.iter().map(Recorded::replay).collect();
     let there = board.contact(&replays);
-    let scenes = numbers.zip(&recorded).zip(&there);
+    let scenes = numbers.iter().copied().zip(&recorded).zip(&there);
     scenes
         .map(|((number, recorded), there)| {
             let kind = recorded.scene.terrain.kind;
@@ -113,6 +133,7 @@ fn count_batch(
             assert_eq!(differs, None, "seed {SEED}, scene {number}, {kind:?}: tick");
             let ticks = there.iter().enumerate().map(|(index, tick)| Tick {
                 instructions: tick.instructions,
+                cycles: tick.cycles,
                 units: tick.work,
                 scene: Some(number),
                 index,

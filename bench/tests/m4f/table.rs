@@ -3,6 +3,7 @@
 use std::fmt;
 
 use hapterra_tests::counting::Counted;
+use hapterra_tests::cycles::Cycles;
 
 /// The kept table.
 const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/instructions-m4f.csv");
@@ -13,6 +14,8 @@ const LEEWAY: f64 = 10.0;
 /// What a unit of work costs is told over ticks that spent at least so many: in
 /// shorter ones what every tick takes would count as much as the units.
 const UNITS: u32 = 8;
+/// The shares of the ticks that take no more.
+const SHARES: [f64; 3] = [0.5, 0.99, 1.0];
 /// The columns, after the state's name.
 const COUNTS: [&str; 3] = ["median", "p99", "max"];
 const COLUMNS: [&str; 12] = [
@@ -46,6 +49,8 @@ pub(crate) struct Target {
 pub(crate) struct Tick {
     /// Instructions, the call and the return included.
     pub(crate) instructions: u32,
+    /// Cycles on the boards' chips, where they are worked out.
+    pub(crate) cycles: Cycles,
     /// Units of work; 0 where more than the contact was counted.
     pub(crate) units: u32,
     /// The number of its scene in the soak.
@@ -57,14 +62,16 @@ pub(crate) struct Tick {
 /// One state's ticks.
 #[derive(Clone, Debug)]
 pub(crate) struct Row {
-    state: String,
+    pub(crate) state: String,
     /// Instructions: median, 99th percentile, most.
-    counts: [u32; 3],
+    pub(crate) counts: [u32; 3],
     /// What they were meant to be.
     target: [Option<u32>; 3],
     /// The ticks with the least and the most instructions a unit of work.
     per_unit: Option<[Tick; 2]>,
     worst: Tick,
+    /// Cycles where they are worked out: of an STM32G474 and of an STM32H743, the same three each.
+    pub(crate) cycles: [[u32; 3]; 2],
     /// The kept row is over more ticks: only its largest count binds this one.
     is_part: bool,
 }
@@ -74,6 +81,7 @@ impl Tick {
     pub(crate) fn of(counted: &Counted, index: usize) -> Self {
         Self {
             instructions: counted.instructions,
+            cycles: counted.cycles,
             units: 0,
             scene: None,
             index,
@@ -92,6 +100,7 @@ impl fmt::Display for Tick {
             units,
             scene,
             index,
+            ..
         } = self;
         let scene = scene
             .map(|scene| format!("scene {scene}, "))
@@ -115,14 +124,20 @@ impl Row {
         let by_cost = |a: &Tick, b: &Tick| a.per_unit().total_cmp(&b.per_unit());
         let (least, most) = (long().min_by(by_cost), long().max_by(by_cost));
         let per_unit = least.zip(most).map(|(least, most)| [least, most]);
+        let of_cycles = |of: fn(&Cycles) -> u32| {
+            let mut cycles: Vec<u32> = ticks.iter().map(|tick| of(&tick.cycles)).collect();
+            cycles.sort_unstable();
+            SHARES.map(|share| *at(&cycles, share))
+        };
+        let cycles = [of_cycles(|c| c.g474), of_cycles(|c| c.h743)];
         ticks.sort_unstable_by_key(|tick| (tick.instructions, tick.scene, tick.index));
-        let at = |share: f64| ticks[((ticks.len() - 1) as f64 * share).round() as usize];
         Self {
             state: state.to_owned(),
-            counts: [0.5, 0.99, 1.0].map(|share| at(share).instructions),
+            counts: SHARES.map(|share| at(&ticks, share).instructions),
+            cycles,
             target: [target.median, target.p99, target.max],
             per_unit,
-            worst: at(1.0),
+            worst: *at(&ticks, 1.0),
             is_part: false,
         }
     }
@@ -176,6 +191,11 @@ impl fmt::Display for Row {
     }
 }
 
+/// The one that such a share of what is sorted does not exceed.
+fn at<T>(sorted: &[T], share: f64) -> &T {
+    &sorted[((sorted.len() - 1) as f64 * share).round() as usize]
+}
+
 /// The kept table: by state, its median, 99th percentile and largest count.
 pub(crate) struct Table(Vec<(String, [f64; 3])>);
 
@@ -189,6 +209,18 @@ impl Table {
             (row[0].to_owned(), [count(1), count(2), count(3)])
         });
         Self(rows.collect())
+    }
+
+    /// The scenes of the stress test with the costliest ticks: without friction, and with.
+    pub(crate) fn kept_scenes() -> [Vec<u64>; 2] {
+        let mut table = csv::Reader::from_path(TABLE).expect("the table is there");
+        let rows = table.records().map(|row| row.expect("a row"));
+        let named = rows.filter_map(|row| {
+            let scene = row[10].parse::<u64>().ok()?;
+            Some((row[0].contains("rough surfaces"), scene))
+        });
+        let (rough, smooth): (Vec<_>, Vec<_>) = named.partition(|(is_rough, _)| *is_rough);
+        [smooth, rough].map(|named| named.into_iter().map(|(_, scene)| scene).collect())
     }
 
     /// Writes it anew.

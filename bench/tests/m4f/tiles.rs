@@ -109,6 +109,7 @@ fn row<'b>(
         assert!(tile.converged == are_tiles, "{name}");
         Tick {
             instructions: tile.instructions,
+            cycles: tile.cycles,
             units: 0,
             scene: None,
             index,

@@ -1,5 +1,6 @@
 //! The STM32G474RE: its clocks, pins and what is particular to it.
 
+use core::arch::global_asm;
 use core::mem::MaybeUninit;
 
 use cortex_m::Peripherals as Core;
@@ -260,4 +261,22 @@ pub(crate) fn enable_pin_differs() -> bool {
 #[inline(always)]
 pub(crate) fn amplifiers_off() {
     pac::GPIOB.bsrr().write(|w| w.set_br(0, true));
+}
+
+// Nothing is copied before the program starts but what the start-up code copies.
+global_asm!(
+    ".section .text.hapterra_fill_nothing, \"ax\", %progbits",
+    ".thumb",
+    ".global hapterra_fill_nothing",
+    ".type hapterra_fill_nothing, %function",
+    ".thumb_func",
+    "hapterra_fill_nothing:",
+    "bx lr",
+    ".size hapterra_fill_nothing, . - hapterra_fill_nothing",
+);
+
+unsafe extern "C" {
+    /// Called by the start-up code before memory is initialised.
+    #[link_name = "hapterra_fill_nothing"]
+    pub(crate) fn fill_memories();
 }

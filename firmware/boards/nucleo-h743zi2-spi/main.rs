@@ -34,6 +34,8 @@ mod revision;
 #[path = "../common/stm32/mod.rs"]
 mod stm32;
 mod stop;
+#[path = "../nucleo-h743zi2/tick_memory.rs"]
+mod tick_memory;
 #[path = "../nucleo-h743zi2/usb.rs"]
 mod usb;
 

@@ -28,6 +28,7 @@ use crate::stm32::priorities::OTHERS;
 use crate::stm32::start::FULL_SCALE_A;
 use crate::stm32::{failure, parts, usb_interrupt};
 use crate::stop::{EmergencyStop, take_stop};
+pub(crate) use crate::tick_memory::fill as fill_memories;
 
 /// Tiles along the side of the window.
 pub(crate) const WINDOW: usize = 8;

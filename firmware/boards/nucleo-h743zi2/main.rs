@@ -31,6 +31,7 @@ mod revision;
 #[path = "../common/stm32/mod.rs"]
 mod stm32;
 mod stop;
+mod tick_memory;
 mod usb;
 
 use embassy_stm32::interrupt;

@@ -78,15 +78,3 @@ impl Checkout {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn own_checkout_is_that_of_this_source() {
-        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let own = Checkout::own().expect("this is one");
-        assert_eq!(Some(own.root()), here.parent());
-    }
-}

@@ -44,8 +44,9 @@ impl Memories {
         page_bytes: 128 * KIB,
         word_bytes: 32,
         image_bytes: 1792 * KIB,
-        // DTCM, AXI SRAM, SRAM1 to 3, SRAM4.
+        // ITCM, DTCM, AXI SRAM, SRAM1 to 3, SRAM4.
         ram: &[
+            (0x0000_0000, 64 * KIB),
             (0x2000_0000, 128 * KIB),
             (0x2400_0000, 512 * KIB),
             (0x3000_0000, 288 * KIB),

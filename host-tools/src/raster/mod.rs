@@ -215,6 +215,15 @@ impl Raster {
         }
     }
 
+    /// Whether a block of the file is being read in the background, or is going to be
+    /// ([`Raster::stop_waiting`]). Coarse samples that are made of the file do not count.
+    pub fn is_reading(&self) -> bool {
+        match &self.source.storage {
+            Storage::Held { .. } => false,
+            Storage::Blocks(blocks) => blocks.is_reading(),
+        }
+    }
+
     /// How often this thread asked for heights that were not here yet. Where it grows while
     /// the thread reads heights, some of their holes are none.
     pub fn not_yet(&self) -> u64 {

@@ -1,16 +1,15 @@
 //! The peripherals of a chip, at their addresses.
 
-use std::cell::Cell;
 use std::collections::HashMap;
-use std::rc::Rc;
 
 use crate::adc::Adc;
 use crate::chip::{Chip, Commands, Unreadable, UsbKind};
 use crate::converter::Converter;
 use crate::nvic::{self, Nvic};
 use crate::shutdown::{self, BreakAt, Outputs, Sources};
+use crate::stopwatch::Stopwatch;
 use crate::supply::{Reset, Supply};
-use crate::timer::{CNT, Timer};
+use crate::timer::Timer;
 use crate::usb::{Cable, FullSpeed, Otg, Peripheral};
 use crate::watchdog::Watchdog;
 
@@ -44,18 +43,6 @@ pub enum Effect {
     Command(usize, i32),
     /// The amplifiers' enable pin.
     Enable(bool),
-}
-
-/// Counts the instructions from the first encoder that a tick reads to the last command
-/// that it writes.
-#[derive(Debug, Default)]
-pub struct Stopwatch {
-    /// Instructions executed, counted by whoever runs the core.
-    pub executed: Rc<Cell<u64>>,
-    /// When the first encoder was last read.
-    began: Option<u64>,
-    /// Instructions until the command of axis 3, tick by tick.
-    pub taken: Vec<u64>,
 }
 
 /// Every pin is analogue but the debugger's, on both chips.
@@ -388,10 +375,9 @@ impl Bus {
 
     /// A word that the core reads.
     pub fn read(&mut self, address: u32) -> u32 {
+        self.touch(address);
         if let Some((timer, offset)) = self.timer(address) {
-            let value = timer.get(offset);
-            self.begin_stopwatch(address);
-            return value;
+            return timer.get(offset);
         }
         if let Some(offset) = self.usb_offset(address) {
             return self.usb.read(offset);
@@ -474,6 +460,7 @@ impl Bus {
 
     /// A write of the core's, in the bytes of `mask`.
     pub fn write(&mut self, address: u32, value: u32, mask: u32) {
+        self.touch(address);
         let enabled = self.output(self.chip.enable);
         if let Some((timer, offset)) = self.timer(address) {
             timer.write(offset, value, mask);
@@ -504,24 +491,18 @@ impl Bus {
         }
     }
 
-    /// Where this is the first encoder's count, the stopwatch begins.
-    fn begin_stopwatch(&mut self, address: u32) {
-        let [first, ..] = self.chip.encoders;
-        let at = self.chip.timers.iter().find(|timer| timer.name == first);
-        if let Some(stopwatch) = &mut self.stopwatch
-            && at.is_some_and(|timer| timer.base + CNT == address)
-        {
-            stopwatch.began = Some(stopwatch.executed.get());
+    /// The stopwatch, if one runs, knows of an access of the core's.
+    fn touch(&self, address: u32) {
+        if let Some(stopwatch) = &self.stopwatch {
+            stopwatch.touch(address);
         }
     }
 
-    /// An axis has a new command: with the last one the stopwatch ends.
+    /// An axis has a new command: the third is the last one of a tick.
     fn reach(&mut self, axis: usize, code: i32) {
         self.effects.push(Effect::Command(axis, code));
-        if let Some(stopwatch) = self.stopwatch.as_mut().filter(|_| axis == 2)
-            && let Some(began) = stopwatch.began.take()
-        {
-            stopwatch.taken.push(stopwatch.executed.get() - began);
+        if let Some(stopwatch) = self.stopwatch.as_ref().filter(|_| axis == 2) {
+            stopwatch.output();
         }
     }
 

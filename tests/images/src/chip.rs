@@ -337,6 +337,8 @@ pub static H743: Chip = Chip {
         (0x0800_0000, 2048 * KIB),
         (0x2000_0000, 128 * KIB),
         (0x2400_0000, 512 * KIB),
+        // ITCM: the core finds it there without a bus.
+        (0x0000_0000, 64 * KIB),
         (0x1FF0_0000, 128 * KIB),
     ],
     timers: &[

@@ -84,6 +84,8 @@ pub struct Device<'t> {
     pub guard: Option<Report>,
     /// The latest status.
     pub status: Option<Status>,
+    /// The latency that the board states, µs.
+    pub latency_us: u16,
     /// What came of the latest request that was answered.
     pub answer: Option<(Request, Result<(), Refusal>)>,
 }
@@ -102,12 +104,13 @@ impl<'t> Device<'t> {
         let pipes = ScriptedPipes::new(Rc::clone(&machine), endpoints);
         let link = Box::new(Bulk(pipes));
         // No verdict depends on how fast this machine is.
-        let (session, _) =
+        let (session, hello) =
             Session::open(terrain, scene, None, link, Patience::EMULATED).expect("a session");
         let mut device = Self {
             machine,
             session,
             endpoints,
+            latency_us: hello.latency_us,
             counts: [0; 3],
             latest: None,
             guard: None,

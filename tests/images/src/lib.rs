@@ -28,6 +28,7 @@ pub mod machine;
 pub mod nvic;
 pub mod quadrature;
 pub mod shutdown;
+pub mod stopwatch;
 pub mod supply;
 pub mod timer;
 pub mod usb;

@@ -15,7 +15,7 @@ const SR: u32 = 0x10;
 const EGR: u32 = 0x14;
 const CCMR1: u32 = 0x18;
 /// The counter.
-pub const CNT: u32 = 0x24;
+const CNT: u32 = 0x24;
 const PSC: u32 = 0x28;
 /// The auto-reload register: it counts from 0 to this.
 pub const ARR: u32 = 0x2C;

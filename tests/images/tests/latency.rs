@@ -1,32 +1,60 @@
-//! Instructions from the read of the encoders to the last command that follows from it,
-//! in the boards' own images.
+//! What the haptic interrupt takes in the boards' own images, by the model of cycles
+//! (docs/cycles.md), and what the page, the build and the images make of it.
+
+#[path = "../../../firmware/build/tick_rate.rs"]
+#[allow(dead_code)] // Only the table.
+mod tick_rate;
 
 use hapterra::raster::Raster;
-use hapterra_image_tests::device::{Device, Plane, on_each_board};
+use hapterra_core::contact::WORK_PER_TICK;
+use hapterra_firmware::amplifier::{CURRENT_LOOP_US, DUTY_HZ};
+use hapterra_image_tests::chip::Chip;
+use hapterra_image_tests::device::{Device, Plane, machines, on_each_board};
+use hapterra_tests::cycles::{Cycles, H743_DATA_LINES};
 use hapterra_tests::repository;
 
 const HOME_MM: [f64; 3] = [100.0, 100.0, 75.0];
 
-/// The median and the largest of some counts.
-fn figures(mut counts: Vec<u64>) -> (u64, u64) {
-    counts.sort_unstable();
-    let largest = counts.last().copied().expect("some ticks");
-    (counts[counts.len() / 2], largest)
+/// What a board's row of the page says.
+struct Row {
+    /// Cycles until the last output, and of the whole interrupt.
+    cycles: [u32; 2],
+    /// The same in µs.
+    us: [u32; 2],
+    fastest_hz: u32,
 }
 
-/// The most instructions that the page says of a board: the last cell of its row.
-fn said(page: &str, board: &str) -> u64 {
-    let begin = format!("| `{board}`, encoder to output | ");
-    let row = page.lines().find(|line| line.starts_with(&begin));
-    let row = row.unwrap_or_else(|| panic!("no row {begin}"));
-    let cell = row[begin.len()..].split(" | ").next().expect("a cell");
-    cell.replace(',', "").parse().expect("a count")
+impl Row {
+    fn read(board: &str) -> Self {
+        let page = repository().join("docs/hardware.md");
+        let page = std::fs::read_to_string(page).expect("the page");
+        let begin = format!("| `{board}`, interrupt | ");
+        let row = page.lines().find(|line| line.starts_with(&begin));
+        let row = row.unwrap_or_else(|| panic!("no row {begin}"));
+        let cells: Vec<&str> = row[begin.len()..].split(" | ").collect();
+        let number = |i: usize| {
+            let digits: String = cells[i].chars().filter(char::is_ascii_digit).collect();
+            digits.parse::<u32>().expect("a number")
+        };
+        Self {
+            cycles: [number(0), number(2)],
+            us: [number(1), number(3)],
+            fastest_hz: 1_000 * number(4),
+        }
+    }
+}
+
+/// The most cycles on a board's chip.
+fn most(chip: &Chip, each: &[Cycles]) -> u32 {
+    let cycles = each
+        .iter()
+        .map(|cycles| if chip.is_m7 { cycles.h743 } else { cycles.g474 });
+    cycles.max().expect("some ticks")
 }
 
 /// Slides over rough ground, pressing by a millimetre and a half.
 #[test]
-fn the_instructions_from_encoder_to_output_are_at_most_what_the_page_says() {
-    let page = std::fs::read_to_string(repository().join("docs/hardware.md")).expect("the page");
+fn cycles_of_the_interrupt_are_at_most_what_the_page_says() {
     let plane = Plane::level(HOME_MM, 55.0);
     let raster = Raster::from_fn(201, 201, |x, y| 55.0 + 0.5 * ((x * y) % 3) as f32);
     on_each_board(
@@ -37,17 +65,62 @@ fn the_instructions_from_encoder_to_output_are_at_most_what_the_page_says() {
             let mut device = Device::arm(machine, terrain, scene);
             device.wait_for_full_force();
             device.move_to(plane.counts_at([100.0, 100.0], 1.5));
-            device.machine.borrow_mut().start_stopwatch();
+            let stopwatch = device.machine.borrow_mut().start_stopwatch();
             device.move_to(plane.counts_at([118.0, 91.0], 1.5));
             device.run_ms(5);
-            let stopwatch = device.machine.borrow().bus().stopwatch.take();
-            let taken = stopwatch.expect("it runs").taken;
-            assert!(taken.len() > 30, "{}", taken.len());
-            let (median, largest) = figures(taken);
-            println!("{}: median {median}, largest {largest}", chip.board);
-            let said = said(&page, chip.board);
-            assert!(largest <= said, "{}: {largest}, not {said}", chip.board);
-            assert!(largest > said / 2, "{}: {largest}, not {said}", chip.board);
+            let found = stopwatch.take();
+            let said = Row::read(chip.board);
+            for (i, each) in [&found.to_output, &found.whole].into_iter().enumerate() {
+                assert!(each.len() > 30, "{}", each.len());
+                let (most, said) = (most(chip, each), said.cycles[i]);
+                let instructions = each.iter().map(|cycles| cycles.instructions).max();
+                let instructions = instructions.expect("some ticks");
+                println!("{}: {most} cycles, {instructions} instructions", chip.board);
+                assert!(most <= said, "{}: {most}, not {said}", chip.board);
+                assert!(most > said * 3 / 4, "{}: {most}, not {said}", chip.board);
+            }
+            let (board, latency_us) = (chip.board, device.latency_us);
+            let behind_us = match board {
+                "nucleo-g474re" => 3,
+                "nucleo-h743zi2" => (2_000_000 / DUTY_HZ) as u16,
+                _ => 15 + 10,
+            };
+            let states_us = said.us[0] as u16 + behind_us + CURRENT_LOOP_US;
+            assert_eq!(latency_us, states_us, "{board}");
         },
     );
+}
+
+#[test]
+fn the_fastest_tick_that_the_build_takes_ends_in_time() {
+    for (board, fastest_hz) in tick_rate::FASTEST_HZ {
+        let said = Row::read(board);
+        let (core_hz, timer_hz) = match board {
+            "nucleo-g474re" => (168_000_000, 42_000_000),
+            _ => (456_000_000, 57_000_000),
+        };
+        let us = said
+            .cycles
+            .map(|cycles| cycles.div_ceil(core_hz / 1_000_000));
+        assert_eq!(said.us, us, "{board}");
+        // The converter on SPI takes its frames' time beside the core's.
+        let frames_us = if board == "nucleo-h743zi2-spi" { 15 } else { 0 };
+        let in_time = |hz: u32| (us[1] + frames_us) * hz <= 1_000_000;
+        let rates = (1..=10).map(|khz| 1_000 * khz);
+        let rates = rates.filter(|hz| timer_hz % hz == 0 && in_time(*hz));
+        assert_eq!(rates.max(), Some(fastest_hz), "{board}");
+        assert_eq!(said.fastest_hz, fastest_hz, "{board}");
+    }
+}
+
+/// What the model of cycles takes an H743's tick to read from AXI SRAM.
+#[test]
+fn the_loops_data_are_within_the_lines_of_the_model() {
+    for machine in machines().into_iter().filter(|machine| machine.chip.is_m7) {
+        let haptic_loop = machine.image.symbol_like(&["application", "LOOP"]);
+        let bytes = haptic_loop.expect("the loop").size;
+        // Two rows of a patch, each on two lines at most; queues, and what else is static.
+        let lines = u64::from(bytes / 32 + 1) + 4 * u64::from(WORK_PER_TICK) + 64;
+        assert!(lines <= H743_DATA_LINES, "{}: {lines}", machine.chip.board);
+    }
 }

@@ -15,6 +15,7 @@ use super::run::{LEAST_WORK_PER_TICK, Player, Scene, Surface};
 use super::supply::Buffers;
 use super::terrain::Terrain;
 use crate::counting::{Counted, Event, Replay, Samples, WINDOW};
+use crate::cycles::Cycles;
 use crate::field::point;
 
 /// A scene, felt here in real time.
@@ -53,6 +54,7 @@ impl Recorded {
             let felt = player.feel(*hip).expect("one tick is one answer");
             answers.push(Counted {
                 instructions: 0,
+                cycles: Cycles::default(),
                 state: felt.state as u32,
                 converged: felt.converged,
                 work: felt.work,

@@ -13,6 +13,7 @@ use super::run::{Scene, shifted};
 use super::supply::{Buffers, Supply};
 use super::terrain::Terrain;
 use crate::counting::{Counted, Event, WINDOW};
+use crate::cycles::Cycles;
 use crate::invariants::seen::unshifted;
 use crate::invariants::{Invariant, Violation};
 
@@ -219,6 +220,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         self.events.push(Event::Hip(hip));
         self.ticks.push(Counted {
             instructions: 0,
+            cycles: Cycles::default(),
             state: state as u32,
             converged: outcome.answers.is_some(),
             work,

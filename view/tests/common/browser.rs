@@ -11,8 +11,8 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use serde_json::{Value, json};
 
-/// For one answer of a page that draws in software on a busy machine.
-const ANSWER: Duration = Duration::from_secs(120);
+use super::HANG;
+
 /// What a page says that is just being loaded: it is asked again.
 const LOADING: [&str; 4] = [
     "Not attached to an active page",
@@ -121,7 +121,7 @@ impl Browser {
     }
 
     fn call(&mut self, method: &str, params: Value, session: Option<&str>) -> Value {
-        let until = Instant::now() + ANSWER;
+        let until = Instant::now() + HANG;
         loop {
             let answer = self.ask(method, params.clone(), session);
             let error = answer["error"]["message"].as_str().unwrap_or_default();
@@ -144,7 +144,7 @@ impl Browser {
         let mut text = message.to_string().into_bytes();
         text.push(0);
         self.to.write_all(&text).expect("the browser reads");
-        let until = Instant::now() + ANSWER;
+        let until = Instant::now() + HANG;
         loop {
             let left = until.saturating_duration_since(Instant::now());
             let heard = self.heard.recv_timeout(left);

@@ -7,7 +7,7 @@ use re_chunk::Chunk;
 use re_log_encoding::Decoder;
 use re_log_types::LogMsg;
 
-use super::PATIENCE;
+use super::HANG;
 
 /// Lengths that no piece has: the session has ended, nothing came for a while.
 const END: u32 = 0;
@@ -20,7 +20,7 @@ impl Feed {
     /// Opens the stream of an address' path.
     pub fn open(port: u16, path: &str) -> Self {
         let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
-        line.set_read_timeout(Some(PATIENCE)).expect("a limit");
+        line.set_read_timeout(Some(HANG)).expect("a limit");
         write!(
             line,
             "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n"

@@ -16,10 +16,8 @@ use std::time::{Duration, Instant};
 
 use hapterra_view_stream::{Message, write};
 
-/// For what takes long on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(60);
-/// For a program that does its whole work before it ends.
-const ENDS_WITHIN: Duration = Duration::from_secs(300);
+/// What has not come by then hangs: pages that software draws on a busy machine take minutes.
+pub const HANG: Duration = Duration::from_secs(900);
 
 /// How a viewer is started whose page nobody opens by itself, on any port that is free.
 const UNSEEN: &str = "--no-browser --port 0";
@@ -67,14 +65,12 @@ impl Running {
 
     /// The next line that it says on standard error.
     pub fn line(&self) -> String {
-        self.said.recv_timeout(PATIENCE).expect("it says a line")
+        self.said.recv_timeout(HANG).expect("it says a line")
     }
 
     /// Waits for a line on standard output that begins so.
     pub fn tells(&self, beginning: &str) {
-        while !{ self.told.recv_timeout(PATIENCE).expect("it tells a line") }.starts_with(beginning)
-        {
-        }
+        while !{ self.told.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning) {}
     }
 
     /// The port of its viewer's page, as one of the lines says.
@@ -112,7 +108,7 @@ impl Running {
 
     /// Waits for its end; whether it ended well.
     pub fn end(&mut self) -> bool {
-        let until = Instant::now() + ENDS_WITHIN;
+        let until = Instant::now() + HANG;
         while self.goes_on() {
             assert!(Instant::now() < until, "it does not end");
             std::thread::sleep(Duration::from_millis(50));
@@ -232,7 +228,7 @@ fn lines_of(from: impl std::io::Read + Send + 'static) -> Receiver<String> {
 /// A request, head and all, and the whole answer.
 pub fn asked(port: u16, request: &str) -> String {
     let mut line = TcpStream::connect(("127.0.0.1", port)).expect("a connection");
-    line.set_read_timeout(Some(PATIENCE)).expect("a limit");
+    line.set_read_timeout(Some(HANG)).expect("a limit");
     line.write_all(request.as_bytes()).expect("it is read");
     let mut answer = Vec::new();
     let _ = line.read_to_end(&mut answer);

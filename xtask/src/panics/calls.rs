@@ -10,6 +10,8 @@ use super::decode::{Flow, instruction};
 /// A function of the image.
 #[derive(Debug)]
 pub(crate) struct Function {
+    /// Its first byte.
+    pub(crate) address: u32,
     /// Its readable name.
     pub(crate) name: String,
     /// All its names as the linker knows them: equal functions may be one.
@@ -55,10 +57,14 @@ pub(crate) fn read(elf: &[u8]) -> Result<Calls> {
         functions: vec![],
         vectors: vectors(&file, &extents)?,
     };
-    for (extent, aliases) in extents.iter().zip(names) {
-        let (callees, has_indirect) = flow_of(*extent, &code, &extents);
-        let name = readable(&aliases);
+    for (extent, aliases) in extents.iter().zip(&names) {
+        let (callees, has_indirect) = match led_to(aliases, &names) {
+            Some(to) => (vec![to], false),
+            None => flow_of(*extent, &code, &extents),
+        };
+        let (name, aliases) = (readable(aliases), aliases.clone());
         calls.functions.push(Function {
+            address: extent.start,
             name,
             aliases,
             callees,
@@ -134,6 +140,22 @@ fn functions(file: &object::File<'_>, code: &[Code<'_>]) -> (Vec<Extent>, Vec<Ve
         names.push(aliases);
     }
     (extents, names)
+}
+
+/// What the linker calls its bridges: a branch reaches 16 MiB, and memories may be farther apart.
+const BRIDGE: &str = "__Thumbv7ABSLongThunk_";
+
+impl Function {
+    /// Returns true if the linker made it, to lead to another function.
+    pub(crate) fn is_bridge(&self) -> bool {
+        self.aliases.iter().any(|name| name.starts_with(BRIDGE))
+    }
+}
+
+/// The function that a bridge with these names leads to.
+fn led_to(aliases: &[String], names: &[Vec<String>]) -> Option<usize> {
+    let to = aliases.iter().find_map(|name| name.strip_prefix(BRIDGE))?;
+    names.iter().position(|n| n.iter().any(|name| name == to))
 }
 
 /// The functions that the one at `extent` branches to, and whether it

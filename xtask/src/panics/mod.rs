@@ -10,6 +10,7 @@
 
 mod calls;
 mod decode;
+mod placed;
 mod reach;
 
 use std::path::Path;
@@ -28,6 +29,12 @@ pub(crate) fn check(board: &Board, path: &Path) -> Result<()> {
     let judged = judge(&calls, board).with_context(|| format!("image {}", board.name))?;
     let (name, list) = (board.name, judged.join(", "));
     say(format!("{name}: no panic can be reached from {list}"));
+    if let Some(interrupt) = board.fast_interrupt {
+        let areas = placed::areas(&elf)?;
+        let told = placed::judge(&calls, board, interrupt, &areas);
+        let told = told.with_context(|| format!("image {name}"))?;
+        say(format!("{name}: {told}"));
+    }
     Ok(())
 }
 
@@ -147,6 +154,7 @@ mod tests {
 
     fn function(name: &str, callees: &[usize], has_indirect: bool) -> Function {
         Function {
+            address: 0,
             name: name.into(),
             aliases: vec![name.into()],
             callees: callees.to_vec(),

@@ -14,7 +14,7 @@ use core::ptr;
 
 use cortex_m::peripheral::SCB;
 
-use crate::chip::{amplifiers_off, write_back};
+use crate::chip::{amplifiers_off, fill_memories, write_back};
 use crate::usb::{LOADER, USB_OSCILLATOR};
 
 /// What says that the loader is wanted, and its complement behind it. RAM that was
@@ -80,9 +80,10 @@ global_asm!(
     "dsb",
     "b .",
     "2:",
-    "bx lr",
+    "b {fill}", // Returns for it.
     ".ltorg",
     mark = sym MARK,
+    fill = sym fill_memories,
     wanted = const WANTED,
     loader = const LOADER,
     oscillator = const USB_OSCILLATOR.0,

@@ -92,6 +92,11 @@ impl Queue {
         self.state().known.remove(job);
     }
 
+    /// Whether no job waits or is being done.
+    pub(super) fn is_idle(&self) -> bool {
+        self.state().known.is_empty()
+    }
+
     /// Waits for a job; `false` where none will come any more.
     pub(super) fn wait(&self) -> bool {
         let state = self.state();
@@ -120,7 +125,9 @@ mod tests {
         assert_eq!(queue.next(), None);
         queue.want(first);
         assert_eq!(queue.next(), None, "it is being done");
+        assert!(!queue.is_idle());
         queue.done(&first);
+        assert!(queue.is_idle());
         for number in 0..=MOST as u32 {
             queue.want(Job::Pass([number, 0]));
         }

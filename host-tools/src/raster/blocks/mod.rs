@@ -204,6 +204,11 @@ impl Shared {
         self.read.load(Ordering::Relaxed)
     }
 
+    /// Whether a block of the file is being read in the background, or is going to be.
+    pub(super) fn is_reading(&self) -> bool {
+        !self.fine.is_idle()
+    }
+
     /// What the line said last, where something did not come.
     pub(super) fn take_outage(&self) -> Option<BadRaster> {
         self.kept().outage.take()

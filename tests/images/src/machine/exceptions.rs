@@ -98,6 +98,11 @@ impl Machine {
         let Some(active) = self.active.pop() else {
             return;
         };
+        if active.vector == self.chip.tick_interrupt as u32 + 16
+            && let Some(stopwatch) = &self.bus().stopwatch
+        {
+            stopwatch.end();
+        }
         let back = self.word(self.register(RegisterARM::SP) as u32 + PC_IN_FRAME);
         let masks = [RegisterARM::BASEPRI, RegisterARM::PRIMASK];
         let kept = masks.map(|mask| self.register(mask));

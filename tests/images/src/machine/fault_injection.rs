@@ -6,8 +6,8 @@ use std::rc::Rc;
 use unicorn_engine::{HookType, MemType, UcHookId, Unicorn};
 
 use super::Machine;
-use crate::bus::Stopwatch;
 use crate::elf::Function;
+use crate::stopwatch::Stopwatch;
 
 /// The interrupt controller's first register that disables.
 const NVIC_ICER: u32 = 0xE000_E180;
@@ -64,19 +64,13 @@ impl Machine {
         counted
     }
 
-    /// Counts every instruction from now on, for the bus' stopwatch. Slow.
-    pub fn start_stopwatch(&mut self) {
-        let stopwatch = Stopwatch::default();
-        let executed = Rc::clone(&stopwatch.executed);
-        let (flash, bytes) = self.chip.memories[0];
-        let count = move |_: &mut Unicorn<'_, ()>, _: u64, _: u32| executed.set(executed.get() + 1);
-        let to = u64::from(flash) + u64::from(bytes) - 1;
-        let hook = self.core.add_code_hook(flash.into(), to, count);
-        hook.expect("a hook");
-        self.core
-            .ctl_flush_tb()
-            .expect("translated code is dropped");
-        self.bus().stopwatch = Some(stopwatch);
+    /// Follows every instruction of the haptic interrupt from now on. Slow.
+    pub fn start_stopwatch(&mut self) -> Stopwatch {
+        let vector = 4 * (self.chip.tick_interrupt as u32 + 16);
+        let entry = self.word(self.chip.memories[0].0 + vector) & !1;
+        let stopwatch = Stopwatch::start(&mut self.core, entry);
+        self.bus().stopwatch = Some(stopwatch.clone());
+        stopwatch
     }
 
     /// From now on the flash's word at `address` cannot be read, until it is

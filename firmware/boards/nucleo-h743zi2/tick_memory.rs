@@ -1,0 +1,52 @@
+//! The memories without wait states: the tick's code in ITCM, the constants in DTCM.
+//!
+//! In flash the tick's code would come through the instruction cache, and the tasks between two
+//! ticks evict it. `memory/nucleo-h743zi2.x` says what lies there.
+
+use core::arch::global_asm;
+
+// Copies both before any Rust runs: any function may copy memory, and what copies it is among
+// them. The check bits of these memories are over eight bytes (RM0433, 2.4), so eight bytes are
+// written at once. What is left of ITCM is zeroed, too: the core reads ahead of what it executes,
+// and a word whose check bits were never written is a double error, which ends the duty cycles.
+global_asm!(
+    ".section .text.hapterra_fill_tick_memory, \"ax\", %progbits",
+    ".thumb",
+    ".global hapterra_fill_tick_memory",
+    ".type hapterra_fill_tick_memory, %function",
+    ".thumb_func",
+    "hapterra_fill_tick_memory:",
+    "ldr r0, =_tick_start",
+    "ldr r1, =_tick_end",
+    "ldr r2, =_tick_loaded",
+    "1:",
+    "ldrd r3, r12, [r2], #8",
+    "strd r3, r12, [r0], #8",
+    "cmp r0, r1",
+    "blo 1b",
+    "ldr r1, =_tick_memory_end",
+    "movs r3, #0",
+    "2:",
+    "strd r3, r3, [r0], #8",
+    "cmp r0, r1",
+    "blo 2b",
+    "ldr r0, =_constants_start",
+    "ldr r1, =_constants_end",
+    "ldr r2, =_constants_loaded",
+    "3:",
+    "ldrd r3, r12, [r2], #8",
+    "strd r3, r12, [r0], #8",
+    "cmp r0, r1",
+    "blo 3b",
+    "dsb",
+    "isb",
+    "bx lr",
+    ".ltorg",
+    ".size hapterra_fill_tick_memory, . - hapterra_fill_tick_memory",
+);
+
+unsafe extern "C" {
+    /// Fills both memories. Needs no stack.
+    #[link_name = "hapterra_fill_tick_memory"]
+    pub(crate) fn fill();
+}

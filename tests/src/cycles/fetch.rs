@@ -1,0 +1,115 @@
+//! What a flash adds: lines that arrive late.
+
+/// How a memory gives code to its core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Flash {
+    /// Bytes that one read gives.
+    pub line: u32,
+    /// Cycles of the core that a read takes.
+    pub read: u64,
+}
+
+/// The flash of an STM32G474 at 168 MHz: four wait states (RM0440, 3.3.3), and 64 bits a read
+/// while it has two banks, as this firmware demands. Its cache counts for nothing here.
+pub const G474: Flash = Flash { line: 8, read: 5 };
+
+/// Reads in the order in which a core executes. The line behind the one in use is read ahead
+/// (PRFTEN), as soon as the memory is free; a jump waits until the read under way has ended.
+#[derive(Clone, Debug)]
+pub struct Fetch {
+    flash: Flash,
+    /// The line in use.
+    line: Option<u32>,
+    /// When the read ahead ends.
+    ahead_at: u64,
+}
+
+impl Fetch {
+    /// Nothing is read yet.
+    #[must_use]
+    pub const fn new(flash: Flash) -> Self {
+        Self {
+            flash,
+            line: None,
+            ahead_at: 0,
+        }
+    }
+
+    /// Returns when an instruction is there that the core wants at `now`.
+    pub fn instruction(&mut self, address: u32, length: u32, now: u64) -> u64 {
+        let (from, to) = (
+            address / self.flash.line,
+            (address + length - 1) / self.flash.line,
+        );
+        (from..=to).fold(now, |now, line| self.take(line, now))
+    }
+
+    fn take(&mut self, line: u32, now: u64) -> u64 {
+        if self.line == Some(line) {
+            return now;
+        }
+        let free_at = now.max(self.ahead_at);
+        let is_ahead = self.line.is_some_and(|before| before + 1 == line);
+        let there_at = if is_ahead {
+            free_at
+        } else {
+            free_at + self.flash.read
+        };
+        self.line = Some(line);
+        self.ahead_at = there_at + self.flash.read;
+        there_at
+    }
+
+    /// Returns when a constant beside the code is there: the memory reads it between two lines, and
+    /// its cache counts for nothing.
+    pub fn literal(&mut self, now: u64) -> u64 {
+        let there_at = now.max(self.ahead_at) + self.flash.read;
+        self.ahead_at = there_at;
+        there_at
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn straight_code_of_wide_instructions_takes_a_read_for_two() {
+        let mut fetch = Fetch::new(G474);
+        let mut now = 0;
+        for i in 0..100 {
+            now = fetch.instruction(4 * i, 4, now) + 1;
+        }
+        // The first line from nothing, 49 behind it at 5 cycles each, and the last two executed.
+        assert_eq!(now, 5 + 49 * 5 + 2);
+    }
+
+    #[test]
+    fn slow_instructions_hide_the_reads() {
+        let mut fetch = Fetch::new(G474);
+        let mut now = fetch.instruction(0, 4, 0);
+        assert_eq!(now, 5);
+        for i in 1..50 {
+            now += 14;
+            assert_eq!(fetch.instruction(4 * i, 4, now), now, "{i}");
+        }
+    }
+
+    #[test]
+    fn a_jump_waits_for_the_read_under_way_and_for_its_own() {
+        let mut fetch = Fetch::new(G474);
+        assert_eq!(fetch.instruction(0, 2, 0), 5);
+        // The line behind is being read until 10.
+        assert_eq!(fetch.instruction(0x100, 2, 6), 15);
+        // A wide instruction on two lines needs both.
+        assert_eq!(fetch.instruction(0x206, 4, 30), 30 + 5 + 5);
+    }
+
+    #[test]
+    fn a_literal_delays_the_line_behind() {
+        let mut fetch = Fetch::new(G474);
+        assert_eq!(fetch.instruction(0, 4, 0), 5);
+        assert_eq!(fetch.literal(6), 15);
+        assert_eq!(fetch.instruction(8, 4, 16), 16);
+    }
+}

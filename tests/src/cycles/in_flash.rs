@@ -1,0 +1,53 @@
+//! What of the tick an H743 leaves in flash: the linker script says it.
+
+const SCRIPT: &str = include_str!("../../../firmware/memory/nucleo-h743zi2.x");
+/// Around the patterns.
+const FROM: &str = "_tick_in_flash_start = .;";
+const TO: &str = "_tick_in_flash_end = .;";
+
+/// Returns true if the function of this mangled name is to stay in flash.
+#[must_use]
+pub fn is_left(name: &str) -> bool {
+    patterns().any(|pattern| fits(name, pattern))
+}
+
+/// The patterns, without what all sections of code begin with.
+fn patterns() -> impl Iterator<Item = &'static str> {
+    let list = SCRIPT.split(FROM).nth(1).and_then(|s| s.split(TO).next());
+    let lines = list.unwrap_or_default().lines();
+    lines.filter_map(|line| line.trim().strip_prefix("*(.text.")?.strip_suffix(')'))
+}
+
+/// Whether a name fits a pattern whose only special character is `*`, at both ends.
+fn fits(name: &str, pattern: &str) -> bool {
+    let parts = pattern.split('*').filter(|part| !part.is_empty());
+    let behind = |rest: Option<usize>, part: &str| {
+        let rest = rest?;
+        let at = name.get(rest..)?.find(part)?;
+        Some(rest + at + part.len())
+    };
+    parts.fold(Some(0), behind).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scripts_patterns_tell_the_functions_apart() {
+        assert!(patterns().count() > 10);
+        for pattern in patterns() {
+            assert!(
+                pattern.starts_with('*') && pattern.ends_with('*'),
+                "{pattern}"
+            );
+        }
+        assert!(is_left(
+            "_ZN13hapterra_core7haptics16Haptics$LT$_$GT$10take_scene17h9bE"
+        ));
+        assert!(!is_left(
+            "_ZN13hapterra_core4feel4Feel12with_effects17h8c6b8f46a38d6445E"
+        ));
+        assert!(!is_left("memcpy"));
+    }
+}
