@@ -13,11 +13,16 @@ use crate::terrain::TileIndex;
 
 /// Units of work a tick may spend at 1 kHz, and at any rate at most.
 ///
-/// A unit is at most 246 instructions of a Cortex-M4F, so a tick is at most 106,000: at 1.5 cycles
-/// each 159,000 of the 168,000 cycles that a NUCLEO-G474RE has for a millisecond.
-pub const WORK_PER_TICK: u32 = 430;
-/// Units of work a second: 86 a tick at 10 kHz.
-const WORK_PER_S: u32 = 860_000;
+/// A unit takes at most 350 cycles of a NUCLEO-G474RE by the model of docs/cycles.md, and all else
+/// of the costliest tick 55,000: 300 units and that are 160,000 of the 168,000 cycles of a
+/// millisecond.
+pub const WORK_PER_TICK: u32 = 300;
+/// Units of work that a tick may spend at any rate at least.
+const LEAST_WORK_PER_TICK: u32 = 86;
+/// Units a second that a core of 168 MHz has time for, and those of them that the rest of a tick
+/// takes.
+const UNITS_PER_S: u32 = 480_000;
+const REST_OF_TICK: u32 = 180;
 
 /// Units of work that a tick may spend at a rate.
 ///
@@ -26,14 +31,21 @@ const WORK_PER_S: u32 = 860_000;
 /// use hapterra_core::rate::TickRate;
 ///
 /// let at = |hz| TickRate::new(hz).map(work_per_tick);
-/// assert_eq!([at(1_000), at(4_000), at(10_000)], [Some(430), Some(215), Some(86)]);
+/// assert_eq!([at(1_000), at(1_500), at(2_000), at(10_000)], [Some(300), Some(140), Some(86), Some(86)]);
 /// ```
 #[must_use]
 pub const fn work_per_tick(rate: TickRate) -> u32 {
     // A rate of zero is none, but the compiler does not know that.
-    match WORK_PER_S.checked_div(rate.hz()) {
-        Some(fits) if fits < WORK_PER_TICK => fits,
-        _ => WORK_PER_TICK,
+    let units = match UNITS_PER_S.checked_div(rate.hz()) {
+        Some(units) => units.saturating_sub(REST_OF_TICK),
+        None => WORK_PER_TICK,
+    };
+    if units < LEAST_WORK_PER_TICK {
+        LEAST_WORK_PER_TICK
+    } else if units > WORK_PER_TICK {
+        WORK_PER_TICK
+    } else {
+        units
     }
 }
 
