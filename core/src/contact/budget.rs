@@ -55,16 +55,19 @@ pub(super) const SHORTCUT: u32 = 2;
 pub(super) const ARRIVAL: u32 = 6;
 /// Units for the closest point of a convex patch.
 pub(super) const CONVEX: u32 = 4;
-/// Units for the closest point of one ruling.
-pub(super) const RULING: u32 = 1;
+/// Units for the closest point of so many rulings.
+#[inline]
+pub(super) const fn rulings(looked: u32) -> u32 {
+    looked + looked.div_ceil(3)
+}
 /// Units for beginning a search by rulings.
 pub(super) const RULINGS: u32 = 8;
 /// Units for the slope of the distance into one patch.
 pub(super) const SLOPE: u32 = 3;
 /// Units for a look at the cone of friction.
-pub(super) const LOOK: u32 = 5;
+pub(super) const LOOK: u32 = 3;
 /// Units for the direction and the end of a straight way with friction.
-pub(super) const DIRECTION: u32 = 3;
+pub(super) const DIRECTION: u32 = 8;
 /// Units for asking whether a box is clear.
 pub(super) const BOX: u32 = 4;
 /// Units for a cell whose patch is intersected with a path.
@@ -117,9 +120,9 @@ impl Budget {
         self.missing
     }
 
-    /// Units that are left.
-    pub(super) const fn left(&self) -> u32 {
-        self.limit.saturating_sub(self.spent)
+    /// Rulings for which units are left.
+    pub(super) const fn left_for_rulings(&self) -> u32 {
+        self.limit.saturating_sub(self.spent) / 4 * 3
     }
 
     /// Units spent so far.

@@ -20,7 +20,7 @@
 use super::on_convex_patch::{Convexity, Place};
 use super::on_ruling::Ruling;
 use super::ruling_search::{MAX_EVALUATIONS, Rulings};
-use crate::contact::budget::{Budget, CONVEX, RULING, RULINGS};
+use crate::contact::budget::{Budget, CONVEX, RULINGS, rulings};
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
 use crate::scalar::smaller;
@@ -75,7 +75,7 @@ pub(super) fn search(
     start: (f32, f32),
     budget: &mut Budget,
 ) -> Option<Nearest> {
-    if !budget.has(CONVEX + RULINGS + RULING) {
+    if !budget.has(CONVEX + RULINGS + rulings(3)) {
         return None;
     }
     budget.spend(CONVEX);
@@ -99,28 +99,29 @@ fn by_rulings(
     budget.spend(RULINGS);
     let transposed = patch.transposed();
     let mut turned = is_steeper_north(patch, hip, start);
-    let most = budget.left().min(MAX_EVALUATIONS);
+    let most = budget.left_for_rulings().min(MAX_EVALUATIONS);
     let (mut best, mut looked) = (start, 0);
     for pass in 1.. {
         let (seen, from, start) = match turned {
             true => (&transposed, (hip.1, hip.0), best.0),
             false => (patch, hip, best.1),
         };
-        let mut rulings = Rulings {
+        let mut search = Rulings {
             patch: seen,
             hip: from,
             looked,
             most,
         };
-        let found = rulings.closest_to(start);
-        let is_spent = rulings.is_spent();
-        budget.spend(RULING * (rulings.looked - looked));
-        looked = rulings.looked;
+        let found = search.closest_to(start);
+        let is_spent = search.is_spent();
+        looked = search.looked;
         if is_spent && most < MAX_EVALUATIONS {
+            budget.spend(rulings(looked));
             return None;
         }
         best = exchanged_if(turned, (found.u, found.v));
         if is_spent || !wants_turning(&found) || pass == MAX_PASSES {
+            budget.spend(rulings(looked));
             let nearest = Nearest {
                 u: best.0,
                 v: best.1,
