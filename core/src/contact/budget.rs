@@ -67,7 +67,7 @@ pub(super) const SLOPE: u32 = 3;
 /// Units for a look at the cone of friction.
 pub(super) const LOOK: u32 = 3;
 /// Units for the direction and the end of a straight way with friction.
-pub(super) const DIRECTION: u32 = 8;
+pub(super) const DIRECTION: u32 = 9;
 /// Units for asking whether a box is clear.
 pub(super) const BOX: u32 = 4;
 /// Units for a cell whose patch is intersected with a path.
