@@ -113,6 +113,55 @@ fn the_fastest_tick_that_the_build_takes_ends_in_time() {
     }
 }
 
+/// The most cycles that a row of the kept table has whose name is one of these, or begins with one
+/// that ends in `*`.
+fn kept(names: &[&str], is_m7: bool) -> u32 {
+    let table = std::fs::read_to_string(repository().join("bench/cycles.csv")).expect("the table");
+    let column = if is_m7 { 0 } else { 3 };
+    let rows = table.lines().skip(1).map(|line| {
+        let (mut cells, name) = (line.rsplit(','), line.rsplitn(8, ',').last());
+        let cycles = cells.nth(column).and_then(|cell| cell.parse::<u32>().ok());
+        (
+            name.expect("a name").trim_matches('"'),
+            cycles.expect("a number"),
+        )
+    });
+    let fits = |name: &str, wanted: &str| match wanted.strip_suffix('*') {
+        Some(begin) => name.starts_with(begin),
+        None => name == wanted,
+    };
+    let rows = rows.filter(|(name, _)| names.iter().any(|wanted| fits(name, wanted)));
+    rows.map(|(_, cycles)| cycles).max().expect("a row")
+}
+
+/// Up to which rate the costliest ticks end in time: those of the counted scenes, and the contact of
+/// the stress test's with all effects and materials around it, with the board's own part.
+#[test]
+fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
+    let mut in_time_khz = [u32::MAX; 2];
+    for (board, is_m7, core_hz, frames_us) in [
+        ("nucleo-g474re", false, 168_000_000, 0),
+        ("nucleo-h743zi2", true, 456_000_000, 0),
+        ("nucleo-h743zi2-spi", true, 456_000_000, 15),
+    ] {
+        let scene = kept(&["chain, sliding fast, rough, controller"], is_m7);
+        let own = Row::read(board).cycles[1] - scene;
+        let around = kept(&["chain, sliding fast, all effects and materials"], is_m7)
+            - kept(&["sliding fast, rough"], is_m7);
+        let costliest = kept(&["chain*"], is_m7).max(kept(&["soak*"], is_m7) + around);
+        let us = (costliest + own).div_ceil(core_hz / 1_000_000) + frames_us;
+        println!("{board}: {us} µs at most");
+        let khz = &mut in_time_khz[usize::from(is_m7)];
+        *khz = (*khz).min(1_000 / us);
+    }
+    let [g474, h743] = in_time_khz;
+    let rates = format!("in time **up to {g474} kHz on a G474 and up to {h743} kHz on an H743**");
+    for page in ["docs/cycles.md", "docs/hardware.md", "docs/underlay.md"] {
+        let text = std::fs::read_to_string(repository().join(page)).expect("the page");
+        assert!(text.contains(&rates), "{page}: {rates}");
+    }
+}
+
 /// What the model of cycles takes an H743's tick to read from AXI SRAM.
 #[test]
 fn the_loops_data_are_within_the_lines_of_the_model() {
