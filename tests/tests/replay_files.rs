@@ -116,7 +116,7 @@ fn one_row_a_row_with_the_columns_that_were_promised() {
 
 #[test]
 fn scale_stiffness_and_limit_are_as_stated() {
-    let press = "t_s,x_mm,y_mm,z_mm\n0,20,10,90\n1,20,10,10\n2,20,10,-60\n";
+    let press = "t_s,x_mm,y_mm,z_mm\n0,20,10,90\n0.001,20,10,10\n0.002,20,10,-60\n";
     let folder = Folder::new(press);
     let flat = ["--cell-mm", "2", "--height-mm-per-unit", "0"];
     let felt = |more: &[&str]| folder.felt(&[&flat, more].concat());

@@ -131,6 +131,9 @@ impl Hint for ReplayError {
             Self::Trajectory(error) if error.is_about_settings() => {
                 "replay it with the version of hapterra that recorded it, or take its path alone with --ignore-settings"
             }
+            Self::Trajectory(error) if error.is_about_time() => {
+                "t_s is in seconds and goes forward row by row, in a recording by whole ticks; --rows-are-ticks takes each row as one tick, whatever t_s says"
+            }
             Self::Trajectory(_) => {
                 "a trajectory is CSV: the header t_s,x_mm,y_mm,z_mm, then four numbers a line"
             }

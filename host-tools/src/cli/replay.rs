@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::ValueHint;
 use hapterra_core::force::ForceLaw;
+use hapterra_core::rate::TickRate;
 use hapterra_core::scene::Sample;
 
 use super::failure::{Failure, OrHint};
@@ -19,7 +20,7 @@ use crate::materials::Materials;
 use crate::output::{Output, keep_apart};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{
-    Record, ReplayError, Replayer, Rule, Settings, Summary, Trajectory, on_native,
+    Pace, Record, ReplayError, Replayer, Rule, Settings, Summary, Ticks, Trajectory, on_native_at,
     replay_trajectory,
 };
 use crate::stability::limits;
@@ -38,15 +39,23 @@ pub struct Args {
     /// Millimetres as the hand feels them; x east, y north, z up, origin at
     /// the south-west sample at height zero: at 1 mm a cell they count felt
     /// cells, which are squares on the ground. Further columns are ignored.
+    /// It is felt at the device's ticks, a thousand a second, by t_s, seconds:
+    /// between two rows the HIP moves on a straight line at a constant speed,
+    /// and the output has a row for each tick. Rows a tick apart are felt row by
+    /// row; so are those of a file without t_s, header x_mm,y_mm,z_mm.
     /// A recording, CSV or Parquet, is felt with the settings that it was
-    /// recorded with, on the terrain that it was recorded on; options given
-    /// here win.
+    /// recorded with, tick rate included, on the terrain that it was recorded
+    /// on; options given here win.
     #[arg(value_hint = ValueHint::FilePath)]
     pub trajectory: PathBuf,
 
     /// Take a recording's path alone: not its settings, and on any terrain
     #[arg(long)]
     pub ignore_settings: bool,
+
+    /// Take each row as one tick, whatever t_s says
+    #[arg(long)]
+    pub rows_are_ticks: bool,
 
     /// File to write what was felt to: CSV, or Parquet where its name ends in .parquet;
     /// `-` for standard output
@@ -81,11 +90,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     keep_apart(&[&args.output], &inputs).or_hint("name another file with --output")?;
     left_behind::tell([args.output.as_path()]);
     let viewer = args.viewing.program()?;
-    let mut trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
+    let trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
     let recorded = trajectory
         .settings()
         .filter(|_| !args.ignore_settings)
         .cloned();
+    let recorded_at = recorded.as_ref().map(rate_of).transpose()?;
     let rendering = rendering(args, recorded.as_ref())?;
     let raster = args.terrain.open()?;
     let measured_at = recorded.as_ref().and_then(|it| it.felt.measured_at);
@@ -112,16 +122,20 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         file,
         title: args.terrain.name(),
         home_mm: recorded.as_ref().and_then(|it| it.felt.home_mm),
+        recorded_at,
         views: recorded.map(|recorded| recorded.views).unwrap_or_default(),
         viewer,
     };
     let began = Instant::now();
-    let summary = match args.on {
-        RunsOn::Native => native(args, &felt, &mut trajectory),
-        RunsOn::Emulated => emulated(args, &felt, &mut trajectory),
+    let (summary, mut ticks) = match args.on {
+        RunsOn::Native => native(args, &felt, trajectory),
+        RunsOn::Emulated => emulated(args, &felt, trajectory),
     }?;
     let seconds = began.elapsed().as_secs_f64();
-    if trajectory.was_cut() {
+    for remark in ticks.remarks() {
+        eprintln!("note: {}: {remark}", args.trajectory.display());
+    }
+    if ticks.trajectory().was_cut() {
         eprintln!(
             "{}: its last row is cut in the middle, and left out: the command that wrote it was killed",
             args.trajectory.display()
@@ -140,11 +154,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         );
     }
     eprintln!(
-        "{} rows, {} in contact, {:.0} rows a second: {}",
+        "{} rows, {} in contact, {:.0} rows a second: {}{}",
         summary.rows,
         summary.in_contact,
         summary.rows as f64 / seconds.max(1e-9),
-        args.output.display()
+        args.output.display(),
+        ticks
+            .pace()
+            .map(|pace| format!("; {pace}"))
+            .unwrap_or_default()
     );
     Ok(())
 }
@@ -153,6 +171,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 struct Felt<'t> {
     terrain: &'t Terrain<'t>,
     law: (ForceLaw, Rule),
+    /// The rate of the recording.
+    recorded_at: Option<TickRate>,
     /// The other views of the recording.
     views: Vec<ViewSettings>,
     /// The terrain file, as it was named.
@@ -227,16 +247,34 @@ fn rendering(args: &Args, recorded: Option<&Settings>) -> Result<Rendering, Fail
     Ok(rendering)
 }
 
-fn native(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result<Summary, Failure> {
+/// The tick rate of a recording.
+fn rate_of(recorded: &Settings) -> Result<TickRate, Failure> {
+    let tick_hz = recorded.device.tick_hz;
+    let why = format!("the recording has tick_hz = {tick_hz}, and no device has that rate");
+    TickRate::new(tick_hz)
+        .ok_or(why)
+        .or_hint("mend tick_hz in its settings (whole kilohertz from 1000 to 10000), or take its path alone with --ignore-settings")
+}
+
+fn native(
+    args: &Args,
+    felt: &Felt<'_>,
+    trajectory: Trajectory,
+) -> Result<(Summary, Ticks), Failure> {
     let (law, rule) = felt.law;
-    let mut replayer = on_native(felt.terrain, law)?;
+    let rate = felt.recorded_at.unwrap_or_default();
+    let mut replayer = on_native_at(rate, felt.terrain, law)?;
     if rule == Rule::Paper {
         replayer = replayer.by_published_rule(law);
     }
     replay(args, felt, trajectory, &mut replayer)
 }
 
-fn emulated(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result<Summary, Failure> {
+fn emulated(
+    args: &Args,
+    felt: &Felt<'_>,
+    trajectory: Trajectory,
+) -> Result<(Summary, Ticks), Failure> {
     let (law, rule) = felt.law;
     if rule == Rule::Paper {
         return Err("--contact paper: no device has the paper's contact rule".to_owned())
@@ -247,20 +285,44 @@ fn emulated(args: &Args, felt: &Felt<'_>, trajectory: &mut Trajectory) -> Result
     let _plant = lines.plant;
     let link: Box<dyn Transport> = Box::new(lines.link);
     let mut replayer = Replayer::open(felt.terrain, law, link, Patience::EMULATED)?;
-    let summary = replay(args, felt, trajectory, &mut replayer)?;
+    let felt = replay(args, felt, trajectory, &mut replayer)?;
     replayer.say_goodbye()?;
     if let Err(why) = emulator.finish() {
         tracing::info!("the emulated board did not end well: {why}");
     }
-    Ok(summary)
+    Ok(felt)
+}
+
+/// The trajectory at the ticks of a device.
+fn ticks(
+    args: &Args,
+    felt: &Felt<'_>,
+    trajectory: Trajectory,
+    tick_hz: u32,
+) -> Result<Ticks, Failure> {
+    let recorded = felt.recorded_at.map(TickRate::hz);
+    if let Some(recorded_hz) = recorded.filter(|hz| *hz != tick_hz) {
+        let why =
+            format!("the recording has {recorded_hz} ticks a second, and the device has {tick_hz}");
+        return Err(why).or_hint(
+            "feel it with --on native, or take its path alone, by its own times, with --ignore-settings",
+        );
+    }
+    let pace = match recorded {
+        _ if args.rows_are_ticks => Pace::RowByRow,
+        Some(_) => Pace::Recorded,
+        None => Pace::ByTime,
+    };
+    Ok(Ticks::new(trajectory, pace, tick_hz))
 }
 
 fn replay<'t>(
     args: &Args,
     felt: &Felt<'t>,
-    trajectory: &mut Trajectory,
+    trajectory: Trajectory,
     replayer: &mut Replayer<'t>,
-) -> Result<Summary, Failure> {
+) -> Result<(Summary, Ticks), Failure> {
+    let mut ticks = ticks(args, felt, trajectory, replayer.device().tick_hz)?;
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();
     let materials = felt.terrain.grid().materials();
@@ -287,7 +349,7 @@ fn replay<'t>(
     };
     let summary = replay_trajectory(
         replayer,
-        trajectory,
+        &mut ticks,
         &settings,
         output,
         &mut show,
@@ -300,5 +362,5 @@ fn replay<'t>(
     if let Some(feed) = feed {
         viewing::end(feed, |line| eprintln!("{line}"));
     }
-    Ok(summary?)
+    Ok((summary?, ticks))
 }

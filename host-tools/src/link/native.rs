@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use hapterra_core::guard::{Drive, Sense};
 use hapterra_core::phantom::Calibration;
+use hapterra_core::rate::TickRate;
 use hapterra_core::wire::status::{BootReport, UsbClock};
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::board::TickClock;
@@ -91,6 +92,27 @@ impl Native<StoppedClock> {
     #[must_use]
     pub fn for_replay() -> Self {
         Self::new(StoppedClock, None)
+    }
+
+    /// The same at any tick rate.
+    #[must_use]
+    pub fn for_replay_at(rate: TickRate) -> Box<dyn Transport> {
+        fn at<const KHZ: u32>() -> Box<dyn Transport> {
+            Box::new(Native::new(StoppedClock::<KHZ>, None))
+        }
+        // The rate is part of the application's type, as it is on a board.
+        match rate.hz() / 1_000 {
+            10 => at::<10>(),
+            9 => at::<9>(),
+            8 => at::<8>(),
+            7 => at::<7>(),
+            6 => at::<6>(),
+            5 => at::<5>(),
+            4 => at::<4>(),
+            3 => at::<3>(),
+            2 => at::<2>(),
+            _ => at::<1>(),
+        }
     }
 }
 

@@ -2,28 +2,32 @@
 //! what was felt comes out. Also the recording that `run` and `demo` write,
 //! which has the same format.
 //!
-//! In lock-step: the device feels one point, answers, and only then gets the
+//! In lock-step: the device feels one point a tick, answers, and only then gets the
 //! next. Every point is felt exactly once, with all the terrain it needs, so
-//! the result depends on nothing but the terrain, the law and the trajectory.
+//! the result depends on nothing but the terrain, the law, the trajectory and the tick rate.
+//! [`Ticks`] says where the HIP is in each tick.
 
 mod felt;
 mod loop_columns;
 mod published;
 mod recording;
 pub mod settings;
+mod ticks;
 mod trajectory;
 
 pub use felt::Replayer;
 pub use loop_columns::LoopColumns;
 pub use recording::{Column, Record, Recording, Value};
 pub use settings::{Rule, Settings};
-pub use trajectory::{FeltRow, FeltRows, Row, Told, Trajectory, TrajectoryError};
+pub use ticks::{Pace, Tick, Ticks};
+pub use trajectory::{FeltRow, FeltRows, Row, Trajectory, TrajectoryError};
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
+use hapterra_core::rate::TickRate;
 use hapterra_core::scene::Sample;
 
-use crate::link::{LinkError, Native, Patience, Transport};
+use crate::link::{LinkError, Native, Patience};
 use crate::output::{Output, OutputError};
 use crate::terrain::{FeltGrid, Terrain, TerrainError};
 use settings::ViewSettings;
@@ -56,7 +60,7 @@ pub enum ReplayError {
 /// What a replay did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
-    /// Rows felt.
+    /// Ticks felt, a row of the output each.
     pub rows: u64,
     /// Of those, rows in contact.
     pub in_contact: u64,
@@ -85,7 +89,7 @@ pub type OnFelt<'f, 't> = dyn FnMut(&Sample, &Record, (u32, &Terrain<'t>)) + 'f;
 /// [`ReplayError`] says what was wrong, with file, line and column.
 pub fn replay_trajectory<'t>(
     replayer: &mut Replayer<'t>,
-    trajectory: &mut Trajectory,
+    ticks: &mut Ticks,
     settings: &Settings,
     output: Output,
     felt: &mut OnFelt<'_, 't>,
@@ -100,20 +104,25 @@ pub fn replay_trajectory<'t>(
     recording.describe(settings);
     let (mut summary, mut view) = (Summary::default(), 0);
     let first = replayer.terrain().clone();
-    while let Some(told) = trajectory.next_told()? {
+    while let Some(tick) = ticks.next_tick()? {
         // Without settings it is a path alone.
-        if told.view != view && !settings.views.is_empty() {
-            view = told.view;
+        if tick.view != view && !settings.views.is_empty() {
+            view = tick.view;
             let of_views = (&first, settings);
-            go_over(replayer, trajectory, of_views, &told, &mut recording)?;
+            go_over(
+                replayer,
+                ticks.trajectory(),
+                of_views,
+                &tick,
+                &mut recording,
+            )?;
         }
+        let scale = *replayer.terrain().scale();
+        let hip = ticks.trajectory().to_grid(tick.hip_mm, &scale)?;
+        summary.leaps += u64::from(replayer.is_leap_to(&hip));
+        let sample = replayer.feel(hip)?;
         let terrain = replayer.terrain();
-        let scale = *terrain.scale();
-        let row = trajectory.lay(&told, &scale)?;
-        summary.leaps += u64::from(replayer.is_leap_to(&row.hip));
-        let sample = replayer.feel(row.hip)?;
-        let terrain = replayer.terrain();
-        let record = Record::new(row.t_s, row.hip_mm, &sample, &scale);
+        let record = Record::new(tick.t_s, tick.hip_mm, &sample, &scale);
         let more = [Value::Text(state_name(sample.state)), Value::Count(view)];
         recording.write(&record, more.get(..columns.len()).unwrap_or(&more))?;
         felt(&sample, &record, (view, terrain));
@@ -152,16 +161,16 @@ fn go_over<'t>(
     replayer: &mut Replayer<'t>,
     trajectory: &mut Trajectory,
     (first, settings): (&Terrain<'t>, &Settings),
-    told: &Told,
+    tick: &Tick,
     recording: &mut Recording,
 ) -> Result<(), ReplayError> {
-    let described = settings.views.iter().find(|view| view.number == told.view);
+    let described = settings.views.iter().find(|view| view.number == tick.view);
     let Some(view) = described else {
-        return Err(trajectory.of_unknown_view(told).into());
+        return Err(trajectory.of_unknown_view(tick.view).into());
     };
     let terrain = terrain_of(first, view)?;
-    let row = trajectory.lay(told, terrain.scale())?;
-    replayer.put_view(terrain, view.law(), row.hip)?;
+    let hip = trajectory.to_grid(tick.hip_mm, terrain.scale())?;
+    replayer.put_view(terrain, view.law(), hip)?;
     Ok(recording.view(view)?)
 }
 
@@ -174,12 +183,24 @@ pub fn is_below_ground(sample: &Sample, record: &Record, terrain: &Terrain<'_>) 
     waits && terrain.height_mm(x, y).is_some_and(|ground| z < ground)
 }
 
-/// A replayer on the application in this program's memory.
+/// A replayer on the application in this program's memory, a thousand ticks a second.
 ///
 /// # Errors
 /// As [`Replayer::open`].
 pub fn on_native<'t>(terrain: &'t Terrain<'t>, law: ForceLaw) -> Result<Replayer<'t>, LinkError> {
-    let device: Box<dyn Transport> = Box::new(Native::for_replay());
+    on_native_at(TickRate::DEFAULT, terrain, law)
+}
+
+/// The same at another tick rate.
+///
+/// # Errors
+/// As [`Replayer::open`].
+pub fn on_native_at<'t>(
+    rate: TickRate,
+    terrain: &'t Terrain<'t>,
+    law: ForceLaw,
+) -> Result<Replayer<'t>, LinkError> {
+    let device = Native::for_replay_at(rate);
     Replayer::open(terrain, law, device, Patience::EMULATED)
 }
 

@@ -71,13 +71,14 @@ impl Folder {
         std::fs::write(self.path(name), text).expect("written");
     }
 
-    /// Makes a trajectory that goes up and down over the hills.
+    /// Makes a trajectory of a row a tick that goes up and down over the hills.
     pub(super) fn write_trajectory(&self, name: &str) {
         let mut text = "t_s,x_mm,y_mm,z_mm\n".to_owned();
         for tick in 0..400 {
             let t = f64::from(tick) / 400.0;
             let (x, z) = (60.0 + 30.0 * t, 40.0 * (12.0 * t).cos() + 20.0);
-            text += &format!("{t},{x},{},{z}\n", 70.0 - 10.0 * t);
+            let t_s = f64::from(tick) * 1e-3;
+            text += &format!("{t_s},{x},{},{z}\n", 70.0 - 10.0 * t);
         }
         self.write(name, &text);
     }

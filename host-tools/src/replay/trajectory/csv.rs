@@ -5,12 +5,14 @@ use std::io::{self, Read, Seek, SeekFrom};
 use csv::{ByteRecord, ReaderBuilder, Trim};
 
 use super::comments::{self, Again};
-use super::{COLUMNS, Numbers, Told, TrajectoryFault, VIEW};
+use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of};
 
 /// Rows of a CSV file that are read one by one.
 pub(super) struct Rows<R> {
     reader: csv::Reader<Again<R>>,
     record: ByteRecord,
+    /// The columns that are read.
+    read: &'static [&'static str],
     columns: usize,
     was_cut: bool,
     /// Which column tells the view, where there is one.
@@ -31,6 +33,7 @@ impl<R: Read + Seek> Rows<R> {
         let mut rows = Self {
             reader,
             record: ByteRecord::new(),
+            read: &COLUMNS,
             columns: 0,
             was_cut: false,
             view: None,
@@ -42,23 +45,23 @@ impl<R: Read + Seek> Rows<R> {
     fn read_header(&mut self) -> Result<(), TrajectoryFault> {
         self.read_record()?;
         let names: Vec<_> = self.record.iter().map(String::from_utf8_lossy).collect();
-        let fits = names.len() >= COLUMNS.len() && names.iter().zip(COLUMNS).all(|(a, b)| a == b);
         self.columns = names.len();
         self.view = names.iter().position(|name| name == VIEW);
-        if !fits {
+        let Some(read) = columns_of(&names) else {
             let found = shown(&names.join(","));
             let at = self.place();
             return Err(TrajectoryFault::Header { at, found });
-        }
+        };
+        self.read = read;
         Ok(())
     }
 
     /// The next row; `None` after the last.
-    pub(super) fn next(&mut self) -> Result<Option<Told>, TrajectoryFault> {
+    pub(super) fn next(&mut self) -> Result<Option<Row>, TrajectoryFault> {
         if !self.read_record()? {
             return Ok(None);
         }
-        if self.record.len() < self.columns && self.columns > COLUMNS.len() && self.is_cut() {
+        if self.record.len() < self.columns && self.columns > self.read.len() && self.is_cut() {
             self.was_cut = true;
             return Ok(None);
         }
@@ -69,7 +72,8 @@ impl<R: Read + Seek> Rows<R> {
                 expected: self.columns,
             });
         }
-        let mut numbers = Numbers::default();
+        let mut numbers = [0.0; COLUMNS.len()];
+        let numbers = numbers.get_mut(..self.read.len()).unwrap_or_default();
         for (column, number) in numbers.iter_mut().enumerate() {
             *number = self.number(column)?;
         }
@@ -77,7 +81,7 @@ impl<R: Read + Seek> Rows<R> {
             Some(column) => self.view(column)?,
             None => 0,
         };
-        Ok(Some(Told { numbers, view }))
+        Ok(Some(Row::new(numbers, view)))
     }
 
     fn view(&mut self, column: usize) -> Result<u32, TrajectoryFault> {
@@ -136,7 +140,7 @@ impl<R: Read + Seek> Rows<R> {
         let found = shown(&String::from_utf8_lossy(field));
         Err(TrajectoryFault::Field {
             at: self.place(),
-            column: COLUMNS[column],
+            column: self.read.get(column).copied().unwrap_or_default(),
             what: format!("`{found}` is not a finite number"),
         })
     }

@@ -24,6 +24,12 @@ impl TrajectoryError {
     pub const fn is_about_settings(&self) -> bool {
         matches!(self.fault, TrajectoryFault::Settings(_))
     }
+
+    /// Returns true if its times cannot be right.
+    #[must_use]
+    pub const fn is_about_time(&self) -> bool {
+        matches!(self.fault, TrajectoryFault::Time { .. })
+    }
 }
 
 /// What is wrong with a trajectory, and where. Lines and rows count from 1.
@@ -32,7 +38,7 @@ pub(super) enum TrajectoryFault {
     #[error("cannot read the trajectory: {0}")]
     Unreadable(io::Error),
     #[error(
-        "{at} is not the header of a trajectory: `{found}` where `t_s,x_mm,y_mm,z_mm` is expected"
+        "{at} is not the header of a trajectory: `{found}` where `t_s,x_mm,y_mm,z_mm` is expected, or `x_mm,y_mm,z_mm` without times"
     )]
     Header { at: String, found: String },
     #[error(
@@ -51,6 +57,31 @@ pub(super) enum TrajectoryFault {
         column: &'static str,
         what: String,
     },
+    #[error("{at}, column t_s: {what}")]
+    Time { at: String, what: TimeFault },
     #[error("{0}")]
     Settings(BadSettings),
+}
+
+/// A time, s, that cannot follow on the time of the row before.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub(in crate::replay) enum TimeFault {
+    #[error("time goes back from {from} s to {to} s")]
+    Backwards { from: f64, to: f64 },
+    #[error("two places at {0} s: the HIP cannot be at both")]
+    TwoPlaces(f64),
+    #[error("time begins at {to} s, and all rows before, at several places, have {from} s")]
+    Begins { from: f64, to: f64 },
+    #[error(
+        "the HIP moves during a gap of {step} s, from {from} s to {to} s: where it was meanwhile is not known"
+    )]
+    Gap { from: f64, to: f64, step: f64 },
+    #[error("a gap of {step} s, from {from} s to {to} s")]
+    Rest { from: f64, to: f64, step: f64 },
+    #[error("numbers near {0} s are too far apart to tell ticks by them")]
+    TooLarge(f64),
+    #[error(
+        "{to} s is {ticks} ticks after the row before, where the settings say {tick_hz} ticks a second"
+    )]
+    OffTick { to: f64, ticks: f64, tick_hz: f64 },
 }

@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use csv::{ReaderBuilder, StringRecord, Trim};
+use hapterra_core::rate::TickRate;
 use parquet::file::reader::SerializedFileReader;
 use parquet::record::Field;
 use parquet::record::reader::RowIter;
@@ -30,7 +31,7 @@ type Values = [Option<f64>; NAMES.len()];
 /// What was felt in a row.
 #[derive(Clone, Copy, Debug)]
 pub struct FeltRow {
-    /// The view that it was felt in: [`super::Told::view`].
+    /// The view that it was felt in: [`super::Row::view`].
     pub view: u32,
     /// What was felt. A trajectory tells a place alone: no contact, and the proxy at the HIP.
     pub record: Record,
@@ -43,6 +44,8 @@ pub struct FeltRows {
     /// recording was cut, and the view.
     trajectory: Trajectory,
     form: Form,
+    /// Rows so far of a file without times: one a tick.
+    untimed: u64,
 }
 
 enum Form {
@@ -67,6 +70,7 @@ impl FeltRows {
             path: path.to_owned(),
             trajectory,
             form,
+            untimed: 0,
         })
     }
 
@@ -83,21 +87,26 @@ impl FeltRows {
     }
 
     fn next_row(&mut self) -> Result<Option<FeltRow>, TrajectoryError> {
-        let Some(told) = self.trajectory.next_told()? else {
+        let Some(row) = self.trajectory.next_row()? else {
             return Ok(None);
         };
         let described = self.trajectory.settings();
         let knows = |settings: &Settings| {
-            settings.views.is_empty() || settings.views.iter().any(|view| view.number == told.view)
+            settings.views.is_empty() || settings.views.iter().any(|view| view.number == row.view)
         };
-        if told.view != 0 && !described.is_none_or(knows) {
-            return Err(self.trajectory.of_unknown_view(&told));
+        if row.view != 0 && !described.is_none_or(knows) {
+            return Err(self.trajectory.of_unknown_view(row.view));
         }
         let values = self.form.values();
         let values = values.map_err(|fault| TrajectoryError::new(&self.path, fault))?;
-        Ok(values.map(|values| FeltRow {
-            view: told.view,
-            record: record(&values),
+        let mut record = values.as_ref().map(record);
+        if let (None, Some(record)) = (row.t_s, &mut record) {
+            record.t_s = self.untimed as f64 / f64::from(TickRate::DEFAULT.hz());
+            self.untimed += 1;
+        }
+        Ok(record.map(|record| FeltRow {
+            view: row.view,
+            record,
         }))
     }
 }

@@ -1,4 +1,5 @@
-//! Trajectory files: `t_s,x_mm,y_mm,z_mm` as CSV, or a recording in either form.
+//! Trajectory files: `t_s,x_mm,y_mm,z_mm` or `x_mm,y_mm,z_mm` as CSV, or a recording in either
+//! form.
 //!
 //! Lengths are millimetres of the arm's tip over the felt terrain: x east, y north, z up,
 //! origin at the south-west sample at height zero.
@@ -21,32 +22,54 @@ pub use felt_rows::{FeltRow, FeltRows};
 
 use super::settings::Settings;
 use crate::terrain::Scale;
+pub(super) use fault::TimeFault;
 use fault::TrajectoryFault;
 
 /// The columns, in this order. A recording begins with them, too, and further
 /// columns are passed over, so what was recorded can be replayed.
 const COLUMNS: [&str; 4] = ["t_s", "x_mm", "y_mm", "z_mm"];
 
+/// The same without the time.
+const PLACE: &[&str] = COLUMNS.split_at(1).1;
+
+/// Returns the columns that every row begins with, if a header begins as a trajectory's does.
+fn columns_of<N: AsRef<str>>(header: &[N]) -> Option<&'static [&'static str]> {
+    let begins = |columns: &[&str]| {
+        let names = header.iter().map(AsRef::as_ref);
+        names.take(columns.len()).eq(columns.iter().copied())
+    };
+    [&COLUMNS[..], PLACE].into_iter().find(|it| begins(it))
+}
+
 /// The column that tells in which view a row was felt.
 const VIEW: &str = "view";
 
-/// One position of the HIP.
+/// A row as it stands in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Time, s.
-    pub t_s: f64,
+    /// Time, s; none in a file without the column.
+    pub t_s: Option<f64>,
     /// Position of the HIP, mm: east, north, up.
     pub hip_mm: [f64; 3],
-    /// The same on the grid.
-    pub hip: GridPoint,
+    /// The view that it was felt in; 0 for the view of the beginning, or where the file has no
+    /// such column.
+    pub view: u32,
 }
 
-/// What a row tells before its place is laid on a grid.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Told {
-    numbers: Numbers,
-    /// The view that it was felt in; 0 for the view of the beginning, or where nothing is said.
-    pub view: u32,
+impl Row {
+    /// A row of the values of the first columns, of which the time may be missing.
+    fn new(numbers: &[f64], view: u32) -> Self {
+        let (t_s, place) = match numbers {
+            [t_s, place @ ..] if place.len() == PLACE.len() => (Some(*t_s), place),
+            place => (None, place),
+        };
+        let number = |axis: usize| place.get(axis).copied().unwrap_or_default();
+        Self {
+            t_s,
+            hip_mm: std::array::from_fn(number),
+            view,
+        }
+    }
 }
 
 /// A trajectory that is read row by row.
@@ -54,17 +77,12 @@ pub struct Trajectory {
     path: PathBuf,
     form: Form,
     settings: Option<Settings>,
-    latest_s: f64,
-    told: bool,
 }
 
 enum Form {
     Csv(Box<csv::Rows<File>>),
     Parquet(Box<parquet::Rows>),
 }
-
-/// A row as it stands in the file: the values of [`COLUMNS`].
-type Numbers = [f64; COLUMNS.len()];
 
 impl Trajectory {
     /// Opens a trajectory file, reads its settings, where it is a recording, and checks
@@ -95,8 +113,6 @@ impl Trajectory {
             path: path.to_owned(),
             form,
             settings: Settings::from_toml(&text).map_err(TrajectoryFault::Settings)?,
-            latest_s: f64::NEG_INFINITY,
-            told: false,
         })
     }
 
@@ -107,52 +123,49 @@ impl Trajectory {
         self.settings.as_ref()
     }
 
-    /// The next row, on the grid of a scale; `None` after the last.
+    /// The next row; `None` after the last.
     ///
     /// # Errors
     /// [`TrajectoryError`] names the line and the column.
-    pub fn next_row(&mut self, scale: &Scale) -> Result<Option<Row>, TrajectoryError> {
-        match self.next_told()? {
-            Some(told) => self.lay(&told, scale).map(Some),
-            None => Ok(None),
-        }
-    }
-
-    /// The next row as it stands in the file; `None` after the last. [`Self::lay`] puts it on
-    /// the grid of its view.
-    ///
-    /// # Errors
-    /// As [`Self::next_row`].
-    pub fn next_told(&mut self) -> Result<Option<Told>, TrajectoryError> {
-        let told = match &mut self.form {
+    pub fn next_row(&mut self) -> Result<Option<Row>, TrajectoryError> {
+        let row = match &mut self.form {
             Form::Csv(rows) => rows.next(),
             Form::Parquet(rows) => rows.next(),
         };
-        told.map_err(|fault| self.wrong(fault))
+        row.map_err(|fault| self.wrong(fault))
     }
 
-    /// A row that nobody can lay on a grid, because its view is not described.
+    /// The latest row cannot be put on a grid, because its view is not described.
     #[must_use]
-    pub fn of_unknown_view(&mut self, told: &Told) -> TrajectoryError {
+    pub fn of_unknown_view(&mut self, view: u32) -> TrajectoryError {
         let (at, column) = (self.place(), VIEW);
-        let what = format!("the recording does not describe view {}", told.view);
+        let what = format!("the recording does not describe view {view}");
         self.wrong(TrajectoryFault::Field { at, column, what })
     }
 
-    /// The latest row on the grid of a scale.
+    /// The latest row cannot follow on the one before it.
+    pub(super) fn mistimed(&mut self, what: TimeFault) -> TrajectoryError {
+        let at = self.place();
+        self.wrong(TrajectoryFault::Time { at, what })
+    }
+
+    /// Puts a place at the latest row, or between it and the one before, on the grid of a scale.
     ///
     /// # Errors
     /// As [`Self::next_row`].
-    pub fn lay(&mut self, told: &Told, scale: &Scale) -> Result<Row, TrajectoryError> {
-        let [t_s, x, y, z] = told.numbers;
-        let hip_mm = [x, y, z];
-        let Some(hip) = scale.to_grid(hip_mm) else {
-            let (column, what) = far(hip_mm, scale);
-            let at = self.place();
-            return Err(self.wrong(TrajectoryFault::Field { at, column, what }));
-        };
-        self.watch_time(t_s);
-        Ok(Row { t_s, hip_mm, hip })
+    pub fn to_grid(
+        &mut self,
+        hip_mm: [f64; 3],
+        scale: &Scale,
+    ) -> Result<GridPoint, TrajectoryError> {
+        match scale.to_grid(hip_mm) {
+            Some(hip) => Ok(hip),
+            None => {
+                let (column, what) = far(hip_mm, scale);
+                let at = self.place();
+                Err(self.wrong(TrajectoryFault::Field { at, column, what }))
+            }
+        }
     }
 
     /// Whether the last row of the recording was cut in its middle, and is left out: the
@@ -176,18 +189,6 @@ impl Trajectory {
     fn wrong(&self, fault: TrajectoryFault) -> TrajectoryError {
         TrajectoryError::new(&self.path, fault)
     }
-
-    /// Time is passed on, not used; that it runs backwards is worth a word, once.
-    fn watch_time(&mut self, t_s: f64) {
-        if t_s < self.latest_s && !self.told {
-            tracing::warn!(
-                "{}: time runs backwards at {t_s} s; rows are felt in the order of the file",
-                self.path.display()
-            );
-            self.told = true;
-        }
-        self.latest_s = t_s;
-    }
 }
 
 /// Which column of a place is too far from the origin, and what to say of it.
@@ -197,7 +198,7 @@ fn far(hip_mm: [f64; 3], scale: &Scale) -> (&'static str, String) {
     let axis = hip_mm.iter().position(far).unwrap_or(0);
     let mm = hip_mm.get(axis).copied().unwrap_or_default();
     let what = format!("{mm} mm is farther than {MAX_CELL} cells of {cell_mm} mm from the origin");
-    (COLUMNS[1 + axis], what)
+    (PLACE.get(axis).copied().unwrap_or_default(), what)
 }
 
 /// What a CSV file tells of views between its rows; nothing where it cannot be wound back.

@@ -8,7 +8,7 @@ use parquet::data_type::{DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
-use super::{COLUMNS, Numbers, Told, TrajectoryFault, VIEW};
+use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of};
 use crate::replay::settings::KEY;
 
 /// Rows that are read at a time.
@@ -19,6 +19,8 @@ pub(super) struct Rows {
     reader: SerializedFileReader<File>,
     /// The next group of rows to be read.
     next_group: usize,
+    /// The columns that are read.
+    names: &'static [&'static str],
     /// What reads the columns of the present group.
     columns: Vec<ColumnReaderImpl<DoubleType>>,
     /// Which column tells the view, where there is one; what reads it, and what it read.
@@ -26,7 +28,7 @@ pub(super) struct Rows {
     view: Option<ColumnReaderImpl<Int64Type>>,
     views: Vec<i64>,
     /// Rows that were read, and are not told yet from `next` on.
-    read: [Vec<f64>; COLUMNS.len()],
+    read: Vec<Vec<f64>>,
     next: usize,
     /// Rows told so far.
     told: u64,
@@ -42,10 +44,10 @@ impl Rows {
         let text = settings.filter_map(|entry| entry.value.clone()).collect();
         let schema = about.schema_descr().columns();
         let names: Vec<_> = schema.iter().map(|column| column.name()).collect();
-        if !names.starts_with(&COLUMNS) {
+        let Some(read) = columns_of(&names) else {
             let first: Vec<_> = names.into_iter().take(COLUMNS.len()).collect();
             return Err(TrajectoryFault::Schema(first.join(", ")));
-        }
+        };
         let view_column = names.iter().position(|name| *name == VIEW);
         let rows = Self {
             view_column,
@@ -53,8 +55,9 @@ impl Rows {
             views: Vec::new(),
             reader,
             next_group: 0,
+            names: read,
             columns: Vec::new(),
-            read: Default::default(),
+            read: vec![Vec::new(); read.len()],
             next: 0,
             told: 0,
         };
@@ -62,22 +65,22 @@ impl Rows {
     }
 
     /// The next row; `None` after the last.
-    pub(super) fn next(&mut self) -> Result<Option<Told>, TrajectoryFault> {
-        while self.next >= self.read[0].len() {
+    pub(super) fn next(&mut self) -> Result<Option<Row>, TrajectoryFault> {
+        while self.next >= self.read.first().map_or(0, Vec::len) {
             if !self.read_more()? {
                 return Ok(None);
             }
         }
-        let mut numbers = Numbers::default();
-        for (column, number) in numbers.iter_mut().enumerate() {
-            let value = self.read[column].get(self.next).copied();
-            *number = value
-                .filter(|x| x.is_finite())
-                .ok_or_else(|| TrajectoryFault::Field {
-                    at: format!("row {}", self.told + 1),
-                    column: COLUMNS[column],
-                    what: "no finite number".into(),
-                })?;
+        let mut numbers = [0.0; COLUMNS.len()];
+        let numbers = numbers.get_mut(..self.read.len()).unwrap_or_default();
+        let columns = self.names.iter().zip(&self.read);
+        for (number, (column, values)) in numbers.iter_mut().zip(columns) {
+            let value = values.get(self.next).copied().filter(|x| x.is_finite());
+            *number = value.ok_or_else(|| TrajectoryFault::Field {
+                at: format!("row {}", self.told + 1),
+                column,
+                what: "no finite number".into(),
+            })?;
         }
         let view = self.views.get(self.next).copied().unwrap_or(0);
         let view = u32::try_from(view).map_err(|_| TrajectoryFault::Field {
@@ -87,7 +90,7 @@ impl Rows {
         })?;
         self.next += 1;
         self.told += 1;
-        Ok(Some(Told { numbers, view }))
+        Ok(Some(Row::new(numbers, view)))
     }
 
     /// The present row, for a message.
@@ -110,7 +113,7 @@ impl Rows {
             let read = column.read_records(AT_A_TIME, None, None, &mut self.views);
             read.map_err(unreadable)?;
         }
-        if !self.read[0].is_empty() {
+        if self.read.first().is_some_and(|values| !values.is_empty()) {
             return Ok(true);
         }
         if self.next_group >= self.reader.num_row_groups() {
@@ -122,7 +125,7 @@ impl Rows {
             .map_err(unreadable)?;
         self.next_group += 1;
         self.columns.clear();
-        for (index, name) in COLUMNS.iter().enumerate() {
+        for (index, name) in self.names.iter().enumerate() {
             let column = group.get_column_reader(index).map_err(unreadable)?;
             let ColumnReader::DoubleColumnReader(column) = column else {
                 return Err(TrajectoryFault::Schema(format!("{name}, another type")));

@@ -13,7 +13,8 @@ fn rows_of(path: &Path) -> Result<Vec<Row>, TrajectoryError> {
     let scale = Scale::new(1.0, 1.0).expect("valid");
     let mut trajectory = Trajectory::open(path)?;
     let mut rows = Vec::new();
-    while let Some(row) = trajectory.next_row(&scale)? {
+    while let Some(row) = trajectory.next_row()? {
+        trajectory.to_grid(row.hip_mm, &scale)?;
         rows.push(row);
     }
     Ok(rows)
@@ -42,6 +43,22 @@ fn forgiving_about_white_space_line_ends_and_marks() {
 }
 
 #[test]
+fn a_path_may_have_no_times() {
+    let plain = rows("x_mm,y_mm,z_mm\n1,2.5,-3e1\n4,5,6\n").expect("plain");
+    let places: Vec<_> = plain.iter().map(|row| (row.t_s, row.hip_mm)).collect();
+    assert_eq!(places, [(None, [1.0, 2.5, -30.0]), (None, [4.0, 5.0, 6.0])]);
+    let more = rows("x_mm,y_mm,z_mm,view,t_s\n1,2,3,7,9\n").expect("further columns");
+    assert_eq!((more[0].t_s, more[0].view), (None, 7));
+    let wrong = message("x_mm,y_mm,z_mm\n1,2\n");
+    assert!(
+        wrong.contains("line 2 has 2 columns where the header has 3"),
+        "{wrong}"
+    );
+    let wrong = message("x_mm,y_mm,z_mm\n1,2,high\n");
+    assert!(wrong.contains("line 2, column z_mm: `high`"), "{wrong}");
+}
+
+#[test]
 fn a_recording_that_was_cut_in_a_row_has_the_rows_before() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("t.csv");
@@ -52,9 +69,8 @@ fn a_recording_that_was_cut_in_a_row_has_the_rows_before() {
     let last_comma = whole.len() - "touching\n".len();
     for end in last_row + 1..last_comma {
         std::fs::write(&path, &whole[..end]).expect("written");
-        let scale = Scale::new(1.0, 1.0).expect("valid");
         let mut trajectory = Trajectory::open(&path).expect("a header");
-        let mut next = || trajectory.next_row(&scale).expect("whole rows");
+        let mut next = || trajectory.next_row().expect("whole rows");
         assert_eq!(next().map(|row| row.hip_mm), Some([1.0, 2.0, 3.0]));
         assert_eq!(next(), None, "{:?}", &whole[..end]);
         assert!(trajectory.was_cut());

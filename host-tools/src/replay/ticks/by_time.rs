@@ -1,0 +1,198 @@
+//! Ticks by the times of rows, and which times cannot be right.
+
+use super::counts::Untimed;
+use super::{ON_TICK, Pace, Row, Tick, Ticks, TimeFault, TrajectoryError};
+
+/// The HIP may move on one straight line for so long, s: what is seen less often than every 2 s
+/// is not a hand's path.
+const LONGEST_MOVE_S: f64 = 2.0;
+/// The HIP may rest between two rows for so long, s: beyond, another clock is likelier.
+const LONGEST_REST_S: f64 = 600.0;
+
+/// A row with a time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Timed {
+    row: Row,
+    t_s: f64,
+    /// Whether a tick was at it or next to it.
+    is_felt: bool,
+}
+
+/// What follows on a row.
+enum Next {
+    /// A later row.
+    Row(Timed),
+    /// A row with which ticks begin anew.
+    Anew(Timed),
+    /// All rows so far have the same time: they state none.
+    Untimed,
+    /// The last row was read.
+    End,
+}
+
+impl Ticks {
+    /// The next tick by the rows' own times.
+    pub(super) fn next_by_time(&mut self) -> Result<Option<Tick>, TrajectoryError> {
+        let Some(mut before) = self.before else {
+            return self.first();
+        };
+        loop {
+            let next = match self.ahead.take() {
+                Some(row) => Next::Row(row),
+                None => self.follow(&before)?,
+            };
+            let mut ahead = match next {
+                Next::Row(ahead) => ahead,
+                Next::Anew(row) => return self.begin(row).map(Some),
+                Next::Untimed => return self.next_row(),
+                Next::End => return Ok(None),
+            };
+            let late = self.due.late(ahead.t_s);
+            if late > ON_TICK {
+                let tick = self.between(&before, &ahead);
+                (before.is_felt, ahead.is_felt) = (true, true);
+                (self.before, self.ahead) = (Some(before), Some(ahead));
+                return Ok(Some(tick));
+            }
+            self.counts.passed_over += u64::from(!before.is_felt);
+            ahead.is_felt |= late >= -ON_TICK;
+            self.before = Some(ahead);
+            if late >= -ON_TICK {
+                return Ok(Some(self.tick_at(&ahead.row)));
+            }
+            before = ahead;
+        }
+    }
+
+    fn first(&mut self) -> Result<Option<Tick>, TrajectoryError> {
+        let Some(row) = self.read()? else {
+            return Ok(None);
+        };
+        match row.t_s {
+            Some(t_s) => self.begin(Timed::new(row, t_s)).map(Some),
+            None => {
+                self.counts.untimed = Some(Untimed::Missing);
+                self.pace = Pace::RowByRow;
+                self.held.push_back(row);
+                self.next_row()
+            }
+        }
+    }
+
+    /// Tick 0, at a row.
+    fn begin(&mut self, row: Timed) -> Result<Tick, TrajectoryError> {
+        if self.due.is_coarse_at(row.t_s) {
+            return Err(self.trajectory.mistimed(TimeFault::TooLarge(row.t_s)));
+        }
+        (self.due.begin_s, self.due.next) = (row.t_s, 0);
+        let is_felt = true;
+        self.before = Some(Timed { is_felt, ..row });
+        Ok(self.tick_at(&row.row))
+    }
+
+    /// The next tick, on the straight line between two rows.
+    fn between(&mut self, before: &Timed, ahead: &Timed) -> Tick {
+        let t_s = self.due.s();
+        let share = (t_s - before.t_s) / (ahead.t_s - before.t_s);
+        let ways = before.row.hip_mm.iter().zip(ahead.row.hip_mm);
+        let mut hip_mm = [0.0; 3];
+        for (at, (from, to)) in hip_mm.iter_mut().zip(ways) {
+            *at = from + (to - from) * share;
+        }
+        self.due.next += 1;
+        self.counts.filled_in += 1;
+        Tick {
+            t_s,
+            hip_mm,
+            view: ahead.row.view,
+        }
+    }
+
+    /// Reads the next row that is later than another.
+    fn follow(&mut self, before: &Timed) -> Result<Next, TrajectoryError> {
+        let mut repeated = 0;
+        // Rows at one time alone may be those of a file whose times say nothing.
+        let is_begin = self.counts.rows == 1 && self.pace == Pace::ByTime;
+        loop {
+            let row = self.read()?;
+            let Some((row, t_s)) = row.and_then(|row| Some((row, row.t_s?))) else {
+                self.counts.passed_over += u64::from(!before.is_felt);
+                return Ok(match is_begin && repeated > 0 {
+                    true => self.without_times(before, repeated, None),
+                    false => Next::End,
+                });
+            };
+            let is_still = row.hip_mm == before.row.hip_mm;
+            if t_s != before.t_s {
+                self.counts.repeated += repeated;
+                return self.later(before, Timed::new(row, t_s), is_still);
+            }
+            if !is_still && is_begin {
+                return Ok(self.without_times(before, repeated, Some(row)));
+            }
+            if !is_still {
+                return Err(self.trajectory.mistimed(TimeFault::TwoPlaces(t_s)));
+            }
+            repeated += 1;
+        }
+    }
+
+    /// Feels rows as ticks from now on: the first row was felt, and those after it have its time.
+    fn without_times(&mut self, first: &Timed, repeated: u64, row: Option<Row>) -> Next {
+        self.counts.untimed = Some(Untimed::Same(first.t_s));
+        self.pace = Pace::RowByRow;
+        self.held.extend((0..repeated).map(|_| first.row));
+        self.held.extend(row);
+        Next::Untimed
+    }
+
+    /// A row at another time than the one before it, if that can be right.
+    fn later(
+        &mut self,
+        before: &Timed,
+        row: Timed,
+        is_still: bool,
+    ) -> Result<Next, TrajectoryError> {
+        let (from, to) = (before.t_s, row.t_s);
+        let step = to - from;
+        let fault = match self.pace {
+            _ if step < 0.0 => Some(TimeFault::Backwards { from, to }),
+            Pace::Recorded => self.off_tick(from, to),
+            _ if step > LONGEST_REST_S => Some(TimeFault::Rest { from, to, step }),
+            _ if step > LONGEST_MOVE_S && !is_still => Some(TimeFault::Gap { from, to, step }),
+            _ => None,
+        };
+        if let Some(fault) = fault {
+            return Err(self.trajectory.mistimed(fault));
+        }
+        if self.pace == Pace::Recorded {
+            let is_gap = step > LONGEST_MOVE_S;
+            self.counts.gaps += u64::from(is_gap);
+            if is_gap || row.row.view != before.row.view {
+                return Ok(Next::Anew(row));
+            }
+        } else if !is_still {
+            self.counts.moves(step);
+        }
+        Ok(Next::Row(row))
+    }
+
+    /// What contradicts the rate of a recording, if anything does.
+    fn off_tick(&self, from: f64, to: f64) -> Option<TimeFault> {
+        let late = self.due.late(to);
+        let is_tick = late >= -ON_TICK && (late - late.round()).abs() <= ON_TICK;
+        let ticks = ((to - from) * self.due.tick_hz * 1e3).round() / 1e3;
+        let tick_hz = self.due.tick_hz;
+        (!is_tick).then_some(TimeFault::OffTick { to, ticks, tick_hz })
+    }
+}
+
+impl Timed {
+    const fn new(row: Row, t_s: f64) -> Self {
+        Self {
+            row,
+            t_s,
+            is_felt: false,
+        }
+    }
+}
