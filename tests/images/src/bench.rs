@@ -2,7 +2,6 @@
 
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::Rule;
 use hapterra_core::scene::{Scene, Source};
 
 use crate::device::{Device, Plane, machines};
@@ -55,7 +54,7 @@ impl Bench {
             .scale
             .to_grid(self.plane.place.home_mm)
             .expect("addressable");
-        terrain.scene(self.plane.law, Rule::Swept, Source::Encoders, home)
+        terrain.scene(self.plane.law, Source::Encoders, home)
     }
 
     /// Presses 3 mm deep and holds still.

@@ -8,7 +8,6 @@ use hapterra::link::{Ask, Bulk, BulkEndpoints, Event, Patience, Session, Transpo
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
 use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Mode, Report};
 use hapterra_core::phantom::Calibration;
@@ -57,7 +56,7 @@ pub fn on_each_board(
     let scale = Scale::new(1.0, 1.0).expect("scale");
     let terrain = Terrain::new(raster, scale, 0).expect("terrain");
     let home = scale.to_grid(home_mm).expect("addressable");
-    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, home);
+    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
     for machine in machines() {
         then(machine, &terrain, scene);
     }

@@ -6,7 +6,6 @@ use hapterra::link::{Client, Patience};
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::Vec3;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Source, View};
@@ -91,7 +90,7 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let at = |east| GridPoint::new([east, 640, 100], Vec3::ZERO);
-    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Encoders, at(640));
+    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, at(640));
     let mut client = Client::numbered(&terrain, scene, None, Patience::REAL_TIME, 1);
     raster.stop_waiting();
     let before = requests(&server);

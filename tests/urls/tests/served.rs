@@ -9,7 +9,6 @@ use hapterra::link::{Event, Native, Patience, Session, Transport};
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::Vec3;
-use hapterra_core::contact::Rule;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
@@ -215,7 +214,7 @@ fn a_device_gets_its_tiles_when_they_have_come_and_no_holes_before() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let home = GridPoint::new([640, 640, 100], Vec3::ZERO);
-    let scene = terrain.scene(ForceLaw::PREMIUM, Rule::Swept, Source::Points, home);
+    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Points, home);
     let mut device = Native::for_replay().restless();
     let is_mute = Rc::default();
     let line = Line {
