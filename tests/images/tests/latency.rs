@@ -7,7 +7,8 @@ mod tick_rate;
 
 use hapterra::raster::Raster;
 use hapterra::stability::limits;
-use hapterra_core::contact::WORK_PER_TICK;
+use hapterra_core::contact::work_per_tick;
+use hapterra_core::rate::TickRate;
 use hapterra_firmware::amplifier::{CURRENT_LOOP_US, DUTY_HZ};
 use hapterra_image_tests::chip::Chip;
 use hapterra_image_tests::device::{Device, Plane, machines, on_each_board};
@@ -119,6 +120,11 @@ fn the_fastest_tick_that_the_build_takes_ends_in_time() {
     }
 }
 
+/// Units of work of the counted ticks, and of each at 2 kHz or faster.
+fn counted_work() -> u32 {
+    work_per_tick(TickRate::new(10_000).expect("a rate"))
+}
+
 /// The most cycles that a row of the kept table has whose name is one of these, or begins with one
 /// that ends in `*`.
 fn kept(names: &[&str], is_m7: bool) -> u32 {
@@ -159,6 +165,12 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
         let costliest = whole.max(contact + around);
         let us = (costliest + own).div_ceil(core_hz / 1_000_000) + frames_us;
         println!("{board}: {us} µs at most");
+        // A tick of 1 kHz may do more work, each unit of which costs as much at most.
+        let slow = TickRate::new(1_000).expect("a rate");
+        let more = u64::from(contact) * u64::from(work_per_tick(slow)) / u64::from(counted_work());
+        let cycles = more + u64::from(around + own + frames_us * (core_hz / 1_000_000));
+        println!("{board}: {cycles} cycles at most at 1 kHz");
+        assert!(cycles <= u64::from(core_hz) / 1_000, "{board}: {cycles} cycles");
         let khz = &mut in_time_khz[usize::from(is_m7)];
         *khz = (*khz).min(1_000 / us);
     }
@@ -177,7 +189,7 @@ fn the_loops_data_are_within_the_lines_of_the_model() {
         let haptic_loop = machine.image.symbol_like(&["application", "LOOP"]);
         let bytes = haptic_loop.expect("the loop").size;
         // Two rows of a patch, each on two lines at most; queues, and what else is static.
-        let lines = u64::from(bytes / 32 + 1) + 4 * u64::from(WORK_PER_TICK) + 64;
+        let lines = u64::from(bytes / 32 + 1) + 4 * u64::from(counted_work()) + 64;
         assert!(lines <= H743_DATA_LINES, "{}: {lines}", machine.chip.board);
     }
 }
