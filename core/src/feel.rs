@@ -234,19 +234,21 @@ impl Feel {
         scene: &Scene,
         hip: GridPoint,
     ) -> Vec3 {
-        let mut point = self.point.take().unwrap_or_else(|| BegunPoint {
-            before: self.felt.clone(),
+        let felt = &self.felt;
+        let point = self.point.get_or_insert_with(|| BegunPoint {
+            before: felt.clone(),
             lacked: 0,
             tile: None,
         });
+        let (lacked, last) = (point.lacked, point.tile);
         // Where the HIP is follows from the point.
         let _ = self.felt.contact.land(window);
         let output = *self.felt.contact.step(window, &hip);
-        let may_lack = point.lacked < TILES_PER_SLOT * (D * D) as u32;
+        let may_lack = lacked < TILES_PER_SLOT * (D * D) as u32;
         let missing = output.missing_tile.filter(|_| may_lack);
         if missing.is_none() && !output.converged {
             self.felt.contact.resume(point.before.contact.output());
-            (self.progress, self.point) = (Progress::GoesOn, Some(point));
+            self.progress = Progress::GoesOn;
             return Vec3::ZERO;
         }
         let force_n = match missing {
@@ -254,13 +256,16 @@ impl Feel {
             None => self.force_n(window, scene, hip, &Mover::Points),
         };
         let Some(tile) = missing.or_else(|| self.missing().filter(|_| may_lack)) else {
-            self.progress = Progress::Done(point.tile.filter(|_| !may_lack));
+            self.point = None;
+            self.progress = Progress::Done(last.filter(|_| !may_lack));
             return force_n;
         };
-        point.lacked += u32::from(self.progress != Progress::Lacks(tile));
-        (self.progress, point.tile) = (Progress::Lacks(tile), Some(tile));
-        self.felt = point.before.clone();
-        self.point = Some(point);
+        if let Some(point) = &mut self.point {
+            point.lacked += u32::from(self.progress != Progress::Lacks(tile));
+            point.tile = Some(tile);
+            self.felt = point.before.clone();
+        }
+        self.progress = Progress::Lacks(tile);
         Vec3::ZERO
     }
 

@@ -23,6 +23,8 @@ static MEMORY: ConstStaticCell<WorkingMemory<'static>> = ConstStaticCell::new(Wo
 /// Where the loop lives. Not in the interrupt's own variable: what has a value from the
 /// start takes flash, too.
 static LOOP: StaticCell<Loop> = StaticCell::new();
+/// Where the link lives. In its task, it would be moved over the stack twice.
+static LINK: StaticCell<Link<'static, WINDOW>> = StaticCell::new();
 /// Carries the loop to its interrupt: filled once, before that is enabled.
 static HANDOVER: Mutex<Cell<Option<&'static mut Loop>>> = Mutex::new(Cell::new(None));
 /// Raised, by an interrupt below the haptic one, when a tick has ended.
@@ -32,7 +34,7 @@ pub(crate) static TICK_DONE: Signal<CriticalSectionRawMutex, ()> = Signal::new()
 pub(crate) fn assemble(
     hardware: Hardware<Encoders, Amplifiers, Clock>,
     board: &str,
-) -> (Link<'static, WINDOW>, &'static Monitor) {
+) -> (&'static mut Link<'static, WINDOW>, &'static Monitor) {
     let Application {
         haptic_loop,
         link,
@@ -40,7 +42,7 @@ pub(crate) fn assemble(
     } = app::assemble(TILES.take(), MEMORY.take(), hardware, board);
     let haptic_loop = LOOP.init(haptic_loop);
     critical_section::with(|cs| HANDOVER.borrow(cs).set(Some(haptic_loop)));
-    (link, monitor)
+    (LINK.init(link), monitor)
 }
 
 /// Runs a tick in the haptic interrupt, whose own variable `slot` is. Returns the loop and

@@ -160,9 +160,9 @@ impl LinkBoard for Emulated {
 }
 
 #[embassy_executor::task]
-async fn serve_link(mut link: Link<'static, WINDOW>, monitor: &'static Monitor) {
+async fn serve_link(link: &'static mut Link<'static, WINDOW>, monitor: &'static Monitor) {
     let (rx, tx) = LINK.open();
-    run(&mut link, rx, tx, &Emulated::new(monitor)).await;
+    run(link, rx, tx, &Emulated::new(monitor)).await;
 }
 
 #[embassy_executor::task]
@@ -174,7 +174,11 @@ async fn serve_plant(port: PlantPort) {
 /// Starts the other tasks, which cannot be handed over from outside: what they
 /// hold between two awaits stays on this executor.
 #[embassy_executor::task]
-async fn start(link: Link<'static, WINDOW>, monitor: &'static Monitor, port: PlantPort) {
+async fn start(
+    link: &'static mut Link<'static, WINDOW>,
+    monitor: &'static Monitor,
+    port: PlantPort,
+) {
     // SAFETY: called from a task of the executor that is meant.
     let spawner = unsafe { Spawner::for_current_executor().await };
     spawner.spawn(serve_link(link, monitor).expect("started once"));

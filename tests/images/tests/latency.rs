@@ -173,7 +173,10 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
         let costliest = u64::from(materials).max(more + u64::from(around));
         let cycles = costliest + u64::from(own + frames_us * (core_hz / 1_000_000));
         println!("{board}: {cycles} cycles at most at 1 kHz");
-        assert!(cycles <= u64::from(core_hz) / 1_000, "{board}: {cycles} cycles");
+        assert!(
+            cycles <= u64::from(core_hz) / 1_000,
+            "{board}: {cycles} cycles"
+        );
         let khz = &mut in_time_khz[usize::from(is_m7)];
         *khz = (*khz).min(1_000 / us);
     }

@@ -22,9 +22,10 @@ use crate::terrain::{CellBox, Ground, Window};
 const WALK_CELLS: u32 = 4;
 /// Tallest piece, in cells, that is intersected.
 const WALK_HEIGHT: u32 = 16;
-/// Halvings that bring a path of millions of cells down to a walk, and two: where the
-/// path began, and where it leads since the HIP has moved.
-const DEPTH: usize = 22;
+/// Halvings that bring a path of 4,096 cells, eight windows, down to a walk, and two: where
+/// the path began, and where it leads since the HIP has moved. A longer one is walked in
+/// longer pieces.
+const DEPTH: usize = 12;
 
 /// How a sweep ended.
 #[derive(Clone, Copy, Debug)]

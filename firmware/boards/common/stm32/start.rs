@@ -79,7 +79,7 @@ async fn main(spawner: Spawner) {
         serial: SerialNumber::new(embassy_stm32::uid::uid()),
         boot,
     };
-    let (mut link, monitor) = application::assemble(hardware, BOARD);
+    let (link, monitor) = application::assemble(hardware, BOARD);
     link.offer_loader();
 
     // The same that the link tells.

@@ -67,7 +67,7 @@ impl LinkBoard for Board {
 /// Serves the link for ever.
 #[embassy_executor::task]
 pub(crate) async fn serve_link(
-    mut link: Link<'static, WINDOW>,
+    link: &'static mut Link<'static, WINDOW>,
     rx: BulkStream<<UsbDriver as Driver<'static>>::EndpointOut>,
     tx: BulkStream<<UsbDriver as Driver<'static>>::EndpointIn>,
     memory: CalibrationMemory,
@@ -76,7 +76,7 @@ pub(crate) async fn serve_link(
         memory,
         leaving: Cell::new(None),
     };
-    run(&mut link, rx, tx, &board).await;
+    run(link, rx, tx, &board).await;
 }
 
 /// Runs the USB stack and what its interrupt has to do, for ever, and checks in for both.
