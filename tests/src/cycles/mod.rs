@@ -27,7 +27,7 @@ const H743_PERIPHERAL: u64 = 32;
 pub const H743_DATA: u64 = 16_000;
 /// Lines of it: the loop's own data, four for each patch that a tick may look at, and a queue's. A
 /// test holds the images to them.
-pub const H743_DATA_LINES: u64 = 600;
+pub const H743_DATA_LINES: u64 = 615;
 /// Cycles of the core for one of them: 13 of the bus, four of which are transfers.
 pub const H743_DATA_LINE: u64 = 26;
 const _: () = assert!(H743_DATA_LINES * H743_DATA_LINE <= H743_DATA);

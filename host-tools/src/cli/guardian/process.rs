@@ -69,6 +69,8 @@ impl Watch {
         fcntl_setfd(&its_news, FdFlags::empty())?;
         let descriptors = (its_presses.as_raw_fd(), its_news.as_raw_fd());
         let (me, (presses_fd, news_fd)) = (std::process::id(), descriptors);
+        // Before the worker changes them.
+        let terminal = tcgetattr(io::stdin()).ok();
         let child = Command::new(std::env::current_exe()?)
             .args(std::env::args_os().skip(1))
             .env(worker::VARIABLE, format!("{me}:{presses_fd}:{news_fd}"))
@@ -79,7 +81,7 @@ impl Watch {
             presses,
             news,
             rest: vec![],
-            terminal: tcgetattr(io::stdin()).ok(),
+            terminal,
             is_listening: false,
             may_be_armed: BTreeSet::new(),
             leaving: BTreeSet::new(),
