@@ -13,9 +13,9 @@ use crate::terrain::TileIndex;
 
 /// Units of work a tick may spend at 1 kHz, and at any rate at most.
 ///
-/// A unit takes at most 350 cycles of a NUCLEO-G474RE by the model of docs/cycles.md, and all else
-/// of the costliest tick 55,000: 300 units and that are 160,000 of the 168,000 cycles of a
-/// millisecond.
+/// A unit takes at most 390 cycles of a NUCLEO-G474RE by the model of docs/cycles.md, and all else
+/// of the costliest tick 23,000. With 300 units that is less than the 168,000 cycles of a
+/// millisecond, which a test of the images holds it to.
 pub const WORK_PER_TICK: u32 = 300;
 /// Units of work that a tick may spend from 2 kHz on: what the costliest have time for at 10 kHz.
 const LEAST_WORK_PER_TICK: u32 = 86;
