@@ -277,7 +277,7 @@ fn a_hello_in_its_session() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 13, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 14, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -306,7 +306,7 @@ fn a_device_that_introduces_itself() {
         },
     });
     let wanted = [
-        std::vec![0, 13, 9, 8, 1, b'b'],
+        std::vec![0, 14, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xBE, 0x01, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],
@@ -359,6 +359,11 @@ fn a_request_and_its_answer() {
         result,
     });
     assert_eq!(bytes(&answer), [8, 200, 1, 1]);
+    let (number, request) = (201, Request::Mark);
+    let message = ToDevice::Request { number, request };
+    assert_eq!(bytes(&message), [5, 201, 11]);
+    let marked = ToHost::Marked { number, tick: 300 };
+    assert_eq!(bytes(&marked), [13, 201, 0xAC, 0x02]);
     let count = SampleCount {
         sent: 300,
         dropped: 2,

@@ -88,6 +88,8 @@ pub struct Device<'t> {
     pub latency_us: u16,
     /// What came of the latest request that was answered.
     pub answer: Option<(Request, Result<(), Refusal>)>,
+    /// The ticks that were marked.
+    pub marked: Vec<u32>,
 }
 
 impl<'t> Device<'t> {
@@ -116,6 +118,7 @@ impl<'t> Device<'t> {
             guard: None,
             status: None,
             answer: None,
+            marked: vec![],
         };
         device.run_ms(20);
         device
@@ -224,6 +227,7 @@ impl<'t> Device<'t> {
                 Event::Guard(report) => self.guard = Some(*report),
                 Event::Status(status) => self.status = Some(status.clone()),
                 Event::Answered { request, result } => self.answer = Some((*request, result)),
+                Event::Marked { tick } => self.marked.push(tick),
                 _ => {}
             };
             self.session
