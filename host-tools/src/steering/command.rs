@@ -1,21 +1,22 @@
 //! Commands as lines of text.
 
-use super::Steer;
+use super::marks::text_of;
+use super::{Steer, Wanted};
 use crate::place::ViewChange;
 
 /// What is understood, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (hand mm), pan-m EAST NORTH (ground m), zoom TIMES, \
-     exaggerate TIMES, stiffness TIMES, reset, clutch on, clutch off; `at SECONDS` before any of them, and before that \
+     exaggerate TIMES, stiffness TIMES, reset, clutch on, clutch off, mark TEXT; `at SECONDS` before any of them, and before that \
      `on NUMBER` for one device of several";
 
 /// A command, and when it is to be done.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Command {
     /// Seconds of the device's time since the beginning; as soon as what came before is
     /// done, where nothing is said.
     pub at_s: Option<f64>,
     /// What is to be done.
-    pub steer: Steer,
+    pub wanted: Wanted,
 }
 
 /// A line that is no command.
@@ -29,36 +30,66 @@ pub struct NoCommand {
 /// Characters of a line that a message repeats at most.
 const SHOWN: usize = 60;
 
-/// Reads a line; none where it is empty or a remark behind `#`.
+/// Reads a line; none where it is empty or a remark behind `#`. The text of a mark is all of the
+/// line's rest, `#` included.
 ///
 /// # Errors
 /// [`NoCommand`] says what is understood.
 pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
-    let text = line.split('#').next().unwrap_or_default();
-    let words: Vec<_> = text.split_whitespace().collect();
-    if words.is_empty() {
-        return Ok(None);
-    }
     let refused = |why| NoCommand {
-        line: text.trim().chars().take(SHOWN).collect(),
+        line: shown(line),
         why,
     };
-    read(&words).map(Some).map_err(refused)
+    let (at_s, rest) = timed(line).map_err(refused)?;
+    if let Some(text) = mark_in(rest) {
+        let text = text_of(text).map_err(refused)?;
+        let wanted = Wanted::Mark(text);
+        return Ok(Some(Command { at_s, wanted }));
+    }
+    let text = rest.split('#').next().unwrap_or_default();
+    let words: Vec<_> = text.split_whitespace().collect();
+    if words.is_empty() && at_s.is_none() {
+        return Ok(None);
+    }
+    let wanted = read(&words).map(Wanted::Steer).map_err(refused)?;
+    Ok(Some(Command { at_s, wanted }))
 }
 
-fn read(words: &[&str]) -> Result<Command, &'static str> {
-    let (at_s, words) = match words {
-        ["at", time, rest @ ..] => {
-            let at_s = number(time)?;
-            if at_s < 0.0 {
-                return Err("a time is not below zero");
-            }
-            (Some(at_s), rest)
-        }
-        _ => (None, words),
+/// The beginning of a line as a message may show it.
+fn shown(line: &str) -> String {
+    let visible = |c: char| if c.is_control() { '\u{FFFD}' } else { c };
+    line.trim().chars().take(SHOWN).map(visible).collect()
+}
+
+/// Takes `at SECONDS` from the beginning of a line.
+fn timed(line: &str) -> Result<(Option<f64>, &str), &'static str> {
+    let Some(rest) = after_word(line, "at") else {
+        return Ok((None, line));
     };
+    let rest = rest.trim_start();
+    let time = rest.split(|c: char| c.is_whitespace() || c == '#').next();
+    let time = time.unwrap_or_default();
+    match number(time)? {
+        at_s if at_s < 0.0 => Err("a time is not below zero"),
+        at_s => Ok((Some(at_s), rest.get(time.len()..).unwrap_or_default())),
+    }
+}
+
+/// What follows on a word at the beginning of a line; none where it begins otherwise.
+fn after_word<'l>(line: &'l str, word: &str) -> Option<&'l str> {
+    let rest = line.trim_start().strip_prefix(word)?;
+    let ends = rest.chars().next().is_none_or(char::is_whitespace);
+    ends.then_some(rest)
+}
+
+/// The text of a mark, where there is one in a line.
+fn mark_in(line: &str) -> Option<&str> {
+    after_word(line, "mark")
+}
+
+fn read(words: &[&str]) -> Result<Steer, &'static str> {
     let change = |change| Ok(Steer::Change(change));
-    let steer = match words {
+    match words {
         ["pan", east, north] => change(ViewChange::Pan {
             east_mm: number(east)?,
             north_mm: number(north)?,
@@ -78,8 +109,7 @@ fn read(words: &[&str]) -> Result<Command, &'static str> {
         ["clutch", ..] => Err("it is on or off"),
         [] => Err("a command is missing"),
         _ => Err("no such word"),
-    };
-    steer.map(|steer| Command { at_s, steer })
+    }
 }
 
 fn number(word: &str) -> Result<f64, &'static str> {
@@ -96,6 +126,7 @@ fn factor(word: &str) -> Result<f64, &'static str> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::marks::LONGEST_MARK;
     use super::*;
 
     #[test]
@@ -130,10 +161,41 @@ mod tests {
             ("clutch\ton\r", None, Steer::Clutch(true)),
             ("clutch off", None, Steer::Clutch(false)),
         ] {
-            assert_eq!(parse(line), Ok(Some(Command { at_s, steer })), "{line}");
+            let wanted = Wanted::Steer(steer);
+            assert_eq!(parse(line), Ok(Some(Command { at_s, wanted })), "{line}");
         }
         for nothing in ["", "  \r", "# a remark", "   # another"] {
             assert_eq!(parse(nothing), Ok(None));
+        }
+    }
+
+    #[test]
+    fn a_mark_is_the_rest_of_its_line() {
+        for (line, at_s, text) in [
+            ("mark a", None, "a"),
+            (
+                "  at 2 mark\ttrial #3, \"left\" 'µ' = [x]\r",
+                Some(2.0),
+                "trial #3, \"left\" 'µ' = [x]",
+            ),
+            ("mark mark at 2 zoom 3", None, "mark at 2 zoom 3"),
+        ] {
+            let wanted = Wanted::Mark(text.to_owned());
+            assert_eq!(parse(line), Ok(Some(Command { at_s, wanted })), "{line}");
+        }
+        let longest = "µ".repeat(LONGEST_MARK);
+        assert!(parse(&format!("mark {longest}")).is_ok());
+        for (line, why) in [
+            ("mark", "a text is missing"),
+            ("mark \r", "a text is missing"),
+            (&format!("mark x{longest}"), "at most 200 characters"),
+            ("mark a\u{1b}[2J", "control character"),
+            ("mark a\tb", "control character"),
+            ("marks a", "no such word"),
+        ] {
+            let told = parse(line).expect_err(line).to_string();
+            assert!(told.contains(why), "{told}");
+            assert!(!told.contains(char::is_control), "{told}");
         }
     }
 

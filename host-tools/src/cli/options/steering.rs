@@ -14,9 +14,10 @@ use crate::cli::terminal::keyboard::keyboard;
 use crate::cli::terminal::raw_keys::RawMode;
 use crate::link::{Ask, Event};
 use crate::place::{Bounds, Laid, Reach};
+use crate::replay::Mark;
 use crate::steering::keys::{KEYS, Key, Keys};
-use crate::steering::{CommandQueue, Origin, Put, Steer, Steering};
-use crate::telemetry::FeltViews;
+use crate::steering::{CommandQueue, Made, Marks, Origin, Put, Steer, Steering, Wanted};
+use crate::telemetry::{FeltViews, SampleLog};
 use crate::terrain::Terrain;
 
 /// How the view may be changed while it is touched.
@@ -24,7 +25,7 @@ use crate::terrain::Terrain;
 pub struct Commands {
     /// Change the view by lines of this file while it is touched, or of standard input where
     /// it is `-`: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `stiffness 0.5`, `clutch on`,
-    /// `clutch off`, `reset`
+    /// `clutch off`, `reset`, `mark TEXT`
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub commands: Option<Origin>,
 }
@@ -82,6 +83,7 @@ impl Commands {
 /// Keys and commands on one side, a session on the other.
 pub(in crate::cli) struct ViewControl<'t> {
     steering: Steering<'t>,
+    marks: Marks,
     commands: CommandQueue,
     keys: Keys,
     typing: Typing,
@@ -123,6 +125,7 @@ impl<'t> ViewControl<'t> {
         };
         Self {
             steering: Steering::new(bounds, rule, terrain.clone()),
+            marks: Marks::default(),
             commands,
             keys: Keys::default(),
             typing: Typing::Nobody,
@@ -148,6 +151,7 @@ impl<'t> ViewControl<'t> {
     /// Takes what the device tells.
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         self.steering.on_event(event);
+        self.marks.on_event(event);
     }
 
     /// Looks at keys and commands at a time of the device, s. What is wrong with them is
@@ -163,8 +167,11 @@ impl<'t> ViewControl<'t> {
             self.take(released);
         }
         let is_free = self.steering.is_settled();
-        let due = self.commands.due(t_s, is_free, tell);
-        self.take(due);
+        match self.commands.due(t_s, is_free, tell) {
+            Some(Wanted::Steer(steer)) => self.take(Some(steer)),
+            Some(Wanted::Mark(text)) => self.marks.mark(text).into_iter().for_each(&mut *tell),
+            None => {}
+        }
         self.steering.lines().into_iter().for_each(tell);
     }
 
@@ -176,7 +183,23 @@ impl<'t> ViewControl<'t> {
 
     /// What is to be asked of the device now.
     pub(in crate::cli) fn asks(&mut self) -> Vec<Ask> {
-        self.steering.asks()
+        let mut asks = self.steering.asks();
+        asks.extend(self.marks.asks());
+        asks
+    }
+
+    /// The marks that were made since the last look, as a recording has them; `is_over` at the
+    /// end, when the device answers no more.
+    pub(in crate::cli) fn marks(&mut self, log: &SampleLog<'_>, is_over: bool) -> Vec<Mark> {
+        let made = match is_over {
+            true => self.marks.take_all(),
+            false => self.marks.take_made(),
+        };
+        let mark = |made: Made| {
+            let t_s = made.tick.map_or(log.t_s(), |tick| log.t_s_of(tick));
+            Mark::new(made, t_s)
+        };
+        made.into_iter().map(mark).collect()
     }
 
     /// The view that is to be put in now, which samples may be felt in from now on.
@@ -200,6 +223,17 @@ impl<'t> ViewControl<'t> {
             view.level,
             short(times)
         )
+    }
+}
+
+/// What was marked, in a line.
+pub(in crate::cli) fn marked(mark: &Mark) -> String {
+    let Mark { text, t_s, .. } = mark;
+    match mark.tick {
+        Some(tick) => format!("mark           `{text}` at tick {tick}, {t_s:.3} s"),
+        None => format!(
+            "mark           `{text}` at about {t_s:.3} s: the device has not said which tick, and may not have raised its pin"
+        ),
     }
 }
 

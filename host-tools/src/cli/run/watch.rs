@@ -95,8 +95,9 @@ impl<'t> Watch<'t> {
     }
 
     /// Ends the recording, and takes the line at the bottom of the terminal away.
-    pub(super) fn finish(self) -> Seen<'t> {
+    pub(super) fn finish(mut self) -> Seen<'t> {
         self.speaker.status(None);
+        self.take_marks(true);
         let (ticks, figures) = (self.log.ticks(), self.log.figures());
         let stood_still = self.stands_still();
         let kept = match (self.failed, self.recording) {
@@ -116,6 +117,16 @@ impl<'t> Watch<'t> {
     fn stands_still(&self) -> bool {
         self.ticked
             .is_some_and(|ticked| ticked.elapsed() >= STANDS_STILL)
+    }
+
+    /// Takes the marks that were made, at the end also those that were only asked for.
+    fn take_marks(&mut self, is_over: bool) {
+        for mark in self.control.marks(&self.log, is_over) {
+            self.speaker.tell(steering::marked(&mark));
+            if let Some(recording) = &mut self.recording {
+                recording.mark(&mark);
+            }
+        }
     }
 
     fn record(&mut self, sample: &Sample) -> Record {
@@ -176,6 +187,7 @@ impl<'t> Onlooker<'t> for Watch<'t> {
         let speaker = &self.speaker;
         self.control
             .look(self.log.t_s(), &mut |line| speaker.tell(line));
+        self.take_marks(false);
         let mut asks = self.prompts.messages();
         asks.extend(self.control.asks());
         asks
