@@ -1,9 +1,8 @@
 //! Marks: made by a command while a terrain is touched, recorded with tick and clock, and kept
 //! by a replay.
 
-use std::time::SystemTime;
-
 use hapterra::replay::{Mark, Settings, Trajectory};
+use hapterra_tests::timeouts::changed_at_unix_s;
 
 use super::folder::{Folder, rows};
 use super::views::comments;
@@ -12,11 +11,6 @@ const COMMANDS: &str = "at 1 mark stimulus #1, \"left\"\nat 2 zoom 1.5\nmark zoo
     at 4 mark \u{1b}[31m\nat 4.5 mark 'end'\n";
 
 const TEXTS: [&str; 3] = ["stimulus #1, \"left\"", "zoomed", "'end'"];
-
-fn host_unix_s() -> f64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    since.expect("after 1970").as_secs_f64()
-}
 
 /// Has the hills felt with the commands; what was said.
 fn run(folder: &Folder, record: &str) -> String {
@@ -36,9 +30,8 @@ fn marks_of(folder: &Folder, name: &str) -> Vec<Mark> {
 #[test]
 fn a_mark_has_its_tick_its_time_and_the_hosts_clock() {
     let folder = Folder::new();
-    let began = host_unix_s();
     let told = run(&folder, "felt.csv");
-    let ended = host_unix_s();
+    let [began, ended] = ["commands", "felt.csv"].map(|name| changed_at_unix_s(&folder.path(name)));
     assert!(
         told.contains("line 4 of the commands: `at 4 mark \u{FFFD}[31m`"),
         "{told}"
