@@ -16,7 +16,7 @@ mod ticks;
 mod trajectory;
 
 pub use felt::Replayer;
-pub use loop_columns::LoopColumns;
+pub use loop_columns::{LoopColumns, mode_name};
 pub use marks::Mark;
 pub use recording::{Column, Record, Recording, Value};
 pub use settings::Settings;

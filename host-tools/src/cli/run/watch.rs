@@ -14,6 +14,7 @@ use crate::cli::terminal::arming_prompts::ArmingPrompts;
 use crate::cli::terminal::desk::Seat;
 use crate::cli::terminal::speaker::Speaker;
 use crate::cli::viewing::Shown;
+use crate::events::Watcher;
 use crate::link::{Ask, Event, Tally};
 use crate::output::OutputError;
 use crate::replay::settings::ViewSettings;
@@ -44,6 +45,7 @@ pub(super) struct Watch<'t> {
     prompts: ArmingPrompts,
     line_due: Instant,
     shown: Option<Shown<'t>>,
+    events: Option<Watcher>,
     speaker: Speaker,
 }
 
@@ -85,6 +87,7 @@ impl<'t> Watch<'t> {
             prompts,
             line_due: Instant::now() + LINE_EVERY,
             shown: None,
+            events: None,
             speaker: speaker.clone(),
         }
     }
@@ -92,6 +95,11 @@ impl<'t> Watch<'t> {
     /// The same, and a viewer is told what is felt.
     pub(super) fn shown(self, shown: Option<Shown<'t>>) -> Self {
         Self { shown, ..self }
+    }
+
+    /// The same, and readers of events are told what happens.
+    pub(super) fn with_events(self, events: Option<Watcher>) -> Self {
+        Self { events, ..self }
     }
 
     /// Ends the recording, and takes the line at the bottom of the terminal away.
@@ -123,6 +131,9 @@ impl<'t> Watch<'t> {
     fn take_marks(&mut self, is_over: bool) {
         for mark in self.control.marks(&self.log, is_over) {
             self.speaker.tell(steering::marked(&mark));
+            if let Some(events) = &self.events {
+                events.mark(&mark);
+            }
             if let Some(recording) = &mut self.recording {
                 recording.mark(&mark);
             }
@@ -134,6 +145,9 @@ impl<'t> Watch<'t> {
         let (view, felt) = self.log.view();
         if let Some(shown) = &mut self.shown {
             shown.take(sample, &record, (view, felt));
+        }
+        if let Some(events) = &mut self.events {
+            events.take(sample, &record, (view, &felt.terrain));
         }
         if view > self.described
             && let Some(laid) = &felt.laid
