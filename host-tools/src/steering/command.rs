@@ -1,12 +1,16 @@
 //! Commands as lines of text.
 
+use hapterra_core::force::{Pattern, Shading, Texture};
+
 use super::marks::text_of;
 use super::{Steer, Wanted};
-use crate::place::ViewChange;
+use crate::place::{SurfaceChange, ViewChange};
 
 /// What is understood, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (hand mm), pan-m EAST NORTH (ground m), zoom TIMES, \
-     exaggerate TIMES, stiffness TIMES, reset, clutch on, clutch off, mark TEXT; `at SECONDS` before any of them, and before that \
+     exaggerate TIMES, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
+     shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
+     clutch on, clutch off, mark TEXT; `at SECONDS` before any of them, and before that \
      `on NUMBER` for one device of several";
 
 /// A command, and when it is to be done.
@@ -101,6 +105,10 @@ fn read(words: &[&str]) -> Result<Steer, &'static str> {
         ["zoom", times] => change(ViewChange::Zoom(factor(times)?)),
         ["exaggerate", times] => change(ViewChange::Exaggerate(factor(times)?)),
         ["stiffness", times] => change(ViewChange::Stiffness(factor(times)?)),
+        [
+            "friction" | "viscous-friction" | "damping" | "shading" | "texture",
+            ..,
+        ] => change(ViewChange::Surface(surface(words)?)),
         ["reset"] => change(ViewChange::Reset),
         ["clutch", "on"] => Ok(Steer::Clutch(true)),
         ["clutch", "off"] => Ok(Steer::Clutch(false)),
@@ -110,6 +118,51 @@ fn read(words: &[&str]) -> Result<Steer, &'static str> {
         [] => Err("a command is missing"),
         _ => Err("no such word"),
     }
+}
+
+/// A change of the surface, but for its stiffness.
+fn surface(words: &[&str]) -> Result<SurfaceChange, &'static str> {
+    let number = |word| number(word).map(|number| number as f32);
+    Ok(match words {
+        ["friction", mu] => SurfaceChange::Friction {
+            dynamic_mu: number(mu)?,
+            static_mu: number(mu)?,
+        },
+        ["friction", mu, at_rest] => SurfaceChange::Friction {
+            dynamic_mu: number(mu)?,
+            static_mu: number(at_rest)?,
+        },
+        ["viscous-friction", viscous_s] => SurfaceChange::ViscousFriction(number(viscous_s)?),
+        ["damping", ns_per_m] => SurfaceChange::Damping(number(ns_per_m)?),
+        ["shading", "none"] => SurfaceChange::Shading(Shading::None),
+        ["shading", "smooth"] => SurfaceChange::Shading(Shading::Smooth),
+        ["texture", "none"] => SurfaceChange::Texture(Texture::NONE),
+        ["texture", "grain", amplitude, wavelength] => SurfaceChange::Texture(Texture {
+            pattern: Pattern::Grain,
+            amplitude_mm: number(amplitude)?,
+            wavelength_mm: number(wavelength)?,
+            ..Texture::NONE
+        }),
+        ["texture", "grating", amplitude, wavelength, direction @ ..] => {
+            SurfaceChange::Texture(Texture {
+                pattern: Pattern::Grating,
+                amplitude_mm: number(amplitude)?,
+                wavelength_mm: number(wavelength)?,
+                direction_deg: match direction {
+                    [] => 0.0,
+                    [degrees] => number(degrees)?,
+                    _ => return Err("a grating takes two or three numbers"),
+                },
+                seed: 0,
+            })
+        }
+        ["friction", ..] => return Err("it takes one or two numbers"),
+        ["shading", ..] => return Err("it is smooth or none"),
+        ["texture", ..] => {
+            return Err("it is none, or grain or grating with an amplitude and a wavelength, mm");
+        }
+        _ => return Err("it takes one number"),
+    })
 }
 
 fn number(word: &str) -> Result<f64, &'static str> {
@@ -128,6 +181,10 @@ fn factor(word: &str) -> Result<f64, &'static str> {
 mod tests {
     use super::super::marks::LONGEST_MARK;
     use super::*;
+
+    const fn of_surface(change: SurfaceChange) -> Steer {
+        Steer::Change(ViewChange::Surface(change))
+    }
 
     #[test]
     fn each_command_is_read() {
@@ -156,6 +213,49 @@ mod tests {
                 "stiffness .5",
                 None,
                 Steer::Change(ViewChange::Stiffness(0.5)),
+            ),
+            (
+                "friction 0.3 .5",
+                None,
+                of_surface(SurfaceChange::Friction {
+                    dynamic_mu: 0.3,
+                    static_mu: 0.5,
+                }),
+            ),
+            (
+                "friction 0.4",
+                None,
+                of_surface(SurfaceChange::Friction {
+                    dynamic_mu: 0.4,
+                    static_mu: 0.4,
+                }),
+            ),
+            (
+                "viscous-friction 0.01",
+                None,
+                of_surface(SurfaceChange::ViscousFriction(0.01)),
+            ),
+            ("damping 2", None, of_surface(SurfaceChange::Damping(2.0))),
+            (
+                "shading smooth",
+                None,
+                of_surface(SurfaceChange::Shading(Shading::Smooth)),
+            ),
+            (
+                "texture none",
+                None,
+                of_surface(SurfaceChange::Texture(Texture::NONE)),
+            ),
+            (
+                "texture grating .1 1.5 30",
+                None,
+                of_surface(SurfaceChange::Texture(Texture {
+                    pattern: Pattern::Grating,
+                    amplitude_mm: 0.1,
+                    wavelength_mm: 1.5,
+                    direction_deg: 30.0,
+                    seed: 0,
+                })),
             ),
             ("at 0 reset", Some(0.0), Steer::Change(ViewChange::Reset)),
             ("clutch\ton\r", None, Steer::Clutch(true)),
@@ -211,6 +311,13 @@ mod tests {
             ("zoom inf", "a number"),
             ("pan 5", "two numbers"),
             ("pan 5 nan", "a number"),
+            ("friction", "one or two numbers"),
+            ("friction a", "a number"),
+            ("damping 1 2", "one number"),
+            ("shading on", "smooth or none"),
+            ("texture grain", "none, or grain or grating"),
+            ("texture grain 0.1 1 30", "none, or grain or grating"),
+            ("texture grating 0.1 1 30 2", "two or three numbers"),
             ("clutch", "on or off"),
             ("at 2", "missing"),
             ("at -1 reset", "below zero"),
@@ -222,6 +329,6 @@ mod tests {
             assert!(told.contains("exaggerate TIMES"), "{told}");
         }
         let long = parse(&"x".repeat(10_000)).expect_err("no command");
-        assert!(long.to_string().len() < 400);
+        assert!(long.to_string().len() < UNDERSTOOD.len() + 2 * SHOWN);
     }
 }

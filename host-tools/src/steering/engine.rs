@@ -10,7 +10,7 @@ use hapterra_core::wire::request::Request;
 
 use super::Steer;
 use crate::link::{Ask, Event};
-use crate::place::{Bounds, Changed, Hand, Laid, ViewChange};
+use crate::place::{Bounds, Changed, Hand, Laid, SurfaceChange, ViewChange};
 use crate::terrain::Terrain;
 
 /// Changes that wait for the clutch to open; they are done at once.
@@ -289,6 +289,18 @@ impl<'r> Steering<'r> {
         sample: &Sample,
         waits: bool,
     ) -> Result<Option<Put<'r>>, String> {
+        let is_friction = |change: &ViewChange| {
+            use SurfaceChange::{Friction, ViscousFriction};
+            matches!(
+                change,
+                ViewChange::Surface(Friction { .. } | ViscousFriction(_))
+            )
+        };
+        if self.rule == Rule::Paper && changes.iter().any(is_friction) {
+            return Err(
+                "the paper's contact rule has no friction: begin without --contact paper".into(),
+            );
+        }
         let hand = self.hand(sample);
         let changed = self.bounds.apply(&self.terrain, &self.now, changes, &hand);
         let Changed {

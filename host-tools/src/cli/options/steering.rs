@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use hapterra_core::contact::Rule;
+use hapterra_core::force::ForceLaw;
 use hapterra_core::phantom::Calibration;
 
 use super::placing::{self, scale_in_words, short};
@@ -24,7 +25,8 @@ use crate::terrain::Terrain;
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Commands {
     /// Change the view by lines of this file while it is touched, or of standard input where
-    /// it is `-`: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `stiffness 0.5`, `clutch on`,
+    /// it is `-`: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `stiffness 0.5`, `friction 0.4`, `damping 2`,
+    /// `shading smooth`, `texture grain 0.1 1`, `clutch on`,
     /// `clutch off`, `reset`, `mark TEXT`
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub commands: Option<Origin>,
@@ -226,6 +228,31 @@ impl<'t> ViewControl<'t> {
     }
 }
 
+/// What a surface feels like, without what it has not.
+fn surface_in_words(law: &ForceLaw) -> String {
+    let number = |number: f32| placing::short(f64::from(number));
+    let (friction, texture) = (&law.friction, &law.texture);
+    let mut words = vec![format!("{} N/mm", number(law.stiffness_n_per_mm))];
+    if friction.static_mu > 0.0 {
+        let [sliding, at_rest] = [friction.dynamic_mu, friction.static_mu].map(number);
+        words.push(format!("friction {sliding}, {at_rest} at rest"));
+    }
+    if friction.viscous_s > 0.0 {
+        words.push(format!("viscous friction {} s", number(friction.viscous_s)));
+    }
+    if law.damping.ns_per_m > 0.0 {
+        words.push(format!("damping {} N·s/m", number(law.damping.ns_per_m)));
+    }
+    if !law.shading.is_none() {
+        words.push("shading".to_owned());
+    }
+    if !texture.is_none() {
+        let [amplitude, wavelength] = [texture.amplitude_mm, texture.wavelength_mm].map(number);
+        words.push(format!("texture of {amplitude} mm every {wavelength} mm"));
+    }
+    words.join(", ")
+}
+
 /// What was marked, in a line.
 pub(in crate::cli) fn marked(mark: &Mark) -> String {
     let Mark { text, t_s, .. } = mark;
@@ -241,9 +268,9 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
 pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     format!(
-        "view {number}: {}; {} N/mm; {} under the home position",
+        "view {number}: {}; {}; {} under the home position",
         scale_in_words(&laid.view),
-        placing::short(f64::from(laid.law.stiffness_n_per_mm)),
+        surface_in_words(&laid.law),
         crate::place::place_in_words(&file, laid.view.home_ground)
     )
 }
