@@ -27,6 +27,9 @@ pub enum Command<'t> {
     Clutch(ClutchHold),
     /// The board's clutch input is held from now on, or no longer.
     ClutchInput(bool),
+    /// Mark the next tick, under a number that tells marks apart. The loop around the tick
+    /// raises the board's mark pin; nothing else follows from it.
+    Mark(u8),
     /// A filled tile.
     Tile(&'t mut Tile),
     /// A haptic interface point for one tick, in a scene fed by points.
@@ -208,6 +211,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             Command::View(view) => self.take_view(&view)?,
             Command::Clutch(hold) => self.clutch.hold(hold),
             Command::ClutchInput(held) => self.clutch.press(held),
+            Command::Mark(_) => {}
             Command::Tile(tile) => back = self.take_tile(tile),
             Command::Point(Point { seq, hip }) => {
                 // Whatever bits came over the wire.

@@ -86,6 +86,11 @@ pub struct View {
     pub keeps_tiles: bool,
 }
 
+/// Time for which the mark pin of a board is high, ms.
+pub const MARK_PULSE_MS: u32 = 10;
+/// Time for which it is low after that, ms, before another mark is taken.
+pub const MARK_GAP_MS: u32 = 10;
+
 /// A haptic interface point (HIP) for one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Point {

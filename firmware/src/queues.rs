@@ -45,6 +45,17 @@ pub(crate) struct LoopReport {
     pub(crate) health: Health,
     /// The epoch of the scene in force.
     pub(crate) epoch: Option<u32>,
+    /// The latest mark whose pulse is over.
+    pub(crate) marked: Marked,
+}
+
+/// A mark whose pulse is over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Marked {
+    /// The mark's number ([`Command::Mark`]); 0 before the first.
+    pub(crate) number: u8,
+    /// The tick that was marked.
+    pub(crate) tick: u32,
 }
 
 /// All queues between the loop and the link.

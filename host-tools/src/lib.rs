@@ -42,6 +42,7 @@ pub mod bringup;
 pub mod calibrate;
 pub mod cli;
 pub mod disk_cache;
+pub mod events;
 pub mod link;
 pub mod materials;
 pub mod output;

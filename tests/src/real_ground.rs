@@ -43,6 +43,34 @@ fn named(names: &[&'static str]) -> Vec<(&'static str, Raster)> {
     there.map(|(name, path)| (name, open(path))).collect()
 }
 
+/// All of them that open, by their names' order. None where they are not on this machine, which
+/// is said, as is what does not open.
+///
+/// # Panics
+/// When their folder cannot be read.
+#[must_use]
+pub fn all_files() -> Vec<(String, Raster)> {
+    let folder = shared("dem/real");
+    let entries = folder
+        .iter()
+        .flat_map(|folder| folder.read_dir().expect("a folder"));
+    let mut paths: Vec<_> = entries
+        .map(|entry| entry.expect("readable").path())
+        .collect();
+    paths.sort();
+    let opened = paths.into_iter().filter_map(|path| {
+        let name = path.file_name()?.to_string_lossy().into_owned();
+        match Raster::open(&path, &OpenOptions::default()) {
+            Ok(raster) => Some((name, raster)),
+            Err(why) => {
+                println!("{name} is left out: {why}");
+                None
+            }
+        }
+    });
+    opened.collect()
+}
+
 /// A raster true to scale, a cell a millimetre.
 ///
 /// # Panics

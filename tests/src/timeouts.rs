@@ -97,6 +97,17 @@ pub fn set_just_changed(path: &Path) {
     set_modified(path, SystemTime::now() + Duration::from_secs(3_600));
 }
 
+/// When a file was last changed, seconds since 1970.
+///
+/// # Panics
+/// When there is no such file.
+#[must_use]
+pub fn changed_at_unix_s(path: &Path) -> f64 {
+    let changed = path.metadata().and_then(|about| about.modified());
+    let since = changed.map(|at| at.duration_since(SystemTime::UNIX_EPOCH));
+    since.expect("a file").expect("after 1970").as_secs_f64()
+}
+
 fn set_modified(path: &Path, time: SystemTime) {
     let file = File::options().append(true).open(path);
     file.and_then(|file| file.set_modified(time))

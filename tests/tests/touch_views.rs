@@ -8,14 +8,14 @@ use std::time::Duration;
 use hapterra::link::{Arming, Event, Native, Patience, Session};
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::place::{
-    Bounds, Coordinates, Laid, Reach, Sizing, Target, View, ViewChange, ViewOptions,
+    Bounds, Coordinates, Laid, Reach, Sizing, SurfaceChange, Target, View, ViewChange, ViewOptions,
 };
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::steering::{Steer, Steering};
 use hapterra::terrain::FeltCells;
 use hapterra_core::Vec3;
-use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::contact::{ContactState, Friction};
+use hapterra_core::force::{Damping, ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::guard::{Limits, MAX_SLEW_N_PER_S, Mode};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Sample;
@@ -308,6 +308,68 @@ fn panned_made_steeper_and_softer_while_it_is_pressed_the_force_makes_no_step() 
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.level(), 8);
         assert_eq!(touching.said, [""; 0]);
+        judge(&touching.samples[began..], GENTLE_N);
+    });
+}
+
+#[test]
+fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
+    let raster = hills();
+    pressed(&raster, 60.0, |touching| {
+        let texture = Texture {
+            pattern: Pattern::Grating,
+            amplitude_mm: 0.1,
+            wavelength_mm: 1.0,
+            ..Texture::NONE
+        };
+        let friction = SurfaceChange::Friction {
+            dynamic_mu: 0.3,
+            static_mu: 0.5,
+        };
+        let first = touching.change(ViewChange::Zoom(64.0));
+        let began = touching.samples.len();
+        let changes = [
+            friction,
+            SurfaceChange::ViscousFriction(0.005),
+            SurfaceChange::Damping(5.0),
+            SurfaceChange::Shading(Shading::Smooth),
+            SurfaceChange::Texture(texture),
+        ];
+        for change in changes {
+            let sample = touching.change(ViewChange::Surface(change));
+            assert_eq!(sample.state, ContactState::Touching, "{change:?}");
+        }
+        assert_eq!(touching.said, [""; 0]);
+        let law = touching.steering.now().law;
+        let wanted = ForceLaw {
+            friction: Friction {
+                static_mu: 0.5,
+                dynamic_mu: 0.3,
+                viscous_s: 0.005,
+            },
+            damping: Damping {
+                ns_per_m: 5.0,
+                ..Damping::NONE
+            },
+            shading: Shading::Smooth,
+            texture,
+            ..ForceLaw::PREMIUM
+        };
+        assert_eq!(law, wanted);
+        let friction = SurfaceChange::Friction {
+            dynamic_mu: 11.0,
+            static_mu: 11.0,
+        };
+        touching.change(ViewChange::Surface(friction));
+        assert!(
+            touching.said[0].contains("a friction of 11"),
+            "{:?}",
+            touching.said
+        );
+        assert_eq!(touching.steering.now().law, wanted, "it stays as it was");
+        let reset = touching.change(ViewChange::Reset);
+        assert_pressed(&reset, &first, "as at the beginning");
+        assert_eq!(touching.steering.now().law, ForceLaw::PREMIUM);
         judge(&touching.samples[began..], GENTLE_N);
     });
 }

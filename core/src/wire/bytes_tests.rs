@@ -357,6 +357,11 @@ fn a_request_and_its_answer() {
         result,
     });
     assert_eq!(bytes(&answer), [8, 200, 1, 1]);
+    let (number, request) = (201, Request::Mark);
+    let message = ToDevice::Request { number, request };
+    assert_eq!(bytes(&message), [5, 201, 11]);
+    let marked = ToHost::Marked { number, tick: 300 };
+    assert_eq!(bytes(&marked), [13, 201, 0xAC, 0x02]);
     let count = SampleCount {
         sent: 300,
         dropped: 2,

@@ -146,6 +146,13 @@ pub enum ToHost {
         /// [`SessionEnd::HostSilent`] where none was.
         end: SessionEnd,
     },
+    /// Answers [`Request::Mark`].
+    Marked {
+        /// The request's number.
+        number: u8,
+        /// The tick that was marked ([`Sample::tick`]).
+        tick: u32,
+    },
 }
 
 /// A run of samples. Numbers are consecutive over the session, so a gap

@@ -56,7 +56,7 @@
 //! silent, the host goes on in a new session; one that leaves waits for its goodbye.
 //!
 //! An answer is a frame of this session that answers something the host has said:
-//! hello, scene taken, point answer, answer, status, calibration, alive, goodbye,
+//! hello, scene taken, point answer, answer, marked, status, calibration, alive, goodbye,
 //! detached, over.
 //! Telemetry is none, because it also comes where the device hears nothing.
 //! The times are those for a board in real time.
@@ -66,6 +66,9 @@
 //! other answers come, is given up and told; where it
 //! was to arm, a request to disarm follows, which makes the device ignore the first
 //! should it still arrive.
+//!
+//! A mark ([`Request::Mark`](request::Request::Mark)) is answered by the tick that was marked
+//! ([`ToHost::Marked`](message::ToHost::Marked)) when its pulse is over, or by a refusal.
 //!
 //! Questions, for status and calibration, are repeated in the same way. They have numbers
 //! of their own, which their answers repeat: a host takes the answer to its present

@@ -60,6 +60,10 @@ pub enum Request {
         /// How it is held from now on.
         hold: ClutchHold,
     },
+    /// To mark a tick: the board's mark pin is high for
+    /// [`MARK_PULSE_MS`](crate::scene::MARK_PULSE_MS) from the end of that tick on. Answered by
+    /// [`ToHost::Marked`](super::message::ToHost::Marked) when the pin may rise again.
+    Mark,
 }
 
 /// Why a request was refused. Nothing was touched.

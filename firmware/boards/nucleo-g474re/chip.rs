@@ -156,6 +156,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
         watchdog: p.IWDG,
         led: Output::new(p.PA8, Level::Low, Speed::Low),
         heartbeat: Output::new(p.PD2, Level::Low, Speed::Low),
+        mark: Output::new(p.PB10, Level::Low, Speed::Low),
     }
 }
 
@@ -238,6 +239,14 @@ pub(crate) fn let_a_halt_stop_the_arm() {
     pac::DBGMCU.apb1lfzr().modify(|w| {
         w.set_iwdg(false);
         w.set_tim5(false);
+    });
+}
+
+/// Sets the mark pin's level, past any driver.
+pub(crate) fn set_mark(is_high: bool) {
+    pac::GPIOB.bsrr().write(|w| match is_high {
+        true => w.set_bs(10, true),
+        false => w.set_br(10, true),
     });
 }
 

@@ -17,6 +17,7 @@
 //! | USB D-, D+ | PA11, PA12 | USB |
 //! | status LED, to ground over a resistor | PA8 | |
 //! | heartbeat, for a one-shot outside | PD2 | |
+//! | mark, high for 10 ms | PB10 | |
 //!
 //! PA5 also drives the board's LED LD2: open its solder bridge.
 #![no_std]

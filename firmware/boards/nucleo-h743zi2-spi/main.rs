@@ -17,6 +17,7 @@
 //! | USB D-, D+ | PA11, PA12 | OTG_FS |
 //! | status LED | PB0 | the board's green LD1 |
 //! | heartbeat, for a one-shot outside | PG1 | |
+//! | mark, high for 10 ms | PG0 | |
 #![no_std]
 #![no_main]
 // Interrupt handlers bear the names of the vectors.

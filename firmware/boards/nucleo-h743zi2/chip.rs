@@ -185,6 +185,7 @@ pub(crate) fn take(p: Peripherals) -> Parts {
         watchdog: p.IWDG1,
         led: Output::new(p.PB0, Level::Low, Speed::Low),
         heartbeat: Output::new(p.PG1, Level::Low, Speed::Low),
+        mark: Output::new(p.PG0, Level::Low, Speed::Low),
     }
 }
 
@@ -272,6 +273,14 @@ pub(crate) fn let_a_halt_stop_the_arm() {
     pac::DBGMCU.apb2fzr1().modify(|w| {
         w.set_tim1(true);
         w.set_tim15(false);
+    });
+}
+
+/// Sets the mark pin's level, past any driver.
+pub(crate) fn set_mark(is_high: bool) {
+    pac::GPIOG.bsrr().write(|w| match is_high {
+        true => w.set_bs(0, true),
+        false => w.set_br(0, true),
     });
 }
 

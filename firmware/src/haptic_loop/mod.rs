@@ -6,6 +6,7 @@
 
 mod clutch_input;
 mod liveness;
+mod mark;
 mod reporter;
 mod timing;
 
@@ -23,6 +24,7 @@ use crate::motor_memory::{MotorLog, Words};
 use crate::queues::{LoopEnds, LoopReport, TickRecord};
 use clutch_input::ClutchInput;
 use liveness::Liveness;
+use mark::Mark;
 use reporter::Reporter;
 use timing::Timing;
 
@@ -50,6 +52,7 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     outcome: Outcome,
     liveness: Liveness,
     reporter: Reporter,
+    mark: Mark,
     motor_log: MotorLog,
     /// An answer that found the queue full. No other tick runs before it is out.
     unsent: Option<TickRecord>,
@@ -79,6 +82,7 @@ where
             outcome: Outcome::default(),
             liveness: Liveness::new(C::RATE),
             reporter: Reporter::new(C::RATE),
+            mark: Mark::new(C::RATE),
             motor_log: MotorLog::new(C::RATE),
             unsent: None,
         }
@@ -110,6 +114,7 @@ where
                 self.render(live)
             }
         };
+        self.mark.tick(self.outcome.sample.tick);
         if self.timing.end(&self.clock, began) {
             self.give_to_haptics(Command::Trip(Fault::TickOverrun));
         }
@@ -120,6 +125,12 @@ where
     /// motors' temperatures, and which of the two it is. Called after each tick.
     pub fn motors_to_keep(&mut self) -> Option<(usize, Words)> {
         self.motor_log.tick(&self.haptics.temperatures())
+    }
+
+    /// The level that the mark pin changes to after this tick, if it does.
+    #[must_use]
+    pub const fn mark_edge(&self) -> Option<bool> {
+        self.mark.edge()
     }
 
     /// The calibration in force.
@@ -142,8 +153,12 @@ where
             let Some(command) = self.ends.commands.dequeue() else {
                 return;
             };
-            if let Command::Scene(scene) = &command {
-                take_materials(&mut self.haptics, &mut self.ends, scene);
+            match &command {
+                Command::Scene(scene) => {
+                    take_materials(&mut self.haptics, &mut self.ends, scene);
+                }
+                Command::Mark(number) => self.mark.begin(*number),
+                _ => {}
             }
             self.give_to_haptics(command);
         }
@@ -232,13 +247,17 @@ where
     /// Reports where the guard stands, at once when that has changed and ten times a
     /// second. Where the queue is full the next tick reports.
     fn report(&mut self, sense: &Sense, drive: &Drive) {
-        let report = self.haptics.report();
-        if self.reporter.sends_report(&report) && self.ends.health.ready() {
+        let (report, marked) = (self.haptics.report(), self.mark.latest());
+        if self.reporter.sends_report(&report, marked.number) && self.ends.health.ready() {
             let health = self.haptics.health(sense, drive);
             let epoch = self.haptics.scene().map(|scene| scene.epoch);
             // There is room.
-            let _ = self.ends.health.enqueue(LoopReport { health, epoch });
-            self.reporter.sent_report(&report);
+            let _ = self.ends.health.enqueue(LoopReport {
+                health,
+                epoch,
+                marked,
+            });
+            self.reporter.sent_report(&report, marked.number);
         }
     }
 

@@ -46,28 +46,29 @@ impl Reporter {
         self.ticks_since_sample == 0
     }
 
-    /// Whether this tick's report is sent.
-    pub(super) fn sends_report(&mut self, report: &Report) -> bool {
+    /// Whether this tick's report is sent; `mark` is the number of the latest mark that is over.
+    pub(super) fn sends_report(&mut self, report: &Report, mark: u8) -> bool {
         self.ticks_since_report = self.ticks_since_report.saturating_add(1);
-        self.ticks_since_report >= self.report_every || self.last_report != without_limits(report)
+        self.ticks_since_report >= self.report_every || self.last_report != packed(report, mark)
     }
 
     /// This report was sent.
-    pub(super) fn sent_report(&mut self, report: &Report) {
+    pub(super) fn sent_report(&mut self, report: &Report, mark: u8) {
         self.ticks_since_report = 0;
-        self.last_report = without_limits(report);
+        self.last_report = packed(report, mark);
     }
 }
 
-/// Packs a report into a number, without its limits: they come and go with every
-/// touch, and each sample has them.
-fn without_limits(report: &Report) -> u64 {
+/// Packs a report and a mark's number into a number, without the limits: they come and go with
+/// every touch, and each sample has them.
+fn packed(report: &Report, mark: u8) -> u64 {
     let fault = report.fault.map_or(0, Fault::number);
     u64::from(report.blockers.bits())
         | u64::from(report.decision.refused.bits()) << 16
         | u64::from(report.decision.count) << 32
         | u64::from(fault) << 40
         | (report.mode as u64) << 48
+        | u64::from(mark) << 56
 }
 
 #[cfg(test)]
@@ -100,8 +101,8 @@ mod tests {
                 report.mode = Mode::Requested;
             }
             report.limits.toggle(Limits::FORCE_CLAMPED);
-            if reporter.sends_report(&report) {
-                reporter.sent_report(&report);
+            if reporter.sends_report(&report, 0) {
+                reporter.sent_report(&report, 0);
                 told += 1;
             }
         }

@@ -25,6 +25,7 @@ impl<'t, const D: usize> Link<'t, D> {
                 | Command::DropScene
                 | Command::View(_)
                 | Command::Clutch(_)
+                | Command::Mark(_)
                 | Command::Tile(_)
                 | Command::Point(_)
                 | Command::Disarm

@@ -56,6 +56,8 @@ pub(crate) struct DeviceState {
     pub(super) may_drive: bool,
     /// While an arm command is open: the guard's count of decisions before it.
     pub(super) arming: Option<u8>,
+    /// Number of the latest mark.
+    mark: u8,
     /// What the host last asked for.
     pub(super) request: LatestRequest,
     /// The calibration waits for the board to store it.
@@ -93,6 +95,7 @@ impl DeviceState {
             told: None,
             may_drive: false,
             arming: None,
+            mark: 0,
             request: LatestRequest::default(),
             storing: Storing::No,
         }
@@ -155,6 +158,15 @@ impl DeviceState {
                 }
             }
         }
+    }
+
+    /// A number for another mark: not 0, which is none.
+    pub(super) const fn next_mark(&mut self) -> u8 {
+        self.mark = match self.mark.checked_add(1) {
+            Some(next) => next,
+            None => 1,
+        };
+        self.mark
     }
 
     /// The host that wanted a calibration stored is gone: a press is for something else.
@@ -249,7 +261,7 @@ impl DeviceState {
     /// What the host should be told next, once.
     pub(super) fn next_message(&mut self) -> Option<ToHost> {
         self.look_at_decision();
-        let answer = self.request.take_answer().map(ToHost::Answer);
+        let answer = self.request.take_answer();
         answer.or_else(|| self.guard_changed().map(ToHost::Guard))
     }
 

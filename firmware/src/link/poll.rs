@@ -58,7 +58,13 @@ impl<const D: usize> Link<'_, D> {
         // them all before the reports so far were read.
         let follows = self.commands_taken;
         self.commands_taken = self.ends.commands.is_empty();
-        while let Some(LoopReport { health, epoch }) = self.ends.health.dequeue() {
+        while let Some(report) = self.ends.health.dequeue() {
+            let LoopReport {
+                health,
+                epoch,
+                marked,
+            } = report;
+            self.device.request.marked(marked);
             self.device.take_health(health, self.ends.monitor.ticks());
             self.device.may_drive &= !(follows && health.report.mode == Mode::Disarmed);
             let is_refused = self.scene.is_some_and(|scene| Some(scene.epoch) != epoch);

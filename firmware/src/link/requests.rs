@@ -9,6 +9,7 @@ use hapterra_core::wire::request::{Answer, Refusal, Request};
 
 use super::Link;
 use super::commands::CommandRoom;
+use crate::queues::Marked;
 
 /// How far a request has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,8 +18,19 @@ enum Progress {
     Arming,
     /// The board stores the calibration.
     Storing,
+    /// The loop makes a mark of this number.
+    Marking(u8),
+    /// The loop has marked this tick.
+    Marked(u32),
     /// It is done, or refused.
     Done(Result<(), Refusal>),
+}
+
+impl Progress {
+    /// Whether there is an answer.
+    const fn is_over(self) -> bool {
+        matches!(self, Self::Done(_) | Self::Marked(_))
+    }
 }
 
 /// The latest request of the session. The host sends the next one only when this one
@@ -38,14 +50,14 @@ impl LatestRequest {
             return true;
         };
         if number == latest {
-            self.answer_is_due = matches!(progress, Progress::Done(_));
+            self.answer_is_due = progress.is_over();
             return false;
         }
         number.wrapping_sub(latest) < 128
     }
 
     fn began(&mut self, number: u8, progress: Progress) {
-        self.answer_is_due = matches!(progress, Progress::Done(_));
+        self.answer_is_due = progress.is_over();
         self.latest = Some((number, progress));
     }
 
@@ -53,7 +65,7 @@ impl LatestRequest {
     /// another.
     fn ended(&mut self, was: Progress, result: Result<(), Refusal>) {
         if let Some((number, progress)) = self.latest.filter(|(_, progress)| *progress == was) {
-            debug_assert!(!matches!(progress, Progress::Done(_)));
+            debug_assert!(!progress.is_over());
             self.began(number, Progress::Done(result));
         }
     }
@@ -68,12 +80,24 @@ impl LatestRequest {
         self.ended(Progress::Storing, result);
     }
 
+    /// The loop has made a mark.
+    pub(super) fn marked(&mut self, mark: Marked) {
+        if let Some((number, progress)) = self.latest
+            && progress == Progress::Marking(mark.number)
+        {
+            self.began(number, Progress::Marked(mark.tick));
+        }
+    }
+
     /// The answer that is due, once.
-    pub(super) fn take_answer(&mut self) -> Option<Answer> {
-        let (number, Progress::Done(result)) = self.latest? else {
-            return None;
+    pub(super) fn take_answer(&mut self) -> Option<ToHost> {
+        let (number, progress) = self.latest?;
+        let answer = match progress {
+            Progress::Done(result) => ToHost::Answer(Answer { number, result }),
+            Progress::Marked(tick) => ToHost::Marked { number, tick },
+            Progress::Arming | Progress::Storing | Progress::Marking(_) => return None,
         };
-        core::mem::take(&mut self.answer_is_due).then_some(Answer { number, result })
+        core::mem::take(&mut self.answer_is_due).then_some(answer)
     }
 }
 
@@ -86,7 +110,7 @@ impl<const D: usize> Link<'_, D> {
         }
         // There is room: no other answer was given to this message.
         if let Some(answer) = self.device.request.take_answer() {
-            self.say(&ToHost::Answer(answer));
+            self.say(&answer);
         }
     }
 
@@ -118,6 +142,11 @@ impl<const D: usize> Link<'_, D> {
             Request::Clutch { hold } => {
                 self.set_clutch(hold, room);
                 Ok(())
+            }
+            Request::Mark => {
+                let number = self.device.next_mark();
+                self.command(room, Command::Mark(number));
+                return Progress::Marking(number);
             }
             Request::ClearFault { seen } => self
                 .device

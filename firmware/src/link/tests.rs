@@ -5,6 +5,7 @@ mod commands;
 mod device_state;
 mod faults;
 mod loader;
+mod marks;
 mod materials;
 mod rig;
 mod session;

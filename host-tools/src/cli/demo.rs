@@ -11,7 +11,7 @@ use super::failure::{Failure, OrHint};
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
 use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
-use super::options::steering::{Commands, ViewControl};
+use super::options::steering::{self, Commands, ViewControl};
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::session_summary::{self, SessionSummary};
 use super::terminal::{interrupt, left_behind, progress, voice};
@@ -26,7 +26,7 @@ use crate::place::{Laid, View};
 use crate::raster::{Raster, files_read_with};
 use crate::remote::without_key;
 use crate::replay::settings::{Device, ViewSettings};
-use crate::replay::{LoopColumns, Record, Recording, Rule, Settings};
+use crate::replay::{LoopColumns, Mark, Record, Recording, Rule, Settings};
 use crate::stability::limits;
 use crate::synth::{Kind, Synth};
 use crate::telemetry::{FeltViews, SampleLog};
@@ -254,6 +254,7 @@ fn control<'t>(
 struct Toured<'t> {
     /// The rows of the recording, with what the loop did.
     rows: Vec<(Record, LoopColumns)>,
+    marks: Vec<Mark>,
     views: FeltViews<'t>,
     summary: SessionSummary,
 }
@@ -334,6 +335,7 @@ impl<'t> Tour<'_, 't> {
         let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
         let progress = progress::bar(Some(stop_tick), template);
         let (mut log, mut rows) = (SampleLog::new(terrain, &device), Vec::new());
+        let mut marks = Vec::new();
         let mut toured = Ok(());
         while toured.is_ok() && log.ticks() < stop_tick && !interrupt::requested() {
             toured = session.poll(Duration::from_millis(100), &mut |event| {
@@ -353,6 +355,11 @@ impl<'t> Tour<'_, 't> {
             control.look(log.t_s(), &mut |line| {
                 progress.suspend(|| voice::put(std::io::stderr(), &format!("{line}\n")));
             });
+            for mark in control.marks(&log, false) {
+                progress
+                    .suspend(|| voice::put(std::io::stderr(), &(steering::marked(&mark) + "\n")));
+                marks.push(mark);
+            }
             for ask in control.asks() {
                 session.ask(ask);
             }
@@ -365,6 +372,7 @@ impl<'t> Tour<'_, 't> {
             }
         }
         progress.finish_and_clear();
+        marks.extend(control.marks(&log, true));
         let figures = log.figures();
         let ticks = log.ticks();
         // However the tour ended, the board is told; what it felt after the tour's end
@@ -379,6 +387,7 @@ impl<'t> Tour<'_, 't> {
         };
         let toured = Toured {
             rows,
+            marks,
             views: log.into_views(),
             summary,
         };
@@ -389,8 +398,11 @@ impl<'t> Tour<'_, 't> {
 fn write(toured: &Toured<'_>, settings: &Settings, path: &Path) -> Result<(), OutputError> {
     let mut recording = Recording::new(Output::create(path)?, &LoopColumns::COLUMNS)?;
     recording.describe(settings);
-    let mut described = 0;
+    let (mut described, mut marks) = (0, toured.marks.iter().peekable());
     for (record, columns) in &toured.rows {
+        while let Some(mark) = marks.next_if(|mark| mark.t_s <= record.t_s) {
+            recording.mark(mark);
+        }
         let (number, felt) = (columns.view(), toured.views.get(columns.view() as usize));
         if number > described
             && let Some(laid) = &felt.laid
@@ -400,5 +412,6 @@ fn write(toured: &Toured<'_>, settings: &Settings, path: &Path) -> Result<(), Ou
         }
         recording.write(record, &columns.values())?;
     }
+    marks.for_each(|mark| recording.mark(mark));
     recording.finish()
 }

@@ -20,8 +20,8 @@ use crate::materials::Materials;
 use crate::output::{Output, keep_apart};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{
-    Pace, Record, ReplayError, Replayer, Rule, Settings, Summary, Ticks, Trajectory, on_native_at,
-    replay_trajectory,
+    Mark, Pace, Record, ReplayError, Replayer, Rule, Settings, Summary, Ticks, Trajectory,
+    on_native_at, replay_trajectory,
 };
 use crate::stability::limits;
 use crate::terrain::Terrain;
@@ -116,14 +116,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(line) = session_summary::materials(&terrain) {
         eprintln!("{line}");
     }
+    let home_mm = recorded.as_ref().and_then(|it| it.felt.home_mm);
+    let later = recorded.map(|it| (it.views, it.marks));
+    let (views, marks) = later.unwrap_or_default();
     let felt = Felt {
         terrain: &terrain,
         law: (law, rendering.rule()),
         file,
         title: args.terrain.name(),
-        home_mm: recorded.as_ref().and_then(|it| it.felt.home_mm),
+        home_mm,
         recorded_at,
-        views: recorded.map(|recorded| recorded.views).unwrap_or_default(),
+        views,
+        marks,
         viewer,
     };
     let began = Instant::now();
@@ -175,6 +179,8 @@ struct Felt<'t> {
     recorded_at: Option<TickRate>,
     /// The other views of the recording.
     views: Vec<ViewSettings>,
+    /// Its marks.
+    marks: Vec<Mark>,
     /// The terrain file, as it was named.
     file: String,
     /// What the viewer calls it.
@@ -331,6 +337,7 @@ fn replay<'t>(
     let device = Device::of(replayer.device());
     let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
     settings.views.clone_from(&felt.views);
+    settings.marks.clone_from(&felt.marks);
     let output = Output::create_or_standard_output(&args.output).map_err(ReplayError::from)?;
     let mut feed = felt.shown(replayer)?;
     let mut shown = 0;

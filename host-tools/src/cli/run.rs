@@ -36,6 +36,7 @@ use super::terminal::speaker::Speaker;
 use super::terminal::voice::tell;
 use super::terminal::{interrupt, left_behind};
 use super::viewing::{ToBeShown, Viewing};
+use crate::events::{Server, Watcher};
 use crate::link::{DeviceAddress, Patience};
 use crate::output::keep_apart;
 use crate::steering::keys::KEYS;
@@ -99,6 +100,12 @@ pub struct Args {
     /// How the view may be changed meanwhile.
     #[command(flatten)]
     pub commands: Commands,
+
+    /// Tell what happens in lines of JSON on this port of 127.0.0.1, to any program of this
+    /// machine that connects; 0 takes a free one
+    #[arg(long, value_name = "PORT")]
+    pub events: Option<u16>,
+
     /// Whether it is shown.
     #[command(flatten)]
     pub viewing: Viewing,
@@ -137,6 +144,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     inputs.extend(args.rendering.materials.inputs());
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
     left_behind::tell(outputs.iter().map(PathBuf::as_path));
+    let events = args.events.map(listen).transpose()?;
     let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;
     let of_ground = (&args.rendering, &args.terrain.reading);
@@ -171,17 +179,40 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut seats = seats_for(args, &devices).into_iter();
     let each = devices.iter().zip(&placed).zip(met);
     let servings = each.zip(recordings.into_iter().zip(commands));
-    let servings = servings.map(|(((device, placed), met), (recording, commands))| Serving {
-        args,
-        device,
-        placed,
-        met,
-        recording,
-        commands,
-        seat: seats.next(),
-        shown: shown.take(),
+    let senders = (1..).map(|number| {
+        let sender = events.as_ref().map(Server::sender);
+        sender.map(|sender| Watcher::new(sender, number))
     });
-    serve_each(servings.collect())
+    let servings = servings.zip(senders);
+    let servings = servings.map(
+        |((((device, placed), met), (recording, commands)), events)| Serving {
+            args,
+            device,
+            placed,
+            met,
+            recording,
+            commands,
+            seat: seats.next(),
+            shown: shown.take(),
+            events,
+        },
+    );
+    let ended = serve_each(servings.collect());
+    if let Some(dropped) = events.map(Server::end).filter(|dropped| *dropped > 0) {
+        tell(format!(
+            "events         {dropped} lines were dropped: a reader was too slow"
+        ));
+    }
+    ended
+}
+
+/// Listens for readers of events.
+fn listen(port: u16) -> Result<Server, Failure> {
+    let server = Server::listen(port)
+        .map_err(|why| format!("events cannot be told on port {port} of 127.0.0.1: {why}"))
+        .or_hint("name another port with --events, or 0 for any that is free")?;
+    tell(format!("events         {}", server.address()));
+    Ok(server)
 }
 
 /// Checks that an arm can be meant by a stiffness.

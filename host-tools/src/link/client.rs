@@ -67,6 +67,11 @@ pub enum Event<'e> {
         /// Whether it was done; why not.
         result: Result<(), Refusal>,
     },
+    /// A tick was marked, as was asked for by [`Request::Mark`].
+    Marked {
+        /// The tick ([`Sample::tick`]).
+        tick: u32,
+    },
     /// A tile of the scene's level was said to the device, which may lose it and ask again.
     TileSent(TileKey),
     /// What was asked for was given up: the device does not answer it, or was
@@ -448,6 +453,7 @@ impl<'t> Client<'t> {
                 request: &request,
                 result: answer.result,
             }),
+            (_, &ToHost::Marked { tick, .. }) => on(Event::Marked { tick }),
             (_, ToHost::Status { status, .. }) => on(Event::Status(status)),
             (_, ToHost::Calibration { calibration, .. }) => {
                 on(Event::Calibration(calibration.as_ref()));

@@ -434,7 +434,9 @@ impl Conversation {
             ToHost::Hello(device) => self.on_hello(now, device, out)?,
             ToHost::Over { number, end } => self.on_over(now, number, end)?,
             ToHost::SceneTaken { epoch, accepted } => self.on_scene_taken(now, epoch, accepted)?,
-            ToHost::Answer(answer) => self.on_answer(now, answer),
+            message @ (ToHost::Answer(Answer { number, .. }) | ToHost::Marked { number, .. }) => {
+                self.on_answer(now, number, message)
+            }
             message @ ToHost::Status { number, .. } => {
                 self.on_told(now, (Ask::Status, number), message)
             }
@@ -570,10 +572,10 @@ impl Conversation {
         Ok(Some(News::SceneTaken))
     }
 
-    fn on_answer(&mut self, now: Duration, answer: Answer) -> Option<News> {
-        let ask = self.asking.request_answered(answer.number)?;
+    fn on_answer(&mut self, now: Duration, number: u8, message: ToHost) -> Option<News> {
+        let ask = self.asking.request_answered(number)?;
         self.heard = now;
-        Some(News::Answered(ask, ToHost::Answer(answer)))
+        Some(News::Answered(ask, message))
     }
 
     fn on_told(

@@ -3,6 +3,7 @@
 
 use hapterra_core::force::ForceLaw;
 
+use super::surface_change::{SurfaceChange, SurfaceError};
 use super::view::{View, finest_level};
 use crate::terrain::{BadScale, FeltGrid, Terrain, TerrainError};
 
@@ -39,7 +40,9 @@ pub enum ViewChange {
     Exaggerate(f64),
     /// A spring so many times stiffer.
     Stiffness(f64),
-    /// Scale, heights and stiffness of the beginning, at the place under the hand.
+    /// Something else of the surface.
+    Surface(SurfaceChange),
+    /// Scale, heights and surface of the beginning, at the place under the hand.
     Reset,
 }
 
@@ -81,6 +84,9 @@ pub enum ChangeError {
         "the stiffest of the materials would have {0:.3} N/mm: up to {STIFFEST_N_PER_MM} N/mm can be had"
     )]
     Material(f32),
+    /// Something of the surface that cannot be had.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
     /// Numbers that no terrain can be felt at.
     #[error(transparent)]
     Terrain(#[from] TerrainError),
@@ -243,6 +249,7 @@ impl Bounds {
                     }
                 }
             }
+            ViewChange::Surface(change) => *law = change.of(law, grid.materials().is_some())?,
             ViewChange::Reset => {
                 let first = &self.first.view;
                 let cell_mm = first.scale.cell_mm() * first.as_large_as_in(grid);

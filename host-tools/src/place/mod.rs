@@ -11,6 +11,7 @@ mod error;
 mod fit;
 mod ground;
 mod reach;
+mod surface_change;
 mod target;
 mod view;
 mod words;
@@ -19,6 +20,7 @@ pub use change::{Bounds, ChangeError, Changed, Hand, Laid, STIFFEST_N_PER_MM, Vi
 pub use coordinates::Coordinates;
 pub use error::PlaceError;
 pub use reach::{Reach, ReachBox};
+pub use surface_change::{SurfaceChange, SurfaceError};
 pub use target::Target;
 pub(crate) use view::FELT_MM;
 pub use view::{Heights, Sizing, View, ViewOptions, suited_height};

@@ -57,7 +57,9 @@ impl LoopColumns {
     }
 }
 
-fn mode_name(mode: Mode) -> &'static str {
+/// A mode's name in a recording.
+#[must_use]
+pub fn mode_name(mode: Mode) -> &'static str {
     match mode {
         Mode::Disarmed => "disarmed",
         Mode::Requested => "requested",

@@ -9,6 +9,7 @@
 
 mod felt;
 mod loop_columns;
+mod marks;
 mod published;
 mod recording;
 pub mod settings;
@@ -16,7 +17,8 @@ mod ticks;
 mod trajectory;
 
 pub use felt::Replayer;
-pub use loop_columns::LoopColumns;
+pub use loop_columns::{LoopColumns, mode_name};
+pub use marks::Mark;
 pub use recording::{Column, Record, Recording, Value};
 pub use settings::{Rule, Settings};
 pub use ticks::{Pace, Tick, Ticks};
@@ -103,6 +105,7 @@ pub fn replay_trajectory<'t>(
     let mut recording = Recording::new(output, columns)?;
     recording.describe(settings);
     let (mut summary, mut view) = (Summary::default(), 0);
+    let mut marks = settings.marks.iter().peekable();
     let first = replayer.terrain().clone();
     while let Some(tick) = ticks.next_tick()? {
         // Without settings it is a path alone.
@@ -123,6 +126,9 @@ pub fn replay_trajectory<'t>(
         let sample = replayer.feel(hip)?;
         let terrain = replayer.terrain();
         let record = Record::new(tick.t_s, tick.hip_mm, &sample, &scale);
+        while let Some(mark) = marks.next_if(|mark| mark.t_s <= record.t_s) {
+            recording.mark(mark);
+        }
         let more = [Value::Text(state_name(sample.state)), Value::Count(view)];
         recording.write(&record, more.get(..columns.len()).unwrap_or(&more))?;
         felt(&sample, &record, (view, terrain));
@@ -133,6 +139,7 @@ pub fn replay_trajectory<'t>(
             return Err(ReplayError::Interrupted);
         }
     }
+    marks.for_each(|mark| recording.mark(mark));
     recording.finish()?;
     Ok(summary)
 }

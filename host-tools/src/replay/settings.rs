@@ -9,6 +9,7 @@ use hapterra_core::force::{Damping, ForceLaw, Shading, Texture};
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
+use super::marks::Mark;
 use crate::link::shown;
 use crate::materials::{Looks, Materials};
 use crate::place::Laid;
@@ -50,6 +51,9 @@ pub struct Settings {
     /// beginning is [`Self::felt`] and [`Self::force`].
     #[serde(rename = "view", default, skip_serializing_if = "Vec::is_empty")]
     pub views: Vec<ViewSettings>,
+    /// The marks that were made while it was felt, in their order.
+    #[serde(rename = "mark", default, skip_serializing_if = "Vec::is_empty")]
+    pub marks: Vec<Mark>,
 }
 
 /// A view that was put in while a terrain was felt.
@@ -338,6 +342,7 @@ impl Settings {
             materials: grid.materials().map(MaterialSettings::of),
             device,
             views: vec![],
+            marks: vec![],
         }
     }
 
@@ -348,11 +353,12 @@ impl Settings {
         toml::to_string(self).unwrap_or_default()
     }
 
-    /// The same without the views that are put in later: what stands before the first row.
+    /// The same without the views and marks that come later: what stands before the first row.
     #[must_use]
-    pub fn without_views(&self) -> Self {
+    pub fn of_beginning(&self) -> Self {
         Self {
             views: vec![],
+            marks: vec![],
             ..self.clone()
         }
     }

@@ -1,21 +1,26 @@
 //! Commands as lines of text.
 
-use super::Steer;
-use crate::place::ViewChange;
+use hapterra_core::force::{Pattern, Shading, Texture};
+
+use super::marks::text_of;
+use super::{Steer, Wanted};
+use crate::place::{SurfaceChange, ViewChange};
 
 /// What is understood, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (hand mm), pan-m EAST NORTH (ground m), zoom TIMES, \
-     exaggerate TIMES, stiffness TIMES, reset, clutch on, clutch off; `at SECONDS` before any of them, and before that \
+     exaggerate TIMES, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
+     shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
+     clutch on, clutch off, mark TEXT; `at SECONDS` before any of them, and before that \
      `on NUMBER` for one device of several";
 
 /// A command, and when it is to be done.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Command {
     /// Seconds of the device's time since the beginning; as soon as what came before is
     /// done, where nothing is said.
     pub at_s: Option<f64>,
     /// What is to be done.
-    pub steer: Steer,
+    pub wanted: Wanted,
 }
 
 /// A line that is no command.
@@ -29,36 +34,66 @@ pub struct NoCommand {
 /// Characters of a line that a message repeats at most.
 const SHOWN: usize = 60;
 
-/// Reads a line; none where it is empty or a remark behind `#`.
+/// Reads a line; none where it is empty or a remark behind `#`. The text of a mark is all of the
+/// line's rest, `#` included.
 ///
 /// # Errors
 /// [`NoCommand`] says what is understood.
 pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
-    let text = line.split('#').next().unwrap_or_default();
-    let words: Vec<_> = text.split_whitespace().collect();
-    if words.is_empty() {
-        return Ok(None);
-    }
     let refused = |why| NoCommand {
-        line: text.trim().chars().take(SHOWN).collect(),
+        line: shown(line),
         why,
     };
-    read(&words).map(Some).map_err(refused)
+    let (at_s, rest) = timed(line).map_err(refused)?;
+    if let Some(text) = mark_in(rest) {
+        let text = text_of(text).map_err(refused)?;
+        let wanted = Wanted::Mark(text);
+        return Ok(Some(Command { at_s, wanted }));
+    }
+    let text = rest.split('#').next().unwrap_or_default();
+    let words: Vec<_> = text.split_whitespace().collect();
+    if words.is_empty() && at_s.is_none() {
+        return Ok(None);
+    }
+    let wanted = read(&words).map(Wanted::Steer).map_err(refused)?;
+    Ok(Some(Command { at_s, wanted }))
 }
 
-fn read(words: &[&str]) -> Result<Command, &'static str> {
-    let (at_s, words) = match words {
-        ["at", time, rest @ ..] => {
-            let at_s = number(time)?;
-            if at_s < 0.0 {
-                return Err("a time is not below zero");
-            }
-            (Some(at_s), rest)
-        }
-        _ => (None, words),
+/// The beginning of a line as a message may show it.
+fn shown(line: &str) -> String {
+    let visible = |c: char| if c.is_control() { '\u{FFFD}' } else { c };
+    line.trim().chars().take(SHOWN).map(visible).collect()
+}
+
+/// Takes `at SECONDS` from the beginning of a line.
+fn timed(line: &str) -> Result<(Option<f64>, &str), &'static str> {
+    let Some(rest) = after_word(line, "at") else {
+        return Ok((None, line));
     };
+    let rest = rest.trim_start();
+    let time = rest.split(|c: char| c.is_whitespace() || c == '#').next();
+    let time = time.unwrap_or_default();
+    match number(time)? {
+        at_s if at_s < 0.0 => Err("a time is not below zero"),
+        at_s => Ok((Some(at_s), rest.get(time.len()..).unwrap_or_default())),
+    }
+}
+
+/// What follows on a word at the beginning of a line; none where it begins otherwise.
+fn after_word<'l>(line: &'l str, word: &str) -> Option<&'l str> {
+    let rest = line.trim_start().strip_prefix(word)?;
+    let ends = rest.chars().next().is_none_or(char::is_whitespace);
+    ends.then_some(rest)
+}
+
+/// The text of a mark, where there is one in a line.
+fn mark_in(line: &str) -> Option<&str> {
+    after_word(line, "mark")
+}
+
+fn read(words: &[&str]) -> Result<Steer, &'static str> {
     let change = |change| Ok(Steer::Change(change));
-    let steer = match words {
+    match words {
         ["pan", east, north] => change(ViewChange::Pan {
             east_mm: number(east)?,
             north_mm: number(north)?,
@@ -70,6 +105,10 @@ fn read(words: &[&str]) -> Result<Command, &'static str> {
         ["zoom", times] => change(ViewChange::Zoom(factor(times)?)),
         ["exaggerate", times] => change(ViewChange::Exaggerate(factor(times)?)),
         ["stiffness", times] => change(ViewChange::Stiffness(factor(times)?)),
+        [
+            "friction" | "viscous-friction" | "damping" | "shading" | "texture",
+            ..,
+        ] => change(ViewChange::Surface(surface(words)?)),
         ["reset"] => change(ViewChange::Reset),
         ["clutch", "on"] => Ok(Steer::Clutch(true)),
         ["clutch", "off"] => Ok(Steer::Clutch(false)),
@@ -78,8 +117,52 @@ fn read(words: &[&str]) -> Result<Command, &'static str> {
         ["clutch", ..] => Err("it is on or off"),
         [] => Err("a command is missing"),
         _ => Err("no such word"),
-    };
-    steer.map(|steer| Command { at_s, steer })
+    }
+}
+
+/// A change of the surface, but for its stiffness.
+fn surface(words: &[&str]) -> Result<SurfaceChange, &'static str> {
+    let number = |word| number(word).map(|number| number as f32);
+    Ok(match words {
+        ["friction", mu] => SurfaceChange::Friction {
+            dynamic_mu: number(mu)?,
+            static_mu: number(mu)?,
+        },
+        ["friction", mu, at_rest] => SurfaceChange::Friction {
+            dynamic_mu: number(mu)?,
+            static_mu: number(at_rest)?,
+        },
+        ["viscous-friction", viscous_s] => SurfaceChange::ViscousFriction(number(viscous_s)?),
+        ["damping", ns_per_m] => SurfaceChange::Damping(number(ns_per_m)?),
+        ["shading", "none"] => SurfaceChange::Shading(Shading::None),
+        ["shading", "smooth"] => SurfaceChange::Shading(Shading::Smooth),
+        ["texture", "none"] => SurfaceChange::Texture(Texture::NONE),
+        ["texture", "grain", amplitude, wavelength] => SurfaceChange::Texture(Texture {
+            pattern: Pattern::Grain,
+            amplitude_mm: number(amplitude)?,
+            wavelength_mm: number(wavelength)?,
+            ..Texture::NONE
+        }),
+        ["texture", "grating", amplitude, wavelength, direction @ ..] => {
+            SurfaceChange::Texture(Texture {
+                pattern: Pattern::Grating,
+                amplitude_mm: number(amplitude)?,
+                wavelength_mm: number(wavelength)?,
+                direction_deg: match direction {
+                    [] => 0.0,
+                    [degrees] => number(degrees)?,
+                    _ => return Err("a grating takes two or three numbers"),
+                },
+                seed: 0,
+            })
+        }
+        ["friction", ..] => return Err("it takes one or two numbers"),
+        ["shading", ..] => return Err("it is smooth or none"),
+        ["texture", ..] => {
+            return Err("it is none, or grain or grating with an amplitude and a wavelength, mm");
+        }
+        _ => return Err("it takes one number"),
+    })
 }
 
 fn number(word: &str) -> Result<f64, &'static str> {
@@ -96,7 +179,12 @@ fn factor(word: &str) -> Result<f64, &'static str> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::marks::LONGEST_MARK;
     use super::*;
+
+    const fn of_surface(change: SurfaceChange) -> Steer {
+        Steer::Change(ViewChange::Surface(change))
+    }
 
     #[test]
     fn each_command_is_read() {
@@ -126,14 +214,88 @@ mod tests {
                 None,
                 Steer::Change(ViewChange::Stiffness(0.5)),
             ),
+            (
+                "friction 0.3 .5",
+                None,
+                of_surface(SurfaceChange::Friction {
+                    dynamic_mu: 0.3,
+                    static_mu: 0.5,
+                }),
+            ),
+            (
+                "friction 0.4",
+                None,
+                of_surface(SurfaceChange::Friction {
+                    dynamic_mu: 0.4,
+                    static_mu: 0.4,
+                }),
+            ),
+            (
+                "viscous-friction 0.01",
+                None,
+                of_surface(SurfaceChange::ViscousFriction(0.01)),
+            ),
+            ("damping 2", None, of_surface(SurfaceChange::Damping(2.0))),
+            (
+                "shading smooth",
+                None,
+                of_surface(SurfaceChange::Shading(Shading::Smooth)),
+            ),
+            (
+                "texture none",
+                None,
+                of_surface(SurfaceChange::Texture(Texture::NONE)),
+            ),
+            (
+                "texture grating .1 1.5 30",
+                None,
+                of_surface(SurfaceChange::Texture(Texture {
+                    pattern: Pattern::Grating,
+                    amplitude_mm: 0.1,
+                    wavelength_mm: 1.5,
+                    direction_deg: 30.0,
+                    seed: 0,
+                })),
+            ),
             ("at 0 reset", Some(0.0), Steer::Change(ViewChange::Reset)),
             ("clutch\ton\r", None, Steer::Clutch(true)),
             ("clutch off", None, Steer::Clutch(false)),
         ] {
-            assert_eq!(parse(line), Ok(Some(Command { at_s, steer })), "{line}");
+            let wanted = Wanted::Steer(steer);
+            assert_eq!(parse(line), Ok(Some(Command { at_s, wanted })), "{line}");
         }
         for nothing in ["", "  \r", "# a remark", "   # another"] {
             assert_eq!(parse(nothing), Ok(None));
+        }
+    }
+
+    #[test]
+    fn a_mark_is_the_rest_of_its_line() {
+        for (line, at_s, text) in [
+            ("mark a", None, "a"),
+            (
+                "  at 2 mark\ttrial #3, \"left\" 'µ' = [x]\r",
+                Some(2.0),
+                "trial #3, \"left\" 'µ' = [x]",
+            ),
+            ("mark mark at 2 zoom 3", None, "mark at 2 zoom 3"),
+        ] {
+            let wanted = Wanted::Mark(text.to_owned());
+            assert_eq!(parse(line), Ok(Some(Command { at_s, wanted })), "{line}");
+        }
+        let longest = "µ".repeat(LONGEST_MARK);
+        assert!(parse(&format!("mark {longest}")).is_ok());
+        for (line, why) in [
+            ("mark", "a text is missing"),
+            ("mark \r", "a text is missing"),
+            (&format!("mark x{longest}"), "at most 200 characters"),
+            ("mark a\u{1b}[2J", "control character"),
+            ("mark a\tb", "control character"),
+            ("marks a", "no such word"),
+        ] {
+            let told = parse(line).expect_err(line).to_string();
+            assert!(told.contains(why), "{told}");
+            assert!(!told.contains(char::is_control), "{told}");
         }
     }
 
@@ -149,6 +311,13 @@ mod tests {
             ("zoom inf", "a number"),
             ("pan 5", "two numbers"),
             ("pan 5 nan", "a number"),
+            ("friction", "one or two numbers"),
+            ("friction a", "a number"),
+            ("damping 1 2", "one number"),
+            ("shading on", "smooth or none"),
+            ("texture grain", "none, or grain or grating"),
+            ("texture grain 0.1 1 30", "none, or grain or grating"),
+            ("texture grating 0.1 1 30 2", "two or three numbers"),
             ("clutch", "on or off"),
             ("at 2", "missing"),
             ("at -1 reset", "below zero"),
@@ -160,6 +329,6 @@ mod tests {
             assert!(told.contains("exaggerate TIMES"), "{told}");
         }
         let long = parse(&"x".repeat(10_000)).expect_err("no command");
-        assert!(long.to_string().len() < 400);
+        assert!(long.to_string().len() < UNDERSTOOD.len() + 2 * SHOWN);
     }
 }

@@ -16,12 +16,23 @@
 pub mod command;
 mod engine;
 pub mod keys;
+mod marks;
 mod queue;
 
 use crate::place::ViewChange;
 
 pub use engine::{Put, Steering};
+pub use marks::{Made, Marks};
 pub use queue::{CommandQueue, Origin};
+
+/// What a command asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Wanted {
+    /// Another view.
+    Steer(Steer),
+    /// A mark with this text.
+    Mark(String),
+}
 
 /// What the user wants of the view.
 #[derive(Clone, Copy, Debug, PartialEq)]

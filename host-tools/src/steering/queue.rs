@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
-use super::Steer;
+use super::Wanted;
 use super::command::{Command, parse};
 
 /// Commands of a device that wait to be taken or to be done; a writer waits beyond them.
@@ -94,7 +94,7 @@ impl CommandQueue {
 
     /// The next command that is due at a time of the device, s; `is_free` tells whether what came
     /// before is done. What is wrong with a line is told.
-    pub fn due(&mut self, t_s: f64, is_free: bool, tell: &mut dyn FnMut(String)) -> Option<Steer> {
+    pub fn due(&mut self, t_s: f64, is_free: bool, tell: &mut dyn FnMut(String)) -> Option<Wanted> {
         while self.waiting.len() < WAITING
             && let Some(Ok(read)) = self.lines.as_ref().map(Receiver::try_recv)
         {
@@ -112,7 +112,7 @@ impl CommandQueue {
         let next = self.waiting.front()?;
         let is_due = is_free && next.at_s.is_none_or(|at_s| t_s >= at_s);
         match is_due {
-            true => self.waiting.pop_front().map(|command| command.steer),
+            true => self.waiting.pop_front().map(|command| command.wanted),
             false => None,
         }
     }
@@ -141,7 +141,9 @@ fn hand_out(line: &str, number: u64, ways: &[Way]) -> bool {
             true
         }
         Ok(Some((None, command))) => {
-            let served = ways.iter().filter(|way| is_served(way, Ok(command)));
+            let served = ways
+                .iter()
+                .filter(|way| is_served(way, Ok(command.clone())));
             served.count() > 0
         }
         Err(why) => ways.iter().any(|way| is_served(way, Err(why.clone()))),
@@ -209,7 +211,12 @@ fn read_lines(
 mod tests {
     use super::*;
     use crate::place::ViewChange;
+    use crate::steering::Steer;
     use crate::timeouts::{next, wait_for, wait_until};
+
+    fn change(change: ViewChange) -> Wanted {
+        Wanted::Steer(Steer::Change(change))
+    }
 
     #[cfg(unix)]
     #[test]
@@ -226,7 +233,7 @@ mod tests {
     fn commands_wait_for_their_time_and_for_the_ones_before() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
-        let text = "# a tour\nat 1 zoom 2\nnonsense\nzoom 4\nat 0.5 reset\n";
+        let text = "# a tour\nat 1 zoom 2\nnonsense\nzoom 4\nat 0.5 reset\nmark done\n";
         std::fs::write(&path, text).expect("written");
         let origin: Origin = path.to_str().expect("text").parse().expect("a file");
         let mut queue = CommandQueue::of(&origin).expect("opened");
@@ -237,14 +244,16 @@ mod tests {
             !told.is_empty()
         });
         let mut due = |t_s, is_free| queue.due(t_s, is_free, &mut |_| {});
-        let zoom = |times| Steer::Change(ViewChange::Zoom(times));
+        let zoom = |times| change(ViewChange::Zoom(times));
         assert_eq!(due(1.0, true), Some(zoom(2.0)));
         assert_eq!(due(1.0, false), None, "not while that is under way");
         // The file is read meanwhile.
         let fourth = wait_for("the fourth line", || due(1.1, true));
         assert_eq!(fourth, zoom(4.0));
         let fifth = wait_for("the fifth line", || due(1.2, true));
-        assert_eq!(fifth, Steer::Change(ViewChange::Reset));
+        assert_eq!(fifth, change(ViewChange::Reset));
+        let sixth = wait_for("the sixth line", || due(1.2, true));
+        assert_eq!(sixth, Wanted::Mark("done".to_owned()));
         assert_eq!(due(9.0, true), None);
         assert!(
             told[0].starts_with("line 3 of the commands: `nonsense`"),
@@ -255,7 +264,7 @@ mod tests {
     }
 
     /// Takes all that is due of some queues until there was so much of each.
-    fn all_due(queues: &mut [CommandQueue], counts: &[usize]) -> (Vec<Vec<Steer>>, Vec<String>) {
+    fn all_due(queues: &mut [CommandQueue], counts: &[usize]) -> (Vec<Vec<Wanted>>, Vec<String>) {
         let (mut due, mut told) = (vec![vec![]; queues.len()], vec![]);
         wait_until("all commands", || {
             for (queue, due) in queues.iter_mut().zip(&mut due) {
@@ -275,7 +284,7 @@ mod tests {
         std::fs::write(&path, text).expect("written");
         let mut queues = CommandQueue::of_several(&Origin::File(path), 2).expect("opened");
         let (due, told) = all_due(&mut queues, &[3, 3]);
-        let zoom = |times| Steer::Change(ViewChange::Zoom(times));
+        let zoom = |times| change(ViewChange::Zoom(times));
         assert_eq!(due[0], [2.0, 4.0, 5.0].map(zoom));
         assert_eq!(due[1], [2.0, 3.0, 5.0].map(zoom));
         // What is wrong is told once, and not by each device.
@@ -300,7 +309,7 @@ mod tests {
         // The third one is not served any more, and the first one has its command.
         drop(queues.pop());
         let (due, _) = all_due(&mut queues, &[1]);
-        assert_eq!(due[0], [Steer::Change(ViewChange::Reset)]);
+        assert_eq!(due[0], [change(ViewChange::Reset)]);
         let mut told = vec![];
         let (mut taken, t_s) = (0, 0.0);
         // What is not due yet is left where there is a bound.

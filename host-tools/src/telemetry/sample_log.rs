@@ -71,6 +71,12 @@ impl<'t> SampleLog<'t> {
         self.timeline.ticks() as f64 / f64::from(self.tick_hz.max(1))
     }
 
+    /// Time of a tick of the device as it runs now, since the beginning, s.
+    #[must_use]
+    pub fn t_s_of(&self, tick: u32) -> f64 {
+        self.timeline.t_s_of(tick)
+    }
+
     /// The figures so far.
     #[must_use]
     pub fn figures(&self) -> Figures {

@@ -33,7 +33,13 @@ impl Timeline {
             self.before += u64::from(self.latest);
         }
         self.latest = sample.tick;
-        self.ticks() as f64 / self.tick_hz
+        self.t_s_of(sample.tick)
+    }
+
+    /// The time of a tick since the latest restart, s.
+    #[must_use]
+    pub fn t_s_of(&self, tick: u32) -> f64 {
+        (self.before + u64::from(tick)) as f64 / self.tick_hz
     }
 }
 

@@ -177,6 +177,8 @@ pub struct Chip {
     pub clutch: (u32, u32),
     /// Changes in each tick that leaves the amplifiers on.
     pub heartbeat: (u32, u32),
+    /// High for a while from each mark on.
+    pub mark: (u32, u32),
     /// The status LED.
     pub led: (u32, u32),
     /// Low while an amplifier is ready, axes 1 to 3.
@@ -296,6 +298,7 @@ pub static G474: Chip = Chip {
     dead_man: (C, 1),
     clutch: (C, 9),
     heartbeat: (D, 2),
+    mark: (B, 10),
     led: (A, 8),
     ready: [(C, 10), (C, 11), (C, 12)],
     monitors_fitted: (C, 8),
@@ -419,6 +422,7 @@ pub static H743: Chip = Chip {
     dead_man: (F, 5),
     clutch: (F, 4),
     heartbeat: (G, 1),
+    mark: (G, 0),
     led: (B, 0),
     ready: [(F, 12), (F, 13), (F, 14)],
     monitors_fitted: (F, 15),

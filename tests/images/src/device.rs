@@ -87,6 +87,8 @@ pub struct Device<'t> {
     pub latency_us: u16,
     /// What came of the latest request that was answered.
     pub answer: Option<(Request, Result<(), Refusal>)>,
+    /// The ticks that were marked.
+    pub marked: Vec<u32>,
 }
 
 impl<'t> Device<'t> {
@@ -115,6 +117,7 @@ impl<'t> Device<'t> {
             guard: None,
             status: None,
             answer: None,
+            marked: vec![],
         };
         device.run_ms(20);
         device
@@ -223,6 +226,7 @@ impl<'t> Device<'t> {
                 Event::Guard(report) => self.guard = Some(*report),
                 Event::Status(status) => self.status = Some(status.clone()),
                 Event::Answered { request, result } => self.answer = Some((*request, result)),
+                Event::Marked { tick } => self.marked.push(tick),
                 _ => {}
             };
             self.session

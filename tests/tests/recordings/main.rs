@@ -2,6 +2,7 @@
 //! again as it was.
 
 mod folder;
+mod marks;
 mod views;
 
 use std::path::Path;

@@ -15,7 +15,7 @@ use super::write_degrees;
 const SIZE: u32 = 512;
 
 /// All comments together, as the page on recordings reads them.
-fn comments(text: &str) -> String {
+pub(super) fn comments(text: &str) -> String {
     let lines = text.lines().filter(|line| line.starts_with('#'));
     lines
         .map(|line| format!("{}\n", line.get(2..).unwrap_or("")))

@@ -22,4 +22,6 @@ pub(crate) struct Parts<O, E, U, W: PeripheralType + 'static> {
     pub(crate) led: Output<'static>,
     /// Changes its level in each tick that leaves the amplifiers on.
     pub(crate) heartbeat: Output<'static>,
+    /// High for a while from each mark on.
+    pub(crate) mark: Output<'static>,
 }

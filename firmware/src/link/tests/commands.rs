@@ -43,7 +43,11 @@ fn scene_that_the_loop_refuses_is_dropped_by_the_link() {
         assert!(
             loop_ends
                 .health
-                .enqueue(LoopReport { health, epoch })
+                .enqueue(LoopReport {
+                    health,
+                    epoch,
+                    marked: Default::default(),
+                })
                 .is_ok()
         );
         link.poll();

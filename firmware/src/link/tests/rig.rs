@@ -127,7 +127,7 @@ pub(super) struct Rig {
     pub(super) session: SessionNumber,
     pub(super) number: u8,
     /// Requests by the number that they were given.
-    asked: Vec<(u8, Request)>,
+    pub(super) asked: Vec<(u8, Request)>,
     /// Refusals heard.
     pub(super) refused: Vec<VersionCheck>,
     /// Whether tiles asked for are answered.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
+use hapterra_core::force::ForceLaw;
 use hapterra_core::phantom::Calibration;
 
 use super::placing::{self, scale_in_words, short};
@@ -13,17 +14,19 @@ use crate::cli::terminal::keyboard::keyboard;
 use crate::cli::terminal::raw_keys::RawMode;
 use crate::link::{Ask, Event};
 use crate::place::{Bounds, Laid, Reach};
+use crate::replay::Mark;
 use crate::steering::keys::{KEYS, Key, Keys};
-use crate::steering::{CommandQueue, Origin, Put, Steer, Steering};
-use crate::telemetry::FeltViews;
+use crate::steering::{CommandQueue, Made, Marks, Origin, Put, Steer, Steering, Wanted};
+use crate::telemetry::{FeltViews, SampleLog};
 use crate::terrain::Terrain;
 
 /// How the view may be changed while it is touched.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Commands {
     /// Change the view by lines of this file while it is touched, or of standard input where
-    /// it is `-`: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `stiffness 0.5`, `clutch on`,
-    /// `clutch off`, `reset`
+    /// it is `-`: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `stiffness 0.5`, `friction 0.4`, `damping 2`,
+    /// `shading smooth`, `texture grain 0.1 1`, `clutch on`,
+    /// `clutch off`, `reset`, `mark TEXT`
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub commands: Option<Origin>,
 }
@@ -81,6 +84,7 @@ impl Commands {
 /// Keys and commands on one side, a session on the other.
 pub(in crate::cli) struct ViewControl<'t> {
     steering: Steering<'t>,
+    marks: Marks,
     commands: CommandQueue,
     keys: Keys,
     typing: Typing,
@@ -122,6 +126,7 @@ impl<'t> ViewControl<'t> {
         };
         Self {
             steering: Steering::new(bounds, terrain.clone()),
+            marks: Marks::default(),
             commands,
             keys: Keys::default(),
             typing: Typing::Nobody,
@@ -147,6 +152,7 @@ impl<'t> ViewControl<'t> {
     /// Takes what the device tells.
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         self.steering.on_event(event);
+        self.marks.on_event(event);
     }
 
     /// Looks at keys and commands at a time of the device, s. What is wrong with them is
@@ -162,8 +168,11 @@ impl<'t> ViewControl<'t> {
             self.take(released);
         }
         let is_free = self.steering.is_settled();
-        let due = self.commands.due(t_s, is_free, tell);
-        self.take(due);
+        match self.commands.due(t_s, is_free, tell) {
+            Some(Wanted::Steer(steer)) => self.take(Some(steer)),
+            Some(Wanted::Mark(text)) => self.marks.mark(text).into_iter().for_each(&mut *tell),
+            None => {}
+        }
         self.steering.lines().into_iter().for_each(tell);
     }
 
@@ -175,7 +184,23 @@ impl<'t> ViewControl<'t> {
 
     /// What is to be asked of the device now.
     pub(in crate::cli) fn asks(&mut self) -> Vec<Ask> {
-        self.steering.asks()
+        let mut asks = self.steering.asks();
+        asks.extend(self.marks.asks());
+        asks
+    }
+
+    /// The marks that were made since the last look, as a recording has them; `is_over` at the
+    /// end, when the device answers no more.
+    pub(in crate::cli) fn marks(&mut self, log: &SampleLog<'_>, is_over: bool) -> Vec<Mark> {
+        let made = match is_over {
+            true => self.marks.take_all(),
+            false => self.marks.take_made(),
+        };
+        let mark = |made: Made| {
+            let t_s = made.tick.map_or(log.t_s(), |tick| log.t_s_of(tick));
+            Mark::new(made, t_s)
+        };
+        made.into_iter().map(mark).collect()
     }
 
     /// The view that is to be put in now, which samples may be felt in from now on.
@@ -202,13 +227,49 @@ impl<'t> ViewControl<'t> {
     }
 }
 
+/// What a surface feels like, without what it has not.
+fn surface_in_words(law: &ForceLaw) -> String {
+    let number = |number: f32| placing::short(f64::from(number));
+    let (friction, texture) = (&law.friction, &law.texture);
+    let mut words = vec![format!("{} N/mm", number(law.stiffness_n_per_mm))];
+    if friction.static_mu > 0.0 {
+        let [sliding, at_rest] = [friction.dynamic_mu, friction.static_mu].map(number);
+        words.push(format!("friction {sliding}, {at_rest} at rest"));
+    }
+    if friction.viscous_s > 0.0 {
+        words.push(format!("viscous friction {} s", number(friction.viscous_s)));
+    }
+    if law.damping.ns_per_m > 0.0 {
+        words.push(format!("damping {} N·s/m", number(law.damping.ns_per_m)));
+    }
+    if !law.shading.is_none() {
+        words.push("shading".to_owned());
+    }
+    if !texture.is_none() {
+        let [amplitude, wavelength] = [texture.amplitude_mm, texture.wavelength_mm].map(number);
+        words.push(format!("texture of {amplitude} mm every {wavelength} mm"));
+    }
+    words.join(", ")
+}
+
+/// What was marked, in a line.
+pub(in crate::cli) fn marked(mark: &Mark) -> String {
+    let Mark { text, t_s, .. } = mark;
+    match mark.tick {
+        Some(tick) => format!("mark           `{text}` at tick {tick}, {t_s:.3} s"),
+        None => format!(
+            "mark           `{text}` at about {t_s:.3} s: the device has not said which tick, and may not have raised its pin"
+        ),
+    }
+}
+
 /// What a view that was put in is, in a line.
 pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     format!(
-        "view {number}: {}; {} N/mm; {} under the home position",
+        "view {number}: {}; {}; {} under the home position",
         scale_in_words(&laid.view),
-        placing::short(f64::from(laid.law.stiffness_n_per_mm)),
+        surface_in_words(&laid.law),
         crate::place::place_in_words(&file, laid.view.home_ground)
     )
 }

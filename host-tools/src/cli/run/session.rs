@@ -19,6 +19,7 @@ use crate::cli::session_summary::{self, SessionSummary};
 use crate::cli::terminal::desk::Seat;
 use crate::cli::terminal::interrupt;
 use crate::cli::viewing::ToBeShown;
+use crate::events::Watcher;
 use crate::link::{
     Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
 };
@@ -54,6 +55,7 @@ pub(super) struct Serving<'p, 't> {
     /// Its place at a keyboard that several devices share.
     pub(super) seat: Option<Arc<Seat>>,
     pub(super) shown: Option<ToBeShown<'t>>,
+    pub(super) events: Option<Watcher>,
 }
 
 impl<'t> Serving<'_, 't> {
@@ -131,7 +133,7 @@ impl<'t> Serving<'_, 't> {
         let shown = (self.shown).and_then(|shown| shown.start(&hello, |line| speaker.tell(line)));
         let control = (control, self.seat.as_ref());
         let watch = Watch::new(args, (placed, speaker), &hello, recording, control);
-        let mut watch = watch.shown(shown);
+        let mut watch = watch.shown(shown).with_events(self.events);
         let end = served.serve(&mut watch);
         // What was recorded is kept, however it ended, and before anything else is done.
         let log = watch.finish();
@@ -293,7 +295,7 @@ fn connect<'t>(
     let native = || {
         let arm = placed.tour.as_ref().map(PlacedTerrain::held_phantom);
         let device = Native::new(HostClock::default(), arm.map(|arm| Box::new(arm) as _));
-        match args.viewing.view {
+        match args.viewing.view || args.events.is_some() {
             true => device.in_real_time(),
             false => device,
         }

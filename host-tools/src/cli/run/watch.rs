@@ -14,6 +14,7 @@ use crate::cli::terminal::arming_prompts::ArmingPrompts;
 use crate::cli::terminal::desk::Seat;
 use crate::cli::terminal::speaker::Speaker;
 use crate::cli::viewing::Shown;
+use crate::events::Watcher;
 use crate::link::{Ask, Event, Tally};
 use crate::output::OutputError;
 use crate::replay::settings::ViewSettings;
@@ -44,6 +45,7 @@ pub(super) struct Watch<'t> {
     prompts: ArmingPrompts,
     line_due: Instant,
     shown: Option<Shown<'t>>,
+    events: Option<Watcher>,
     speaker: Speaker,
 }
 
@@ -85,6 +87,7 @@ impl<'t> Watch<'t> {
             prompts,
             line_due: Instant::now() + LINE_EVERY,
             shown: None,
+            events: None,
             speaker: speaker.clone(),
         }
     }
@@ -94,9 +97,15 @@ impl<'t> Watch<'t> {
         Self { shown, ..self }
     }
 
+    /// The same, and readers of events are told what happens.
+    pub(super) fn with_events(self, events: Option<Watcher>) -> Self {
+        Self { events, ..self }
+    }
+
     /// Ends the recording, and takes the line at the bottom of the terminal away.
-    pub(super) fn finish(self) -> Seen<'t> {
+    pub(super) fn finish(mut self) -> Seen<'t> {
         self.speaker.status(None);
+        self.take_marks(true);
         let (ticks, figures) = (self.log.ticks(), self.log.figures());
         let stood_still = self.stands_still();
         let kept = match (self.failed, self.recording) {
@@ -118,11 +127,27 @@ impl<'t> Watch<'t> {
             .is_some_and(|ticked| ticked.elapsed() >= STANDS_STILL)
     }
 
+    /// Takes the marks that were made, at the end also those that were only asked for.
+    fn take_marks(&mut self, is_over: bool) {
+        for mark in self.control.marks(&self.log, is_over) {
+            self.speaker.tell(steering::marked(&mark));
+            if let Some(events) = &self.events {
+                events.mark(&mark);
+            }
+            if let Some(recording) = &mut self.recording {
+                recording.mark(&mark);
+            }
+        }
+    }
+
     fn record(&mut self, sample: &Sample) -> Record {
         let record = self.log.take(sample);
         let (view, felt) = self.log.view();
         if let Some(shown) = &mut self.shown {
             shown.take(sample, &record, (view, felt));
+        }
+        if let Some(events) = &mut self.events {
+            events.take(sample, &record, (view, &felt.terrain));
         }
         if view > self.described
             && let Some(laid) = &felt.laid
@@ -176,6 +201,7 @@ impl<'t> Onlooker<'t> for Watch<'t> {
         let speaker = &self.speaker;
         self.control
             .look(self.log.t_s(), &mut |line| speaker.tell(line));
+        self.take_marks(false);
         let mut asks = self.prompts.messages();
         asks.extend(self.control.asks());
         asks

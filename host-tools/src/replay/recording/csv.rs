@@ -4,13 +4,16 @@ use std::io::Write;
 
 use super::{BEFORE_CONTACT, CONTACT, Column, NUMBERS, Record, Value};
 use crate::output::{Output, OutputError};
+use crate::replay::marks::Mark;
 use crate::replay::settings::{Settings, ViewSettings};
 
 /// A CSV recording being written.
 pub(super) struct Csv {
     output: Output,
-    /// What is not written yet: a row, or the settings and the header before the first.
-    text: Vec<u8>,
+    /// The latest row, or the header before the first: not written yet.
+    row: Vec<u8>,
+    /// Remarks that stand before it.
+    remarks: Vec<u8>,
 }
 
 impl Csv {
@@ -19,16 +22,23 @@ impl Csv {
         let (before, after) = NUMBERS.split_at(BEFORE_CONTACT);
         let names = before.iter().chain([&CONTACT]).chain(after).copied();
         let names = names.chain(more.iter().map(Column::name));
-        let mut text = names.collect::<Vec<_>>().join(",").into_bytes();
-        text.push(b'\n');
-        Self { output, text }
+        let mut row = names.collect::<Vec<_>>().join(",").into_bytes();
+        row.push(b'\n');
+        Self {
+            output,
+            row,
+            remarks: vec![],
+        }
     }
 
-    /// Puts the settings before what is not written yet: the header.
+    /// Puts the settings before the header.
     pub(super) fn describe(&mut self, settings: &Settings) {
-        let header = std::mem::take(&mut self.text);
-        self.remark(&settings.without_views().to_toml());
-        self.text.extend(header);
+        self.remark(&settings.of_beginning().to_toml());
+    }
+
+    /// Puts a mark before the latest row: a remark that no row follows may be cut.
+    pub(super) fn mark(&mut self, mark: &Mark) {
+        self.remark(&mark.to_toml());
     }
 
     /// Says between two rows that the rows from here on were felt in another view. What
@@ -42,7 +52,7 @@ impl Csv {
     fn remark(&mut self, text: &str) {
         for line in text.lines() {
             let space = if line.is_empty() { "" } else { " " };
-            self.text.extend(format!("#{space}{line}\n").bytes());
+            self.remarks.extend(format!("#{space}{line}\n").bytes());
         }
     }
 
@@ -54,13 +64,13 @@ impl Csv {
         for number in before.iter().chain([&contact]).chain(after) {
             // The shortest digits that read back to the same value. Writing to
             // a vector cannot fail.
-            let _ = write!(self.text, "{number},");
+            let _ = write!(self.row, "{number},");
         }
         for value in more {
-            let _ = write!(self.text, "{value},");
+            let _ = write!(self.row, "{value},");
         }
-        self.text.pop();
-        self.text.push(b'\n');
+        self.row.pop();
+        self.row.push(b'\n');
         Ok(())
     }
 
@@ -70,8 +80,10 @@ impl Csv {
     }
 
     fn flush(&mut self) -> Result<(), OutputError> {
-        let written = self.output.write_all(&self.text);
-        self.text.clear();
+        let remarks = self.output.write_all(&self.remarks);
+        let written = remarks.and_then(|()| self.output.write_all(&self.row));
+        self.remarks.clear();
+        self.row.clear();
         written.map_err(|source| OutputError {
             path: self.output.path().to_owned(),
             source,

@@ -12,6 +12,7 @@ use std::path::Path;
 use hapterra_core::contact::ContactState;
 use hapterra_core::scene::Sample;
 
+use super::marks::Mark;
 use super::settings::{Settings, ViewSettings};
 use crate::output::{Output, OutputError};
 use crate::terrain::Scale;
@@ -163,6 +164,14 @@ impl Recording {
                 parquet.view(view);
                 Ok(())
             }
+        }
+    }
+
+    /// Adds a mark, before the latest row or the header.
+    pub fn mark(&mut self, mark: &Mark) {
+        match &mut self.0 {
+            Form::Csv(csv) => csv.mark(mark),
+            Form::Parquet(parquet) => parquet.mark(mark),
         }
     }
 

@@ -17,6 +17,7 @@ use parquet::schema::types::{ColumnPath, Type};
 
 use super::{BEFORE_CONTACT, CONTACT, Column, NUMBERS, Record, Value};
 use crate::output::{Output, OutputError};
+use crate::replay::marks::Mark;
 use crate::replay::settings::{KEY, Settings, ViewSettings};
 
 /// Rows that are kept before they are written as one group: a minute of a device.
@@ -58,12 +59,17 @@ impl Parquet {
     }
 
     pub(super) fn describe(&mut self, settings: &Settings) {
-        self.settings = settings.without_views().to_toml();
+        self.settings = settings.of_beginning().to_toml();
     }
 
     /// Rows of another view follow. The file's metadata is written at its end.
     pub(super) fn view(&mut self, view: &ViewSettings) {
         self.settings += &view.to_toml();
+    }
+
+    /// Adds a mark to the file's metadata.
+    pub(super) fn mark(&mut self, mark: &Mark) {
+        self.settings += &mark.to_toml();
     }
 
     pub(super) fn write(&mut self, record: &Record, more: &[Value<'_>]) -> Result<(), OutputError> {

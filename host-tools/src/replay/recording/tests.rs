@@ -133,3 +133,41 @@ fn settings_stand_before_the_header_and_nothing_is_left_of_what_is_not_finished(
     }
     assert_eq!(folder.path().read_dir().expect("a folder").count(), 0);
 }
+
+/// Marks whose texts are hard to write down: the first before any row, the last after all.
+fn marks() -> Vec<Mark> {
+    let texts = [
+        "a, \"b\" 'c' \\ # d",
+        "[[view]]",
+        "= µ \u{1F9E0} \u{2028} end",
+        "'''\"\"\"",
+    ];
+    let mark = |(at, text): (u32, &str)| Mark {
+        tick: (at != 2).then_some(at),
+        t_s: f64::from(at) / 1000.0,
+        host_unix_s: 1_764_226_800.123_456,
+        text: text.to_owned(),
+    };
+    (0..).zip(texts).map(mark).collect()
+}
+
+#[test]
+fn marks_come_back_from_both_forms() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["m.csv", "m.parquet"] {
+        let path = folder.path().join(name);
+        let output = Output::create(&path).expect("created");
+        let mut recording = Recording::new(output, &[]).expect("begun");
+        recording.describe(&settings());
+        recording.mark(&marks()[0]);
+        for mark in &marks()[1..] {
+            recording.write(&record(7), &[]).expect("written");
+            recording.mark(mark);
+        }
+        recording.finish().expect("finished");
+        let trajectory = Trajectory::open(&path).expect("opened");
+        let read = trajectory.settings().expect("settings");
+        assert_eq!(read.marks, marks(), "{name}");
+        assert_eq!(read.of_beginning(), settings(), "{name}");
+    }
+}

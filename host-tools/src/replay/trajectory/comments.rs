@@ -56,21 +56,21 @@ impl<R: Seek> Seek for Again<R> {
     }
 }
 
-/// What a block of comments begins with that tells of another view.
-const VIEW: &[u8] = b"[[view]]";
+/// What a block of comments begins with that tells of another view or of a mark.
+const LATER: [&[u8]; 2] = [b"[[view]]", b"[[mark]]"];
 /// Bytes of such blocks that are looked at, at most: a view takes less than four hundred.
 const MOST: usize = 1 << 24;
 
-/// Reads the comments between rows that tell of other views, without their `#` and a space
+/// Reads the comments between rows that tell of other views and of marks, without their `#` and a space
 /// after it; other remarks are passed over, and so is one that no row follows: whoever wrote it
 /// may have been killed in the middle.
-pub(super) fn views(stream: impl Read) -> io::Result<String> {
+pub(super) fn later(stream: impl Read) -> io::Result<String> {
     let (mut reader, mut line) = (
         BufReader::with_capacity(1 << 16, Bounded::new(stream)),
         Vec::new(),
     );
     let (mut found, mut block) = (String::new(), String::new());
-    let (mut is_view, mut was_comment) = (false, true);
+    let (mut is_meant, mut was_comment) = (false, true);
     while found.len() < MOST {
         line.clear();
         if reader.read_until(b'\n', &mut line)? == 0 {
@@ -83,17 +83,15 @@ pub(super) fn views(stream: impl Read) -> io::Result<String> {
         was_comment = comment.is_some();
         match comment {
             Some(text) => {
-                is_view = if begins {
-                    text.starts_with(VIEW)
-                } else {
-                    is_view
-                };
-                if is_view && block.len() < MOST {
+                if begins {
+                    is_meant = LATER.iter().any(|table| text.starts_with(table));
+                }
+                if is_meant && block.len() < MOST {
                     block += &String::from_utf8_lossy(text);
                 }
             }
             None => {
-                is_view = false;
+                is_meant = false;
                 found += &std::mem::take(&mut block);
             }
         }
@@ -160,12 +158,15 @@ mod tests {
     #[test]
     fn views_between_rows_are_found_and_other_remarks_are_not() {
         let text = "# a = 1\n# [[view]]\nt_s\n0\n# [[view]]\n# number = 1\n1\n# a remark\n\
-                    # [[view]]\n2\n# [[view]]\r\n# number = 2\r\n3\n";
-        let found = views(text.as_bytes()).expect("in memory");
-        assert_eq!(found, "[[view]]\nnumber = 1\n[[view]]\r\nnumber = 2\r\n");
+                    # [[view]]\n2\n# [[mark]]\n# t_s = 1\n# [[view]]\r\n# number = 2\r\n3\n";
+        let found = later(text.as_bytes()).expect("in memory");
+        assert_eq!(
+            found,
+            "[[view]]\nnumber = 1\n[[mark]]\nt_s = 1\n[[view]]\r\nnumber = 2\r\n"
+        );
         let cut = b"# a = 1\nt_s\n0\n# [[view]]\n# numb";
-        assert_eq!(views(&cut[..]).expect("in memory"), "", "killed meanwhile");
-        assert_eq!(views(&b""[..]).expect("in memory"), "");
+        assert_eq!(later(&cut[..]).expect("in memory"), "", "killed meanwhile");
+        assert_eq!(later(&b""[..]).expect("in memory"), "");
     }
 
     #[test]

@@ -103,10 +103,10 @@ impl Trajectory {
                 (Form::Parquet(Box::new(rows)), text)
             }
             false => {
-                let views = views_of(&mut file)?;
+                let later = later_remarks(&mut file)?;
                 let (rows, text) = csv::Rows::open(file)?;
                 // Remarks that are no settings are followed by no views.
-                (Form::Csv(Box::new(rows)), text + &views)
+                (Form::Csv(Box::new(rows)), text + &later)
             }
         };
         Ok(Self {
@@ -201,14 +201,14 @@ fn far(hip_mm: [f64; 3], scale: &Scale) -> (&'static str, String) {
     (PLACE.get(axis).copied().unwrap_or_default(), what)
 }
 
-/// What a CSV file tells of views between its rows; nothing where it cannot be wound back.
-fn views_of(file: &mut File) -> Result<String, TrajectoryFault> {
+/// What a CSV file says of views and marks between its rows; nothing where it cannot be wound back.
+fn later_remarks(file: &mut File) -> Result<String, TrajectoryFault> {
     if file.stream_position().is_err() {
         return Ok(String::new());
     }
-    let views = comments::views(&mut *file);
-    let views = views.and_then(|views| file.seek(SeekFrom::Start(0)).map(|_| views));
-    views.map_err(TrajectoryFault::Unreadable)
+    let later = comments::later(&mut *file);
+    let later = later.and_then(|later| file.seek(SeekFrom::Start(0)).map(|_| later));
+    later.map_err(TrajectoryFault::Unreadable)
 }
 
 /// Whether a file begins as Parquet does; what cannot be wound back is CSV.

@@ -1,0 +1,49 @@
+//! Marks: each request makes one pulse, and its answer names the tick.
+
+use std::vec::Vec;
+
+use hapterra_core::scene::{MARK_GAP_MS, MARK_PULSE_MS};
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::request::Request;
+
+use super::rig::Rig;
+
+fn marked(rig: &Rig) -> Vec<(u8, u32)> {
+    let answer = |message: &ToHost| match message {
+        ToHost::Marked { number, tick } => Some((*number, *tick)),
+        _ => None,
+    };
+    rig.heard.iter().filter_map(answer).collect()
+}
+
+fn latest_tick(rig: &Rig) -> u32 {
+    let told = rig.telemetry();
+    let last = told.last().and_then(|telemetry| telemetry.samples.last());
+    last.expect("samples").tick
+}
+
+#[test]
+fn a_mark_is_answered_with_its_tick_when_its_pulse_is_over() {
+    let mut rig = Rig::armed();
+    rig.run(16);
+    let before = latest_tick(&rig);
+    let number = rig.asked.last().map_or(0, |(number, _)| number + 1);
+    let request = Request::Mark;
+    // Asked for again and again, as a host does that hears no answer.
+    for _ in 0..4 {
+        rig.say(&ToDevice::Request { number, request });
+        rig.run(1);
+    }
+    rig.run(MARK_PULSE_MS + MARK_GAP_MS - 8);
+    assert_eq!(marked(&rig), [], "the pulse is not over");
+    rig.run(8);
+    let [(answered, tick)] = marked(&rig)[..] else {
+        panic!("{:?}", marked(&rig));
+    };
+    assert_eq!(answered, number);
+    assert!((before..before + 20).contains(&tick), "{before} {tick}");
+    // Asked for once more, it is answered again and marks no other tick.
+    rig.say(&ToDevice::Request { number, request });
+    rig.run(40);
+    assert_eq!(marked(&rig), [(number, tick); 2]);
+}

@@ -1,0 +1,340 @@
+//! Readers of events on a local socket.
+
+use std::io::{self, ErrorKind, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::line::{Event, FORMAT, Line};
+
+/// Lines that wait for the thread, at most.
+const WAITING: usize = 4096;
+/// Bytes that wait for a reader, at most, beside what the system keeps for it.
+const FOR_A_READER: usize = 256 << 10;
+/// Readers at a time; more are closed.
+const READERS: usize = 16;
+/// Between two looks at new readers and at those that were slow.
+const LOOK: Duration = Duration::from_millis(20);
+/// For how long readers may take what is left at the end.
+const AT_THE_END: Duration = Duration::from_secs(1);
+
+/// What the senders and the thread share.
+#[derive(Debug, Default)]
+struct Shared {
+    readers: AtomicUsize,
+    /// Readers that have come so far.
+    joined: AtomicU64,
+    /// Lines that no reader was told, because the queue was full.
+    dropped: AtomicU64,
+}
+
+/// Offers lines. It never waits.
+#[derive(Clone, Debug)]
+pub struct Sender {
+    lines: SyncSender<String>,
+    shared: Arc<Shared>,
+}
+
+impl Sender {
+    /// How many readers have come so far; none where nobody reads now.
+    pub(super) fn readers_so_far(&self) -> Option<u64> {
+        let reads = self.shared.readers.load(Ordering::Acquire) > 0;
+        reads.then(|| self.shared.joined.load(Ordering::Acquire))
+    }
+
+    /// Offers a line; without room it is dropped, and counted.
+    pub(super) fn offer(&self, line: String) {
+        if self.lines.try_send(line).is_err() {
+            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// The socket and the thread that writes to its readers.
+#[derive(Debug)]
+pub struct Server {
+    sender: Sender,
+    address: SocketAddr,
+    /// Returns how many lines readers were too slow for.
+    thread: JoinHandle<u64>,
+}
+
+impl Server {
+    /// Listens on a port of this machine alone, 127.0.0.1; 0 takes any that is free.
+    ///
+    /// # Errors
+    /// A port that is taken.
+    pub fn listen(port: u16) -> io::Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let (lines, waiting) = sync_channel(WAITING);
+        let shared = Arc::<Shared>::default();
+        let readers = Readers {
+            listener,
+            readers: vec![],
+            shared: Arc::clone(&shared),
+            dropped: 0,
+        };
+        let thread = std::thread::Builder::new()
+            .name("events".into())
+            .spawn(move || readers.run(&waiting))?;
+        Ok(Self {
+            sender: Sender { lines, shared },
+            address,
+            thread,
+        })
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Another way for lines to come in.
+    #[must_use]
+    pub fn sender(&self) -> Sender {
+        self.sender.clone()
+    }
+
+    /// Ends it when all other senders are gone. Readers have a second for what is left. Returns
+    /// how many lines were dropped.
+    #[must_use]
+    pub fn end(self) -> u64 {
+        let Sender { lines, shared } = self.sender;
+        drop(lines);
+        let of_readers = self.thread.join().unwrap_or_default();
+        of_readers + shared.dropped.load(Ordering::Acquire)
+    }
+}
+
+/// A reader, and what it has yet to be told.
+struct Reader {
+    stream: TcpStream,
+    waiting: Vec<u8>,
+    dropped: u64,
+}
+
+impl Reader {
+    /// Adds a line where there is room, after the number of those that there was none for.
+    fn take(&mut self, line: &[u8]) {
+        let said = match self.dropped {
+            0 => String::new(),
+            lines => of_reader(&Event::Dropped { lines }),
+        };
+        if self.waiting.len() + said.len() + line.len() > FOR_A_READER {
+            self.dropped += 1;
+            return;
+        }
+        self.dropped = 0;
+        self.waiting.extend(said.bytes());
+        self.waiting.extend(line);
+    }
+
+    /// Writes what the reader takes now. Returns false if it is gone.
+    fn write(&mut self) -> bool {
+        while !self.waiting.is_empty() {
+            match self.stream.write(&self.waiting) {
+                Ok(0) => return false,
+                Ok(written) => drop(self.waiting.drain(..written)),
+                Err(why) if why.kind() == ErrorKind::WouldBlock => return true,
+                Err(why) if why.kind() == ErrorKind::Interrupted => {}
+                Err(_) => return false,
+            }
+        }
+        true
+    }
+}
+
+/// A line that is no device's.
+fn of_reader(event: &Event<'_>) -> String {
+    Line { event, at: None }.text()
+}
+
+/// The thread's part.
+struct Readers {
+    listener: TcpListener,
+    readers: Vec<Reader>,
+    shared: Arc<Shared>,
+    /// Lines that readers were too slow for.
+    dropped: u64,
+}
+
+impl Readers {
+    fn run(mut self, lines: &Receiver<String>) -> u64 {
+        loop {
+            self.accept();
+            match lines.recv_timeout(LOOK) {
+                Ok(line) => self.take(&line),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            for line in lines.try_iter().take(WAITING) {
+                self.take(&line);
+            }
+            self.write();
+        }
+        let until = Instant::now() + AT_THE_END;
+        while self.readers.iter().any(|reader| !reader.waiting.is_empty()) && Instant::now() < until
+        {
+            std::thread::sleep(LOOK);
+            self.write();
+        }
+        self.dropped
+    }
+
+    fn take(&mut self, line: &str) {
+        for reader in &mut self.readers {
+            let before = reader.dropped;
+            reader.take(line.as_bytes());
+            self.dropped += u64::from(reader.dropped > before);
+        }
+    }
+
+    fn write(&mut self) {
+        self.readers.retain_mut(Reader::write);
+        let count = self.readers.len();
+        self.shared.readers.store(count, Ordering::Release);
+    }
+
+    /// Takes readers that have come. What is wrong with one is its own.
+    fn accept(&mut self) {
+        while let Ok((stream, _)) = self.listener.accept() {
+            if self.readers.len() >= READERS || stream.set_nonblocking(true).is_err() {
+                continue;
+            }
+            let _ = stream.set_nodelay(true);
+            let hello = Event::Hello {
+                format: FORMAT,
+                program: env!("CARGO_PKG_VERSION"),
+            };
+            self.readers.push(Reader {
+                stream,
+                waiting: of_reader(&hello).into_bytes(),
+                dropped: 0,
+            });
+            self.write();
+            self.shared.joined.fetch_add(1, Ordering::AcqRel);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::timeouts::wait_until;
+    use std::io::{BufRead, BufReader};
+
+    fn connected(server: &Server) -> TcpStream {
+        let before = server.sender.shared.joined.load(Ordering::Acquire);
+        let stream = TcpStream::connect(server.address()).expect("connected");
+        wait_until("the reader is seen", || {
+            server.sender.shared.joined.load(Ordering::Acquire) > before
+        });
+        stream
+    }
+
+    fn number(line: &str) -> Option<u64> {
+        line.strip_prefix("{\"n\":")?
+            .trim_end()
+            .strip_suffix('}')?
+            .parse()
+            .ok()
+    }
+
+    #[test]
+    fn readers_hear_every_line_in_order_and_then_the_end() {
+        let server = Server::listen(0).expect("listens");
+        assert!(server.address().ip().is_loopback());
+        assert_eq!(server.sender().readers_so_far(), None);
+        let streams = [connected(&server), connected(&server)];
+        let sender = server.sender();
+        assert_eq!(sender.readers_so_far(), Some(2));
+        for n in 0..1000 {
+            sender.offer(format!("{{\"n\":{n}}}\n"));
+        }
+        drop(sender);
+        assert_eq!(server.end(), 0);
+        for stream in streams {
+            let lines: Vec<_> = BufReader::new(stream).lines().map(Result::unwrap).collect();
+            assert!(lines[0].starts_with("{\"event\":\"hello\",\"format\":1"));
+            let numbers: Vec<_> = lines[1..].iter().filter_map(|line| number(line)).collect();
+            assert_eq!(numbers, Vec::from_iter(0..1000));
+        }
+    }
+
+    /// The lines of a reader, in a thread.
+    fn read(stream: TcpStream, mut take: impl FnMut(&str) + Send + 'static) {
+        std::thread::spawn(move || {
+            let lines = BufReader::new(stream).lines();
+            lines.map_while(Result::ok).for_each(|line| take(&line));
+        });
+    }
+
+    #[test]
+    fn a_stuck_reader_holds_nobody_up_and_is_told_what_it_missed() {
+        let server = Server::listen(0).expect("listens");
+        let (stuck, quick) = (connected(&server), connected(&server));
+        let sender = server.sender();
+        let seen = Arc::new(AtomicU64::new(0));
+        let sees = Arc::clone(&seen);
+        read(quick, move |line| {
+            assert!(!line.contains("dropped"), "{line}");
+            sees.fetch_max(number(line).unwrap_or(0), Ordering::AcqRel);
+        });
+        // More than the system and the buffer keep for a reader.
+        let spaces = " ".repeat(1000);
+        for n in 1..=20_000 {
+            sender.offer(format!("{{\"n\":{n}}}{spaces}\n"));
+            if n % 100 == 0 {
+                wait_until("the other reader", || seen.load(Ordering::Acquire) == n);
+            }
+        }
+        let said = Arc::new(AtomicU64::new(0));
+        let says = Arc::clone(&said);
+        read(stuck, move |line| {
+            let rest = line.strip_prefix("{\"event\":\"dropped\",\"lines\":");
+            let lines = rest.and_then(|rest| rest.strip_suffix('}')?.parse().ok());
+            says.fetch_add(lines.unwrap_or(0), Ordering::AcqRel);
+        });
+        wait_until("what it missed is said", || {
+            sender.offer("{}\n".to_owned());
+            said.load(Ordering::Acquire) > 0
+        });
+        drop(sender);
+        assert!(server.end() >= said.load(Ordering::Acquire));
+    }
+
+    #[test]
+    fn a_full_queue_is_counted_and_waited_for_by_nobody() {
+        let (lines, _waiting) = sync_channel(2);
+        let shared = Arc::<Shared>::default();
+        let sender = Sender {
+            lines,
+            shared: Arc::clone(&shared),
+        };
+        for _ in 0..10 {
+            sender.offer(String::new());
+        }
+        assert_eq!(shared.dropped.load(Ordering::Acquire), 8);
+    }
+
+    #[test]
+    fn readers_that_are_gone_are_forgotten() {
+        let server = Server::listen(0).expect("listens");
+        drop(connected(&server));
+        let sender = server.sender();
+        wait_until("nobody reads", || {
+            sender.offer("{}\n".to_owned());
+            sender.readers_so_far().is_none()
+        });
+        let taken = Server::listen(server.address().port());
+        assert_eq!(taken.expect_err("taken").kind(), ErrorKind::AddrInUse);
+        drop(sender);
+        assert_eq!(server.end(), 0);
+    }
+}

@@ -1,0 +1,219 @@
+//! From samples to events: what has changed.
+
+use hapterra_core::guard::{Fault, Limits, Mode};
+use hapterra_core::scene::Sample;
+
+use super::line::{At, Event, Line, Place};
+use super::server::Sender;
+use crate::replay::{Mark, Record, mode_name};
+use crate::terrain::Terrain;
+
+/// Between two places that are told, s of the device's time.
+const PLACE_EVERY_S: f64 = 0.1;
+/// Between two looks at the material, s of the device's time.
+const MATERIAL_EVERY_S: f64 = 0.01;
+/// The HIP's speed is known from samples no farther apart than this, s.
+const SPEED_WITHIN_S: f64 = 0.005;
+
+/// What was told last.
+#[derive(Debug, Default)]
+struct Told {
+    view: Option<usize>,
+    contact: Option<bool>,
+    limits: Option<(Limits, Mode, Option<Fault>)>,
+    /// The class of the material; none outside before one was touched.
+    class: Option<Option<i64>>,
+    proxy_mm: Option<[f64; 3]>,
+    place_due_s: f64,
+    material_due_s: f64,
+}
+
+/// Watches what a device feels.
+#[derive(Debug)]
+pub struct Watcher {
+    sender: Sender,
+    device: usize,
+    at: At,
+    told: Told,
+    /// Readers that had come when something was told last.
+    readers: u64,
+    /// The HIP of the sample before, with its view.
+    before: Option<(usize, Record)>,
+}
+
+impl Watcher {
+    /// Watches a device, counted from 1.
+    #[must_use]
+    pub fn new(sender: Sender, device: usize) -> Self {
+        let at = At {
+            device,
+            tick: 0,
+            t_s: 0.0,
+        };
+        Self {
+            sender,
+            device,
+            at,
+            told: Told::default(),
+            readers: 0,
+            before: None,
+        }
+    }
+
+    /// Takes a sample, its row and the view in which it was felt.
+    pub fn take(
+        &mut self,
+        sample: &Sample,
+        record: &Record,
+        (view, terrain): (usize, &Terrain<'_>),
+    ) {
+        let Some(readers) = self.sender.readers_so_far() else {
+            self.before = None;
+            return;
+        };
+        // Whoever comes is told how everything is.
+        if readers != self.readers {
+            (self.readers, self.told) = (readers, Told::default());
+        }
+        self.at = At {
+            device: self.device,
+            tick: sample.tick,
+            t_s: record.t_s,
+        };
+        if self.told.view.replace(view) != Some(view) {
+            self.tell(&view_of(view, terrain));
+        }
+        let limits = (sample.limits, sample.mode, sample.fault);
+        if self.told.limits.replace(limits) != Some(limits) {
+            self.tell(&limits_of(limits));
+        }
+        let touching = record.contact;
+        let changes = self.told.contact.replace(touching) != Some(touching);
+        if touching {
+            // The material of a contact comes before it.
+            self.tell_material(record, terrain, changes);
+        }
+        if changes {
+            self.tell_contact(record, (view, terrain));
+        } else if touching {
+            self.tell_place(record, terrain);
+        }
+        self.before = Some((view, *record));
+    }
+
+    /// Takes a mark.
+    pub fn mark(&self, mark: &Mark) {
+        if self.sender.readers_so_far().is_some() {
+            self.tell(&Event::Mark {
+                marked_tick: mark.tick,
+                marked_t_s: mark.t_s,
+                host_unix_s: mark.host_unix_s,
+                text: &mark.text,
+            });
+        }
+    }
+
+    fn tell(&self, event: &Event<'_>) {
+        let at = Some(self.at);
+        self.sender.offer(Line { event, at }.text());
+    }
+
+    fn tell_contact(&mut self, record: &Record, (view, terrain): (usize, &Terrain<'_>)) {
+        let before = self.before.filter(|(of, _)| *of == view);
+        let speed = before.and_then(|(_, before)| speed_into(&before, record));
+        self.told_place(record);
+        self.tell(&Event::Contact {
+            touching: record.contact,
+            speed_mm_s: speed.filter(|_| record.contact),
+            force_n: record.force_n,
+            place: place_of(record, terrain),
+        });
+    }
+
+    fn told_place(&mut self, record: &Record) {
+        self.told.proxy_mm = Some(record.proxy_mm);
+        self.told.place_due_s = record.t_s + PLACE_EVERY_S;
+    }
+
+    fn tell_place(&mut self, record: &Record, terrain: &Terrain<'_>) {
+        let moved = self.told.proxy_mm != Some(record.proxy_mm);
+        if moved && record.t_s >= self.told.place_due_s {
+            self.told_place(record);
+            self.tell(&Event::Place(place_of(record, terrain)));
+        }
+    }
+
+    fn tell_material(&mut self, record: &Record, terrain: &Terrain<'_>, at_once: bool) {
+        let Some(materials) = terrain.grid().materials() else {
+            return;
+        };
+        if !at_once && record.t_s < self.told.material_due_s {
+            return;
+        }
+        self.told.material_due_s = record.t_s + MATERIAL_EVERY_S;
+        let index = materials.index_at(terrain.raster(), ground_of(record, terrain));
+        let class = usize::from(index).checked_sub(1);
+        let class = class.and_then(|at| materials.looks().class.get(at));
+        let number = class.map(|class| class.class);
+        if self.told.class.replace(number) != Some(number) {
+            self.tell(&Event::Material {
+                class: number,
+                name: class.and_then(|class| class.name.as_deref()),
+            });
+        }
+    }
+}
+
+fn view_of(view: usize, terrain: &Terrain<'_>) -> Event<'static> {
+    let scale = terrain.scale_of_level_0();
+    Event::View {
+        view,
+        level: terrain.level(),
+        cell_mm: scale.cell_mm(),
+        cell_m: terrain.grid().side_m(),
+        height_mm_per_unit: scale.height_mm_per_unit(),
+    }
+}
+
+fn limits_of((limits, mode, fault): (Limits, Mode, Option<Fault>)) -> Event<'static> {
+    Event::Limits {
+        limits: limits.iter_names().map(|(name, _)| name).collect(),
+        mode: mode_name(mode),
+        fault: fault.map(Fault::number),
+    }
+}
+
+/// The proxy in the file's coordinates.
+fn ground_of(record: &Record, terrain: &Terrain<'_>) -> [f64; 2] {
+    let cell_mm = terrain.scale_of_level_0().cell_mm();
+    let [east, north, _] = record.proxy_mm;
+    terrain.grid().to_ground([east / cell_mm, north / cell_mm])
+}
+
+fn place_of(record: &Record, terrain: &Terrain<'_>) -> Place {
+    let (raster, ground) = (terrain.raster(), ground_of(record, terrain));
+    let units = record.proxy_mm[2] / terrain.scale_of_level_0().height_mm_per_unit();
+    Place {
+        proxy_mm: record.proxy_mm,
+        ground,
+        lonlat: raster.georeference().to_lonlat(ground),
+        height_m: units * raster.metres_per_vertical_unit(),
+    }
+}
+
+/// Speed of the HIP into the surface, mm/s: along the way from the proxy to it. None where the
+/// samples are too far apart to tell.
+fn speed_into(before: &Record, now: &Record) -> Option<f64> {
+    let dt_s = now.t_s - before.t_s;
+    if !(dt_s > 0.0 && dt_s <= SPEED_WITHIN_S) {
+        return None;
+    }
+    let along = |axis: usize| now.hip_mm[axis] - now.proxy_mm[axis];
+    let depth_mm = (0..3).map(|axis| along(axis).powi(2)).sum::<f64>().sqrt();
+    if depth_mm == 0.0 {
+        return None;
+    }
+    let moved = |axis: usize| now.hip_mm[axis] - before.hip_mm[axis];
+    let into: f64 = (0..3).map(|axis| moved(axis) * along(axis)).sum();
+    Some(into / depth_mm / dt_s)
+}

@@ -1,0 +1,190 @@
+//! Changes of a surface while it is felt, but for its stiffness.
+
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{Damping, ForceLaw, Shading, Texture};
+
+/// What may be changed of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SurfaceChange {
+    /// Coefficients of friction: while the tip slides, and at rest.
+    Friction {
+        /// While it slides.
+        dynamic_mu: f32,
+        /// At rest.
+        static_mu: f32,
+    },
+    /// Friction that grows with the speed, s.
+    ViscousFriction(f32),
+    /// Damping along the force, N·s/m.
+    Damping(f32),
+    /// Which normals the force follows.
+    Shading(Shading),
+    /// The micro-relief.
+    Texture(Texture),
+}
+
+/// Why a surface cannot be changed as it is asked for. It stays as it is.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// Coefficients that a contact cannot work with.
+    #[error(
+        "a friction of {dynamic_mu}, and {static_mu} at rest: from 0 to {most}, and at rest not less than while the tip slides",
+        most = Friction::MOST
+    )]
+    Friction {
+        /// While the tip slides.
+        dynamic_mu: f32,
+        /// At rest.
+        static_mu: f32,
+    },
+    /// A time that a contact cannot work with.
+    #[error("a viscous friction of {0} s: from 0 to {most} s can be had", most = Friction::MOST_VISCOUS_S)]
+    ViscousFriction(f32),
+    /// More or less damping than can be had.
+    #[error("a damping of {0} N·s/m: from 0 to {most} N·s/m can be had", most = Damping::MOST_NS_PER_M)]
+    Damping(f32),
+    /// A relief that no hand could feel or no tick could make.
+    #[error(
+        "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {most} mm can be had",
+        shortest = Texture::WAVELENGTHS_MM.0,
+        longest = Texture::WAVELENGTHS_MM.1,
+        most = Texture::MOST_AMPLITUDE_MM
+    )]
+    Texture {
+        /// How far it reaches above and below the surface.
+        amplitude_mm: f32,
+        /// From ridge to ridge.
+        wavelength_mm: f32,
+    },
+    /// What each material has by itself.
+    #[error(
+        "each material of the scene has its own: change the table and begin anew, or begin without --materials"
+    )]
+    OfMaterials,
+}
+
+impl SurfaceChange {
+    /// The law after this change; `has_materials` where the ground is not the same everywhere.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    pub fn of(self, law: &ForceLaw, has_materials: bool) -> Result<ForceLaw, SurfaceError> {
+        let mut law = *law;
+        if has_materials && !matches!(self, Self::Shading(_)) {
+            return Err(SurfaceError::OfMaterials);
+        }
+        match self {
+            Self::Friction {
+                dynamic_mu,
+                static_mu,
+            } => {
+                (law.friction.dynamic_mu, law.friction.static_mu) = (dynamic_mu, static_mu);
+                let error = SurfaceError::Friction {
+                    dynamic_mu,
+                    static_mu,
+                };
+                law.friction.is_valid().then_some(law).ok_or(error)
+            }
+            Self::ViscousFriction(viscous_s) => {
+                law.friction.viscous_s = viscous_s;
+                let error = SurfaceError::ViscousFriction(viscous_s);
+                law.friction.is_valid().then_some(law).ok_or(error)
+            }
+            Self::Damping(ns_per_m) => {
+                law.damping.ns_per_m = ns_per_m;
+                let error = SurfaceError::Damping(ns_per_m);
+                law.damping.is_valid().then_some(law).ok_or(error)
+            }
+            Self::Shading(shading) => {
+                law.shading = shading;
+                Ok(law)
+            }
+            Self::Texture(texture) => {
+                law.texture = texture;
+                let error = SurfaceError::Texture {
+                    amplitude_mm: texture.amplitude_mm,
+                    wavelength_mm: texture.wavelength_mm,
+                };
+                let is_felt = texture.is_none() || texture.amplitude_mm > 0.0;
+                (is_felt && texture.is_valid()).then_some(law).ok_or(error)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hapterra_core::force::Pattern;
+
+    fn texture(amplitude_mm: f32, wavelength_mm: f32) -> SurfaceChange {
+        SurfaceChange::Texture(Texture {
+            pattern: Pattern::Grain,
+            amplitude_mm,
+            wavelength_mm,
+            ..Texture::NONE
+        })
+    }
+
+    const fn friction(dynamic_mu: f32, static_mu: f32) -> SurfaceChange {
+        SurfaceChange::Friction {
+            dynamic_mu,
+            static_mu,
+        }
+    }
+
+    #[test]
+    fn a_change_that_can_be_had_leaves_a_valid_law() {
+        for change in [
+            friction(0.0, 0.0),
+            friction(0.3, 0.5),
+            friction(10.0, 10.0),
+            SurfaceChange::ViscousFriction(1.0),
+            SurfaceChange::Damping(20.0),
+            SurfaceChange::Shading(Shading::Smooth),
+            SurfaceChange::Texture(Texture::NONE),
+            texture(0.125, 1.0),
+        ] {
+            let law = change.of(&ForceLaw::PREMIUM, false).expect("can be had");
+            assert!(law.is_valid(), "{change:?}");
+            let ForceLaw {
+                stiffness_n_per_mm,
+                max_force_n,
+                ..
+            } = ForceLaw::PREMIUM;
+            assert_eq!(law.stiffness_n_per_mm, stiffness_n_per_mm);
+            assert_eq!(law.max_force_n, max_force_n);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_had_is_refused_with_what_can() {
+        for (change, says) in [
+            (friction(0.5, 0.3), "at rest not less"),
+            (friction(-0.1, 0.0), "from 0 to 10"),
+            (friction(f32::NAN, 1.0), "from 0 to 10"),
+            (friction(1.0, 11.0), "from 0 to 10"),
+            (SurfaceChange::ViscousFriction(1.5), "from 0 to 1 s"),
+            (SurfaceChange::Damping(21.0), "from 0 to 20 N·s/m"),
+            (SurfaceChange::Damping(f32::INFINITY), "from 0 to 20 N·s/m"),
+            (texture(0.2, 1.0), "up to an eighth"),
+            (texture(0.0, 1.0), "above 0"),
+            (texture(0.01, 0.1), "from 0.25 to 100 mm"),
+        ] {
+            let error = change.of(&ForceLaw::PREMIUM, false).expect_err(says);
+            assert!(error.to_string().contains(says), "{error}");
+        }
+    }
+
+    #[test]
+    fn materials_have_all_but_shading_by_themselves() {
+        let law = &ForceLaw::PREMIUM;
+        let damping = SurfaceChange::Damping(1.0);
+        assert_eq!(damping.of(law, true), Err(SurfaceError::OfMaterials));
+        assert!(
+            SurfaceChange::Shading(Shading::Smooth)
+                .of(law, true)
+                .is_ok()
+        );
+    }
+}

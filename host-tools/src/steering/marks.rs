@@ -1,0 +1,149 @@
+//! Marks: moments of a session that the user names, to be found again in its recording and in
+//! what a pin of the board starts.
+
+use std::collections::VecDeque;
+use std::time::SystemTime;
+
+use hapterra_core::wire::request::Request;
+
+use crate::link::{Ask, Event};
+
+/// Characters of a mark's text, at most.
+pub(super) const LONGEST_MARK: usize = 200;
+/// Marks that wait for the device, at most: each takes it 20 ms.
+const WAITING: usize = 64;
+
+/// A mark as it was made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Made {
+    /// What the user calls it.
+    pub text: String,
+    /// The host's clock when the mark was asked for, seconds since 1970 in UTC.
+    pub host_unix_s: f64,
+    /// The tick that the device marked; none where it has not answered.
+    pub tick: Option<u32>,
+}
+
+/// The text of a mark, trimmed.
+///
+/// # Errors
+/// Says what is wrong with it.
+pub(super) fn text_of(text: &str) -> Result<String, &'static str> {
+    let text = text.trim();
+    if text.is_empty() {
+        return Err("a text is missing");
+    }
+    if text.chars().count() > LONGEST_MARK {
+        return Err("the text of a mark has at most 200 characters");
+    }
+    if text.contains(char::is_control) {
+        return Err("the text of a mark has no control characters, as tabs");
+    }
+    Ok(text.to_owned())
+}
+
+/// Marks that are asked of a device, one after the other.
+#[derive(Debug, Default)]
+pub struct Marks {
+    /// Text and host clock of those that have not been answered.
+    waiting: VecDeque<(String, f64)>,
+    asks: Vec<Ask>,
+    made: Vec<Made>,
+}
+
+impl Marks {
+    /// Asks for a mark now. Returns a line for the user where too many wait already.
+    pub fn mark(&mut self, text: String) -> Option<String> {
+        if self.waiting.len() >= WAITING {
+            return Some(format!(
+                "the mark `{text}` is left out: {WAITING} marks wait for the device"
+            ));
+        }
+        self.waiting.push_back((text, host_unix_s()));
+        self.asks.push(Ask::Request(Request::Mark));
+        None
+    }
+
+    /// Takes what the device tells.
+    pub fn on_event(&mut self, event: &Event<'_>) {
+        let tick = match event {
+            Event::Marked { tick } => Some(*tick),
+            Event::Answered {
+                request: Request::Mark,
+                ..
+            }
+            | Event::Unanswered(Ask::Request(Request::Mark)) => None,
+            _ => return,
+        };
+        // The device answers them in their order.
+        self.made(tick);
+    }
+
+    fn made(&mut self, tick: Option<u32>) {
+        let made = self.waiting.pop_front();
+        self.made.extend(made.map(|(text, host_unix_s)| Made {
+            text,
+            host_unix_s,
+            tick,
+        }));
+    }
+
+    /// What is to be asked of the device now.
+    pub fn asks(&mut self) -> Vec<Ask> {
+        std::mem::take(&mut self.asks)
+    }
+
+    /// The marks that were made since the last look.
+    pub fn take_made(&mut self) -> Vec<Made> {
+        std::mem::take(&mut self.made)
+    }
+
+    /// The same at the end of a session: what the device has not answered is without a tick.
+    pub fn take_all(&mut self) -> Vec<Made> {
+        while !self.waiting.is_empty() {
+            self.made(None);
+        }
+        self.take_made()
+    }
+}
+
+fn host_unix_s() -> f64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    since.map_or(0.0, |since| since.as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_mark_is_asked_for_once_and_has_the_tick_of_its_answer() {
+        let mut marks = Marks::default();
+        for text in ["a", "b", "c"] {
+            assert_eq!(marks.mark(text.to_owned()), None);
+        }
+        assert_eq!(marks.asks(), [Ask::Request(Request::Mark); 3]);
+        assert_eq!(marks.asks(), []);
+        marks.on_event(&Event::Marked { tick: 7 });
+        marks.on_event(&Event::Unanswered(&Ask::Request(Request::Disarm)));
+        marks.on_event(&Event::Unanswered(&Ask::Request(Request::Mark)));
+        let made: Vec<_> = (marks.take_made().into_iter())
+            .map(|made| (made.text, made.tick))
+            .collect();
+        assert_eq!(made, [("a".to_owned(), Some(7)), ("b".to_owned(), None)]);
+        let rest = marks.take_all();
+        assert!(rest.len() == 1 && rest[0].text == "c" && rest[0].tick.is_none());
+        assert_eq!(marks.take_all(), []);
+    }
+
+    #[test]
+    fn marks_beyond_those_that_may_wait_are_reported() {
+        let mut marks = Marks::default();
+        for _ in 0..WAITING {
+            assert_eq!(marks.mark("x".to_owned()), None);
+        }
+        let told = marks.mark("y".to_owned()).expect("a line");
+        assert!(told.contains("`y` is left out"), "{told}");
+        assert_eq!(marks.asks().len(), WAITING);
+    }
+}

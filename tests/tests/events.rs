@@ -1,0 +1,260 @@
+//! Events on a local socket: what a native run tells, and the examples that listen to it.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::spawn;
+
+use hapterra::replay::Trajectory;
+use hapterra_tests::{hapterra_binary, repository};
+use serde_json::Value;
+
+fn hapterra(words: &[&str]) -> Command {
+    let mut command = Command::new(hapterra_binary());
+    command.args(words).env_remove("HAPTERRA_MPS2_ELF");
+    command
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}
+
+/// An example that prints, and the line on which it is told events.
+struct Example {
+    child: Child,
+    line: TcpStream,
+}
+
+/// Starts an example with text for its output; none, with a line, where there is no Python.
+fn example(name: &str) -> Option<Example> {
+    let script = repository().join("docs/examples").join(name);
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = listener.local_addr().expect("an address").port();
+    let child = Command::new("python3")
+        .args([text(&script), &port.to_string(), "--text"])
+        .stdout(Stdio::piped())
+        .spawn();
+    match child {
+        Ok(child) => {
+            let (line, _) = listener.accept().expect("it connects");
+            Some(Example { child, line })
+        }
+        Err(why) => {
+            eprintln!("skipped: {name}: python3 does not start: {why}");
+            None
+        }
+    }
+}
+
+/// The lines that an example prints of all events.
+fn said(mut example: Example, events: &[Value]) -> Vec<String> {
+    for event in events {
+        writeln!(example.line, "{event}").expect("taken");
+    }
+    drop(example.line);
+    let output = example.child.wait_with_output().expect("ended");
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).expect("text");
+    text.lines().map(str::to_owned).collect()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let list = value.as_array().expect("a list").iter();
+    list.map(|number| number.as_f64().expect("a number"))
+        .collect()
+}
+
+/// Whether numbers are the same but for their last digit, which the reader of JSON here rounds.
+fn near(told: &[f64], recorded: &[f64]) -> bool {
+    let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-12 * b.abs();
+    told.len() == recorded.len() && told.iter().zip(recorded).all(is_near)
+}
+
+/// All events of a run of five seconds over hills, its recording and what the examples said.
+#[test]
+fn a_run_tells_what_is_felt_and_examples_speak_and_sound_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [hills, record, commands] =
+        ["hills.tif", "felt.csv", "commands"].map(|name| folder.path().join(name));
+    let made = hapterra(&["synth", "fractal", "-o", text(&hills), "--size", "256"]).status();
+    assert!(made.expect("started").success());
+    std::fs::write(&commands, "at 4 mark a \"b\"\nat 4.1 zoom 1.5\n").expect("written");
+    let words = ["run", text(&hills), "--device", "native", "--seconds", "6"];
+    let more = ["--record", text(&record), "--commands", text(&commands)];
+    let mut run = hapterra(&[&words[..], &more, &["--events", "0"]].concat())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("started");
+    let mut told = BufReader::new(run.stderr.take().expect("piped"));
+    let mut first = String::new();
+    told.read_line(&mut first).expect("a line");
+    let address = first
+        .strip_prefix("events         ")
+        .expect("where it listens");
+    let connect = || TcpStream::connect(address.trim()).expect("connected");
+    // Another reader never reads.
+    let (stream, stuck) = (connect(), connect());
+    let events = spawn(move || {
+        let lines = BufReader::new(stream).lines().map_while(Result::ok);
+        let parsed = lines.map(|line| serde_json::from_str(&line).expect("JSON"));
+        parsed.collect::<Vec<Value>>()
+    });
+    let told: Vec<_> = told.lines().map_while(Result::ok).collect();
+    assert!(run.wait().expect("ended").success(), "{told:?}");
+    drop(stuck);
+    let events = events.join().expect("read to the end");
+    judge(&events, &record);
+    if let Some(example) = example("speak_heights.py") {
+        let heights = said(example, &events);
+        let of = |kind: &'static str| events.iter().filter(move |event| event["event"] == *kind);
+        let told: Vec<_> = of("contact")
+            .filter(|event| event["touching"] == true)
+            .chain(of("place"))
+            .map(|event| format!("{:.0} metres", event["height_m"].as_f64().expect("m")))
+            .collect();
+        assert!(!heights.is_empty());
+        assert!(
+            heights.iter().all(|height| told.contains(height)),
+            "{heights:?}"
+        );
+    }
+    if let Some(example) = example("sound_impacts.py") {
+        let knocks = said(example, &events);
+        let contacts = events.iter().filter(|event| event["speed_mm_s"].is_f64());
+        assert_eq!(knocks.len(), contacts.count(), "{knocks:?}");
+        assert!(knocks.iter().all(|knock| knock.starts_with("knock at ")));
+    }
+}
+
+/// Holds events against the recording of the same run.
+fn judge(events: &[Value], record: &Path) {
+    let recorded = std::fs::read_to_string(record).expect("there");
+    let mut lines = recorded.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<_> = lines.next().expect("a header").split(',').collect();
+    let rows: Vec<Vec<_>> = lines.map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| header.iter().position(|it| *it == name).expect("a column");
+    let row_of = |event: &Value| {
+        let tick = event["tick"].to_string();
+        let row = rows.iter().find(|row| row[column("tick")] == tick);
+        row.unwrap_or_else(|| panic!("no row of {event}"))
+    };
+    let trajectory = Trajectory::open(record).expect("a recording");
+    let settings = trajectory.settings().expect("settings");
+    assert_eq!(events[0]["event"], "hello");
+    assert_eq!(events[0]["format"], 1);
+    let kind = |kind: &str| -> Vec<_> { events.iter().filter(|it| it["event"] == *kind).collect() };
+    let mut first = None;
+    for event in &events[1..] {
+        let number = |name: &str| {
+            row_of(event)[column(name)]
+                .parse::<f64>()
+                .expect("a number")
+        };
+        assert_eq!(event["device"], 1, "{event}");
+        let t_s = event["t_s"].as_f64().expect("s");
+        assert!(near(&[t_s], &[number("t_s")]), "{event}");
+        if let Some(touching) = event["touching"].as_bool() {
+            assert_eq!(f64::from(u8::from(touching)), number("contact"), "{event}");
+            let force = ["force_x_n", "force_y_n", "force_z_n"].map(number);
+            assert!(
+                near(&numbers(&event["force_n"]), &force),
+                "{event}: {force:?}"
+            );
+        }
+        if event["proxy_mm"].is_array() {
+            let proxy = ["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"].map(number);
+            assert!(
+                near(&numbers(&event["proxy_mm"]), &proxy),
+                "{event}: {proxy:?}"
+            );
+            let view = settings
+                .views
+                .iter()
+                .find(|of| f64::from(of.number) == number("view"));
+            let (cell_mm, height_mm) = view.map_or(
+                (settings.felt.cell_mm, settings.felt.height_mm_per_unit),
+                |view| (view.cell_mm, view.height_mm_per_unit),
+            );
+            let height = event["height_m"].as_f64().expect("m");
+            assert!((height * height_mm - proxy[2]).abs() < 1e-6, "{event}");
+            // The place goes as far on the ground as the proxy does in the hand.
+            let (place, cell_m) = (numbers(&event["ground"]), settings.felt.cell_m);
+            let at = [place[0], place[1], proxy[0] / cell_mm, proxy[1] / cell_mm];
+            let from = *first.get_or_insert(at);
+            let cell_m = cell_m.expect("metres");
+            for axis in 0..2 {
+                let on_map = at[axis] - from[axis];
+                let in_hand = cell_m * (at[axis + 2] - from[axis + 2]);
+                // A map is larger or smaller than its ground by less than this.
+                let near = 1e-3 * in_hand.abs() + 1e-6;
+                assert!(
+                    (on_map - in_hand).abs() <= near,
+                    "{event}: {on_map} {in_hand}"
+                );
+            }
+            let lonlat = numbers(&event["lonlat"]);
+            assert!(
+                (lonlat[0] - 3.0).abs() < 0.1 && lonlat[1].abs() < 0.1,
+                "{event}"
+            );
+        }
+    }
+    let contacts = kind("contact");
+    assert!(
+        contacts
+            .windows(2)
+            .all(|pair| pair[0]["touching"] != pair[1]["touching"])
+    );
+    let began = contacts.iter().find(|event| event["touching"] == true);
+    let speed = began.expect("a contact")["speed_mm_s"]
+        .as_f64()
+        .expect("a speed");
+    assert!((1.0..1_000.0).contains(&speed), "{speed} mm/s");
+    assert!(kind("place").len() > 5);
+    let views: Vec<_> = kind("view")
+        .iter()
+        .map(|event| event["view"].as_u64())
+        .collect();
+    assert_eq!(views, [Some(0), Some(1)]);
+    let limits = kind("limits");
+    for event in &limits {
+        let names: Vec<_> = event["limits"].as_array().expect("a list").iter().collect();
+        let names: Vec<_> = names.iter().filter_map(|name| name.as_str()).collect();
+        assert_eq!(names.join(" "), row_of(event)[column("limits")], "{event}");
+    }
+    assert!(limits.iter().any(|event| event["mode"] == "armed"));
+    let [mark] = kind("mark")[..] else {
+        panic!("one mark");
+    };
+    let [recorded] = &settings.marks[..] else {
+        panic!("one mark");
+    };
+    assert_eq!(mark["text"], recorded.text.as_str());
+    assert_eq!(mark["marked_tick"].as_u64(), recorded.tick.map(u64::from));
+    let times = ["marked_t_s", "host_unix_s"].map(|name| mark[name].as_f64().expect("s"));
+    assert!(
+        near(&times, &[recorded.t_s, recorded.host_unix_s]),
+        "{mark}"
+    );
+}
+
+#[test]
+fn a_port_that_is_taken_is_an_error_before_anything_is_armed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hills = folder.path().join("hills.tif");
+    let made = hapterra(&["synth", "fractal", "-o", text(&hills), "--size", "64"]).status();
+    assert!(made.expect("started").success());
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = taken.local_addr().expect("an address").port().to_string();
+    let words = ["run", text(&hills), "--device", "native", "--events", &port];
+    let run = hapterra(&words).output().expect("started");
+    let told = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert_eq!(run.status.code(), Some(1), "{told}");
+    assert!(
+        told.contains(&format!("on port {port} of 127.0.0.1")),
+        "{told}"
+    );
+    assert!(told.contains("hint: name another port"), "{told}");
+}
