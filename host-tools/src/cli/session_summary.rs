@@ -146,6 +146,13 @@ impl SessionSummary {
     }
 }
 
+/// The ball that feels a terrain and the level in which it does, in words; none of a point.
+pub(super) fn tip(terrain: &Terrain<'_>) -> Option<String> {
+    let (cells, mm) = (terrain.tip_cells(), terrain.grid().tip_mm());
+    let level = terrain.level();
+    (cells > 0.0).then(|| format!("felt by a ball of {mm} mm, {cells:.1} cells of level {level}"))
+}
+
 /// A terrain and its scale, in words.
 pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     let (raster, grid, scale) = (terrain.raster(), terrain.grid(), terrain.scale());
@@ -167,7 +174,10 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
         }
         _ => String::new(),
     };
-    format!("{columns} × {rows} samples,{felt} {cell_mm} mm a cell, {proportions}")
+    let tip = tip(terrain)
+        .map(|tip| format!(", {tip}"))
+        .unwrap_or_default();
+    format!("{columns} × {rows} samples,{felt} {cell_mm} mm a cell, {proportions}{tip}")
 }
 
 /// A device in words.

@@ -12,6 +12,7 @@ use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
 use super::steps::{BinaryUnit, steps};
+use super::tip::{Ball, Block, MOST_CELLS};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::materials::MaterialBuffer;
 use crate::raster::Raster;
@@ -34,6 +35,8 @@ pub struct Terrain<'r> {
     /// Patches of the level, east and north.
     size: [i32; 2],
     top: i32,
+    /// What feels it, if it is no point: heights are then those of the ball's centre.
+    ball: Option<Ball>,
     fingerprint: OnceLock<u64>,
 }
 
@@ -53,6 +56,18 @@ pub enum TerrainError {
         cells: f64,
         /// The scale that made it so.
         scale: Scale,
+    },
+    /// A tip that is no ball, or one so large that tiles would take too long.
+    #[error(
+        "a tip of {tip_mm} mm: {cells:.1} cells of level {level}, where 0 to {MOST_CELLS} can be felt"
+    )]
+    Tip {
+        /// Its radius, hand millimetres.
+        tip_mm: f64,
+        /// The same in cells of the level.
+        cells: f64,
+        /// The level.
+        level: u8,
     },
     /// More cells than positions can count.
     #[error("{0} samples in a row or column; at most {MAX_CELL} can be felt")]
@@ -144,14 +159,23 @@ impl<'r> Terrain<'r> {
             });
         }
         let scale = scale.at_level(level);
+        let ball = ball(&grid, &scale, level)?;
+        let higher = ball.as_ref().map_or(0, |ball| ball.radius().ceil() as i32);
         Ok(Self {
             grid,
             scale,
             level,
             size,
-            top: top(grid.raster(), &scale)?,
+            top: (top(grid.raster(), &scale)? + higher).min(MAX_CELL + 1),
+            ball,
             fingerprint: OnceLock::new(),
         })
+    }
+
+    /// Radius of the ball that feels it, in cells of its level; 0 for a point.
+    #[must_use]
+    pub fn tip_cells(&self) -> f64 {
+        self.ball.as_ref().map_or(0.0, Ball::radius)
     }
 
     /// The same raster in another grid of felt cells, at a scale of level 0 and a level.
@@ -178,6 +202,7 @@ impl<'r> Terrain<'r> {
         let height = |terrain: &Self| terrain.scale.height_cells(1.0);
         let (ours, theirs) = (height(self), height(other));
         self.level == other.level
+            && self.tip_cells() == other.tip_cells()
             && self.grid.has_samples_of(&other.grid)
             && (ours - theirs).abs() <= f64::from(f32::EPSILON) * 1e-3 * ours.abs()
     }
@@ -262,23 +287,36 @@ impl<'r> Terrain<'r> {
         scene
     }
 
-    /// Height of the bilinear surface in hand millimetres at a place in hand
-    /// millimetres, in `f64`; `None` in a hole and off the data.
+    /// Height of the surface that is felt in hand millimetres at a place in hand
+    /// millimetres, in `f64`: bilinear between samples, or between the heights of a ball's centre
+    /// at samples. `None` in a hole and off the data.
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
-        self.height_of_level_mm(self.level, [east_mm, north_mm])
+        let Some(ball) = &self.ball else {
+            return self.ground_mm(self.level, [east_mm, north_mm]);
+        };
+        let cell_mm = self.scale.cell_mm();
+        let (column, u) = place(east_mm / cell_mm, self.size[0])?;
+        let (row, v) = place(north_mm / cell_mm, self.size[1])?;
+        let corners = ball
+            .centres(&self.block(ball.halo(), [column, row], 2))
+            .heights;
+        let along = |at: usize| corners[at] * (1.0 - u) + corners[at + 1] * u;
+        let height = along(0) * (1.0 - v) + along(2) * v;
+        Some(height * cell_mm).filter(|height| !height.is_nan())
     }
 
-    /// The same where it is only looked at, in places so far apart, mm: of a raster that
-    /// stays in its file, at a level that is quick to read.
+    /// Height of the ground where it is only looked at, in places so far apart, mm: of a raster
+    /// that stays in its file, at a level that is quick to read.
     #[must_use]
     pub fn seen_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
         let cells = apart_mm / self.scale_of_level_0().cell_mm();
         let level = self.raster().level_for(cells).max(self.level);
-        self.height_of_level_mm(level, [east_mm, north_mm])
+        self.ground_mm(level, [east_mm, north_mm])
     }
 
-    fn height_of_level_mm(&self, level: u8, [east_mm, north_mm]: [f64; 2]) -> Option<f64> {
+    /// The bilinear ground at a place.
+    fn ground_mm(&self, level: u8, [east_mm, north_mm]: [f64; 2]) -> Option<f64> {
         let coarser = level - self.level;
         let cell_mm = self.scale.cell_mm() * f64::from(coarser).exp2();
         let size = self.size.map(|patches| patches >> coarser.min(31));
@@ -320,7 +358,7 @@ impl<'r> Terrain<'r> {
             let height = relative(low, base);
             return Some(Heights::Flat { base, height });
         }
-        let steps = match self.grid.is_resampled() {
+        let steps = match self.is_interpolated() {
             true => vec![Step::Cells(INTERPOLATED_STEP)],
             false => steps(unit, self.scale.height_cells(1.0)).collect(),
         };
@@ -367,15 +405,25 @@ impl<'r> Terrain<'r> {
     }
 
     /// The height at a sample of this terrain's level, in cells, as the file has it at a level of
-    /// detail; NaN where there is none that can be felt.
+    /// detail, or that of a ball's centre on flat ground there; NaN where there is none that can be
+    /// felt.
     pub(super) fn cells_at(&self, level: u8, column: u32, row: u32) -> f64 {
         let whole = |index: u32| u64::from(index) << self.level.min(31);
         let height = self.grid.height_seen(level, [whole(column), whole(row)]);
-        let cells = self.scale.height_cells(height);
+        self.within(self.scale.height_cells(height)) + self.tip_cells()
+    }
+
+    /// A height in cells; NaN where positions cannot say it.
+    fn within(&self, cells: f64) -> f64 {
         match cells.abs() <= f64::from(MAX_CELL) {
             true => cells,
             false => f64::NAN,
         }
+    }
+
+    /// Whether heights are other numbers than those of the file.
+    const fn is_interpolated(&self) -> bool {
+        self.grid.is_resampled() || self.ball.is_some()
     }
 
     /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what the heights
@@ -383,25 +431,53 @@ impl<'r> Terrain<'r> {
     fn read(&self, key: TileKey, heights: &mut [f64; POSTS * POSTS]) -> BinaryUnit {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
         let (west, south) = (first(key.index.col), first(key.index.row));
+        if let Some(ball) = &self.ball {
+            let centres = ball.centres(&self.block(ball.halo(), [west, south], POSTS));
+            for (height, centre) in heights.iter_mut().zip(centres.heights) {
+                *height = self.rounded(self.within(centre));
+            }
+            return BinaryUnit::ANY;
+        }
         let mut unit = BinaryUnit::ANY;
         for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
             self.grid.copy_row(self.level, row, west, line);
             for height in line {
                 unit = unit.with(*height);
-                let cells = self.scale.height_cells(*height);
                 // Where not all heights were read before, one may leave what can be said.
-                *height = match cells.abs() <= f64::from(MAX_CELL) {
-                    true => self.rounded(cells),
-                    false => f64::NAN,
-                };
+                *height = self.rounded(self.within(self.scale.height_cells(*height)));
             }
         }
         unit
     }
 
+    /// Samples of the level from a sample on, so many each way, and a halo around them, in cells;
+    /// NaN in holes and off the data.
+    fn block(&self, halo: usize, first: [u32; 2], side: usize) -> Block {
+        let samples = side + 2 * halo;
+        let mut heights = vec![f64::NAN; samples * samples];
+        let [west, south] = first.map(|first| i64::from(first) - halo as i64);
+        // West of the field there are no columns to ask for.
+        let beside = west.min(0).unsigned_abs() as usize;
+        for (row, line) in (south..).zip(heights.chunks_exact_mut(samples)) {
+            let (Ok(row), Some(line)) = (u32::try_from(row), line.get_mut(beside..)) else {
+                continue;
+            };
+            self.grid
+                .copy_row(self.level, row, west.max(0) as u32, line);
+            for height in line {
+                *height = self.within(self.scale.height_cells(*height));
+            }
+        }
+        Block {
+            columns: samples,
+            rows: samples,
+            heights,
+        }
+    }
+
     /// A height in cells, as it goes to the device.
     fn rounded(&self, cells: f64) -> f64 {
-        match self.grid.is_resampled() {
+        match self.is_interpolated() {
             true => (cells / INTERPOLATED_STEP).round() * INTERPOLATED_STEP,
             false => cells,
         }
@@ -415,6 +491,20 @@ impl<'r> Terrain<'r> {
         };
         inside(key.index.col, self.size[0]) * inside(key.index.row, self.size[1])
     }
+}
+
+/// The ball that feels a grid at the scale of a level, if it is no point.
+fn ball(grid: &FeltGrid<'_>, scale: &Scale, level: u8) -> Result<Option<Ball>, TerrainError> {
+    let tip_mm = grid.tip_mm();
+    let cells = tip_mm / scale.cell_mm();
+    if !(0.0..=MOST_CELLS).contains(&cells) {
+        return Err(TerrainError::Tip {
+            tip_mm,
+            cells,
+            level,
+        });
+    }
+    Ok((cells > 0.0).then(|| Ball::new(cells)))
 }
 
 /// The patch and the place in it of a coordinate in cells.

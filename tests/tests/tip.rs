@@ -1,0 +1,321 @@
+//! A tip of finite radius against a ball on the bilinear surface, in `f64`, that shares no code
+//! with the tiles: the nearest ground to the ball's centre is its radius away.
+
+use std::process::Command;
+
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::replay::{Replayer, on_native};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra_core::contact::{ContactState, Rule};
+use hapterra_core::force::ForceLaw;
+use hapterra_core::scene::Sample;
+use hapterra_tests::walk::wander;
+use hapterra_tests::{hapterra_binary, shared};
+
+/// Distance of a place from the bilinear surface of samples, all in cells: over fine lines of
+/// each patch that is near enough, along each of which the nearest point is known.
+fn distance(height: &dyn Fn(i64, i64) -> f64, [x, y, z]: [f64; 3], within: f64) -> f64 {
+    const LINES: u32 = 32;
+    let cells = |at: f64| (at - within).floor() as i64..=(at + within).floor() as i64;
+    let mut least = f64::INFINITY;
+    for row in cells(y) {
+        for column in cells(x) {
+            let at = |dx: i64, dy: i64| height(column + dx, row + dy);
+            let [sw, se, nw, ne] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
+            if [sw, se, nw, ne].iter().any(|h| h.is_nan()) {
+                continue;
+            }
+            for line in 0..=LINES {
+                let t = f64::from(line) / f64::from(LINES);
+                let mix = |a: f64, b: f64| a * (1.0 - t) + b * t;
+                let (column, row) = (column as f64, row as f64);
+                let east = [
+                    [column, row + t, mix(sw, nw)],
+                    [column + 1.0, row + t, mix(se, ne)],
+                ];
+                let north = [
+                    [column + t, row, mix(sw, se)],
+                    [column + t, row + 1.0, mix(nw, ne)],
+                ];
+                for [from, to] in [east, north] {
+                    least = least.min(to_stretch([x, y, z], from, to));
+                }
+            }
+        }
+    }
+    least
+}
+
+/// Distance of a place from a straight stretch.
+fn to_stretch(place: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
+    let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let (along, off) = (minus(to, from), minus(place, from));
+    let share = (dot(off, along) / dot(along, along)).clamp(0.0, 1.0);
+    let gap = minus(off, along.map(|x| x * share));
+    dot(gap, gap).sqrt()
+}
+
+/// Heights of a terrain's ground in cells, not those of a ball's centre.
+fn ground<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
+    move |x, y| match (u32::try_from(x), u32::try_from(y)) {
+        (Ok(x), Ok(y)) => {
+            let height = terrain.grid().height_of_level(terrain.level(), x, y);
+            height * terrain.scale().height_mm_per_unit() / terrain.scale().cell_mm()
+        }
+        _ => f64::NAN,
+    }
+}
+
+fn feel(replayer: &mut Replayer<'_>, hip_mm: [f64; 3]) -> Sample {
+    let hip = replayer.terrain().scale().to_grid(hip_mm);
+    replayer.feel(hip.expect("addressable")).expect("felt")
+}
+
+/// Parts of the radius by which proxies of a walk are too far from the ground, or too near, sorted.
+fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
+    let grid = FeltGrid::new(raster, FeltCells::default()).with_tip(radius * scale.cell_mm());
+    let terrain = Terrain::over(grid, scale, 0).expect("terrain");
+    let height = ground(&terrain);
+    let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+    let mut off = Vec::new();
+    for hip_mm in wander(&terrain, 7, rows, 0.5) {
+        let sample = feel(&mut replayer, hip_mm);
+        if sample.state == ContactState::Touching {
+            let proxy = scale.to_mm(&sample.proxy).map(|mm| mm / scale.cell_mm());
+            let found = distance(&height, proxy, radius + 1.0);
+            off.push(((found - radius) / radius).abs());
+        }
+    }
+    off.sort_by(f64::total_cmp);
+    off
+}
+
+/// How far proxies are off, as parts of the radius: 99 in 100 of them, and all, at most. What a
+/// grid leaves of a ball falls with the cells that its radius has.
+#[test]
+fn a_ball_touches_real_ground_a_radius_away() {
+    for (file, bounds) in [
+        (
+            "dem/real/bigtujunga.tif",
+            [(2.0, 0.05, 0.08), (4.0, 0.03, 0.04), (8.0, 0.01, 0.02)],
+        ),
+        (
+            "dem/real/mt_everest_90m.tif",
+            [(2.0, 0.08, 0.11), (4.0, 0.03, 0.05), (8.0, 0.01, 0.02)],
+        ),
+        // A city of walls.
+        (
+            "dem/real/dom1_32_356_5699_1_nw_2020.tif",
+            [(2.0, 0.2, 0.25), (4.0, 0.1, 0.15), (8.0, 0.04, 0.05)],
+        ),
+    ] {
+        let Some(path) = shared(file) else { return };
+        let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
+        let scale = Scale::true_to(&FeltGrid::new(&raster, FeltCells::default()), 1.0);
+        let scale = scale.expect("scale");
+        for (radius, most, worst) in bounds {
+            let off = walked(&raster, scale, radius, 1_000);
+            let share = |part: f64| off[(part * (off.len() - 1) as f64) as usize];
+            let found = format!(
+                "half within {:.4}, 99 % {:.4}, all {:.4} of the radius",
+                share(0.5),
+                share(0.99),
+                share(1.0)
+            );
+            eprintln!("{file}, {radius} cells, {} ticks: {found}", off.len());
+            assert!(off.len() > 500, "{file}: the walk hardly touches");
+            assert!(
+                share(0.99) < most && share(1.0) < worst,
+                "{file}, {radius} cells: {found}"
+            );
+        }
+    }
+}
+
+/// A pole of one sample on flat ground, 20 cells high.
+fn pole() -> Raster {
+    Raster::from_fn(120, 60, |x, y| if (x, y) == (60, 30) { 20.0 } else { 0.0 }).expect("raster")
+}
+
+/// Of 20 passes over a pole at half of its height, beside it by up to half a radius, those in which
+/// it is felt, by speed in cells a tick.
+fn felt_passes(radius: f64, speed: f64) -> usize {
+    let raster = pole();
+    let scale = Scale::new(1.0, 1.0).expect("scale");
+    let grid = FeltGrid::new(&raster, FeltCells::default()).with_tip(radius);
+    let terrain = Terrain::over(grid, scale, 0).expect("terrain");
+    let mut replayer = on_native(&terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
+    let is_felt = |pass: &u32| {
+        let share = (f64::from(*pass) + 0.5) / 20.0;
+        let (beside, mut x) = (radius.max(0.5) * (share - 0.5), 15.0 + share * speed);
+        feel(&mut replayer, [x, 30.0 + beside, 40.0]);
+        let mut felt = 0.0f32;
+        while x < 105.0 {
+            let sample = feel(&mut replayer, [x, 30.0 + beside, 10.0]);
+            felt = felt.max(sample.force_n.length());
+            x += speed;
+        }
+        felt > 0.0
+    };
+    (0..20).filter(is_felt).count()
+}
+
+/// A tick ends within a ball's pole where it is no longer than that is wide.
+#[test]
+fn a_pole_is_felt_at_steps_of_one_and_a_half_radii() {
+    for radius in [1.0, 2.0, 4.0, 8.0] {
+        for step in [0.1, 0.5 * radius, radius, 1.5 * radius] {
+            assert_eq!(
+                felt_passes(radius, step),
+                20,
+                "radius {radius}, {step} cells a tick"
+            );
+        }
+    }
+    // A point's tick ends beyond it.
+    assert!(felt_passes(0.0, 12.0) < 10);
+}
+
+#[test]
+fn samples_without_data_have_none_under_a_ball() {
+    let hole = |x: u32, y: u32| (20..30).contains(&x) && (10..50).contains(&y);
+    let raster = Raster::from_fn(60, 60, |x, y| if hole(x, y) { f32::NAN } else { 3.0 });
+    let raster = raster.expect("raster");
+    let grid = FeltGrid::new(&raster, FeltCells::default()).with_tip(4.0);
+    let terrain = Terrain::over(grid, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
+    let point = Terrain::over(grid.with_tip(0.0), Scale::new(1.0, 1.0).expect("scale"), 0);
+    let point = point.expect("terrain");
+    for y in 0..118 {
+        for x in 0..118 {
+            let place = [f64::from(x) / 2.0, f64::from(y) / 2.0];
+            let [ball, ground] = [&terrain, &point].map(|it| it.height_mm(place[0], place[1]));
+            assert_eq!(ball, ground.map(|ground| ground + 4.0), "{place:?}");
+        }
+    }
+}
+
+/// What a command said on standard error; it succeeds.
+fn runs(folder: &std::path::Path, words: &[&str]) -> String {
+    let mut command = Command::new(hapterra_binary());
+    let run = command
+        .current_dir(folder)
+        .args(words)
+        .env_remove("HAPTERRA_MPS2_ELF");
+    let run = run.output().expect("started");
+    let [out, said] = [&run.stdout, &run.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(run.status.success(), "{words:?}: {out}{said}");
+    format!("{out}{said}")
+}
+
+/// Rows without the columns that the guard has its part in.
+fn felt(text: &str) -> Vec<String> {
+    let rows = text.lines().filter(|line| !line.starts_with('#'));
+    let part = |row: &str| row.split(',').take(8).collect::<Vec<_>>().join(",");
+    rows.map(part).collect()
+}
+
+#[test]
+fn recordings_of_a_ball_are_felt_again_with_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("there");
+    runs(
+        folder,
+        &["synth", "fractal", "-o", "hills.tif", "--size", "512"],
+    );
+    let native = [
+        "--device",
+        "native",
+        "--seconds",
+        "5",
+        "--passivity",
+        "off",
+        "--tip",
+        "2mm",
+    ];
+    let said = runs(
+        folder,
+        &[&["run", "hills.tif", "--record", "run.csv"][..], &native].concat(),
+    );
+    assert!(said.contains("felt by a ball of 2 mm"), "{said}");
+    runs(
+        folder,
+        &[&["demo", "hills.tif", "--out", "demo"][..], &native].concat(),
+    );
+    for recording in ["run.csv", "demo/hills.csv"] {
+        let text = read(recording);
+        assert!(text.contains("# tip_mm = 2.0\n"), "{recording}");
+        runs(
+            folder,
+            &["replay", "hills.tif", recording, "-o", "again.csv"],
+        );
+        let again = read("again.csv");
+        assert!(again.contains("# tip_mm = 2.0\n"));
+        let (live, again) = (felt(&text), felt(&again));
+        assert!(
+            live.iter().filter(|row| row.contains(",1,")).count() > 500,
+            "{recording}"
+        );
+        assert!(live == again, "{recording} is felt otherwise");
+        let said = runs(
+            folder,
+            &[
+                "replay",
+                "hills.tif",
+                recording,
+                "-o",
+                "point.csv",
+                "--tip",
+                "0",
+            ],
+        );
+        assert!(
+            said.contains("--tip 0.0, where the recording has 2.0"),
+            "{said}"
+        );
+        assert!(!read("point.csv").contains("tip_mm") && felt(&read("point.csv")) != live);
+    }
+}
+
+#[test]
+fn a_tip_of_too_many_cells_takes_a_coarser_level() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    runs(
+        folder,
+        &["synth", "fractal", "-o", "hills.tif", "--size", "256"],
+    );
+    std::fs::write(folder.join("in.csv"), "t_s,x_mm,y_mm,z_mm\n0,60,60,500\n").expect("written");
+    runs(
+        folder,
+        &[
+            "replay",
+            "hills.tif",
+            "in.csv",
+            "-o",
+            "out.csv",
+            "--tip",
+            "20",
+        ],
+    );
+    let text = std::fs::read_to_string(folder.join("out.csv")).expect("there");
+    assert!(text.contains("# level = 2\n"), "{text}");
+    for (words, expected) in [
+        (
+            ["--tip=20", "--level=0"],
+            "a tip of 20 mm: 20.0 cells of level 0, where 0 to 8 can be felt",
+        ),
+        (["--tip=-1", "--level=0"], "a radius from 0 to 100 mm"),
+        (["--tip=two", "--level=0"], "a radius from 0 to 100 mm"),
+    ] {
+        let mut command = Command::new(hapterra_binary());
+        let command =
+            command
+                .current_dir(folder)
+                .args(["replay", "hills.tif", "in.csv", "-o", "o.csv"]);
+        let run = command.args(words).output().expect("started");
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert!(!run.status.success() && said.contains(expected), "{said}");
+    }
+}
