@@ -7,11 +7,12 @@
 //! --write`. Run as a test, it counts a part of the scenes, of which only the
 //! largest counts are held against the table.
 
+#[allow(dead_code)] // The cycles use others of them.
 mod m4f;
 
 use hapterra_tests::counting::CountingBoard;
 use m4f::table::{Row, Table};
-use m4f::{chain, contact, cycles, soak, tiles};
+use m4f::{chain, contact, soak, tiles};
 
 #[test]
 fn no_state_of_the_tick_costs_more_than_it_did() {
@@ -34,29 +35,5 @@ fn no_state_of_the_tick_costs_more_than_it_did() {
         return Table::write(&rows);
     }
     let worse = Table::kept().worse(&rows);
-    assert!(worse.is_empty(), "{}", worse.join("\n"));
-}
-
-/// `cargo xtask cycles` runs it; `--write` writes the table.
-#[test]
-#[ignore = "takes ten minutes: cargo xtask cycles"]
-fn no_state_of_the_tick_takes_more_cycles_than_it_did() {
-    let Some(board) = CountingBoard::found() else {
-        return;
-    };
-    let board = board.following();
-    let rows = std::thread::scope(|scope| {
-        let others = scope.spawn(|| [contact::rows(&board), soak::costliest_rows(&board)].concat());
-        let mut rows = chain::rows(&board);
-        rows.extend(others.join().expect("no panic inside"));
-        rows
-    });
-    println!("{}", cycles::TITLES.join(", "));
-    rows.iter()
-        .for_each(|row| println!("{}", cycles::record(row).join(", ")));
-    if std::env::var("HAPTERRA_COUNTS").is_ok_and(|wanted| wanted == "write") {
-        return cycles::write(&rows);
-    }
-    let worse = cycles::worse(&rows);
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }

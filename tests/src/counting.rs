@@ -5,7 +5,7 @@
 //! `cargo xtask counts` build it and name it.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -22,7 +22,7 @@ use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::plant::Sensed;
 use serde::Serialize;
 
-use crate::cycles::{Cycles, trace};
+use crate::cycles::Cycles;
 use crate::emulation::{named, qemu};
 use crate::scene::materials::Materials;
 
@@ -33,6 +33,8 @@ pub const WINDOW: usize = 16;
 
 /// `-icount shift`: an instruction takes 2¹⁰ ns, a count of the timer 40 ns.
 const SHIFT: u32 = 10;
+/// More instructions than the call and the return of a tick that is counted.
+const CALL: u32 = 16;
 /// Words of a record; see the image.
 const RECORD: usize = 13;
 
@@ -41,9 +43,12 @@ const RECORD: usize = 13;
 pub struct CountingBoard {
     qemu: PathBuf,
     image: PathBuf,
-    /// Whether it follows what it executes, for the cycles.
-    follows: bool,
+    /// What follows the image's instructions in its folder, for the cycles of each tick.
+    follow: Option<Follow>,
 }
+
+/// Runs an image in a folder to its end, and returns what each tick took.
+pub type Follow = fn(image: &Path, folder: &Path) -> Vec<Cycles>;
 
 /// What happens in a replay.
 #[derive(Clone, Copy, Debug)]
@@ -116,24 +121,17 @@ impl CountingBoard {
         Some(Self {
             qemu,
             image,
-            follows: false,
+            follow: None,
         })
     }
 
-    /// The board that follows each instruction and works out the cycles of each tick, at a
-    /// hundredth of its speed.
+    /// The board with the cycles of each tick, by something that follows what the image executes.
     #[must_use]
-    pub fn following(self) -> Self {
+    pub fn following(self, follow: Follow) -> Self {
         Self {
-            follows: true,
+            follow: Some(follow),
             ..self
         }
-    }
-
-    /// Returns true if it follows what it executes.
-    #[must_use]
-    pub const fn follows(&self) -> bool {
-        self.follows
     }
 
     /// Steps the contact alone, in real time, through one replay after the other;
@@ -258,9 +256,6 @@ impl CountingBoard {
     }
 
     fn run(&self, folder: &Path) -> Vec<Counted> {
-        if self.follows {
-            return self.follow(folder);
-        }
         let ran = self
             .emulation(folder)
             .args(["-icount", &format!("shift={SHIFT},sleep=off")])
@@ -268,30 +263,9 @@ impl CountingBoard {
             .expect("QEMU starts");
         let said = String::from_utf8_lossy(&ran.stderr);
         assert!(ran.status.success(), "{}: {said}", ran.status);
-        records(folder, "ticks.bin")
-    }
-
-    /// The same with cycles. A tick begins where the image's `tick` or `step` does; those without
-    /// a record are the first ones, in which the arm is armed.
-    fn follow(&self, folder: &Path) -> Vec<Counted> {
-        let mut emulation = self
-            .emulation(folder)
-            .args(["-d", "in_asm,exec,nochain"])
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("QEMU starts");
-        let log = emulation.stderr.take().expect("piped");
-        let log = BufReader::with_capacity(1 << 20, log);
-        let names = ["mps2_an386_counts4tick", "mps2_an386_counts4step"];
-        let cycles = trace::ticks(log, "mps2_an386_counts", &names).expect("a log");
-        let status = emulation.wait().expect("it ends");
-        assert!(status.success(), "{status}");
         let mut counted = records(folder, "ticks.bin");
-        let unrecorded = cycles.len().checked_sub(counted.len());
-        let cycles = cycles.iter().skip(unrecorded.expect("each record's tick"));
-        for (tick, cycles) in counted.iter_mut().zip(cycles) {
-            (tick.cycles, tick.instructions) = (*cycles, cycles.instructions);
+        if let Some(follow) = self.follow {
+            add_cycles(&mut counted, &follow(&self.image, folder));
         }
         counted
     }
@@ -307,6 +281,22 @@ impl CountingBoard {
             .arg(&self.image)
             .stdin(Stdio::null());
         command
+    }
+}
+
+/// Adds the cycles of each tick. Those without a record are the first ones, in which the arm is armed.
+///
+/// # Panics
+/// If what was followed is not what was counted, but for the call and the return of each tick.
+fn add_cycles(counted: &mut [Counted], followed: &[Cycles]) {
+    let unrecorded = followed.len().checked_sub(counted.len());
+    let followed = &followed[unrecorded.expect("each record's tick")..];
+    let mut calls = vec![];
+    for (tick, cycles) in counted.iter_mut().zip(followed) {
+        calls.extend(tick.instructions.checked_sub(cycles.instructions));
+        let is_same = calls.last() == calls.first() && calls.last() < Some(&CALL);
+        assert!(is_same, "tick {}: {tick:?}, {cycles:?}", calls.len());
+        (tick.cycles, tick.instructions) = (*cycles, cycles.instructions);
     }
 }
 

@@ -3,35 +3,15 @@
 //! by tick.
 
 use hapterra_core::Vec3;
-use hapterra_tests::counting::CountingBoard;
+use hapterra_tests::counting::{Counted, CountingBoard};
 use hapterra_tests::scene::recorded::Recorded;
-use hapterra_tests::scene::run::Surface;
-
-const SEED: u64 = 77;
-
-/// By number: a third of them with friction.
-fn surface(number: u64) -> Surface {
-    match number % 3 {
-        0 => Surface::Rough,
-        _ => Surface::Smooth,
-    }
-}
 
 #[test]
 fn scenes_give_the_same_bits_on_the_emulated_processor() {
     let Some(board) = CountingBoard::found() else {
         return;
     };
-    let scenes: Vec<Recorded> = (0..40)
-        .map(|number| Recorded::random(SEED, number, surface(number)))
-        .collect();
-    let replays: Vec<_> = scenes.iter().map(Recorded::replay).collect();
-    let there = board.contact(&replays);
-    for (number, (scene, there)) in scenes.iter().zip(&there).enumerate() {
-        let kind = scene.scene.terrain.kind;
-        let differs = scene.differs(there);
-        assert_eq!(differs, None, "seed {SEED}, scene {number}, {kind:?}: tick");
-    }
+    let there = replayed(&board, &Recorded::compared());
     let ticks: usize = there.iter().map(Vec::len).sum();
     assert!(ticks > 15_000, "{ticks}");
 }
@@ -42,22 +22,22 @@ fn scenes_on_materials_give_the_same_bits_on_the_emulated_processor() {
     let Some(board) = CountingBoard::found() else {
         return;
     };
-    let recorded = |number| {
-        Some((
-            number,
-            Recorded::on_materials(SEED, number, surface(number))?,
-        ))
-    };
-    let scenes: Vec<(u64, Recorded)> = (0..120).filter_map(recorded).collect();
+    let scenes = Recorded::compared_on_materials();
     assert!(scenes.len() >= 20, "{} scenes", scenes.len());
+    let there = replayed(&board, &scenes);
+    let forces = there.iter().flatten();
+    let forces = forces.filter(|tick| tick.vector != Vec3::ZERO).count();
+    assert!(forces > 3_000, "{forces} ticks with a force");
+}
+
+/// What the board answers, which is what was answered here.
+fn replayed(board: &CountingBoard, scenes: &[(u64, Recorded)]) -> Vec<Vec<Counted>> {
     let replays: Vec<_> = scenes.iter().map(|(_, scene)| scene.replay()).collect();
     let there = board.contact(&replays);
     for ((number, scene), there) in scenes.iter().zip(&there) {
         let kind = scene.scene.terrain.kind;
         let differs = scene.differs(there);
-        assert_eq!(differs, None, "seed {SEED}, scene {number}, {kind:?}: tick");
+        assert_eq!(differs, None, "scene {number}, {kind:?}: tick");
     }
-    let forces = there.iter().flatten();
-    let forces = forces.filter(|tick| tick.vector != Vec3::ZERO).count();
-    assert!(forces > 3_000, "{forces} ticks with a force");
+    there
 }

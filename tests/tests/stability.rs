@@ -38,7 +38,7 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
     assert!(
         rows.lines()
             .nth(1)
-            .is_some_and(|row| row.starts_with("1000,0.0,false,limp,0.5,80,0.1,none,0,0,still,"))
+            .is_some_and(|row| row.starts_with("1000,0.0,false,limp,0.5,200,0.1,none,0,0,still,"))
     );
     let picture = std::fs::read(png).expect("a picture");
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);

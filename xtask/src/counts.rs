@@ -7,34 +7,45 @@ use anyhow::Result;
 
 use crate::image;
 use crate::run::{cargo, run, timed};
-use crate::setup::{qemu, toolchain};
+use crate::setup::{emulator, qemu, toolchain};
 
 /// Counts over all scenes, prints the counts beside their targets, and compares them
 /// with the kept table, or writes that anew. About five minutes on two cores.
 pub(crate) fn counts(write: bool) -> Result<()> {
-    replay(&["--nocapture"], write)
+    let wanted = if write { "write" } else { "all" };
+    replay(
+        "hapterra-bench",
+        "instructions_m4f",
+        &["--nocapture"],
+        wanted,
+    )
 }
 
 /// Works out the cycles of a tick on the boards' chips, prints them, and compares them with the
-/// kept table, or writes that anew. About twenty minutes on two cores.
-pub(crate) fn cycles(write: bool) -> Result<()> {
-    replay(&["--nocapture", "--ignored"], write)
+/// kept table, or writes that anew: of the random scenes that the tests count, and of those with the
+/// costliest ticks; or of all of them, which takes half an hour on two cores.
+pub(crate) fn cycles(wanted: Option<&str>) -> Result<()> {
+    emulator::ready()?;
+    let words = ["--nocapture", "--ignored"];
+    replay(
+        "hapterra-image-tests",
+        "cycles",
+        &words,
+        wanted.unwrap_or_default(),
+    )
 }
 
-/// Runs the program that replays scenes on the counting image.
-fn replay(words: &[&str], write: bool) -> Result<()> {
+/// Runs a program that replays scenes on the counting image.
+fn replay(package: &str, program: &str, words: &[&str], wanted: &str) -> Result<()> {
     let qemu = qemu::ready()?;
     let image = image()?;
     let mut command = cargo();
-    let program = ["--package", "hapterra-bench", "--test", "instructions_m4f"];
     command
-        .arg("test")
-        .args(program)
-        .arg("--")
+        .args(["test", "--package", package, "--test", program, "--"])
         .args(words)
         .env("HAPTERRA_QEMU", qemu)
         .env(image::COUNTS_VARIABLE, image)
-        .env("HAPTERRA_COUNTS", if write { "write" } else { "all" });
+        .env("HAPTERRA_COUNTS", wanted);
     run(&mut command)
 }
 

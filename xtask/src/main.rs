@@ -47,7 +47,8 @@ cargo xtask COMMAND
   panics [BOARD]         build the images and prove that no interrupt can panic
   counts [--write]       instructions of a tick on the emulated Cortex-M4F, beside their
                          targets and the kept table; --write: keep these
-  cycles [--write]       cycles of a tick on the boards' chips, at most, beside the kept table
+  cycles [--write|--all] cycles of a tick on the boards' chips, at most, beside the kept table;
+                         --all: of all 12,500 random scenes
   soak MINUTES [--seed N] [--rough]  random scenes on all cores, every tick judged in f64
   soak --seed N --scene K [--rough]  one of them again
   campaign [--seconds N] [--seed S] [--segment K [--effects]]
@@ -98,8 +99,8 @@ fn command() -> Result<ExitCode> {
         }
         "test" => test::test(&test_words(&mut words)?)?,
         "soak" => soak::soak(words.raw_args()?.collect())?,
-        "counts" => counts::counts(flag(&mut words, "write")?)?,
-        "cycles" => counts::cycles(flag(&mut words, "write")?)?,
+        "counts" => counts::counts(flag(&mut words, &["write"])?.is_some())?,
+        "cycles" => counts::cycles(flag(&mut words, &["write", "all"])?)?,
         "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
         "panics" => test::check_panics(&test::images(boards(&mut words)?)?)?,
         "campaign" => campaign::campaign(words.raw_args()?)?,
@@ -160,14 +161,15 @@ fn boards(words: &mut lexopt::Parser) -> Result<&'static [board::Board]> {
     }
 }
 
-/// The one option that a command knows, given or not.
-fn flag(words: &mut lexopt::Parser, name: &str) -> Result<bool> {
-    let mut given = false;
+/// The one of these flags that is given.
+fn flag(words: &mut lexopt::Parser, names: &[&'static str]) -> Result<Option<&'static str>> {
+    let mut given = None;
     while let Some(word) = words.next()? {
-        match word {
-            Long(long) if long == name => given = true,
-            other => return Err(other.unexpected().into()),
-        }
+        let named = |name: &&&str| matches!(&word, Long(long) if long == *name);
+        given = match names.iter().find(named) {
+            Some(name) => Some(*name),
+            None => return Err(word.unexpected().into()),
+        };
     }
     Ok(given)
 }

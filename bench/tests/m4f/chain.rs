@@ -26,9 +26,8 @@ const LATE: Option<usize> = Some(APPROACH);
 const UNDER_MM: f64 = 3.0;
 const STEP_MM: f64 = 0.05;
 const SETTLES: usize = 60;
-/// Times that they do, and where each instruction is followed, which takes long.
+/// Times that they do.
 const RUNS: u32 = 20;
-const RUNS_FOLLOWED: u32 = 5;
 
 /// A field in cells of a millimetre, and an underlay that is off.
 struct Under<'g>(GridSamples<'g>);
@@ -376,8 +375,7 @@ impl<'g> Arm<'g> {
         };
         let field = Under(GridSamples(self.grid));
         let counted = APPROACH..APPROACH + SETTLES;
-        let times = if board.follows() { RUNS_FOLLOWED } else { RUNS };
-        let runs = (0..times).flat_map(|run| {
+        let runs = (0..RUNS).flat_map(|run| {
             let heading = f64::from(run) * 0.7;
             let along = |tick: usize| 0.5 * (tick as f64 - 0.5 * counted.end as f64);
             let surface = |tick: usize| match late {
@@ -399,7 +397,7 @@ impl<'g> Arm<'g> {
         let there = runs.filter(|(_, tick)| tick.state == touching && tick.converged);
         let there: Vec<Tick> = there.map(|(index, tick)| Tick::of(&tick, index)).collect();
         assert!(
-            there.len() > times as usize * SETTLES * 9 / 10,
+            there.len() > RUNS as usize * SETTLES * 9 / 10,
             "{name}: {}",
             there.len()
         );

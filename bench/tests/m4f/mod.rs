@@ -1,8 +1,7 @@
-//! The parts of the count on the emulated Cortex-M4F.
+//! The parts of the count on the emulated Cortex-M4F, and of the cycles (`tests/images`).
 
 pub(crate) mod chain;
 pub(crate) mod contact;
-pub(crate) mod cycles;
 pub(crate) mod soak;
 pub(crate) mod table;
 pub(crate) mod tiles;

@@ -2,7 +2,6 @@
 //! that are held and tiles that come late.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
 use hapterra_core::contact::Rule;
@@ -22,9 +21,7 @@ pub(crate) const ALL: u64 = 10_000;
 /// hundreds of times, or some fifty.
 pub(crate) const PART: u64 = 1000;
 /// Scenes that the emulated processor replays at once.
-const BATCH: u64 = 20;
-/// Scenes beside the costliest ones.
-const SOME: u64 = 24;
+const BATCH: usize = 20;
 /// Scenes of every kind of terrain, and of the paper's rule, at least.
 const OF_EACH: usize = 30;
 /// Most instructions that a tick of the contact may take on any scene: with the
@@ -64,23 +61,19 @@ pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
     rows
 }
 
-/// Rows over the scenes whose costliest ticks the kept table names, and some more: for what takes
-/// too long to be done with all of them.
-pub(crate) fn costliest_rows(board: &CountingBoard) -> Vec<Row> {
-    let [smooth, rough]: [Vec<u64>; 2] = Table::kept_scenes();
-    let row = |name: &str, named: Vec<u64>, surface| {
-        let numbers: Vec<u64> = named.into_iter().chain(0..SOME).collect();
-        let batches = numbers.chunks(BATCH as usize);
-        let counted = batches.flat_map(|batch| count_batch(board, batch, surface));
-        let ticks = counted.flat_map(|scene| scene.ticks);
-        Row::new(name, Target::default(), ticks.collect())
+/// Rows over the scenes whose bits the emulated processor is compared by, without materials and on
+/// them.
+pub(crate) fn compared_rows(board: &CountingBoard) -> Vec<Row> {
+    let row = |name: &str, scenes: Vec<(u64, Recorded)>| {
+        let counted = count_recorded(board, scenes).into_iter();
+        let ticks = counted.flat_map(|scene| scene.ticks).collect();
+        Row::new(name, Target::default(), ticks)
     };
     vec![
-        row("soak, costliest scenes", smooth, Surface::Smooth),
+        row("compared scenes", Recorded::compared()),
         row(
-            "soak, rough surfaces, costliest scene",
-            rough,
-            Surface::Rough,
+            "compared scenes on materials",
+            Recorded::compared_on_materials(),
         ),
     ]
 }
@@ -101,17 +94,25 @@ fn rough_row(board: &CountingBoard, scenes: u64) -> Row {
     }
 }
 
-/// Replays the scenes on all cores.
+/// Replays the scenes on all cores, and those that are known to have the costliest ticks.
 fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedScene> {
-    let next = AtomicU64::new(0);
+    let [smooth, rough] = Table::kept_scenes();
+    let mut costliest = match surface {
+        Surface::Smooth => smooth,
+        Surface::Rough => rough,
+    };
+    costliest.retain(|number| *number >= scenes);
+    costliest.sort_unstable();
+    costliest.dedup();
+    let numbers: Vec<u64> = (0..scenes).chain(costliest).collect();
+    let batches = Mutex::new(numbers.chunks(BATCH));
     let counted = Mutex::new(Vec::new());
     let work = || loop {
-        let first = next.fetch_add(BATCH, Ordering::Relaxed);
-        if first >= scenes {
+        let batch = batches.lock().expect("no panic inside").next();
+        let Some(batch) = batch else {
             return;
-        }
-        let numbers: Vec<u64> = (first..scenes.min(first + BATCH)).collect();
-        let batch = count_batch(board, &numbers, surface);
+        };
+        let batch = count_batch(board, batch, surface);
         counted.lock().expect("no panic inside").extend(batch);
     };
     thread::scope(|scope| {
@@ -126,21 +127,25 @@ fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedSce
 /// Replays so many scenes in one run of the emulated processor, which must answer
 /// as this one does.
 fn count_batch(board: &CountingBoard, numbers: &[u64], surface: Surface) -> Vec<CountedScene> {
-    let random = |number| Recorded::random(SEED, number, surface);
-    let recorded: Vec<_> = numbers.iter().copied().map(random).collect();
-    let replays: Vec<_> = recorded.iter().map(Recorded::replay).collect();
+    let random = |number: &u64| (*number, Recorded::random(SEED, *number, surface));
+    count_recorded(board, numbers.iter().map(random).collect())
+}
+
+/// The same, of scenes with their numbers: all of them on materials, or none.
+fn count_recorded(board: &CountingBoard, scenes: Vec<(u64, Recorded)>) -> Vec<CountedScene> {
+    let replays: Vec<_> = scenes.iter().map(|(_, scene)| scene.replay()).collect();
     let there = board.contact(&replays);
-    let scenes = numbers.iter().copied().zip(&recorded).zip(&there);
+    let scenes = scenes.iter().zip(&there);
     scenes
         .map(|((number, recorded), there)| {
             let (kind, rule) = (recorded.scene.terrain.kind, recorded.scene.rule);
             let differs = recorded.differs(there);
-            assert_eq!(differs, None, "seed {SEED}, scene {number}, {kind:?}: tick");
+            assert_eq!(differs, None, "scene {number}, {kind:?}: tick");
             let ticks = there.iter().enumerate().map(|(index, tick)| Tick {
                 instructions: tick.instructions,
                 cycles: tick.cycles,
                 units: tick.work,
-                scene: Some(number),
+                scene: Some(*number),
                 index,
             });
             let ticks = ticks.collect();

@@ -4,9 +4,10 @@ use std::fmt;
 
 use hapterra_tests::counting::Counted;
 use hapterra_tests::cycles::Cycles;
+use hapterra_tests::repository;
 
-/// The kept table.
-const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/instructions-m4f.csv");
+/// The kept table, in the repository.
+const TABLE: &str = "bench/instructions-m4f.csv";
 /// More than this share above the kept count is a regression, and more than
 /// [`LEEWAY`] instructions: another compiler may take a few.
 const TOLERANCE: f64 = 0.05;
@@ -202,7 +203,8 @@ pub(crate) struct Table(Vec<(String, [f64; 3])>);
 impl Table {
     /// Reads it.
     pub(crate) fn kept() -> Self {
-        let mut table = csv::Reader::from_path(TABLE).expect("the table is there");
+        let mut table =
+            csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
         let rows = table.records().map(|row| {
             let row = row.expect("a row");
             let count = |i: usize| row[i].parse().expect("a count");
@@ -211,9 +213,11 @@ impl Table {
         Self(rows.collect())
     }
 
-    /// The scenes of the stress test with the costliest ticks: without friction, and with.
+    /// The scenes of the stress test whose ticks are the costliest of all and of each kind: without
+    /// friction, and with.
     pub(crate) fn kept_scenes() -> [Vec<u64>; 2] {
-        let mut table = csv::Reader::from_path(TABLE).expect("the table is there");
+        let mut table =
+            csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
         let rows = table.records().map(|row| row.expect("a row"));
         let named = rows.filter_map(|row| {
             let scene = row[10].parse::<u64>().ok()?;
@@ -225,7 +229,8 @@ impl Table {
 
     /// Writes it anew.
     pub(crate) fn write(rows: &[Row]) {
-        let mut table = csv::Writer::from_path(TABLE).expect("the table can be written");
+        let mut table =
+            csv::Writer::from_path(repository().join(TABLE)).expect("the table can be written");
         table.write_record(COLUMNS).expect("written");
         for row in rows {
             table.write_record(row.record()).expect("written");

@@ -28,6 +28,7 @@ use crate::stm32::priorities::OTHERS;
 use crate::stm32::start::FULL_SCALE_A;
 use crate::stm32::{failure, parts, usb_interrupt};
 use crate::stop::{EmergencyStop, take_stop};
+use crate::tick_memory;
 pub(crate) use crate::tick_memory::fill as fill_memories;
 
 /// Tiles along the side of the window.
@@ -91,10 +92,11 @@ pub(crate) fn sample_slowly(channels: [u8; 3]) {
     }
 }
 
-/// Sets up what comes before the clocks: faults and caches. No DMA is used, so the data
-/// cache needs no care. Does not return on a chip that is too old.
+/// Sets up what comes before the clocks: the tick's memory, faults and caches. No DMA is used, so
+/// the data cache needs no care. Does not return on a chip that is too old.
 pub(crate) fn prepare(core: &mut Core) {
     revision::refuse_older();
+    tick_memory::protect(&core.MPU);
     flash::tell_bus_faults(core);
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);
@@ -262,11 +264,15 @@ pub(crate) fn resets_below_mv() -> u16 {
 
 /// Lets the watchdog and the clock of embassy's time run on while a debugger halts the core,
 /// whatever that asked for: the one resets the chip, by the other the next tick knows of the
-/// halt. Lets the halt stop TIM1. Its outputs are then off as by a break (RM0433, 38.3.28).
+/// halt, and so does TIM15, which lets the duty cycles go on. Lets the halt stop TIM1. Its outputs
+/// are then off as by a break (RM0433, 38.3.28).
 pub(crate) fn let_a_halt_stop_the_arm() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(false));
     pac::DBGMCU.apb1lfzr1().modify(|w| w.set_tim5(false));
-    pac::DBGMCU.apb2fzr1().modify(|w| w.set_tim1(true));
+    pac::DBGMCU.apb2fzr1().modify(|w| {
+        w.set_tim1(true);
+        w.set_tim15(false);
+    });
 }
 
 /// Changes the heartbeat's level, past any driver.

@@ -5,6 +5,15 @@
 
 use core::arch::global_asm;
 
+use cortex_m::peripheral::MPU;
+
+/// MPU_RBAR: all of ITCM, from address 0 on, as region 1. Region 0 is the stack's guard.
+const REGION: u32 = 1 << 4 | 1;
+/// Bytes of ITCM.
+const ITCM_BYTES: u32 = 64 * 1024;
+/// MPU_RASR: loads and code but no stores, normal memory, 64 KiB, on.
+const READ_ONLY: u32 = 0b110 << 24 | 1 << 17 | (ITCM_BYTES.ilog2() - 1) << 1 | 1;
+
 // Copies both before any Rust runs: any function may copy memory, and what copies it is among
 // them. The check bits of these memories are over eight bytes (RM0433, 2.4), so eight bytes are
 // written at once. What is left of ITCM is zeroed, too: the core reads ahead of what it executes,
@@ -49,4 +58,16 @@ unsafe extern "C" {
     /// Fills both memories. Needs no stack.
     #[link_name = "hapterra_fill_tick_memory"]
     pub(crate) fn fill();
+}
+
+/// Forbids stores to ITCM, which is filled by now: a store through a null pointer is a hard fault
+/// and no change of the tick's code. The memory protection unit is on.
+pub(crate) fn protect(mpu: &MPU) {
+    // SAFETY: nothing of the program stores there once `fill` has run, before any Rust.
+    unsafe {
+        mpu.rbar.write(REGION);
+        mpu.rasr.write(READ_ONLY);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
 }

@@ -36,7 +36,7 @@ use super::terminal::speaker::Speaker;
 use super::terminal::voice::tell;
 use super::terminal::{interrupt, left_behind};
 use super::viewing::{ToBeShown, Viewing};
-use crate::link::DeviceAddress;
+use crate::link::{DeviceAddress, Patience};
 use crate::output::keep_apart;
 use crate::steering::keys::KEYS;
 use devices::OneDevice;
@@ -44,9 +44,6 @@ use placed::{InReach, Placed};
 use session::{Serving, recording};
 use together::serve_each;
 
-/// The device lets an armed arm be for so long, seconds, without a word from here, where the user
-/// does not say: longer than a host that goes on takes to come back.
-const SILENCE_BY_DEFAULT_S: u16 = 30;
 /// The stiffest surface that `hapterra stability` tries by itself.
 const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
 
@@ -83,7 +80,7 @@ pub struct Args {
 
     /// For how many seconds the device lets an armed arm be while it hears nothing from
     /// here; then it lets the force out and disarms
-    #[arg(long, value_name = "S", default_value_t = SILENCE_BY_DEFAULT_S,
+    #[arg(long, value_name = "S", default_value_t = Patience::REAL_SILENCE_S,
           value_parser = clap::value_parser!(u16).range(i64::from(SILENCE_S.0)..=i64::from(SILENCE_S.1)))]
     pub silence_s: u16,
 

@@ -46,9 +46,9 @@ pub struct Args {
     )]
     pub passivity: Vec<Passivity>,
 
-    /// Microseconds from reading the encoders to the amplifiers; 80 is what a nucleo-g474re
-    /// may take, and amplifiers that are commanded by duty cycles take up to 1000 more
-    #[arg(long, value_name = "US", default_value_t = 80, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    /// Microseconds from reading the encoders to the amplifiers; 200 is what a nucleo-g474re
+    /// may take, and 1130 is more than a nucleo-h743zi2 with duty cycles takes
+    #[arg(long, value_name = "US", default_value_t = 200, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub delay_us: u32,
 
     /// Friction of the arm's joints, as parts of the model's

@@ -28,6 +28,10 @@ pub struct Patience {
 }
 
 impl Patience {
+    /// How long a real board lets an armed arm be while its host is silent, unless the user says
+    /// otherwise, seconds: longer than a host that goes on takes to come back.
+    pub const REAL_SILENCE_S: u16 = 30;
+
     /// For a device that runs in real time.
     pub const REAL_TIME: Self = Self {
         again: Duration::from_millis(400),
@@ -35,7 +39,7 @@ impl Patience {
         greet_again: Duration::from_millis(750),
         give_up: Duration::from_secs(4),
         goodbye: Duration::from_secs(3),
-        silence_s: DEFAULT_SILENCE_S,
+        silence_s: Self::REAL_SILENCE_S,
     };
 
     /// For an emulated board, or a device in this program, whose speed is that of a shared
@@ -77,6 +81,19 @@ impl Patience {
             give_up,
             goodbye: Self::REAL_TIME.goodbye.min(give_up),
             ..Self::REAL_TIME
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_real_arm_is_armed_for_long_after_its_host_is_gone() {
+        let dialogue = Patience::of_a_dialogue(Duration::from_secs(60));
+        for patience in [Patience::REAL_TIME, dialogue] {
+            assert!((5..=30).contains(&patience.silence_s), "{patience:?}");
         }
     }
 }

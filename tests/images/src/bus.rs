@@ -155,9 +155,18 @@ impl Bus {
         if self.is_halted && self.is_frozen(self.chip.freeze.watchdog) {
             self.watchdog.stand_still(by_ns);
         }
-        let clock_stands = self.is_halted && self.is_frozen(self.chip.freeze.clock);
+        self.follow_gate();
+        let freeze = self.chip.freeze;
+        let stands = |bit| self.is_halted && self.is_frozen(bit);
+        let clock_stands = stands(freeze.clock);
+        let gate_stands = freeze.gate.is_some_and(stands);
         for (timer, at) in self.timers.iter_mut().zip(self.chip.timers) {
-            match clock_stands && at.name == "TIM5" {
+            let is_frozen = match at.name {
+                "TIM5" => clock_stands,
+                "TIM15" => gate_stands,
+                _ => false,
+            };
+            match is_frozen {
                 true => timer.stand_still(self.now_ns),
                 false => timer.advance(self.now_ns),
             }
@@ -179,6 +188,16 @@ impl Bus {
             self.nvic.pend(self.chip.comparator.interrupt);
         }
         self.follow_break();
+    }
+
+    /// TIM15 is ITR0 of TIM1.
+    fn follow_gate(&mut self) {
+        let level = self
+            .timer_named("TIM15")
+            .is_some_and(|gate| gate.triggers());
+        if let Some(timer) = self.timer_named("TIM1") {
+            timer.trigger = level;
+        }
     }
 
     fn is_frozen(&self, (register, bit): (u32, u32)) -> bool {
@@ -221,6 +240,7 @@ impl Bus {
     /// What is at the pins of the duty cycles, on a board that commands by them.
     #[must_use]
     pub fn duty_outputs(&mut self) -> Option<Outputs> {
+        self.follow_gate();
         let at = self.chip.output_break?;
         let stops = self.chip.freeze.outputs;
         let is_stopped = self.is_halted && stops.is_some_and(|bit| self.is_frozen(bit));

@@ -269,6 +269,7 @@ pub static G474: Chip = Chip {
     freeze: Freeze {
         watchdog: (0xE004_2008, 1 << 12),
         clock: (0xE004_2008, 1 << 3),
+        gate: None,
         outputs: None,
     },
     output_break: None,
@@ -343,6 +344,7 @@ pub static H743: Chip = Chip {
     ],
     timers: &[
         timer("TIM1", 0x4001_0000, None),
+        timer("TIM15", 0x4001_4000, None),
         timer("TIM8", 0x4001_0400, None),
         timer("TIM3", 0x4000_0400, None),
         timer("TIM4", 0x4000_0800, None),
@@ -372,10 +374,11 @@ pub static H743: Chip = Chip {
     external_clock: (0x5802_4400, 1 << 16),
     // 0b10 is OTG_HS (USB1), 0b11 is OTG_FS (USB2).
     recovery: (0x4000_8400, 0b11),
-    // DBGMCU_APB4FZ1.DBG_IWDG1, APB1LFZ1.DBG_TIM5, APB2FZ1.DBG_TIM1.
+    // DBGMCU_APB4FZ1.DBG_IWDG1, APB1LFZ1.DBG_TIM5, APB2FZ1.DBG_TIM15, DBG_TIM1.
     freeze: Freeze {
         watchdog: (0x5C00_1054, 1 << 18),
         clock: (0x5C00_103C, 1 << 3),
+        gate: Some((0x5C00_104C, 1 << 16)),
         outputs: Some((0x5C00_104C, 1 << 0)),
     },
     // SYSCFG_CFGR: PVDL, CM7L; FLASHL, DTCML, ITCML, AXISRAML.

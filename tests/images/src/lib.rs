@@ -22,6 +22,7 @@ pub mod bench;
 pub mod bus;
 pub mod chip;
 pub mod converter;
+pub mod counting;
 pub mod device;
 pub mod elf;
 pub mod machine;

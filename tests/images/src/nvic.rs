@@ -2,8 +2,9 @@
 //!
 //! Modelled: the registers that enable, disable, raise and take back interrupts, their
 //! priorities with four bits, and the reset by AIRCR. Not modelled: priority groups, the active
-//! bits, STIR, SysTick. What else is in the page reads back what was written; the memory
-//! protection unit, the faults and the data cache take theirs from there.
+//! bits, STIR, SysTick. Of the memory protection unit the regions, as `machine/protection` says.
+//! What else is in the page reads back what was written; the faults and the data cache take theirs
+//! from there.
 
 use std::collections::HashMap;
 
@@ -19,6 +20,15 @@ const IPR: u32 = 0x400;
 const AIRCR: u32 = 0xD0C;
 const KEY: u32 = 0x05FA;
 const SYSRESETREQ: u32 = 1 << 2;
+/// The memory protection unit: on, the region that is meant, its base, with the number of another
+/// region where bit 4 is set, and its attributes.
+const MPU_CTRL: u32 = 0xD94;
+const MPU_RNR: u32 = 0xD98;
+const MPU_RBAR: u32 = 0xD9C;
+const MPU_RASR: u32 = 0xDA0;
+const VALID: u32 = 1 << 4;
+/// Regions of a Cortex-M7; an M4 has half of them.
+const REGIONS: usize = 16;
 /// Most interrupts there can be.
 const INTERRUPTS: usize = 240;
 
@@ -27,6 +37,8 @@ pub struct Nvic {
     enabled: [bool; INTERRUPTS],
     pending: [bool; INTERRUPTS],
     priority: [u8; INTERRUPTS],
+    /// Base and attributes of each region.
+    regions: [(u32, u32); REGIONS],
     other: HashMap<u32, u32>,
     /// The program has asked for a reset.
     pub asks_for_reset: bool,
@@ -38,6 +50,7 @@ impl Default for Nvic {
             enabled: [false; INTERRUPTS],
             pending: [false; INTERRUPTS],
             priority: [0; INTERRUPTS],
+            regions: [(0, 0); REGIONS],
             other: HashMap::new(),
             asks_for_reset: false,
         }
@@ -63,6 +76,8 @@ impl Nvic {
                 let four = self.priority.get(first..first + 4).unwrap_or(&[0; 4]);
                 u32::from_le_bytes(four.try_into().unwrap_or_default())
             }
+            MPU_RBAR => self.region().0 | self.region_number() as u32,
+            MPU_RASR => self.region().1,
             _ => self.other.get(&offset).copied().unwrap_or(0),
         }
     }
@@ -88,11 +103,40 @@ impl Nvic {
                     }
                 }
             }
+            MPU_RBAR => {
+                if value & VALID != 0 {
+                    self.other.insert(MPU_RNR, value & 0xF);
+                }
+                self.regions[self.region_number()].0 = value & !0x1F;
+            }
+            MPU_RASR => self.regions[self.region_number()].1 = value,
             AIRCR => self.asks_for_reset |= value >> 16 == KEY && value & SYSRESETREQ != 0,
             _ => {
                 let word = self.other.entry(offset).or_default();
                 *word = *word & !mask | value & mask;
             }
+        }
+    }
+
+    fn region_number(&self) -> usize {
+        self.other
+            .get(&MPU_RNR)
+            .map_or(0, |n| *n as usize % REGIONS)
+    }
+
+    fn region(&self) -> (u32, u32) {
+        self.regions[self.region_number()]
+    }
+
+    /// Base and attributes of every region of the memory protection unit, which are zero while it
+    /// is off.
+    #[must_use]
+    pub fn regions(&self) -> [(u32, u32); REGIONS] {
+        let is_on = self.other.get(&MPU_CTRL).is_some_and(|on| on & 1 != 0);
+        if is_on {
+            self.regions
+        } else {
+            Default::default()
         }
     }
 

@@ -1,6 +1,6 @@
 //! What stops the arm in hardware: the break of TIM1, and what a halted core stops.
 //!
-//! Modelled as RM0433 has it: of TIM1 CEN of CR1, the compare modes of CCMR1 and CCMR2, the
+//! Modelled as RM0433 has it: of TIM1 CEN of CR1, the gate, the compare modes of CCMR1 and CCMR2, the
 //! enables of CCER (38.4.7 to 38.4.11), and (38.3.16, 38.3.28, 38.4.20) BKE, BKP, OSSI and MOE
 //! of BDTR, BKINE of AF1, BIF of SR; of SYSCFG_CFGR (12.3.3) PVDL, which also locks the
 //! comparator's settings, CM7L, and the bits for double errors of flash and RAM; of DBGMCU (60.5.8) the bits that
@@ -55,6 +55,8 @@ pub struct Freeze {
     pub watchdog: (u32, u32),
     /// That of the timer of embassy's time.
     pub clock: (u32, u32),
+    /// That of TIM15, which gates TIM1.
+    pub gate: Option<(u32, u32)>,
     /// TIM1's.
     pub outputs: Option<(u32, u32)>,
 }
@@ -87,6 +89,8 @@ pub enum Outputs {
     Pulses,
     /// They are driven low.
     Low,
+    /// They stand at whichever level they were at: an amplifier reads a broken wire.
+    Standing,
     /// Nothing, on one of them at least: what is outside decides.
     Floating,
 }
@@ -112,7 +116,8 @@ pub fn outputs(timer: &Timer, is_stopped: bool) -> Outputs {
         modes & CHANNEL == PWM_1
     };
     match timer.get(CR1) & CEN != 0 && each(&makes_duty_cycles) {
-        true => Outputs::Pulses,
+        true if timer.is_let() => Outputs::Pulses,
+        true => Outputs::Standing,
         false => Outputs::Low,
     }
 }

@@ -1,14 +1,16 @@
 //! A timer of the chips: counting up, moved by an encoder, or standing still.
 //!
-//! Modelled: CEN, URS and CKD of CR1, the encoder mode on both channels of SMCR, UG of EGR, the
+//! Modelled: CEN, URS, OPM and CKD of CR1, MMS of CR2 where it gives CEN to other timers, the encoder
+//! mode on both channels and the gated mode of SMCR, UG of EGR, the
 //! flags and interrupts of the update and of the four compare matches, the input filters of
 //! CCMR1, CNT, PSC, ARR and the compare registers. What a timer does to its pins is in
-//! `shutdown`. Not modelled: counting down, one pulse, repetition, the other slave modes,
+//! `shutdown`. Not modelled: counting down, repetition, the other slave modes and triggers,
 //! capture, DMA, and every preload: what is written counts at once.
 
 use crate::quadrature::{Filter, count};
 
 const CR1: u32 = 0x00;
+const CR2: u32 = 0x04;
 const SMCR: u32 = 0x08;
 const DIER: u32 = 0x0C;
 const SR: u32 = 0x10;
@@ -27,6 +29,12 @@ pub const CCR1: u32 = 0x34;
 /// Bits of CR1.
 const CEN: u32 = 1 << 0;
 const URS: u32 = 1 << 2;
+const OPM: u32 = 1 << 3;
+/// CR2.MMS: CEN is what other timers are triggered by.
+const GIVES_CEN: (u32, u32) = (7 << 4, 1 << 4);
+/// SMCR: it counts while its trigger is high, and the trigger is ITR0.
+const SMS_TS: u32 = 0x77;
+const GATED: u32 = 5;
 /// Bit of SR: the counter went round.
 const UIF: u32 = 1 << 0;
 
@@ -37,6 +45,8 @@ pub struct Timer {
     now_ns: u64,
     /// What is left of the last count, in billionths of a clock.
     carry: u64,
+    /// The level of ITR0.
+    pub(crate) trigger: bool,
 }
 
 impl Timer {
@@ -48,6 +58,7 @@ impl Timer {
             registers: [0; 28],
             now_ns: 0,
             carry: 0,
+            trigger: false,
         };
         timer.set(ARR, 0xFFFF);
         timer.set(AF1, 1);
@@ -106,7 +117,19 @@ impl Timer {
 
     fn is_counting(&self) -> bool {
         let follows_encoder = matches!(self.get(SMCR) & 7, 1..=3);
-        self.get(CR1) & CEN != 0 && !follows_encoder
+        self.get(CR1) & CEN != 0 && !follows_encoder && self.is_let()
+    }
+
+    /// Returns true unless the timer is gated and its trigger is low.
+    #[must_use]
+    pub fn is_let(&self) -> bool {
+        self.get(SMCR) & SMS_TS != GATED || self.trigger
+    }
+
+    /// The level that it gives to other timers, as far as it gives its CEN.
+    #[must_use]
+    pub fn triggers(&self) -> bool {
+        self.get(CR2) & GIVES_CEN.0 == GIVES_CEN.1 && self.get(CR1) & CEN != 0
     }
 
     /// Lets time pass up to `now_ns`, setting flags on the way.
@@ -140,7 +163,11 @@ impl Timer {
             }
         }
         self.set(SR, self.get(SR) | flags);
-        self.set(CNT, (to % period) as u32);
+        let ends = to >= period && self.get(CR1) & OPM != 0;
+        if ends {
+            self.set(CR1, self.get(CR1) & !CEN);
+        }
+        self.set(CNT, if ends { 0 } else { (to % period) as u32 });
     }
 
     /// Whether its interrupt is asserted.
@@ -170,6 +197,28 @@ mod tests {
             }
         }
         assert_eq!(rounds, 10_000);
+    }
+
+    #[test]
+    fn one_pulse_gates_another_timer_for_one_period() {
+        let mut timers = [Timer::new(1_000_000), Timer::new(1_000_000)];
+        let [gate, gated] = &mut timers;
+        for (register, value) in [(ARR, 99), (CR2, GIVES_CEN.1), (CR1, CEN | OPM)] {
+            gate.write(register, value, u32::MAX);
+        }
+        for (register, value) in [(SMCR, GATED), (CR1, CEN)] {
+            gated.write(register, value, u32::MAX);
+        }
+        for us in 1..=300 {
+            gated.trigger = gate.triggers();
+            gate.advance(us * 1000);
+            gated.advance(us * 1000);
+        }
+        assert_eq!((gate.get(CR1) & CEN, gate.get(CNT)), (0, 0));
+        assert_eq!(gated.get(CNT), 100);
+        gate.write(CR2, 0, u32::MAX);
+        gate.write(CR1, CEN | OPM, u32::MAX);
+        assert!(!gate.triggers(), "it gives something else");
     }
 
     #[test]

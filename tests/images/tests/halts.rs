@@ -30,7 +30,11 @@ fn the_first_tick_after_a_halt_has_no_force() {
             machine.resume();
             machine.slice = 10;
             let resumed_ns = machine.bus().now_ns;
-            let off = machine.run_until(1, |m| !m.is_enabled());
+            let off = machine.run_until(1, |m| {
+                let pulses = m.bus().drives_duty_cycles() == Some(true);
+                assert!(!(pulses && m.is_enabled()), "{board}, {ms} ms: pulses");
+                !m.is_enabled()
+            });
             assert_eq!(off, Stop::Asked, "{board}, {ms} ms: still on");
             let took_ns = machine.bus().now_ns - resumed_ns;
             assert!(took_ns < OFF_NS, "{board}, {ms} ms: off after {took_ns} ns");

@@ -6,6 +6,7 @@
 mod tick_rate;
 
 use hapterra::raster::Raster;
+use hapterra::stability::limits;
 use hapterra_core::contact::WORK_PER_TICK;
 use hapterra_firmware::amplifier::{CURRENT_LOOP_US, DUTY_HZ};
 use hapterra_image_tests::chip::Chip;
@@ -87,6 +88,11 @@ fn cycles_of_the_interrupt_are_at_most_what_the_page_says() {
             };
             let states_us = said.us[0] as u16 + behind_us + CURRENT_LOOP_US;
             assert_eq!(latency_us, states_us, "{board}");
+            let tried_us = match board {
+                "nucleo-h743zi2" => limits::LONG_US,
+                _ => limits::SHORT_US,
+            };
+            assert!(latency_us <= tried_us, "{board}");
         },
     );
 }
@@ -110,6 +116,57 @@ fn the_fastest_tick_that_the_build_takes_ends_in_time() {
         let rates = rates.filter(|hz| timer_hz % hz == 0 && in_time(*hz));
         assert_eq!(rates.max(), Some(fastest_hz), "{board}");
         assert_eq!(said.fastest_hz, fastest_hz, "{board}");
+    }
+}
+
+/// The most cycles that a row of the kept table has whose name is one of these, or begins with one
+/// that ends in `*`.
+fn kept(names: &[&str], is_m7: bool) -> u32 {
+    let table = std::fs::read_to_string(repository().join("bench/cycles.csv")).expect("the table");
+    let column = if is_m7 { 0 } else { 3 };
+    let rows = table.lines().skip(1).map(|line| {
+        let (mut cells, name) = (line.rsplit(','), line.rsplitn(8, ',').last());
+        let cycles = cells.nth(column).and_then(|cell| cell.parse::<u32>().ok());
+        (
+            name.expect("a name").trim_matches('"'),
+            cycles.expect("a number"),
+        )
+    });
+    let fits = |name: &str, wanted: &str| match wanted.strip_suffix('*') {
+        Some(begin) => name.starts_with(begin),
+        None => name == wanted,
+    };
+    let rows = rows.filter(|(name, _)| names.iter().any(|wanted| fits(name, wanted)));
+    rows.map(|(_, cycles)| cycles).max().expect("a row")
+}
+
+/// Up to which rate the costliest ticks end in time: those of the counted scenes, and the contact of
+/// the stress test's with all effects and materials around it, with the board's own part.
+#[test]
+fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
+    let mut in_time_khz = [u32::MAX; 2];
+    for (board, is_m7, core_hz, frames_us) in [
+        ("nucleo-g474re", false, 168_000_000, 0),
+        ("nucleo-h743zi2", true, 456_000_000, 0),
+        ("nucleo-h743zi2-spi", true, 456_000_000, 15),
+    ] {
+        let scene = kept(&["chain, sliding fast, rough, controller"], is_m7);
+        let own = Row::read(board).cycles[1] - scene;
+        let around = kept(&["chain, sliding fast, all effects and materials"], is_m7)
+            - kept(&["sliding fast, rough"], is_m7);
+        let whole = kept(&["chain*", "compared scenes on materials"], is_m7);
+        let contact = kept(&["soak*", "compared scenes"], is_m7);
+        let costliest = whole.max(contact + around);
+        let us = (costliest + own).div_ceil(core_hz / 1_000_000) + frames_us;
+        println!("{board}: {us} µs at most");
+        let khz = &mut in_time_khz[usize::from(is_m7)];
+        *khz = (*khz).min(1_000 / us);
+    }
+    let [g474, h743] = in_time_khz;
+    let rates = format!("in time **up to {g474} kHz on a G474 and up to {h743} kHz on an H743**");
+    for page in ["docs/cycles.md", "docs/hardware.md", "docs/underlay.md"] {
+        let text = std::fs::read_to_string(repository().join(page)).expect("the page");
+        assert!(text.contains(&rates), "{page}: {rates}");
     }
 }
 

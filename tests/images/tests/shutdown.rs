@@ -195,9 +195,23 @@ fn on_each_hung(play: impl Fn(&mut Machine)) {
             return;
         }
         let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
+        machine.run_ticks(1);
         machine.patch(tick.address, &HANG);
-        machine.run_ms(3);
         play(&mut machine);
+    });
+}
+
+#[test]
+fn a_tick_that_hangs_has_no_duty_cycles_after_two_periods() {
+    on_each_hung(|machine| {
+        machine.run_ms(1);
+        let pulses = |m: &Machine| m.bus().drives_duty_cycles();
+        assert_eq!(pulses(machine), Some(true));
+        machine.run_ms(1);
+        assert!(machine.is_enabled(), "nothing else switches off");
+        assert_eq!(pulses(machine), Some(false));
+        machine.run_ms(20);
+        assert_eq!(pulses(machine), Some(false));
     });
 }
 
@@ -274,6 +288,40 @@ fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
         device.run_ms(40);
         let told = device.latest.and_then(|sample| sample.fault);
         assert_eq!(told, Some(Fault::EmergencyStop));
+    });
+}
+
+#[test]
+fn a_write_through_a_null_pointer_switches_off_and_changes_no_code() {
+    // movs r0, #0; str r0, [r0, #0x20]; bx lr: the first word of the tick's code in ITCM.
+    const WRITE: [u8; 6] = [0x00, 0x20, 0x00, 0x62, 0x70, 0x47];
+    const ITCM_BYTES: usize = 64 * 1024;
+    let write = |device: &mut Device<'_>, _: Scene| {
+        let mut machine = device.machine.borrow_mut();
+        let board = machine.chip.board;
+        let code = |m: &Machine| m.chip.is_m7.then(|| m.bytes(0, ITCM_BYTES));
+        let before = code(&machine);
+        assert!(
+            before
+                .as_ref()
+                .is_none_or(|code| code[0x20..0x24] != [0; 4])
+        );
+        let encoder = machine.image.message_encoder();
+        machine.patch(encoder.address, &WRITE);
+        let stop = run_until_off(&mut machine, 50);
+        assert_eq!(stop, Stop::Asked, "{board}: off");
+        assert_eq!(machine.hard_faults, 1, "{board}");
+        assert_eq!(code(&machine), before, "{board}");
+        let _ = machine.take_effects();
+        assert_eq!(machine.run_ms(200), Stop::Software, "{board}");
+        assert_eq!(machine.take_effects(), [], "{board}: nothing after it");
+        machine.restore(encoder);
+    };
+    after(Reset::Software, write, |board, status| {
+        let crash = status.boot.crash.clone().expect("a record");
+        assert_eq!(crash.kind, CrashKind::HardFault, "{board}: {crash:?}");
+        let fault = status.health.report.fault;
+        assert_eq!(fault, Some(Fault::HardFault), "{board}");
     });
 }
 

@@ -6,7 +6,6 @@ pub mod core;
 pub mod fetch;
 pub mod in_flash;
 pub mod instruction;
-pub mod trace;
 
 use self::core::{Core, Floats};
 use fetch::{Fetch, G474};

@@ -18,6 +18,16 @@ use crate::counting::{Counted, Event, Replay, Samples, WINDOW};
 use crate::cycles::Cycles;
 use crate::field::point;
 
+/// The seed of scenes by which the emulated processor is compared.
+const COMPARED: u64 = 77;
+
+fn surface(number: u64) -> Surface {
+    match number % 3 {
+        0 => Surface::Rough,
+        _ => Surface::Smooth,
+    }
+}
+
 /// A scene, felt here in real time.
 pub struct Recorded {
     /// Its settings.
@@ -102,6 +112,24 @@ impl Recorded {
             events,
             answers,
         })
+    }
+
+    /// Scenes by which the emulated processor is compared with this one, with their numbers: a third
+    /// of them with friction.
+    #[must_use]
+    pub fn compared() -> Vec<(u64, Self)> {
+        let random = |number| (number, Self::random(COMPARED, number, surface(number)));
+        (0..40).map(random).collect()
+    }
+
+    /// The same on materials.
+    #[must_use]
+    pub fn compared_on_materials() -> Vec<(u64, Self)> {
+        let on_materials = |number| {
+            let recorded = Self::on_materials(COMPARED, number, surface(number))?;
+            Some((number, recorded))
+        };
+        (0..120).filter_map(on_materials).collect()
     }
 
     /// As the counting board takes it.

@@ -156,9 +156,12 @@ pub(super) fn partial(folder: &Path) -> Option<String> {
     names.find(|name| name.ends_with(".partial"))
 }
 
+/// The abort stands for a stack that overflows and for memory that ends: Rust's runtime ends both by
+/// one. Neither can be had truly. No input is known any more that overflows a stack, and a thread
+/// that runs has the pages of its stack already. A worker whose address space is limited to what it
+/// has goes on for minutes, and serves: it asks for no more.
 #[test]
 fn worker_killed_while_armed_is_disarmed_by_guardian() {
-    // A stack that overflows and memory that ends are both an abort.
     for (name, number) in [("ABRT", 6), ("KILL", 9)] {
         let armed = Armed::new();
         armed.kill_worker(name);

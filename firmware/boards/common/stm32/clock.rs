@@ -13,7 +13,7 @@ use hapterra_firmware::board::TickClock;
 pub(crate) type TickTimer = TIM7;
 
 /// Ticks a second. `build.rs` has checked that the board can have this rate.
-pub(super) const TICK_HZ: u32 = match u32::from_str_radix(env!("HAPTERRA_TICK_HZ"), 10) {
+pub(crate) const TICK_HZ: u32 = match u32::from_str_radix(env!("HAPTERRA_TICK_HZ"), 10) {
     Ok(hz) => hz,
     Err(_) => panic!("build.rs writes a number"),
 };

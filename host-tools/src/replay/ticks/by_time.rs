@@ -73,7 +73,7 @@ impl Ticks {
             None => {
                 self.counts.untimed = Some(Untimed::Missing);
                 self.pace = Pace::RowByRow;
-                self.held.push_back(row);
+                self.held.push_back((row, 1));
                 self.next_row()
             }
         }
@@ -141,8 +141,8 @@ impl Ticks {
     fn without_times(&mut self, first: &Timed, repeated: u64, row: Option<Row>) -> Next {
         self.counts.untimed = Some(Untimed::Same(first.t_s));
         self.pace = Pace::RowByRow;
-        self.held.extend((0..repeated).map(|_| first.row));
-        self.held.extend(row);
+        self.held.push_back((first.row, repeated));
+        self.held.extend(row.map(|row| (row, 1)));
         Next::Untimed
     }
 

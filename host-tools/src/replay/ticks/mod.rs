@@ -57,8 +57,8 @@ pub struct Ticks {
     before: Option<Timed>,
     /// The row after it, if it was read already.
     ahead: Option<Timed>,
-    /// Rows that were read, and are a tick each.
-    held: VecDeque<Row>,
+    /// Rows that were read, and how many times each stands there: a tick each.
+    held: VecDeque<(Row, u64)>,
     counts: Counts,
 }
 
@@ -114,8 +114,14 @@ impl Ticks {
 
     /// The next row as the next tick.
     fn next_row(&mut self) -> Result<Option<Tick>, TrajectoryError> {
-        let row = match self.held.pop_front() {
-            Some(row) => Some(row),
+        while self.held.front().is_some_and(|(_, times)| *times == 0) {
+            self.held.pop_front();
+        }
+        let row = match self.held.front_mut() {
+            Some((row, times)) => {
+                *times -= 1;
+                Some(*row)
+            }
             None => self.read()?,
         };
         let Some(row) = row else {

@@ -7,13 +7,18 @@ use super::{Machine, Stop};
 const LOOK_NS: u64 = 5_000;
 
 impl Machine {
-    /// Says to the chip what a debugger says when it attaches: the watchdog and the clock of
-    /// embassy's time are to stop while the core is halted, and nothing else is.
+    /// Says to the chip what a debugger says when it attaches: the watchdog, the clock of embassy's
+    /// time and the gate of the duty cycles are to stop while the core is halted, and nothing else
+    /// is.
     pub fn attach_debugger(&mut self) {
-        for (register, bit) in [self.chip.freeze.watchdog, self.chip.freeze.clock] {
+        let freeze = self.chip.freeze;
+        for (register, bit) in [freeze.watchdog, freeze.clock]
+            .into_iter()
+            .chain(freeze.gate)
+        {
             self.bus().write(register, bit, bit);
         }
-        if let Some((register, bit)) = self.chip.freeze.outputs {
+        if let Some((register, bit)) = freeze.outputs {
             self.bus().write(register, 0, bit);
         }
     }

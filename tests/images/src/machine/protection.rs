@@ -1,5 +1,6 @@
-//! The memory protection unit (ARM DDI 0403E, B3.5) as far as an image uses it: region 0
-//! with no access at all, over the default map. And exception entry where the stack cannot
+//! The memory protection unit (ARM DDI 0403E, B3.5) as far as an image uses it: regions with no
+//! access at all, and regions that nobody may store to, over the default map. Not modelled: other
+//! access, subregions, XN, and regions over each other. And exception entry where the stack cannot
 //! be written: the handler runs all the same (ARM DDI 0337, 5.12.1), and its frame holds
 //! what was there.
 
@@ -11,9 +12,6 @@ use unicorn_engine::{HookType, MemType, Prot, Unicorn};
 
 use super::Machine;
 
-const MPU_CTRL: u32 = 0xE000_ED94;
-const MPU_RBAR: u32 = 0xE000_ED9C;
-const MPU_RASR: u32 = 0xE000_EDA0;
 /// The fault status and the address of a forbidden access.
 const CFSR: u32 = 0xE000_ED28;
 const MMFAR: u32 = 0xE000_ED34;
@@ -27,8 +25,21 @@ const STKERR: u32 = 1 << 12;
 /// What is forbidden, and the last access to it.
 #[derive(Default)]
 pub(super) struct Protection {
-    region: Range<u32>,
+    /// Base and attributes of each region, as the registers had them.
+    registers: [(u32, u32); 16],
     met: Rc<Cell<Option<u32>>>,
+}
+
+/// A region with less access than the default map gives, and what it has, of its base and
+/// attributes.
+fn restricted((base, attributes): (u32, u32)) -> Option<(Range<u32>, Prot)> {
+    let access = match attributes >> 24 & 7 {
+        0 => Prot::NONE,
+        0b110 | 0b111 => Prot::READ | Prot::EXEC,
+        _ => return None,
+    };
+    let bytes = 2 << (attributes >> 1 & 0x1F);
+    (attributes & 1 != 0).then(|| (base..base + bytes, access))
 }
 
 impl Machine {
@@ -45,13 +56,17 @@ impl Machine {
 
     /// Forbids what the registers say now.
     pub(super) fn protect(&mut self) {
-        let region = self.forbidden();
-        let before = std::mem::replace(&mut self.protection.region, region.clone());
-        if region == before {
+        let registers = self.bus().nvic.regions();
+        let before = std::mem::replace(&mut self.protection.registers, registers);
+        if registers == before {
             return;
         }
-        self.allow(before, Prot::ALL);
-        self.allow(region, Prot::NONE);
+        for (region, _) in before.into_iter().filter_map(restricted) {
+            self.allow(region, Prot::ALL);
+        }
+        for (region, access) in registers.into_iter().filter_map(restricted) {
+            self.allow(region, access);
+        }
         self.core.ctl_flush_tlb().expect("what it knows is dropped");
     }
 
@@ -69,18 +84,6 @@ impl Machine {
         }
     }
 
-    fn forbidden(&self) -> Range<u32> {
-        let mut bus = self.bus();
-        let (control, base) = (bus.read(MPU_CTRL), bus.read(MPU_RBAR) & !0x1F);
-        let attributes = bus.read(MPU_RASR);
-        let is_on = control & 1 != 0 && attributes & 1 != 0;
-        let has_access = attributes >> 24 & 7 != 0;
-        if !is_on || has_access {
-            return 0..0;
-        }
-        base..base + (2 << (attributes >> 1 & 0x1F))
-    }
-
     /// Tells the program of the access that failed.
     pub(super) fn report_forbidden(&mut self) {
         if let Some(address) = self.protection.met.take() {
@@ -91,8 +94,10 @@ impl Machine {
 
     /// Writes an exception's frame, where that can be.
     pub(super) fn stack_frame(&mut self, stack: u32, frame: &[u8]) {
-        let forbidden = &self.protection.region;
-        if forbidden.contains(&stack) || forbidden.contains(&(stack + frame.len() as u32 - 1)) {
+        let regions = self.protection.registers.into_iter();
+        let mut regions = regions.filter_map(restricted);
+        let last = stack + frame.len() as u32 - 1;
+        if regions.any(|(region, _)| region.contains(&stack) || region.contains(&last)) {
             self.raise_status(MSTKERR);
         } else if self.core.mem_write(stack.into(), frame).is_err() {
             self.raise_status(STKERR);

@@ -1,0 +1,110 @@
+//! Cycles of single ticks on the boards' chips, at most, beside the kept table `bench/cycles.csv`
+//! (docs/cycles.md). `cargo xtask cycles` runs this over all counted scenes; after a change that is
+//! meant, `cargo xtask cycles --write`. Run as a test, it takes the scenes by which the emulated
+//! processor is compared.
+
+#[path = "../../../bench/tests/m4f/mod.rs"]
+#[allow(dead_code)] // The counts of instructions use others of them.
+mod m4f;
+
+use hapterra_image_tests::counting::follow;
+use hapterra_tests::counting::CountingBoard;
+use hapterra_tests::repository;
+use m4f::table::Row;
+use m4f::{chain, contact, soak};
+
+/// The kept table, in the repository.
+const TABLE: &str = "bench/cycles.csv";
+/// More than this share above the kept figure is a regression, as for instructions.
+const TOLERANCE: f64 = 1.05;
+/// The columns: cycles, of an STM32G474 and of an STM32H743.
+const TITLES: [&str; 8] = [
+    "state",
+    "max instructions",
+    "g474 median",
+    "g474 p99",
+    "g474 max",
+    "h743 median",
+    "h743 p99",
+    "h743 max",
+];
+
+/// A row's cells.
+fn record(row: &Row) -> Vec<String> {
+    let figures = row.cycles.as_flattened().iter();
+    let figures = row.counts[2..].iter().chain(figures);
+    let cells = [row.state.clone()].into_iter();
+    cells.chain(figures.map(ToString::to_string)).collect()
+}
+
+/// Writes the table anew.
+fn write(rows: &[Row]) {
+    let mut table =
+        csv::Writer::from_path(repository().join(TABLE)).expect("the table can be written");
+    table.write_record(TITLES).expect("written");
+    for row in rows {
+        table.write_record(record(row)).expect("written");
+    }
+}
+
+/// A sentence for each figure in one of these columns that is more than the table allows.
+fn worse(rows: &[Row], columns: &[usize]) -> Vec<String> {
+    let mut table = csv::Reader::from_path(repository().join(TABLE)).expect("the table is there");
+    let kept: Vec<_> = table.records().map(|row| row.expect("a row")).collect();
+    let worse_row = |row: &Row| {
+        let record = record(row);
+        let Some(kept) = kept.iter().find(|kept| kept[0] == *row.state) else {
+            return vec![format!("{}: not in the table", row.state)];
+        };
+        let number = |text: &str| text.parse::<f64>().expect("a number");
+        let is_worse = |i: &usize| number(&record[*i]) > TOLERANCE * number(&kept[*i]);
+        let told = |i: usize| {
+            let (title, now, kept) = (TITLES[i], &record[i], &kept[i]);
+            format!("{}: {title} {now}, {kept} in the table", row.state)
+        };
+        let worse = columns.iter().copied().filter(is_worse);
+        worse.map(told).collect()
+    };
+    rows.iter().flat_map(worse_row).collect()
+}
+
+#[test]
+fn no_compared_scene_takes_more_cycles_than_it_did() {
+    let Some(board) = CountingBoard::found() else {
+        return;
+    };
+    let rows = soak::compared_rows(&board.following(follow));
+    let worse = worse(&rows, &[1, 2, 3, 4, 5, 6, 7]);
+    assert!(worse.is_empty(), "{}", worse.join("\n"));
+}
+
+/// `cargo xtask cycles` runs it; `--write` writes the table.
+#[test]
+#[ignore = "takes minutes: cargo xtask cycles"]
+fn no_state_of_the_tick_takes_more_cycles_than_it_did() {
+    let Some(board) = CountingBoard::found() else {
+        return;
+    };
+    let board = board.following(follow);
+    let mut rows = chain::rows(&board);
+    rows.extend(contact::rows(&board));
+    let wanted = std::env::var("HAPTERRA_COUNTS").unwrap_or_default();
+    let scenes = if wanted == "all" {
+        soak::ALL
+    } else {
+        soak::PART
+    };
+    rows.extend(soak::rows(&board, scenes));
+    rows.extend(soak::compared_rows(&board));
+    println!("{}", TITLES.join(", "));
+    rows.iter()
+        .for_each(|row| println!("{}", record(row).join(", ")));
+    if wanted == "write" {
+        return write(&rows);
+    }
+    // The table's rows of the stress test are over a part of them.
+    let is_bound = |i: &usize| wanted != "all" || TITLES[*i].contains("max");
+    let columns: Vec<usize> = (1..TITLES.len()).filter(is_bound).collect();
+    let worse = worse(&rows, &columns);
+    assert!(worse.is_empty(), "{}", worse.join("\n"));
+}
