@@ -58,10 +58,11 @@ fn to_stretch(place: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
 
 /// Heights of a terrain's ground in cells, not those of a ball's centre.
 fn ground<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
+    let scale = terrain.scale_of_level_0().at_level(terrain.level());
     move |x, y| match (u32::try_from(x), u32::try_from(y)) {
         (Ok(x), Ok(y)) => {
             let height = terrain.grid().height_of_level(terrain.level(), x, y);
-            height * terrain.scale().height_mm_per_unit() / terrain.scale().cell_mm()
+            height * scale.height_mm_per_unit() / scale.cell_mm()
         }
         _ => f64::NAN,
     }
@@ -82,7 +83,8 @@ fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
     for hip_mm in wander(&terrain, 7, rows, 0.5) {
         let sample = feel(&mut replayer, hip_mm);
         if sample.state == ContactState::Touching {
-            let proxy = scale.to_mm(&sample.proxy).map(|mm| mm / scale.cell_mm());
+            let proxy = terrain.scale().to_mm(&sample.proxy);
+            let proxy = proxy.map(|mm| mm / scale.cell_mm());
             let found = distance(&height, proxy, radius + 1.0);
             off.push(((found - radius) / radius).abs());
         }

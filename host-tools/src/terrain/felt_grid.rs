@@ -341,16 +341,17 @@ impl<'r> FeltGrid<'r> {
         let (Some(column), Some(row)) = (whole(column), whole(row)) else {
             return f64::NAN;
         };
-        self.height_seen(level, [column, row])
+        // Both are below 2^32, or beyond the field.
+        self.height_seen(level, [column as f64, row as f64])
     }
 
-    /// The height at a felt sample, as the file has it at a level of detail.
-    pub(super) fn height_seen(&self, level: u8, [column, row]: [u64; 2]) -> f64 {
-        if column >= u64::from(self.columns) || row >= u64::from(self.rows) {
+    /// The height at a place in felt cells, as the file has it at a level of detail; NaN in a hole
+    /// and outside the field.
+    pub(super) fn height_seen(&self, level: u8, [u, v]: [f64; 2]) -> f64 {
+        let [last_column, last_row] = self.last();
+        if u > last_column || v > last_row {
             return f64::NAN;
         }
-        // Both are below 2^32.
-        let (u, v) = (column as f64, row as f64);
         let place = match &self.resampling {
             None => [u, v],
             Some(places) => places.in_file(u, v),

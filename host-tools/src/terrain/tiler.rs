@@ -12,7 +12,7 @@ use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
 use super::steps::{BinaryUnit, steps};
-use super::tip::{Ball, Block, MOST_CELLS};
+use super::tip::{Ball, Block, MOST_CELLS, Nodes};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::materials::MaterialBuffer;
 use crate::raster::Raster;
@@ -29,10 +29,14 @@ const TILE_BYTES: usize = 4 * POSTS * POSTS;
 #[derive(Clone)]
 pub struct Terrain<'r> {
     grid: FeltGrid<'r>,
-    /// Of the level's cells.
+    /// Of level 0.
+    scale_of_level_0: Scale,
+    /// Of felt cells.
     scale: Scale,
     level: u8,
-    /// Patches of the level, east and north.
+    /// Felt cells a cell of the level, along a side: 1 for a point.
+    parts: u32,
+    /// Felt patches, east and north.
     size: [i32; 2],
     top: i32,
     /// What feels it, if it is no point: heights are then those of the ball's centre.
@@ -158,21 +162,30 @@ impl<'r> Terrain<'r> {
                 rows,
             });
         }
-        let scale = scale.at_level(level);
-        let ball = ball(&grid, &scale, level)?;
+        let of_level = scale.at_level(level);
+        let ball = ball(&grid, &of_level, level)?;
         let higher = ball.as_ref().map_or(0, |ball| ball.radius().ceil() as i32);
+        let parts = ball.as_ref().map_or(1, Ball::parts);
+        let size = size.map(|patches| patches.checked_mul(parts as i32));
+        let [Some(east), Some(north)] = size.map(|patches| patches.filter(|n| *n < MAX_CELL)) else {
+            return Err(TerrainError::TooLarge(larger));
+        };
+        let scale_of_level_0 = scale;
+        let scale = of_level.in_parts(parts);
         Ok(Self {
             grid,
+            scale_of_level_0,
             scale,
             level,
-            size,
+            parts,
+            size: [east, north],
             top: (top(grid.raster(), &scale)? + higher).min(MAX_CELL + 1),
             ball,
             fingerprint: OnceLock::new(),
         })
     }
 
-    /// Radius of the ball that feels it, in cells of its level; 0 for a point.
+    /// Radius of the ball that feels it, in felt cells; 0 for a point.
     #[must_use]
     pub fn tip_cells(&self) -> f64 {
         self.ball.as_ref().map_or(0.0, Ball::radius)
@@ -225,16 +238,28 @@ impl<'r> Terrain<'r> {
         self.level
     }
 
-    /// The scale of this level: its cells are `2^level` times the file's.
+    /// The scale of felt cells: `2^level` times the grid's, or a whole part of that under a ball.
     #[must_use]
     pub const fn scale(&self) -> &Scale {
         &self.scale
     }
 
+    /// Felt cells a cell of the level, along a side: 1 for a point.
+    #[must_use]
+    pub const fn parts(&self) -> u32 {
+        self.parts
+    }
+
+    /// Cells of the grid that are as long as a felt one.
+    #[must_use]
+    pub fn cells_of_grid(&self) -> f64 {
+        f64::from(self.level).exp2() / f64::from(self.parts)
+    }
+
     /// The scale of the finest level: of the grid's own cells.
     #[must_use]
-    pub fn scale_of_level_0(&self) -> Scale {
-        self.scale.of_level_0(self.level)
+    pub const fn scale_of_level_0(&self) -> Scale {
+        self.scale_of_level_0
     }
 
     /// Hash of all heights of the raster: the same terrain has the same, and a file that
@@ -246,7 +271,7 @@ impl<'r> Terrain<'r> {
         *self.fingerprint.get_or_init(print)
     }
 
-    /// Size in patches of this level, east and north.
+    /// Size in felt patches, east and north.
     #[must_use]
     pub const fn size(&self) -> [i32; 2] {
         self.size
@@ -298,9 +323,8 @@ impl<'r> Terrain<'r> {
         let cell_mm = self.scale.cell_mm();
         let (column, u) = place(east_mm / cell_mm, self.size[0])?;
         let (row, v) = place(north_mm / cell_mm, self.size[1])?;
-        let corners = ball
-            .centres(&self.block(ball.halo(), [column, row], 2))
-            .heights;
+        let (block, nodes) = self.block(ball, [column, row], 2);
+        let corners = ball.centres(&block, nodes);
         let along = |at: usize| corners[at] * (1.0 - u) + corners[at + 1] * u;
         let height = along(0) * (1.0 - v) + along(2) * v;
         Some(height * cell_mm).filter(|height| !height.is_nan())
@@ -318,8 +342,8 @@ impl<'r> Terrain<'r> {
     /// The bilinear ground at a place.
     fn ground_mm(&self, level: u8, [east_mm, north_mm]: [f64; 2]) -> Option<f64> {
         let coarser = level - self.level;
-        let cell_mm = self.scale.cell_mm() * f64::from(coarser).exp2();
-        let size = self.size.map(|patches| patches >> coarser.min(31));
+        let cell_mm = self.scale_of_level_0.at_level(level).cell_mm();
+        let size = self.size.map(|patches| (patches / self.parts as i32) >> coarser.min(31));
         let (column, u) = place(east_mm / cell_mm, size[0])?;
         let (row, v) = place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
@@ -374,7 +398,8 @@ impl<'r> Terrain<'r> {
         buffer: &'b mut MaterialBuffer,
     ) -> Option<TileMaterials<'b>> {
         let materials = self.grid.materials().filter(|_| self.has(key))?;
-        Some(materials.tile((&self.grid, self.size), key, buffer))
+        let felt = (&self.grid, self.size, self.cells_of_grid());
+        Some(materials.tile(felt, key.index, buffer))
     }
 
     /// How often this thread asked for heights or classes that were not here yet
@@ -404,13 +429,27 @@ impl<'r> Terrain<'r> {
         of_classes.map_or(Ok(()), Raster::check_came)
     }
 
-    /// The height at a sample of this terrain's level, in cells, as the file has it at a level of
-    /// detail, or that of a ball's centre on flat ground there; NaN where there is none that can be
-    /// felt.
-    pub(super) fn cells_at(&self, level: u8, column: u32, row: u32) -> f64 {
-        let whole = |index: u32| u64::from(index) << self.level.min(31);
-        let height = self.grid.height_seen(level, [whole(column), whole(row)]);
+    /// The height of the ground at a felt sample, in the file's vertical unit, as the file has it at
+    /// a level of detail; NaN where there is none.
+    pub(crate) fn ground_seen(&self, level: u8, [column, row]: [u32; 2]) -> f64 {
+        let place = [column, row].map(|index| f64::from(index) * self.cells_of_grid());
+        self.grid.height_seen(level, place)
+    }
+
+    /// The same in cells, or the height of a ball's centre on flat ground there; NaN where there is
+    /// none that can be felt.
+    pub(super) fn cells_at(&self, level: u8, felt: [u32; 2]) -> f64 {
+        let height = self.ground_seen(level, felt);
         self.within(self.scale.height_cells(height)) + self.tip_cells()
+    }
+
+    /// Has the samples between two places in felt cells read that are not here yet, both included.
+    pub(crate) fn prefetch(&self, from: [i32; 2], to: [i32; 2]) {
+        let parts = self.parts as i32;
+        let halo = self.ball.as_ref().map_or(0, |ball| ball.halo() as i32);
+        let from = from.map(|felt| felt.div_euclid(parts).saturating_sub(halo));
+        let to = to.map(|felt| felt.div_euclid(parts).saturating_add(halo));
+        self.grid.prefetch(self.level, from, to);
     }
 
     /// A height in cells; NaN where positions cannot say it.
@@ -432,8 +471,8 @@ impl<'r> Terrain<'r> {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
         let (west, south) = (first(key.index.col), first(key.index.row));
         if let Some(ball) = &self.ball {
-            let centres = ball.centres(&self.block(ball.halo(), [west, south], POSTS));
-            for (height, centre) in heights.iter_mut().zip(centres.heights) {
+            let (block, nodes) = self.block(ball, [west, south], POSTS);
+            for (height, centre) in heights.iter_mut().zip(ball.centres(&block, nodes)) {
                 *height = self.rounded(self.within(centre));
             }
             return BinaryUnit::ANY;
@@ -450,12 +489,11 @@ impl<'r> Terrain<'r> {
         unit
     }
 
-    /// Samples of the level from a sample on, so many each way, and a halo around them, in cells;
-    /// NaN in holes and off the data.
-    fn block(&self, halo: usize, first: [u32; 2], side: usize) -> Block {
-        let samples = side + 2 * halo;
+    /// Samples of the level that a ball's nodes depend on, `side` of them each way from a felt sample
+    /// on, in felt cells, NaN in holes and off the data; and where the nodes are.
+    fn block(&self, ball: &Ball, first: [u32; 2], side: usize) -> (Block, Nodes) {
+        let ([west, south], samples, nodes) = ball.around(first, side);
         let mut heights = vec![f64::NAN; samples * samples];
-        let [west, south] = first.map(|first| i64::from(first) - halo as i64);
         // West of the field there are no columns to ask for.
         let beside = west.min(0).unsigned_abs() as usize;
         for (row, line) in (south..).zip(heights.chunks_exact_mut(samples)) {
@@ -468,11 +506,12 @@ impl<'r> Terrain<'r> {
                 *height = self.within(self.scale.height_cells(*height));
             }
         }
-        Block {
+        let block = Block {
             columns: samples,
             rows: samples,
             heights,
-        }
+        };
+        (block, nodes)
     }
 
     /// A height in cells, as it goes to the device.
@@ -504,7 +543,7 @@ fn ball(grid: &FeltGrid<'_>, scale: &Scale, level: u8) -> Result<Option<Ball>, T
             level,
         });
     }
-    Ok((cells > 0.0).then(|| Ball::new(cells)))
+    Ok((cells > 0.0).then(|| Ball::new(cells, scale.cell_mm())))
 }
 
 /// The patch and the place in it of a coordinate in cells.

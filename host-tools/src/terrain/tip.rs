@@ -5,7 +5,7 @@
 //! surface is a ball on the ground, and device and contact stay as they are. It is made on the
 //! host, of a block of samples with a halo of the radius, when a tile is made.
 //!
-//! Let `S` be the bilinear surface of the samples, in cells, and `R` the radius. Then
+//! Let `S` be the bilinear surface of the samples and `R` the radius. Then
 //!
 //! ```text
 //! centre(p) = max over |w| <= R of  S(p + w) + sqrt(R² − |w|²)
@@ -15,34 +15,40 @@
 //! straight line of slope `m` at a distance `δ` the ball is a circle of radius `ρ = sqrt(R² − δ²)`,
 //! which rests on the line at `ρ m / sqrt(1 + m²)` uphill, at the height of the line below `p` plus
 //! `ρ sqrt(1 + m²)`. So the maximum along such a line is exact; that over the surface is taken
-//! along lines of both directions, `1/n` of a cell apart. Between two lines the ball may rest
-//! higher, by at most `1 / (4 n² R)` cells on a plane; `n` is chosen so that this is at most 0.5 %
-//! of the radius.
+//! along lines of both directions. Between two lines that are `d` apart the ball may rest higher, by
+//! at most `d² / 4R` on a plane; `d` is chosen so that this is at most 0.5 % of the radius.
 //!
-//! A stretch of a line touches the ball of exactly one node of each column that is near enough, so
-//! a tile takes as many steps as there are stretches in the block, times the ball's width.
+//! Between two nodes the centre's surface is interpolated, and wrong where it bends. So a ball has
+//! nodes that are a fraction of its radius apart, whatever the samples are: **felt cells**, of which
+//! a whole number makes a cell of the ground. Lengths below are in felt cells.
 
 use std::sync::Arc;
 
-/// Largest radius, cells of the level that is felt. A larger ball is felt at a coarser level.
+/// Largest radius, cells of the ground's level. A larger ball is felt on a coarser level.
 pub const MOST_CELLS: f64 = 8.0;
+/// Felt cells in a radius, at least.
+pub(super) const FELT_CELLS: f64 = 24.0;
+/// A felt cell is not made smaller than this, hand millimetres: half an encoder's count.
+pub(super) const FINEST_MM: f64 = 1.0 / 64.0;
 /// What the ball may rest too low for want of a line, as a part of its radius.
 const SAG: f64 = 5e-3;
 
-/// A ball in a grid of cells.
+/// A ball over a grid.
 #[derive(Clone, Debug)]
 pub(super) struct Ball {
-    /// Radius, cells.
+    /// Radius.
     radius: f64,
+    /// Felt cells a cell of the ground.
+    parts: u32,
     /// Samples around a block that its nodes depend on.
     halo: usize,
-    /// Lines a cell.
-    lines: usize,
-    /// Places east and north of its middle, cells, and the height of the ball there.
-    caps: Arc<[(isize, isize, f64)]>,
+    /// Lines a cell of the ground.
+    lines: u32,
+    /// Heights of the ball over the nodes of its square, row by row; less than everything beside it.
+    caps: Arc<[f64]>,
 }
 
-/// Samples of a rectangle, row by row from the south-west, in cells.
+/// Samples of a rectangle, row by row from the south-west.
 pub(super) struct Block {
     pub(super) columns: usize,
     pub(super) rows: usize,
@@ -50,29 +56,56 @@ pub(super) struct Block {
     pub(super) heights: Vec<f64>,
 }
 
-impl Ball {
-    /// A ball of a radius in cells, positive and at most [`MOST_CELLS`].
-    pub(super) fn new(radius: f64) -> Self {
-        let reach = radius.floor() as isize;
-        let places = (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| (x, y)));
-        let cap = |(x, y): (isize, isize)| {
-            let squared = radius * radius - (x * x + y * y) as f64;
-            (squared >= 0.0).then(|| (x, y, squared.sqrt()))
+/// Nodes of a square within a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nodes {
+    /// The south-western one, from the block's first sample.
+    pub(super) first: [usize; 2],
+    /// Nodes along a side.
+    pub(super) side: usize,
+}
+
+impl Nodes {
+    /// Those within `reach` of a place along an axis, as the first and the one after the last.
+    fn near(&self, axis: usize, place: f64, reach: f64) -> (usize, usize) {
+        let node = |at: f64| {
+            let node = at - self.first[axis] as f64;
+            node.clamp(0.0, self.side as f64) as usize
         };
+        (node((place - reach).ceil()), node((place + reach).floor() + 1.0))
+    }
+}
+
+impl Ball {
+    /// A ball of a radius in cells of the ground, positive and at most [`MOST_CELLS`]; a cell is
+    /// `cell_mm` large in the hand.
+    pub(super) fn new(cells: f64, cell_mm: f64) -> Self {
+        let most = (cell_mm / FINEST_MM).floor().max(1.0);
+        let parts = (FELT_CELLS / cells).ceil().clamp(1.0, most) as u32;
+        let radius = cells * f64::from(parts);
+        let reach = radius.floor() as i32;
+        let cap = |(x, y): (i32, i32)| {
+            let squared = radius * radius - f64::from(x).powi(2) - f64::from(y).powi(2);
+            if squared >= 0.0 {
+                squared.sqrt()
+            } else {
+                f64::NEG_INFINITY
+            }
+        };
+        let places = (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| (x, y)));
+        let lines = 1.0 / ((4.0 * SAG).sqrt() * cells);
         Self {
             radius,
-            halo: radius.ceil() as usize + 1,
-            lines: (1.0 / (4.0 * SAG * radius * radius))
-                .sqrt()
-                .ceil()
-                .clamp(1.0, 64.0) as usize,
-            caps: places.filter_map(cap).collect(),
+            parts,
+            halo: cells.ceil() as usize + 1,
+            lines: lines.ceil().clamp(1.0, 64.0) as u32,
+            caps: places.map(cap).collect(),
         }
     }
 
-    /// Radius, cells.
-    pub(super) const fn radius(&self) -> f64 {
-        self.radius
+    /// Felt cells a cell of the ground, along a side.
+    pub(super) const fn parts(&self) -> u32 {
+        self.parts
     }
 
     /// Samples around a block that its nodes depend on.
@@ -80,46 +113,66 @@ impl Ball {
         self.halo
     }
 
-    /// The heights of the ball's centre over the samples of a block but for its halo. A sample
-    /// without data stays without, and only patches with four samples bear the ball.
-    pub(super) fn centres(&self, block: &Block) -> Block {
-        let bearing = Bearing::of(block);
-        let inner = |samples: usize| samples.saturating_sub(2 * self.halo);
-        let (columns, rows) = (inner(block.columns), inner(block.rows));
-        let mut centres = Block {
-            columns,
-            rows,
-            heights: vec![f64::NEG_INFINITY; columns * rows],
+    /// Radius, felt cells.
+    pub(super) const fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// The samples that nodes depend on, `side` of them along each axis from a felt node on: the
+    /// first sample, which may lie beside the field, how many along a side, and where the nodes are.
+    pub(super) fn around(&self, first: [u32; 2], side: usize) -> ([i64; 2], usize, Nodes) {
+        let (parts, halo) = (i64::from(self.parts), self.halo as i64);
+        let from = first.map(|node| i64::from(node) / parts - halo);
+        let nodes = Nodes {
+            first: [0, 1].map(|axis| (i64::from(first[axis]) - from[axis] * parts) as usize),
+            side,
         };
-        self.on_nodes(block, &bearing, &mut centres);
+        // The nodes begin within the first cell after the halo.
+        let cells = (side - 1).div_ceil(self.parts as usize) + 1;
+        (from, cells + 1 + 2 * self.halo, nodes)
+    }
+
+    /// The heights of the ball's centre over nodes of a block, row by row. A node on ground without
+    /// data has none, and only patches with four samples bear the ball.
+    pub(super) fn centres(&self, block: &Block, nodes: Nodes) -> Vec<f64> {
+        let bearing = Bearing::of(block);
+        let mut centres = vec![f64::NEG_INFINITY; nodes.side * nodes.side];
+        self.on_samples(&bearing, nodes, &mut centres);
         for axis in [Axis::North, Axis::East] {
-            self.on_lines(block, &bearing, axis, &mut centres);
+            self.on_lines((block, &bearing), axis, nodes, &mut centres);
         }
-        for row in 0..rows {
-            for column in 0..columns {
-                let own = block.heights[block.at(column + self.halo, row + self.halo)];
-                let centre = &mut centres.heights[row * columns + column];
-                // Also where it is NaN.
-                *centre = if own.is_nan() {
-                    own
-                } else {
-                    centre.max(own + self.radius)
-                };
-            }
+        for (at, centre) in centres.iter_mut().enumerate() {
+            let place = [nodes.first[0] + at % nodes.side, nodes.first[1] + at / nodes.side];
+            let own = block.between(place, self.parts as usize);
+            // Also where it is NaN.
+            *centre = if own.is_nan() {
+                own
+            } else {
+                centre.max(own + self.radius)
+            };
         }
         centres
     }
 
     /// Where the ball rests on a sample.
-    fn on_nodes(&self, block: &Block, bearing: &Bearing, centres: &mut Block) {
-        for (x, y, cap) in self.caps.iter() {
-            let first = self.halo.saturating_add_signed(*x);
-            for row in 0..centres.rows {
-                let from = block.at(first, (row + self.halo).saturating_add_signed(*y));
-                let samples = &bearing.nodes[from..from + centres.columns];
-                let line = row * centres.columns;
-                let line = &mut centres.heights[line..line + centres.columns];
-                for (centre, sample) in line.iter_mut().zip(samples) {
+    fn on_samples(&self, bearing: &Bearing, nodes: Nodes, centres: &mut [f64]) {
+        let (parts, reach) = (self.parts as usize, self.radius.floor());
+        let width = 2 * reach as usize + 1;
+        for (at, sample) in bearing.nodes.iter().enumerate() {
+            if *sample == f64::NEG_INFINITY {
+                continue;
+            }
+            let place = [at % bearing.columns, at / bearing.columns].map(|sample| sample * parts);
+            let near = |axis: usize| nodes.near(axis, place[axis] as f64, reach);
+            let ((west, east), (south, north)) = (near(0), near(1));
+            let beside = |axis: usize, node: usize| nodes.first[axis] + node + reach as usize - place[axis];
+            for row in south..north {
+                if west >= east {
+                    break;
+                }
+                let line = &mut centres[row * nodes.side..][west..east];
+                let caps = &self.caps[beside(1, row) * width + beside(0, west)..];
+                for (centre, cap) in line.iter_mut().zip(caps) {
                     let height = sample + cap;
                     *centre = if height > *centre { height } else { *centre };
                 }
@@ -128,26 +181,22 @@ impl Ball {
     }
 
     /// Where the ball rests within a stretch of a line along an axis.
-    fn on_lines(&self, block: &Block, bearing: &Bearing, axis: Axis, centres: &mut Block) {
+    fn on_lines(
+        &self,
+        (block, bearing): (&Block, &Bearing),
+        axis: Axis,
+        nodes: Nodes,
+        centres: &mut [f64],
+    ) {
         let (across, along) = axis.sizes(block);
-        let (to_across, to_along) = axis.sizes(centres);
-        let (wide, reach) = (self.halo as isize, self.radius.ceil() as isize);
+        let parts = f64::from(self.parts);
         for part in 0..self.lines {
-            let off = part as f64 / self.lines as f64;
-            // The ball's circle over the line, by the column of its middle beside the line's cell.
-            let circles: Vec<_> = (-reach..=reach + 1)
-                .map(|beside| {
-                    (
-                        beside,
-                        self.radius * self.radius - (beside as f64 - off).powi(2),
-                    )
-                })
-                .filter(|(_, squared)| *squared > 0.0)
-                .map(|(beside, squared)| (beside, squared.sqrt()))
-                .collect();
+            let off = f64::from(part) / f64::from(self.lines);
             for line in 0..across - usize::from(part > 0) {
+                let place = (line as f64 + off) * parts;
+                let (first, end) = nodes.near(axis.across(), place, self.radius);
                 for start in 0..along - 1 {
-                    if !bearing.bears(axis, line, start, part > 0) {
+                    if first >= end || !bearing.bears(axis, line, start, part > 0) {
                         continue;
                     }
                     let at = |step: usize| {
@@ -157,24 +206,21 @@ impl Ball {
                             _ => height(line) * (1.0 - off) + height(line + 1) * off,
                         }
                     };
-                    let (low, slope) = (at(0), at(1) - at(0));
+                    let (low, slope) = (at(0), (at(1) - at(0)) / parts);
                     let steep = (1.0 + slope * slope).sqrt();
                     let sine = slope / steep;
-                    for (beside, circle) in &circles {
-                        let to = line as isize + beside - wide;
-                        let middle = (start as f64 - circle * sine).ceil();
-                        let node = middle as isize - wide;
-                        if to < 0
-                            || to >= to_across as isize
-                            || node < 0
-                            || node >= to_along as isize
-                        {
-                            continue;
+                    for beside in first..end {
+                        let apart = (nodes.first[axis.across()] + beside) as f64 - place;
+                        // The ball's circle over the line.
+                        let circle = (self.radius * self.radius - apart * apart).max(0.0).sqrt();
+                        let middle = (start as f64 + 0.5) * parts - circle * sine;
+                        let (from, to) = nodes.near(axis.along(), middle, 0.5 * parts);
+                        for node in from..to {
+                            let run = (nodes.first[axis.along()] + node) as f64 - start as f64 * parts;
+                            let height = low + slope * run + circle * steep;
+                            let centre = &mut centres[axis.node(nodes.side, beside, node)];
+                            *centre = if height > *centre { height } else { *centre };
                         }
-                        let height = low + slope * (middle - start as f64) + circle * steep;
-                        let index = axis.at(centres, to as usize, node as usize);
-                        let centre = &mut centres.heights[index];
-                        *centre = if height > *centre { height } else { *centre };
                     }
                 }
             }
@@ -204,11 +250,47 @@ impl Axis {
             Self::East => block.at(along, across),
         }
     }
+
+    /// The axis of its nodes across lines: 0 east, 1 north.
+    const fn across(self) -> usize {
+        1 - self.along()
+    }
+
+    /// The axis of its nodes along lines.
+    const fn along(self) -> usize {
+        match self {
+            Self::East => 0,
+            Self::North => 1,
+        }
+    }
+
+    const fn node(self, side: usize, across: usize, along: usize) -> usize {
+        match self {
+            Self::North => along * side + across,
+            Self::East => across * side + along,
+        }
+    }
 }
 
 impl Block {
     const fn at(&self, column: usize, row: usize) -> usize {
         row * self.columns + column
+    }
+
+    /// The bilinear height at a node, in parts of a cell from the first sample; NaN in a hole.
+    fn between(&self, node: [usize; 2], parts: usize) -> f64 {
+        let [(column, east), (row, north)] = node.map(|node| (node / parts, node % parts));
+        let mix = |from: usize, to: usize, share: usize, at: &dyn Fn(usize) -> f64| match share {
+            // The next sample has no weight, also where it is a hole.
+            0 => at(from),
+            _ => {
+                let share = share as f64 / parts as f64;
+                at(from) * (1.0 - share) + at(to) * share
+            }
+        };
+        mix(row, row + 1, north, &|row| {
+            mix(column, column + 1, east, &|column| self.heights[self.at(column, row)])
+        })
     }
 }
 

@@ -82,19 +82,64 @@ fn centre(block: &Block, [u, v]: [f64; 2], radius: f64) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// A block of `side` samples within a halo, from heights by column and row of its middle.
-fn block(radius: f64, side: usize, height: impl Fn(i32, i32) -> f64) -> (Ball, Block) {
-    let ball = Ball::new(radius);
-    let samples = side + 2 * ball.halo();
-    let place = |at: usize| at as i32 - ball.halo() as i32;
-    let all = (0..samples * samples).map(|at| height(place(at % samples), place(at / samples)));
-    let heights = all.collect();
-    let block = Block {
-        columns: samples,
-        rows: samples,
-        heights,
-    };
-    (ball, block)
+/// A ball over heights by column and row, which is felt from the node on the sample at zero on.
+struct Rest {
+    /// Felt cells a cell.
+    parts: usize,
+    /// Samples around that node.
+    halo: usize,
+    /// The samples, in cells.
+    block: Block,
+    /// Nodes along a side, and the centres over them, in cells.
+    side: usize,
+    centres: Vec<f64>,
+}
+
+impl Rest {
+    /// Of a ball of a radius in cells of a millimetre, over so many cells each way.
+    fn new(radius: f64, cells: usize, height: impl Fn(i32, i32) -> f64) -> Self {
+        let ball = Ball::new(radius, 1.0);
+        let parts = ball.parts() as usize;
+        let side = cells * parts + 1;
+        let (first, samples, nodes) = ball.around([0, 0], side);
+        let place = |at: usize| at as i32 + first[0] as i32;
+        let all = (0..samples * samples).map(|at| height(place(at % samples), place(at / samples)));
+        let block = |scale: f64, heights: &[f64]| Block {
+            columns: samples,
+            rows: samples,
+            heights: heights.iter().map(|height| height * scale).collect(),
+        };
+        let heights: Vec<_> = all.collect();
+        let felt = f64::from(ball.parts());
+        let centres = ball.centres(&block(felt, &heights), nodes);
+        Self {
+            parts,
+            halo: ball.halo(),
+            block: block(1.0, &heights),
+            side,
+            centres: centres.iter().map(|centre| centre / felt).collect(),
+        }
+    }
+
+    /// The centre over a node by column and row.
+    fn centre(&self, [column, row]: [usize; 2]) -> f64 {
+        self.centres[row * self.side + column]
+    }
+
+    /// Where a node is, in cells from the sample at zero.
+    fn place(&self, node: [usize; 2]) -> [f64; 2] {
+        node.map(|node| node as f64 / self.parts as f64)
+    }
+
+    /// The same from the block's first sample.
+    fn in_block(&self, node: [usize; 2]) -> [f64; 2] {
+        self.place(node).map(|place| place + self.halo as f64)
+    }
+
+    fn nodes(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let side = self.side;
+        (0..side * side).map(move |at| [at % side, at / side])
+    }
 }
 
 const RADII: [f64; 7] = [0.3, 1.0, 1.7, 2.5, 4.0, 6.3, 8.0];
@@ -112,11 +157,12 @@ fn noise(column: i32, row: i32) -> f64 {
 fn a_ball_on_a_plane_is_its_radius_off_it() {
     for radius in RADII {
         for [east, north] in [[0.0, 0.0], [0.5, 0.0], [0.0, -2.0], [1.0, 1.0], [-3.0, 4.0]] {
-            let plane = |x: i32, y: i32| east * f64::from(x) + north * f64::from(y);
-            let (ball, block) = block(radius, 3, plane);
+            let plane = |x: f64, y: f64| east * x + north * y;
+            let rest = Rest::new(radius, 1, |x, y| plane(f64::from(x), f64::from(y)));
             let steep = (1.0f64 + east * east + north * north).sqrt();
-            for (at, centre) in ball.centres(&block).heights.iter().enumerate() {
-                let off = centre - plane(at as i32 % 3, at as i32 / 3);
+            for node in rest.nodes() {
+                let [x, y] = rest.place(node);
+                let off = rest.centre(node) - plane(x, y);
                 // Normal to the plane.
                 let off = (off / steep - radius) / radius;
                 assert!(
@@ -146,17 +192,19 @@ fn a_ball_rests_on_poles_walls_and_pits_as_a_search_finds() {
     ];
     for radius in [0.3, 1.0, 2.5, 8.0] {
         for (name, shape) in shapes {
-            let (ball, block) = block(radius, 3, shape);
-            let centres = ball.centres(&block);
-            for (at, found) in centres.heights.iter().enumerate() {
-                let place = [at % 3, at / 3].map(|at| (at + ball.halo()) as f64);
+            let rest = Rest::new(radius, 2, shape);
+            // On samples and between.
+            let along = [0, rest.parts / 3, (17 * rest.parts).div_ceil(10), 2 * rest.parts];
+            let nodes = along.map(|row| along.map(|column| [column, row]));
+            for node in nodes.into_iter().flatten() {
+                let (place, found) = (rest.in_block(node), rest.centre(node));
                 // Not higher than the ball, and nothing is nearer than 1 % less than the radius.
-                let sought = centre(&block, place, radius);
-                let smaller = centre(&block, place, 0.99 * radius);
-                let is_right = *found < sought + 1e-6 * radius && *found > smaller;
+                let sought = centre(&rest.block, place, radius);
+                let smaller = centre(&rest.block, place, 0.99 * radius);
+                let is_right = found < sought + 1e-6 * radius && found > smaller;
                 assert!(
                     is_right,
-                    "{name}, radius {radius}, node {at}: {found} between {smaller} and {sought}"
+                    "{name}, radius {radius}, node {node:?}: {found} between {smaller} and {sought}"
                 );
             }
         }
@@ -170,15 +218,19 @@ fn samples_without_data_stay_without_and_bear_nothing() {
         _ if x > 3 => f64::NAN,
         _ => f64::from(x),
     };
-    let (ball, block) = block(2.0, 6, hole);
-    let centres = ball.centres(&block);
-    for (at, centre) in centres.heights.iter().enumerate() {
-        let (x, y) = (at as i32 % 6, at as i32 / 6);
-        assert_eq!(centre.is_nan(), hole(x, y).is_nan(), "{x} {y}");
-        assert!(
-            centre.is_nan() || *centre >= hole(x, y) + 2.0,
-            "{x} {y}: {centre}"
-        );
+    let rest = Rest::new(2.0, 5, hole);
+    for node in rest.nodes() {
+        let ([x, y], centre) = (rest.place(node), rest.centre(node));
+        // A patch with such a sample has none, and its border with a whole patch does.
+        let own = surface(&rest.block, rest.in_block(node));
+        let is_border = [x, y].iter().any(|place| place.fract() == 0.0);
+        assert!(own.is_none() || !centre.is_nan(), "{x} {y}");
+        assert!(own.is_some() || is_border || centre.is_nan(), "{x} {y}");
+        if [x, y].iter().all(|place| place.fract() == 0.0) {
+            let sample = hole(x as i32, y as i32);
+            assert_eq!(centre.is_nan(), sample.is_nan(), "{x} {y}");
+            assert!(centre.is_nan() || centre >= sample + 2.0, "{x} {y}: {centre}");
+        }
     }
     // A sample of no whole patch bears the ball over itself alone.
     let lone = |x: i32, y: i32| match (x, y) {
@@ -186,8 +238,9 @@ fn samples_without_data_stay_without_and_bear_nothing() {
         (0..=2, 0..=2) => f64::NAN,
         _ => 0.0,
     };
-    let (ball, block) = self::block(3.0, 5, lone);
-    let centres = ball.centres(&block);
-    assert_eq!(centres.heights[5 + 3], 3.0);
-    assert_eq!(centres.heights[5 + 1], 53.0);
+    let rest = Rest::new(3.0, 4, lone);
+    let on = |x: usize, y: usize| rest.centre([x, y].map(|place| place * rest.parts));
+    assert_eq!(on(3, 1), 3.0);
+    assert_eq!(on(1, 1), 53.0);
+    assert!(rest.centre([rest.parts + 1, rest.parts]).is_nan());
 }

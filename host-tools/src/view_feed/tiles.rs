@@ -85,7 +85,7 @@ impl Tiles {
     /// Shows the tile at a place (cells) in full detail, for good: under rows that are not
     /// felt by a device with a window.
     pub(super) fn detail(&mut self, terrain: &Terrain<'_>, cells: [f64; 2]) {
-        let side = f64::from(TILE_CELLS) * f64::from(terrain.level()).exp2();
+        let side = f64::from(TILE_CELLS) * terrain.cells_of_grid();
         let [col, row] = cells.map(|cells| (cells / side).floor() as i32);
         let key = TileKey::new(terrain.level(), col, row);
         let has_room = self.detailed.len() < MOST_DETAILED;
