@@ -72,7 +72,10 @@ impl Nodes {
             let node = at - self.first[axis] as f64;
             node.clamp(0.0, self.side as f64) as usize
         };
-        (node((place - reach).ceil()), node((place + reach).floor() + 1.0))
+        (
+            node((place - reach).ceil()),
+            node((place + reach).floor() + 1.0),
+        )
     }
 }
 
@@ -142,7 +145,10 @@ impl Ball {
             self.on_lines((block, &bearing), axis, nodes, &mut centres);
         }
         for (at, centre) in centres.iter_mut().enumerate() {
-            let place = [nodes.first[0] + at % nodes.side, nodes.first[1] + at / nodes.side];
+            let place = [
+                nodes.first[0] + at % nodes.side,
+                nodes.first[1] + at / nodes.side,
+            ];
             let own = block.between(place, self.parts as usize);
             // Also where it is NaN.
             *centre = if own.is_nan() {
@@ -165,7 +171,8 @@ impl Ball {
             let place = [at % bearing.columns, at / bearing.columns].map(|sample| sample * parts);
             let near = |axis: usize| nodes.near(axis, place[axis] as f64, reach);
             let ((west, east), (south, north)) = (near(0), near(1));
-            let beside = |axis: usize, node: usize| nodes.first[axis] + node + reach as usize - place[axis];
+            let beside =
+                |axis: usize, node: usize| nodes.first[axis] + node + reach as usize - place[axis];
             for row in south..north {
                 if west >= east {
                     break;
@@ -216,7 +223,8 @@ impl Ball {
                         let middle = (start as f64 + 0.5) * parts - circle * sine;
                         let (from, to) = nodes.near(axis.along(), middle, 0.5 * parts);
                         for node in from..to {
-                            let run = (nodes.first[axis.along()] + node) as f64 - start as f64 * parts;
+                            let run =
+                                (nodes.first[axis.along()] + node) as f64 - start as f64 * parts;
                             let height = low + slope * run + circle * steep;
                             let centre = &mut centres[axis.node(nodes.side, beside, node)];
                             *centre = if height > *centre { height } else { *centre };
@@ -289,7 +297,9 @@ impl Block {
             }
         };
         mix(row, row + 1, north, &|row| {
-            mix(column, column + 1, east, &|column| self.heights[self.at(column, row)])
+            mix(column, column + 1, east, &|column| {
+                self.heights[self.at(column, row)]
+            })
         })
     }
 }

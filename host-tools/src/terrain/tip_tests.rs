@@ -194,7 +194,12 @@ fn a_ball_rests_on_poles_walls_and_pits_as_a_search_finds() {
         for (name, shape) in shapes {
             let rest = Rest::new(radius, 2, shape);
             // On samples and between.
-            let along = [0, rest.parts / 3, (17 * rest.parts).div_ceil(10), 2 * rest.parts];
+            let along = [
+                0,
+                rest.parts / 3,
+                (17 * rest.parts).div_ceil(10),
+                2 * rest.parts,
+            ];
             let nodes = along.map(|row| along.map(|column| [column, row]));
             for node in nodes.into_iter().flatten() {
                 let (place, found) = (rest.in_block(node), rest.centre(node));
@@ -229,7 +234,10 @@ fn samples_without_data_stay_without_and_bear_nothing() {
         if [x, y].iter().all(|place| place.fract() == 0.0) {
             let sample = hole(x as i32, y as i32);
             assert_eq!(centre.is_nan(), sample.is_nan(), "{x} {y}");
-            assert!(centre.is_nan() || centre >= sample + 2.0, "{x} {y}: {centre}");
+            assert!(
+                centre.is_nan() || centre >= sample + 2.0,
+                "{x} {y}: {centre}"
+            );
         }
     }
     // A sample of no whole patch bears the ball over itself alone.
