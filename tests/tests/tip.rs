@@ -6,6 +6,7 @@ use std::process::Command;
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::{Replayer, on_native};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction, Rule};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
@@ -233,53 +234,52 @@ fn steps_of_force(terrain: &Terrain<'_>, path: &[[f64; 3]]) -> usize {
     let mut replayer = on_native(terrain, ForceLaw::PREMIUM, Rule::Swept).expect("opened");
     let forces = path.iter().map(|hip| feel(&mut replayer, *hip).force_n);
     let forces: Vec<_> = forces.collect();
-    let is_step = |pair: &&[hapterra_core::Vec3]| (pair[1] - pair[0]).length() > 0.05;
+    let is_step = |pair: &&[Vec3]| (pair[1] - pair[0]).length() > 0.05;
     forces.windows(2).filter(is_step).count()
 }
 
-/// A hand's way along a row of a terrain at 30 mm/s, 1 mm below the mean height of 6 mm around.
-fn way_over(terrain: &Terrain<'_>, north_mm: f64) -> Vec<[f64; 3]> {
-    const AROUND: usize = 100;
+/// A hand's way along a row of a terrain at 30 mm/s, so deep below the mean of what is felt within
+/// 1 mm around.
+fn way_over(terrain: &Terrain<'_>, north_mm: f64, deep_mm: f64) -> Vec<[f64; 3]> {
+    const AROUND: usize = 33;
     let east = |tick: usize| 5.0 + 0.03 * tick as f64;
-    let heights = (0..7_000).map(|tick| terrain.height_mm(east(tick), north_mm).expect("a city"));
+    let heights = (0..5_000).map(|tick| terrain.height_mm(east(tick), north_mm).expect("a city"));
     let heights: Vec<_> = heights.collect();
     let means = heights.windows(2 * AROUND + 1).enumerate();
     let below = means.map(|(tick, around)| {
         let mean = around.iter().sum::<f64>() / around.len() as f64;
-        [east(tick + AROUND), north_mm, mean - 1.0]
+        [east(tick + AROUND), north_mm, mean - deep_mm]
     });
     let mut way: Vec<_> = below.collect();
-    // From the air, where a contact begins.
-    way[0][2] += 100.0;
+    // From the air, where a contact begins, within 200 ticks.
+    for (tick, hip) in way.iter_mut().take(200).enumerate() {
+        hip[2] += 0.2 * (200 - tick) as f64;
+    }
     way
 }
 
-/// The same ways, a radius higher for the ball, whose centre the HIP is.
+/// The same ways from above by the ball of a hand and by a point, each as deep in what it feels.
 #[test]
 fn steps_of_force_on_lidar_fall_five_times_under_a_ball() {
     let Some(path) = shared("dem/real/dom1_32_356_5699_1_nw_2020.tif") else {
         return;
     };
     let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
+    let grid = FeltGrid::new(&raster, FeltCells::default());
     // As large as a Premium's workspace fits it.
-    let scale = Scale::true_to(&FeltGrid::new(&raster, FeltCells::default()), 0.23);
-    let scale = scale.expect("scale");
-    for radius in [2.0, 4.0, 8.0] {
-        let [ball, point] = terrains(&raster, scale, radius);
-        let mut found = [0, 0];
-        for row in 1..=8 {
-            let mut way = way_over(&point, f64::from(row) * 25.3);
-            found[0] += steps_of_force(&point, &way);
-            for hip in &mut way {
-                hip[2] += radius * scale.cell_mm();
-            }
-            found[1] += steps_of_force(&ball, &way);
-        }
-        let [of_point, of_ball] = found;
-        eprintln!("radius {radius} cells: {of_point} steps of a point, {of_ball} of the ball");
+    let scale = Scale::true_to(&grid, 0.23).expect("scale");
+    let ball = Terrain::over(grid.with_tip(5.0), scale, 2).expect("terrain");
+    let point = Terrain::over(grid, scale, 0).expect("terrain");
+    for deep_mm in [0.1, 0.3, 0.5] {
+        let count = |terrain: &Terrain<'_>| {
+            let ways = (1..=6).map(|row| way_over(terrain, f64::from(row) * 27.3, deep_mm));
+            ways.map(|way| steps_of_force(terrain, &way)).sum()
+        };
+        let [of_point, of_ball]: [usize; 2] = [&point, &ball].map(count);
+        eprintln!("{deep_mm} mm deep: {of_point} steps of a point, {of_ball} of the ball");
         assert!(
-            true || of_ball * 5 <= of_point,
-            "{of_ball} of {of_point} steps"
+            of_point > 100 && of_ball * 5 <= of_point,
+            "{deep_mm} mm deep: {of_ball} of {of_point} steps"
         );
     }
 }
@@ -329,7 +329,7 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("there");
     runs(
         folder,
-        &["synth", "fractal", "-o", "hills.tif", "--size", "512"],
+        &["synth", "crater", "-o", "hills.tif", "--size", "512"],
     );
     let native = [
         "--device",
@@ -424,5 +424,32 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
         let run = command.args(words).output().expect("started");
         let said = String::from_utf8_lossy(&run.stderr);
         assert!(!run.status.success() && said.contains(expected), "{said}");
+    }
+}
+
+/// A run and a demo are for a hand; a replayed path is for comparisons.
+#[test]
+fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    runs(
+        folder,
+        &["synth", "crater", "-o", "hills.tif", "--size", "256"],
+    );
+    std::fs::write(folder.join("in.csv"), "t_s,x_mm,y_mm,z_mm\n0,60,60,500\n").expect("written");
+    let run = ["run", "hills.tif", "--device", "native", "--seconds", "1"];
+    let demo = ["demo", "hills.tif", "--device", "native", "--seconds", "1"];
+    let replay = ["replay", "hills.tif", "in.csv", "-o", "out.csv"];
+    let line = "felt by a ball of 5 mm over level";
+    for (words, more, is_ball) in [
+        (&run[..], &[][..], true),
+        (&run[..], &["--tip", "0"][..], false),
+        // A stated level is as fine as a point feels it.
+        (&run[..], &["--level", "0"][..], false),
+        (&demo[..], &[][..], true),
+        (&replay[..], &[][..], false),
+    ] {
+        let said = runs(folder, &[words, more].concat());
+        assert_eq!(said.contains(line), is_ball, "{words:?} {more:?}: {said}");
     }
 }

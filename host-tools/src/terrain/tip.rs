@@ -27,7 +27,7 @@ use std::sync::Arc;
 /// Largest radius, cells of the ground's level. A larger ball is felt on a coarser level.
 pub const MOST_CELLS: f64 = 8.0;
 /// Felt cells in a radius, at least.
-pub(super) const FELT_CELLS: f64 = 24.0;
+pub(super) const FELT_CELLS: f64 = 32.0;
 /// A felt cell is not made smaller than this, hand millimetres: half an encoder's count.
 pub(super) const FINEST_MM: f64 = 1.0 / 64.0;
 /// What the ball may rest too low for want of a line, as a part of its radius.

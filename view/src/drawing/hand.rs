@@ -192,3 +192,36 @@ impl Rows {
         ])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::ground::tests::scene;
+    use super::*;
+
+    /// As large on the ground as it is in the hand, in each view.
+    #[test]
+    fn a_ball_is_drawn_in_its_size_and_a_point_as_a_dot() {
+        let sample = Sample {
+            t_s: 0.0,
+            hip_mm: [40.0, 30.0, 0.0],
+            proxy_mm: [40.0, 30.0, 0.0],
+            force_n: [0.0; 3],
+            ground_mm: 0.0,
+            contact: false,
+            cost: None,
+        };
+        let drawn = |tip_mm: f64, ground_m_per_mm: f64| {
+            let scene = hapterra_view_stream::Scene {
+                tip_mm,
+                ground_m_per_mm: Some(ground_m_per_mm),
+                ..scene()
+            };
+            let mut rows = Rows::default();
+            rows.push(&Ground::new(&scene), &sample, None);
+            rows.radii
+        };
+        assert_eq!(drawn(2.0, 60.0), [Radius::new_scene_units(120.0)]);
+        assert_eq!(drawn(2.0, 30.0), [Radius::new_scene_units(60.0)]);
+        assert_eq!(drawn(0.0, 60.0), []);
+    }
+}

@@ -11,6 +11,10 @@ use crate::place::{Heights, suited_height};
 use crate::raster::Raster;
 use crate::terrain::{FeltCells, FeltGrid, MOST_TIP_CELLS, Scale, Terrain};
 
+/// Radius of the ball by which a hand feels the ground unless another is stated, mm: with a friction
+/// of 0.4 no ground that was tried holds it (docs/tip.md).
+const HAND_MM: f64 = 5.0;
+
 /// How the terrain feels.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Feel")]
@@ -44,7 +48,8 @@ pub struct Rendering {
     pub level: Option<u8>,
 
     /// Radius of the ball at the tip, hand millimetres: 2 or 2mm. The HIP is its centre; a level
-    /// is felt in which it is at most 8 cells large [default: 0, a point]
+    /// is felt in which it is at most 8 cells large [default: run and demo 5, replay 0, a point;
+    /// with --level 0]
     #[arg(long, value_name = "MM", value_parser = tip_mm, allow_negative_numbers = true)]
     pub tip: Option<f64>,
 
@@ -186,6 +191,13 @@ impl Rendering {
     #[must_use]
     pub fn tip_mm(&self) -> f64 {
         self.tip.unwrap_or(0.0)
+    }
+
+    /// The same of an arm that a hand holds: a stated level is felt by a point.
+    #[must_use]
+    pub fn tip_of_hand_mm(&self) -> f64 {
+        let usual = if self.level.is_none() { HAND_MM } else { 0.0 };
+        self.tip.unwrap_or(usual)
     }
 
     /// The terrain at a scale; without a stated level the finest in which the tip is not too many
