@@ -140,7 +140,7 @@ impl Ball {
     pub(super) fn centres(&self, block: &Block, nodes: Nodes) -> Vec<f64> {
         let bearing = Bearing::of(block);
         let mut centres = vec![f64::NEG_INFINITY; nodes.side * nodes.side];
-        self.on_samples(&bearing, nodes, &mut centres);
+        self.on_samples((block, &bearing), nodes, &mut centres);
         for axis in [Axis::North, Axis::East] {
             self.on_lines((block, &bearing), axis, nodes, &mut centres);
         }
@@ -161,11 +161,11 @@ impl Ball {
     }
 
     /// Where the ball rests on a sample.
-    fn on_samples(&self, bearing: &Bearing, nodes: Nodes, centres: &mut [f64]) {
+    fn on_samples(&self, (block, bearing): (&Block, &Bearing), nodes: Nodes, centres: &mut [f64]) {
         let (parts, reach) = (self.parts as usize, self.radius.floor());
         let width = 2 * reach as usize + 1;
         for (at, sample) in bearing.nodes.iter().enumerate() {
-            if *sample == f64::NEG_INFINITY {
+            if *sample == f64::NEG_INFINITY || bearing.is_between_stretches(block, at) {
                 continue;
             }
             let place = [at % bearing.columns, at / bearing.columns].map(|sample| sample * parts);
@@ -221,7 +221,9 @@ impl Ball {
                         // The ball's circle over the line.
                         let circle = (self.radius * self.radius - apart * apart).max(0.0).sqrt();
                         let middle = (start as f64 + 0.5) * parts - circle * sine;
-                        let (from, to) = nodes.near(axis.along(), middle, 0.5 * parts);
+                        // Also where rounding puts a node beside both of its stretches.
+                        let half = 0.5 * parts + 1e-9;
+                        let (from, to) = nodes.near(axis.along(), middle, half);
                         for node in from..to {
                             let run =
                                 (nodes.first[axis.along()] + node) as f64 - start as f64 * parts;
@@ -334,6 +336,25 @@ impl Bearing {
             }
         }
         bearing
+    }
+
+    /// Returns true if a ball that touches a sample touches the ground beside it, too: along an axis
+    /// the ground turns up there, or goes straight on.
+    fn is_between_stretches(&self, block: &Block, at: usize) -> bool {
+        let (column, row) = (at % block.columns, at / block.columns);
+        [Axis::East, Axis::North].into_iter().any(|axis| {
+            let (line, place) = match axis {
+                Axis::East => (row, column),
+                Axis::North => (column, row),
+            };
+            let bears = |start: usize| self.bears(axis, line, start, false);
+            let last = axis.sizes(block).1 - 1;
+            if place == 0 || place == last || !bears(place - 1) || !bears(place) {
+                return false;
+            }
+            let height = |place: usize| block.heights[axis.at(block, line, place)];
+            height(place + 1) - height(place) >= height(place) - height(place - 1)
+        })
     }
 
     /// Returns true if a stretch of a line is in a patch with four samples, or on its edge.

@@ -13,7 +13,7 @@ use crate::terrain::{FeltCells, FeltGrid, MOST_TIP_CELLS, Scale, Terrain};
 
 /// Radius of the ball by which a hand feels the ground unless another is stated, mm: with a friction
 /// of 0.4 no ground that was tried holds it (docs/tip.md).
-const HAND_MM: f64 = 5.0;
+const HAND_MM: f64 = 7.0;
 
 /// How the terrain feels.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -48,7 +48,7 @@ pub struct Rendering {
     pub level: Option<u8>,
 
     /// Radius of the ball at the tip, hand millimetres: 2 or 2mm. The HIP is its centre; a level
-    /// is felt in which it is at most 8 cells large [default: run and demo 5, replay 0, a point;
+    /// is felt in which it is at most 8 cells large [default: run and demo 7, replay 0, a point;
     /// with --level 0]
     #[arg(long, value_name = "MM", value_parser = tip_mm, allow_negative_numbers = true)]
     pub tip: Option<f64>,
