@@ -153,10 +153,13 @@ fn a_ball_touches_real_ground_a_radius_away() {
     }
 }
 
+/// Whether a sample by column and row is another than those around.
+type Shape<'s> = &'s dyn Fn(u32, u32) -> bool;
+
 #[test]
 fn a_ball_touches_poles_walls_and_pits_a_radius_away() {
     let every = |x: u32, n: u32| x % n == n / 2;
-    let shapes: [(&str, &dyn Fn(u32, u32) -> bool, f32); 5] = [
+    let shapes: [(&str, Shape<'_>, f32); 5] = [
         ("poles", &|x, y| every(x, 5) && every(y, 5), 10.0),
         ("pits", &|x, y| every(x, 5) && every(y, 5), -10.0),
         ("walls", &|x, _| x % 12 < 6, 20.0),
