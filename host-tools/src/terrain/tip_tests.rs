@@ -55,12 +55,17 @@ fn centre(block: &Block, [u, v]: [f64; 2], radius: f64) -> f64 {
     // Samples and grid lines themselves, too.
     for column in 0..block.columns {
         for row in 0..block.rows {
-            let place = [column as f64, row as f64];
-            places.push((ball(place), place));
+            let at = [column as f64, row as f64];
+            for part in 0..8 {
+                let on = f64::from(part) / 8.0;
+                for place in [[at[0] + on, at[1]], [at[0], at[1] + on]] {
+                    places.push((ball(place), place));
+                }
+            }
         }
     }
     places.sort_by(|a, b| b.0.total_cmp(&a.0));
-    places.truncate(16);
+    places.truncate(32);
     for _ in 0..35 {
         step *= 0.7;
         for best in &mut places {
