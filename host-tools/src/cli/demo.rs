@@ -99,6 +99,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let materials = (args.rendering.materials).over((&name, &raster), of_ground, None)?;
     let mut asked = args.placing.of(&args.rendering, &raster)?;
     asked.grid = asked.grid.with_materials(materials.as_ref());
+    asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
     // The virtual Phantom is one.
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
     let terrain = view.terrain(asked.grid)?;

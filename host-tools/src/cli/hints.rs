@@ -26,6 +26,7 @@ impl Hint for TerrainError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::NoSuchLevel { .. } => "choose a lower --level",
+            Self::Tip { .. } => "choose a smaller --tip, a larger --cell-mm, or a higher --level",
             Self::TooLarge(_) => "cut a smaller part out of the file",
             Self::TooTall { .. } | Self::Scale(_) => {
                 "choose a smaller --exaggeration or --height-mm-per-unit, a larger --cell-mm, or name the file's no-data value with --no-data"

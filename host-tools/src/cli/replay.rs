@@ -113,8 +113,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let law = rendering.law()?;
     let law = rendering.materials.law(materials.as_ref(), law);
-    if let Some(line) = session_summary::materials(&terrain) {
-        eprintln!("{line}");
+    for line in [
+        session_summary::materials(&terrain),
+        session_summary::tip(&terrain),
+    ] {
+        line.iter().for_each(|line| eprintln!("{line}"));
     }
     let home_mm = recorded.as_ref().and_then(|it| it.felt.home_mm);
     let later = recorded.map(|it| (it.views, it.marks));

@@ -152,6 +152,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let materials = (args.rendering.materials).over((&name, &raster), of_ground, None)?;
     let mut asked = args.placing.of(&args.rendering, &raster)?;
     asked.grid = asked.grid.with_materials(materials.as_ref());
+    asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
     let law = args.rendering.law()?;
     check_stiffness(law.stiffness_n_per_mm)?;
     let law = args.rendering.materials.law(materials.as_ref(), law);

@@ -146,6 +146,14 @@ impl SessionSummary {
     }
 }
 
+/// The ball that feels a terrain and the level in which it does, in words; none of a point.
+pub(super) fn tip(terrain: &Terrain<'_>) -> Option<String> {
+    let (mm, level) = (terrain.grid().tip_mm(), terrain.level());
+    let felt = placing::short(terrain.scale().cell_mm());
+    (mm > 0.0)
+        .then(|| format!("felt by a ball of {mm} mm over level {level}, on cells of {felt} mm"))
+}
+
 /// A terrain and its scale, in words.
 pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     let (raster, grid, scale) = (terrain.raster(), terrain.grid(), terrain.scale());
@@ -155,7 +163,8 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
         None => format!("{} mm a vertical unit", scale.height_mm_per_unit()),
     };
     let (columns, rows) = (raster.columns(), raster.rows());
-    let cell_mm = placing::short(scale.cell_mm());
+    let of_level = terrain.scale_of_level_0().at_level(terrain.level());
+    let cell_mm = placing::short(of_level.cell_mm());
     let felt = match grid.side_m() {
         Some(side) if grid.is_resampled() => format!(
             " felt as {} × {} squares of {side:.3} m,",
@@ -167,7 +176,10 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
         }
         _ => String::new(),
     };
-    format!("{columns} × {rows} samples,{felt} {cell_mm} mm a cell, {proportions}")
+    let tip = tip(terrain)
+        .map(|tip| format!(", {tip}"))
+        .unwrap_or_default();
+    format!("{columns} × {rows} samples,{felt} {cell_mm} mm a cell, {proportions}{tip}")
 }
 
 /// A device in words.

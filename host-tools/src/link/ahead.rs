@@ -52,8 +52,7 @@ impl Ahead {
             let cells = |tile: i32| tile.saturating_mul(TILE_CELLS as i32);
             let [from, to] = tiles;
             let to = to.map(|tile| cells(tile.saturating_add(1)));
-            let grid = terrain.grid();
-            grid.prefetch(terrain.level(), from.map(cells), to);
+            terrain.prefetch(from.map(cells), to);
         }
     }
 }
@@ -66,7 +65,7 @@ pub(super) fn read_around(terrain: &Terrain<'_>, hip: &GridPoint) {
         [east, north].map(|cell| cell.saturating_sub(tile)),
         [east, north].map(|cell| cell.saturating_add(tile)),
     );
-    terrain.grid().prefetch(terrain.level(), from, to);
+    terrain.prefetch(from, to);
 }
 
 /// First and last tile, east and north, from the one under the HIP to where it will be after

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use hapterra_core::force::{ForceLaw, Material, MaterialTable};
-use hapterra_core::terrain::{POSTS, TileKey};
+use hapterra_core::terrain::{POSTS, TileIndex};
 use hapterra_core::wire::materials::{MOST_TILE_BYTES, TileMaterials};
 use serde::{Deserialize, Serialize};
 use twox_hash::XxHash64;
@@ -158,18 +158,18 @@ impl Materials {
         self.looks.index(self.pixels.at(terrain, ground))
     }
 
-    /// The materials of a tile of a grid's level, as they go on the link. Beyond the field they go
-    /// on as it ends there.
+    /// The materials of a tile over a grid, whose samples are `step` of the grid's cells apart, as they
+    /// go on the link. Beyond the field they go on as it ends there.
     pub(crate) fn tile<'b>(
         &self,
-        (grid, last): (&FeltGrid<'_>, [i32; 2]),
-        key: TileKey,
+        (grid, last, step): (&FeltGrid<'_>, [i32; 2], f64),
+        index: TileIndex,
         buffer: &'b mut MaterialBuffer,
     ) -> TileMaterials<'b> {
-        let (first, terrain) = (key.index.first_cell(), grid.raster());
+        let (first, terrain) = (index.first_cell(), grid.raster());
         let place = |first: i32, i: usize, last: i32| {
             let sample = first.saturating_add(i as i32).clamp(0, last);
-            f64::from(sample) * f64::from(key.level).exp2()
+            f64::from(sample) * step
         };
         let on_terrain = terrain.georeference();
         let from_terrain = self.pixels.from(&on_terrain);

@@ -3,7 +3,7 @@
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
-use hapterra_core::terrain::Tile;
+use hapterra_core::terrain::{Tile, TileKey};
 
 use super::*;
 use crate::raster::{GroundTransform, OpenOptions};

@@ -154,7 +154,8 @@ pub fn terrain_of<'t>(
 ) -> Result<Terrain<'t>, ReplayError> {
     let grid = match view.measured_at {
         Some(ground) => FeltGrid::at(first.raster(), first.grid().cells(), ground)
-            .with_materials(first.grid().materials()),
+            .with_materials(first.grid().materials())
+            .with_tip(first.grid().tip_mm()),
         None => *first.grid(),
     };
     let number = view.number;

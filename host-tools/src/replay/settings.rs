@@ -190,6 +190,10 @@ pub struct Felt {
     pub cell_mm: f64,
     /// Hand millimetres a vertical unit of the file.
     pub height_mm_per_unit: f64,
+    /// Radius of the ball that felt it, hand millimetres; left out where it was a point. The HIP
+    /// and the proxy are the ball's centre.
+    #[serde(default, skip_serializing_if = "is_point")]
+    pub tip_mm: f64,
     /// Times that heights are higher than true to scale, where the file knows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
@@ -230,6 +234,12 @@ pub struct Force {
     /// Its micro-relief; left out where it is even.
     #[serde(default, skip_serializing_if = "Texture::is_none")]
     pub texture: Texture,
+}
+
+/// Returns true if a tip is a point.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_point(tip_mm: &f64) -> bool {
+    *tip_mm == 0.0
 }
 
 /// What the ground was made of.
@@ -327,6 +337,7 @@ impl Settings {
                 level: terrain.level(),
                 cell_mm: scale.cell_mm(),
                 height_mm_per_unit: scale.height_mm_per_unit(),
+                tip_mm: grid.tip_mm(),
                 exaggeration: scale.exaggeration(grid),
                 home_mm,
             },

@@ -57,6 +57,8 @@ pub struct FeltGrid<'r> {
     resampling: Option<Resampling>,
     /// What the ground is made of, where that is not the same everywhere.
     materials: Option<&'r Materials>,
+    /// Radius of the ball that feels it, hand millimetres; 0 for a point.
+    tip_mm: f64,
 }
 
 /// Place of felt sample (u, v) in the file: column `first + u · column_step + v · lean`,
@@ -93,6 +95,18 @@ impl<'r> FeltGrid<'r> {
         Self { materials, ..self }
     }
 
+    /// The same ground, felt by a ball of a radius in hand millimetres; 0 for a point.
+    #[must_use]
+    pub const fn with_tip(self, tip_mm: f64) -> Self {
+        Self { tip_mm, ..self }
+    }
+
+    /// Radius of the ball that feels it, hand millimetres; 0 for a point.
+    #[must_use]
+    pub const fn tip_mm(&self) -> f64 {
+        self.tip_mm
+    }
+
     /// What the ground is made of, where that is not the same everywhere.
     #[must_use]
     pub const fn materials(&self) -> Option<&'r Materials> {
@@ -114,7 +128,8 @@ impl<'r> FeltGrid<'r> {
         if is_alike(&now, &there) {
             return None;
         }
-        let anew = Self::at(self.raster, self.cells, ground).with_materials(self.materials);
+        let anew = Self::at(self.raster, self.cells, ground);
+        let anew = anew.with_materials(self.materials).with_tip(self.tip_mm);
         (self.cells == FeltCells::Stored || !anew.is_distorted()).then_some(anew)
     }
 
@@ -160,6 +175,7 @@ impl<'r> FeltGrid<'r> {
             side_m: cell.map(|cell| cell.square_metres()),
             resampling: None,
             materials: None,
+            tip_mm: 0.0,
         };
         match (cells, cell) {
             (FeltCells::Square, Some(cell)) if is_square(&cell) => {
@@ -325,16 +341,17 @@ impl<'r> FeltGrid<'r> {
         let (Some(column), Some(row)) = (whole(column), whole(row)) else {
             return f64::NAN;
         };
-        self.height_seen(level, [column, row])
+        // Both are below 2^32, or beyond the field.
+        self.height_seen(level, [column as f64, row as f64])
     }
 
-    /// The height at a felt sample, as the file has it at a level of detail.
-    pub(super) fn height_seen(&self, level: u8, [column, row]: [u64; 2]) -> f64 {
-        if column >= u64::from(self.columns) || row >= u64::from(self.rows) {
+    /// The height at a place in felt cells, as the file has it at a level of detail; NaN in a hole
+    /// and outside the field.
+    pub(super) fn height_seen(&self, level: u8, [u, v]: [f64; 2]) -> f64 {
+        let [last_column, last_row] = self.last();
+        if u > last_column || v > last_row {
             return f64::NAN;
         }
-        // Both are below 2^32.
-        let (u, v) = (column as f64, row as f64);
         let place = match &self.resampling {
             None => [u, v],
             Some(places) => places.in_file(u, v),
@@ -381,6 +398,9 @@ impl FeltGrid<'_> {
         (self.columns, self.rows).hash(hasher);
         if let Some(materials) = self.materials {
             materials.fingerprint().hash(hasher);
+        }
+        if self.tip_mm > 0.0 {
+            self.tip_mm.to_bits().hash(hasher);
         }
         if let Some(places) = &self.resampling {
             let numbers = [

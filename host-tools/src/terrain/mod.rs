@@ -11,6 +11,7 @@ mod identity;
 mod scale;
 mod steps;
 mod tiler;
+mod tip;
 mod underlay;
 
 pub use distortion::Distortion;
@@ -18,3 +19,4 @@ pub use felt_grid::{FeltCells, FeltGrid};
 pub(crate) use identity::fingerprint;
 pub use scale::{BadScale, Scale};
 pub use tiler::{INTERPOLATED_STEP, Terrain, TerrainError, TileBuffer};
+pub use tip::MOST_CELLS as MOST_TIP_CELLS;

@@ -80,12 +80,11 @@ impl Scale {
         }
     }
 
-    /// The scale of which this is [`Self::at_level`].
+    /// The same terrain, equally large in the hand, with cells that are a whole part as large.
     #[must_use]
-    pub fn of_level_0(&self, level: u8) -> Self {
+    pub(super) fn in_parts(&self, parts: u32) -> Self {
         Self {
-            // A power of two: exact both ways.
-            cell_mm: self.cell_mm / f64::from(level).exp2(),
+            cell_mm: self.cell_mm / f64::from(parts),
             ..*self
         }
     }
@@ -175,7 +174,7 @@ mod tests {
         assert!(Scale::new(1.0, f64::NAN).is_err());
         let plain = Scale::new(2.0, 3.0).expect("valid");
         let scale = plain.at_level(3);
-        assert_eq!(scale.of_level_0(3), plain);
+        assert_eq!(scale.in_parts(8), plain);
         assert_eq!((scale.cell_mm(), scale.height_cells(16.0)), (16.0, 3.0));
     }
 }

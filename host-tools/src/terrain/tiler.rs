@@ -11,6 +11,7 @@ use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
 use super::steps::{BinaryUnit, steps};
+use super::tip::{Ball, Block, MOST_CELLS, Nodes};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::materials::MaterialBuffer;
 use crate::raster::Raster;
@@ -20,6 +21,10 @@ use crate::raster::Raster;
 /// rounded have no bits that a tile could do without on the link.
 pub const INTERPOLATED_STEP: f64 = 1.0 / (1 << 17) as f64;
 
+/// Heights of a ball's centre are rounded to multiples of this, felt cells: slopes stay true to a
+/// thousandth, and tiles take half the bytes.
+const CENTRE_STEP: f64 = 1.0 / (1 << 10) as f64;
+
 /// Bytes of a tile's samples.
 const TILE_BYTES: usize = 4 * POSTS * POSTS;
 
@@ -27,12 +32,18 @@ const TILE_BYTES: usize = 4 * POSTS * POSTS;
 #[derive(Clone)]
 pub struct Terrain<'r> {
     grid: FeltGrid<'r>,
-    /// Of the level's cells.
+    /// Of level 0.
+    scale_of_level_0: Scale,
+    /// Of felt cells.
     scale: Scale,
     level: u8,
-    /// Patches of the level, east and north.
+    /// Felt cells a cell of the level, along a side: 1 for a point.
+    parts: u32,
+    /// Felt patches, east and north.
     size: [i32; 2],
     top: i32,
+    /// What feels it, if it is no point: heights are then those of the ball's centre.
+    ball: Option<Ball>,
     fingerprint: OnceLock<u64>,
     /// Whether it was said that a tile is too steep.
     steep: OnceLock<()>,
@@ -54,6 +65,18 @@ pub enum TerrainError {
         cells: f64,
         /// The scale that made it so.
         scale: Scale,
+    },
+    /// A tip that is no ball, or one so large that tiles would take too long.
+    #[error(
+        "a tip of {tip_mm} mm: {cells:.1} cells of level {level}, where 0 to {MOST_CELLS} can be felt"
+    )]
+    Tip {
+        /// Its radius, hand millimetres.
+        tip_mm: f64,
+        /// The same in cells of the level.
+        cells: f64,
+        /// The level.
+        level: u8,
     },
     /// More cells than positions can count.
     #[error("{0} samples in a row or column; at most {MAX_CELL} can be felt")]
@@ -155,16 +178,35 @@ impl<'r> Terrain<'r> {
                 rows,
             });
         }
-        let scale = scale.at_level(level);
+        let of_level = scale.at_level(level);
+        let ball = ball(&grid, &of_level, level)?;
+        let higher = ball.as_ref().map_or(0, |ball| ball.radius().ceil() as i32);
+        let parts = ball.as_ref().map_or(1, Ball::parts);
+        let size = size.map(|patches| patches.checked_mul(parts as i32));
+        let [Some(east), Some(north)] = size.map(|patches| patches.filter(|n| *n < MAX_CELL))
+        else {
+            return Err(TerrainError::TooLarge(larger));
+        };
+        let scale_of_level_0 = scale;
+        let scale = of_level.in_parts(parts);
         Ok(Self {
             grid,
+            scale_of_level_0,
             scale,
             level,
-            size,
-            top: top(grid.raster(), &scale)?,
+            parts,
+            size: [east, north],
+            top: (top(grid.raster(), &scale)? + higher).min(MAX_CELL + 1),
+            ball,
             fingerprint: OnceLock::new(),
             steep: OnceLock::new(),
         })
+    }
+
+    /// Radius of the ball that feels it, in felt cells; 0 for a point.
+    #[must_use]
+    pub fn tip_cells(&self) -> f64 {
+        self.ball.as_ref().map_or(0.0, Ball::radius)
     }
 
     /// The same raster in another grid of felt cells, at a scale of level 0 and a level.
@@ -191,6 +233,7 @@ impl<'r> Terrain<'r> {
         let height = |terrain: &Self| terrain.scale.height_cells(1.0);
         let (ours, theirs) = (height(self), height(other));
         self.level == other.level
+            && self.tip_cells() == other.tip_cells()
             && self.grid.has_samples_of(&other.grid)
             && (ours - theirs).abs() <= f64::from(f32::EPSILON) * 1e-3 * ours.abs()
     }
@@ -213,16 +256,28 @@ impl<'r> Terrain<'r> {
         self.level
     }
 
-    /// The scale of this level: its cells are `2^level` times the file's.
+    /// The scale of felt cells: `2^level` times the grid's, or a whole part of that under a ball.
     #[must_use]
     pub const fn scale(&self) -> &Scale {
         &self.scale
     }
 
+    /// Felt cells a cell of the level, along a side: 1 for a point.
+    #[must_use]
+    pub const fn parts(&self) -> u32 {
+        self.parts
+    }
+
+    /// Cells of the grid that are as long as a felt one.
+    #[must_use]
+    pub fn cells_of_grid(&self) -> f64 {
+        f64::from(self.level).exp2() / f64::from(self.parts)
+    }
+
     /// The scale of the finest level: of the grid's own cells.
     #[must_use]
-    pub fn scale_of_level_0(&self) -> Scale {
-        self.scale.of_level_0(self.level)
+    pub const fn scale_of_level_0(&self) -> Scale {
+        self.scale_of_level_0
     }
 
     /// Hash of all heights of the raster: the same terrain has the same, and a file that
@@ -234,7 +289,7 @@ impl<'r> Terrain<'r> {
         *self.fingerprint.get_or_init(print)
     }
 
-    /// Size in patches of this level, east and north.
+    /// Size in felt patches, east and north.
     #[must_use]
     pub const fn size(&self) -> [i32; 2] {
         self.size
@@ -274,26 +329,40 @@ impl<'r> Terrain<'r> {
         scene
     }
 
-    /// Height of the bilinear surface in hand millimetres at a place in hand
-    /// millimetres, in `f64`; `None` in a hole and off the data.
+    /// Height of the surface that is felt in hand millimetres at a place in hand
+    /// millimetres, in `f64`: bilinear between samples, or between the heights of a ball's centre
+    /// at samples. `None` in a hole and off the data.
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
-        self.height_of_level_mm(self.level, [east_mm, north_mm])
+        let Some(ball) = &self.ball else {
+            return self.ground_mm(self.level, [east_mm, north_mm]);
+        };
+        let cell_mm = self.scale.cell_mm();
+        let (column, u) = place(east_mm / cell_mm, self.size[0])?;
+        let (row, v) = place(north_mm / cell_mm, self.size[1])?;
+        let (block, nodes) = self.block(ball, [column, row], 2);
+        let corners = ball.centres(&block, nodes);
+        let along = |at: usize| corners[at] * (1.0 - u) + corners[at + 1] * u;
+        let height = along(0) * (1.0 - v) + along(2) * v;
+        Some(height * cell_mm).filter(|height| !height.is_nan())
     }
 
-    /// The same where it is only looked at, in places so far apart, mm: of a raster that
-    /// stays in its file, at a level that is quick to read.
+    /// Height of the ground where it is only looked at, in places so far apart, mm: of a raster
+    /// that stays in its file, at a level that is quick to read.
     #[must_use]
     pub fn seen_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
         let cells = apart_mm / self.scale_of_level_0().cell_mm();
         let level = self.raster().level_for(cells).max(self.level);
-        self.height_of_level_mm(level, [east_mm, north_mm])
+        self.ground_mm(level, [east_mm, north_mm])
     }
 
-    fn height_of_level_mm(&self, level: u8, [east_mm, north_mm]: [f64; 2]) -> Option<f64> {
+    /// The bilinear ground at a place.
+    fn ground_mm(&self, level: u8, [east_mm, north_mm]: [f64; 2]) -> Option<f64> {
         let coarser = level - self.level;
-        let cell_mm = self.scale.cell_mm() * f64::from(coarser).exp2();
-        let size = self.size.map(|patches| patches >> coarser.min(31));
+        let cell_mm = self.scale_of_level_0.at_level(level).cell_mm();
+        let size = self
+            .size
+            .map(|patches| (patches / self.parts as i32) >> coarser.min(31));
         let (column, u) = place(east_mm / cell_mm, size[0])?;
         let (row, v) = place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
@@ -336,9 +405,9 @@ impl<'r> Terrain<'r> {
             let height = relative(low, base);
             return Some(Heights::Flat { base, height });
         }
-        let steps = match self.grid.is_resampled() {
-            true => vec![Step::Cells(INTERPOLATED_STEP)],
-            false => steps(unit, self.scale.height_cells(1.0)).collect(),
+        let steps = match self.step() {
+            Some(step) => vec![Step::Cells(step)],
+            None => steps(unit, self.scale.height_cells(1.0)).collect(),
         };
         Some(buffer.above(low, high, &steps))
     }
@@ -369,7 +438,8 @@ impl<'r> Terrain<'r> {
         buffer: &'b mut MaterialBuffer,
     ) -> Option<TileMaterials<'b>> {
         let materials = self.grid.materials().filter(|_| self.has(key))?;
-        Some(materials.tile((&self.grid, self.size), key, buffer))
+        let felt = (&self.grid, self.size, self.cells_of_grid());
+        Some(materials.tile(felt, key.index, buffer))
     }
 
     /// How often this thread asked for heights or classes that were not here yet
@@ -399,15 +469,44 @@ impl<'r> Terrain<'r> {
         of_classes.map_or(Ok(()), Raster::check_came)
     }
 
-    /// The height at a sample of this terrain's level, in cells, as the file has it at a level of
-    /// detail; NaN where there is none that can be felt.
-    pub(super) fn cells_at(&self, level: u8, column: u32, row: u32) -> f64 {
-        let whole = |index: u32| u64::from(index) << self.level.min(31);
-        let height = self.grid.height_seen(level, [whole(column), whole(row)]);
-        let cells = self.scale.height_cells(height);
+    /// The height of the ground at a felt sample, in the file's vertical unit, as the file has it at
+    /// a level of detail; NaN where there is none.
+    pub(crate) fn ground_seen(&self, level: u8, [column, row]: [u32; 2]) -> f64 {
+        let place = [column, row].map(|index| f64::from(index) * self.cells_of_grid());
+        self.grid.height_seen(level, place)
+    }
+
+    /// The same in cells, or the height of a ball's centre on flat ground there; NaN where there is
+    /// none that can be felt.
+    pub(super) fn cells_at(&self, level: u8, felt: [u32; 2]) -> f64 {
+        let height = self.ground_seen(level, felt);
+        self.within(self.scale.height_cells(height)) + self.tip_cells()
+    }
+
+    /// Has the samples between two places in felt cells read that are not here yet, both included.
+    pub(crate) fn prefetch(&self, from: [i32; 2], to: [i32; 2]) {
+        let parts = self.parts as i32;
+        let halo = self.ball.as_ref().map_or(0, |ball| ball.halo() as i32);
+        let from = from.map(|felt| felt.div_euclid(parts).saturating_sub(halo));
+        let to = to.map(|felt| felt.div_euclid(parts).saturating_add(halo));
+        self.grid.prefetch(self.level, from, to);
+    }
+
+    /// A height in cells; NaN where positions cannot say it.
+    fn within(&self, cells: f64) -> f64 {
         match cells.abs() <= f64::from(MAX_CELL) {
             true => cells,
             false => f64::NAN,
+        }
+    }
+
+    /// What heights are rounded to multiples of, cells, where they are other numbers than those of
+    /// the file.
+    const fn step(&self) -> Option<f64> {
+        match (&self.ball, self.grid.is_resampled()) {
+            (Some(_), _) => Some(CENTRE_STEP),
+            (None, true) => Some(INTERPOLATED_STEP),
+            (None, false) => None,
         }
     }
 
@@ -416,27 +515,55 @@ impl<'r> Terrain<'r> {
     fn read(&self, key: TileKey, heights: &mut [f64; POSTS * POSTS]) -> BinaryUnit {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
         let (west, south) = (first(key.index.col), first(key.index.row));
+        if let Some(ball) = &self.ball {
+            let (block, nodes) = self.block(ball, [west, south], POSTS);
+            for (height, centre) in heights.iter_mut().zip(ball.centres(&block, nodes)) {
+                *height = self.rounded(self.within(centre));
+            }
+            return BinaryUnit::ANY;
+        }
         let mut unit = BinaryUnit::ANY;
         for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
             self.grid.copy_row(self.level, row, west, line);
             for height in line {
                 unit = unit.with(*height);
-                let cells = self.scale.height_cells(*height);
                 // Where not all heights were read before, one may leave what can be said.
-                *height = match cells.abs() <= f64::from(MAX_CELL) {
-                    true => self.rounded(cells),
-                    false => f64::NAN,
-                };
+                *height = self.rounded(self.within(self.scale.height_cells(*height)));
             }
         }
         unit
     }
 
+    /// Samples of the level that a ball's nodes depend on, `side` of them each way from a felt sample
+    /// on, in felt cells, NaN in holes and off the data; and where the nodes are.
+    fn block(&self, ball: &Ball, first: [u32; 2], side: usize) -> (Block, Nodes) {
+        let ([west, south], samples, nodes) = ball.around(first, side);
+        let mut heights = vec![f64::NAN; samples * samples];
+        // West of the field there are no columns to ask for.
+        let beside = west.min(0).unsigned_abs() as usize;
+        for (row, line) in (south..).zip(heights.chunks_exact_mut(samples)) {
+            let (Ok(row), Some(line)) = (u32::try_from(row), line.get_mut(beside..)) else {
+                continue;
+            };
+            self.grid
+                .copy_row(self.level, row, west.max(0) as u32, line);
+            for height in line {
+                *height = self.within(self.scale.height_cells(*height));
+            }
+        }
+        let block = Block {
+            columns: samples,
+            rows: samples,
+            heights,
+        };
+        (block, nodes)
+    }
+
     /// A height in cells, as it goes to the device.
     fn rounded(&self, cells: f64) -> f64 {
-        match self.grid.is_resampled() {
-            true => (cells / INTERPOLATED_STEP).round() * INTERPOLATED_STEP,
-            false => cells,
+        match self.step() {
+            Some(step) => (cells / step).round() * step,
+            None => cells,
         }
     }
 
@@ -448,6 +575,20 @@ impl<'r> Terrain<'r> {
         };
         inside(key.index.col, self.size[0]) * inside(key.index.row, self.size[1])
     }
+}
+
+/// The ball that feels a grid at the scale of a level, if it is no point.
+fn ball(grid: &FeltGrid<'_>, scale: &Scale, level: u8) -> Result<Option<Ball>, TerrainError> {
+    let tip_mm = grid.tip_mm();
+    let cells = tip_mm / scale.cell_mm();
+    if !(0.0..=MOST_CELLS).contains(&cells) {
+        return Err(TerrainError::Tip {
+            tip_mm,
+            cells,
+            level,
+        });
+    }
+    Ok((cells > 0.0).then(|| Ball::new(cells, scale.cell_mm())))
 }
 
 /// The patch and the place in it of a coordinate in cells.

@@ -101,10 +101,12 @@ impl Terrain<'_> {
             let at = i64::from(first) + ((place as i64) << tile.shift);
             at.clamp(0, i64::from(last)) as u32
         };
-        let level = self.level().saturating_add(tile.shift);
+        // Its samples are so many cells of the ground apart.
+        let shift = tile.shift.saturating_sub(self.parts().ilog2() as u8);
+        let level = self.level().saturating_add(shift);
         let column = sample(tile.first.x, place[0], size[0]);
         let row = sample(tile.first.y, place[1], size[1]);
-        self.cells_at(level, column, row)
+        self.cells_at(level, [column, row])
     }
 
     /// A sample of the near tile: on its border the height that the wide one has there, so that the

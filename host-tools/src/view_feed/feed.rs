@@ -106,12 +106,12 @@ impl<'t> ViewFeed<'t> {
         let surroundings = Surroundings::new(&terrain, home_cells(&prepared.scene));
         let first = prepared.into_messages();
         Self {
+            tiles: Tiles::new(window, terrain.parts()),
             first: terrain.clone(),
             terrain,
             stands,
             standing: None,
             scene_due: None,
-            tiles: Tiles::new(window),
             surroundings,
             tick,
             queue: Queue::start(pipe, first, limit),
@@ -192,7 +192,7 @@ impl<'t> ViewFeed<'t> {
         // A view that the viewer never heard of leaves what is before it.
         let before = self.scene_due.as_ref();
         let all_keep = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
-        self.tiles.go_over(keeps_tiles);
+        self.tiles.go_over(keeps_tiles, picture.terrain.parts());
         self.terrain = picture.terrain.clone();
         let scene = Scene {
             keeps_tiles: all_keep,

@@ -11,6 +11,8 @@ use hapterra_view_stream::Tiles;
 #[derive(Debug, Default)]
 pub(super) struct HeldTiles {
     side: i32,
+    /// Felt cells a cell of the level: a tile is shown as the one of the level around it.
+    parts: i32,
     slots: BTreeMap<u32, TileIndex>,
     awaited: Option<TileIndex>,
     has_changed: bool,
@@ -18,26 +20,40 @@ pub(super) struct HeldTiles {
 
 impl HeldTiles {
     /// An empty window of `side` × `side` tiles.
-    pub(super) fn new(side: u8) -> Self {
+    pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {
+            parts: parts as i32,
             side: i32::from(side.max(1)),
             has_changed: true,
             ..Self::default()
         }
     }
 
-    /// A tile was sent: the slot that it takes.
-    pub(super) fn sent(&mut self, key: TileKey) -> u32 {
-        let slot = self.slot(key.index);
-        let before = self.slots.insert(slot, key.index);
-        self.has_changed |= before != Some(key.index);
-        slot
+    /// A felt tile was sent: the tile of the level that is shown for it, and the slot that this takes.
+    pub(super) fn sent(&mut self, key: TileKey) -> (u32, TileKey) {
+        let index = self.of_level(key.index);
+        let slot = self.slot(index);
+        let before = self.slots.insert(slot, index);
+        self.has_changed |= before != Some(index);
+        (slot, TileKey { index, ..key })
     }
 
     /// What the loop lacks now.
     pub(super) fn lacks(&mut self, tile: Option<TileIndex>) {
+        let tile = tile.map(|tile| self.of_level(tile));
         self.has_changed |= self.awaited != tile;
         self.awaited = tile;
+    }
+
+    /// Another view has felt cells of another size.
+    pub(super) fn go_over(&mut self, parts: u32) {
+        self.parts = parts as i32;
+    }
+
+    /// The tile of the level around a felt one.
+    fn of_level(&self, felt: TileIndex) -> TileIndex {
+        let [col, row] = [felt.col, felt.row].map(|index| index.div_euclid(self.parts.max(1)));
+        TileIndex::new(col, row)
     }
 
     /// The device begins with an empty window.
@@ -80,10 +96,10 @@ mod tests {
 
     #[test]
     fn a_tile_takes_the_place_of_the_one_in_its_slot() {
-        let mut held = HeldTiles::new(4);
+        let mut held = HeldTiles::new(4, 1);
         assert_eq!(held.take_change(), Some(Tiles::default()));
         let slots =
-            [(0, 0), (4, 0), (-4, 8), (1, 0)].map(|(c, r)| held.sent(TileKey::new(0, c, r)));
+            [(0, 0), (4, 0), (-4, 8), (1, 0)].map(|(c, r)| held.sent(TileKey::new(0, c, r)).0);
         assert_eq!(slots, [0, 0, 0, 1]);
         held.lacks(Some(TileIndex::new(2, 3)));
         let tiles = held.take_change().expect("it has changed");
@@ -94,5 +110,19 @@ mod tests {
         assert_eq!(held.take_change(), None);
         held.clear();
         assert_eq!(held.take_change().expect("empty").held, [[0; 2]; 0]);
+    }
+
+    /// A ball's tile is a part of one of the level.
+    #[test]
+    fn felt_tiles_are_shown_as_the_tile_around_them() {
+        let mut held = HeldTiles::new(4, 3);
+        for (col, row, slot, shown) in [(0, 0, 0, (0, 0)), (2, 5, 4, (0, 1)), (3, 3, 5, (1, 1))] {
+            let key = TileKey::new(1, shown.0, shown.1);
+            assert_eq!(held.sent(TileKey::new(1, col, row)), (slot, key));
+        }
+        held.lacks(Some(TileIndex::new(8, 0)));
+        let tiles = held.take_change().expect("it has changed");
+        assert_eq!(tiles.held, [[0, 0], [0, 1], [1, 1]]);
+        assert_eq!(tiles.awaited, [[2, 0]]);
     }
 }

@@ -77,6 +77,7 @@ impl<'t> Picture<'_, 't> {
             level: terrain.level(),
             cell_mm: level_0_mm,
             mm_per_unit: scale.height_mm_per_unit(),
+            tip_mm: terrain.grid().tip_mm(),
             home_mm: self.home_mm.unwrap_or(middle_mm),
             laid_mm: self.laid_mm.unwrap_or([0.0, 0.0, east_mm, north_mm]),
             ground_m_per_mm: terrain.grid().side_m().map(|side| side / level_0_mm),

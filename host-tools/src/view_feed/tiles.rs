@@ -32,10 +32,11 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Of a device with an empty window of `side` × `side` tiles.
-    pub(super) fn new(side: u8) -> Self {
+    /// Of a device with an empty window of `side` × `side` tiles, with so many felt cells a cell of
+    /// the level.
+    pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {
-            held: HeldTiles::new(side),
+            held: HeldTiles::new(side, parts),
             coming: None,
             detailed: HashSet::new(),
             untold: vec![],
@@ -61,10 +62,11 @@ impl Tiles {
 
     /// Another view is in force: with the tiles of the one before, or with none but those
     /// that were sent since the device took it.
-    pub(super) fn go_over(&mut self, keeps_tiles: bool) {
+    pub(super) fn go_over(&mut self, keeps_tiles: bool, parts: u32) {
         if !keeps_tiles {
             self.forget();
         }
+        self.held.go_over(parts);
         for key in self.coming.take().unwrap_or_default() {
             self.sent(key);
         }
@@ -77,7 +79,7 @@ impl Tiles {
     }
 
     fn sent(&mut self, key: TileKey) {
-        let slot = self.held.sent(key);
+        let (slot, key) = self.held.sent(key);
         self.untold.retain(|(other, _)| *other != slot);
         self.untold.push((slot, key));
     }
@@ -88,8 +90,10 @@ impl Tiles {
         let side = f64::from(TILE_CELLS) * f64::from(terrain.level()).exp2();
         let [col, row] = cells.map(|cells| (cells / side).floor() as i32);
         let key = TileKey::new(terrain.level(), col, row);
+        let felt = |index: i32| index.saturating_mul(terrain.parts() as i32);
+        let is_there = terrain.has(TileKey::new(key.level, felt(col), felt(row)));
         let has_room = self.detailed.len() < MOST_DETAILED;
-        if has_room && terrain.has(key) && self.detailed.insert(key) {
+        if has_room && is_there && self.detailed.insert(key) {
             self.untold.push((self.detailed.len() as u32, key));
         }
     }

@@ -151,7 +151,9 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
 fn what_run_recorded_is_felt_again_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, record) = (folder.text("hills.tif"), folder.text("run.csv"));
-    let words = ["run", &terrain, "--device", "native", "--record", &record];
+    let words = [
+        "run", &terrain, "--tip", "0", "--device", "native", "--record", &record,
+    ];
     folder.runs(
         &[
             &words[..],

@@ -349,7 +349,9 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
         ["hills.asc", "felt.csv", "commands", "again.csv"].map(|name| folder.text(name));
     for pan in ["", "at 4.0 pan 2 1\n"] {
         folder.write("commands", pan);
-        let words = ["run", &terrain, "--device", "native", "--record", &record];
+        let words = [
+            "run", &terrain, "--tip", "0", "--device", "native", "--record", &record,
+        ];
         let more = ["--seconds", "9", "--at", "13,56", "--exaggeration", "9"];
         folder.runs(&[&words[..], &more, &["--commands", &commands]].concat());
         folder.runs(&["replay", &terrain, &record, "-o", &again]);

@@ -20,6 +20,8 @@ pub(super) struct Ground {
     cell: f64,
     /// What a vertical unit of the file is.
     relief: f64,
+    /// Radius of the ball at the tip; 0 for a point.
+    pub(super) ball: f64,
     /// What a millimetre of the tip is, level and upright.
     pub(super) per_mm: f64,
     up_per_mm: f64,
@@ -58,6 +60,7 @@ impl Ground {
             level: scene.level,
             cell: scene.cell_mm * per_mm,
             relief: scene.mm_per_unit * per_mm,
+            ball: scene.tip_mm * per_mm,
             per_mm,
             up_per_mm: per_mm,
             near: laid.clamp(1e-3, NEAR_MM) * per_mm,
@@ -158,6 +161,7 @@ pub(super) mod tests {
             level: 0,
             cell_mm: 0.5,
             mm_per_unit: 0.01,
+            tip_mm: 0.0,
             home_mm: [40.0, 30.0, 12.0],
             laid_mm: [0.0, 0.0, 80.0, 80.0],
             ground_m_per_mm: Some(60.0),

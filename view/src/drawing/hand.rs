@@ -54,6 +54,14 @@ pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
             .with_radii([Radius::new_ui_points(width)]);
         log.standing(entity, "looks", &looks)
     };
+    let proxy = match ground.ball > 0.0 {
+        // Its radius comes with its places: views differ in it.
+        true => {
+            let looks = Points3D::update_fields().with_colors([PROXY]);
+            log.standing("hand/proxy", "looks", &looks)?
+        }
+        false => points("hand/proxy", PROXY, 8.0)?,
+    };
     let arrow = Arrows3D::update_fields()
         .with_colors([FORCE])
         .with_radii([Radius::new_scene_units((0.7 * ground.per_mm) as f32)]);
@@ -62,7 +70,7 @@ pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
         .with_labels(["HIP"])
         .with_show_labels(true);
     Ok(vec![
-        points("hand/proxy", PROXY, 8.0)?,
+        proxy,
         points("hand/hip", HIP, 7.0)?,
         log.standing("hand/hip", "name", &name)?,
         lines("hand/ray", RAY, 2.0)?,
@@ -76,6 +84,8 @@ pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
 struct Rows {
     times_s: Vec<f64>,
     proxies: Vec<[f32; 3]>,
+    /// Of the ball at the tip, where it is no point.
+    radii: Vec<Radius>,
     hips: Vec<[f32; 3]>,
     rays: Vec<[[f32; 3]; 2]>,
     forces: Vec<[f32; 3]>,
@@ -146,6 +156,10 @@ impl Rows {
         let (proxy, hip) = (ground.at(sample.proxy_mm), ground.at(sample.hip_mm));
         self.times_s.push(sample.t_s);
         self.proxies.push(proxy);
+        if ground.ball > 0.0 {
+            let radius = Radius::new_scene_units(ground.ball as f32);
+            self.radii.push(radius);
+        }
         self.hips.push(hip);
         // The loop looks for the surface between the proxy of the tick before and the HIP.
         let from = before.map_or(hip, |before| ground.at(before.proxy_mm));
@@ -157,8 +171,12 @@ impl Rows {
 
     fn entries(self, log: &Log) -> Result<[Entry; 4]> {
         let times = &self.times_s;
-        let points = |entity: &str, places: &[[f32; 3]]| {
+        let points = |entity: &str, places: &[[f32; 3]], radii: Vec<Radius>| {
             let points = Points3D::update_fields().with_positions(places.to_vec());
+            let points = match radii.is_empty() {
+                true => points,
+                false => points.with_radii(radii),
+            };
             log.happened(entity, times, points.columns_of_unit_batches()?)
         };
         let rays =
@@ -167,10 +185,43 @@ impl Rows {
             .with_origins(self.proxies.clone())
             .with_vectors(self.forces);
         Ok([
-            points("hand/proxy", &self.proxies)?,
-            points("hand/hip", &self.hips)?,
+            points("hand/proxy", &self.proxies, self.radii)?,
+            points("hand/hip", &self.hips, vec![])?,
             log.happened("hand/ray", times, rays.columns_of_unit_batches()?)?,
             log.happened("hand/force", times, arrows.columns_of_unit_batches()?)?,
         ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ground::tests::scene;
+    use super::*;
+
+    /// As large on the ground as it is in the hand, in each view.
+    #[test]
+    fn a_ball_is_drawn_in_its_size_and_a_point_as_a_dot() {
+        let sample = Sample {
+            t_s: 0.0,
+            hip_mm: [40.0, 30.0, 0.0],
+            proxy_mm: [40.0, 30.0, 0.0],
+            force_n: [0.0; 3],
+            ground_mm: 0.0,
+            contact: false,
+            cost: None,
+        };
+        let drawn = |tip_mm: f64, ground_m_per_mm: f64| {
+            let scene = hapterra_view_stream::Scene {
+                tip_mm,
+                ground_m_per_mm: Some(ground_m_per_mm),
+                ..scene()
+            };
+            let mut rows = Rows::default();
+            rows.push(&Ground::new(&scene), &sample, None);
+            rows.radii
+        };
+        assert_eq!(drawn(2.0, 60.0), [Radius::new_scene_units(120.0)]);
+        assert_eq!(drawn(2.0, 30.0), [Radius::new_scene_units(60.0)]);
+        assert_eq!(drawn(0.0, 60.0), []);
     }
 }

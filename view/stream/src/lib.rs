@@ -25,4 +25,4 @@ pub use message::{
 };
 
 /// Version of the stream. The first message holds it.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;

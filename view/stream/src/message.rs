@@ -56,6 +56,8 @@ pub struct Scene {
     pub cell_mm: f64,
     /// Millimetres of a vertical unit of the file.
     pub mm_per_unit: f64,
+    /// Radius of the ball whose centre the proxy is, mm; 0 for a point.
+    pub tip_mm: f64,
     /// The place under the tip in the arm's home pose, mm. The picture's origin.
     pub home_mm: [f64; 3],
     /// What is laid in front of the arm, from west, south to east, north, mm.

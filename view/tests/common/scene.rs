@@ -30,6 +30,7 @@ pub fn scene(is_live: bool) -> Message {
         level: 0,
         cell_mm: CELL_MM,
         mm_per_unit: 1.0 / METRES,
+        tip_mm: 0.0,
         home_mm: [0.5 * side, 0.5 * side, 20.0],
         laid_mm: [0.0, 0.0, side, side],
         ground_m_per_mm: Some(METRES),

@@ -25,6 +25,7 @@ impl Rendering {
             cell_mm: Some(cell_mm),
             cells: Some(cells),
             level: Some(merged("level", self.level, felt.level, &mut told)),
+            tip: Some(merged("tip", self.tip, felt.tip_mm, &mut told)),
             stiffness_n_per_mm: Some(merged(
                 "stiffness-n-per-mm",
                 self.stiffness_n_per_mm,

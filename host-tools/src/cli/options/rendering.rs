@@ -10,7 +10,11 @@ use crate::cli::failure::{Failure, OrHint};
 use crate::place::{Heights, suited_height};
 use crate::raster::Raster;
 use crate::replay::Rule;
-use crate::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use crate::terrain::{FeltCells, FeltGrid, MOST_TIP_CELLS, Scale, Terrain};
+
+/// Radius of the ball by which a hand feels the ground unless another is stated, mm: with a friction
+/// of 0.4 no ground that was tried holds it (docs/tip.md).
+const HAND_MM: f64 = 7.0;
 
 /// How the terrain feels.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -43,6 +47,12 @@ pub struct Rendering {
     /// that the encoders tell]
     #[arg(long)]
     pub level: Option<u8>,
+
+    /// Radius of the ball at the tip, hand millimetres: 2 or 2mm. The HIP is its centre; a level
+    /// is felt in which it is at most 8 cells large [default: run and demo 7, replay 0, a point;
+    /// with --level 0]
+    #[arg(long, value_name = "MM", value_parser = tip_mm, allow_negative_numbers = true)]
+    pub tip: Option<f64>,
 
     /// Stiffness of the surface [default: 0.5]
     #[arg(long, value_name = "N/MM")]
@@ -89,6 +99,13 @@ pub struct Rendering {
     /// Contact rule [default: swept]
     #[arg(long, value_enum)]
     pub contact: Option<Rule>,
+}
+
+/// A radius in millimetres, with or without the unit.
+fn tip_mm(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix("mm").unwrap_or(text).trim();
+    let radius = number.parse().ok().filter(|mm| (0.0..=100.0).contains(mm));
+    radius.ok_or_else(|| "a radius from 0 to 100 mm, as 2 or 2mm".to_owned())
 }
 
 /// Which normals the force follows.
@@ -155,18 +172,35 @@ impl Rendering {
     #[must_use]
     pub fn grid<'r>(&self, raster: &'r Raster, measured_at: Option<[f64; 2]>) -> FeltGrid<'r> {
         let cells = self.cells.unwrap_or_default();
-        match measured_at {
+        let grid = match measured_at {
             Some(ground) => FeltGrid::at(raster, cells, ground),
             None => FeltGrid::new(raster, cells),
-        }
+        };
+        grid.with_tip(self.tip_mm())
     }
 
-    /// The terrain at a scale.
+    /// Radius of the ball at the tip, hand millimetres; 0 for a point.
+    #[must_use]
+    pub fn tip_mm(&self) -> f64 {
+        self.tip.unwrap_or(0.0)
+    }
+
+    /// The same of an arm that a hand holds: a stated level is felt by a point.
+    #[must_use]
+    pub fn tip_of_hand_mm(&self) -> f64 {
+        let usual = if self.level.is_none() { HAND_MM } else { 0.0 };
+        self.tip.unwrap_or(usual)
+    }
+
+    /// The terrain at a scale; without a stated level the finest in which the tip is not too many
+    /// cells large.
     ///
     /// # Errors
     /// Heights or a size that positions cannot say, or a level too high.
     pub fn terrain<'r>(&self, grid: FeltGrid<'r>, scale: Scale) -> Result<Terrain<'r>, Failure> {
-        Ok(Terrain::over(grid, scale, self.level.unwrap_or(0))?)
+        let holds = |level: &u8| grid.tip_mm() / scale.at_level(*level).cell_mm() <= MOST_TIP_CELLS;
+        let level = self.level.or_else(|| (0..31).find(holds));
+        Ok(Terrain::over(grid, scale, level.unwrap_or(0))?)
     }
 
     /// The force law.

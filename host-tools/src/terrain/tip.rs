@@ -1,0 +1,372 @@
+//! A tip of finite radius: the ground as a ball's centre feels it.
+//!
+//! A ball that rests on a height field has its centre on another height field: at each place the
+//! highest of the ground under the ball plus the ball's own height there. So a point on this
+//! surface is a ball on the ground, and device and contact stay as they are. It is made on the
+//! host, of a block of samples with a halo of the radius, when a tile is made.
+//!
+//! Let `S` be the bilinear surface of the samples and `R` the radius. Then
+//!
+//! ```text
+//! centre(p) = max over |w| <= R of  S(p + w) + sqrt(R² − |w|²)
+//! ```
+//!
+//! A bilinear patch is straight along its grid lines and along every line parallel to them. Over a
+//! straight line of slope `m` at a distance `δ` the ball is a circle of radius `ρ = sqrt(R² − δ²)`,
+//! which rests on the line at `ρ m / sqrt(1 + m²)` uphill, at the height of the line below `p` plus
+//! `ρ sqrt(1 + m²)`. So the maximum along such a line is exact; that over the surface is taken
+//! along lines of both directions. Between two lines that are `d` apart the ball may rest higher, by
+//! at most `d² / 4R` on a plane; `d` is chosen so that this is at most 0.5 % of the radius.
+//!
+//! Between two nodes the centre's surface is interpolated, and wrong where it bends. So a ball has
+//! nodes that are a fraction of its radius apart, whatever the samples are: **felt cells**, of which
+//! a whole number makes a cell of the ground. Lengths below are in felt cells.
+
+use std::sync::Arc;
+
+/// Largest radius, cells of the ground's level. A larger ball is felt on a coarser level.
+pub const MOST_CELLS: f64 = 8.0;
+/// Felt cells in a radius, at least.
+pub(super) const FELT_CELLS: f64 = 32.0;
+/// A felt cell is not made smaller than this, hand millimetres: half an encoder's count.
+pub(super) const FINEST_MM: f64 = 1.0 / 64.0;
+/// What the ball may rest too low for want of a line, as a part of its radius.
+const SAG: f64 = 5e-3;
+
+/// A ball over a grid.
+#[derive(Clone, Debug)]
+pub(super) struct Ball {
+    /// Radius.
+    radius: f64,
+    /// Felt cells a cell of the ground.
+    parts: u32,
+    /// Samples around a block that its nodes depend on.
+    halo: usize,
+    /// Lines a cell of the ground.
+    lines: u32,
+    /// Heights of the ball over the nodes of its square, row by row; less than everything beside it.
+    caps: Arc<[f64]>,
+}
+
+/// Samples of a rectangle, row by row from the south-west.
+pub(super) struct Block {
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+    /// NaN where there is no data.
+    pub(super) heights: Vec<f64>,
+}
+
+/// Nodes of a square within a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nodes {
+    /// The south-western one, from the block's first sample.
+    pub(super) first: [usize; 2],
+    /// Nodes along a side.
+    pub(super) side: usize,
+}
+
+impl Nodes {
+    /// Those within `reach` of a place along an axis, as the first and the one after the last.
+    fn near(&self, axis: usize, place: f64, reach: f64) -> (usize, usize) {
+        let node = |at: f64| {
+            let node = at - self.first[axis] as f64;
+            node.clamp(0.0, self.side as f64) as usize
+        };
+        (
+            node((place - reach).ceil()),
+            node((place + reach).floor() + 1.0),
+        )
+    }
+}
+
+impl Ball {
+    /// A ball of a radius in cells of the ground, positive and at most [`MOST_CELLS`]; a cell is
+    /// `cell_mm` large in the hand.
+    pub(super) fn new(cells: f64, cell_mm: f64) -> Self {
+        let most = (cell_mm / FINEST_MM).floor().max(1.0);
+        let parts = (FELT_CELLS / cells).ceil().clamp(1.0, most) as u32;
+        let radius = cells * f64::from(parts);
+        let reach = radius.floor() as i32;
+        let cap = |(x, y): (i32, i32)| {
+            let squared = radius * radius - f64::from(x).powi(2) - f64::from(y).powi(2);
+            if squared >= 0.0 {
+                squared.sqrt()
+            } else {
+                f64::NEG_INFINITY
+            }
+        };
+        let places = (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| (x, y)));
+        let lines = 1.0 / ((4.0 * SAG).sqrt() * cells);
+        Self {
+            radius,
+            parts,
+            halo: cells.ceil() as usize + 1,
+            lines: lines.ceil().clamp(1.0, 64.0) as u32,
+            caps: places.map(cap).collect(),
+        }
+    }
+
+    /// Felt cells a cell of the ground, along a side.
+    pub(super) const fn parts(&self) -> u32 {
+        self.parts
+    }
+
+    /// Samples around a block that its nodes depend on.
+    pub(super) const fn halo(&self) -> usize {
+        self.halo
+    }
+
+    /// Radius, felt cells.
+    pub(super) const fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// The samples that nodes depend on, `side` of them along each axis from a felt node on: the
+    /// first sample, which may lie beside the field, how many along a side, and where the nodes are.
+    pub(super) fn around(&self, first: [u32; 2], side: usize) -> ([i64; 2], usize, Nodes) {
+        let (parts, halo) = (i64::from(self.parts), self.halo as i64);
+        let from = first.map(|node| i64::from(node) / parts - halo);
+        let nodes = Nodes {
+            first: [0, 1].map(|axis| (i64::from(first[axis]) - from[axis] * parts) as usize),
+            side,
+        };
+        // The nodes begin within the first cell after the halo.
+        let cells = (side - 1).div_ceil(self.parts as usize) + 1;
+        (from, cells + 1 + 2 * self.halo, nodes)
+    }
+
+    /// The heights of the ball's centre over nodes of a block, row by row. A node on ground without
+    /// data has none, and only patches with four samples bear the ball.
+    pub(super) fn centres(&self, block: &Block, nodes: Nodes) -> Vec<f64> {
+        let bearing = Bearing::of(block);
+        let mut centres = vec![f64::NEG_INFINITY; nodes.side * nodes.side];
+        self.on_samples((block, &bearing), nodes, &mut centres);
+        for axis in [Axis::North, Axis::East] {
+            self.on_lines((block, &bearing), axis, nodes, &mut centres);
+        }
+        for (at, centre) in centres.iter_mut().enumerate() {
+            let place = [
+                nodes.first[0] + at % nodes.side,
+                nodes.first[1] + at / nodes.side,
+            ];
+            let own = block.between(place, self.parts as usize);
+            // Also where it is NaN.
+            *centre = if own.is_nan() {
+                own
+            } else {
+                centre.max(own + self.radius)
+            };
+        }
+        centres
+    }
+
+    /// Where the ball rests on a sample.
+    fn on_samples(&self, (block, bearing): (&Block, &Bearing), nodes: Nodes, centres: &mut [f64]) {
+        let (parts, reach) = (self.parts as usize, self.radius.floor());
+        let width = 2 * reach as usize + 1;
+        for (at, sample) in bearing.nodes.iter().enumerate() {
+            if *sample == f64::NEG_INFINITY || bearing.is_between_stretches(block, at) {
+                continue;
+            }
+            let place = [at % bearing.columns, at / bearing.columns].map(|sample| sample * parts);
+            let near = |axis: usize| nodes.near(axis, place[axis] as f64, reach);
+            let ((west, east), (south, north)) = (near(0), near(1));
+            let beside =
+                |axis: usize, node: usize| nodes.first[axis] + node + reach as usize - place[axis];
+            for row in south..north {
+                if west >= east {
+                    break;
+                }
+                let line = &mut centres[row * nodes.side..][west..east];
+                let caps = &self.caps[beside(1, row) * width + beside(0, west)..];
+                for (centre, cap) in line.iter_mut().zip(caps) {
+                    let height = sample + cap;
+                    *centre = if height > *centre { height } else { *centre };
+                }
+            }
+        }
+    }
+
+    /// Where the ball rests within a stretch of a line along an axis.
+    fn on_lines(
+        &self,
+        (block, bearing): (&Block, &Bearing),
+        axis: Axis,
+        nodes: Nodes,
+        centres: &mut [f64],
+    ) {
+        let (across, along) = axis.sizes(block);
+        let parts = f64::from(self.parts);
+        for part in 0..self.lines {
+            let off = f64::from(part) / f64::from(self.lines);
+            for line in 0..across - usize::from(part > 0) {
+                let place = (line as f64 + off) * parts;
+                let (first, end) = nodes.near(axis.across(), place, self.radius);
+                for start in 0..along - 1 {
+                    if first >= end || !bearing.bears(axis, line, start, part > 0) {
+                        continue;
+                    }
+                    let at = |step: usize| {
+                        let height = |line| block.heights[axis.at(block, line, start + step)];
+                        match part {
+                            0 => height(line),
+                            _ => height(line) * (1.0 - off) + height(line + 1) * off,
+                        }
+                    };
+                    let (low, slope) = (at(0), (at(1) - at(0)) / parts);
+                    let steep = (1.0 + slope * slope).sqrt();
+                    let sine = slope / steep;
+                    for beside in first..end {
+                        let apart = (nodes.first[axis.across()] + beside) as f64 - place;
+                        // The ball's circle over the line.
+                        let circle = (self.radius * self.radius - apart * apart).max(0.0).sqrt();
+                        let middle = (start as f64 + 0.5) * parts - circle * sine;
+                        // Also where rounding puts a node beside both of its stretches.
+                        let half = 0.5 * parts + 1e-9;
+                        let (from, to) = nodes.near(axis.along(), middle, half);
+                        for node in from..to {
+                            let run =
+                                (nodes.first[axis.along()] + node) as f64 - start as f64 * parts;
+                            let height = low + slope * run + circle * steep;
+                            let centre = &mut centres[axis.node(nodes.side, beside, node)];
+                            *centre = if height > *centre { height } else { *centre };
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Which way a line runs.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Axis {
+    East,
+    North,
+}
+
+impl Axis {
+    /// Samples across lines of this axis, and along them.
+    const fn sizes(self, block: &Block) -> (usize, usize) {
+        match self {
+            Self::North => (block.columns, block.rows),
+            Self::East => (block.rows, block.columns),
+        }
+    }
+
+    const fn at(self, block: &Block, across: usize, along: usize) -> usize {
+        match self {
+            Self::North => block.at(across, along),
+            Self::East => block.at(along, across),
+        }
+    }
+
+    /// The axis of its nodes across lines: 0 east, 1 north.
+    const fn across(self) -> usize {
+        1 - self.along()
+    }
+
+    /// The axis of its nodes along lines.
+    const fn along(self) -> usize {
+        match self {
+            Self::East => 0,
+            Self::North => 1,
+        }
+    }
+
+    const fn node(self, side: usize, across: usize, along: usize) -> usize {
+        match self {
+            Self::North => along * side + across,
+            Self::East => across * side + along,
+        }
+    }
+}
+
+impl Block {
+    const fn at(&self, column: usize, row: usize) -> usize {
+        row * self.columns + column
+    }
+
+    /// The bilinear height at a node, in parts of a cell from the first sample; NaN in a hole.
+    fn between(&self, node: [usize; 2], parts: usize) -> f64 {
+        let [(column, east), (row, north)] = node.map(|node| (node / parts, node % parts));
+        let mix = |from: usize, to: usize, share: usize, at: &dyn Fn(usize) -> f64| match share {
+            // The next sample has no weight, also where it is a hole.
+            0 => at(from),
+            _ => {
+                let share = share as f64 / parts as f64;
+                at(from) * (1.0 - share) + at(to) * share
+            }
+        };
+        mix(row, row + 1, north, &|row| {
+            mix(column, column + 1, east, &|column| {
+                self.heights[self.at(column, row)]
+            })
+        })
+    }
+}
+
+/// What of a block bears a ball.
+struct Bearing {
+    columns: usize,
+    /// Whether the patch north-east of a sample has four samples.
+    patches: Vec<bool>,
+    /// Samples of such patches; less than everything where a sample is of none.
+    nodes: Vec<f64>,
+}
+
+impl Bearing {
+    fn of(block: &Block) -> Self {
+        let mut bearing = Self {
+            columns: block.columns,
+            patches: vec![false; block.heights.len()],
+            nodes: vec![f64::NEG_INFINITY; block.heights.len()],
+        };
+        for row in 0..block.rows.saturating_sub(1) {
+            for column in 0..block.columns.saturating_sub(1) {
+                let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
+                let corners = corners.map(|(x, y)| block.at(column + x, row + y));
+                if corners.iter().any(|at| block.heights[*at].is_nan()) {
+                    continue;
+                }
+                bearing.patches[corners[0]] = true;
+                for at in corners {
+                    bearing.nodes[at] = block.heights[at];
+                }
+            }
+        }
+        bearing
+    }
+
+    /// Returns true if a ball that touches a sample touches the ground beside it, too: along an axis
+    /// the ground turns up there, or goes straight on.
+    fn is_between_stretches(&self, block: &Block, at: usize) -> bool {
+        let (column, row) = (at % block.columns, at / block.columns);
+        [Axis::East, Axis::North].into_iter().any(|axis| {
+            let (line, place) = match axis {
+                Axis::East => (row, column),
+                Axis::North => (column, row),
+            };
+            let bears = |start: usize| self.bears(axis, line, start, false);
+            let last = axis.sizes(block).1 - 1;
+            if place == 0 || place == last || !bears(place - 1) || !bears(place) {
+                return false;
+            }
+            let height = |place: usize| block.heights[axis.at(block, line, place)];
+            height(place + 1) - height(place) >= height(place) - height(place - 1)
+        })
+    }
+
+    /// Returns true if a stretch of a line is in a patch with four samples, or on its edge.
+    fn bears(&self, axis: Axis, line: usize, start: usize, within: bool) -> bool {
+        let patch = |line: usize| match axis {
+            Axis::North => self.patches[start * self.columns + line],
+            Axis::East => self.patches[line * self.columns + start],
+        };
+        patch(line) || (!within && line > 0 && patch(line - 1))
+    }
+}
+
+#[cfg(test)]
+#[path = "tip_tests.rs"]
+mod tests;
