@@ -141,8 +141,8 @@ impl Rulings<'_> {
         ];
         (1..2 * HALF).find_map(|look| {
             let (start, first, end, last) = halves[usize::from(look > HALF)];
-            let gone = (look - HALF * u8::from(look > HALF)) as f32;
-            let (before, after) = ((HALF as f32 - gone) * first, gone * last);
+            let gone = f32::from(look - HALF * u8::from(look > HALF));
+            let (before, after) = ((f32::from(HALF) - gone) * first, gone * last);
             let v = start + (end - start) * (after / (before + after));
             let ruling = (!self.is_spent()).then(|| self.look_at(v))?;
             self.is_farther(&ruling, from).then_some(ruling)

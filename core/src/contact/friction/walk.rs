@@ -124,7 +124,7 @@ impl Walk {
             if excess.is_held() || self.ways == WAYS {
                 return here.rests();
             }
-            let newton = match self.inside > ACROSS && self.inside % 2 == 0 {
+            let newton = match self.inside > ACROSS && self.inside.is_multiple_of(2) {
                 true => newton(&here, view),
                 false => None,
             };
