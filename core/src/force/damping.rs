@@ -12,6 +12,9 @@ use crate::scalar::{larger, smaller};
 /// times the part of a cell on which the force turns ([`super::shading`]): this much at 23°,
 /// twice as much at 45°, the most.
 const EDGE_GIVES: f32 = 0.1;
+/// A motion across the force that is slower is not damped, mm/s: a hand that rests and an arm that
+/// hums are. They create little, and damping that comes late would shake them.
+const SLOW_MM_S: f32 = 30.0;
 /// So much more may have been created before it is turned less, mJ.
 const LEAST_MJ: f32 = 0.1;
 
@@ -136,7 +139,7 @@ impl Damper {
         if !share.is_finite() {
             return spring_n;
         }
-        let across_mm_s = velocity_mm_s - spring_n * share;
+        let across_mm_s = beyond(velocity_mm_s - spring_n * share, SLOW_MM_S);
         let mut takes = self.controller.as_ref().map_or_else(Takes::default, |it| {
             it.damping_ns_per_mm(&Motion {
                 along,
@@ -153,6 +156,12 @@ impl Damper {
         let most_n = smaller(2.0 * spring_n.length(), self.law.max_force_n);
         clamp_length(along_n - across_mm_s * takes.across, most_n)
     }
+}
+
+/// What of a vector is beyond a length; nothing of one that is no number.
+fn beyond(v: Vec3, length: f32) -> Vec3 {
+    let share = 1.0 - length / v.length();
+    if share > 0.0 { v * share } else { Vec3::ZERO }
 }
 
 #[cfg(test)]

@@ -23,6 +23,8 @@ pub(super) const MOST_MJ: f32 = 2.0;
 /// Most damping, as ticks of the stiffness, besides the latency. What the velocity is off by,
 /// some 0.1 of a count a tick, makes a force of so many times the spring's for 0.1 of a count.
 const MOST_TICKS: f32 = 2.0;
+/// The same across the force: an even motion creates what half of it takes.
+const MOST_TICKS_ACROSS: f32 = 1.0;
 /// Below this share of the force hardly any leaves the guard, and damping is not scaled up to it.
 const LEAST_SHARE: f32 = 1e-4;
 /// Forces kept: those on their way, the one that acts and the one before it. A power of two.
@@ -213,18 +215,20 @@ impl Passivity {
     /// created when it has acted for a tick: along that force, and across it where damping along it
     /// cannot take all, as where the tip moves round a peak or a point that friction holds.
     pub(super) fn damping_ns_per_mm(&self, motion: &Motion) -> Takes {
-        let most = (MOST_TICKS * self.tick_s + self.latency_s) * self.stiffness_n_per_mm;
         // No number where nothing moves: then there is nothing to take from.
-        let takes = |mj: f32, squared: f32| match mj / (squared * self.tick_s) {
-            takes if takes < most => takes,
-            _ => most,
+        let takes = |mj: f32, squared: f32, ticks: f32| {
+            let most = (ticks * self.tick_s + self.latency_s) * self.stiffness_n_per_mm;
+            match mj / (squared * self.tick_s) {
+                takes if takes < most => takes,
+                _ => most,
+            }
         };
         let created_mj = within(self.coming_mj + motion.along * self.tick_s);
-        let along = takes(created_mj, motion.along_squared);
+        let along = takes(created_mj, motion.along_squared, MOST_TICKS);
         let left_mj = within(created_mj - along * motion.along_squared * self.tick_s);
         Takes {
             along,
-            across: takes(left_mj, motion.across_squared),
+            across: takes(left_mj, motion.across_squared, MOST_TICKS_ACROSS),
         }
     }
 }
