@@ -12,7 +12,7 @@ use hapterra_core::scene::{Sample, Scene, Source};
 use crate::heights::Unread;
 use crate::scale::Scale;
 use crate::surface::{Surface, SurfaceError};
-use crate::terrain::{NoTile, Terrain};
+use crate::terrain::{NoTile, Terrain, TerrainError};
 use crate::tick_loop::TickLoop;
 
 /// Ticks in which a force comes in again after a change, at most, at every rate.
@@ -76,6 +76,9 @@ pub enum ContactError {
     /// The surface on this terrain.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
+    /// The heights of the terrain.
+    #[error(transparent)]
+    Terrain(#[from] TerrainError),
     /// The terrain has a material that the surface has not.
     #[error(
         "the terrain has material {found}, and the surface {count}, from 0 on: give it more, or the terrain less"
@@ -259,6 +262,7 @@ impl Contact {
 /// A surface on a terrain, as the loop takes it.
 fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
     let cell_mm = Scale::cell_mm(terrain.scale()) as f32;
+    terrain.check_heights()?;
     surface.check_cells(cell_mm)?;
     let last = terrain.last_material();
     let count = surface.table().map_or(1, |table| table.materials().len());

@@ -177,7 +177,7 @@ impl Terrain {
             order,
         };
         let (range, step) = survey(&array);
-        let terrain = Self {
+        Ok(Self {
             heights: Arc::new(array),
             columns,
             rows,
@@ -185,8 +185,7 @@ impl Terrain {
             range,
             step,
             materials: None,
-        };
-        terrain.checked()
+        })
     }
 
     /// A terrain of rows of the same length, each from west to east.
@@ -256,7 +255,7 @@ impl Terrain {
     /// [`TerrainError`].
     pub fn with_height_scale(self, mm_per_unit: f64) -> Result<Self, TerrainError> {
         let scale = Scale::new(self.scale.cell_mm(), mm_per_unit)?;
-        Self { scale, ..self }.checked()
+        Ok(Self { scale, ..self })
     }
 
     /// The same ground with a material for each sample: an index of the surface's table
@@ -395,7 +394,9 @@ impl Terrain {
         Ok(())
     }
 
-    fn checked(self) -> Result<Self, TerrainError> {
+    /// Checks that the heights can be touched at the scale; those of a callback are checked tile by
+    /// tile.
+    pub(crate) fn check_heights(&self) -> Result<(), TerrainError> {
         let cell_mm = self.scale.cell_mm();
         for height in self.range.into_iter().flatten() {
             let cells = self.scale.height_cells(height);
@@ -409,7 +410,7 @@ impl Terrain {
                 return Err(TerrainError::Step { column, row, cells });
             }
         }
-        Ok(self)
+        Ok(())
     }
 }
 

@@ -256,7 +256,12 @@ fn parameters_out_of_bounds_are_named() {
 fn bad_terrains_are_errors() {
     let of = |columns, rows, cell_mm, heights: &[f64]| {
         let terrain = Terrain::from_slice(columns, rows, cell_mm, RowOrder::SouthFirst, heights);
-        terrain.expect_err("is refused").to_string()
+        let made = terrain.map_err(|error| error.to_string());
+        let made = made.map(|it| Contact::new(it, Surface::default()));
+        match made {
+            Err(error) => error,
+            Ok(contact) => contact.err().expect("is refused").to_string(),
+        }
     };
     assert!(of(1, 4, 1.0, &[0.0; 4]).contains("1 × 4 samples"));
     assert!(of(2, 3, 1.0, &[0.0; 5]).contains("5 samples for 2 columns and 3 rows"));
@@ -270,6 +275,9 @@ fn bad_terrains_are_errors() {
         error.to_string(),
         "row 1 has 2 samples and row 0 has 3: make all rows as long"
     );
+    let metres = Terrain::from_fn(3, 3, 0.1, |x, _| x as i16 * 2000).expect("a terrain");
+    let metres = metres.with_height_scale(0.01).expect("a scale");
+    assert!(Contact::new(metres, Surface::default()).is_ok());
     let none: [[f64; 0]; 0] = [];
     assert!(Terrain::from_rows(1.0, RowOrder::NorthFirst, &none).is_err());
 }
