@@ -10,3 +10,6 @@ pub mod memory;
 pub mod status;
 pub mod surface;
 pub mod terrain;
+
+#[cfg(test)]
+mod tests;

@@ -64,7 +64,7 @@ pub struct HapterraSurface {
 }
 
 impl HapterraSurface {
-    fn of(law: &ForceLaw) -> Self {
+    pub(crate) fn of(law: &ForceLaw) -> Self {
         Self {
             stiffness_n_per_mm: law.stiffness_n_per_mm,
             max_force_n: law.max_force_n,
@@ -88,7 +88,7 @@ impl HapterraSurface {
         }
     }
 
-    fn law(&self) -> Result<ForceLaw, Failure> {
+    pub(crate) fn law(&self) -> Result<ForceLaw, Failure> {
         let unknown = |what: &str, number: u32, known: &str| {
             let message = format!("{what} is {number}: give {known}");
             Failure::new(HapterraStatus::Choice, message)
