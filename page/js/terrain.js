@@ -27,7 +27,7 @@ export function fit(raw) {
   const mmPerUnit = trueMm === null ? UNKNOWN_RELIEF_MM / relief : trueMm * times;
   return {
     name: raw.name,
-    of: [raw.nx, raw.ny],
+    of: raw.of ?? [raw.nx, raw.ny],
     nx,
     ny,
     cellMm,
@@ -100,7 +100,7 @@ function range_m(x, y, seed) {
     reach *= 0.47;
     scale *= 2.03;
   }
-  return 400 + 1500 * sum ** 1.5;
+  return 300 + 640 * sum ** 1.35;
 }
 
 /** Even noise from −1 to 1 (gradients on a grid, Perlin's way). */

@@ -18,6 +18,8 @@ export function product(a, b) {
   return out;
 }
 
+export const AS_IS = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+
 /** Puts a thing along the z axis at `at`, along `axis`, `wide` times as wide and `long` times as long. */
 export function placed(at, axis, wide, long) {
   const z = unit(axis);
@@ -28,9 +30,9 @@ export function placed(at, axis, wide, long) {
 
 /** Looks at `centre` from a distance; angles in radians, `yaw` 0 looks north. */
 export class Camera {
-  yaw = -0.35;
-  pitch = 0.72;
-  distance = 420;
+  yaw = -0.28;
+  pitch = 0.66;
+  distance = 465;
   centre = [0, 0, 0];
   #tan = Math.tan(0.3);
 

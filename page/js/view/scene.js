@@ -1,22 +1,27 @@
 // The picture: ground with its light, pen, proxy, force.
 
 import { SUN, lit } from "./light.js";
-import { Camera, add, length, placed, times } from "./matrix.js";
+import { AS_IS, Camera, add, length, placed, times } from "./matrix.js";
 import { GROUND, THING, TRAIL } from "./shaders.js";
 import { BALL, PEN, POINT, SHAFT, sides } from "./shapes.js";
 
 /** Vertices along a side of the ground's mesh, at most. */
-const MAX_MESH = 400;
+const MAX_MESH = 320;
+/** A picture that takes longer than this, ms, is drawn with fewer pixels, down to a part of them. */
+const SLOW_MS = 70;
+const LEAST_PIXELS = 0.5;
 /** The block under the lowest sample, mm. */
 const BLOCK_MM = 14;
 /** Length of the arrow for a newton, mm. */
 const ARROW_MM = 14;
 const TRAIL_POINTS = 240;
-const COLOURS = { proxy: [1, 0.5, 0.12, 1], hip: [0.25, 0.65, 1, 0.75], force: [1, 0.85, 0.2, 1], pen: [0.82, 0.85, 0.9, 1], block: [0.37, 0.33, 0.31, 1], scale: [0.9, 0.93, 0.96, 1] };
+const COLOURS = { proxy: [1, 0.5, 0.12, 1], hip: [0.25, 0.65, 1, 1], force: [1, 0.85, 0.2, 1], pen: [0.82, 0.85, 0.9, 1], block: [0.37, 0.33, 0.31, 1], scale: [0.9, 0.93, 0.96, 1] };
 
 export class Scene {
   camera = new Camera();
   #trail = [];
+  #pixels = Math.min(2, devicePixelRatio);
+  #last = 0;
 
   /** Throws where the browser has no WebGL 2. */
   constructor(canvas) {
@@ -59,13 +64,13 @@ export class Scene {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
     this.shapes.SIDES = shape(gl, sides(drawn, -BLOCK_MM));
     this.size = [(drawn.nx - 1) * drawn.cellMm, (drawn.ny - 1) * drawn.cellMm];
-    this.contour = contour(terrain);
+    this.contour = Math.max(0.5, terrain.topMm / 10);
   }
 
   /** Draws what is touched: `arm`, `proxy`, `force` as in touch.js; `scaleMm`, how long the bar is. */
   draw({ arm, proxy, force, state }, scaleMm) {
     const { gl, camera, canvas } = this;
-    const ratio = Math.min(2, devicePixelRatio);
+    const ratio = this.#ratio();
     const [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio].map(Math.round);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     gl.viewport(0, 0, width, height);
@@ -74,13 +79,21 @@ export class Scene {
     camera.look(width / Math.max(1, height));
     this.#drawGround(proxy);
     this.#use(this.thing, { camera: camera.matrix, sun: SUN });
-    this.#put("SIDES", placed([0, 0, 0], [0, 0, 1], 1, 1), COLOURS.block, 1, true);
+    this.#put("SIDES", AS_IS, COLOURS.block, 1);
     this.#drawScale(scaleMm);
     const pen = [0.25, -0.35, 1];
     this.#put("PEN", placed(add(proxy, times(pen, 1.6)), pen, 2.6, 62), COLOURS.pen);
     this.#put("BALL", placed(proxy, [0, 0, 1], 2.2, 2.2), COLOURS.proxy);
     if (state !== "free") this.#drawForce(arm.at, proxy, force);
     this.#drawTrail(proxy, state, ratio);
+  }
+
+  /** Pixels of the picture for one of the page: fewer from frame to frame while they take too long. */
+  #ratio() {
+    const took = performance.now() - this.#last;
+    this.#last += took;
+    if (took > SLOW_MS && took < 2000) this.#pixels = Math.max(LEAST_PIXELS, this.#pixels * 0.93);
+    return this.#pixels;
   }
 
   #drawGround(proxy) {
@@ -90,20 +103,19 @@ export class Scene {
     gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
   }
 
-  /** The HIP inside the ground, seen through it, and the force as an arrow. */
+  /** The HIP inside the ground and the force as an arrow: in front of all else. */
   #drawForce(hip, proxy, force) {
     const gl = this.gl;
     const size = length(force);
-    gl.disable(gl.DEPTH_TEST);
-    gl.enable(gl.BLEND);
-    this.#put("BALL", placed(hip, [0, 0, 1], 1.5, 1.5), COLOURS.hip);
-    gl.disable(gl.BLEND);
-    gl.enable(gl.DEPTH_TEST);
-    if (size < 0.02) return;
     const reach = ARROW_MM * size;
     const head = Math.min(6, reach * 0.5);
-    this.#put("SHAFT", placed(proxy, force, 2.4, reach - head), COLOURS.force);
-    this.#put("POINT", placed(add(proxy, times(force, (reach - head) / size)), force, 2.6, head), COLOURS.force);
+    gl.depthRange(0, 0.05);
+    this.#put("BALL", placed(hip, [0, 0, 1], 1.5, 1.5), COLOURS.hip);
+    if (size > 0.02) {
+      this.#put("SHAFT", placed(proxy, force, 2.4, reach - head), COLOURS.force);
+      this.#put("POINT", placed(add(proxy, times(force, (reach - head) / size)), force, 2.6, head), COLOURS.force);
+    }
+    gl.depthRange(0, 1);
   }
 
   /** A bar along the front edge. */
@@ -143,11 +155,6 @@ export class Scene {
     gl.bindVertexArray(array);
     gl.drawArrays(gl.TRIANGLES, 0, count);
   }
-}
-
-/** Millimetres from contour to contour: some ten of them. */
-function contour({ topMm }) {
-  return Math.max(0.5, topMm / 10);
 }
 
 function set(gl, uniform, value) {

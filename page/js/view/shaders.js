@@ -30,7 +30,7 @@ in vec3 place;
 in vec2 across;
 out vec4 colour;
 vec3 tint(float share) {
-  vec3 ramp[5] = vec3[](vec3(.20, .33, .27), vec3(.43, .49, .31), vec3(.66, .55, .38), vec3(.55, .45, .41), vec3(.97, .96, .94));
+  vec3 ramp[5] = vec3[](vec3(.19, .37, .30), vec3(.42, .52, .30), vec3(.74, .62, .40), vec3(.60, .48, .42), vec3(.97, .96, .94));
   float at = clamp(share, 0.0, 1.0) * 3.999;
   return mix(ramp[int(at)], ramp[int(at) + 1], smoothstep(0.0, 1.0, fract(at)));
 }
@@ -45,7 +45,7 @@ void main() {
   base *= 1.0 - 0.16 * (1.0 - smoothstep(0.4, 1.4, line));
   float light = texel.b;
   float direct = max(dot(normal, normalize(sun)), 0.0);
-  vec3 lit = base * (vec3(1.0, .93, .80) * 1.35 * direct * smoothstep(.25, .85, light) + vec3(.42, .52, .66) * (0.25 + 0.45 * light));
+  vec3 lit = base * (vec3(1.0, .93, .80) * 1.35 * direct * smoothstep(.25, .85, light) + vec3(.50, .58, .70) * (0.34 + 0.5 * light));
   // The pen's own shadow says how far above the ground it is.
   float above = max(proxy.z - place.z, 0.0);
   float spot = exp(-dot(place.xy - proxy.xy, place.xy - proxy.xy) / (4.0 + above * above * 0.4));
@@ -78,7 +78,7 @@ in float height;
 out vec4 colour;
 void main() {
   float light = 0.55 + 0.45 * dot(normalize(turned), normalize(sun));
-  float layer = 1.0 - strata * 0.16 * step(0.5, fract(height / 5.0));
+  float layer = 1.0 - strata * 0.07 * step(0.5, fract(height / 7.0));
   colour = vec4(tint.rgb * (0.45 + 0.75 * light) * layer, tint.a);
 }`,
 ];
