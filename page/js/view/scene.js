@@ -82,8 +82,8 @@ export class Scene {
     this.#put("SIDES", AS_IS, COLOURS.block, 1);
     this.#drawScale(scaleMm);
     const pen = [0.25, -0.35, 1];
-    this.#put("PEN", placed(add(proxy, times(pen, 1.6)), pen, 2.6, 62), COLOURS.pen);
-    this.#put("BALL", placed(proxy, [0, 0, 1], 2.2, 2.2), COLOURS.proxy);
+    this.#put("PEN", placed(add(proxy, times(pen, 1.6)), pen, 3.2, 62), COLOURS.pen);
+    this.#put("BALL", placed(proxy, [0, 0, 1], 2.6, 2.6), COLOURS.proxy);
     if (state !== "free") this.#drawForce(arm.at, proxy, force);
     this.#drawTrail(proxy, state, ratio);
   }
