@@ -5,10 +5,12 @@ import { AS_IS, Camera, add, length, placed, times } from "./matrix.js";
 import { GROUND, THING, TRAIL } from "./shaders.js";
 import { BALL, PEN, POINT, SHAFT, sides } from "./shapes.js";
 
-/** Vertices along a side of the ground's mesh, at most. */
+/** Vertices along a side of the ground's mesh, at most; fewer where the machine is slow. */
 const MAX_MESH = 320;
-/** A picture that takes longer than this, ms, is drawn with fewer pixels, down to a part of them. */
-const SLOW_MS = 70;
+const LEAST_MESH = 80;
+/** After so many frames that took longer than this, ms, the picture is made coarser. */
+const SLOW_MS = 60;
+const SLOW_FRAMES = 4;
 const LEAST_PIXELS = 0.5;
 /** The block under the lowest sample, mm. */
 const BLOCK_MM = 14;
@@ -21,7 +23,9 @@ export class Scene {
   camera = new Camera();
   #trail = [];
   #pixels = Math.min(2, devicePixelRatio);
+  #side = MAX_MESH;
   #last = 0;
+  #slow = 0;
 
   /** Throws where the browser has no WebGL 2. */
   constructor(canvas) {
@@ -56,21 +60,28 @@ export class Scene {
     texture(0, gl.NEAREST, gl.R32F, gl.RED, gl.FLOAT, drawn.heights);
     texture(1, gl.LINEAR_MIPMAP_LINEAR, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, drawn.texels);
     gl.generateMipmap(gl.TEXTURE_2D);
-    this.mesh = [drawn.nx, drawn.ny].map((count) => Math.min(MAX_MESH, count));
-    const indices = grid(...this.mesh);
-    this.count = indices.length;
-    gl.bindVertexArray(this.empty);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+    this.drawn = [drawn.nx, drawn.ny];
+    this.#setMesh();
     this.shapes.SIDES = shape(gl, sides(drawn, -BLOCK_MM));
     this.size = [(drawn.nx - 1) * drawn.cellMm, (drawn.ny - 1) * drawn.cellMm];
     this.contour = Math.max(0.5, terrain.topMm / 10);
   }
 
+  #setMesh() {
+    const gl = this.gl;
+    this.mesh = this.drawn.map((count) => Math.min(this.#side, count));
+    const indices = strips(...this.mesh);
+    this.count = indices.length;
+    gl.bindVertexArray(this.empty);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+  }
+
   /** Draws what is touched: `arm`, `proxy`, `force` as in touch.js; `scaleMm`, how long the bar is. */
   draw({ arm, proxy, force, state }, scaleMm) {
     const { gl, camera, canvas } = this;
-    const ratio = this.#ratio();
+    this.#keepUp();
+    const ratio = this.#pixels;
     const [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio].map(Math.round);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     gl.viewport(0, 0, width, height);
@@ -88,19 +99,24 @@ export class Scene {
     this.#drawTrail(proxy, state, ratio);
   }
 
-  /** Pixels of the picture for one of the page: fewer from frame to frame while they take too long. */
-  #ratio() {
+  /** Makes the picture coarser while frames take too long: its mesh first, then its pixels. */
+  #keepUp() {
     const took = performance.now() - this.#last;
     this.#last += took;
-    if (took > SLOW_MS && took < 2000) this.#pixels = Math.max(LEAST_PIXELS, this.#pixels * 0.93);
-    return this.#pixels;
+    this.#slow = took > SLOW_MS && took < 2000 ? this.#slow + 1 : 0;
+    if (this.#slow < SLOW_FRAMES) return;
+    this.#slow = 0;
+    if (this.#side > LEAST_MESH) {
+      this.#side /= 2;
+      this.#setMesh();
+    } else this.#pixels = Math.max(LEAST_PIXELS, this.#pixels * 0.8);
   }
 
   #drawGround(proxy) {
     const { gl, terrain } = this;
     this.#use(this.ground, { camera: this.camera.matrix, heights: 0, slopes: 1, mesh: this.mesh, size: this.size, sun: SUN, proxy, top: terrain.topMm, contour: this.contour });
     gl.bindVertexArray(this.empty);
-    gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
+    gl.drawElements(gl.TRIANGLE_STRIP, this.count, gl.UNSIGNED_INT, 0);
   }
 
   /** The HIP inside the ground and the force as an arrow: in front of all else. */
@@ -197,16 +213,12 @@ function shape(gl, corners) {
   return { array, count: corners.length / 6 };
 }
 
-/** Two triangles a cell. */
-function grid(columns, rows) {
-  const indices = new Uint32Array(6 * (columns - 1) * (rows - 1));
-  let at = 0;
+/** A strip of triangles a row, ended by the number that WebGL 2 begins a new one at. */
+function strips(columns, rows) {
+  const indices = [];
   for (let row = 0; row + 1 < rows; row++) {
-    for (let i = 0; i + 1 < columns; i++) {
-      const first = row * columns + i;
-      indices.set([first, first + 1, first + columns, first + columns, first + 1, first + columns + 1], at);
-      at += 6;
-    }
+    for (let i = 0; i < columns; i++) indices.push((row + 1) * columns + i, row * columns + i);
+    indices.push(0xffffffff);
   }
-  return indices;
+  return new Uint32Array(indices);
 }
