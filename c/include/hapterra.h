@@ -13,6 +13,87 @@
 #include <stdint.h>
 
 /**
+ * What a function returns: 0, or which error.
+ */
+enum HapterraStatus
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * All is well.
+   */
+  HAPTERRA_STATUS_OK = 0,
+  /**
+   * A pointer is null.
+   */
+  HAPTERRA_STATUS_NULL_POINTER = 1,
+  /**
+   * A pointer is not aligned, or a count is larger than memory.
+   */
+  HAPTERRA_STATUS_BAD_POINTER = 2,
+  /**
+   * The terrain has no heights yet, or the contact has not begun.
+   */
+  HAPTERRA_STATUS_NOT_BEGUN = 3,
+  /**
+   * A terrain of such a size, or with so many samples, cannot be.
+   */
+  HAPTERRA_STATUS_SIZE = 4,
+  /**
+   * The millimetres of a cell or of a vertical unit are no scale.
+   */
+  HAPTERRA_STATUS_SCALE = 5,
+  /**
+   * Heights are too tall or too steep.
+   */
+  HAPTERRA_STATUS_HEIGHTS = 6,
+  /**
+   * A parameter of a surface is out of its bounds.
+   */
+  HAPTERRA_STATUS_SURFACE = 7,
+  /**
+   * A material of the terrain is not one of the surfaces.
+   */
+  HAPTERRA_STATUS_MATERIAL = 8,
+  /**
+   * No tick rate: 1,000 to 10,000 in whole thousands.
+   */
+  HAPTERRA_STATUS_RATE = 9,
+  /**
+   * A place is not a number, or too far away.
+   */
+  HAPTERRA_STATUS_PLACE = 10,
+  /**
+   * The reader of heights returned an error.
+   */
+  HAPTERRA_STATUS_UNREAD = 11,
+  /**
+   * A path is too long for one step.
+   */
+  HAPTERRA_STATUS_FAR = 12,
+  /**
+   * A number is none of an enumeration's.
+   */
+  HAPTERRA_STATUS_CHOICE = 13,
+  /**
+   * There is no memory.
+   */
+  HAPTERRA_STATUS_MEMORY = 14,
+  /**
+   * The library is at fault. The object cannot be used any more but for its end.
+   */
+  HAPTERRA_STATUS_INTERNAL = 15,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum HapterraStatus HapterraStatus;
+#else
+typedef uint32_t HapterraStatus;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * Which normals a force follows.
  */
 enum HapterraShading
@@ -253,7 +334,7 @@ const char *hapterra_version(void);
  * Fills a surface with the defaults: 0.5 N/mm, 8.5 N, without friction, damping and texture.
  * Returns `HAPTERRA_STATUS_NULL_POINTER` for null.
  */
-Status hapterra_surface_default(struct HapterraSurface *surface);
+HapterraStatus hapterra_surface_default(struct HapterraSurface *surface);
 
 /**
  * Returns a terrain without heights, which the caller owns until `hapterra_terrain_free`.
@@ -273,12 +354,12 @@ void hapterra_terrain_free(struct HapterraTerrain *terrain);
  * # Safety
  * At `heights` are `columns` times `rows` values.
  */
-Status hapterra_terrain_set_f32(struct HapterraTerrain *terrain,
-                                const float *heights,
-                                uint32_t columns,
-                                uint32_t rows,
-                                double cell_mm,
-                                uint32_t row_order);
+HapterraStatus hapterra_terrain_set_f32(struct HapterraTerrain *terrain,
+                                        const float *heights,
+                                        uint32_t columns,
+                                        uint32_t rows,
+                                        double cell_mm,
+                                        uint32_t row_order);
 
 /**
  * As `hapterra_terrain_set_f32`, in double precision.
@@ -286,30 +367,31 @@ Status hapterra_terrain_set_f32(struct HapterraTerrain *terrain,
  * # Safety
  * At `heights` are `columns` times `rows` values.
  */
-Status hapterra_terrain_set_f64(struct HapterraTerrain *terrain,
-                                const double *heights,
-                                uint32_t columns,
-                                uint32_t rows,
-                                double cell_mm,
-                                uint32_t row_order);
+HapterraStatus hapterra_terrain_set_f64(struct HapterraTerrain *terrain,
+                                        const double *heights,
+                                        uint32_t columns,
+                                        uint32_t rows,
+                                        double cell_mm,
+                                        uint32_t row_order);
 
 /**
  * Gives a terrain heights in millimetres that a function reads where they are touched. Function and
  * `user` are the caller's, and valid until the terrain and all contacts that began on it have ended.
  * A contact that was moved to another thread calls it from there.
  */
-Status hapterra_terrain_set_reader(struct HapterraTerrain *terrain,
-                                   HapterraRead read,
-                                   void *user,
-                                   uint32_t columns,
-                                   uint32_t rows,
-                                   double cell_mm);
+HapterraStatus hapterra_terrain_set_reader(struct HapterraTerrain *terrain,
+                                           HapterraRead read,
+                                           void *user,
+                                           uint32_t columns,
+                                           uint32_t rows,
+                                           double cell_mm);
 
 /**
  * Says how many millimetres a unit of the heights is, where they are not millimetres. It counts for
  * the heights that the terrain has, and for contacts that begin later.
  */
-Status hapterra_terrain_set_height_scale(struct HapterraTerrain *terrain, double mm_per_unit);
+HapterraStatus hapterra_terrain_set_height_scale(struct HapterraTerrain *terrain,
+                                                 double mm_per_unit);
 
 /**
  * Says of which material each sample is: the number of one of the surfaces of
@@ -319,10 +401,10 @@ Status hapterra_terrain_set_height_scale(struct HapterraTerrain *terrain, double
  * # Safety
  * At `materials` are `count` values.
  */
-Status hapterra_terrain_set_materials(struct HapterraTerrain *terrain,
-                                      const uint8_t *materials,
-                                      size_t count,
-                                      uint32_t order);
+HapterraStatus hapterra_terrain_set_materials(struct HapterraTerrain *terrain,
+                                              const uint8_t *materials,
+                                              size_t count,
+                                              uint32_t order);
 
 /**
  * Returns the height of the surface at a place, mm; NaN in a hole, off the terrain, where it cannot
@@ -357,11 +439,11 @@ void hapterra_contact_free(struct HapterraContact *contact);
  * # Safety
  * At `surfaces` are `count` values.
  */
-Status hapterra_contact_begin(struct HapterraContact *contact,
-                              const struct HapterraTerrain *terrain,
-                              const struct HapterraSurface *surfaces,
-                              size_t count,
-                              uint32_t rate_hz);
+HapterraStatus hapterra_contact_begin(struct HapterraContact *contact,
+                                      const struct HapterraTerrain *terrain,
+                                      const struct HapterraSurface *surfaces,
+                                      size_t count,
+                                      uint32_t rate_hz);
 
 /**
  * Puts other surfaces in between two steps, as `hapterra_contact_begin` takes them. The proxy stays
@@ -370,9 +452,9 @@ Status hapterra_contact_begin(struct HapterraContact *contact,
  * # Safety
  * At `surfaces` are `count` values.
  */
-Status hapterra_contact_set_surface(struct HapterraContact *contact,
-                                    const struct HapterraSurface *surfaces,
-                                    size_t count);
+HapterraStatus hapterra_contact_set_surface(struct HapterraContact *contact,
+                                            const struct HapterraSurface *surfaces,
+                                            size_t count);
 
 /**
  * Makes one step with the HIP at three numbers, mm: east, north, up from the south-west sample at
@@ -382,9 +464,9 @@ Status hapterra_contact_set_surface(struct HapterraContact *contact,
  * # Safety
  * At `hip_mm` are 3 numbers, and at `step` is room for one step.
  */
-Status hapterra_contact_step(struct HapterraContact *contact,
-                             const double *hip_mm,
-                             struct HapterraStep *step);
+HapterraStatus hapterra_contact_step(struct HapterraContact *contact,
+                                     const double *hip_mm,
+                                     struct HapterraStep *step);
 
 /**
  * Makes `count` steps, of three numbers each, one after the other into `steps`. It ends with the
@@ -393,11 +475,11 @@ Status hapterra_contact_step(struct HapterraContact *contact,
  * # Safety
  * At `hips_mm` are 3 times `count` numbers, and at `steps` is room for `count` steps.
  */
-Status hapterra_contact_run(struct HapterraContact *contact,
-                            const double *hips_mm,
-                            size_t count,
-                            struct HapterraStep *steps,
-                            size_t *done);
+HapterraStatus hapterra_contact_run(struct HapterraContact *contact,
+                                    const double *hips_mm,
+                                    size_t count,
+                                    struct HapterraStep *steps,
+                                    size_t *done);
 
 /**
  * Returns the message of the contact's last error, empty where there was none, null for null. It is

@@ -4,15 +4,17 @@ use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::slice;
 
-use crate::status::{Failure, HapterraStatus as Status};
+use crate::status::{Failure, HapterraStatus};
 
 /// Checks that a pointer may be that of an array.
-fn check<T>(pointer: *const T, count: usize) -> Result<(), Status> {
+fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
     let bytes = count.checked_mul(size_of::<T>());
     match pointer {
-        pointer if pointer.is_null() => Err(Status::NullPointer),
-        pointer if !pointer.is_aligned() => Err(Status::BadPointer),
-        _ if bytes.is_none_or(|bytes| bytes > isize::MAX as usize) => Err(Status::BadPointer),
+        pointer if pointer.is_null() => Err(HapterraStatus::NullPointer),
+        pointer if !pointer.is_aligned() => Err(HapterraStatus::BadPointer),
+        _ if bytes.is_none_or(|bytes| bytes > isize::MAX as usize) => {
+            Err(HapterraStatus::BadPointer)
+        }
         _ => Ok(()),
     }
 }
@@ -21,7 +23,10 @@ fn check<T>(pointer: *const T, count: usize) -> Result<(), Status> {
 ///
 /// # Safety
 /// At `pointer` are `count` values that nobody changes during the call.
-pub(crate) unsafe fn array<'a, T>(pointer: *const T, count: usize) -> Result<&'a [T], Status> {
+pub(crate) unsafe fn array<'a, T>(
+    pointer: *const T,
+    count: usize,
+) -> Result<&'a [T], HapterraStatus> {
     check(pointer, count)?;
     // SAFETY: not null, aligned, no larger than memory; the values are there by the contract of the
     // header, which every caller of this function repeats.
@@ -35,7 +40,7 @@ pub(crate) unsafe fn array<'a, T>(pointer: *const T, count: usize) -> Result<&'a
 pub(crate) unsafe fn room<'a, T>(
     pointer: *mut T,
     count: usize,
-) -> Result<&'a mut [MaybeUninit<T>], Status> {
+) -> Result<&'a mut [MaybeUninit<T>], HapterraStatus> {
     check(pointer, count)?;
     // SAFETY: as above, and what need not be initialised may hold anything.
     Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), count) })
@@ -43,5 +48,5 @@ pub(crate) unsafe fn room<'a, T>(
 
 /// Runs a call; a panic is a failure.
 pub(crate) fn caught<R>(call: impl FnOnce() -> Result<R, Failure>) -> Result<R, Failure> {
-    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|_| Err(Status::Internal.into()))
+    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|_| Err(HapterraStatus::Internal.into()))
 }

@@ -6,7 +6,7 @@ use std::mem::MaybeUninit;
 use hapterra_touch::{Contact, State, Step};
 
 use crate::border::{array, caught, room};
-use crate::status::{Failure, HapterraStatus as Status, Message};
+use crate::status::{Failure, HapterraStatus, Message};
 use crate::surface::{HapterraSurface, surface};
 use crate::terrain::HapterraTerrain;
 
@@ -70,11 +70,14 @@ pub struct HapterraContact {
 
 impl HapterraContact {
     /// Makes a call; after a panic there is no contact any more.
-    fn call(&mut self, call: impl FnOnce(&mut Option<Contact>) -> Result<(), Failure>) -> Status {
+    fn call(
+        &mut self,
+        call: impl FnOnce(&mut Option<Contact>) -> Result<(), Failure>,
+    ) -> HapterraStatus {
         let Err(failure) = caught(|| call(&mut self.contact)) else {
-            return Status::Ok;
+            return HapterraStatus::Ok;
         };
-        if failure.status == Status::Internal {
+        if failure.status == HapterraStatus::Internal {
             self.contact = None;
         }
         self.message.keep(failure)
@@ -107,11 +110,11 @@ pub unsafe extern "C" fn hapterra_contact_begin(
     surfaces: *const HapterraSurface,
     count: usize,
     rate_hz: u32,
-) -> Status {
-    contact.map_or(Status::NullPointer, |contact| {
+) -> HapterraStatus {
+    contact.map_or(HapterraStatus::NullPointer, |contact| {
         contact.call(|contact| {
-            let terrain = terrain.ok_or(Status::NullPointer)?;
-            let terrain = terrain.terrain.clone().ok_or(Status::NotBegun)?;
+            let terrain = terrain.ok_or(HapterraStatus::NullPointer)?;
+            let terrain = terrain.terrain.clone().ok_or(HapterraStatus::NotBegun)?;
             // SAFETY: by this function's contract.
             let surface = unsafe { surface(surfaces, count) }?;
             *contact = Some(Contact::at_rate(terrain, surface, rate_hz)?);
@@ -130,10 +133,10 @@ pub unsafe extern "C" fn hapterra_contact_set_surface(
     contact: Option<&mut HapterraContact>,
     surfaces: *const HapterraSurface,
     count: usize,
-) -> Status {
-    contact.map_or(Status::NullPointer, |contact| {
+) -> HapterraStatus {
+    contact.map_or(HapterraStatus::NullPointer, |contact| {
         contact.call(|contact| {
-            let contact = contact.as_mut().ok_or(Status::NotBegun)?;
+            let contact = contact.as_mut().ok_or(HapterraStatus::NotBegun)?;
             // SAFETY: by this function's contract.
             Ok(contact.set_surface(unsafe { surface(surfaces, count) }?)?)
         })
@@ -151,7 +154,7 @@ pub unsafe extern "C" fn hapterra_contact_step(
     contact: Option<&mut HapterraContact>,
     hip_mm: *const f64,
     step: *mut HapterraStep,
-) -> Status {
+) -> HapterraStatus {
     // SAFETY: by this function's contract.
     unsafe { hapterra_contact_run(contact, hip_mm, 1, step, None) }
 }
@@ -168,11 +171,11 @@ pub unsafe extern "C" fn hapterra_contact_run(
     count: usize,
     steps: *mut HapterraStep,
     done: Option<&mut MaybeUninit<usize>>,
-) -> Status {
+) -> HapterraStatus {
     let mut happened = 0;
-    let status = contact.map_or(Status::NullPointer, |contact| {
+    let status = contact.map_or(HapterraStatus::NullPointer, |contact| {
         contact.call(|contact| {
-            let contact = contact.as_mut().ok_or(Status::NotBegun)?;
+            let contact = contact.as_mut().ok_or(HapterraStatus::NotBegun)?;
             // SAFETY: by this function's contract.
             let hips_mm = unsafe { array(hips_mm.cast::<[f64; 3]>(), count) }?;
             // SAFETY: by this function's contract.

@@ -42,8 +42,6 @@ pub enum HapterraStatus {
     Internal = 15,
 }
 
-use HapterraStatus as Status;
-
 /// Texts by number.
 const TEXTS: [&CStr; 16] = [
     c"all is well",
@@ -67,19 +65,19 @@ const TEXTS: [&CStr; 16] = [
 /// An error, with the message that the object keeps.
 #[derive(Debug)]
 pub(crate) struct Failure {
-    pub(crate) status: Status,
+    pub(crate) status: HapterraStatus,
     message: String,
 }
 
 impl Failure {
-    pub(crate) fn new(status: Status, message: impl ToString) -> Self {
+    pub(crate) fn new(status: HapterraStatus, message: impl ToString) -> Self {
         let message = message.to_string();
         Self { status, message }
     }
 }
 
-impl From<Status> for Failure {
-    fn from(status: Status) -> Self {
+impl From<HapterraStatus> for Failure {
+    fn from(status: HapterraStatus) -> Self {
         let text = TEXTS.get(status as usize).copied().unwrap_or_default();
         Self::new(status, text.to_string_lossy())
     }
@@ -90,10 +88,10 @@ impl From<TerrainError> for Failure {
         let status = match error {
             TerrainError::Size { .. }
             | TerrainError::Count { .. }
-            | TerrainError::Ragged { .. } => Status::Size,
-            TerrainError::Memory { .. } => Status::Memory,
-            TerrainError::Scale(_) => Status::Scale,
-            TerrainError::TooTall { .. } | TerrainError::Step { .. } => Status::Heights,
+            | TerrainError::Ragged { .. } => HapterraStatus::Size,
+            TerrainError::Memory { .. } => HapterraStatus::Memory,
+            TerrainError::Scale(_) => HapterraStatus::Scale,
+            TerrainError::TooTall { .. } | TerrainError::Step { .. } => HapterraStatus::Heights,
         };
         Self::new(status, error)
     }
@@ -103,10 +101,10 @@ impl From<ContactError> for Failure {
     fn from(error: ContactError) -> Self {
         let status = match error {
             ContactError::Terrain(error) => return error.into(),
-            ContactError::Surface(_) => Status::Surface,
-            ContactError::Material { .. } => Status::Material,
-            ContactError::Rate(_) => Status::Rate,
-            ContactError::Refused => Status::Internal,
+            ContactError::Surface(_) => HapterraStatus::Surface,
+            ContactError::Material { .. } => HapterraStatus::Material,
+            ContactError::Rate(_) => HapterraStatus::Rate,
+            ContactError::Refused => HapterraStatus::Internal,
         };
         Self::new(status, error)
     }
@@ -115,10 +113,10 @@ impl From<ContactError> for Failure {
 impl From<StepError> for Failure {
     fn from(error: StepError) -> Self {
         let status = match error {
-            StepError::Place { .. } => Status::Place,
-            StepError::Unread(_) => Status::Unread,
-            StepError::Steep { .. } => Status::Heights,
-            StepError::Far { .. } => Status::Far,
+            StepError::Place { .. } => HapterraStatus::Place,
+            StepError::Unread(_) => HapterraStatus::Unread,
+            StepError::Steep { .. } => HapterraStatus::Heights,
+            StepError::Far { .. } => HapterraStatus::Far,
         };
         Self::new(status, error)
     }
@@ -129,7 +127,7 @@ impl From<StepError> for Failure {
 pub(crate) struct Message(CString);
 
 impl Message {
-    pub(crate) fn keep(&mut self, failure: Failure) -> Status {
+    pub(crate) fn keep(&mut self, failure: Failure) -> HapterraStatus {
         // No message has a zero in it.
         self.0 = CString::new(failure.message).unwrap_or_default();
         failure.status
@@ -145,7 +143,8 @@ impl Message {
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_error_text(status: u32) -> *const c_char {
     let text = TEXTS.get(status as usize);
-    text.unwrap_or(&TEXTS[Status::Choice as usize]).as_ptr()
+    text.unwrap_or(&TEXTS[HapterraStatus::Choice as usize])
+        .as_ptr()
 }
 
 /// Returns the version of the library, such as `0.1.0`, for ever valid. Not to be freed.

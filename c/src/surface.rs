@@ -7,7 +7,7 @@ use hapterra_touch::{
 };
 
 use crate::border::array;
-use crate::status::{Failure, HapterraStatus as Status};
+use crate::status::{Failure, HapterraStatus};
 
 /// Which normals a force follows.
 #[repr(u32)]
@@ -91,7 +91,7 @@ impl HapterraSurface {
     fn law(&self) -> Result<ForceLaw, Failure> {
         let unknown = |what: &str, number: u32, known: &str| {
             let message = format!("{what} is {number}: give {known}");
-            Failure::new(Status::Choice, message)
+            Failure::new(HapterraStatus::Choice, message)
         };
         Ok(ForceLaw {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
@@ -131,7 +131,7 @@ impl HapterraSurface {
 
 impl From<SurfaceError> for Failure {
     fn from(error: SurfaceError) -> Self {
-        Self::new(Status::Surface, error)
+        Self::new(HapterraStatus::Surface, error)
     }
 }
 
@@ -140,12 +140,12 @@ impl From<SurfaceError> for Failure {
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_surface_default(
     surface: Option<&mut MaybeUninit<HapterraSurface>>,
-) -> Status {
+) -> HapterraStatus {
     let Some(surface) = surface else {
-        return Status::NullPointer;
+        return HapterraStatus::NullPointer;
     };
     surface.write(HapterraSurface::of(&ForceLaw::PREMIUM));
-    Status::Ok
+    HapterraStatus::Ok
 }
 
 /// A surface and its materials.
@@ -160,7 +160,7 @@ pub(crate) unsafe fn surface(
     let surfaces = unsafe { array(surfaces, count) }?;
     let Some((first, others)) = surfaces.split_first() else {
         return Err(Failure::new(
-            Status::Surface,
+            HapterraStatus::Surface,
             "no surface: give at least one",
         ));
     };

@@ -5,7 +5,7 @@ use std::ffi::{c_char, c_void};
 use hapterra_touch::{Block, Height, Heights, RowOrder, Terrain, TerrainError, Unread};
 
 use crate::border::{array, caught};
-use crate::status::{Failure, HapterraStatus as Status, Message};
+use crate::status::{Failure, HapterraStatus, Message};
 
 /// Which row of an array comes first.
 #[repr(u32)]
@@ -70,11 +70,14 @@ impl Heights for Reader {
 
 impl HapterraTerrain {
     /// Puts other heights in; the ones before stay where there are none.
-    fn put(&mut self, made: impl FnOnce(Option<&Terrain>) -> Result<Terrain, Failure>) -> Status {
+    fn put(
+        &mut self,
+        made: impl FnOnce(Option<&Terrain>) -> Result<Terrain, Failure>,
+    ) -> HapterraStatus {
         match caught(|| made(self.terrain.as_ref())) {
             Ok(terrain) => {
                 self.terrain = Some(terrain);
-                Status::Ok
+                HapterraStatus::Ok
             }
             Err(failure) => self.message.keep(failure),
         }
@@ -88,7 +91,7 @@ impl HapterraTerrain {
         [columns, rows]: [u32; 2],
         cell_mm: f64,
         order: u32,
-    ) -> Status {
+    ) -> HapterraStatus {
         self.put(|_| {
             let order = row_order(order)?;
             let count = (columns as usize).checked_mul(rows as usize);
@@ -106,7 +109,7 @@ fn row_order(order: u32) -> Result<RowOrder, Failure> {
         1 => Ok(RowOrder::SouthFirst),
         other => {
             let message = format!("row order is {other}: give 0 (north first) or 1 (south first)");
-            Err(Failure::new(Status::Choice, message))
+            Err(Failure::new(HapterraStatus::Choice, message))
         }
     }
 }
@@ -137,8 +140,8 @@ pub unsafe extern "C" fn hapterra_terrain_set_f32(
     rows: u32,
     cell_mm: f64,
     row_order: u32,
-) -> Status {
-    terrain.map_or(Status::NullPointer, |terrain| {
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
         // SAFETY: by this function's contract.
         unsafe { terrain.put_array(heights, [columns, rows], cell_mm, row_order) }
     })
@@ -156,8 +159,8 @@ pub unsafe extern "C" fn hapterra_terrain_set_f64(
     rows: u32,
     cell_mm: f64,
     row_order: u32,
-) -> Status {
-    terrain.map_or(Status::NullPointer, |terrain| {
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
         // SAFETY: by this function's contract.
         unsafe { terrain.put_array(heights, [columns, rows], cell_mm, row_order) }
     })
@@ -174,10 +177,10 @@ pub extern "C" fn hapterra_terrain_set_reader(
     columns: u32,
     rows: u32,
     cell_mm: f64,
-) -> Status {
-    terrain.map_or(Status::NullPointer, |terrain| {
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
         terrain.put(|_| {
-            let read = read.ok_or(Status::NullPointer)?;
+            let read = read.ok_or(HapterraStatus::NullPointer)?;
             let reader = Reader { read, user };
             Ok(Terrain::from_tiles(columns, rows, cell_mm, reader)?)
         })
@@ -190,10 +193,10 @@ pub extern "C" fn hapterra_terrain_set_reader(
 pub extern "C" fn hapterra_terrain_set_height_scale(
     terrain: Option<&mut HapterraTerrain>,
     mm_per_unit: f64,
-) -> Status {
-    terrain.map_or(Status::NullPointer, |terrain| {
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
         terrain.put(|terrain| {
-            let terrain = terrain.cloned().ok_or(Status::NotBegun)?;
+            let terrain = terrain.cloned().ok_or(HapterraStatus::NotBegun)?;
             Ok(terrain.with_height_scale(mm_per_unit)?)
         })
     })
@@ -211,10 +214,10 @@ pub unsafe extern "C" fn hapterra_terrain_set_materials(
     materials: *const u8,
     count: usize,
     order: u32,
-) -> Status {
-    terrain.map_or(Status::NullPointer, |terrain| {
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
         terrain.put(|terrain| {
-            let terrain = terrain.cloned().ok_or(Status::NotBegun)?;
+            let terrain = terrain.cloned().ok_or(HapterraStatus::NotBegun)?;
             // SAFETY: by this function's contract.
             let materials = unsafe { array(materials, count) }?;
             Ok(terrain.with_materials(row_order(order)?, materials.to_vec())?)
