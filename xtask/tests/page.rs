@@ -173,8 +173,8 @@ fn saved_path_feels_the_same_in_replay_bit_for_bit() {
     // Rough and grainy: every effect of the page.
     let _ = site.value("[...document.querySelectorAll('#presets button')].at(-1).click()");
     site.wait("hapterra.touch.surface.friction === 0.5 && hapterra.touch.surface.texture === 0.22");
-    for step in 1..60 {
-        let share = f64::from(step) / 60.0;
+    for step in 1..40 {
+        let share = f64::from(step) / 40.0;
         site.point([0.35 + 0.3 * share, 0.5 + 0.1 * (9.0 * share).sin()]);
         let rows = site.value("hapterra.touch.path.rows").as_u64().unwrap_or(0);
         site.wait(&format!("hapterra.touch.path.rows >= {}", rows + 50));

@@ -176,13 +176,9 @@ export class Scene {
 function set(gl, uniform, value) {
   if (!uniform) return;
   const { at, type } = uniform;
+  const kinds = { [gl.FLOAT]: "1f", [gl.FLOAT_VEC2]: "2fv", [gl.FLOAT_VEC3]: "3fv", [gl.FLOAT_VEC4]: "4fv", [gl.INT_VEC2]: "2iv" };
   if (type === gl.FLOAT_MAT4) gl.uniformMatrix4fv(at, false, value);
-  else if (type === gl.FLOAT) gl.uniform1f(at, value);
-  else if (type === gl.FLOAT_VEC2) gl.uniform2fv(at, value);
-  else if (type === gl.FLOAT_VEC3) gl.uniform3fv(at, value);
-  else if (type === gl.FLOAT_VEC4) gl.uniform4fv(at, value);
-  else if (type === gl.INT_VEC2) gl.uniform2iv(at, value);
-  else gl.uniform1i(at, value);
+  else gl[`uniform${kinds[type] ?? "1i"}`](at, value);
 }
 
 function program(gl, sources) {

@@ -35,7 +35,7 @@ pub(crate) fn demo(
     build(&folder)?;
     if let Some(file) = file {
         let is_url = file.to_string_lossy().contains("://");
-        let mut cut = Command::new(command(is_url, true)?);
+        let mut cut = Command::new(command(is_url)?);
         cut.arg("cut").arg(file).arg("--output").arg(&folder);
         run(cut.args(extra))?;
     }
@@ -71,7 +71,7 @@ pub(crate) fn test() -> Result<()> {
     let mut tests = cargo();
     tests
         .args(["test", "--package", "xtask", "--test", "page"])
-        .env("HAPTERRA", command(false, false)?)
+        .env("HAPTERRA", command(false)?)
         .env("HAPTERRA_PAGE", folder);
     match view::browser() {
         Ok(browser) => drop(tests.env(view::BROWSER, browser)),
@@ -85,19 +85,15 @@ fn node() -> Result<PathBuf> {
 }
 
 /// Builds the `hapterra` command and gives its path.
-fn command(is_remote: bool, is_release: bool) -> Result<PathBuf> {
+fn command(is_remote: bool) -> Result<PathBuf> {
     let mut build = cargo();
     build.args(["build", "--package", "hapterra", "--bin", "hapterra"]);
     if is_remote {
         build.args(["--features", "remote"]);
     }
-    if is_release {
-        build.arg("--release");
-    }
     timed("building the hapterra command", || run(&mut build))?;
     let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
-    let profile = if is_release { "release" } else { "debug" };
-    Ok(target_dir().join(profile).join(program))
+    Ok(target_dir().join("debug").join(program))
 }
 
 /// Writes the page without a terrain file.
@@ -156,7 +152,7 @@ fn geotiff(folder: &Path) -> Result<()> {
         read(&kept) == read(&root().join("page"))
     };
     let library = kept.join("node_modules/geotiff");
-    if !locks.iter().all(|name| is_same(&name)) || !library.join(GEOTIFF[0].0).is_file() {
+    if !locks.iter().all(|name| is_same(name)) || !library.join(GEOTIFF[0].0).is_file() {
         for name in locks {
             copy(&root().join("page").join(name), &kept.join(name))?;
         }
