@@ -220,7 +220,16 @@ fn dropped_files_of_one_terrain_have_the_same_heights() {
             println!("SKIPPED: GeoTIFF: the page was built without npm");
             continue;
         }
-        let words = ["synth", "fractal", "--size", "70x50", "--output", name];
+        let words = [
+            "synth",
+            "fractal",
+            "--amplitude",
+            "3000",
+            "--size",
+            "70x50",
+            "--output",
+            name,
+        ];
         if hapterra(&folder, &words, &[]).is_none() {
             return;
         }
