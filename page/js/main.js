@@ -97,8 +97,8 @@ async function main() {
     });
     element("presets").append(button);
   }
-  element("sound").addEventListener("click", async () => {
-    await sound.toggle();
+  element("sound").addEventListener("click", () => {
+    sound.toggle();
     element("sound").textContent = sound.isOn ? "Sound off" : "Sound on";
   });
   element("new").addEventListener("click", () => setTerrain(made((seed += 1))));

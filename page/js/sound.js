@@ -6,16 +6,13 @@ const PER_NEWTON_HZ = 55;
 
 export class Sound {
   #context = null;
-  #last = 0;
-
-  get isOn() {
-    return this.#context?.state === "running";
-  }
+  isOn = false;
 
   /** Browsers allow sound only after a click: call it from one. */
-  async toggle() {
+  toggle() {
     if (!this.#context) this.#open();
-    await (this.isOn ? this.#context.suspend() : this.#context.resume());
+    this.isOn = !this.isOn;
+    this.isOn ? this.#context.resume() : this.#context.suspend();
   }
 
   #open() {

@@ -30,6 +30,12 @@ export function scale({ widthMm, metresPerMm }) {
   return { mm: round / perMm, text: `${value} ${unit}` };
 }
 
+/** Size of what was loaded besides terrain, kB: page and kernel. */
+function loadedKb() {
+  const loaded = performance.getEntriesByType("resource").filter(({ name }) => !/terrain\.|geotiff/.test(name));
+  return Math.round(loaded.reduce((sum, { decodedBodySize }) => sum + decodedBodySize, 0) / 1000);
+}
+
 /** A frame's numbers, and the cursor that the force holds back. */
 export function facts({ camera, canvas, scaleAt }, { arm, proxy, force, state, path }, clock, bar) {
   const px = (at) => {
@@ -50,5 +56,5 @@ export function facts({ camera, canvas, scaleAt }, { arm, proxy, force, state, p
   element("scale").textContent = bar.text;
   const lost = clock.lostMs >= 1 ? `${(clock.lostMs / 1000).toFixed(1)} s not run: this machine was busy` : "no time lost";
   const kept = path.isFull ? "path full at 5 minutes" : `${(path.rows / 1000).toFixed(0)} s of path`;
-  element("facts").textContent = `${state} · 1,000 steps a second, ${lost} · ${kept} · left drag or arrow keys turn the view, shift and wheel zoom · drop a height map to touch it: it stays on this machine`;
+  element("facts").textContent = `${state} · 1,000 steps a second, ${lost} · ${kept} · ${loadedKb()} kB of page and kernel · drag or arrow keys turn the view, shift and wheel zoom`;
 }
