@@ -152,7 +152,7 @@ fn geotiff(folder: &Path) -> Result<()> {
         read(&kept) == read(&root().join("page"))
     };
     let library = kept.join("node_modules/geotiff");
-    if !locks.iter().all(|name| is_same(name)) || !library.join(GEOTIFF[0].0).is_file() {
+    if !locks.iter().all(is_same) || !library.join(GEOTIFF[0].0).is_file() {
         for name in locks {
             copy(&root().join("page").join(name), &kept.join(name))?;
         }
