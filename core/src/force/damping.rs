@@ -1,9 +1,9 @@
-//! Damping along the force, of a scene's choice and of the passivity controller's.
+//! Damping of a scene's choice along the force, and of the passivity controller's.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::passivity::{MOST_MJ, Moment, Passivity};
+use super::passivity::{MOST_MJ, Moment, Motion, Passivity, Takes};
 use super::{FeltWith, ForceLaw, clamp_length};
 use crate::scalar::{larger, smaller};
 
@@ -131,19 +131,27 @@ impl Damper {
         let spring_n = spring_n * share;
         // Along the force, times its size: positive where the tip gives way to it.
         let along = velocity_mm_s.dot(spring_n);
-        let squared = spring_n.length_squared();
-        let mut ns_per_mm = 1e-3 * self.law.damping.ns_per_m;
-        if let Some(controller) = &self.controller {
-            ns_per_mm += controller.damping_ns_per_mm(along, squared);
-        }
-        let share = ns_per_mm * along / squared;
+        let share = along / spring_n.length_squared();
         // No number without a force.
-        if share.is_finite() {
-            let damped_n = spring_n * (1.0 - share.clamp(-1.0, 1.0));
-            clamp_length(damped_n, self.law.max_force_n)
-        } else {
-            spring_n
+        if !share.is_finite() {
+            return spring_n;
         }
+        let across_mm_s = velocity_mm_s - spring_n * share;
+        let mut takes = self.controller.as_ref().map_or_else(Takes::default, |it| {
+            it.damping_ns_per_mm(&Motion {
+                along,
+                along_squared: along * share,
+                across_squared: across_mm_s.length_squared(),
+            })
+        });
+        if !(self.law.shading.is_none() && self.law.texture.is_none()) {
+            // Such a force is not on the way to the proxy: damping across it could pull.
+            takes.across = 0.0;
+        }
+        takes.along += 1e-3 * self.law.damping.ns_per_m;
+        let along_n = spring_n * (1.0 - (takes.along * share).clamp(-1.0, 1.0));
+        let most_n = smaller(2.0 * spring_n.length(), self.law.max_force_n);
+        clamp_length(along_n - across_mm_s * takes.across, most_n)
     }
 }
 

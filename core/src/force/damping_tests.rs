@@ -6,6 +6,7 @@ use std::vec::Vec;
 use glam::Vec3;
 
 use super::super::passivity::Shares;
+use super::super::{Pattern, Shading, Texture};
 use super::*;
 use crate::rate::TickRate;
 
@@ -260,6 +261,75 @@ fn with_the_controller_no_tap_gives_energy_and_without_it_every_one_does() {
                 }
             }
         }
+    }
+}
+
+/// Energy, mJ, that a point which holds the proxy gives to a tip on circles of 4 mm round it,
+/// 200 mm/s fast, in a second: no motion is along the force.
+fn given_on_circles_mj(law: &ForceLaw, hz: u32) -> f64 {
+    const RADIUS_MM: f64 = 4.0;
+    let tick_s = 1.0 / f64::from(hz);
+    let tip_mm = |t_s: f64| {
+        let (sin, cos) = libm::sincos(200.0 / RADIUS_MM * t_s);
+        Vec3::new(cos as f32, sin as f32, 0.0) * RADIUS_MM as f32
+    };
+    let mut damper = Damper::of(law, &felt(hz, 0.0));
+    let (mut given_mj, mut asked_n) = (0.0, Vec3::ZERO);
+    for tick in 0..hz {
+        let now_s = f64::from(tick) * tick_s;
+        let moved_mm = tip_mm(now_s) - tip_mm(now_s - tick_s);
+        let velocity_mm_s = moved_mm * hz as f32;
+        let mut force_n = law.spring().force_n(-tip_mm(now_s));
+        if let Some(damper) = &mut damper {
+            damper.observe(&Moment {
+                displacement_mm: -tip_mm(now_s),
+                moved_mm,
+                velocity_mm_s,
+                asked_n,
+                most_n: 8.5,
+                shares: Shares::ALL,
+            });
+            force_n = damper.force_n(force_n, velocity_mm_s);
+        }
+        asked_n = force_n;
+        given_mj += f64::from(force_n.dot(tip_mm(now_s + tick_s) - tip_mm(now_s)));
+    }
+    given_mj
+}
+
+#[test]
+fn a_tip_on_circles_round_a_point_is_given_no_energy() {
+    for hz in [1000, 2000, 4000, 10_000] {
+        for stiffness in [0.2, 0.5, 1.0, 2.0] {
+            let without = given_on_circles_mj(&law(stiffness, 0.0, Controller::Off), hz);
+            let with = given_on_circles_mj(&law(stiffness, 0.0, Controller::On), hz);
+            assert!(without > 0.3, "{hz} Hz, {stiffness} N/mm: {without} mJ");
+            assert!(
+                with.abs() < 0.02 * without,
+                "{hz} Hz, {stiffness} N/mm: {with} mJ, {without} without"
+            );
+        }
+    }
+}
+
+#[test]
+fn across_a_shaded_or_textured_force_nothing_is_taken() {
+    let texture = Texture {
+        pattern: Pattern::Grain,
+        amplitude_mm: 0.1,
+        wavelength_mm: 2.0,
+        ..Texture::NONE
+    };
+    let shaded = ForceLaw {
+        shading: Shading::Smooth,
+        ..law(1.0, 0.0, Controller::On)
+    };
+    let textured = ForceLaw {
+        texture,
+        ..law(1.0, 0.0, Controller::On)
+    };
+    for law in [shaded, textured] {
+        assert!(given_on_circles_mj(&law, 1000) > 1.0);
     }
 }
 

@@ -209,19 +209,40 @@ impl Passivity {
         self.stiffness_n_per_mm = stiffness_n_per_mm;
     }
 
-    /// The damping that takes back what was created, and what a spring's force will have created
-    /// when it has acted for a tick, N·s/mm. `along` is that force times the velocity, `squared` the
-    /// square of the force.
-    pub(super) fn damping_ns_per_mm(&self, along: f32, squared: f32) -> f32 {
+    /// The damping, N·s/mm, that takes back what was created, and what a spring's force will have
+    /// created when it has acted for a tick: along that force, and across it where damping along it
+    /// cannot take all, as where the tip moves round a peak or a point that friction holds.
+    pub(super) fn damping_ns_per_mm(&self, motion: &Motion) -> Takes {
         let most = (MOST_TICKS * self.tick_s + self.latency_s) * self.stiffness_n_per_mm;
-        let created_mj = within(self.coming_mj + along * self.tick_s);
-        let takes_back = created_mj * squared / (along * along * self.tick_s);
         // No number where nothing moves: then there is nothing to take from.
-        match takes_back < most {
-            true => takes_back,
-            false => most,
+        let takes = |mj: f32, squared: f32| match mj / (squared * self.tick_s) {
+            takes if takes < most => takes,
+            _ => most,
+        };
+        let created_mj = within(self.coming_mj + motion.along * self.tick_s);
+        let along = takes(created_mj, motion.along_squared);
+        let left_mj = within(created_mj - along * motion.along_squared * self.tick_s);
+        Takes {
+            along,
+            across: takes(left_mj, motion.across_squared),
         }
     }
+}
+
+/// How the tip moves while a force acts.
+pub(super) struct Motion {
+    /// The force times the velocity, mJ/s.
+    pub(super) along: f32,
+    /// Squares of the speeds along the force and across it, mm²/s².
+    pub(super) along_squared: f32,
+    pub(super) across_squared: f32,
+}
+
+/// Damping along a force and across it, N·s/mm.
+#[derive(Default)]
+pub(super) struct Takes {
+    pub(super) along: f32,
+    pub(super) across: f32,
 }
 
 /// What is kept of an energy, mJ: what is no number counts as none.
