@@ -19,6 +19,10 @@ pub(crate) struct Request {
     pub(crate) file: Option<OsString>,
     /// Whether it is shown live.
     pub(crate) view: bool,
+    /// Whether it is touched on a page in a browser, without any device.
+    pub(crate) touch: bool,
+    /// Where that page is only written to.
+    pub(crate) out: Option<PathBuf>,
     /// Passed on to `hapterra demo` as they are.
     pub(crate) extra: Vec<OsString>,
 }
@@ -149,8 +153,8 @@ mod tests {
     fn line(file: Option<&str>, extra: &[&str], emulated: bool) -> String {
         let request = Request {
             file: file.map(OsString::from),
-            view: false,
             extra: extra.iter().map(OsString::from).collect(),
+            ..Request::default()
         };
         let emulation = Emulation {
             image: "ELF".into(),
@@ -200,9 +204,9 @@ mod tests {
     fn options_are_read_in_both_spellings() {
         let words = ["--device=emulated", "--outer", "x", "--out", "y"];
         let request = Request {
-            file: None,
             view: true,
             extra: words.map(OsString::from).into(),
+            ..Request::default()
         };
         assert_eq!(request.device().as_deref(), Some("emulated"));
         assert_eq!(request.value("--out").as_deref(), Some("y"));

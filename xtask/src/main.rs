@@ -14,6 +14,7 @@ mod image;
 mod lint;
 mod miri;
 mod nightly;
+mod page;
 mod panics;
 mod run;
 mod setup;
@@ -33,6 +34,10 @@ cargo xtask COMMAND
   demo [FILE] [-- ARGS]  touch a terrain file on the emulated board; without FILE,
                          a terrain made on the spot; ARGS go to `hapterra demo`
   demo --view [FILE]     the same, live in a browser; builds the viewer, too
+  demo --touch [FILE] [--out FOLDER]
+                         touch it with the mouse on a page in a browser, no arm needed; --out:
+                         only write the page's folder, for any web server
+  page --test            the page's tests, in a browser where there is one
   view [--test|--pictures]
                          build the viewer; --test: run its tests, in a browser where there is
                          one; --pictures: take those in docs/
@@ -93,9 +98,12 @@ fn command() -> Result<ExitCode> {
     };
     match name.as_str() {
         "demo" => {
-            return demo_words(&mut words)
-                .and_then(|r| demo::demo(&r))
-                .map(exit_code);
+            let request = demo_words(&mut words)?;
+            if request.touch {
+                page::demo(request.file.as_ref(), request.out, &request.extra)?;
+                return Ok(ExitCode::SUCCESS);
+            }
+            return demo::demo(&request).map(exit_code);
         }
         "test" => test::test(&test_words(&mut words)?)?,
         "soak" => soak::soak(words.raw_args()?.collect())?,
@@ -122,6 +130,11 @@ fn command() -> Result<ExitCode> {
             Some(Long("pictures")) => view::pictures()?,
             Some(other) => return Err(other.unexpected().into()),
             None => println!("{}", view::build()?.display()),
+        },
+        "page" => match words.next()? {
+            Some(Long("test")) => page::test()?,
+            Some(other) => return Err(other.unexpected().into()),
+            None => bail!("say: cargo xtask page --test, or cargo xtask demo --touch"),
         },
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
         plain => {
@@ -194,7 +207,7 @@ fn test_words(words: &mut lexopt::Parser) -> Result<test::Request> {
     }
 }
 
-/// `[--view] [FILE] [-- ARGS]`: what follows `--` is not looked at here.
+/// `[--view|--touch [--out FOLDER]] [FILE] [-- ARGS]`: what follows `--` is not looked at here.
 fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
     let mut request = demo::Request::default();
     loop {
@@ -209,6 +222,8 @@ fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
         }
         match words.next()? {
             Some(Long("view")) => request.view = true,
+            Some(Long("touch")) => request.touch = true,
+            Some(Long("out")) if request.touch => request.out = Some(words.value()?.into()),
             Some(Value(file)) if request.file.is_none() => request.file = Some(file),
             Some(other) => {
                 let what = other.unexpected();
@@ -238,6 +253,8 @@ mod tests {
         assert_eq!(request.file, Some("a.tif".into()));
         assert_eq!(request.extra, ["--seconds", "3", "--"]);
         assert_eq!(demo(&["--", "b"]).unwrap().file, None);
+        let touched = demo(&["--touch", "--out", "f", "a.tif"]).unwrap();
+        assert_eq!((touched.touch, touched.out), (true, Some("f".into())));
         let viewed = demo(&["--view", "a.tif"]).unwrap();
         assert_eq!((viewed.view, viewed.file), (true, Some("a.tif".into())));
         assert_eq!(demo(&[]).unwrap(), demo::Request::default());

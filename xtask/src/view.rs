@@ -12,7 +12,7 @@ use crate::run::{cargo, on_path, root, run, say, target_dir, timed};
 use crate::setup::packages::{self, found_or_installed};
 
 /// Names the browser that the page is tested with.
-const BROWSER: &str = "HAPTERRA_BROWSER";
+pub(crate) const BROWSER: &str = "HAPTERRA_BROWSER";
 /// What browsers that can be driven are called.
 const BROWSERS: [&str; 5] = [
     "chromium-headless-shell",
@@ -87,7 +87,8 @@ fn tests() -> Result<Command> {
     Ok(tests)
 }
 
-fn browser() -> Result<PathBuf> {
+/// A browser that can be driven; installed where there is none.
+pub(crate) fn browser() -> Result<PathBuf> {
     if let Some(given) = std::env::var_os(BROWSER) {
         return Ok(given.into());
     }

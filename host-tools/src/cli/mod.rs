@@ -12,6 +12,7 @@
 pub mod bench;
 pub mod bringup;
 pub mod calibrate;
+pub mod cut;
 pub mod demo;
 pub mod failure;
 pub mod flash;
@@ -60,6 +61,8 @@ pub enum Command {
     Info(info::Args),
     /// Make a terrain file by formula
     Synth(synth::Args),
+    /// Write a terrain's heights for the page that touches it in a browser
+    Cut(cut::Args),
     /// Serve a terrain to a device and watch what is felt
     Run(run::Args),
     /// Show it all: a terrain, a board, a hand that tours it, and a picture
@@ -96,6 +99,7 @@ pub fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Info(args) => info::run(&args),
         Command::Synth(args) => synth::run(&args),
+        Command::Cut(args) => cut::run(&args),
         Command::Run(args) => run::run(&args.pinned()),
         Command::Demo(args) => demo::run(&args),
         Command::Replay(args) => replay::run(&args),

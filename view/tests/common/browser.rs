@@ -59,6 +59,13 @@ pub struct Page {
     session: String,
 }
 
+impl Page {
+    /// The session by which the browser is called for it.
+    pub fn session(&self) -> &str {
+        &self.session
+    }
+}
+
 /// Colours of a picture of a page.
 #[derive(Debug)]
 pub struct Colours {
@@ -120,7 +127,8 @@ impl Browser {
         }
     }
 
-    fn call(&mut self, method: &str, params: Value, session: Option<&str>) -> Value {
+    /// Calls a method of the browser, or of a page by its session.
+    pub fn call(&mut self, method: &str, params: Value, session: Option<&str>) -> Value {
         let until = Instant::now() + HANG;
         loop {
             let answer = self.ask(method, params.clone(), session);

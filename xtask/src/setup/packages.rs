@@ -33,6 +33,8 @@ pub(crate) const BROWSER: Packages = [
     "chromium",
     "",
 ];
+/// For the unit tests of the page.
+pub(crate) const NODE: Packages = ["nodejs", "nodejs", "nodejs", "node"];
 pub(crate) const CMAKE_AND_LIBCLANG: Packages = [
     "cmake libclang-dev",
     "cmake clang-devel",

@@ -11,6 +11,9 @@ use crate::run::{cargo, on_path, output, run_quietly, say, target_dir};
 /// The boards' target: Cortex-M4F and M7 with single-precision FPU.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
+/// The target of browsers.
+pub(crate) const WASM: &str = "wasm32-unknown-unknown";
+
 const BY_HAND: &str = "\
 type: rustup target add thumbv7em-none-eabihf
       (rustup itself is on https://rustup.rs)";
@@ -88,7 +91,7 @@ pub(crate) fn ready() -> Result<Toolchain> {
 
 fn either() -> Result<Toolchain> {
     // What is here already comes before anything that needs the network.
-    if !own_has_target() && distribution::is_whole().is_ok() {
+    if !own_has_target(TARGET) && distribution::is_whole().is_ok() {
         return from_distribution();
     }
     own().or_else(|why| {
@@ -98,17 +101,32 @@ fn either() -> Result<Toolchain> {
 }
 
 fn own() -> Result<Toolchain> {
-    if own_has_target() {
-        return Ok(Toolchain::Own);
+    add_target(TARGET)?;
+    Ok(Toolchain::Own)
+}
+
+/// Sees to it that the toolchain that runs this program compiles for browsers.
+///
+/// # Errors
+/// What to type.
+pub(crate) fn with_wasm() -> Result<()> {
+    add_target(WASM).with_context(|| {
+        format!("type: rustup target add {WASM}\n      (rustup itself is on https://rustup.rs)")
+    })
+}
+
+fn add_target(target: &str) -> Result<()> {
+    if own_has_target(target) {
+        return Ok(());
     }
-    say(format!("the target {TARGET} is not installed"));
+    say(format!("the target {target} is not installed"));
     let rustup = on_path("rustup").context("there is no rustup on the PATH")?;
-    say(format!("installing: rustup target add {TARGET}"));
-    run_quietly(Command::new(rustup).args(["target", "add", TARGET]))?;
-    if !own_has_target() {
+    say(format!("installing: rustup target add {target}"));
+    run_quietly(Command::new(rustup).args(["target", "add", target]))?;
+    if !own_has_target(target) {
         bail!("rustup added the target, but not to the toolchain in use");
     }
-    Ok(Toolchain::Own)
+    Ok(())
 }
 
 fn from_distribution() -> Result<Toolchain> {
@@ -117,10 +135,10 @@ fn from_distribution() -> Result<Toolchain> {
     Ok(Toolchain::Distribution)
 }
 
-fn own_has_target() -> bool {
+fn own_has_target(target: &str) -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut ask = Command::new(rustc);
-    ask.args(["--print", "target-libdir", "--target", TARGET]);
+    ask.args(["--print", "target-libdir", "--target", target]);
     output(&mut ask).is_some_and(|dir| holds_core(Path::new(dir.trim())))
 }
 

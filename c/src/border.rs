@@ -1,0 +1,52 @@
+//! What crosses the border: arrays that a caller owns, and calls that must not panic.
+
+use std::mem::MaybeUninit;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::slice;
+
+use crate::status::{Failure, HapterraStatus};
+
+/// Checks that a pointer may be that of an array.
+fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
+    let bytes = count.checked_mul(size_of::<T>());
+    match pointer {
+        pointer if pointer.is_null() => Err(HapterraStatus::NullPointer),
+        pointer if !pointer.is_aligned() => Err(HapterraStatus::BadPointer),
+        _ if bytes.is_none_or(|bytes| bytes > isize::MAX as usize) => {
+            Err(HapterraStatus::BadPointer)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A caller's array.
+///
+/// # Safety
+/// At `pointer` are `count` values that nobody changes during the call.
+pub(crate) unsafe fn array<'a, T>(
+    pointer: *const T,
+    count: usize,
+) -> Result<&'a [T], HapterraStatus> {
+    check(pointer, count)?;
+    // SAFETY: not null, aligned, no larger than memory; the values are there by the contract of the
+    // header, which every caller of this function repeats.
+    Ok(unsafe { slice::from_raw_parts(pointer, count) })
+}
+
+/// A caller's room for an array, whatever it holds.
+///
+/// # Safety
+/// At `pointer` is room for `count` values that nobody else uses during the call.
+pub(crate) unsafe fn room<'a, T>(
+    pointer: *mut T,
+    count: usize,
+) -> Result<&'a mut [MaybeUninit<T>], HapterraStatus> {
+    check(pointer, count)?;
+    // SAFETY: as above, and what need not be initialised may hold anything.
+    Ok(unsafe { slice::from_raw_parts_mut(pointer.cast(), count) })
+}
+
+/// Runs a call; a panic is a failure.
+pub(crate) fn caught<R>(call: impl FnOnce() -> Result<R, Failure>) -> Result<R, Failure> {
+    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|_| Err(HapterraStatus::Internal.into()))
+}

@@ -1,0 +1,201 @@
+//! Contacts.
+
+use std::ffi::c_char;
+use std::mem::MaybeUninit;
+
+use hapterra_touch::{Contact, State, Step};
+
+use crate::border::{array, caught, room};
+use crate::status::{Failure, HapterraStatus, Message};
+use crate::surface::{HapterraSurface, surface};
+use crate::terrain::HapterraTerrain;
+
+/// What a proxy is doing.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HapterraState {
+    /// The HIP is in the air: no force.
+    Free = 0,
+    /// The proxy is on the surface and the HIP below it.
+    Touching = 1,
+    /// The surface has come to an end, and the last force fades away.
+    Fading = 2,
+    /// The HIP is below the surface and has not been above it: no force until it has.
+    BelowGround = 3,
+    /// The HIP is in a hole or outside and has not been above the surface: no force.
+    Outside = 4,
+}
+
+/// A step's answer. 64 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HapterraStep {
+    /// The force on the hand, N: east, north, up. Each is a number of single precision.
+    pub force_n: [f64; 3],
+    /// The proxy, mm: east, north, up.
+    pub proxy_mm: [f64; 3],
+    /// The height of the surface over the HIP, mm, in the state `HAPTERRA_STATE_BELOW_GROUND`; NaN in all others.
+    pub surface_mm: f64,
+    /// A `HapterraState`.
+    pub state: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+impl From<Step> for HapterraStep {
+    fn from(step: Step) -> Self {
+        let (state, surface_mm) = match step.state {
+            State::Free => (HapterraState::Free, f64::NAN),
+            State::Touching => (HapterraState::Touching, f64::NAN),
+            State::Fading => (HapterraState::Fading, f64::NAN),
+            State::BelowGround { surface_mm } => (HapterraState::BelowGround, surface_mm),
+            State::Outside => (HapterraState::Outside, f64::NAN),
+        };
+        Self {
+            force_n: step.force_n.map(f64::from),
+            proxy_mm: step.proxy_mm,
+            surface_mm,
+            state: state as u32,
+            reserved: 0,
+        }
+    }
+}
+
+/// One haptic interface point (HIP) over a terrain. Made by `hapterra_contact_new`, it has not begun.
+#[derive(Default)]
+pub struct HapterraContact {
+    contact: Option<Contact>,
+    message: Message,
+}
+
+impl HapterraContact {
+    /// Makes a call; after a panic there is no contact any more.
+    fn call(
+        &mut self,
+        call: impl FnOnce(&mut Option<Contact>) -> Result<(), Failure>,
+    ) -> HapterraStatus {
+        let Err(failure) = caught(|| call(&mut self.contact)) else {
+            return HapterraStatus::Ok;
+        };
+        if failure.status == HapterraStatus::Internal {
+            self.contact = None;
+        }
+        self.message.keep(failure)
+    }
+}
+
+/// Returns a contact that has not begun, which the caller owns until `hapterra_contact_free`.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_contact_new() -> Box<HapterraContact> {
+    Box::default()
+}
+
+/// Ends a contact; null is left alone.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_contact_free(contact: Option<Box<HapterraContact>>) {
+    drop(contact);
+}
+
+/// Begins a contact, or begins it anew, on the heights that a terrain has now: `rate_hz` steps a
+/// second, 1,000 to 10,000 in whole thousands. The first of the `count` surfaces, 1 to 16, is the
+/// surface, and the others are materials of the terrain, of which stiffness, friction, damping and
+/// texture count. Surfaces are copied, and the terrain may end before the contact.
+///
+/// # Safety
+/// At `surfaces` are `count` values.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub unsafe extern "C" fn hapterra_contact_begin(
+    contact: Option<&mut HapterraContact>,
+    terrain: Option<&HapterraTerrain>,
+    surfaces: *const HapterraSurface,
+    count: usize,
+    rate_hz: u32,
+) -> HapterraStatus {
+    contact.map_or(HapterraStatus::NullPointer, |contact| {
+        contact.call(|contact| {
+            let terrain = terrain.ok_or(HapterraStatus::NullPointer)?;
+            let terrain = terrain.terrain.clone().ok_or(HapterraStatus::NotBegun)?;
+            // SAFETY: by this function's contract.
+            let surface = unsafe { surface(surfaces, count) }?;
+            *contact = Some(Contact::at_rate(terrain, surface, rate_hz)?);
+            Ok(())
+        })
+    })
+}
+
+/// Puts other surfaces in between two steps, as `hapterra_contact_begin` takes them. The proxy stays
+/// where it is, and the next force is that of the other surface.
+///
+/// # Safety
+/// At `surfaces` are `count` values.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub unsafe extern "C" fn hapterra_contact_set_surface(
+    contact: Option<&mut HapterraContact>,
+    surfaces: *const HapterraSurface,
+    count: usize,
+) -> HapterraStatus {
+    contact.map_or(HapterraStatus::NullPointer, |contact| {
+        contact.call(|contact| {
+            let contact = contact.as_mut().ok_or(HapterraStatus::NotBegun)?;
+            // SAFETY: by this function's contract.
+            Ok(contact.set_surface(unsafe { surface(surfaces, count) }?)?)
+        })
+    })
+}
+
+/// Makes one step with the HIP at three numbers, mm: east, north, up from the south-west sample at
+/// height zero. Where it returns an error the step has not happened and `step` is as before. An
+/// error gives no force: a program that drives a device has to set its force to zero.
+///
+/// # Safety
+/// At `hip_mm` are 3 numbers, and at `step` is room for one step.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub unsafe extern "C" fn hapterra_contact_step(
+    contact: Option<&mut HapterraContact>,
+    hip_mm: *const f64,
+    step: *mut HapterraStep,
+) -> HapterraStatus {
+    // SAFETY: by this function's contract.
+    unsafe { hapterra_contact_run(contact, hip_mm, 1, step, None) }
+}
+
+/// Makes `count` steps, of three numbers each, one after the other into `steps`. It ends with the
+/// first that cannot happen. `done` may be null; else it receives how many steps have happened.
+///
+/// # Safety
+/// At `hips_mm` are 3 times `count` numbers, and at `steps` is room for `count` steps.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub unsafe extern "C" fn hapterra_contact_run(
+    contact: Option<&mut HapterraContact>,
+    hips_mm: *const f64,
+    count: usize,
+    steps: *mut HapterraStep,
+    done: Option<&mut MaybeUninit<usize>>,
+) -> HapterraStatus {
+    let mut happened = 0;
+    let status = contact.map_or(HapterraStatus::NullPointer, |contact| {
+        contact.call(|contact| {
+            let contact = contact.as_mut().ok_or(HapterraStatus::NotBegun)?;
+            // SAFETY: by this function's contract.
+            let hips_mm = unsafe { array(hips_mm.cast::<[f64; 3]>(), count) }?;
+            // SAFETY: by this function's contract.
+            let steps = unsafe { room(steps, count) }?;
+            for (hip_mm, step) in hips_mm.iter().zip(steps) {
+                step.write(contact.step(*hip_mm)?.into());
+                happened += 1;
+            }
+            Ok(())
+        })
+    });
+    if let Some(done) = done {
+        done.write(happened);
+    }
+    status
+}
+
+/// Returns the message of the contact's last error, empty where there was none, null for null. It is
+/// the contact's, and valid until the next call with it.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_contact_message(contact: Option<&HapterraContact>) -> *const c_char {
+    contact.map_or(std::ptr::null(), |contact| contact.message.as_ptr())
+}

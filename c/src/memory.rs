@@ -1,0 +1,33 @@
+//! Memory for a caller that lives in the library's own, as the page around a WebAssembly module does.
+
+use std::alloc::{Layout, alloc, dealloc};
+use std::ffi::c_void;
+use std::ptr::null_mut;
+
+/// Aligned for every type of the header.
+const ALIGNMENT: usize = 16;
+
+/// Returns memory of so many bytes, aligned to 16, that the caller owns until `hapterra_free`; null
+/// for no bytes, and where there is none. Meant for WebAssembly; C has `malloc`.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_alloc(bytes: usize) -> *mut c_void {
+    match Layout::from_size_align(bytes, ALIGNMENT) {
+        // SAFETY: the size is not zero.
+        Ok(layout) if bytes > 0 => unsafe { alloc(layout) }.cast(),
+        _ => null_mut(),
+    }
+}
+
+/// Gives memory back that `hapterra_alloc` returned for the same number of bytes. Null is left alone.
+///
+/// # Safety
+/// `pointer` is null, or came from `hapterra_alloc(bytes)` and has not been given back.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub unsafe extern "C" fn hapterra_free(pointer: *mut c_void, bytes: usize) {
+    if let Ok(layout) = Layout::from_size_align(bytes, ALIGNMENT)
+        && !pointer.is_null()
+    {
+        // SAFETY: by this function's contract it was allocated with this layout.
+        unsafe { dealloc(pointer.cast(), layout) }
+    }
+}

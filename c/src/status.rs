@@ -1,0 +1,155 @@
+//! Errors as numbers, with texts.
+
+use std::ffi::{CStr, CString, c_char};
+
+use hapterra_touch::{ContactError, StepError, TerrainError};
+
+/// What a function returns: 0, or which error.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HapterraStatus {
+    /// All is well.
+    Ok = 0,
+    /// A pointer is null.
+    NullPointer = 1,
+    /// A pointer is not aligned, or a count is larger than memory.
+    BadPointer = 2,
+    /// The terrain has no heights yet, or the contact has not begun.
+    NotBegun = 3,
+    /// A terrain of such a size, or with so many samples, cannot be.
+    Size = 4,
+    /// The millimetres of a cell or of a vertical unit are no scale.
+    Scale = 5,
+    /// Heights are too tall or too steep.
+    Heights = 6,
+    /// A parameter of a surface is out of its bounds.
+    Surface = 7,
+    /// A material of the terrain is not one of the surfaces.
+    Material = 8,
+    /// No tick rate: 1,000 to 10,000 in whole thousands.
+    Rate = 9,
+    /// A place is not a number, or too far away.
+    Place = 10,
+    /// The reader of heights returned an error.
+    Unread = 11,
+    /// A path is too long for one step.
+    Far = 12,
+    /// A number is none of an enumeration's.
+    Choice = 13,
+    /// There is no memory.
+    Memory = 14,
+    /// The library is at fault. The object cannot be used any more but for its end.
+    Internal = 15,
+}
+
+/// Texts by number.
+const TEXTS: [&CStr; 16] = [
+    c"all is well",
+    c"a pointer is null: give one",
+    c"a pointer is not aligned or a count larger than memory",
+    c"the terrain has no heights yet, or the contact has not begun",
+    c"a terrain of such a size, or with so many samples, cannot be",
+    c"the millimetres of a cell or of a vertical unit are no scale",
+    c"heights are too tall or too steep: scale them down, or make no-data NaN",
+    c"a parameter of a surface is out of its bounds",
+    c"a material of the terrain is not one of the surfaces",
+    c"no tick rate: give 1,000 to 10,000 in whole thousands",
+    c"a place is not a number or too far away",
+    c"the reader of heights returned an error",
+    c"a path is too long for one step: go there in smaller steps",
+    c"a number is none of an enumeration's",
+    c"there is no memory",
+    c"the library is at fault: report it, and free the object",
+];
+
+/// An error, with the message that the object keeps.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub(crate) status: HapterraStatus,
+    message: String,
+}
+
+impl Failure {
+    pub(crate) fn new(status: HapterraStatus, message: impl ToString) -> Self {
+        let message = message.to_string();
+        Self { status, message }
+    }
+}
+
+impl From<HapterraStatus> for Failure {
+    fn from(status: HapterraStatus) -> Self {
+        let text = TEXTS.get(status as usize).copied().unwrap_or_default();
+        Self::new(status, text.to_string_lossy())
+    }
+}
+
+impl From<TerrainError> for Failure {
+    fn from(error: TerrainError) -> Self {
+        let status = match error {
+            TerrainError::Size { .. }
+            | TerrainError::Count { .. }
+            | TerrainError::Ragged { .. } => HapterraStatus::Size,
+            TerrainError::Memory { .. } => HapterraStatus::Memory,
+            TerrainError::Scale(_) => HapterraStatus::Scale,
+            TerrainError::TooTall { .. } | TerrainError::Step { .. } => HapterraStatus::Heights,
+        };
+        Self::new(status, error)
+    }
+}
+
+impl From<ContactError> for Failure {
+    fn from(error: ContactError) -> Self {
+        let status = match error {
+            ContactError::Terrain(error) => return error.into(),
+            ContactError::Surface(_) => HapterraStatus::Surface,
+            ContactError::Material { .. } => HapterraStatus::Material,
+            ContactError::Rate(_) => HapterraStatus::Rate,
+            ContactError::Refused => HapterraStatus::Internal,
+        };
+        Self::new(status, error)
+    }
+}
+
+impl From<StepError> for Failure {
+    fn from(error: StepError) -> Self {
+        let status = match error {
+            StepError::Place { .. } => HapterraStatus::Place,
+            StepError::Unread(_) => HapterraStatus::Unread,
+            StepError::Steep { .. } => HapterraStatus::Heights,
+            StepError::Far { .. } => HapterraStatus::Far,
+        };
+        Self::new(status, error)
+    }
+}
+
+/// The message of an object's last error.
+#[derive(Default)]
+pub(crate) struct Message(CString);
+
+impl Message {
+    pub(crate) fn keep(&mut self, failure: Failure) -> HapterraStatus {
+        // No message has a zero in it.
+        self.0 = CString::new(failure.message).unwrap_or_default();
+        failure.status
+    }
+
+    pub(crate) fn as_ptr(&self) -> *const c_char {
+        self.0.as_ptr()
+    }
+}
+
+/// Returns the text of a status, for ever valid; that of `HAPTERRA_STATUS_CHOICE` for any other
+/// number. Not to be freed.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_error_text(status: u32) -> *const c_char {
+    let text = TEXTS.get(status as usize);
+    text.unwrap_or(&TEXTS[HapterraStatus::Choice as usize])
+        .as_ptr()
+}
+
+/// Returns the version of the library, such as `0.1.0`, for ever valid. Not to be freed.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_version() -> *const c_char {
+    const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");
+    VERSION.as_ptr().cast()
+}

@@ -1,0 +1,246 @@
+//! Terrains.
+
+use std::ffi::{c_char, c_void};
+
+use hapterra_touch::{Block, Height, Heights, RowOrder, Terrain, TerrainError, Unread};
+
+use crate::border::{array, caught};
+use crate::status::{Failure, HapterraStatus, Message};
+
+/// Which row of an array comes first.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HapterraRowOrder {
+    /// The northernmost, as in images and GeoTIFF.
+    NorthFirst = 0,
+    /// The southernmost.
+    SouthFirst = 1,
+}
+
+/// A height field. Made by `hapterra_terrain_new`, it has no heights yet.
+#[derive(Default)]
+pub struct HapterraTerrain {
+    pub(crate) terrain: Option<Terrain>,
+    message: Message,
+}
+
+/// Reads heights of a block of samples into `heights`, row by row from the south and each row from
+/// west to east: `columns` times `rows`, at most 33 × 33, NaN for a hole. `column` and `row` count
+/// from the south-west sample. Returns 0, or any other number for an error. `user` is the pointer
+/// that was given with the function. It is called during calls with a contact or terrain only, and
+/// must not end by an exception or `longjmp`.
+pub type HapterraRead = Option<
+    extern "C" fn(
+        user: *mut c_void,
+        column: u32,
+        row: u32,
+        columns: u32,
+        rows: u32,
+        heights: *mut f64,
+    ) -> u32,
+>;
+
+/// A caller's function as a source.
+struct Reader {
+    read: extern "C" fn(*mut c_void, u32, u32, u32, u32, *mut f64) -> u32,
+    user: *mut c_void,
+}
+
+// SAFETY: the pointer is handed to the caller's function and not used here; the header asks that the
+// function be right in whichever thread uses the terrain.
+unsafe impl Send for Reader {}
+// SAFETY: as above.
+unsafe impl Sync for Reader {}
+
+impl Heights for Reader {
+    fn read(&self, block: Block, heights: &mut [f64]) -> Result<(), Unread> {
+        let Block {
+            column,
+            row,
+            columns,
+            rows,
+        } = block;
+        let room = heights.as_mut_ptr();
+        match (self.read)(self.user, column, row, columns, rows, room) {
+            0 => Ok(()),
+            error => Err(Unread(error)),
+        }
+    }
+}
+
+impl HapterraTerrain {
+    /// Puts other heights in; the ones before stay where there are none.
+    fn put(
+        &mut self,
+        made: impl FnOnce(Option<&Terrain>) -> Result<Terrain, Failure>,
+    ) -> HapterraStatus {
+        match caught(|| made(self.terrain.as_ref())) {
+            Ok(terrain) => {
+                self.terrain = Some(terrain);
+                HapterraStatus::Ok
+            }
+            Err(failure) => self.message.keep(failure),
+        }
+    }
+
+    /// # Safety
+    /// At `heights` are columns times rows of them.
+    unsafe fn put_array<T: Height>(
+        &mut self,
+        heights: *const T,
+        [columns, rows]: [u32; 2],
+        cell_mm: f64,
+        order: u32,
+    ) -> HapterraStatus {
+        self.put(|_| {
+            let order = row_order(order)?;
+            let count = (columns as usize).checked_mul(rows as usize);
+            let count = count.ok_or(TerrainError::Memory { columns, rows })?;
+            // SAFETY: by this function's contract.
+            let heights = unsafe { array(heights, count) }?;
+            Ok(Terrain::from_slice(columns, rows, cell_mm, order, heights)?)
+        })
+    }
+}
+
+fn row_order(order: u32) -> Result<RowOrder, Failure> {
+    match order {
+        0 => Ok(RowOrder::NorthFirst),
+        1 => Ok(RowOrder::SouthFirst),
+        other => {
+            let message = format!("row order is {other}: give 0 (north first) or 1 (south first)");
+            Err(Failure::new(HapterraStatus::Choice, message))
+        }
+    }
+}
+
+/// Returns a terrain without heights, which the caller owns until `hapterra_terrain_free`.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_terrain_new() -> Box<HapterraTerrain> {
+    Box::default()
+}
+
+/// Ends a terrain; null is left alone. Contacts on it stay as they are.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_terrain_free(terrain: Option<Box<HapterraTerrain>>) {
+    drop(terrain);
+}
+
+/// Gives a terrain `columns` times `rows` heights in millimetres, `cell_mm` apart, row by row in a
+/// `HapterraRowOrder`, each row from west to east; NaN is a hole. They are copied. Contacts that
+/// have begun keep the terrain that they have.
+///
+/// # Safety
+/// At `heights` are `columns` times `rows` values.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub unsafe extern "C" fn hapterra_terrain_set_f32(
+    terrain: Option<&mut HapterraTerrain>,
+    heights: *const f32,
+    columns: u32,
+    rows: u32,
+    cell_mm: f64,
+    row_order: u32,
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
+        // SAFETY: by this function's contract.
+        unsafe { terrain.put_array(heights, [columns, rows], cell_mm, row_order) }
+    })
+}
+
+/// As `hapterra_terrain_set_f32`, in double precision.
+///
+/// # Safety
+/// At `heights` are `columns` times `rows` values.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub unsafe extern "C" fn hapterra_terrain_set_f64(
+    terrain: Option<&mut HapterraTerrain>,
+    heights: *const f64,
+    columns: u32,
+    rows: u32,
+    cell_mm: f64,
+    row_order: u32,
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
+        // SAFETY: by this function's contract.
+        unsafe { terrain.put_array(heights, [columns, rows], cell_mm, row_order) }
+    })
+}
+
+/// Gives a terrain heights in millimetres that a function reads where they are touched. Function and
+/// `user` are the caller's, and valid until the terrain and all contacts that began on it have ended.
+/// A contact that was moved to another thread calls it from there.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_terrain_set_reader(
+    terrain: Option<&mut HapterraTerrain>,
+    read: HapterraRead,
+    user: *mut c_void,
+    columns: u32,
+    rows: u32,
+    cell_mm: f64,
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
+        terrain.put(|_| {
+            let read = read.ok_or(HapterraStatus::NullPointer)?;
+            let reader = Reader { read, user };
+            Ok(Terrain::from_tiles(columns, rows, cell_mm, reader)?)
+        })
+    })
+}
+
+/// Says how many millimetres a unit of the heights is, where they are not millimetres. It counts for
+/// the heights that the terrain has, and for contacts that begin later.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_terrain_set_height_scale(
+    terrain: Option<&mut HapterraTerrain>,
+    mm_per_unit: f64,
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
+        terrain.put(|terrain| {
+            let terrain = terrain.cloned().ok_or(HapterraStatus::NotBegun)?;
+            Ok(terrain.with_height_scale(mm_per_unit)?)
+        })
+    })
+}
+
+/// Says of which material each sample is: the number of one of the surfaces of
+/// `hapterra_contact_begin`, row by row in a `HapterraRowOrder`. There are as many as the terrain
+/// has samples, and they are copied.
+///
+/// # Safety
+/// At `materials` are `count` values.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub unsafe extern "C" fn hapterra_terrain_set_materials(
+    terrain: Option<&mut HapterraTerrain>,
+    materials: *const u8,
+    count: usize,
+    order: u32,
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
+        terrain.put(|terrain| {
+            let terrain = terrain.cloned().ok_or(HapterraStatus::NotBegun)?;
+            // SAFETY: by this function's contract.
+            let materials = unsafe { array(materials, count) }?;
+            Ok(terrain.with_materials(row_order(order)?, materials.to_vec())?)
+        })
+    })
+}
+
+/// Returns the height of the surface at a place, mm; NaN in a hole, off the terrain, where it cannot
+/// be read, and for null.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_terrain_height_mm(
+    terrain: Option<&HapterraTerrain>,
+    east_mm: f64,
+    north_mm: f64,
+) -> f64 {
+    let terrain = terrain.and_then(|terrain| terrain.terrain.as_ref());
+    let height = caught(|| Ok(terrain.and_then(|it| it.height_mm(east_mm, north_mm))));
+    height.ok().flatten().unwrap_or(f64::NAN)
+}
+
+/// Returns the message of the terrain's last error, empty where there was none, null for null. It is
+/// the terrain's, and valid until the next call with it.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_terrain_message(terrain: Option<&HapterraTerrain>) -> *const c_char {
+    terrain.map_or(std::ptr::null(), |terrain| terrain.message.as_ptr())
+}

@@ -1,0 +1,32 @@
+// Files that were dropped: by what they begin with, else by their names' ends.
+//
+// Each reader returns what `fit` of terrain.js takes, and throws an `Error` that says what is wrong,
+// where, and what to do.
+
+import { asc } from "./asc.js";
+import { hgt } from "./hgt.js";
+import { npy } from "./npy.js";
+import { png } from "./png.js";
+import { Told } from "./samples.js";
+import { tiff } from "./tiff.js";
+
+const KINDS = "GeoTIFF, .hgt, Esri ASCII (.asc), grey PNG or NumPy (.npy)";
+
+/** Bytes of a file named `name`, as a terrain. */
+export async function read(name, bytes) {
+  const raw = await reader(name, bytes)(bytes, name).catch((why) => {
+    throw why instanceof Told ? why : new Told(`${name}: it cannot be read: ${why.message}. Is the file whole? Try to open it with gdalinfo.`);
+  });
+  return { name, ...raw };
+}
+
+function reader(name, bytes) {
+  const begins = (...codes) => codes.every((code, i) => bytes[i] === code);
+  if (begins(0x89, 0x50, 0x4e, 0x47)) return png;
+  if (begins(0x93, 0x4e, 0x55, 0x4d)) return npy;
+  if (begins(0x49, 0x49, 0x2a) || begins(0x49, 0x49, 0x2b) || begins(0x4d, 0x4d, 0x00)) return tiff;
+  if (/\.hgt$/i.test(name)) return hgt;
+  const text = new TextDecoder("latin1").decode(bytes.subarray(0, 64));
+  if (/^\s*(ncols|nrows)\s/i.test(text)) return asc;
+  throw new Told(`${name}: its kind is not known here. Drop a ${KINDS}; \`cargo xtask demo --touch FILE\` opens many more.`);
+}

@@ -1,0 +1,20 @@
+// What readers share: errors and samples.
+
+/** An error whose words are for the user. */
+export class Told extends Error {}
+
+/** Heights are read in the file's order of bytes, whatever this machine's is. */
+const isLittle = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1;
+
+/** Samples of a kind (`f4`, `i2`, …) from `bytes`, as 32-bit floats. */
+export function samples(kind, bytes, isLittleEndian, count) {
+  const Kind = { f4: Float32Array, f8: Float64Array, i1: Int8Array, u1: Uint8Array, i2: Int16Array, u2: Uint16Array, i4: Int32Array, u4: Uint32Array }[kind];
+  if (!Kind) throw new Told(`samples of type ${kind} are not read here: store them as 32-bit floats (numpy: a.astype("f4"))`);
+  const size = Kind.BYTES_PER_ELEMENT;
+  if (bytes.length < count * size) throw new Told(`${count * size} bytes of heights are expected, and ${bytes.length} are there: the file is cut off. Copy it again.`);
+  const own = bytes.slice(0, count * size);
+  if (isLittleEndian !== isLittle) {
+    for (let i = 0; i < own.length; i += size) own.subarray(i, i + size).reverse();
+  }
+  return Float32Array.from(new Kind(own.buffer));
+}

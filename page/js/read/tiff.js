@@ -1,0 +1,41 @@
+// GeoTIFF, read by geotiff.js, which is loaded when the first one is dropped.
+
+import { turned } from "../terrain.js";
+import { Told } from "./samples.js";
+
+const LIBRARY = "geotiff.js";
+const DEGREE_M = 111_320;
+const GEOGRAPHIC = 2;
+
+function library() {
+  return new Promise((resolve, reject) => {
+    if (globalThis.GeoTIFF) return resolve(globalThis.GeoTIFF);
+    const script = document.createElement("script");
+    script.src = LIBRARY;
+    script.onload = () => resolve(globalThis.GeoTIFF);
+    script.onerror = () => reject(new Told(`This page was made without ${LIBRARY}, so it cannot read GeoTIFF. Make it again with npm and a network, or convert the file: gdal_translate -of AAIGrid in.tif out.asc.`));
+    document.head.append(script);
+  });
+}
+
+export async function tiff(bytes) {
+  const { fromArrayBuffer } = await library();
+  const file = await fromArrayBuffer(bytes.slice().buffer);
+  const image = await file.getImage();
+  const [nx, ny] = [image.getWidth(), image.getHeight()];
+  const [band] = await image.readRasters({ samples: [0] });
+  const noData = image.getGDALNoData();
+  const heights = Float32Array.from(band, (height) => (height === noData ? NaN : height));
+  return { nx, ny, heights: turned(heights, nx, ny), cellM: cell(image, ny), unitM: 1 };
+}
+
+/** Side of a cell in metres, the mean of both axes; null where the file does not say. */
+function cell(image, ny) {
+  const hasPlace = image.fileDirectory.hasTag("ModelPixelScale") || image.fileDirectory.hasTag("ModelTransformation");
+  if (!hasPlace) return null;
+  const [east, north] = image.getResolution().map(Math.abs);
+  const side = Math.sqrt(east * north);
+  if (image.getGeoKeys()?.GTModelTypeGeoKey !== GEOGRAPHIC) return side;
+  const latitude = image.getOrigin()[1] - (north * ny) / 2;
+  return side * DEGREE_M * Math.sqrt(Math.cos((latitude * Math.PI) / 180));
+}

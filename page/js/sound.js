@@ -1,0 +1,46 @@
+// The force as sound: the pitch follows its size, and its changes are heard as a rustle.
+
+/** Hz without force, and for each newton more. */
+const BASE_HZ = 85;
+const PER_NEWTON_HZ = 55;
+
+export class Sound {
+  #context = null;
+  isOn = false;
+
+  /** Browsers allow sound only after a click: call it from one. */
+  toggle() {
+    if (!this.#context) this.#open();
+    this.isOn = !this.isOn;
+    this.isOn ? this.#context.resume() : this.#context.suspend();
+  }
+
+  #open() {
+    const context = (this.#context = new AudioContext());
+    const gain = () => {
+      const node = new GainNode(context, { gain: 0 });
+      node.connect(context.destination);
+      return node;
+    };
+    this.tone = new OscillatorNode(context, { type: "triangle", frequency: BASE_HZ });
+    this.toneGain = gain();
+    this.tone.connect(this.toneGain);
+    this.tone.start();
+    const noise = new AudioBuffer({ length: context.sampleRate, sampleRate: context.sampleRate });
+    noise.getChannelData(0).forEach((_, i, data) => (data[i] = Math.random() * 2 - 1));
+    this.rustle = new AudioBufferSourceNode(context, { buffer: noise, loop: true });
+    this.filter = new BiquadFilterNode(context, { type: "bandpass", frequency: 900, Q: 0.8 });
+    this.rustleGain = gain();
+    this.rustle.connect(this.filter).connect(this.rustleGain);
+    this.rustle.start();
+  }
+
+  /** A frame's force, N, and how much it changed from tick to tick, N. */
+  hear(newtons, changeN) {
+    if (!this.isOn) return;
+    const soon = this.#context.currentTime;
+    this.tone.frequency.setTargetAtTime(BASE_HZ + PER_NEWTON_HZ * newtons, soon, 0.02);
+    this.toneGain.gain.setTargetAtTime(Math.min(0.16, 0.06 * newtons), soon, 0.02);
+    this.rustleGain.gain.setTargetAtTime(Math.min(0.35, 6 * changeN), soon, 0.015);
+  }
+}

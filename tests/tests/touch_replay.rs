@@ -1,0 +1,208 @@
+//! Forces of the library for arrays against `replay` on a file of the same heights: the same bits.
+
+use hapterra::materials::{ClassMaterial, Looks, Materials};
+use hapterra::raster::{OpenOptions, Raster};
+use hapterra::replay::{on_native_at, state_name};
+use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra_core::rate::TickRate;
+use hapterra_tests::walk::wander;
+use hapterra_touch as touch;
+use hapterra_touch::{
+    Contact, Damping, ForceLaw, Friction, Material, Pattern, RowOrder, Shading, State, Surface,
+    Texture,
+};
+
+const COLUMNS: u32 = 130;
+const ROWS: u32 = 97;
+const CELL_MM: f64 = 0.7;
+
+/// Rough hills with holes, the northern row first.
+fn heights() -> Vec<f64> {
+    let height = |at: u32| {
+        let (x, y) = (f64::from(at % COLUMNS), f64::from(at / COLUMNS));
+        let hole = at.is_multiple_of(997);
+        let hill = 6.0 * (0.21 * x).sin() * (0.13 * y).cos() + 0.4 * (2.1 * x + 1.3 * y).sin();
+        if hole { f64::NAN } else { hill - 1000.3 }
+    };
+    (0..COLUMNS * ROWS).map(height).collect()
+}
+
+/// A `.npy` file of heights of a type.
+fn npy(descr: &str, samples: impl Iterator<Item = Vec<u8>>) -> Raster {
+    let header =
+        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({ROWS}, {COLUMNS}), }}");
+    let header = format!("{header:<117}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(samples.flatten());
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("heights.npy");
+    std::fs::write(&path, bytes).expect("written");
+    Raster::open(&path, &OpenOptions::default()).expect("a raster")
+}
+
+fn rough() -> ForceLaw {
+    ForceLaw {
+        stiffness_n_per_mm: 0.4,
+        max_force_n: 6.0,
+        friction: Friction {
+            static_mu: 0.5,
+            dynamic_mu: 0.3,
+            viscous_s: 0.004,
+        },
+        damping: Damping {
+            ns_per_m: 2.0,
+            ..Damping::NONE
+        },
+        shading: Shading::Smooth,
+        texture: Texture {
+            pattern: Pattern::Grain,
+            amplitude_mm: 0.1,
+            wavelength_mm: 1.5,
+            direction_deg: 0.0,
+            seed: 3,
+        },
+    }
+}
+
+fn name(state: State) -> &'static str {
+    match state {
+        State::Free => "free",
+        State::Touching => "touching",
+        State::Fading => "letting go",
+        State::BelowGround { .. } | State::Outside => "waiting",
+    }
+}
+
+/// Fails unless both feel the same of a path that wanders about, bit for bit. Returns how many
+/// places were in contact.
+fn same(
+    terrain: &Terrain<'_>,
+    contact: &mut Contact,
+    law: ForceLaw,
+    rate: u32,
+    seed: u64,
+) -> usize {
+    let rate = TickRate::new(rate).expect("a rate");
+    let mut replayer = on_native_at(rate, terrain, law).expect("opened");
+    let mut touched = 0;
+    for (row, hip_mm) in wander(terrain, seed, 4_000, -2.0).into_iter().enumerate() {
+        let hip = terrain.scale().to_grid(hip_mm).expect("addressable");
+        let sample = replayer.feel(hip).expect("felt");
+        let proxy_mm = terrain.scale().to_mm(&sample.proxy);
+        let step = contact.step(hip_mm).expect("a step");
+        let bits = step.force_n.map(f32::to_bits);
+        assert_eq!(
+            (bits, step.proxy_mm.map(f64::to_bits), name(step.state)),
+            (
+                sample.force_n.to_array().map(f32::to_bits),
+                proxy_mm.map(f64::to_bits),
+                state_name(sample.state)
+            ),
+            "row {row} at {hip_mm:?}: {step:?}, not {sample:?}"
+        );
+        assert_eq!(
+            contact.terrain().height_mm(hip_mm[0], hip_mm[1]),
+            terrain.height_mm(hip_mm[0], hip_mm[1])
+        );
+        touched += usize::from(step.state == State::Touching);
+    }
+    touched
+}
+
+#[test]
+fn forces_over_an_array_are_those_of_a_replay() {
+    let heights = heights();
+    let raster = npy(
+        "<f8",
+        heights.iter().map(|height| height.to_le_bytes().to_vec()),
+    );
+    let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
+    let ground = touch::Terrain::from_slice(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, &heights);
+    let ground = ground.expect("a terrain");
+    for (law, rate, seed) in [
+        (ForceLaw::PREMIUM, 1_000, 1),
+        (rough(), 1_000, 2),
+        (rough(), 4_000, 3),
+    ] {
+        let surface = Surface::new(law).expect("a surface");
+        let mut contact = Contact::at_rate(ground.clone(), surface, rate).expect("a contact");
+        let touched = same(&terrain, &mut contact, law, rate, seed);
+        assert!(touched > 1_000, "{touched} in contact");
+    }
+}
+
+#[test]
+fn integers_at_a_height_scale_are_those_of_a_replay() {
+    let heights: Vec<i16> = heights()
+        .iter()
+        .map(|height| (height * 9.0) as i16)
+        .collect();
+    let raster = npy(
+        "<i2",
+        heights.iter().map(|height| height.to_le_bytes().to_vec()),
+    );
+    let (cell_mm, mm_per_unit) = (0.3, 0.017);
+    let scale = Scale::new(cell_mm, mm_per_unit).expect("a scale");
+    let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
+    let ground = touch::Terrain::from_vec(COLUMNS, ROWS, cell_mm, RowOrder::NorthFirst, heights);
+    let ground = ground.and_then(|it| it.with_height_scale(mm_per_unit));
+    let surface = Surface::new(rough()).expect("a surface");
+    let mut contact = Contact::new(ground.expect("a terrain"), surface).expect("a contact");
+    assert!(same(&terrain, &mut contact, rough(), 1_000, 4) > 1_000);
+}
+
+#[test]
+fn materials_are_those_of_a_replay() {
+    let heights = heights();
+    let class = |at: usize| [0, 7, 9][(at % COLUMNS as usize / 11 + at / 1300) % 3];
+    let classes: Vec<u8> = (0..heights.len()).map(class).collect();
+    let raster = npy(
+        "<f8",
+        heights.iter().map(|height| height.to_le_bytes().to_vec()),
+    );
+    let of_classes = npy("|u1", classes.iter().map(|class| vec![*class]));
+    let materials = [
+        Material {
+            stiffness_n_per_mm: 0.2,
+            ..Material::of(&rough())
+        },
+        Material {
+            friction: Friction::coulomb(0.7),
+            texture: Texture::NONE,
+            ..Material::of(&rough())
+        },
+    ];
+    let named = [7, 9].into_iter().zip(materials);
+    let looks = Looks {
+        default: Material::of(&rough()),
+        class: named
+            .map(|(class, material)| ClassMaterial {
+                class,
+                name: None,
+                material,
+            })
+            .collect(),
+    };
+    let over = Materials::over(("heights", &raster), ("classes", of_classes), looks);
+    let over = over.expect("they overlap");
+    let grid = FeltGrid::new(&raster, FeltCells::default()).with_materials(Some(&over));
+    let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
+    let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
+    let law = over.law(&rough());
+    let ground = touch::Terrain::from_vec(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, heights);
+    let index = |class: &u8| {
+        [0, 7, 9]
+            .iter()
+            .position(|it| it == class)
+            .expect("a class") as u8
+    };
+    let indices = classes.iter().map(index).collect();
+    let ground = ground.and_then(|it| it.with_materials(RowOrder::NorthFirst, indices));
+    let surface = Surface::new(law).and_then(|it| it.with_materials(&materials));
+    let mut contact =
+        Contact::new(ground.expect("a terrain"), surface.expect("a surface")).expect("a contact");
+    assert!(same(&terrain, &mut contact, law, 1_000, 5) > 1_000);
+}

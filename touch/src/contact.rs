@@ -1,0 +1,286 @@
+//! One HIP in contact with one terrain.
+
+use alloc::vec::Vec;
+
+use hapterra_core::contact::ContactState;
+use hapterra_core::force::MaterialTable;
+use hapterra_core::grid::{GridPoint, MAX_CELL};
+use hapterra_core::guard::Limits;
+use hapterra_core::rate::TickRate;
+use hapterra_core::scene::{Sample, Scene, Source};
+
+use crate::heights::Unread;
+use crate::scale::Scale;
+use crate::surface::{Surface, SurfaceError};
+use crate::terrain::{NoTile, Terrain, TerrainError};
+use crate::tick_loop::TickLoop;
+
+/// Ticks in which a force comes in again after a change, at most, at every rate.
+const MOST_SETTLING: u32 = 4_096;
+
+/// A haptic interface point (HIP) and its proxy over a terrain: millimetres in, newtons out.
+///
+/// It runs the device's own loop, fed by points, as `hapterra replay` does: the same path has the
+/// same forces, bit for bit. One step is one tick, so speeds (of damping and viscous friction) are
+/// by the tick rate, 1 kHz unless [`Contact::at_rate`] says otherwise.
+///
+/// A contact takes 1.5 MB for its window of tiles, whatever the size of the terrain. It can be sent
+/// to another thread.
+#[doc(alias = "god object")]
+#[doc(alias = "god-object")]
+#[doc(alias = "virtual proxy")]
+#[doc(alias = "haptic rendering")]
+pub struct Contact {
+    terrain: Terrain,
+    tick_loop: TickLoop,
+    scene: Scene,
+    materials: usize,
+    /// Where the HIP was.
+    last: Option<GridPoint>,
+}
+
+/// One step's answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// The force on the hand: east, north, up, N.
+    pub force_n: [f32; 3],
+    /// The proxy: on the surface while it touches, at the HIP while it is free, mm.
+    pub proxy_mm: [f64; 3],
+    /// What the proxy is doing.
+    pub state: State,
+}
+
+/// What a proxy is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum State {
+    /// The HIP is in the air, and so is the proxy: no force.
+    Free,
+    /// The proxy is on the surface, and the HIP below it.
+    Touching,
+    /// The surface that the proxy was on has come to an end, and the last force fades away.
+    Fading,
+    /// The HIP is below the surface and has not been above it, so that the side it came from is
+    /// unknown: no force until it has been above `surface_mm`. A path may begin here, or go on here
+    /// from a hole or from outside.
+    BelowGround {
+        /// The height of the surface over the HIP, mm.
+        surface_mm: f64,
+    },
+    /// The HIP is in a hole or outside of the terrain and has not been above the surface: no force.
+    Outside,
+}
+
+/// A contact that cannot be made.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ContactError {
+    /// The surface on this terrain.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// The heights of the terrain.
+    #[error(transparent)]
+    Terrain(#[from] TerrainError),
+    /// The terrain has a material that the surface has not.
+    #[error(
+        "the terrain has material {found}, and the surface {count}, from 0 on: give it more, or the terrain less"
+    )]
+    Material {
+        /// The largest of the terrain.
+        found: u8,
+        /// Materials of the surface.
+        count: usize,
+    },
+    /// No rate of the loop.
+    #[error("{0} ticks a second: give 1,000 to 10,000, in whole thousands")]
+    Rate(u32),
+    /// The loop refuses the scene.
+    #[error("the loop refuses the surface on this terrain: report it as a fault of hapterra")]
+    Refused,
+}
+
+/// A step that has not happened: the contact is as before it.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// A place that is not a number, or too far away.
+    #[error("the HIP is at {hip_mm:?} mm: give numbers within {MAX_CELL} cells of {cell_mm} mm")]
+    Place {
+        /// The place, mm.
+        hip_mm: [f64; 3],
+        /// Millimetres a cell.
+        cell_mm: f64,
+    },
+    /// Heights could not be read.
+    #[error(transparent)]
+    Unread(#[from] Unread),
+    /// Heights that were read are too steep.
+    #[error(
+        "neighbouring samples near {east_mm} mm east, {north_mm} mm north differ by more than 10,000 cells: scale the heights down, or make them NaN"
+    )]
+    Steep {
+        /// The HIP, mm east.
+        east_mm: f64,
+        /// The HIP, mm north.
+        north_mm: f64,
+    },
+    /// Too far from the last place.
+    #[error("the path to {hip_mm:?} mm takes too many ticks: go there in smaller steps")]
+    Far {
+        /// The place, mm.
+        hip_mm: [f64; 3],
+    },
+}
+
+/// A step of a path that has not happened, and the steps before it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("point {} of the path: {why}", done.len())]
+pub struct RunError {
+    /// The steps before it.
+    pub done: Vec<Step>,
+    /// Why it has not happened.
+    pub why: StepError,
+}
+
+impl Contact {
+    /// A contact at 1,000 steps a second. The first place should be above the terrain.
+    ///
+    /// # Errors
+    /// [`ContactError`] where surface and terrain do not fit each other.
+    pub fn new(terrain: Terrain, surface: Surface) -> Result<Self, ContactError> {
+        Self::at_rate(terrain, surface, TickRate::DEFAULT.hz())
+    }
+
+    /// A contact at another rate, steps a second: 1,000 to 10,000 in whole thousands.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and [`ContactError::Rate`].
+    pub fn at_rate(terrain: Terrain, surface: Surface, rate_hz: u32) -> Result<Self, ContactError> {
+        let rate = TickRate::new(rate_hz).ok_or(ContactError::Rate(rate_hz))?;
+        let scene = scene(&terrain, &surface)?;
+        let mut tick_loop = TickLoop::new(rate);
+        let begun = tick_loop.begin(scene, surface.table());
+        begun.map_err(|_| ContactError::Refused)?;
+        Ok(Self {
+            materials: surface.table().map_or(0, |table| table.materials().len()),
+            terrain,
+            tick_loop,
+            scene,
+            last: None,
+        })
+    }
+
+    /// One step with the HIP at a place: east, north, up from the south-west sample at height zero.
+    ///
+    /// # Errors
+    /// [`StepError`]; the step has not happened then.
+    pub fn step(&mut self, hip_mm: [f64; 3]) -> Result<Step, StepError> {
+        let scale = *self.terrain.scale();
+        let hip = scale.to_grid(hip_mm).ok_or(StepError::Place {
+            hip_mm,
+            cell_mm: scale.cell_mm(),
+        })?;
+        let sample = self.sample(hip, hip_mm)?;
+        let step = Step {
+            force_n: sample.force_n.to_array(),
+            proxy_mm: scale.to_mm(&sample.proxy),
+            state: self.state(&sample, hip_mm),
+        };
+        self.last = Some(hip);
+        Ok(step)
+    }
+
+    /// One step for each place of a path.
+    ///
+    /// # Errors
+    /// [`RunError`] at the first step that cannot happen, with those before it.
+    pub fn run(
+        &mut self,
+        path_mm: impl IntoIterator<Item = [f64; 3]>,
+    ) -> Result<Vec<Step>, RunError> {
+        let mut done = Vec::new();
+        for hip_mm in path_mm {
+            match self.step(hip_mm) {
+                Ok(step) => done.push(step),
+                Err(why) => return Err(RunError { done, why }),
+            }
+        }
+        Ok(done)
+    }
+
+    /// Puts another surface in between two steps. A proxy in the air or on the ground stays where it
+    /// is, and the force of the next step is that of the other surface. Friction begins at rest; a
+    /// force that fades ends.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the surface is the one before then.
+    pub fn set_surface(&mut self, surface: Surface) -> Result<(), ContactError> {
+        let next = scene(&self.terrain, &surface)?;
+        let hip = self.last.unwrap_or_default();
+        let put = self.tick_loop.change(next, surface.table(), hip);
+        put.map_err(|_| ContactError::Refused)?;
+        self.scene = next;
+        self.materials = surface.table().map_or(0, |table| table.materials().len());
+        // The loop begins anew: points where the HIP was let it find out that the proxy is in the air,
+        // or let the force come in again. They need no heights that were not read before.
+        for _ in 0..MOST_SETTLING {
+            match self.last.map(|hip| self.sample(hip, [0.0; 3])) {
+                Some(Ok(sample)) if sample.limits.contains(Limits::BOUNDARY_FADING) => {}
+                _ => break,
+            }
+        }
+        Ok(())
+    }
+
+    /// The terrain.
+    #[must_use]
+    pub const fn terrain(&self) -> &Terrain {
+        &self.terrain
+    }
+
+    fn sample(&mut self, hip: GridPoint, hip_mm: [f64; 3]) -> Result<Sample, StepError> {
+        let [east_mm, north_mm, _] = hip_mm;
+        let felt = self.tick_loop.step(hip, &self.terrain, self.materials);
+        match felt {
+            Ok(Some(sample)) => Ok(sample),
+            Ok(None) => Err(StepError::Far { hip_mm }),
+            Err(NoTile::Unread(unread)) => Err(unread.into()),
+            Err(NoTile::Step) => Err(StepError::Steep { east_mm, north_mm }),
+        }
+    }
+
+    fn state(&self, sample: &Sample, [east, north, up]: [f64; 3]) -> State {
+        match sample.state {
+            ContactState::Free => State::Free,
+            ContactState::Touching => State::Touching,
+            ContactState::Fading => State::Fading,
+            ContactState::Waiting => match self.terrain.height_mm(east, north) {
+                Some(surface_mm) if up < surface_mm => State::BelowGround { surface_mm },
+                _ => State::Outside,
+            },
+        }
+    }
+}
+
+/// A surface on a terrain, as the loop takes it.
+fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
+    let cell_mm = Scale::cell_mm(terrain.scale()) as f32;
+    terrain.check_heights()?;
+    surface.check_cells(cell_mm)?;
+    let last = terrain.last_material();
+    let count = surface.table().map_or(1, |table| table.materials().len());
+    if let Some(found) = last.filter(|found| usize::from(*found) >= count) {
+        return Err(ContactError::Material { found, count });
+    }
+    let table = surface.table().filter(|_| last.is_some());
+    Ok(Scene {
+        epoch: 1,
+        level: 0,
+        size: terrain.size(),
+        top: terrain.top(),
+        underlay: None,
+        cell_mm,
+        home: GridPoint::default(),
+        law: *surface.params(),
+        source: Source::Points,
+        hold_clock: false,
+        materials: table.map(MaterialTable::check_sum),
+    })
+}

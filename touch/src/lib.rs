@@ -1,0 +1,25 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+#[cfg(test)]
+extern crate std;
+
+mod contact;
+mod heights;
+mod scale;
+mod surface;
+mod terrain;
+mod tick_loop;
+
+pub use contact::{Contact, ContactError, RunError, State, Step, StepError};
+pub use hapterra_core::contact::Friction;
+pub use hapterra_core::force::{Damping, ForceLaw, Material, Pattern, Shading, Texture};
+pub use heights::{Block, Height, Heights, RowOrder, Unread};
+pub use scale::{BadScale, Scale};
+pub use surface::{Surface, SurfaceError};
+pub use terrain::{Terrain, TerrainError};
+
+#[cfg(test)]
+mod tests;

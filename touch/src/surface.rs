@@ -1,0 +1,212 @@
+//! The one parameter of a surface.
+
+use core::ops::RangeInclusive;
+
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{Damping, ForceLaw, Material, MaterialTable, Texture};
+
+/// How a surface is rendered: stiffness, limit, friction, damping, shading, texture, and materials
+/// where it is not the same everywhere. Checked when it is made; all of it acts in every step.
+///
+/// ```
+/// use hapterra_touch::{ForceLaw, Friction, Shading, Surface};
+///
+/// let params = ForceLaw {
+///     friction: Friction::coulomb(0.4),
+///     shading: Shading::Smooth,
+///     ..ForceLaw::PREMIUM
+/// };
+/// let surface = Surface::new(params)?;
+///
+/// let params = ForceLaw { friction: Friction::coulomb(-1.0), ..params };
+/// let error = Surface::new(params).unwrap_err();
+/// assert_eq!(error.to_string(), "dynamic friction is -1: give 0 to 10");
+/// # Ok::<(), hapterra_touch::SurfaceError>(())
+/// ```
+#[doc(alias = "stiffness")]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    params: ForceLaw,
+    /// The surface itself first; empty where all is of one material.
+    table: MaterialTable,
+}
+
+/// Parameters that no surface can have.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// A number out of its bounds.
+    #[error("{what} is {value}: give {least} to {most}")]
+    Bounds {
+        /// Which number.
+        what: &'static str,
+        /// The number.
+        value: f32,
+        /// The least that it may be.
+        least: f32,
+        /// The most that it may be.
+        most: f32,
+    },
+    /// Less friction at rest than while it slides.
+    #[error(
+        "static friction is {static_mu} and dynamic friction {dynamic_mu}: static friction is never less"
+    )]
+    Friction {
+        /// Coefficient at rest.
+        static_mu: f32,
+        /// Coefficient while the proxy slides.
+        dynamic_mu: f32,
+    },
+    /// Too many materials.
+    #[error("{0} materials besides the surface itself: give at most {most}", most = MaterialTable::MOST - 1)]
+    Materials(usize),
+    /// Materials that multiply a stiffness of nothing.
+    #[error("a surface with materials has a stiffness of 0 N/mm: give more")]
+    NoStiffness,
+    /// A texture too fine or too coarse for the terrain's cells.
+    #[error(
+        "a texture of {wavelength_mm} mm on cells of {cell_mm} mm: a wave is a millionth of a cell to a million cells long"
+    )]
+    Texture {
+        /// From ridge to ridge, mm.
+        wavelength_mm: f32,
+        /// Millimetres a cell.
+        cell_mm: f32,
+    },
+}
+
+impl Surface {
+    /// A surface of these parameters, the same everywhere.
+    ///
+    /// # Errors
+    /// [`SurfaceError`] names the number that is out of bounds.
+    pub fn new(params: ForceLaw) -> Result<Self, SurfaceError> {
+        let table = MaterialTable::EMPTY;
+        check(&params)?;
+        Ok(Self { params, table })
+    }
+
+    /// The same surface with other materials where the terrain has them
+    /// ([`Terrain::with_materials`](crate::Terrain::with_materials)): the first has the number 1, and 0
+    /// is the surface itself.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    pub fn with_materials(self, materials: &[Material]) -> Result<Self, SurfaceError> {
+        let mut all = [Material::of(&self.params); MaterialTable::MOST];
+        let Some(others) = all.get_mut(1..=materials.len()) else {
+            return Err(SurfaceError::Materials(materials.len()));
+        };
+        others.copy_from_slice(materials);
+        for material in materials {
+            check(&material.law(&self.params))?;
+        }
+        if self.params.stiffness_n_per_mm == 0.0 {
+            return Err(SurfaceError::NoStiffness);
+        }
+        let all = all.get(..=materials.len()).unwrap_or(&all);
+        // From 1 to the most.
+        let table = MaterialTable::new(all).unwrap_or(MaterialTable::EMPTY);
+        Ok(Self { table, ..self })
+    }
+
+    /// Its parameters.
+    #[must_use]
+    pub const fn params(&self) -> &ForceLaw {
+        &self.params
+    }
+
+    /// Its materials, the surface itself first; none where all is of one.
+    pub(crate) fn table(&self) -> Option<&MaterialTable> {
+        Some(&self.table).filter(|table| !table.materials().is_empty())
+    }
+
+    /// Checks that cells of a size can carry its textures.
+    pub(crate) fn check_cells(&self, cell_mm: f32) -> Result<(), SurfaceError> {
+        let materials = self.table.materials().iter();
+        let mut textures = materials
+            .map(|material| &material.texture)
+            .chain([&self.params.texture]);
+        match textures.find(|texture| !texture.fits(cell_mm)) {
+            None => Ok(()),
+            Some(texture) => Err(SurfaceError::Texture {
+                wavelength_mm: texture.wavelength_mm,
+                cell_mm,
+            }),
+        }
+    }
+}
+
+impl Default for Surface {
+    /// [`ForceLaw::PREMIUM`]: 0.5 N/mm, without friction.
+    fn default() -> Self {
+        Self {
+            params: ForceLaw::PREMIUM,
+            table: MaterialTable::EMPTY,
+        }
+    }
+}
+
+/// Checks what [`ForceLaw::is_valid`] does, and says what is wrong.
+fn check(params: &ForceLaw) -> Result<(), SurfaceError> {
+    let ForceLaw {
+        stiffness_n_per_mm,
+        max_force_n,
+        friction,
+        damping,
+        shading: _,
+        texture,
+    } = params;
+    within("stiffness, N/mm,", *stiffness_n_per_mm, 0.0..=f32::MAX)?;
+    within("max_force, N,", *max_force_n, 0.0..=f32::MAX)?;
+    within(
+        "dynamic friction",
+        friction.dynamic_mu,
+        0.0..=Friction::MOST,
+    )?;
+    within("static friction", friction.static_mu, 0.0..=Friction::MOST)?;
+    let most_s = Friction::MOST_VISCOUS_S;
+    within("viscous friction, s,", friction.viscous_s, 0.0..=most_s)?;
+    if friction.static_mu < friction.dynamic_mu {
+        return Err(SurfaceError::Friction {
+            static_mu: friction.static_mu,
+            dynamic_mu: friction.dynamic_mu,
+        });
+    }
+    let most = Damping::MOST_NS_PER_M;
+    within("damping, N·s/m,", damping.ns_per_m, 0.0..=most)?;
+    if texture.is_none() {
+        return Ok(());
+    }
+    let (shortest, longest) = Texture::WAVELENGTHS_MM;
+    within(
+        "texture wavelength, mm,",
+        texture.wavelength_mm,
+        shortest..=longest,
+    )?;
+    let steepest_mm = texture.wavelength_mm * Texture::STEEPEST;
+    let most_mm = steepest_mm.min(Texture::MOST_AMPLITUDE_MM);
+    within(
+        "texture amplitude, mm,",
+        texture.amplitude_mm,
+        0.0..=most_mm,
+    )?;
+    within(
+        "texture direction, degrees,",
+        texture.direction_deg,
+        -360.0..=360.0,
+    )
+}
+
+fn within(what: &'static str, value: f32, range: RangeInclusive<f32>) -> Result<(), SurfaceError> {
+    let (least, most) = range.into_inner();
+    // Not a number is in no range.
+    match (least..=most).contains(&value) {
+        true => Ok(()),
+        false => Err(SurfaceError::Bounds {
+            what,
+            value,
+            least,
+            most,
+        }),
+    }
+}

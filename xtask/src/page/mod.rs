@@ -1,0 +1,182 @@
+//! `cargo xtask demo --touch` and `cargo xtask page`: the page that touches a terrain in a
+//! browser.
+
+mod server;
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::run::{cargo, on_path, root, run, run_quietly, say, target_dir, timed};
+use crate::setup::{packages, toolchain};
+use crate::view;
+use server::Server;
+
+/// What the page is made of, in `page/`.
+const FILES: [&str; 3] = ["index.html", "style.css", "js"];
+/// The reader of GeoTIFF, in npm's folder, and what it is called beside the page.
+const GEOTIFF: [(&str, &str); 2] = [
+    ("dist-browser/geotiff.js", "geotiff.js"),
+    ("LICENSE", "geotiff-LICENSE.txt"),
+];
+
+/// Writes the page, with a terrain file where there is one, into a folder, and serves it
+/// unless the user named that folder. `extra` goes to `hapterra cut`.
+pub(crate) fn demo(
+    file: Option<&OsString>,
+    out: Option<PathBuf>,
+    extra: &[OsString],
+) -> Result<()> {
+    let is_served = out.is_none();
+    let folder = out.unwrap_or_else(|| target_dir().join("page"));
+    build(&folder)?;
+    if let Some(file) = file {
+        let is_url = file.to_string_lossy().contains("://");
+        let mut cut = Command::new(command(is_url)?);
+        cut.arg("cut").arg(file).arg("--output").arg(&folder);
+        run(cut.args(extra))?;
+    }
+    if !is_served {
+        say(format!(
+            "wrote the page: any web server can give out {}",
+            folder.display()
+        ));
+        return Ok(());
+    }
+    let server = Server::bind(&folder).context("no port on the loopback address is free")?;
+    say(format!(
+        "open {} in a browser; Ctrl-C ends it",
+        server.address()
+    ));
+    server.serve();
+    Ok(())
+}
+
+/// Builds the page and runs its tests: by node, and in a browser where there is one or one can
+/// be installed.
+pub(crate) fn test() -> Result<()> {
+    match packages::found_or_installed(node, &packages::NODE) {
+        Ok(node) => timed("running the page's unit tests", || {
+            run(Command::new(node)
+                .current_dir(root().join("page"))
+                .args(["--test", "tests/"]))
+        })?,
+        Err(why) => say(format!("SKIPPED: the page's unit tests: {why:#}")),
+    }
+    let folder = target_dir().join("page-test");
+    build(&folder)?;
+    let mut tests = cargo();
+    tests
+        .args(["test", "--package", "xtask", "--test", "page"])
+        .env("HAPTERRA", command(false)?)
+        .env("HAPTERRA_PAGE", folder);
+    match view::browser() {
+        Ok(browser) => drop(tests.env(view::BROWSER, browser)),
+        Err(why) => say(format!("SKIPPED: the page in a browser: {why:#}")),
+    }
+    timed("running the page's tests in a browser", || run(&mut tests))
+}
+
+fn node() -> Result<PathBuf> {
+    on_path("node").context("there is no node on the PATH")
+}
+
+/// Builds the `hapterra` command and gives its path.
+fn command(is_remote: bool) -> Result<PathBuf> {
+    let mut build = cargo();
+    build.args(["build", "--package", "hapterra", "--bin", "hapterra"]);
+    if is_remote {
+        build.args(["--features", "remote"]);
+    }
+    timed("building the hapterra command", || run(&mut build))?;
+    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
+    Ok(target_dir().join("debug").join(program))
+}
+
+/// Writes the page without a terrain file.
+fn build(folder: &Path) -> Result<()> {
+    let write = |name: &str, bytes: Vec<u8>| {
+        let path = folder.join(name);
+        fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))
+    };
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    for name in FILES {
+        copy(&root().join("page").join(name), &folder.join(name))?;
+    }
+    copy(&kernel()?, &folder.join("kernel.wasm"))?;
+    // Of the last time.
+    let _ = fs::remove_file(folder.join("terrain.npy"));
+    write("terrain.json", b"{}\n".to_vec())?;
+    if let Err(why) = geotiff(folder) {
+        say(format!(
+            "SKIPPED: GeoTIFF files dropped on the page: {why:#}"
+        ));
+    }
+    Ok(())
+}
+
+/// Compiles the kernel for browsers: the C library as it is.
+fn kernel() -> Result<PathBuf> {
+    toolchain::with_wasm()?;
+    let mut build = cargo();
+    build
+        .args([
+            "build",
+            "--release",
+            "--package",
+            "hapterra-c",
+            "--lib",
+            "--target",
+            toolchain::WASM,
+        ])
+        .env_remove("RUSTFLAGS")
+        .env("CARGO_PROFILE_RELEASE_DEBUG", "0")
+        .env("CARGO_PROFILE_RELEASE_STRIP", "true");
+    timed("compiling the kernel to WebAssembly", || run(&mut build))?;
+    Ok(target_dir()
+        .join(toolchain::WASM)
+        .join("release/hapterra_c.wasm"))
+}
+
+/// Copies the reader of GeoTIFF that npm keeps, of the version in `page/package-lock.json`.
+fn geotiff(folder: &Path) -> Result<()> {
+    let npm = on_path("npm").context("there is no npm on the PATH")?;
+    let kept = target_dir().join("page-npm");
+    fs::create_dir_all(&kept)?;
+    let locks = ["package.json", "package-lock.json"];
+    let is_same = |name: &&str| {
+        let read = |folder: &Path| fs::read(folder.join(name)).ok();
+        read(&kept) == read(&root().join("page"))
+    };
+    let library = kept.join("node_modules/geotiff");
+    if !locks.iter().all(is_same) || !library.join(GEOTIFF[0].0).is_file() {
+        for name in locks {
+            copy(&root().join("page").join(name), &kept.join(name))?;
+        }
+        let words = ["ci", "--ignore-scripts", "--no-audit", "--no-fund"];
+        timed("getting geotiff.js from npm", || {
+            run_quietly(Command::new(npm).current_dir(&kept).args(words))
+        })?;
+    }
+    GEOTIFF
+        .iter()
+        .try_for_each(|(from, to)| copy(&library.join(from), &folder.join(to)))
+}
+
+/// Copies a file, or a folder with all that is in it.
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    if from.is_dir() {
+        fs::create_dir_all(to)?;
+        for entry in from.read_dir()? {
+            let entry = entry?;
+            copy(&entry.path(), &to.join(entry.file_name()))?;
+        }
+        return Ok(());
+    }
+    fs::copy(from, to)
+        .map(drop)
+        .with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))
+}
