@@ -82,7 +82,7 @@ def test_grids_that_are_no_squares_are_errors():
     for da, text in [
         (degrees, "cells are degrees"),
         (array(y=Y * 2), "cells are 30 by 60"),
-        (array(x=X**1.5), "coordinates x are not even"),
+        (array(x=[0, 30, 61, 90, 120]), "coordinates x are not even"),
         (array().expand_dims("time"), "dimensions .*'time'.*: choose two"),
         (array().rename(x="a"), "which of the dimensions .* is x"),
         (array().drop_vars("x"), "x has no coordinates"),
@@ -134,7 +134,7 @@ def test_no_data_of_rasterio_makes_holes(dtype):
 
 
 def test_datasets_that_are_no_squares_are_errors():
-    turned = rasterio.Affine.rotation(20) * rasterio.Affine.scale(30)
+    turned = rasterio.Affine(28, 10, 5e5, 10, -28, 4e6)
     for options, band, text in [
         ({"transform": turned}, 2, "turned against north"),
         ({"crs": "EPSG:4326"}, 2, "cells are degrees"),
