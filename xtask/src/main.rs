@@ -15,6 +15,7 @@ mod lint;
 mod miri;
 mod nightly;
 mod panics;
+mod python;
 mod run;
 mod setup;
 mod size;
@@ -36,6 +37,9 @@ cargo xtask COMMAND
   view [--test|--pictures]
                          build the viewer; --test: run its tests, in a browser where there is
                          one; --pictures: take those in docs/
+  python [--test]        build the Python package's wheel and print where it is; --test: install
+                         it in an environment of its own and run its tests; without Python
+                         3.9 it says so
   test [--quick] [-- ARGS]
                          all tests, with images, budgets and dependencies; what failed is
                          listed at the end; --quick: the emulated board only, no
@@ -66,6 +70,7 @@ cargo xtask COMMAND
 
   HAPTERRA_TOOLCHAIN=rustup|distribution  builds the images only with this one
   HAPTERRA_QEMU=PATH                      the qemu-system-arm to use
+  HAPTERRA_PYTHON=PATH                    the Python to test the Python package with
   HAPTERRA_TICK_HZ=1000..8000             haptic ticks a second of the real boards' images
 ";
 
@@ -122,6 +127,14 @@ fn command() -> Result<ExitCode> {
             Some(Long("pictures")) => view::pictures()?,
             Some(other) => return Err(other.unexpected().into()),
             None => println!("{}", view::build()?.display()),
+        },
+        "python" => match flag(&mut words, &["test"])? {
+            Some(_) => python::test()?,
+            None => {
+                if let Some(wheel) = python::build()? {
+                    println!("{}", wheel.display());
+                }
+            }
         },
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
         plain => {
