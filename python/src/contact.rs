@@ -25,7 +25,7 @@ pub(crate) struct Contact {
 }
 
 /// Force, N, proxy, mm, number of the state, and the surface over a HIP that is below ground, mm.
-type Answer = ([f32; 3], [f64; 3], u8, Option<f64>);
+type Answer = ((f32, f32, f32), (f64, f64, f64), u8, Option<f64>);
 
 /// Rows of steps, remarks on times, and why the step after the rows has not happened.
 type Run<'py> = (Bound<'py, PyByteArray>, Vec<String>, Option<String>);
@@ -44,7 +44,7 @@ impl Contact {
         let step = self.lock()?.step([east_mm, north_mm, up_mm]);
         let step = step.map_err(refused)?;
         let (state, surface_mm) = number(step.state);
-        Ok((step.force_n, step.proxy_mm, state, surface_mm))
+        Ok((step.force_n.into(), step.proxy_mm.into(), state, surface_mm))
     }
 
     /// A step for each tick of a path of 3 f8 a row, by times of f8 where there are such.

@@ -1,5 +1,6 @@
 """Steps, paths, times and threads."""
 
+import _thread
 import threading
 import warnings
 
@@ -129,7 +130,7 @@ def test_surface_changes_between_steps():
 
 
 def test_other_threads_run_meanwhile():
-    # Each waits in the run of another: with the lock held, the second would never begin.
+    # With the interpreter's lock held, no call would ever meet the run of the other thread.
     path = np.tile(DOWN, (3000, 1))
     contact = Contact(FLAT)
     done = []
@@ -148,14 +149,23 @@ def test_other_threads_run_meanwhile():
 
 
 def test_ctrl_c_ends_a_run():
-    import _thread
+    # Rests of 500 s in the air are a million ticks; the last rows are a contact that friction holds.
+    path = [[5, 5, 4]] * 3 + [[5, 5, 1]]
+    contact = Contact(FLAT, Surface(friction=5))
+    contact.run(path[:1])
 
-    path = np.tile(DOWN, (100_000, 1))
-    contact = Contact(FLAT)
-    timer = threading.Timer(0.2, _thread.interrupt_main)
-    timer.start()
+    def interrupt():
+        while True:
+            try:
+                contact.step([5, 5, 4])
+            except RuntimeError:
+                return _thread.interrupt_main()
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
     with pytest.raises(KeyboardInterrupt):
-        contact.run(path)
-        timer.join()
-        pytest.fail("the path ended first")
-    assert contact.step([5, 5, 4]).state == State.FREE
+        contact.run(path, [0, 500, 1000, 1000.001])
+        thread.join()
+    thread.join()
+    # From where the path ends the proxy would not follow; from the air it meets the ground half-way.
+    assert contact.step([6, 5, 1]).proxy_mm[0] > 5.3

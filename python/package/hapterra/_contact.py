@@ -104,7 +104,7 @@ class Contact:
         """
         east, north, up = hip_mm
         force, proxy, state, surface = self._native.step(east, north, up)
-        return Step(tuple(force), tuple(proxy), _STATES[state], surface)
+        return Step(force, proxy, _STATES[state], surface)
 
     def run(self, path_mm: npt.ArrayLike, t: npt.ArrayLike | None = None) -> npt.NDArray[np.void]:
         """A step for each tick of a path, without the interpreter's lock.

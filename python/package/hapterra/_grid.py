@@ -104,7 +104,7 @@ def _unit(name: Any) -> str | None:
     return _DEGREES if text.startswith("degree") else _NAMES.get(text, text)
 
 
-def of_xarray(da: Any, x: str | None, y: str | None) -> Grid:
+def of_xarray(da: Any, x: Any, y: Any) -> Grid:
     """The grid of a DataArray."""
     if da.ndim != 2:
         raise ValueError(
@@ -141,7 +141,7 @@ def _scaled(heights: Any, scale: float, offset: float) -> Any:
     return heights if (scale, offset) == (1, 0) else heights * scale + offset
 
 
-def _dimension(da: Any, word: str, axis: str, names: set[str]) -> str:
+def _dimension(da: Any, word: str, axis: str, names: set[str]) -> Any:
     def is_it(name: Any) -> bool:
         attrs = da[name].attrs if name in da.coords else {}
         stated = {str(name).lower(), attrs.get("standard_name")}

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Literal, final
 
+_Vector = tuple[float, float, float]
+
 @final
 class Surface:
     """How a surface is rendered; `help(hapterra.Surface)` has units and bounds."""
@@ -47,7 +49,7 @@ class Contact:
     def __new__(cls, terrain: Terrain, surface: Surface, rate_hz: int) -> Contact: ...
     def step(
         self, east_mm: float, north_mm: float, up_mm: float
-    ) -> tuple[list[float], list[float], int, float | None]: ...
+    ) -> tuple[_Vector, _Vector, int, float | None]: ...
     def run(
         self, path: bytes, t_s: bytes | None = None
     ) -> tuple[bytearray, list[str], str | None]: ...

@@ -161,14 +161,14 @@ class Terrain:
 
 
 def _samples(heights: npt.ArrayLike) -> npt.NDArray[Any]:
-    samples = heights if isinstance(heights, np.ndarray) else np.asarray(heights)
+    samples: Any = heights if isinstance(heights, np.ndarray) else np.asarray(heights)
     if samples.dtype.kind not in "fiub":
         raise TypeError(f"heights are of {samples.dtype}: give real numbers")
     if samples.ndim != 2:
         raise ValueError(f"heights have the shape {samples.shape}: give (rows, columns)")
     if isinstance(samples, np.ma.MaskedArray):
-        masked = np.ma.getmaskarray(samples)
-        samples = samples.filled(0) if not masked.any() else samples.astype("f8").filled(np.nan)
+        is_whole = not np.ma.getmaskarray(samples).any()
+        samples = samples.data if is_whole else np.ma.filled(samples.astype("f8"), np.nan)
     native = samples.dtype.newbyteorder("=")
     kind = native if native.str[1:] in _KEPT else np.dtype("f8")
     return np.asarray(samples, kind)
