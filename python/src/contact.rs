@@ -54,8 +54,6 @@ impl Contact {
         let t_s = t_s
             .map(|t_s| numbers(t_s, f64::from_ne_bytes))
             .transpose()?;
-        let mut guard = self.lock()?;
-        let contact = &mut *guard;
         let hz = f64::from(self.rate_hz);
         let Ticks { ticks, remarks } = py.detach(|| {
             let (path, _) = path.as_chunks();
@@ -64,6 +62,7 @@ impl Contact {
                 Some(t_s) => by_time(&t_s, path, hz).map_err(refused),
             }
         })?;
+        let contact = &mut *self.lock()?;
         let (mut rows, mut why) = (Vec::new(), None);
         for ticks in ticks.chunks(UNINTERRUPTED) {
             let ran = py.detach(|| run(contact, ticks, &mut rows));

@@ -153,9 +153,10 @@ def test_ctrl_c_ends_a_run():
     path = [[5, 5, 4]] * 3 + [[5, 5, 1]]
     contact = Contact(FLAT, Surface(friction=5))
     contact.run(path[:1])
+    ended = []
 
     def interrupt():
-        while True:
+        while not ended:
             try:
                 contact.step([5, 5, 4])
             except RuntimeError:
@@ -165,7 +166,7 @@ def test_ctrl_c_ends_a_run():
     thread.start()
     with pytest.raises(KeyboardInterrupt):
         contact.run(path, [0, 500, 1000, 1000.001])
-        thread.join()
+        ended.append(True)
     thread.join()
     # From where the path ends the proxy would not follow; from the air it meets the ground half-way.
     assert contact.step([6, 5, 1]).proxy_mm[0] > 5.3
