@@ -62,7 +62,8 @@ def test_example_in_the_readme_draws_forces(tmp_path):
     example = re.search(r"```python\n(.*?)```", readme, re.S)[1]
     example = "import matplotlib\nmatplotlib.use('Agg')\n" + example
     example += "assert steps['force_n'][:, 2].max() > 0.5\n"
-    subprocess.run([sys.executable, "-W", "error::UserWarning:__main__", "-c", example], cwd=tmp_path, check=True)
+    strict = [sys.executable, "-W", "error::UserWarning:__main__"]
+    subprocess.run([*strict, "-c", example], cwd=tmp_path, check=True)
     assert (tmp_path / "forces.png").stat().st_size > 5000
 
 

@@ -8,25 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-_METRES = {
-    "m": 1.0,
-    "km": 1000.0,
-    "cm": 0.01,
-    "mm": 0.001,
-    "ft": 0.3048,
-    "us-ft": 1200 / 3937,
-}
+_METRES = {"m": 1.0, "km": 1000.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us-ft": 1200 / 3937}
 _NAMES = {
-    "metre": "m",
-    "meter": "m",
-    "metres": "m",
-    "meters": "m",
-    "kilometre": "km",
-    "kilometer": "km",
-    "kilometres": "km",
-    "kilometers": "km",
-    "foot": "ft",
-    "feet": "ft",
+    **dict.fromkeys(("metre", "metres", "meter", "meters"), "m"),
+    **dict.fromkeys(("kilometre", "kilometres", "kilometer", "kilometers"), "km"),
+    **dict.fromkeys(("foot", "feet"), "ft"),
     "us survey foot": "us-ft",
 }
 _DEGREES = "degree"
