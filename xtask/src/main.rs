@@ -131,7 +131,7 @@ fn command() -> Result<ExitCode> {
         "python" => match flag(&mut words, &["test"])? {
             Some(_) => python::test()?,
             None => {
-                if let Some(wheel) = python::build()? {
+                if let Some((_, wheel)) = python::build()? {
                     println!("{}", wheel.display());
                 }
             }

@@ -3,28 +3,31 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 
 use crate::deny;
 use crate::run::{cargo, output, root, run, run_quietly, say, target_dir, timed};
 
 /// Names the interpreter to use.
 const PYTHON: &str = "HAPTERRA_PYTHON";
-/// Succeeds on an interpreter that is new enough.
-const IS_NEW_ENOUGH: &str = "import sys; sys.exit(sys.version_info < (3, 9))";
+/// Prints the version of an interpreter that is new enough, and fails on others.
+const VERSION: &str =
+    "import sys; v = sys.version_info; print('%d.%d' % v[:2]); sys.exit(v < (3, 9))";
 
-/// Builds the wheel, and gives its path; none, and a line, where there is no Python.
+/// Builds the wheel, and gives the interpreter of its environment and its path; none, and a line,
+/// where there is no Python.
 ///
 /// # Errors
 /// What failed: the environment, which takes a network the first time, or the build.
-pub(crate) fn build() -> Result<Option<PathBuf>> {
+pub(crate) fn build() -> Result<Option<(PathBuf, PathBuf)>> {
     let Some(python) = interpreter()? else {
         say("SKIPPED: the Python package: there is no Python 3.9 or newer on the PATH");
         return Ok(None);
     };
     let python = environment(&python)?;
     install(&python, &["maturin>=1.8,<2"])?;
-    timed("building the wheel", || wheel(&python)).map(Some)
+    let wheel = timed("building the wheel", || wheel(&python))?;
+    Ok(Some((python, wheel)))
 }
 
 /// Lints the package's crate, holds its dependencies to `deny.toml`, installs the wheel, and runs
@@ -33,7 +36,7 @@ pub(crate) fn build() -> Result<Option<PathBuf>> {
 /// # Errors
 /// As [`build`], and what the tests say.
 pub(crate) fn test() -> Result<()> {
-    let Some(wheel) = build()? else {
+    let Some((python, wheel)) = build()? else {
         return Ok(());
     };
     timed("linting the Python package's crate", lint)?;
@@ -41,7 +44,6 @@ pub(crate) fn test() -> Result<()> {
     timed("building the hapterra command", || {
         run(cargo().args(["build", "--package", "hapterra", "--bin", "hapterra"]))
     })?;
-    let python = interpreter_of(&home());
     install(&python, &[&format!("{}[test]", wheel.display())])?;
     // The version stays the same while one works on it.
     let again = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
@@ -55,8 +57,27 @@ pub(crate) fn test() -> Result<()> {
     timed("running the Python package's tests", || run(&mut tests))
 }
 
+/// An interpreter that is new enough.
+struct Python {
+    program: PathBuf,
+    /// As 3.11.
+    version: String,
+}
+
+impl Python {
+    fn of(program: &Path) -> Option<Self> {
+        let version = output(Command::new(program).args(["-c", VERSION]))?;
+        let version = version.trim().to_owned();
+        // Other programs may succeed and print nothing.
+        (!version.is_empty()).then(|| Self {
+            program: program.to_owned(),
+            version,
+        })
+    }
+}
+
 /// The interpreter that is asked for, or the first that is new enough.
-fn interpreter() -> Result<Option<PathBuf>> {
+fn interpreter() -> Result<Option<Python>> {
     if let Some(given) = std::env::var_os(PYTHON) {
         let given = PathBuf::from(given);
         let why = || {
@@ -65,35 +86,22 @@ fn interpreter() -> Result<Option<PathBuf>> {
                 given.display()
             )
         };
-        ensure!(is_new_enough(&given), why());
-        return Ok(Some(given));
+        return Python::of(&given).with_context(why).map(Some);
     }
-    let names = ["python3", "python"].map(PathBuf::from);
-    Ok(names.into_iter().find(|name| is_new_enough(name)))
+    let names = ["python3", "python"];
+    Ok(names.iter().find_map(|name| Python::of(Path::new(name))))
 }
 
-fn is_new_enough(python: &Path) -> bool {
-    output(Command::new(python).args(["-c", IS_NEW_ENOUGH])).is_some()
-}
-
-fn home() -> PathBuf {
-    target_dir().join("python-env")
-}
-
-/// The interpreter of an environment.
-fn interpreter_of(home: &Path) -> PathBuf {
-    match cfg!(windows) {
+/// The package's own environment for a version of Python, made where it is not there or its
+/// interpreter has gone. Gives its interpreter.
+fn environment(python: &Python) -> Result<PathBuf> {
+    let home = target_dir().join(format!("python-env-{}", python.version));
+    let own = match cfg!(windows) {
         true => home.join("Scripts").join("python.exe"),
         false => home.join("bin").join("python"),
-    }
-}
-
-/// The package's own environment, made where it is not there or its interpreter has gone.
-fn environment(python: &Path) -> Result<PathBuf> {
-    let home = home();
-    let own = interpreter_of(&home);
-    if !is_new_enough(&own) {
-        let mut make = Command::new(python);
+    };
+    if Python::of(&own).is_none() {
+        let mut make = Command::new(&python.program);
         make.args(["-m", "venv", "--clear"]).arg(&home);
         let hint = "Python's venv is missing; on Debian: apt-get install python3-venv";
         run_quietly(&mut make).context(hint)?;
@@ -148,7 +156,8 @@ mod tests {
 
     #[test]
     fn programs_that_are_no_python_are_not_taken() {
-        assert!(!is_new_enough(Path::new("/no/such/python")));
-        assert!(!is_new_enough(Path::new("false")));
+        for program in ["/no/such/python", "false", "true"] {
+            assert!(Python::of(Path::new(program)).is_none(), "{program}");
+        }
     }
 }
