@@ -16,6 +16,7 @@ mod miri;
 mod nightly;
 mod page;
 mod panics;
+mod python;
 mod run;
 mod setup;
 mod size;
@@ -41,6 +42,9 @@ cargo xtask COMMAND
   view [--test|--pictures]
                          build the viewer; --test: run its tests, in a browser where there is
                          one; --pictures: take those in docs/
+  python [--test]        build the Python package's wheel and print where it is; --test: install
+                         it in an environment of its own and run its tests; without Python
+                         3.9 it says so
   test [--quick] [-- ARGS]
                          all tests, with images, budgets and dependencies; what failed is
                          listed at the end; --quick: the emulated board only, no
@@ -71,6 +75,7 @@ cargo xtask COMMAND
 
   HAPTERRA_TOOLCHAIN=rustup|distribution  builds the images only with this one
   HAPTERRA_QEMU=PATH                      the qemu-system-arm to use
+  HAPTERRA_PYTHON=PATH                    the Python to test the Python package with
   HAPTERRA_TICK_HZ=1000..8000             haptic ticks a second of the real boards' images
 ";
 
@@ -135,6 +140,14 @@ fn command() -> Result<ExitCode> {
             Some(Long("test")) => page::test()?,
             Some(other) => return Err(other.unexpected().into()),
             None => bail!("say: cargo xtask page --test, or cargo xtask demo --touch"),
+        },
+        "python" => match flag(&mut words, &["test"])? {
+            Some(_) => python::test()?,
+            None => {
+                if let Some((_, wheel)) = python::build()? {
+                    println!("{}", wheel.display());
+                }
+            }
         },
         "flash" => flash::flash(board::by_name(&words.value()?.string()?)?)?,
         plain => {

@@ -1,0 +1,30 @@
+"""Touch a height field: a haptic proxy over an array, millimetres in, newtons out.
+
+>>> import numpy as np, hapterra
+>>> hills = hapterra.Terrain(np.zeros((200, 200)), cell_mm=0.5)
+>>> contact = hapterra.Contact(hills, hapterra.Surface(friction=0.4))
+>>> contact.step([50, 50, 5]).state
+<State.FREE: 0>
+>>> contact.step([50, 50, -1]).force_n
+(0.0, 0.0, 0.5)
+
+Lengths are millimetres of the hand: x east, y north, z up, origin at the south-west sample at
+height zero. The haptic interface point (HIP) is where the hand is; the proxy stays on the surface,
+and a spring between them makes the force. Forces are those of ``hapterra replay`` on the same
+heights, bit for bit.
+"""
+
+from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
+from ._native import Surface
+from ._terrain import Terrain
+
+__all__ = [
+    "STEP",
+    "Contact",
+    "State",
+    "Step",
+    "StepError",
+    "Surface",
+    "Terrain",
+    "to_dataframe",
+]

@@ -1,0 +1,166 @@
+"""Contacts, and what their steps are."""
+
+from __future__ import annotations
+
+import enum
+import warnings
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._native import Surface
+from ._terrain import Terrain
+
+if TYPE_CHECKING:
+    import pandas
+
+#: A row of ``Contact.run``. Vectors are east, north, up; ``state`` is a number of ``State``.
+STEP = np.dtype(
+    [
+        ("t_s", "=f8"),
+        ("hip_mm", "=f8", (3,)),
+        ("proxy_mm", "=f8", (3,)),
+        ("force_n", "=f4", (3,)),
+        ("state", "u1"),
+    ],
+    align=True,
+)
+
+
+class State(enum.IntEnum):
+    """What a proxy is doing."""
+
+    #: The HIP is in the air, and so is the proxy: no force.
+    FREE = 0
+    #: The proxy is on the surface, and the HIP below it.
+    TOUCHING = 1
+    #: The surface that the proxy was on has come to an end, and the last force fades away.
+    FADING = 2
+    #: The HIP is below the surface and has not been above it: no force until it has.
+    BELOW_GROUND = 3
+    #: The HIP is in a hole or outside and has not been above the surface: no force.
+    OUTSIDE = 4
+
+
+_STATES = list(State)
+
+
+class Step(NamedTuple):
+    """One step's answer."""
+
+    #: The force on the hand, N: east, north, up.
+    force_n: tuple[float, float, float]
+    #: The proxy, mm: on the surface while it touches, at the HIP while it is free.
+    proxy_mm: tuple[float, float, float]
+    #: What the proxy is doing.
+    state: State
+    #: The height of the surface over the HIP, mm, while the state is BELOW_GROUND.
+    surface_mm: float | None
+
+
+class StepError(ValueError):
+    """A step of a path that has not happened. The steps before it have."""
+
+    #: The steps before it, as ``Contact.run`` returns them; ``len(steps)`` is the row that failed.
+    steps: npt.NDArray[np.void]
+
+    def __init__(self, message: str, steps: npt.NDArray[np.void]) -> None:
+        super().__init__(message)
+        self.steps = steps
+
+
+class Contact:
+    """A haptic interface point (HIP) and its proxy over a terrain.
+
+    Parameters
+    ----------
+    terrain : Terrain
+    surface : Surface, optional
+        0.5 N/mm without friction where there is none.
+    rate : int
+        Steps a second, 1000 to 10000 in whole thousands: damping and viscous friction go by it.
+
+    The first place should be above the terrain: a path that begins below it has the state
+    BELOW_GROUND, and no force until it has been above. A contact is one hand's: give each thread
+    its own. A terrain may be shared.
+    """
+
+    def __init__(
+        self, terrain: Terrain, surface: Surface | None = None, *, rate: int = 1000
+    ) -> None:
+        if not isinstance(terrain, Terrain):
+            raise TypeError("the terrain is no hapterra.Terrain: Terrain(heights, cell_mm=)")
+        self._native = _native.Contact(terrain._native, surface or Surface(), rate)
+        self.terrain = terrain
+        self.rate = rate
+
+    def step(self, hip_mm: Iterable[float]) -> Step:
+        """One step with the HIP at a place: east, north, up, mm.
+
+        Raises ValueError for a place that cannot be; the step has not happened then.
+        """
+        east, north, up = hip_mm
+        force, proxy, state, surface = self._native.step(east, north, up)
+        return Step(force, proxy, _STATES[state], surface)
+
+    def run(self, path_mm: npt.ArrayLike, t: npt.ArrayLike | None = None) -> npt.NDArray[np.void]:
+        """A step for each tick of a path, without the interpreter's lock.
+
+        Parameters
+        ----------
+        path_mm : array of shape (N, 3)
+            East, north, up, mm.
+        t : array of shape (N,), seconds, optional
+            Without it each row is a tick. With it the path is sampled at ``rate``, by the rule of
+            ``hapterra replay``: ticks begin at ``t[0]``; a row within a hundredth of a tick is the
+            tick, bit for bit; elsewhere the HIP lies on the straight line between two rows. Times
+            that cannot be right are a ValueError, odd ones a warning.
+
+        Returns
+        -------
+        array of ``STEP``
+            A row for each tick: ``t_s``, ``hip_mm``, ``proxy_mm``, ``force_n``, ``state``.
+
+        Raises
+        ------
+        StepError
+            At the first step that cannot happen, with those before it.
+        """
+        path = np.asarray(path_mm, "=f8")
+        if path.ndim != 2 or path.shape[1] != 3:
+            raise ValueError(f"the path has the shape {path.shape}: give (N, 3), east, north, up")
+        times = None if t is None else np.asarray(t, "=f8")
+        if times is not None and times.shape != path.shape[:1]:
+            raise ValueError(f"t has the shape {times.shape}, and the path has {len(path)} rows")
+        ran = self._native.run(path.tobytes(), None if times is None else times.tobytes())
+        rows, remarks, error = ran
+        for remark in remarks:
+            warnings.warn(remark, stacklevel=2)
+        steps = np.frombuffer(rows, STEP)
+        if error is not None:
+            raise StepError(f"step {len(steps)} of the path: {error}", steps)
+        return steps
+
+    def set_surface(self, surface: Surface) -> None:
+        """Puts another surface in between two steps; the proxy stays where it is."""
+        self._native.set_surface(surface)
+
+    def __repr__(self) -> str:
+        return f"<Contact at {self.rate} steps a second on {self.terrain!r}>"
+
+
+def to_dataframe(steps: npt.NDArray[np.void]) -> pandas.DataFrame:
+    """The steps of ``Contact.run`` as a DataFrame, columns named as in ``hapterra replay``'s CSV
+    but for ``state``, which has the names of ``State``."""
+    import pandas
+
+    columns = {"t_s": steps["t_s"]}
+    for field, name in (("hip_mm", "{}_mm"), ("proxy_mm", "proxy_{}_mm"), ("force_n", "force_{}_n")):
+        for axis, letter in enumerate("xyz"):
+            columns[name.format(letter)] = steps[field][:, axis]
+    names = [state.name.lower() for state in State]
+    columns["state"] = pandas.Categorical.from_codes(steps["state"].astype("i1"), names)
+    return pandas.DataFrame(columns)

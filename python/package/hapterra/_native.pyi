@@ -1,0 +1,56 @@
+"""What is compiled. Use the names of `hapterra`."""
+
+from collections.abc import Sequence
+from typing import Literal, final
+
+_Vector = tuple[float, float, float]
+
+@final
+class Surface:
+    """How a surface is rendered; `help(hapterra.Surface)` has units and bounds."""
+
+    def __new__(
+        cls,
+        *,
+        stiffness: float = 0.5,
+        max_force: float = 8.5,
+        friction: float = 0.0,
+        static_friction: float | None = None,
+        viscous_friction: float = 0.0,
+        damping: float = 0.0,
+        shading: Literal["none", "smooth"] = "none",
+        texture: Literal["none", "grain", "grating"] = "none",
+        texture_amplitude: float | None = None,
+        texture_wavelength: float = 1.0,
+        texture_direction: float = 0.0,
+        texture_seed: int = 0,
+        materials: Sequence[Surface] = ...,
+    ) -> Surface: ...
+
+@final
+class Terrain:
+    def __new__(
+        cls,
+        samples: bytes,
+        kind: str,
+        shape: Sequence[int],
+        *,
+        cell_mm: float,
+        height_mm_per_unit: float,
+        south_first: bool,
+        materials: bytes | None = None,
+    ) -> Terrain: ...
+    def height_mm(self, east_mm: float, north_mm: float) -> float | None: ...
+    @property
+    def size_mm(self) -> tuple[float, float]: ...
+
+@final
+class Contact:
+    def __new__(cls, terrain: Terrain, surface: Surface, rate_hz: int) -> Contact: ...
+    def step(
+        self, east_mm: float, north_mm: float, up_mm: float
+    ) -> tuple[_Vector, _Vector, int, float | None]: ...
+    def run(
+        self, path: bytes, t_s: bytes | None = None
+    ) -> tuple[bytearray, list[str], str | None]: ...
+    def set_surface(self, surface: Surface) -> None: ...

@@ -1,0 +1,42 @@
+//! The part of the Python package `hapterra` that is compiled: `hapterra._native`.
+//!
+//! Arrays cross the border as bytes of the machine's own order, since the stable interface of
+//! CPython 3.9 has no buffers; `package/hapterra/*.py` has numpy on its side. Errors of the library are
+//! `ValueError`s with its texts.
+
+mod contact;
+mod surface;
+mod terrain;
+mod ticks;
+
+use pyo3::exceptions::{PyMemoryError, PyValueError};
+use pyo3::{PyErr, PyResult, pymodule};
+
+/// The module.
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::contact::Contact;
+    #[pymodule_export]
+    use super::surface::Surface;
+    #[pymodule_export]
+    use super::terrain::Terrain;
+}
+
+/// An error of the library in Python.
+fn refused(error: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// Numbers of an array that came as bytes.
+fn numbers<T, const BYTES: usize>(
+    bytes: &[u8],
+    of_bytes: impl Fn([u8; BYTES]) -> T,
+) -> PyResult<Vec<T>> {
+    let (chunks, _) = bytes.as_chunks();
+    let mut all = Vec::new();
+    let reserved = all.try_reserve_exact(chunks.len());
+    reserved.map_err(|error| PyMemoryError::new_err(error.to_string()))?;
+    all.extend(chunks.iter().copied().map(of_bytes));
+    Ok(all)
+}

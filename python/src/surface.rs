@@ -1,0 +1,163 @@
+//! Surfaces.
+
+use hapterra_touch::{
+    Damping, ForceLaw, Friction, Material, Pattern, Shading, Surface as Touched, Texture,
+};
+use pyo3::{Py, PyResult, pyclass, pymethods};
+
+use crate::refused;
+
+const LIKE: ForceLaw = ForceLaw::PREMIUM;
+/// The command's defaults of a texture, mm.
+const WAVELENGTH_MM: f32 = 1.0;
+const MOST_AMPLITUDE_MM: f32 = 0.2;
+
+/// How a surface is rendered. All parameters are by keyword, and checked.
+///
+/// Parameters
+/// ----------
+/// stiffness : N/mm between the haptic interface point (HIP) and the proxy; 0.5.
+/// max_force : N, the limit of the force; 8.5.
+/// friction : Coulomb's coefficient while the proxy slides, 0 to 10; 0, like ice.
+/// static_friction : the same until it begins to slide; as friction.
+/// viscous_friction : s, 0 to 1; the time by which the proxy trails; 0.
+/// damping : N·s/m along the force, 0 to 20; 0.
+/// shading : "none", edges between cells are felt, or "smooth", the force turns evenly.
+/// texture : "none", "grain" or "grating".
+/// texture_amplitude : mm above and below the surface, at most 2 and an eighth of the wavelength;
+///     a tenth of the wavelength, at most 0.2.
+/// texture_wavelength : mm from ridge to ridge, 0.25 to 100; 1.
+/// texture_direction : degrees from east to north in which the ridges of a grating follow; 0.
+/// texture_seed : which of the textures that are alike; 0.
+/// materials : surfaces for the numbers 1, 2, ... of ``Terrain(materials=)``, 15 at most. Their
+///     stiffness, friction, damping and texture count; limit and shading are the surface's own.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Names the number that is out of bounds.
+#[pyclass(frozen, eq, module = "hapterra")]
+#[derive(PartialEq)]
+pub(crate) struct Surface {
+    pub(crate) surface: Touched,
+    others: usize,
+}
+
+#[pymethods]
+impl Surface {
+    #[new]
+    #[pyo3(signature = (
+        *, stiffness=LIKE.stiffness_n_per_mm, max_force=LIKE.max_force_n,
+        friction=LIKE.friction.dynamic_mu, static_friction=None,
+        viscous_friction=LIKE.friction.viscous_s, damping=LIKE.damping.ns_per_m,
+        shading="none", texture="none", texture_amplitude=None, texture_wavelength=WAVELENGTH_MM,
+        texture_direction=0.0, texture_seed=0, materials=Vec::new(),
+    ))]
+    // One for each word of Python.
+    #[expect(clippy::too_many_arguments)]
+    fn new(
+        stiffness: f32,
+        max_force: f32,
+        friction: f32,
+        static_friction: Option<f32>,
+        viscous_friction: f32,
+        damping: f32,
+        shading: &str,
+        texture: &str,
+        texture_amplitude: Option<f32>,
+        texture_wavelength: f32,
+        texture_direction: f32,
+        texture_seed: u32,
+        materials: Vec<Py<Self>>,
+    ) -> PyResult<Self> {
+        let law = ForceLaw {
+            stiffness_n_per_mm: stiffness,
+            max_force_n: max_force,
+            friction: Friction {
+                static_mu: static_friction.unwrap_or(friction),
+                dynamic_mu: friction,
+                viscous_s: viscous_friction,
+            },
+            damping: Damping {
+                ns_per_m: damping,
+                ..LIKE.damping
+            },
+            shading: choice("shading", SHADINGS, shading)?,
+            texture: match choice("texture", PATTERNS, texture)? {
+                Pattern::None => Texture::NONE,
+                pattern => Texture {
+                    pattern,
+                    amplitude_mm: texture_amplitude
+                        .unwrap_or((0.1 * texture_wavelength).min(MOST_AMPLITUDE_MM)),
+                    wavelength_mm: texture_wavelength,
+                    direction_deg: texture_direction,
+                    seed: texture_seed,
+                },
+            },
+        };
+        let surface = Touched::new(law).map_err(refused)?;
+        let others = materials.len();
+        if others == 0 {
+            return Ok(Self { surface, others });
+        }
+        let of = |other: &Py<Self>| Material::of(other.get().surface.params());
+        let materials: Vec<_> = materials.iter().map(of).collect();
+        let surface = surface.with_materials(&materials).map_err(refused)?;
+        Ok(Self { surface, others })
+    }
+
+    fn __repr__(&self) -> String {
+        let law = self.surface.params();
+        let Friction {
+            static_mu,
+            dynamic_mu,
+            viscous_s,
+        } = law.friction;
+        let mut text = format!(
+            "Surface(stiffness={}, max_force={}, friction={dynamic_mu}, static_friction={static_mu}, \
+             viscous_friction={viscous_s}, damping={}, shading='{}', texture='{}'",
+            law.stiffness_n_per_mm,
+            law.max_force_n,
+            law.damping.ns_per_m,
+            name(SHADINGS, law.shading),
+            name(PATTERNS, law.texture.pattern),
+        );
+        let texture = &law.texture;
+        if !texture.is_none() {
+            text += &format!(
+                ", texture_amplitude={}, texture_wavelength={}, texture_direction={}, texture_seed={}",
+                texture.amplitude_mm, texture.wavelength_mm, texture.direction_deg, texture.seed
+            );
+        }
+        if self.others > 0 {
+            text += &format!(", materials=[{} more]", self.others);
+        }
+        text + ")"
+    }
+}
+
+type Names<T, const COUNT: usize> = [(&'static str, T); COUNT];
+
+const SHADINGS: Names<Shading, 2> = [("none", Shading::None), ("smooth", Shading::Smooth)];
+const PATTERNS: Names<Pattern, 3> = [
+    ("none", Pattern::None),
+    ("grain", Pattern::Grain),
+    ("grating", Pattern::Grating),
+];
+
+fn choice<T: Copy, const COUNT: usize>(
+    what: &str,
+    names: Names<T, COUNT>,
+    given: &str,
+) -> PyResult<T> {
+    let found = names.iter().find(|(name, _)| *name == given);
+    found.map(|(_, of)| *of).ok_or_else(|| {
+        let names = names.map(|(name, _)| format!("{name:?}")).join(" or ");
+        refused(format!("{what} is {given:?}: give {names}"))
+    })
+}
+
+fn name<T: PartialEq, const COUNT: usize>(names: Names<T, COUNT>, of: T) -> &'static str {
+    let found = names.into_iter().find(|(_, it)| *it == of);
+    found.map_or("", |(name, _)| name)
+}

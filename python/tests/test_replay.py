@@ -1,0 +1,135 @@
+"""Runs against the command ``hapterra replay`` on the same heights: the same bits."""
+
+import csv
+import os
+import subprocess
+
+import numpy as np
+import pytest
+
+from hapterra import Contact, State, Surface, Terrain
+
+HAPTERRA = os.environ.get("HAPTERRA")
+pytestmark = pytest.mark.skipif(
+    not HAPTERRA, reason="HAPTERRA does not name the command; cargo xtask python --test does"
+)
+CELL_MM = 0.7
+NAMES = {
+    "free": {State.FREE},
+    "touching": {State.TOUCHING},
+    "letting go": {State.FADING},
+    "waiting": {State.BELOW_GROUND, State.OUTSIDE},
+}
+ROUGH = dict(
+    stiffness=0.4,
+    max_force=6,
+    friction=0.3,
+    static_friction=0.5,
+    viscous_friction=0.004,
+    damping=2,
+    shading="smooth",
+    texture="grain",
+    texture_amplitude=0.1,
+    texture_wavelength=1.5,
+    texture_seed=3,
+)
+FLAGS = (
+    "--stiffness-n-per-mm=0.4 --max-force-n=6 --friction=0.3 --static-friction=0.5"
+    " --viscous-friction=0.004 --damping-ns-per-m=2 --shading=smooth --texture=grain"
+    " --texture-amplitude=0.1 --texture-wavelength=1.5 --texture-seed=3"
+).split()
+
+
+def hills():
+    """Rough hills with holes."""
+    y, x = np.mgrid[0:97.0, 0:130.0]
+    heights = 6 * np.sin(0.21 * x) * np.cos(0.13 * y) + 0.4 * np.sin(2.1 * x + 1.3 * y)
+    heights.flat[::997] = np.nan
+    return heights
+
+
+def stroke(rows):
+    """A hand that wanders over the hills and through them."""
+    at = np.arange(rows) * 0.01
+    return np.c_[
+        45 + 40 * np.sin(0.21 * at), 33 + 30 * np.sin(0.33 * at + 1), 7 - 8 * np.sin(0.05 * at + 5) ** 2
+    ]
+
+
+def replayed(folder, heights, path, t=None, words=()):
+    """What the command writes."""
+    np.save(folder / "hills.npy", heights)
+    columns = {} if t is None else {"t_s": t}
+    columns |= dict(zip(("x_mm", "y_mm", "z_mm"), path.T))
+    # By the shortest digits that read back to the same value, as the command writes them, too.
+    rows = zip(*(column.tolist() for column in columns.values()))
+    with (folder / "path.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([columns, *rows])
+    files = [folder / "hills.npy", folder / "path.csv", "-o", folder / "felt.csv"]
+    subprocess.run([HAPTERRA, "replay", *files, *words], check=True, timeout=600)
+    with (folder / "felt.csv").open(newline="") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def same(steps, felt):
+    """Fails unless they are the same, bit for bit. Returns how many touch."""
+    assert len(steps) == len(felt["t_s"])
+    assert np.array_equal(steps["t_s"], np.array(felt["t_s"], float))
+    touching = steps["state"] == State.TOUCHING
+    for field, name in (("hip_mm", "{}_mm"), ("proxy_mm", "proxy_{}_mm"), ("force_n", "force_{}_n")):
+        for axis, letter in enumerate("xyz"):
+            found = steps[field][:, axis]
+            expected = np.array(felt[name.format(letter)], float).astype(found.dtype)
+            # Without contact the file has the HIP in place of the proxy, which is rounded.
+            differ = found != expected if field != "proxy_mm" else touching & (found != expected)
+            rows = np.flatnonzero(differ)
+            assert not len(rows), f"{field} {letter}: {len(rows)} rows from {rows[0]} on"
+    for name, state in zip(felt["state"], steps["state"]):
+        assert State(state) in NAMES[name]
+    return touching.sum()
+
+
+@pytest.mark.parametrize("surface, flags", [({}, []), (ROUGH, FLAGS)], ids=["ice", "rough"])
+def test_run_is_a_replay(tmp_path, surface, flags):
+    path = stroke(20_000)
+    felt = replayed(tmp_path, hills(), path, words=[f"--cell-mm={CELL_MM}", *flags])
+    contact = Contact(Terrain(hills(), cell_mm=CELL_MM), Surface(**surface))
+    touching = same(contact.run(path), felt)
+    assert 2_000 < touching < 18_000, touching
+
+
+def test_integers_at_a_scale_are_a_replay(tmp_path):
+    heights = np.nan_to_num(hills() * 9).astype(">i2")
+    path = stroke(20_000) * [0.42, 0.42, 0.2]
+    words = ["--cell-mm=0.3", "--height-mm-per-unit=0.017"]
+    felt = replayed(tmp_path, heights, path, words=words)
+    terrain = Terrain(np.asfortranarray(heights), cell_mm=0.3, height_mm_per_unit=0.017)
+    assert same(Contact(terrain).run(path), felt) > 1_000
+
+
+@pytest.mark.filterwarnings("ignore:.* rows:UserWarning")
+@pytest.mark.parametrize("hz", [90.0, 1000.0, 3333.3])
+@pytest.mark.parametrize("begin_s", [0.0, 1_767_225_600.0])
+def test_times_are_those_of_a_replay(tmp_path, hz, begin_s):
+    rows = 4_000
+    random = np.random.default_rng(7)
+    t = begin_s + (np.arange(rows) + random.uniform(-0.4, 0.4, rows)) / hz
+    # Every third row is next to a tick, and rows may repeat.
+    t[::3] = begin_s + np.round((t[::3] - begin_s) * 1000 + 0.009 * random.uniform(-1, 1)) / 1000
+    path = stroke(rows) + [0, 0, -2]
+    repeat = np.sort(np.r_[np.arange(rows), [5, 700]])
+    t, path = np.maximum.accumulate(t)[repeat], path[repeat]
+    path = path[np.r_[True, (np.diff(t) > 0) | (np.diff(path, axis=0) == 0).all(1)]]
+    t = t[np.r_[True, (np.diff(t) > 0) | (np.diff(repeat) == 0)]]
+    felt = replayed(tmp_path, hills(), path, t, [f"--cell-mm={CELL_MM}", *FLAGS])
+    steps = Contact(Terrain(hills(), cell_mm=CELL_MM), Surface(**ROUGH)).run(path, t)
+    same(steps, felt)
+    assert abs(len(steps) - 1000 * (t[-1] - t[0])) < 2
+
+
+def test_one_time_for_all_rows_is_a_replay(tmp_path):
+    path = stroke(3_000)
+    t = np.full(3_000, 4.5)
+    felt = replayed(tmp_path, hills(), path, t, [f"--cell-mm={CELL_MM}"])
+    same(Contact(Terrain(hills(), cell_mm=CELL_MM)).run(path, t), felt)

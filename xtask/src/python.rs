@@ -1,0 +1,163 @@
+//! `cargo xtask python`: the Python package, in an environment of its own under `target/`.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::deny;
+use crate::run::{cargo, output, root, run, run_quietly, say, target_dir, timed};
+
+/// Names the interpreter to use.
+const PYTHON: &str = "HAPTERRA_PYTHON";
+/// Prints the version of an interpreter that is new enough, and fails on others.
+const VERSION: &str =
+    "import sys; v = sys.version_info; print('%d.%d' % v[:2]); sys.exit(v < (3, 9))";
+
+/// Builds the wheel, and gives the interpreter of its environment and its path; none, and a line,
+/// where there is no Python.
+///
+/// # Errors
+/// What failed: the environment, which takes a network the first time, or the build.
+pub(crate) fn build() -> Result<Option<(PathBuf, PathBuf)>> {
+    let Some(python) = interpreter()? else {
+        say("SKIPPED: the Python package: there is no Python 3.9 or newer on the PATH");
+        return Ok(None);
+    };
+    let python = environment(&python)?;
+    install(&python, &["maturin>=1.8,<2"])?;
+    let wheel = timed("building the wheel", || wheel(&python))?;
+    Ok(Some((python, wheel)))
+}
+
+/// Lints the package's crate, holds its dependencies to `deny.toml`, installs the wheel, and runs
+/// its tests with `hapterra` beside them. Without Python it ends well after one line.
+///
+/// # Errors
+/// As [`build`], and what the tests say.
+pub(crate) fn test() -> Result<()> {
+    let Some((python, wheel)) = build()? else {
+        return Ok(());
+    };
+    timed("linting the Python package's crate", lint)?;
+    deny::check_workspace("python/Cargo.toml")?;
+    timed("building the hapterra command", || {
+        run(cargo().args(["build", "--package", "hapterra", "--bin", "hapterra"]))
+    })?;
+    install(&python, &[&format!("{}[test]", wheel.display())])?;
+    // The version stays the same while one works on it.
+    let again = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
+    install(&python, &again)?;
+    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
+    let mut tests = Command::new(&python);
+    tests
+        .args(["-m", "pytest"])
+        .current_dir(root().join("python"))
+        .env("HAPTERRA", target_dir().join("debug").join(program));
+    timed("running the Python package's tests", || run(&mut tests))
+}
+
+/// An interpreter that is new enough.
+struct Python {
+    program: PathBuf,
+    /// As 3.11.
+    version: String,
+}
+
+impl Python {
+    fn of(program: &Path) -> Option<Self> {
+        let version = output(Command::new(program).args(["-c", VERSION]))?;
+        let version = version.trim().to_owned();
+        // Other programs may succeed and print nothing.
+        (!version.is_empty()).then(|| Self {
+            program: program.to_owned(),
+            version,
+        })
+    }
+}
+
+/// The interpreter that is asked for, or the first that is new enough.
+fn interpreter() -> Result<Option<Python>> {
+    if let Some(given) = std::env::var_os(PYTHON) {
+        let given = PathBuf::from(given);
+        let why = || {
+            format!(
+                "{PYTHON} is {}: name a Python 3.9 or newer",
+                given.display()
+            )
+        };
+        return Python::of(&given).with_context(why).map(Some);
+    }
+    let names = ["python3", "python"];
+    Ok(names.iter().find_map(|name| Python::of(Path::new(name))))
+}
+
+/// The package's own environment for a version of Python, made where it is not there or its
+/// interpreter has gone. Gives its interpreter.
+fn environment(python: &Python) -> Result<PathBuf> {
+    let home = target_dir().join(format!("python-env-{}", python.version));
+    let own = match cfg!(windows) {
+        true => home.join("Scripts").join("python.exe"),
+        false => home.join("bin").join("python"),
+    };
+    if Python::of(&own).is_none() {
+        let mut make = Command::new(&python.program);
+        make.args(["-m", "venv", "--clear"]).arg(&home);
+        let hint = "Python's venv is missing; on Debian: apt-get install python3-venv";
+        run_quietly(&mut make).context(hint)?;
+    }
+    Ok(own)
+}
+
+fn install(python: &Path, words: &[&str]) -> Result<()> {
+    let mut pip = Command::new(python);
+    pip.args(["-m", "pip", "install", "--quiet"]);
+    pip.args(["--disable-pip-version-check"]).args(words);
+    run_quietly(&mut pip)
+        .context("pip cannot install what the Python package needs: is there a network?")
+}
+
+/// The wheel, alone in its folder.
+fn wheel(python: &Path) -> Result<PathBuf> {
+    let wheels = target_dir().join("wheels");
+    if wheels.exists() {
+        std::fs::remove_dir_all(&wheels).context("target/wheels cannot be emptied")?;
+    }
+    let mut maturin = Command::new(python);
+    maturin
+        .args(["-m", "maturin", "build", "--release", "--locked"])
+        .arg("--interpreter")
+        .arg(python)
+        .arg("--out")
+        .arg(&wheels)
+        .current_dir(root().join("python"))
+        .env("CARGO_TARGET_DIR", target_dir());
+    run_quietly(&mut maturin)?;
+    let mut made = std::fs::read_dir(&wheels).context("maturin has made no folder of wheels")?;
+    let wheel = made.next().context("maturin has made no wheel")??;
+    Ok(wheel.path())
+}
+
+/// Formatting and clippy of the crate.
+fn lint() -> Result<()> {
+    let cargo = |words: &[&str]| {
+        let mut command = cargo();
+        command.current_dir(root().join("python")).args(words);
+        command
+    };
+    run(&mut cargo(&["fmt", "--check"])).context("type: cd python && cargo fmt")?;
+    let clippy = ["clippy", "--release", "--locked", "--", "-D", "warnings"];
+    run(&mut cargo(&clippy))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn programs_that_are_no_python_are_not_taken() {
+        for program in ["/no/such/python", "false", "true"] {
+            assert!(Python::of(Path::new(program)).is_none(), "{program}");
+        }
+    }
+}
