@@ -6,6 +6,9 @@
 mod browser;
 #[path = "../src/page/server.rs"]
 mod server;
+#[allow(dead_code, unreachable_pub)]
+#[path = "../../tests/src/timeouts.rs"]
+mod timeouts;
 
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -13,7 +16,6 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
@@ -21,9 +23,8 @@ use serde_json::json;
 
 use browser::{Browser, Page};
 use server::Server;
+use timeouts::{HANG, wait_until};
 
-/// Longer than anything takes on a busy machine.
-const HANG: Duration = Duration::from_secs(120);
 /// Software draws the pages: one at a time, and small ones.
 static ONE: Mutex<()> = Mutex::new(());
 const SIZE: [u32; 2] = [720, 480];
@@ -89,15 +90,7 @@ impl Site {
 
     /// Waits until an expression is true.
     fn wait(&mut self, expression: &str) {
-        let until = Instant::now() + HANG;
-        while self.value(expression) != true {
-            let said = self.text("said");
-            assert!(
-                Instant::now() < until,
-                "{expression}: the page says: {said}"
-            );
-            std::thread::sleep(Duration::from_millis(100));
-        }
+        wait_until(expression, || self.value(expression) == true);
     }
 
     /// Moves the mouse to a place, in shares of the page.
@@ -185,12 +178,10 @@ fn saved_path_feels_the_same_in_replay_bit_for_bit() {
     assert!(colours.count > 400, "{colours:?}");
     assert!(colours.near.iter().all(|pixels| *pixels > 5), "{colours:?}");
     let _ = site.value("document.getElementById('save').click()");
-    let until = Instant::now() + HANG;
     let files = ["path.csv", "terrain.npy"].map(|name| saved.join(name));
-    while !files.iter().all(|file| file.is_file()) {
-        assert!(Instant::now() < until, "not saved: {files:?}");
-        std::thread::sleep(Duration::from_millis(100));
-    }
+    wait_until("the saved files", || {
+        files.iter().all(|file| file.is_file())
+    });
     let line = site.text("saved");
     let words: Vec<_> = line.split(' ').skip(1).collect();
     if hapterra(&saved, &words, &[]).is_none() {
