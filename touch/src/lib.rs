@@ -12,6 +12,7 @@ mod scale;
 mod surface;
 mod terrain;
 mod tick_loop;
+pub mod tiles;
 
 pub use contact::{Contact, ContactError, RunError, State, Step, StepError};
 pub use hapterra_core::contact::Friction;

@@ -8,6 +8,7 @@ use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, POSTS, TILE_CELLS, Tile,
 
 use crate::heights::{Array, Block, Height, Heights, RowOrder, Unread};
 use crate::scale::{BadScale, Scale};
+use crate::tiles;
 
 /// A height field: samples on a square grid, bilinear between them.
 ///
@@ -331,14 +332,7 @@ impl Terrain {
         };
         let ends = range.map(|height| self.scale.height_cells(height));
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        // Rounded to `f32` above the base, a sample reaches the next whole number at most; from 2^23
-        // on, up to 2^30, by as much as its last place.
-        let rounding = if high - low < f64::from(1 << 23) {
-            0
-        } else {
-            64
-        };
-        (libm::ceil(high) as i32 + rounding).min(MAX_CELL + 1)
+        tiles::top(low, high)
     }
 
     /// The largest material that a sample has; none where all are of one.
@@ -377,7 +371,7 @@ impl Terrain {
         let width = block.columns as usize;
         let filled = tile.fill(key, base, |col, row| {
             let cells = (col < width).then(|| room.get(row * width + col)).flatten();
-            cells.map_or(f32::NAN, |cells| (cells - f64::from(base)) as f32)
+            cells.map_or(f32::NAN, |cells| tiles::above(base, *cells))
         });
         filled.map_err(|_| NoTile::Step)?;
         if materials > 0
@@ -497,8 +491,7 @@ fn place(cells: f64, patches: u32) -> Option<(u32, f64)> {
     Some((patch as u32, cells - patch))
 }
 
-/// The whole height that a tile counts from: the lowest sample's, or the middle where single heights
-/// would leave what the contact can address.
+/// The whole height that a tile counts from; 0 where all is a hole.
 fn base(cells: &[f64]) -> i32 {
     let known = cells.iter().copied().filter(|cells| !cells.is_nan());
     let range = known.fold(None, |range: Option<(f64, f64)>, h| {
@@ -508,7 +501,5 @@ fn base(cells: &[f64]) -> i32 {
     let Some((low, high)) = range else {
         return 0;
     };
-    let from_low = high - libm::floor(low) <= f64::from(MAX_CELL);
-    let base = if from_low { low } else { 0.5 * (low + high) };
-    libm::floor(base) as i32 // both within ±MAX_CELL
+    tiles::base(low, high)
 }

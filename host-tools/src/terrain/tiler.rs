@@ -10,6 +10,8 @@ use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, POSTS, TILE_CELLS, TileK
 use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
+use hapterra_touch::tiles;
+
 use super::steps::{BinaryUnit, steps};
 use super::tip::{Ball, Block, MOST_CELLS, Nodes};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
@@ -114,9 +116,9 @@ impl Default for TileBuffer {
 impl TileBuffer {
     /// The heights, of which these are the lowest and the highest, as they are shortest on the link.
     pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
-        let base = base(low, high);
+        let base = tiles::base(low, high);
         for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
-            *single = relative(*height, base);
+            *single = tiles::above(base, *height);
         }
         self.packed(base, steps)
     }
@@ -401,8 +403,8 @@ impl<'r> Terrain<'r> {
             return Some(Heights::Hole);
         };
         if low == high && known == self.samples_in(key) {
-            let base = base(low, high);
-            let height = relative(low, base);
+            let base = tiles::base(low, high);
+            let height = tiles::above(base, low);
             return Some(Heights::Flat { base, height });
         }
         let steps = match self.step() {
@@ -601,11 +603,6 @@ fn place(cells: f64, patches: i32) -> Option<(u32, f64)> {
     Some((patch as u32, cells - patch))
 }
 
-/// A height above a tile's base, rounded once.
-fn relative(height: f64, base: i32) -> f32 {
-    (height - f64::from(base)) as f32
-}
-
 /// Lowest and highest height, and how many there are; `None` if there is none.
 pub(super) fn range(heights: &[f64]) -> Option<(f64, f64, usize)> {
     let known = heights.iter().copied().filter(|h| !h.is_nan());
@@ -613,14 +610,6 @@ pub(super) fn range(heights: &[f64]) -> Option<(f64, f64, usize)> {
         let (low, high, count) = range.unwrap_or((h, h, 0));
         Some((low.min(h), high.max(h), count + 1))
     })
-}
-
-/// The whole height a tile counts from: the lowest sample's, or the middle
-/// where single heights would leave what the device can address.
-fn base(low: f64, high: f64) -> i32 {
-    let from_low = high - low.floor() <= f64::from(MAX_CELL);
-    let base = if from_low { low } else { 0.5 * (low + high) };
-    base.floor() as i32 // both within ±MAX_CELL
 }
 
 fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
@@ -637,14 +626,7 @@ fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
     if !raster.is_known_whole() {
         return Ok(MAX_CELL + 1);
     }
-    // Rounded to `f32` above the base, a sample reaches the next whole number
-    // at most; from 2^23 on, up to 2^30, by as much as its last place.
-    let rounding = if high - low < f64::from(1 << 23) {
-        0
-    } else {
-        64
-    };
-    Ok((high.ceil() as i32 + rounding).min(MAX_CELL + 1))
+    Ok(tiles::top(low, high))
 }
 
 #[cfg(test)]

@@ -136,7 +136,7 @@ impl Rendering {
     /// Numbers that no terrain can be scaled with.
     pub fn scale(&self, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
         let cell_mm = self.cell_mm.unwrap_or(1.0);
-        let plain = Scale::true_to(grid, cell_mm);
+        let plain = grid.true_scale(cell_mm);
         let scale = match (
             self.height_mm_per_unit,
             self.exaggeration.unwrap_or_default(),
