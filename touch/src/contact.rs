@@ -8,6 +8,7 @@ use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::Limits;
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::terrain::FieldSize;
 
 use crate::heights::Unread;
 use crate::scale::Scale;
@@ -264,6 +265,7 @@ fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
     let cell_mm = Scale::cell_mm(terrain.scale()) as f32;
     terrain.check_heights()?;
     surface.check_cells(cell_mm)?;
+    let [east, north] = terrain.size();
     let last = terrain.last_material();
     let count = surface.table().map_or(1, |table| table.materials().len());
     if let Some(found) = last.filter(|found| usize::from(*found) >= count) {
@@ -273,7 +275,7 @@ fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
     Ok(Scene {
         epoch: 1,
         level: 0,
-        size: terrain.size(),
+        size: FieldSize::new(east, north),
         top: terrain.top(),
         underlay: None,
         cell_mm,

@@ -13,6 +13,7 @@ mod surface;
 mod terrain;
 mod tick_loop;
 pub mod tiles;
+pub mod tip;
 
 pub use contact::{Contact, ContactError, RunError, State, Step, StepError};
 pub use hapterra_core::contact::Friction;

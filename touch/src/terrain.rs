@@ -4,7 +4,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use hapterra_core::grid::MAX_CELL;
-use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, POSTS, TILE_CELLS, Tile, TileKey};
+use hapterra_core::terrain::{MAX_STEP_CELLS, POSTS, TILE_CELLS, Tile, TileKey};
 
 use crate::heights::{Array, Block, Height, Heights, RowOrder, Unread};
 use crate::scale::{BadScale, Scale};
@@ -302,8 +302,9 @@ impl Terrain {
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
         let cell_mm = self.scale.cell_mm();
-        let (column, u) = place(east_mm / cell_mm, self.columns - 1)?;
-        let (row, v) = place(north_mm / cell_mm, self.rows - 1)?;
+        let size = self.size();
+        let (column, u) = tiles::place(east_mm / cell_mm, size[0])?;
+        let (row, v) = tiles::place(north_mm / cell_mm, size[1])?;
         let mut corners = [f64::NAN; 4];
         let block = Block {
             column,
@@ -320,9 +321,10 @@ impl Terrain {
         (!hole).then(|| mix(mix(sw, se, u), mix(nw, ne, u), v))
     }
 
-    pub(crate) fn size(&self) -> FieldSize {
+    /// Patches east and north.
+    pub(crate) fn size(&self) -> [i32; 2] {
         // Checked: at most MAX_CELL samples.
-        FieldSize::new(self.columns as i32 - 1, self.rows as i32 - 1)
+        [self.columns, self.rows].map(|count| count as i32 - 1)
     }
 
     /// A whole height in cells that no sample exceeds.
@@ -479,16 +481,6 @@ fn survey<T: Height>(array: &Array<T>) -> (Option<[f64; 2]>, Option<Steepest>) {
         }
     }
     (range, steepest)
-}
-
-/// The patch and the place in it of a coordinate in cells.
-fn place(cells: f64, patches: u32) -> Option<(u32, f64)> {
-    if !(0.0..=f64::from(patches)).contains(&cells) {
-        return None;
-    }
-    // The last sample belongs to the last patch.
-    let patch = libm::floor(cells).min(f64::from(patches - 1));
-    Some((patch as u32, cells - patch))
 }
 
 /// The whole height that a tile counts from; 0 where all is a hole.
