@@ -10,10 +10,11 @@ use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::terrain::FieldSize;
 
+use crate::checks::TerrainError;
+use crate::cut::NoTile;
 use crate::heights::Unread;
-use crate::scale::Scale;
 use crate::surface::{Surface, SurfaceError};
-use crate::terrain::{NoTile, Terrain, TerrainError};
+use crate::terrain::Terrain;
 use crate::tick_loop::TickLoop;
 
 /// Ticks in which a force comes in again after a change, at most, at every rate.
@@ -173,7 +174,7 @@ impl Contact {
     /// # Errors
     /// [`StepError`]; the step has not happened then.
     pub fn step(&mut self, hip_mm: [f64; 3]) -> Result<Step, StepError> {
-        let scale = *self.terrain.scale();
+        let scale = self.terrain.felt_scale();
         let hip = scale.to_grid(hip_mm).ok_or(StepError::Place {
             hip_mm,
             cell_mm: scale.cell_mm(),
@@ -262,7 +263,7 @@ impl Contact {
 
 /// A surface on a terrain, as the loop takes it.
 fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
-    let cell_mm = Scale::cell_mm(terrain.scale()) as f32;
+    let cell_mm = terrain.felt_scale().cell_mm() as f32;
     terrain.check_heights()?;
     surface.check_cells(cell_mm)?;
     let [east, north] = terrain.size();
