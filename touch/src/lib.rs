@@ -14,6 +14,7 @@ mod scale;
 mod surface;
 mod terrain;
 mod tick_loop;
+pub mod ticks;
 pub mod tiles;
 pub mod tip;
 
