@@ -84,6 +84,10 @@ enum HapterraStatus
    * The library is at fault. The object cannot be used any more but for its end.
    */
   HAPTERRA_STATUS_INTERNAL = 15,
+  /**
+   * A tip is no ball that can touch these cells.
+   */
+  HAPTERRA_STATUS_TIP = 16,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -277,7 +281,7 @@ typedef struct HapterraSurface {
 
 /**
  * Reads heights of a block of samples into `heights`, row by row from the south and each row from
- * west to east: `columns` times `rows`, at most 33 × 33, NaN for a hole. `column` and `row` count
+ * west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for a hole. `column` and `row` count
  * from the south-west sample. Returns 0, or any other number for an error. `user` is the pointer
  * that was given with the function. It is called during calls with a contact or terrain only, and
  * must not end by an exception or `longjmp`.
@@ -394,6 +398,15 @@ HapterraStatus hapterra_terrain_set_height_scale(struct HapterraTerrain *terrain
                                                  double mm_per_unit);
 
 /**
+ * Puts a ball of a radius in millimetres in place of the point that touches the terrain, or with 0 the
+ * point again. The HIP and the proxy are then the ball's centre, one radius above flat ground, and so
+ * is `hapterra_terrain_height_mm`. The radius is at most 8 cells. It counts for the heights that the
+ * terrain has, and for contacts that begin later.
+ */
+HapterraStatus hapterra_terrain_set_tip(struct HapterraTerrain *terrain,
+                                        double tip_mm);
+
+/**
  * Says of which material each sample is: the number of one of the surfaces of
  * `hapterra_contact_begin`, row by row in a `HapterraRowOrder`. There are as many as the terrain
  * has samples, and they are copied.
@@ -407,7 +420,7 @@ HapterraStatus hapterra_terrain_set_materials(struct HapterraTerrain *terrain,
                                               uint32_t order);
 
 /**
- * Returns the height of the surface at a place, mm; NaN in a hole, off the terrain, where it cannot
+ * Returns the height of the surface at a place, mm, or of a ball's centre over it; NaN in a hole, off the terrain, where it cannot
  * be read, and for null.
  */
 double hapterra_terrain_height_mm(const struct HapterraTerrain *terrain,

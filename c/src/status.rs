@@ -40,10 +40,12 @@ pub enum HapterraStatus {
     Memory = 14,
     /// The library is at fault. The object cannot be used any more but for its end.
     Internal = 15,
+    /// A tip is no ball that can touch these cells.
+    Tip = 16,
 }
 
 /// Texts by number.
-const TEXTS: [&CStr; 16] = [
+const TEXTS: [&CStr; 17] = [
     c"all is well",
     c"a pointer is null: give one",
     c"a pointer is not aligned or a count larger than memory",
@@ -60,6 +62,7 @@ const TEXTS: [&CStr; 16] = [
     c"a number is none of an enumeration's",
     c"there is no memory",
     c"the library is at fault: report it, and free the object",
+    c"a tip is no ball that can touch these cells: give a radius from 0 to 8 cells",
 ];
 
 /// An error, with the message that the object keeps.
@@ -91,6 +94,7 @@ impl From<TerrainError> for Failure {
             | TerrainError::Ragged { .. } => HapterraStatus::Size,
             TerrainError::Memory { .. } => HapterraStatus::Memory,
             TerrainError::Scale(_) => HapterraStatus::Scale,
+            TerrainError::Tip(_) | TerrainError::TipCells { .. } => HapterraStatus::Tip,
             TerrainError::TooTall { .. } | TerrainError::Step { .. } => HapterraStatus::Heights,
         };
         Self::new(status, error)

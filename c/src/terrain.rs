@@ -25,7 +25,7 @@ pub struct HapterraTerrain {
 }
 
 /// Reads heights of a block of samples into `heights`, row by row from the south and each row from
-/// west to east: `columns` times `rows`, at most 33 × 33, NaN for a hole. `column` and `row` count
+/// west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for a hole. `column` and `row` count
 /// from the south-west sample. Returns 0, or any other number for an error. `user` is the pointer
 /// that was given with the function. It is called during calls with a contact or terrain only, and
 /// must not end by an exception or `longjmp`.
@@ -202,6 +202,23 @@ pub extern "C" fn hapterra_terrain_set_height_scale(
     })
 }
 
+/// Puts a ball of a radius in millimetres in place of the point that touches the terrain, or with 0 the
+/// point again. The HIP and the proxy are then the ball's centre, one radius above flat ground, and so
+/// is `hapterra_terrain_height_mm`. The radius is at most 8 cells. It counts for the heights that the
+/// terrain has, and for contacts that begin later.
+#[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
+pub extern "C" fn hapterra_terrain_set_tip(
+    terrain: Option<&mut HapterraTerrain>,
+    tip_mm: f64,
+) -> HapterraStatus {
+    terrain.map_or(HapterraStatus::NullPointer, |terrain| {
+        terrain.put(|terrain| {
+            let terrain = terrain.cloned().ok_or(HapterraStatus::NotBegun)?;
+            Ok(terrain.with_tip(tip_mm)?)
+        })
+    })
+}
+
 /// Says of which material each sample is: the number of one of the surfaces of
 /// `hapterra_contact_begin`, row by row in a `HapterraRowOrder`. There are as many as the terrain
 /// has samples, and they are copied.
@@ -225,7 +242,7 @@ pub unsafe extern "C" fn hapterra_terrain_set_materials(
     })
 }
 
-/// Returns the height of the surface at a place, mm; NaN in a hole, off the terrain, where it cannot
+/// Returns the height of the surface at a place, mm, or of a ball's centre over it; NaN in a hole, off the terrain, where it cannot
 /// be read, and for null.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_height_mm(

@@ -8,7 +8,7 @@ use crate::contact::{
     HapterraStep, hapterra_contact_begin, hapterra_contact_new, hapterra_contact_run,
 };
 use crate::surface::{HapterraShading, HapterraSurface, HapterraTexture, hapterra_surface_default};
-use crate::terrain::{hapterra_terrain_new, hapterra_terrain_set_f64};
+use crate::terrain::{hapterra_terrain_new, hapterra_terrain_set_f64, hapterra_terrain_set_tip};
 
 /// All of it that can differ from the defaults.
 fn rough() -> HapterraSurface {
@@ -57,6 +57,7 @@ fn steps_are_those_of_the_library() {
         .collect();
     let terrain =
         Terrain::from_slice(60, 50, 0.8, RowOrder::NorthFirst, &heights).expect("a terrain");
+    let terrain = terrain.with_tip(1.5).expect("a ball");
     let surface = Surface::new(rough().law().expect("known numbers")).expect("a surface");
     let mut contact = Contact::at_rate(terrain, surface, 2000).expect("a contact");
     let expected = contact.run(path.iter().copied()).expect("steps");
@@ -67,6 +68,7 @@ fn steps_are_those_of_the_library() {
     let status = unsafe {
         [
             hapterra_terrain_set_f64(Some(&mut terrain), heights.as_ptr(), 60, 50, 0.8, 0),
+            hapterra_terrain_set_tip(Some(&mut terrain), 1.5),
             hapterra_contact_begin(Some(&mut contact), Some(&terrain), &rough(), 1, 2000),
             hapterra_contact_run(
                 Some(&mut contact),
@@ -77,7 +79,7 @@ fn steps_are_those_of_the_library() {
             ),
         ]
     };
-    assert_eq!(status.map(|status| status as u32), [0; 3]);
+    assert_eq!(status.map(|status| status as u32), [0; 4]);
     // SAFETY: all steps have happened.
     let steps = steps.iter().map(|step| unsafe { step.assume_init() });
     for (step, expected) in steps.zip(expected) {

@@ -49,6 +49,9 @@ static void nulls(void) {
     expect(hapterra_terrain_set_height_scale(NULL, 1.0), null, "set_height_scale");
     expect(hapterra_terrain_set_height_scale(terrain, 1.0), HAPTERRA_STATUS_NOT_BEGUN,
            "set_height_scale without heights");
+    expect(hapterra_terrain_set_tip(NULL, 1.0), null, "set_tip");
+    expect(hapterra_terrain_set_tip(terrain, 1.0), HAPTERRA_STATUS_NOT_BEGUN,
+           "set_tip without heights");
     expect(hapterra_terrain_set_materials(NULL, materials, 4, 0), null, "set_materials");
     expect(hapterra_contact_begin(NULL, terrain, &surface, 1, 1000), null, "begin");
     expect(hapterra_contact_begin(contact, NULL, &surface, 1, 1000), null, "begin, terrain");
@@ -110,6 +113,14 @@ static void numbers(void) {
     expect(hapterra_contact_begin(contact, terrain, surfaces, 1, 1000), HAPTERRA_STATUS_HEIGHTS,
            "begin, tall");
     expect(hapterra_terrain_set_f32(terrain, heights, 3, 3, 1.0, 0), 0, "set_f32");
+    expect(hapterra_terrain_set_tip(terrain, -1.0), HAPTERRA_STATUS_TIP, "tip below 0");
+    expect(hapterra_terrain_set_tip(terrain, 8.5), HAPTERRA_STATUS_TIP, "tip of 8.5 cells");
+    says(hapterra_terrain_message(terrain), "a tip of 8.5 mm: 8.5 cells of 1 mm, where 0 to 8");
+    expect(hapterra_terrain_height_mm(terrain, 1.5, 1.5) == 0.0, 1, "a point still");
+    expect(hapterra_terrain_set_tip(terrain, 2.0), 0, "set_tip");
+    expect(hapterra_terrain_height_mm(terrain, 1.5, 1.5) == 2.0, 1, "centre of the ball");
+    expect(hapterra_terrain_set_tip(terrain, 0.0), 0, "set_tip, 0");
+    expect(hapterra_terrain_height_mm(terrain, 1.5, 1.5) == 0.0, 1, "a point again");
     expect(hapterra_contact_begin(contact, terrain, surfaces, 0, 1000), HAPTERRA_STATUS_SURFACE,
            "no surface");
     expect(hapterra_contact_begin(contact, terrain, surfaces, 17, 1000), HAPTERRA_STATUS_SURFACE,
@@ -138,7 +149,7 @@ static void numbers(void) {
     error = 42;
     expect(hapterra_contact_step(contact, path, steps), HAPTERRA_STATUS_UNREAD, "unread");
     says(hapterra_contact_message(contact), "42");
-    for (uint32_t status = 0; status <= HAPTERRA_STATUS_INTERNAL + 1; status++) {
+    for (uint32_t status = 0; status <= HAPTERRA_STATUS_TIP + 1; status++) {
         says(hapterra_error_text(status), " ");
     }
     says(hapterra_version(), ".");

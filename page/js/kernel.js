@@ -1,6 +1,7 @@
 // The kernel: the C library (c/include/hapterra.h), compiled to WebAssembly, by its C names.
 
 import { TICK_HZ } from "./clock.js";
+import { every, stepOf } from "./terrain.js";
 
 /** Sizes of the header's structures, bytes. */
 const SURFACE_BYTES = 48;
@@ -61,20 +62,57 @@ export class Kernel {
     this.#check(status, () => this.#c.hapterra_contact_message(this.#contact));
   }
 
-  /** The terrain of contacts that begin from now on, as `fit` of terrain.js makes it. */
-  setTerrain({ heights, nx, ny, cellMm }) {
+  #checkTerrain(status) {
+    this.#check(status, () => this.#c.hapterra_terrain_message(this.#terrain));
+  }
+
+  /** The terrain of contacts that begin from now on, as `fit` of terrain.js makes it, under a ball of
+   * `tipMm`, or a point for 0. A ball is felt on every second, fourth, … sample where its radius is
+   * more than 8 cells, as in the command. */
+  setTerrain(terrain, tipMm) {
+    const step = stepOf(terrain.cellMm, tipMm);
+    const { heights, nx, ny, cellMm } = every(terrain, step);
     const c = this.#c;
     const at = this.#alloc(heights.byteLength);
     this.#memory.f32.set(heights, at / 4);
     const status = c.hapterra_terrain_set_f32(this.#terrain, at, nx, ny, cellMm, SOUTH_FIRST);
     c.hapterra_free(at, heights.byteLength);
-    this.#check(status, () => c.hapterra_terrain_message(this.#terrain));
+    this.#checkTerrain(status);
+    this.#checkTerrain(c.hapterra_terrain_set_tip(this.#terrain, tipMm));
+  }
+
+  /** Height of the ground at a place, or of the ball's centre, mm; 0 where there is none. */
+  heightAt(x, y) {
+    return this.#c.hapterra_terrain_height_mm(this.#terrain, x, y) || 0;
   }
 
   /** Begins a contact: the next step is its first. */
-  begin({ friction, stiffness, texture, wavelength }) {
-    const c = this.#c;
-    c.hapterra_surface_default(this.#surface);
+  begin(surface) {
+    this.#write(surface);
+    this.#checkContact(this.#c.hapterra_contact_begin(this.#contact, this.#terrain, this.#surface, 1, TICK_HZ));
+  }
+
+  /** Changes the surface between two steps; the contact goes on. */
+  setSurface(surface) {
+    this.#write(surface);
+    this.#checkContact(this.#c.hapterra_contact_set_surface(this.#contact, this.#surface, 1));
+  }
+
+  /** Puts forces of a surface into a path, as a contact has them that begins with it. */
+  again(surface, path) {
+    const now = this.#contact;
+    this.#contact = this.#c.hapterra_contact_new();
+    try {
+      this.begin(surface);
+      for (let i = 0; i < path.rows; i++) path.row(i).set(this.step(path.row(i).subarray(0, 3)).force, 3);
+    } finally {
+      this.#c.hapterra_contact_free(this.#contact);
+      this.#contact = now;
+    }
+  }
+
+  #write({ friction, stiffness, texture, wavelength }) {
+    this.#c.hapterra_surface_default(this.#surface);
     const { f32, u32 } = this.#memory;
     const first = this.#surface / 4;
     f32[first] = stiffness;
@@ -85,7 +123,6 @@ export class Kernel {
       f32[first + 8] = texture;
       f32[first + 9] = wavelength;
     }
-    this.#checkContact(c.hapterra_contact_begin(this.#contact, this.#terrain, this.#surface, 1, TICK_HZ));
   }
 
   /** One tick with the HIP at three numbers, mm. Returns `force`, N, `proxy`, mm, and `state`. */

@@ -48,7 +48,7 @@ function save(name, content) {
 async function main() {
   const scene = new Scene(element("view"));
   const kernel = await load("kernel.wasm");
-  const touch = new Touch(kernel, fit(await first()), surface());
+  const touch = new Touch(kernel, fit(await first()), surface(), Number(element("tip").value));
   const [clock, sound] = [new Clock(), new Sound()];
   let bar = null;
   let seed = 7;
@@ -63,12 +63,13 @@ async function main() {
     bar = scale(terrain);
     title(terrain);
   };
+  const shownValues = () => show(surface(), touch.arm.pressN, Number(element("tip").value));
   const hand = {
     get pressN() { return touch.arm.pressN; },
     press(newtons) {
       touch.arm.pressN = Math.round(Math.max(0, Math.min(MAX_PRESS_N, newtons)) * 10) / 10;
       element("press").value = touch.arm.pressN;
-      show(surface(), touch.arm.pressN);
+      shownValues();
     },
     turn(yaw, pitch) {
       scene.camera.yaw += yaw;
@@ -84,8 +85,18 @@ async function main() {
 
   const changed = () => {
     touch.setSurface(surface());
-    show(surface(), touch.arm.pressN);
+    shownValues();
   };
+  element("tip").addEventListener("input", shownValues);
+  element("tip").addEventListener("change", () => {
+    try {
+      touch.setTip(Number(element("tip").value));
+    } catch (why) {
+      say(why.message);
+      element("tip").value = touch.tipMm;
+      shownValues();
+    }
+  });
   for (const id of sliders) element(id).addEventListener("input", changed);
   element("press").addEventListener("input", (event) => hand.press(Number(event.target.value)));
   for (const [name, values] of Object.entries(PRESETS)) {
@@ -103,10 +114,13 @@ async function main() {
   });
   element("new").addEventListener("click", () => setTerrain(made((seed += 1))));
   element("save").addEventListener("click", () => {
+    const { isMixed } = touch.path;
+    if (isMixed) kernel.again(touch.surface, touch.path);
     save("path.csv", touch.path.csv());
     save("terrain.npy", npy(touch.terrain));
     element("saved").hidden = false;
-    element("saved").textContent = command(touch.terrain, touch.surface);
+    element("mixed").hidden = !isMixed;
+    element("command").textContent = command(touch.terrain, touch.surface, touch.tipMm);
   });
   const opened = async (file) => {
     if (!file) return;
@@ -142,7 +156,12 @@ async function main() {
       phase += WANDER;
       if (pointer.at === null) touch.point([touch.terrain.widthMm * (0.5 + 0.3 * Math.sin(2 * phase)), touch.terrain.depthMm * (0.5 + 0.3 * Math.sin(3 * phase + 1))]);
       const before = touch.force;
-      touch.tick();
+      try {
+        touch.tick();
+      } catch (why) {
+        say(why.message);
+        break;
+      }
       change += Math.hypot(...touch.force.map((n, axis) => n - before[axis])) / ticks;
     }
     sound.hear(Math.hypot(...touch.force), change);
@@ -154,7 +173,7 @@ async function main() {
   hand.press(1);
   say("");
   // For tests.
-  globalThis.hapterra = { touch, clock, scene, pointer };
+  globalThis.hapterra = { touch, clock, scene, pointer, sound };
   requestAnimationFrame(frame);
 }
 

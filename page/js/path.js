@@ -10,10 +10,13 @@ const BLOCK_ROWS = 10000;
 export class Path {
   #blocks = [];
   rows = 0;
+  /** The surface changed on the way: no one surface has the forces of all rows. */
+  isMixed = false;
 
   clear() {
     this.#blocks = [];
     this.rows = 0;
+    this.isMixed = false;
   }
 
   get isFull() {
@@ -59,10 +62,11 @@ export function npy({ nx, ny, heights }) {
 }
 
 /** What to type to feel the path again, beside the two files. */
-export function command(terrain, { friction, stiffness, texture, wavelength }) {
+export function command(terrain, { friction, stiffness, texture, wavelength }, tipMm) {
   const words = ["hapterra replay terrain.npy path.csv -o felt.csv"];
   words.push(`--cell-mm ${terrain.cellMm} --height-mm-per-unit 1`);
   words.push(`--stiffness-n-per-mm ${stiffness} --friction ${friction}`);
   if (texture > 0) words.push(`--texture grain --texture-amplitude ${texture} --texture-wavelength ${wavelength}`);
+  if (tipMm > 0) words.push(`--tip ${tipMm}mm`);
   return words.join(" ");
 }

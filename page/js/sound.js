@@ -6,7 +6,13 @@ const PER_NEWTON_HZ = 55;
 
 export class Sound {
   #context = null;
+  #make;
   isOn = false;
+
+  /** `make` makes what it sounds in. */
+  constructor(make = () => new AudioContext()) {
+    this.#make = make;
+  }
 
   /** Browsers allow sound only after a click: call it from one. */
   toggle() {
@@ -16,7 +22,7 @@ export class Sound {
   }
 
   #open() {
-    const context = (this.#context = new AudioContext());
+    const context = (this.#context = this.#make());
     const gain = () => {
       const node = new GainNode(context, { gain: 0 });
       node.connect(context.destination);

@@ -2,6 +2,12 @@
 
 /** Samples that a terrain has at most: of a larger one every second, third, … is taken. */
 export const MAX_SAMPLES = 4_000_000;
+/** Cells whose sides differ by less than this share keep their heights. */
+const SQUARE = 1e-3;
+/** A place this near to a sample, in cells, is on it. */
+const ON_SAMPLE = 1e-6;
+/** Cells that the radius of a ball has at most. */
+const MAX_TIP_CELLS = 8;
 /** The longer side in the hand, mm. */
 const SIDE_MM = 240;
 /** Relief that is felt well, mm: a flatter terrain is felt higher than it is. */
@@ -11,32 +17,34 @@ const UNKNOWN_RELIEF_MM = 32;
 
 /**
  * Fits heights into the hand. `raw`: `name`, `nx`, `ny`, `heights` (its own unit, south row first,
- * NaN where there is none), `cellM` and `unitM` (metres; null where the file does not say).
+ * NaN where there is none), `cellM` (metres of a cell's side, or of its sides east and north) and `unitM`
+ * (metres), both null where the file does not say.
  * Throws where nothing can be touched.
  */
 export function fit(raw) {
-  const thin = thinned(raw);
-  const { nx, ny } = thin;
-  if (nx < 2 || ny < 2) throw new Error(`${raw.name}: ${raw.nx} × ${raw.ny} samples are no surface. Drop a grid of at least 2 × 2 heights.`);
-  const [low, high] = range(thin.heights);
+  if (raw.nx < 2 || raw.ny < 2) throw new Error(`${raw.name}: ${raw.nx} × ${raw.ny} samples are no surface. Drop a grid of at least 2 × 2 heights.`);
+  const squares = squared(raw);
+  const { nx, ny } = squares;
+  const [low, high] = range(squares.heights);
   if (!(high >= low)) throw new Error(`${raw.name}: no height is in it, only no-data. Check which value means no data.`);
   const cellMm = SIDE_MM / (Math.max(nx, ny) - 1);
   const relief = high - low || 1;
-  const trueMm = thin.cellM === null ? null : (cellMm / thin.cellM) * (raw.unitM ?? 1);
+  const trueMm = squares.cellM === null ? null : (cellMm / squares.cellM) * (raw.unitM ?? 1);
   const times = trueMm === null ? null : Math.max(1, Math.round((10 * RELIEF_MM) / (relief * trueMm)) / 10);
   const mmPerUnit = trueMm === null ? UNKNOWN_RELIEF_MM / relief : trueMm * times;
   return {
     name: raw.name,
     of: raw.of ?? [raw.nx, raw.ny],
+    isSquare: squares.isSquare,
     nx,
     ny,
     cellMm,
-    heights: thin.heights.map((height) => (height - low) * mmPerUnit),
+    heights: squares.heights.map((height) => (height - low) * mmPerUnit),
     widthMm: (nx - 1) * cellMm,
     depthMm: (ny - 1) * cellMm,
     topMm: (high - low) * mmPerUnit,
     exaggeration: times,
-    metresPerMm: thin.cellM === null ? null : thin.cellM / cellMm,
+    metresPerMm: squares.cellM === null ? null : squares.cellM / cellMm,
     range: [low, high].map((height) => height * (raw.unitM ?? 1)),
   };
 }
@@ -51,16 +59,55 @@ function range(heights) {
   return [low, high];
 }
 
-/** Every n-th sample, so that there are not too many. */
-function thinned(raw) {
-  const step = Math.ceil(Math.sqrt((raw.nx * raw.ny) / MAX_SAMPLES));
-  if (step <= 1) return raw;
-  const [nx, ny] = [raw.nx, raw.ny].map((count) => Math.floor((count - 1) / step) + 1);
+/**
+ * Square cells over the field: the finer axis keeps its samples, or every n-th of them where there
+ * would be too many, and the other is interpolated. Cells as good as square keep their heights.
+ */
+function squared(raw) {
+  const [east, north = east] = [raw.cellM ?? 1].flat();
+  const isSquare = Math.abs(east - north) <= SQUARE * Math.min(east, north);
+  const [width, depth] = isSquare ? [1, 1] : [east, north];
+  const side = Math.min(width, depth);
+  const size = (n) => [width * (raw.nx - 1), depth * (raw.ny - 1)].map((length) => Math.floor(length / (side * n) + ON_SAMPLE) + 1);
+  let step = 1;
+  while (size(step)[0] * size(step)[1] > MAX_SAMPLES) step += 1;
+  const cellM = raw.cellM === null ? null : (isSquare ? Math.sqrt(east * north) : side) * step;
+  if (isSquare && step === 1) return { ...raw, cellM, isSquare };
+  const [nx, ny] = size(step);
   const heights = new Float32Array(nx * ny);
+  const between = (a, b, share) => (share < ON_SAMPLE ? a : a + (b() - a) * share);
   for (let row = 0; row < ny; row++) {
-    for (let i = 0; i < nx; i++) heights[row * nx + i] = raw.heights[row * step * raw.nx + i * step];
+    const [j, v] = split((row * step * side) / depth);
+    for (let i = 0; i < nx; i++) {
+      const [column, u] = split((i * step * side) / width);
+      const at = (j) => between(raw.heights[j * raw.nx + column], () => raw.heights[j * raw.nx + column + 1], u);
+      heights[row * nx + i] = between(at(j), () => at(j + 1), v);
+    }
   }
-  return { ...raw, nx, ny, heights, cellM: raw.cellM === null ? null : raw.cellM * step };
+  return { ...raw, nx, ny, heights, cellM, isSquare };
+}
+
+/** The sample before a place and the share of the next one. */
+function split(place) {
+  const sample = Math.floor(place + ON_SAMPLE);
+  return [sample, place - sample];
+}
+
+/** How many samples on a ball of a radius is felt: a power of two, so that it has 8 cells at most. */
+export function stepOf(cellMm, tipMm) {
+  const times = tipMm / (MAX_TIP_CELLS * cellMm);
+  return times > 1 ? 2 ** Math.ceil(Math.log2(times)) : 1;
+}
+
+/** Every `step`-th sample from the south-west. */
+export function every({ nx, ny, heights, cellMm }, step) {
+  if (step === 1) return { nx, ny, heights, cellMm };
+  const [columns, rows] = [nx, ny].map((count) => Math.floor((count - 1) / step) + 1);
+  const kept = new Float32Array(columns * rows);
+  for (let row = 0; row < rows; row++) {
+    for (let i = 0; i < columns; i++) kept[row * columns + i] = heights[row * step * nx + i * step];
+  }
+  return { nx: columns, ny: rows, heights: kept, cellMm: cellMm * step };
 }
 
 /** Rows in the opposite order: most files begin in the north. */
@@ -68,14 +115,6 @@ export function turned(heights, nx, ny) {
   const rows = new Float32Array(nx * ny);
   for (let row = 0; row < ny; row++) rows.set(heights.subarray(row * nx, (row + 1) * nx), (ny - 1 - row) * nx);
   return rows;
-}
-
-/** Height of the highest of the four samples around a place, mm; 0 where there is none. */
-export function heightAt({ nx, ny, cellMm, heights }, x, y) {
-  const cell = (mm, count) => Math.max(0, Math.min(count - 2, Math.floor(mm / cellMm)));
-  const first = cell(y, ny) * nx + cell(x, nx);
-  const around = [0, 1, nx, nx + 1].map((i) => heights[first + i]);
-  return Math.max(0, ...around.filter((height) => height === height));
 }
 
 /** A mountain range by formula, for a page without a file. The same seed gives the same one. */

@@ -2,10 +2,11 @@
 
 import { Arm } from "./arm.js";
 import { Path } from "./path.js";
-import { heightAt } from "./terrain.js";
 
 /** How far above the ground a path begins, mm: a point that begins below it is not felt. */
 const ABOVE_MM = 0.05;
+/** How far a lifted arm is above the highest ground, mm. */
+const HOVER_MM = 8;
 /** How far the hand keeps from the terrain's edges, mm. */
 const EDGE_MM = 4;
 
@@ -16,36 +17,53 @@ export class Touch {
   proxy = [0, 0, 0];
   state = "free";
 
-  /** `kernel` as in kernel.js. */
-  constructor(kernel, terrain, surface) {
+  /** `kernel` as in kernel.js; `tipMm`: radius of the ball that touches, 0 for a point. */
+  constructor(kernel, terrain, surface, tipMm) {
     this.kernel = kernel;
     this.surface = surface;
+    this.tipMm = tipMm;
     this.setTerrain(terrain);
   }
 
   /** Begins in the middle of another terrain, above its ground. */
   setTerrain(terrain) {
+    this.kernel.setTerrain(terrain, this.tipMm);
     this.terrain = terrain;
-    this.kernel.setTerrain(terrain);
     const middle = [terrain.widthMm / 2, terrain.depthMm / 2];
-    this.arm.hoverMm = terrain.topMm + 8;
+    this.arm.hoverMm = terrain.topMm + this.tipMm + HOVER_MM;
     this.arm.putHand(middle);
     this.arm.put([...middle, this.arm.hoverMm]);
     this.#begin();
   }
 
-  /** Another surface. The contact begins anew right above where it was, and so does the path. */
+  /** Another surface under the same contact: the proxy stays, and the next force is the other's. */
   setSurface(surface) {
+    this.kernel.setSurface(surface);
     this.surface = surface;
-    this.begin();
+    this.path.isMixed = this.path.rows > 0;
   }
 
-  /** Begins path and contact anew where the arm is, above the ground. */
-  begin() {
+  /** Another ball, for which the ground is another: contact and path begin anew where the hand is, and
+   * an arm inside the ground is lifted out. Where it throws all is as before. */
+  setTip(tipMm) {
+    try {
+      this.kernel.setTerrain(this.terrain, tipMm);
+    } catch (why) {
+      this.kernel.setTerrain(this.terrain, this.tipMm);
+      throw why;
+    }
+    this.tipMm = tipMm;
+    this.arm.hoverMm = this.terrain.topMm + tipMm + HOVER_MM;
     const [x, y, z] = this.arm.at;
-    const ground = heightAt(this.terrain, x, y);
+    const ground = this.kernel.heightAt(x, y);
     if (z <= ground + ABOVE_MM) this.arm.put([x, y, ground + ABOVE_MM]);
     this.#begin();
+  }
+
+  /** Where the ball is above the ground, or the point: the proxy without the radius. */
+  get foot() {
+    const [x, y, z] = this.proxy;
+    return [x, y, z - this.tipMm];
   }
 
   #begin() {
@@ -62,6 +80,8 @@ export class Touch {
 
   tick() {
     this.arm.step(this.force);
+    // A step that cannot happen has no force.
+    this.force = [0, 0, 0];
     const felt = this.kernel.step(this.arm.at);
     this.force = felt.force;
     this.proxy = felt.proxy;

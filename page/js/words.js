@@ -4,7 +4,8 @@ const element = (id) => document.getElementById(id);
 const set = (id, values) => Object.entries(values).forEach(([name, value]) => element(id).setAttribute(name, value));
 
 /** Values beside the sliders. */
-export function show({ friction, stiffness, texture }, pressN) {
+export function show({ friction, stiffness, texture }, pressN, tipMm) {
+  element("tip-is").textContent = tipMm > 0 ? `ball of ${tipMm} mm` : "point";
   element("press-is").textContent = pressN > 0 ? `${pressN.toFixed(1)} N` : "lifted";
   element("friction-is").textContent = friction > 0 ? friction.toFixed(2) : "none";
   element("stiffness-is").textContent = `${stiffness.toFixed(2)} N/mm`;
@@ -12,8 +13,8 @@ export function show({ friction, stiffness, texture }, pressN) {
 }
 
 /** What is touched, and how large. */
-export function title({ name, nx, ny, of, range, exaggeration, metresPerMm }) {
-  const samples = nx === of[0] && ny === of[1] ? `${nx} × ${ny} heights` : `${nx} × ${ny} of ${of[0]} × ${of[1]} heights`;
+export function title({ name, nx, ny, of, isSquare, range, exaggeration, metresPerMm }) {
+  const samples = !isSquare ? `${nx} × ${ny} square cells out of ${of[0]} × ${of[1]} heights` : nx === of[0] && ny === of[1] ? `${nx} × ${ny} heights` : `${nx} × ${ny} of ${of[0]} × ${of[1]} heights`;
   const unit = metresPerMm === null ? "" : " m";
   const heights = `${range.map((height) => Math.round(height).toLocaleString("en")).join(" to ")}${unit}`;
   const steep = exaggeration === null ? "height scale unknown" : exaggeration === 1 ? "true to scale" : `${exaggeration} times as steep as true`;

@@ -33,7 +33,8 @@ test("saved terrain is read again with the same bits", async () => {
 
 test("command names the surface as it was felt", () => {
   const surface = { friction: 0.4, stiffness: 0.7, texture: 0.1, wavelength: 2 };
-  const words = command({ cellMm: 0.25 }, surface);
+  const words = command({ cellMm: 0.25 }, surface, 0);
   assert.match(words, /--cell-mm 0.25 .*--stiffness-n-per-mm 0.7 --friction 0.4 --texture grain --texture-amplitude 0.1 --texture-wavelength 2$/);
-  assert.doesNotMatch(command({ cellMm: 0.25 }, { ...surface, texture: 0 }), /texture/);
+  assert.doesNotMatch(command({ cellMm: 0.25 }, { ...surface, texture: 0 }, 0), /texture|tip/);
+  assert.match(command({ cellMm: 0.25 }, surface, 2.5), / --tip 2.5mm$/);
 });

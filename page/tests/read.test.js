@@ -3,7 +3,7 @@ import test from "node:test";
 import { deflateSync } from "node:zlib";
 
 import { read } from "../js/read/file.js";
-import { fit, heightAt, made } from "../js/terrain.js";
+import { every, fit, made, stepOf } from "../js/terrain.js";
 
 const bytes = (text) => new TextEncoder().encode(text);
 
@@ -46,7 +46,8 @@ test("png of 8 bits and hgt are read", async () => {
   assert.deepEqual([...raw.heights], [9, 250, 7, 8]);
   const hgt = await read("N46E007.hgt", Uint8Array.from([0, 1, 0, 2, 128, 0, 1, 4]));
   assert.deepEqual([...hgt.heights], [NaN, 260, 1, 2]);
-  assert.ok(Math.abs(hgt.cellM - 111_320 * Math.sqrt(Math.cos((46.5 * Math.PI) / 180))) < 1);
+  // Of WGS 84 at 46.5° north.
+  [76_762, 111_161].forEach((metres, axis) => assert.ok(Math.abs(hgt.cellM[axis] - metres) < 5, `${hgt.cellM}`));
 });
 
 test("bad file is named with what to do", async () => {
@@ -86,11 +87,35 @@ test("terrain of too many samples is thinned evenly", () => {
   assert.ok(Math.abs(slope - 1) < 1e-4, `${slope}`);
 });
 
+test("cells of degrees become squares of true slopes", () => {
+  // 1 m up for each metre east and 0.5 m for each metre north, with a hole.
+  const [nx, ny, cellM] = [41, 31, [20, 29]];
+  const heights = Float32Array.from({ length: nx * ny }, (_, i) => (i % nx) * cellM[0] + 0.5 * Math.floor(i / nx) * cellM[1]);
+  heights[15 * nx + 20] = NaN;
+  const terrain = fit({ name: "a", nx, ny, heights, cellM, unitM: 1 });
+  assert.deepEqual([terrain.nx, terrain.ny, terrain.of, terrain.isSquare], [41, 44, [41, 31], false]);
+  assert.equal(terrain.exaggeration, 1);
+  let slopes = 0;
+  for (let at = 0; at < 41 * 43; at++) {
+    if (at % 41 === 40) continue;
+    const [east, north] = [1, 41].map((step) => (terrain.heights[at + step] - terrain.heights[at]) / terrain.cellMm);
+    if (Number.isNaN(east) || Number.isNaN(north)) continue;
+    assert.ok(Math.abs(east - 1) < 1e-4 && Math.abs(north - 0.5) < 1e-4, `${east} ${north} at ${at}`);
+    slopes += 1;
+  }
+  assert.ok(slopes > 1700, `${slopes}`);
+});
+
+test("large ball is felt on fewer samples, as in the command", () => {
+  assert.deepEqual([-1, 0, 2, 8, 8.1, 16, 40].map((tip) => stepOf(1, tip)), [1, 1, 1, 1, 2, 2, 8]);
+  const heights = Float32Array.from({ length: 35 }, (_, i) => i);
+  assert.deepEqual(every({ nx: 7, ny: 5, heights, cellMm: 2 }, 4), { nx: 2, ny: 2, heights: Float32Array.from([0, 4, 28, 32]), cellMm: 8 });
+});
+
 test("made terrain is the same for a seed, and has heights everywhere", () => {
   const [a, b, c] = [made(7, 40), made(7, 40), made(8, 40)];
   assert.deepEqual(a.heights, b.heights);
   assert.notDeepEqual(a.heights, c.heights);
   assert.ok(a.heights.every(Number.isFinite));
-  const terrain = fit(a);
-  assert.ok(heightAt(terrain, 100, 100) >= 0);
+  assert.ok(fit(a).heights.every((height) => height >= 0));
 });

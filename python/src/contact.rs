@@ -9,7 +9,7 @@ use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
 
 use crate::surface::Surface;
 use crate::terrain::Terrain;
-use crate::ticks::{Tick, Ticks, by_row, by_time};
+use crate::ticks::{Tick, Ticks};
 use crate::{numbers, refused};
 
 /// Bytes of a row of steps: `STEP` of `package/hapterra/_contact.py`.
@@ -54,13 +54,9 @@ impl Contact {
         let t_s = t_s
             .map(|t_s| numbers(t_s, f64::from_ne_bytes))
             .transpose()?;
-        let hz = f64::from(self.rate_hz);
         let Ticks { ticks, remarks } = py.detach(|| {
             let (path, _) = path.as_chunks();
-            match t_s {
-                None => Ok(by_row(path, 0.0, hz)),
-                Some(t_s) => by_time(&t_s, path, hz).map_err(refused),
-            }
+            Ticks::of(path, t_s.as_deref(), self.rate_hz).map_err(refused)
         })?;
         let contact = &mut *self.lock()?;
         let (mut rows, mut why) = (Vec::new(), None);

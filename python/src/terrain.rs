@@ -81,6 +81,12 @@ impl Terrain {
         })
     }
 
+    /// The same ground under a ball of a radius.
+    fn with_tip(&self, tip_mm: f64) -> PyResult<Self> {
+        let terrain = self.0.clone().with_tip(tip_mm);
+        terrain.map(Self).map_err(refused)
+    }
+
     /// The height of the surface, mm; none in a hole and off the terrain.
     fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
         self.0.height_mm(east_mm, north_mm)

@@ -99,6 +99,16 @@ def test_run_is_a_replay(tmp_path, surface, flags):
     assert 2_000 < touching < 18_000, touching
 
 
+@pytest.mark.parametrize("tip_mm", [0.5, 2, 8 * CELL_MM])
+def test_run_under_a_tip_is_a_replay(tmp_path, tip_mm):
+    path = stroke(20_000) + [0, 0, tip_mm]
+    words = [f"--cell-mm={CELL_MM}", f"--tip={tip_mm}mm", *FLAGS]
+    felt = replayed(tmp_path, hills(), path, words=words)
+    terrain = Terrain(hills(), cell_mm=CELL_MM).with_tip(tip_mm)
+    touching = same(Contact(terrain, Surface(**ROUGH)).run(path), felt)
+    assert 2_000 < touching < 18_000, touching
+
+
 def test_integers_at_a_scale_are_a_replay(tmp_path):
     heights = np.nan_to_num(hills() * 9).astype(">i2")
     path = stroke(20_000) * [0.42, 0.42, 0.2]

@@ -115,3 +115,17 @@ def test_materials_lie_where_the_array_says():
     for bad in (materials[:5], materials * 99, materials.astype(float), -materials):
         with pytest.raises(ValueError, match="materials"):
             Terrain(np.ones((40, 40)), cell_mm=1, materials=bad)
+
+
+def test_tip_is_a_ball_by_its_centre():
+    point = Terrain(np.zeros((9, 9)), cell_mm=1)
+    ball = point.with_tip(2.5)
+    assert (point.height_mm(4.2, 4), ball.height_mm(4.2, 4)) == (0, 2.5)
+    assert (point.tip_mm, ball.tip_mm, ball.shape) == (0, 2.5, (9, 9))
+    assert "tip_mm=2.5" in repr(ball) and "tip" not in repr(point)
+    assert ball.with_tip(0).height_mm(4.2, 4) == 0
+    steps = Contact(ball).run([[4, 4, 5], [4, 4, 2]])
+    assert steps["proxy_mm"][1, 2] == 2.5 and steps["force_n"][1, 2] == 0.25
+    for radius in (-1, 8.1, np.nan):
+        with pytest.raises(ValueError, match="where 0 to 8 can be felt"):
+            point.with_tip(radius)

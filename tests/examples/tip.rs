@@ -4,7 +4,7 @@
 
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::synth::{Kind, Synth};
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
+use hapterra::terrain::{FeltCells, FeltGrid, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::message::Heights;
 use hapterra_tests::shared;
@@ -22,7 +22,7 @@ fn main() {
         None => made().expect("a raster"),
     };
     let grid = FeltGrid::new(&raster, FeltCells::default());
-    let scale = Scale::true_to(&grid, 1.0).expect("scale");
+    let scale = grid.true_scale(1.0).expect("scale");
     println!("radius_cells,felt_cells_in_radius,bytes_a_tile,tiles_per_s,times_link");
     for radius in [0.0, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0] {
         let grid = grid.with_tip(radius * scale.cell_mm());

@@ -1,7 +1,7 @@
 //! Files of real ground that several tests slide over.
 
 use hapterra::raster::{OpenOptions, Raster};
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
 
 use crate::shared;
 
@@ -78,6 +78,6 @@ pub fn all_files() -> Vec<(String, Raster)> {
 #[must_use]
 pub fn terrain(raster: &Raster) -> Terrain<'_> {
     let grid = FeltGrid::new(raster, FeltCells::Square);
-    let scale = Scale::true_to(&grid, 1.0).expect("scale");
+    let scale = grid.true_scale(1.0).expect("scale");
     Terrain::over(grid, scale, 0).expect("terrain")
 }

@@ -26,7 +26,7 @@ fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
     for path in paths {
         let raster = Raster::open(&path, &OpenOptions::default()).expect("opens");
         let grid = FeltGrid::new(&raster, FeltCells::Square);
-        let scale = Scale::true_to(&grid, 1.0).expect("a scale");
+        let scale = grid.true_scale(1.0).expect("a scale");
         let mean = checked(&path, &grid, scale, 0);
         println!("{}: {mean} bytes a tile", path.display());
         assert!(mean <= FLOATS / 2, "{}: {mean}", path.display());

@@ -147,7 +147,7 @@ fn on_real_terrains_too_whatever_their_holes() {
         let Some(path) = shared(file) else { return };
         let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
         let grid = FeltGrid::new(&raster, FeltCells::default());
-        let scale = Scale::true_to(&grid, cell_mm).expect("scale");
+        let scale = grid.true_scale(cell_mm).expect("scale");
         eprint!("{file}: ");
         let touched = judge(&raster, scale, 5, 2000);
         assert!(touched > 100, "{file}: the walk hardly touches");

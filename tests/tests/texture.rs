@@ -6,7 +6,7 @@ use std::process::Command;
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::on_native;
 use hapterra::synth::{Kind, Synth};
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
 use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::scene::Sample;
@@ -96,7 +96,7 @@ fn seen(plain: &Sample, textured: &Sample) -> Seen {
 fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
     for (name, raster) in &rasters() {
         let grid = FeltGrid::new(raster, FeltCells::Square);
-        let scale = Scale::true_to(&grid, 1.0).expect("scale");
+        let scale = grid.true_scale(1.0).expect("scale");
         let terrain = Terrain::over(grid, scale, 0).expect("terrain");
         let law = ForceLaw {
             shading: Shading::Smooth,

@@ -120,7 +120,7 @@ const MOST_OFF: f64 = 0.02;
 
 /// Walks over a raster, and checks that the centre is a radius away from the ground.
 fn check_distance(name: &str, raster: &Raster, radius: f64) {
-    let scale = Scale::true_to(&FeltGrid::new(raster, FeltCells::default()), 1.0);
+    let scale = FeltGrid::new(raster, FeltCells::default()).true_scale(1.0);
     let off = walked(raster, scale.expect("scale"), radius, 1_000);
     let share = |part: f64| off[(part * (off.len() - 1) as f64) as usize];
     let found = format!(
@@ -274,7 +274,7 @@ fn steps_of_force_on_lidar_fall_five_times_under_a_ball() {
     let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
     let grid = FeltGrid::new(&raster, FeltCells::default());
     // As large as a Premium's workspace fits it.
-    let scale = Scale::true_to(&grid, 0.23).expect("scale");
+    let scale = grid.true_scale(0.23).expect("scale");
     let ball = Terrain::over(grid.with_tip(7.0), scale, 2).expect("terrain");
     let point = Terrain::over(grid, scale, 0).expect("terrain");
     for deep_mm in [0.1, 0.3, 0.5] {

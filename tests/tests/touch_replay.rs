@@ -134,6 +134,28 @@ fn forces_over_an_array_are_those_of_a_replay() {
     }
 }
 
+/// From less than a cell to 8 of them; the smallest has felt cells of half an encoder's count.
+#[test]
+fn forces_under_a_tip_are_those_of_a_replay() {
+    let heights = heights();
+    let raster = npy(
+        "<f8",
+        heights.iter().map(|height| height.to_le_bytes().to_vec()),
+    );
+    let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
+    let ground = touch::Terrain::from_slice(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, &heights);
+    let ground = ground.expect("a terrain");
+    for (tip_mm, seed) in [(0.2, 6), (1.0, 7), (2.0, 8), (8.0 * CELL_MM, 9)] {
+        let grid = FeltGrid::new(&raster, FeltCells::default()).with_tip(tip_mm);
+        let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
+        let surface = Surface::new(rough()).expect("a surface");
+        let ball = ground.clone().with_tip(tip_mm).expect("a ball");
+        let mut contact = Contact::new(ball, surface).expect("a contact");
+        let touched = same(&terrain, &mut contact, rough(), 1_000, seed);
+        assert!(touched > 1_000, "{tip_mm} mm: {touched} in contact");
+    }
+}
+
 #[test]
 fn integers_at_a_height_scale_are_those_of_a_replay() {
     let heights: Vec<i16> = heights()
@@ -190,7 +212,6 @@ fn materials_are_those_of_a_replay() {
     let over = over.expect("they overlap");
     let grid = FeltGrid::new(&raster, FeltCells::default()).with_materials(Some(&over));
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
-    let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
     let law = over.law(&rough());
     let ground = touch::Terrain::from_vec(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, heights);
     let index = |class: &u8| {
@@ -202,7 +223,12 @@ fn materials_are_those_of_a_replay() {
     let indices = classes.iter().map(index).collect();
     let ground = ground.and_then(|it| it.with_materials(RowOrder::NorthFirst, indices));
     let surface = Surface::new(law).and_then(|it| it.with_materials(&materials));
-    let mut contact =
-        Contact::new(ground.expect("a terrain"), surface.expect("a surface")).expect("a contact");
-    assert!(same(&terrain, &mut contact, law, 1_000, 5) > 1_000);
+    let (ground, surface) = (ground.expect("a terrain"), surface.expect("a surface"));
+    for (tip_mm, seed) in [(0.0, 5), (3.0, 10)] {
+        let terrain = Terrain::over(grid.with_tip(tip_mm), scale, 0).expect("a terrain");
+        let ball = ground.clone().with_tip(tip_mm).expect("a ball");
+        let mut contact = Contact::new(ball, surface.clone()).expect("a contact");
+        let touched = same(&terrain, &mut contact, law, 1_000, seed);
+        assert!(touched > 1_000, "{tip_mm} mm: {touched} in contact");
+    }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::on_native;
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 
@@ -66,7 +66,7 @@ fn a_slope_of_degrees_feels_as_steep_as_it_is_in_every_direction() {
             let raster = Raster::open(plane(latitude, slope), &OpenOptions::default());
             let raster = raster.expect("opens");
             let grid = FeltGrid::new(&raster, FeltCells::Square);
-            let scale = Scale::true_to(&grid, 1.0).expect("scale");
+            let scale = grid.true_scale(1.0).expect("scale");
             let terrain = Terrain::over(grid, scale, 0).expect("terrain");
             let [x, y, z] = force(&terrain);
             let felt = [-x / z, -y / z];
@@ -124,7 +124,7 @@ fn stored_cells_are_felt_as_squares_of_the_same_area() {
     let raster = Raster::open(plane(60.0, [1.0, 0.0]), &OpenOptions::default()).expect("opens");
     let grid = FeltGrid::new(&raster, FeltCells::Stored);
     assert_eq!((grid.columns(), grid.rows()), (SIDE, SIDE));
-    let terrain = Terrain::over(grid, Scale::true_to(&grid, 1.0).expect("scale"), 0);
+    let terrain = Terrain::over(grid, grid.true_scale(1.0).expect("scale"), 0);
     let [x, _, z] = force(&terrain.expect("terrain"));
     assert!((x / z).abs() < 0.75, "a cell is half as wide as it is long");
 }

@@ -8,11 +8,13 @@ use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::Limits;
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::terrain::FieldSize;
 
+use crate::checks::TerrainError;
+use crate::cut::NoTile;
 use crate::heights::Unread;
-use crate::scale::Scale;
 use crate::surface::{Surface, SurfaceError};
-use crate::terrain::{NoTile, Terrain, TerrainError};
+use crate::terrain::Terrain;
 use crate::tick_loop::TickLoop;
 
 /// Ticks in which a force comes in again after a change, at most, at every rate.
@@ -172,7 +174,7 @@ impl Contact {
     /// # Errors
     /// [`StepError`]; the step has not happened then.
     pub fn step(&mut self, hip_mm: [f64; 3]) -> Result<Step, StepError> {
-        let scale = *self.terrain.scale();
+        let scale = self.terrain.felt_scale();
         let hip = scale.to_grid(hip_mm).ok_or(StepError::Place {
             hip_mm,
             cell_mm: scale.cell_mm(),
@@ -261,9 +263,10 @@ impl Contact {
 
 /// A surface on a terrain, as the loop takes it.
 fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
-    let cell_mm = Scale::cell_mm(terrain.scale()) as f32;
+    let cell_mm = terrain.felt_scale().cell_mm() as f32;
     terrain.check_heights()?;
     surface.check_cells(cell_mm)?;
+    let [east, north] = terrain.size();
     let last = terrain.last_material();
     let count = surface.table().map_or(1, |table| table.materials().len());
     if let Some(found) = last.filter(|found| usize::from(*found) >= count) {
@@ -273,7 +276,7 @@ fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
     Ok(Scene {
         epoch: 1,
         level: 0,
-        size: terrain.size(),
+        size: FieldSize::new(east, north),
         top: terrain.top(),
         underlay: None,
         cell_mm,

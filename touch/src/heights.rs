@@ -77,6 +77,35 @@ impl<T: Copy> Array<T> {
     }
 }
 
+/// A difference of neighbouring heights, and its sample.
+pub(crate) type Steepest = (f64, [u32; 2]);
+
+/// Lowest and highest height, and the largest difference of neighbours with its sample.
+pub(crate) fn survey<T: Height>(array: &Array<T>) -> (Option<[f64; 2]>, Option<Steepest>) {
+    let (mut range, mut steepest) = (None, None::<Steepest>);
+    for row in 0..array.rows {
+        let line = array.row(row);
+        // North of the last row there is none.
+        let north = array.row(row + 1);
+        for (column, sample) in line.iter().enumerate() {
+            let height: f64 = (*sample).into();
+            if height.is_nan() {
+                continue;
+            }
+            let [low, high] = range.unwrap_or([height; 2]);
+            range = Some([low.min(height), high.max(height)]);
+            let beside = [line.get(column + 1), north.get(column)];
+            for neighbour in beside.into_iter().flatten() {
+                let step = ((*neighbour).into() - height).abs();
+                if step > steepest.map_or(0.0, |(most, _)| most) {
+                    steepest = Some((step, [column as u32, row]));
+                }
+            }
+        }
+    }
+    (range, steepest)
+}
+
 impl<T: Height> Heights for Array<T> {
     fn read(&self, block: Block, heights: &mut [f64]) -> Result<(), Unread> {
         let lines = heights.chunks_exact_mut(block.columns.max(1) as usize);

@@ -6,20 +6,26 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+mod checks;
 mod contact;
+mod cut;
 mod heights;
 mod scale;
 mod surface;
 mod terrain;
 mod tick_loop;
+pub mod ticks;
+pub mod tiles;
+pub mod tip;
 
+pub use checks::TerrainError;
 pub use contact::{Contact, ContactError, RunError, State, Step, StepError};
 pub use hapterra_core::contact::Friction;
 pub use hapterra_core::force::{Damping, ForceLaw, Material, Pattern, Shading, Texture};
 pub use heights::{Block, Height, Heights, RowOrder, Unread};
 pub use scale::{BadScale, Scale};
 pub use surface::{Surface, SurfaceError};
-pub use terrain::{Terrain, TerrainError};
+pub use terrain::Terrain;
 
 #[cfg(test)]
 mod tests;

@@ -56,6 +56,25 @@ impl Scale {
         self.height_mm_per_unit
     }
 
+    /// The same terrain, equally large in the hand, with every `2^level`-th sample only: its cells are
+    /// that much larger.
+    #[must_use]
+    pub fn at_level(&self, level: u8) -> Self {
+        Self {
+            cell_mm: libm::ldexp(self.cell_mm, level.into()),
+            ..*self
+        }
+    }
+
+    /// The same terrain, equally large in the hand, with cells that are a whole part as large.
+    #[must_use]
+    pub fn in_parts(&self, parts: u32) -> Self {
+        Self {
+            cell_mm: self.cell_mm / f64::from(parts),
+            ..*self
+        }
+    }
+
     /// A height in cells.
     #[must_use]
     pub fn height_cells(&self, height: f64) -> f64 {
@@ -95,5 +114,53 @@ impl Scale {
     pub fn to_mm(&self, point: &GridPoint) -> [f64; 3] {
         let frac = point.frac().to_array();
         core::array::from_fn(|i| (f64::from(point.cell()[i]) + f64::from(frac[i])) * self.cell_mm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn to_the_grid_and_back() {
+        let scale = Scale::new(0.25, 1.0).expect("valid");
+        for mm in [[0.1, -0.1, 1e6], [-1e-12, 0.25, -0.25], [1e8, -1e8, 0.0]] {
+            let point = scale.to_grid(mm).expect("addressable");
+            assert!(point.frac().max_element() < 1.0);
+            for (back, mm) in scale.to_mm(&point).into_iter().zip(mm) {
+                assert!((back - mm).abs() <= 0.25 * 2f64.powi(-24), "{back} {mm}");
+            }
+        }
+        // Whole cells of lengths that no binary fraction is.
+        let scale = Scale::new(0.7, 1.0).expect("valid");
+        for cell in 0..2000 {
+            let point = GridPoint::new([cell, -cell, 3], Vec3::ZERO);
+            assert_eq!(scale.to_grid(scale.to_mm(&point)), Some(point));
+        }
+        let scale = Scale::new(0.25, 1.0).expect("valid");
+        // Just below a whole cell rounds up into the next.
+        let below = scale.to_grid([-1e-12, 0.0, 0.0]).expect("addressable");
+        assert_eq!((below.cell()[0], below.frac().x), (0, 0.0));
+    }
+
+    #[test]
+    fn what_cannot_be_addressed_is_no_point() {
+        let scale = Scale::new(1.0, 1.0).expect("valid");
+        for bad in [f64::NAN, f64::INFINITY, 5.4e8, -5.4e8] {
+            assert_eq!(scale.to_grid([0.0, bad, 0.0]), None);
+        }
+        assert!(scale.to_grid([f64::from(MAX_CELL), 0.0, 0.0]).is_some());
+    }
+
+    #[test]
+    fn nonsense_is_refused_and_a_level_keeps_the_size() {
+        for cell in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-60, 1e60] {
+            assert!(Scale::new(cell, 1.0).is_err(), "{cell}");
+        }
+        assert!(Scale::new(1.0, f64::NAN).is_err());
+        let plain = Scale::new(2.0, 3.0).expect("valid");
+        let scale = plain.at_level(3);
+        assert_eq!(scale.in_parts(8), plain);
+        assert_eq!((scale.cell_mm(), scale.height_cells(16.0)), (16.0, 3.0));
     }
 }

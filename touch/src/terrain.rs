@@ -1,13 +1,14 @@
-//! A height field of any size, and the tiles that are cut from it.
+//! A height field of any size: where its samples come from.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use hapterra_core::grid::MAX_CELL;
-use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, POSTS, TILE_CELLS, Tile, TileKey};
 
-use crate::heights::{Array, Block, Height, Heights, RowOrder, Unread};
-use crate::scale::{BadScale, Scale};
+use crate::checks::{TerrainError, check_count, check_size, room_for};
+use crate::heights::{Array, Height, Heights, RowOrder, Steepest, survey};
+use crate::scale::Scale;
+use crate::tip::Ball;
 
 /// A height field: samples on a square grid, bilinear between them.
 ///
@@ -32,93 +33,19 @@ use crate::scale::{BadScale, Scale};
 #[doc(alias = "DEM")]
 #[derive(Clone)]
 pub struct Terrain {
-    heights: Arc<dyn Heights>,
-    columns: u32,
-    rows: u32,
-    scale: Scale,
+    pub(crate) heights: Arc<dyn Heights>,
+    pub(crate) columns: u32,
+    pub(crate) rows: u32,
+    /// Of samples.
+    pub(crate) scale: Scale,
     /// Lowest and highest height; none of a source that is not in memory.
-    range: Option<[f64; 2]>,
+    pub(crate) range: Option<[f64; 2]>,
     /// Largest difference of neighbouring heights, and the sample.
-    step: Option<Steepest>,
-    materials: Option<Arc<Array<u8>>>,
-}
-
-/// Heights that are no terrain.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum TerrainError {
-    /// Too small or too large.
-    #[error(
-        "a terrain of {columns} × {rows} samples; from 2 × 2 to {MAX_CELL} × {MAX_CELL} can be touched"
-    )]
-    Size {
-        /// Samples from west to east.
-        columns: u32,
-        /// Samples from south to north.
-        rows: u32,
-    },
-    /// More or fewer samples than the size says.
-    #[error("{given} samples for {columns} columns and {rows} rows: give columns times rows")]
-    Count {
-        /// Samples that were given.
-        given: usize,
-        /// Samples from west to east.
-        columns: u32,
-        /// Samples from south to north.
-        rows: u32,
-    },
-    /// More samples than there is memory for.
-    #[error("no memory for {columns} × {rows} samples: read them tile by tile")]
-    Memory {
-        /// Samples from west to east.
-        columns: u32,
-        /// Samples from south to north.
-        rows: u32,
-    },
-    /// A row of another length than the first.
-    #[error("row {row} has {given} samples and row 0 has {first}: make all rows as long")]
-    Ragged {
-        /// The row, as they were given.
-        row: usize,
-        /// Its samples.
-        given: usize,
-        /// Samples of the first row.
-        first: usize,
-    },
-    /// The millimetres of a cell or of a vertical unit.
-    #[error(transparent)]
-    Scale(#[from] BadScale),
-    /// Higher or lower than positions can be.
-    #[error(
-        "heights reach {cells:.4e} cells of {cell_mm} mm; at most ±{MAX_CELL} can be touched: scale the heights down, or make no-data NaN"
-    )]
-    TooTall {
-        /// The largest height, cells.
-        cells: f64,
-        /// Millimetres a cell.
-        cell_mm: f64,
-    },
-    /// Too steep.
-    #[error(
-        "sample {column}, {row}, from the south-west, differs from a neighbour by {cells:.3e} cells; at most {MAX_STEP_CELLS} can be touched: scale the heights down, or make the sample NaN"
-    )]
-    Step {
-        /// Its column, from the west.
-        column: u32,
-        /// Its row, from the south.
-        row: u32,
-        /// The difference, cells.
-        cells: f64,
-    },
-}
-
-/// A difference of neighbouring heights, and its sample.
-type Steepest = (f64, [u32; 2]);
-
-/// A tile that could not be cut.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum NoTile {
-    Unread(Unread),
-    Step,
+    pub(crate) step: Option<Steepest>,
+    pub(crate) materials: Option<Arc<Array<u8>>>,
+    /// What touches it, if it is no point.
+    pub(crate) ball: Option<Ball>,
+    tip_mm: f64,
 }
 
 impl Terrain {
@@ -185,6 +112,8 @@ impl Terrain {
             range,
             step,
             materials: None,
+            ball: None,
+            tip_mm: 0.0,
         })
     }
 
@@ -212,7 +141,7 @@ impl Terrain {
     }
 
     /// A terrain whose heights are read block by block where it is touched, at most 33 × 33 samples
-    /// at a time, and never kept but for a window of 512 × 512 cells.
+    /// at a time or 52 × 52 under a tip, and never kept but for a window of 512 × 512 cells.
     ///
     /// ```
     /// use hapterra_touch::{Block, Terrain, Unread};
@@ -246,6 +175,8 @@ impl Terrain {
             range: None,
             step: None,
             materials: None,
+            ball: None,
+            tip_mm: 0.0,
         })
     }
 
@@ -278,6 +209,53 @@ impl Terrain {
         })
     }
 
+    /// The same ground under a ball of a radius in millimetres, or under a point for 0.
+    ///
+    /// A ball on a height field has its centre on another height field, and a point touches that one.
+    /// **The HIP and the proxy are then the ball's centre**, which over flat ground is one radius above
+    /// it, and so is [`Self::height_mm`]. The centre is within 2 % of the radius of where it belongs.
+    /// Materials are those under the centre. A ball that touches makes the forces of
+    /// `hapterra replay --tip`, bit for bit.
+    ///
+    /// ```
+    /// use hapterra_touch::Terrain;
+    ///
+    /// let pole = |x, y| if (x, y) == (10, 10) { 3.0 } else { 0.0 };
+    /// let terrain = Terrain::from_fn(21, 21, 1.0, pole)?.with_tip(2.0)?;
+    /// assert_eq!(terrain.height_mm(3.0, 3.0), Some(2.0));
+    /// assert_eq!(terrain.height_mm(10.0, 10.0), Some(5.0));
+    /// # Ok::<(), hapterra_touch::TerrainError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`TerrainError::Tip`] for a radius below 0, larger than 8 cells or not a number: of larger
+    /// balls take every second sample. [`TerrainError::TipCells`] where the ball makes too many cells.
+    pub fn with_tip(self, tip_mm: f64) -> Result<Self, TerrainError> {
+        let ball = Ball::new(tip_mm, self.scale.cell_mm())?;
+        let parts = ball.as_ref().map_or(1, Ball::parts);
+        let (columns, rows) = (self.columns, self.rows);
+        let cells = u64::from(columns.max(rows) - 1) * u64::from(parts);
+        match cells < MAX_CELL as u64 {
+            true => Ok(Self {
+                ball,
+                tip_mm,
+                ..self
+            }),
+            false => Err(TerrainError::TipCells {
+                tip_mm,
+                parts,
+                columns,
+                rows,
+            }),
+        }
+    }
+
+    /// The radius of the ball that touches it, mm; 0 for a point.
+    #[must_use]
+    pub const fn tip_mm(&self) -> f64 {
+        self.tip_mm
+    }
+
     /// Samples from west to east, and from south to north.
     #[must_use]
     pub const fn samples(&self) -> [u32; 2] {
@@ -294,123 +272,6 @@ impl Terrain {
     #[must_use]
     pub const fn scale(&self) -> &Scale {
         &self.scale
-    }
-
-    /// The height of the surface at a place in millimetres, mm. `None` in a hole, off the terrain,
-    /// and where it cannot be read.
-    #[must_use]
-    pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
-        let cell_mm = self.scale.cell_mm();
-        let (column, u) = place(east_mm / cell_mm, self.columns - 1)?;
-        let (row, v) = place(north_mm / cell_mm, self.rows - 1)?;
-        let mut corners = [f64::NAN; 4];
-        let block = Block {
-            column,
-            row,
-            columns: 2,
-            rows: 2,
-        };
-        self.heights.read(block, &mut corners).ok()?;
-        let mm = corners.map(|height| height * self.scale.height_mm_per_unit());
-        let mix = |a: f64, b: f64, t: f64| a * (1.0 - t) + b * t;
-        let [sw, se, nw, ne] = mm;
-        // Every corner counts: a cell with a hole at one is a hole.
-        let hole = mm.iter().any(|height| !height.is_finite());
-        (!hole).then(|| mix(mix(sw, se, u), mix(nw, ne, u), v))
-    }
-
-    pub(crate) fn size(&self) -> FieldSize {
-        // Checked: at most MAX_CELL samples.
-        FieldSize::new(self.columns as i32 - 1, self.rows as i32 - 1)
-    }
-
-    /// A whole height in cells that no sample exceeds.
-    pub(crate) fn top(&self) -> i32 {
-        let Some(range) = self.range else {
-            return MAX_CELL + 1;
-        };
-        let ends = range.map(|height| self.scale.height_cells(height));
-        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        // Rounded to `f32` above the base, a sample reaches the next whole number at most; from 2^23
-        // on, up to 2^30, by as much as its last place.
-        let rounding = if high - low < f64::from(1 << 23) {
-            0
-        } else {
-            64
-        };
-        (libm::ceil(high) as i32 + rounding).min(MAX_CELL + 1)
-    }
-
-    /// The largest material that a sample has; none where all are of one.
-    pub(crate) fn last_material(&self) -> Option<u8> {
-        let materials = self.materials.as_ref()?;
-        materials.samples.iter().copied().max()
-    }
-
-    /// Cuts a tile of the terrain into a buffer, with its materials if the table has any. `room` is
-    /// for its samples.
-    pub(crate) fn cut(
-        &self,
-        key: TileKey,
-        materials: usize,
-        room: &mut Vec<f64>,
-        tile: &mut Tile,
-    ) -> Result<(), NoTile> {
-        let first = |index: i32| index.max(0) as u32 * TILE_CELLS as u32;
-        let (column, row) = (first(key.index.col), first(key.index.row));
-        let block = Block {
-            column,
-            row,
-            columns: self.columns.saturating_sub(column).min(POSTS as u32),
-            rows: self.rows.saturating_sub(row).min(POSTS as u32),
-        };
-        room.clear();
-        room.resize((block.columns * block.rows) as usize, f64::NAN);
-        let read = self.heights.read(block, room);
-        read.map_err(NoTile::Unread)?;
-        for height in room.iter_mut() {
-            let cells = self.scale.height_cells(*height);
-            let is_within = cells.abs() <= f64::from(MAX_CELL);
-            *height = if is_within { cells } else { f64::NAN };
-        }
-        let base = base(room);
-        let width = block.columns as usize;
-        let filled = tile.fill(key, base, |col, row| {
-            let cells = (col < width).then(|| room.get(row * width + col)).flatten();
-            cells.map_or(f32::NAN, |cells| (cells - f64::from(base)) as f32)
-        });
-        filled.map_err(|_| NoTile::Step)?;
-        if materials > 0
-            && let Some(of) = &self.materials
-        {
-            let samples = (0..POSTS as u32).flat_map(|v| {
-                let line = of.row(row + v).get(column as usize..).unwrap_or(&[]);
-                (0..POSTS).map(move |u| line.get(u).copied().unwrap_or(0))
-            });
-            // Checked when they were put together.
-            let set = tile.set_materials(materials, samples);
-            set.map_err(|_| NoTile::Step)?;
-        }
-        Ok(())
-    }
-
-    /// Checks that the heights can be touched at the scale; those of a callback are checked tile by
-    /// tile.
-    pub(crate) fn check_heights(&self) -> Result<(), TerrainError> {
-        let cell_mm = self.scale.cell_mm();
-        for height in self.range.into_iter().flatten() {
-            let cells = self.scale.height_cells(height);
-            if cells.is_nan() || cells.abs() > f64::from(MAX_CELL) {
-                return Err(TerrainError::TooTall { cells, cell_mm });
-            }
-        }
-        if let Some((step, [column, row])) = self.step {
-            let cells = self.scale.height_cells(step).abs();
-            if cells > f64::from(MAX_STEP_CELLS) {
-                return Err(TerrainError::Step { column, row, cells });
-            }
-        }
-        Ok(())
     }
 }
 
@@ -429,86 +290,4 @@ impl core::fmt::Debug for Terrain {
             .field("range", range)
             .finish_non_exhaustive()
     }
-}
-
-fn check_size(columns: u32, rows: u32) -> Result<(), TerrainError> {
-    let ok = |samples: u32| (2..=MAX_CELL as u32).contains(&samples);
-    match ok(columns) && ok(rows) {
-        true => Ok(()),
-        false => Err(TerrainError::Size { columns, rows }),
-    }
-}
-
-fn check_count(columns: u32, rows: u32, given: usize) -> Result<(), TerrainError> {
-    check_size(columns, rows)?;
-    match u64::from(columns) * u64::from(rows) == given as u64 {
-        true => Ok(()),
-        false => Err(TerrainError::Count {
-            given,
-            columns,
-            rows,
-        }),
-    }
-}
-
-/// Memory for the samples.
-fn room_for<T>(columns: u32, rows: u32) -> Result<Vec<T>, TerrainError> {
-    check_size(columns, rows)?;
-    let mut samples = Vec::new();
-    let count = usize::try_from(u64::from(columns) * u64::from(rows)).unwrap_or(usize::MAX);
-    let reserved = samples.try_reserve_exact(count);
-    reserved.map_err(|_| TerrainError::Memory { columns, rows })?;
-    Ok(samples)
-}
-
-/// Lowest and highest height, and the largest difference of neighbours with its sample.
-fn survey<T: Height>(array: &Array<T>) -> (Option<[f64; 2]>, Option<Steepest>) {
-    let (mut range, mut steepest) = (None, None::<Steepest>);
-    for row in 0..array.rows {
-        let line = array.row(row);
-        // North of the last row there is none.
-        let north = array.row(row + 1);
-        for (column, sample) in line.iter().enumerate() {
-            let height: f64 = (*sample).into();
-            if height.is_nan() {
-                continue;
-            }
-            let [low, high] = range.unwrap_or([height; 2]);
-            range = Some([low.min(height), high.max(height)]);
-            let beside = [line.get(column + 1), north.get(column)];
-            for neighbour in beside.into_iter().flatten() {
-                let step = ((*neighbour).into() - height).abs();
-                if step > steepest.map_or(0.0, |(most, _)| most) {
-                    steepest = Some((step, [column as u32, row]));
-                }
-            }
-        }
-    }
-    (range, steepest)
-}
-
-/// The patch and the place in it of a coordinate in cells.
-fn place(cells: f64, patches: u32) -> Option<(u32, f64)> {
-    if !(0.0..=f64::from(patches)).contains(&cells) {
-        return None;
-    }
-    // The last sample belongs to the last patch.
-    let patch = libm::floor(cells).min(f64::from(patches - 1));
-    Some((patch as u32, cells - patch))
-}
-
-/// The whole height that a tile counts from: the lowest sample's, or the middle where single heights
-/// would leave what the contact can address.
-fn base(cells: &[f64]) -> i32 {
-    let known = cells.iter().copied().filter(|cells| !cells.is_nan());
-    let range = known.fold(None, |range: Option<(f64, f64)>, h| {
-        let (low, high) = range.unwrap_or((h, h));
-        Some((low.min(h), high.max(h)))
-    });
-    let Some((low, high)) = range else {
-        return 0;
-    };
-    let from_low = high - libm::floor(low) <= f64::from(MAX_CELL);
-    let base = if from_low { low } else { 0.5 * (low + high) };
-    libm::floor(base) as i32 // both within ±MAX_CELL
 }

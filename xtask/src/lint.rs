@@ -1,10 +1,12 @@
 //! `cargo xtask lint`: formatting, clippy and documentation, warnings as errors.
 
+use std::process::Command;
+
 use anyhow::{Context, Result};
 
 use crate::board::{BOARDS, EMULATED};
 use crate::image::{COUNTS, package_words};
-use crate::run::{cargo, run, timed};
+use crate::run::{cargo, run, say, timed};
 use crate::setup::{emulator, toolchain};
 
 /// Runs them all; the first that complains ends it.
@@ -42,6 +44,10 @@ pub(crate) fn lint() -> Result<()> {
             run(&mut command)
         })?;
     }
+    match toolchain::with_wasm() {
+        Ok(()) => timed("clippy for the browser's kernel", || run(&mut wasm()))?,
+        Err(why) => say(format!("SKIPPED: clippy for the browser's kernel: {why:#}")),
+    }
     timed("documentation", || {
         let mut command = cargo();
         command
@@ -49,4 +55,14 @@ pub(crate) fn lint() -> Result<()> {
             .env("RUSTDOCFLAGS", "-D warnings");
         run(&mut command)
     })
+}
+
+/// Clippy for the library for arrays and its C face, compiled to WebAssembly.
+fn wasm() -> Command {
+    let mut command = cargo();
+    command
+        .args(["clippy", "--lib", "--target", toolchain::WASM])
+        .args(["--package", "hapterra-touch", "--package", "hapterra-c"])
+        .args(["--", "-D", "warnings"]);
+    command
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use hapterra::raster::{OpenOptions, Raster};
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Pace, SentTile, board};
@@ -99,7 +99,9 @@ impl Case {
 /// When it cannot be felt so.
 pub(super) fn terrain(raster: &Raster) -> Result<Terrain<'_>, NotMeasured> {
     let grid = FeltGrid::new(raster, FeltCells::default());
-    let scale = Scale::true_to(&grid, CELL_MM).map_err(|error| NotMeasured(error.to_string()))?;
+    let scale = grid
+        .true_scale(CELL_MM)
+        .map_err(|error| NotMeasured(error.to_string()))?;
     Terrain::over(grid, scale, 0).map_err(|error| NotMeasured(error.to_string()))
 }
 

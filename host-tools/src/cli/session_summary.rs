@@ -157,7 +157,7 @@ pub(super) fn tip(terrain: &Terrain<'_>) -> Option<String> {
 /// A terrain and its scale, in words.
 pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     let (raster, grid, scale) = (terrain.raster(), terrain.grid(), terrain.scale());
-    let proportions = match terrain.scale_of_level_0().exaggeration(grid) {
+    let proportions = match grid.exaggeration(&terrain.scale_of_level_0()) {
         Some(1.0) => "heights true to scale".to_owned(),
         Some(times) => format!("heights × {}", (times * 1e6).round() / 1e6),
         None => format!("{} mm a vertical unit", scale.height_mm_per_unit()),
@@ -208,7 +208,7 @@ pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
 mod tests {
     use super::*;
     use crate::raster::Raster;
-    use crate::terrain::{FeltCells, FeltGrid, Scale};
+    use crate::terrain::{FeltCells, FeltGrid};
 
     /// A cell of level 3 is eight cells of the file, and as much higher.
     #[test]
@@ -217,7 +217,7 @@ mod tests {
         let raster = raster.expect("a field");
         for level in [0, 3] {
             let grid = FeltGrid::new(&raster, FeltCells::Stored);
-            let scale = Scale::true_to(&grid, 1.0).expect("a scale");
+            let scale = grid.true_scale(1.0).expect("a scale");
             let words = in_words(&Terrain::over(grid, scale, level).expect("a terrain"));
             assert!(
                 words.contains("heights true to scale"),

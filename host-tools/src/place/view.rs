@@ -8,9 +8,7 @@ use super::fit::{ABOVE_MM, Extent};
 use super::ground;
 use super::reach::Reach;
 use super::target::Target;
-use crate::terrain::{
-    BadScale, Distortion, FeltGrid, MOST_TIP_CELLS, Scale, Terrain, TerrainError,
-};
+use crate::terrain::{BadScale, Distortion, FeltGrid, MAX_TIP_CELLS, Scale, Terrain, TerrainError};
 
 /// Relief that a terrain gets in the hand where the file does not know how large its cells
 /// are, so that it has no true proportions, mm.
@@ -384,7 +382,7 @@ impl<'g> Wanted<'g> {
 pub(super) fn finest_level(grid: &FeltGrid<'_>, resolution_mm: f64, scale: &Scale) -> u8 {
     let fewest = grid.columns().min(grid.rows()) - 1;
     let last = fewest.max(1).ilog2() as u8;
-    let least_mm = resolution_mm.max(grid.tip_mm() / MOST_TIP_CELLS);
+    let least_mm = resolution_mm.max(grid.tip_mm() / MAX_TIP_CELLS);
     let fine = |level: &u8| scale.at_level(*level).cell_mm() < least_mm;
     (0..last).find(|level| !fine(level)).unwrap_or(last)
 }

@@ -117,7 +117,7 @@ impl ViewSettings {
             level: terrain.level(),
             cell_mm: scale.cell_mm(),
             height_mm_per_unit: scale.height_mm_per_unit(),
-            exaggeration: scale.exaggeration(grid),
+            exaggeration: grid.exaggeration(&scale),
             home_mm: laid.view.home_mm,
             stiffness_n_per_mm: laid.law.stiffness_n_per_mm,
             max_force_n: laid.law.max_force_n,
@@ -338,7 +338,7 @@ impl Settings {
                 cell_mm: scale.cell_mm(),
                 height_mm_per_unit: scale.height_mm_per_unit(),
                 tip_mm: grid.tip_mm(),
-                exaggeration: scale.exaggeration(grid),
+                exaggeration: grid.exaggeration(&scale),
                 home_mm,
             },
             force: Force {
@@ -494,18 +494,6 @@ impl Felt {
             true => self.height_mm_per_unit,
             false => self.height_mm_per_unit * (cell_mm / self.cell_mm),
         }
-    }
-}
-
-impl Scale {
-    /// Times that heights are higher than true to scale, to nine digits; none where the
-    /// file does not know the size of its cells.
-    #[must_use]
-    pub fn exaggeration(&self, grid: &FeltGrid<'_>) -> Option<f64> {
-        let true_cells = grid.cells_per_vertical_unit()?;
-        let times = self.height_cells(1.0) / true_cells;
-        let rounded = (times * 1e9).round() / 1e9;
-        times.is_finite().then_some(rounded)
     }
 }
 

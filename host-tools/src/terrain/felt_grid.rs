@@ -6,6 +6,7 @@
 
 use std::hash::{Hash, Hasher};
 
+use super::{BadScale, Scale};
 use crate::materials::Materials;
 use crate::raster::{CellSize, Raster, Sides, around, bilinear};
 
@@ -282,6 +283,26 @@ impl<'r> FeltGrid<'r> {
     pub fn cells_per_vertical_unit(&self) -> Option<f64> {
         let metres = self.raster.metres_per_vertical_unit();
         self.side_m.map(|side| metres / side)
+    }
+
+    /// The scale of `cell_mm` hand millimetres a cell, with heights at the file's true proportions,
+    /// or 1 mm a unit where it does not know its cell size.
+    ///
+    /// # Errors
+    /// As [`Scale::new`].
+    pub fn true_scale(&self, cell_mm: f64) -> Result<Scale, BadScale> {
+        let cells = self.cells_per_vertical_unit();
+        Scale::new(cell_mm, cells.map_or(1.0, |cells| cells * cell_mm))
+    }
+
+    /// Times that heights are higher at a scale than true to scale, to nine digits; none where the
+    /// file does not know the size of its cells.
+    #[must_use]
+    pub fn exaggeration(&self, scale: &Scale) -> Option<f64> {
+        let true_cells = self.cells_per_vertical_unit()?;
+        let times = scale.height_cells(1.0) / true_cells;
+        let rounded = (times * 1e9).round() / 1e9;
+        times.is_finite().then_some(rounded)
     }
 
     /// The file's coordinates of a place in felt cells from the south-west sample.

@@ -8,15 +8,13 @@
 mod distortion;
 mod felt_grid;
 mod identity;
-mod scale;
 mod steps;
 mod tiler;
-mod tip;
 mod underlay;
 
 pub use distortion::Distortion;
 pub use felt_grid::{FeltCells, FeltGrid};
+pub use hapterra_touch::tip::MAX_CELLS as MAX_TIP_CELLS;
+pub use hapterra_touch::{BadScale, Scale};
 pub(crate) use identity::fingerprint;
-pub use scale::{BadScale, Scale};
 pub use tiler::{INTERPOLATED_STEP, Terrain, TerrainError, TileBuffer};
-pub use tip::MOST_CELLS as MOST_TIP_CELLS;

@@ -10,8 +10,10 @@ use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, POSTS, TILE_CELLS, TileK
 use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
+use hapterra_touch::tiles;
+use hapterra_touch::tip::{self, Ball, CENTRE_STEP, Nodes, Samples, TipError};
+
 use super::steps::{BinaryUnit, steps};
-use super::tip::{Ball, Block, MOST_CELLS, Nodes};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::materials::MaterialBuffer;
 use crate::raster::Raster;
@@ -20,10 +22,6 @@ use crate::raster::Raster;
 /// Single precision is as coarse 64 cells above a tile's base, and the floats of what is not
 /// rounded have no bits that a tile could do without on the link.
 pub const INTERPOLATED_STEP: f64 = 1.0 / (1 << 17) as f64;
-
-/// Heights of a ball's centre are rounded to multiples of this, felt cells: slopes stay true to a
-/// thousandth, and tiles take half the bytes.
-const CENTRE_STEP: f64 = 1.0 / (1 << 10) as f64;
 
 /// Bytes of a tile's samples.
 const TILE_BYTES: usize = 4 * POSTS * POSTS;
@@ -68,13 +66,12 @@ pub enum TerrainError {
     },
     /// A tip that is no ball, or one so large that tiles would take too long.
     #[error(
-        "a tip of {tip_mm} mm: {cells:.1} cells of level {level}, where 0 to {MOST_CELLS} can be felt"
+        "a tip of {} mm: {:.1} cells of level {level}, where 0 to {} can be felt",
+        tip.tip_mm, tip.cells, tip::MAX_CELLS
     )]
     Tip {
-        /// Its radius, hand millimetres.
-        tip_mm: f64,
-        /// The same in cells of the level.
-        cells: f64,
+        /// The tip.
+        tip: TipError,
         /// The level.
         level: u8,
     },
@@ -114,9 +111,9 @@ impl Default for TileBuffer {
 impl TileBuffer {
     /// The heights, of which these are the lowest and the highest, as they are shortest on the link.
     pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
-        let base = base(low, high);
+        let base = tiles::base(low, high);
         for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
-            *single = relative(*height, base);
+            *single = tiles::above(base, *height);
         }
         self.packed(base, steps)
     }
@@ -179,7 +176,8 @@ impl<'r> Terrain<'r> {
             });
         }
         let of_level = scale.at_level(level);
-        let ball = ball(&grid, &of_level, level)?;
+        let ball = Ball::new(grid.tip_mm(), of_level.cell_mm());
+        let ball = ball.map_err(|tip| TerrainError::Tip { tip, level })?;
         let higher = ball.as_ref().map_or(0, |ball| ball.radius().ceil() as i32);
         let parts = ball.as_ref().map_or(1, Ball::parts);
         let size = size.map(|patches| patches.checked_mul(parts as i32));
@@ -338,13 +336,11 @@ impl<'r> Terrain<'r> {
             return self.ground_mm(self.level, [east_mm, north_mm]);
         };
         let cell_mm = self.scale.cell_mm();
-        let (column, u) = place(east_mm / cell_mm, self.size[0])?;
-        let (row, v) = place(north_mm / cell_mm, self.size[1])?;
-        let (block, nodes) = self.block(ball, [column, row], 2);
-        let corners = ball.centres(&block, nodes);
-        let along = |at: usize| corners[at] * (1.0 - u) + corners[at + 1] * u;
-        let height = along(0) * (1.0 - v) + along(2) * v;
-        Some(height * cell_mm).filter(|height| !height.is_nan())
+        let (column, u) = tiles::place(east_mm / cell_mm, self.size[0])?;
+        let (row, v) = tiles::place(north_mm / cell_mm, self.size[1])?;
+        let (samples, nodes) = self.samples(ball, [column, row], tip::PATCH);
+        let height = ball.between(&samples, nodes, [u, v])?;
+        Some(height * cell_mm)
     }
 
     /// Height of the ground where it is only looked at, in places so far apart, mm: of a raster
@@ -363,8 +359,8 @@ impl<'r> Terrain<'r> {
         let size = self
             .size
             .map(|patches| (patches / self.parts as i32) >> coarser.min(31));
-        let (column, u) = place(east_mm / cell_mm, size[0])?;
-        let (row, v) = place(north_mm / cell_mm, size[1])?;
+        let (column, u) = tiles::place(east_mm / cell_mm, size[0])?;
+        let (row, v) = tiles::place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
             let height = self.grid.height_of_level(level, column + dx, row + dy);
             height * self.scale.height_mm_per_unit()
@@ -401,8 +397,8 @@ impl<'r> Terrain<'r> {
             return Some(Heights::Hole);
         };
         if low == high && known == self.samples_in(key) {
-            let base = base(low, high);
-            let height = relative(low, base);
+            let base = tiles::base(low, high);
+            let height = tiles::above(base, low);
             return Some(Heights::Flat { base, height });
         }
         let steps = match self.step() {
@@ -516,8 +512,8 @@ impl<'r> Terrain<'r> {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
         let (west, south) = (first(key.index.col), first(key.index.row));
         if let Some(ball) = &self.ball {
-            let (block, nodes) = self.block(ball, [west, south], POSTS);
-            for (height, centre) in heights.iter_mut().zip(ball.centres(&block, nodes)) {
+            let (samples, nodes) = self.samples(ball, [west, south], POSTS);
+            for (height, centre) in heights.iter_mut().zip(ball.centres(&samples, nodes)) {
                 *height = self.rounded(self.within(centre));
             }
             return BinaryUnit::ANY;
@@ -536,12 +532,12 @@ impl<'r> Terrain<'r> {
 
     /// Samples of the level that a ball's nodes depend on, `side` of them each way from a felt sample
     /// on, in felt cells, NaN in holes and off the data; and where the nodes are.
-    fn block(&self, ball: &Ball, first: [u32; 2], side: usize) -> (Block, Nodes) {
-        let ([west, south], samples, nodes) = ball.around(first, side);
-        let mut heights = vec![f64::NAN; samples * samples];
+    fn samples(&self, ball: &Ball, first: [u32; 2], side: usize) -> (Samples, Nodes) {
+        let ([west, south], along, nodes) = ball.around(first, side);
+        let mut heights = vec![f64::NAN; along * along];
         // West of the field there are no columns to ask for.
         let beside = west.min(0).unsigned_abs() as usize;
-        for (row, line) in (south..).zip(heights.chunks_exact_mut(samples)) {
+        for (row, line) in (south..).zip(heights.chunks_exact_mut(along)) {
             let (Ok(row), Some(line)) = (u32::try_from(row), line.get_mut(beside..)) else {
                 continue;
             };
@@ -551,12 +547,12 @@ impl<'r> Terrain<'r> {
                 *height = self.within(self.scale.height_cells(*height));
             }
         }
-        let block = Block {
-            columns: samples,
-            rows: samples,
+        let samples = Samples {
+            columns: along,
+            rows: along,
             heights,
         };
-        (block, nodes)
+        (samples, nodes)
     }
 
     /// A height in cells, as it goes to the device.
@@ -577,35 +573,6 @@ impl<'r> Terrain<'r> {
     }
 }
 
-/// The ball that feels a grid at the scale of a level, if it is no point.
-fn ball(grid: &FeltGrid<'_>, scale: &Scale, level: u8) -> Result<Option<Ball>, TerrainError> {
-    let tip_mm = grid.tip_mm();
-    let cells = tip_mm / scale.cell_mm();
-    if !(0.0..=MOST_CELLS).contains(&cells) {
-        return Err(TerrainError::Tip {
-            tip_mm,
-            cells,
-            level,
-        });
-    }
-    Ok((cells > 0.0).then(|| Ball::new(cells, scale.cell_mm())))
-}
-
-/// The patch and the place in it of a coordinate in cells.
-fn place(cells: f64, patches: i32) -> Option<(u32, f64)> {
-    if !(0.0..=f64::from(patches)).contains(&cells) {
-        return None;
-    }
-    // The last sample belongs to the last patch.
-    let patch = cells.floor().min(f64::from(patches - 1));
-    Some((patch as u32, cells - patch))
-}
-
-/// A height above a tile's base, rounded once.
-fn relative(height: f64, base: i32) -> f32 {
-    (height - f64::from(base)) as f32
-}
-
 /// Lowest and highest height, and how many there are; `None` if there is none.
 pub(super) fn range(heights: &[f64]) -> Option<(f64, f64, usize)> {
     let known = heights.iter().copied().filter(|h| !h.is_nan());
@@ -613,14 +580,6 @@ pub(super) fn range(heights: &[f64]) -> Option<(f64, f64, usize)> {
         let (low, high, count) = range.unwrap_or((h, h, 0));
         Some((low.min(h), high.max(h), count + 1))
     })
-}
-
-/// The whole height a tile counts from: the lowest sample's, or the middle
-/// where single heights would leave what the device can address.
-fn base(low: f64, high: f64) -> i32 {
-    let from_low = high - low.floor() <= f64::from(MAX_CELL);
-    let base = if from_low { low } else { 0.5 * (low + high) };
-    base.floor() as i32 // both within ±MAX_CELL
 }
 
 fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
@@ -637,14 +596,7 @@ fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
     if !raster.is_known_whole() {
         return Ok(MAX_CELL + 1);
     }
-    // Rounded to `f32` above the base, a sample reaches the next whole number
-    // at most; from 2^23 on, up to 2^30, by as much as its last place.
-    let rounding = if high - low < f64::from(1 << 23) {
-        0
-    } else {
-        64
-    };
-    Ok((high.ceil() as i32 + rounding).min(MAX_CELL + 1))
+    Ok(tiles::top(low, high))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 // Esri's ASCII grid: a header of six lines, then heights, north row first.
 
 import { turned } from "../terrain.js";
-import { Told } from "./samples.js";
+import { Told, degree } from "./samples.js";
 
 export async function asc(bytes, name) {
   const text = new TextDecoder("latin1").decode(bytes);
@@ -19,6 +19,8 @@ export async function asc(bytes, name) {
     heights[i] = height === noData ? NaN : height;
   }
   // A cell of less than a hundredth is one in degrees.
-  const cellM = cellsize > 0 ? (cellsize < 0.01 ? cellsize * 111_320 : cellsize) : null;
+  const south = head.yllcorner ?? head.yllcenter ?? 0;
+  const degrees = () => degree(south + (cellsize * ny) / 2).map((metres) => metres * cellsize);
+  const cellM = cellsize > 0 ? (cellsize < 0.01 ? degrees() : cellsize) : null;
   return { nx, ny, heights: turned(heights, nx, ny), cellM, unitM: 1 };
 }

@@ -1,10 +1,9 @@
 // SRTM's .hgt: a square degree, 16 bits a sample, north row first.
 
 import { turned } from "../terrain.js";
-import { Told, samples } from "./samples.js";
+import { Told, degree, samples } from "./samples.js";
 
 const NO_DATA = -32768;
-const DEGREE_M = 111_320;
 
 export async function hgt(bytes, name) {
   const side = Math.sqrt(bytes.length / 2);
@@ -12,7 +11,6 @@ export async function hgt(bytes, name) {
   const heights = samples("i2", bytes, false, side * side).map((height) => (height === NO_DATA ? NaN : height));
   const south = /([NS])(\d+)[EW]\d+/i.exec(name);
   const latitude = south ? (south[1].toUpperCase() === "S" ? -1 : 1) * Number(south[2]) + 0.5 : 0;
-  // Cells of degrees are narrower than they are high: felt as squares of the mean side.
-  const cellM = (DEGREE_M / (side - 1)) * Math.sqrt(Math.cos((latitude * Math.PI) / 180));
+  const cellM = degree(latitude).map((metres) => metres / (side - 1));
   return { nx: side, ny: side, heights: turned(heights, side, side), cellM, unitM: 1 };
 }

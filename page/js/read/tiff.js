@@ -1,10 +1,9 @@
 // GeoTIFF, read by geotiff.js, which is loaded when the first one is dropped.
 
 import { turned } from "../terrain.js";
-import { Told } from "./samples.js";
+import { Told, degree } from "./samples.js";
 
 const LIBRARY = "geotiff.js";
-const DEGREE_M = 111_320;
 const GEOGRAPHIC = 2;
 
 function library() {
@@ -29,13 +28,12 @@ export async function tiff(bytes) {
   return { nx, ny, heights: turned(heights, nx, ny), cellM: cell(image, ny), unitM: 1 };
 }
 
-/** Side of a cell in metres, the mean of both axes; null where the file does not say. */
+/** Sides of a cell east and north in metres; null where the file does not say. */
 function cell(image, ny) {
   const hasPlace = image.fileDirectory.hasTag("ModelPixelScale") || image.fileDirectory.hasTag("ModelTransformation");
   if (!hasPlace) return null;
   const [east, north] = image.getResolution().map(Math.abs);
-  const side = Math.sqrt(east * north);
-  if (image.getGeoKeys()?.GTModelTypeGeoKey !== GEOGRAPHIC) return side;
-  const latitude = image.getOrigin()[1] - (north * ny) / 2;
-  return side * DEGREE_M * Math.sqrt(Math.cos((latitude * Math.PI) / 180));
+  if (image.getGeoKeys()?.GTModelTypeGeoKey !== GEOGRAPHIC) return [east, north];
+  const [metresEast, metresNorth] = degree(image.getOrigin()[1] - (north * ny) / 2);
+  return [east * metresEast, north * metresNorth];
 }

@@ -1,5 +1,7 @@
 // Light on the terrain, worked out once a terrain: slopes, and how much light reaches a place.
 
+import { every } from "../terrain.js";
+
 /** Samples along a side that are drawn, at most: each WebGL 2 has textures of that size. */
 const MAX_SIDE = 2048;
 /** Samples along a side of the map of shadows. */
@@ -13,16 +15,6 @@ export function lit(terrain) {
   const drawn = every(terrain, step);
   const coarse = every(terrain, Math.ceil((Math.max(terrain.nx, terrain.ny) - 1) / (SHADOW_SIDE - 1)));
   return { ...drawn, texels: slopes(drawn, coarse, shadows(coarse)) };
-}
-
-/** Every `step`-th sample, and the last ones left out where they are not one of these. */
-function every({ nx, ny, heights, cellMm }, step) {
-  const [columns, rows] = [nx, ny].map((count) => Math.floor((count - 1) / step) + 1);
-  const kept = new Float32Array(columns * rows);
-  for (let row = 0; row < rows; row++) {
-    for (let i = 0; i < columns; i++) kept[row * columns + i] = heights[row * step * nx + i * step];
-  }
-  return { nx: columns, ny: rows, heights: kept, cellMm: cellMm * step };
 }
 
 /** Share of sun and sky at each place, 0 to 1: blocked by higher ground around it. */

@@ -32,7 +32,7 @@ export function placed(at, axis, wide, long) {
 export class Camera {
   yaw = -0.28;
   pitch = 0.66;
-  distance = 465;
+  distance = 480;
   centre = [0, 0, 0];
   #tan = Math.tan(0.3);
 

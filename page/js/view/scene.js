@@ -16,6 +16,8 @@ const LEAST_PIXELS = 0.5;
 const BLOCK_MM = 14;
 /** Length of the arrow for a newton, mm. */
 const ARROW_MM = 14;
+/** Radius of the ball that marks a point, mm. */
+const POINT_MM = 1.2;
 const TRAIL_POINTS = 240;
 const COLOURS = { proxy: [1, 0.5, 0.12, 1], hip: [0.25, 0.65, 1, 1], force: [1, 0.85, 0.2, 1], pen: [0.82, 0.85, 0.9, 1], block: [0.37, 0.33, 0.31, 1], scale: [0.9, 0.93, 0.96, 1] };
 
@@ -47,7 +49,7 @@ export class Scene {
     const gl = this.gl;
     this.terrain = terrain;
     this.#trail = [];
-    this.camera.centre = [terrain.widthMm / 2, terrain.depthMm / 2, terrain.topMm * 0.3];
+    this.camera.centre = [terrain.widthMm / 2, terrain.depthMm / 2, terrain.topMm * 0.3 - BLOCK_MM];
     const drawn = lit(terrain);
     const texture = (unit, filter, ...image) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -77,8 +79,8 @@ export class Scene {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
   }
 
-  /** Draws what is touched: `arm`, `proxy`, `force` as in touch.js; `scaleMm`, how long the bar is. */
-  draw({ arm, proxy, force, state }, scaleMm) {
+  /** Draws what is touched: `arm`, `proxy`, `force`, … as in touch.js; `scaleMm`, how long the bar is. */
+  draw({ arm, proxy, foot, force, state, tipMm }, scaleMm) {
     const { gl, camera, canvas } = this;
     this.#keepUp();
     const ratio = this.#pixels;
@@ -88,15 +90,16 @@ export class Scene {
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     camera.look(width / Math.max(1, height));
-    this.#drawGround(proxy);
+    this.#drawGround(foot);
     this.#use(this.thing, { camera: camera.matrix, sun: SUN });
     this.#put("SIDES", AS_IS, COLOURS.block, 1);
     this.#drawScale(scaleMm);
+    const ball = tipMm || POINT_MM;
     const pen = [0.25, -0.35, 1];
     this.#put("PEN", placed(add(proxy, times(pen, 1.6)), pen, 3.2, 62), COLOURS.pen);
-    this.#put("BALL", placed(proxy, [0, 0, 1], 2.6, 2.6), COLOURS.proxy);
+    this.#put("BALL", placed(proxy, [0, 0, 1], ball, ball), COLOURS.proxy);
     if (state !== "free") this.#drawForce(arm.at, proxy, force);
-    this.#drawTrail(proxy, state, ratio);
+    this.#drawTrail(foot, state, ratio);
   }
 
   /** Makes the picture coarser while frames take too long: its mesh first, then its pixels. */
@@ -112,9 +115,9 @@ export class Scene {
     } else this.#pixels = Math.max(LEAST_PIXELS, this.#pixels * 0.8);
   }
 
-  #drawGround(proxy) {
+  #drawGround(foot) {
     const { gl, terrain } = this;
-    this.#use(this.ground, { camera: this.camera.matrix, heights: 0, slopes: 1, mesh: this.mesh, size: this.size, sun: SUN, proxy, top: terrain.topMm, contour: this.contour });
+    this.#use(this.ground, { camera: this.camera.matrix, heights: 0, slopes: 1, mesh: this.mesh, size: this.size, sun: SUN, foot, top: terrain.topMm, contour: this.contour });
     gl.bindVertexArray(this.empty);
     gl.drawElements(gl.TRIANGLE_STRIP, this.count, gl.UNSIGNED_INT, 0);
   }
@@ -141,10 +144,10 @@ export class Scene {
     for (const end of [0, scaleMm]) this.#put("SHAFT", placed(add(at, [end, 0, -2]), [0, 0, 1], 1.6, 4), COLOURS.scale);
   }
 
-  #drawTrail(proxy, state, ratio) {
+  #drawTrail(foot, state, ratio) {
     const gl = this.gl;
     const last = this.#trail.at(-1);
-    if (state === "touching" && (!last || length(last.map((x, i) => x - proxy[i])) > 0.6)) this.#trail.push([...proxy]);
+    if (state === "touching" && (!last || length(last.map((x, i) => x - foot[i])) > 0.6)) this.#trail.push(foot);
     if (this.#trail.length > TRAIL_POINTS) this.#trail.shift();
     const points = this.#trail.flatMap((at, i) => [...at, (i + 1) / this.#trail.length]);
     this.#use(this.trail, { camera: this.camera.matrix, sizePx: 6 * ratio });

@@ -23,7 +23,7 @@ void main() {
   `${HEAD}
 uniform sampler2D slopes;
 uniform vec3 sun;
-uniform vec3 proxy;
+uniform vec3 foot;
 uniform float top;
 uniform float contour;
 in vec3 place;
@@ -47,8 +47,8 @@ void main() {
   float direct = max(dot(normal, normalize(sun)), 0.0);
   vec3 lit = base * (vec3(1.0, .93, .80) * 1.35 * direct * smoothstep(.25, .85, light) + vec3(.50, .58, .70) * (0.34 + 0.5 * light));
   // The pen's own shadow says how far above the ground it is.
-  float above = max(proxy.z - place.z, 0.0);
-  float spot = exp(-dot(place.xy - proxy.xy, place.xy - proxy.xy) / (4.0 + above * above * 0.4));
+  float above = max(foot.z - place.z, 0.0);
+  float spot = exp(-dot(place.xy - foot.xy, place.xy - foot.xy) / (4.0 + above * above * 0.4));
   lit *= 1.0 - 0.75 * spot / (1.0 + above * 0.12);
   colour = vec4(pow(lit, vec3(0.85)), 1);
 }`,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,6 +77,8 @@ class Terrain:
         self.height_mm_per_unit = float(height_mm_per_unit)
         #: What the data stated about itself; none of a plain array.
         self.source: dict[str, Any] | None = None
+        #: Radius of the ball that touches it, mm; 0 for a point.
+        self.tip_mm = 0.0
 
     @classmethod
     def from_xarray(
@@ -144,20 +147,34 @@ class Terrain:
         terrain.source = grid.source()
         return terrain
 
+    def with_tip(self, mm: float) -> Terrain:
+        """The same ground touched by a ball of a radius in place of a point; 0 is the point.
+
+        The HIP and the proxy are then the ball's centre, one radius above flat ground, and so is
+        ``height_mm``. Forces are those of ``hapterra replay --tip``, bit for bit. The radius is at
+        most 8 cells; of larger balls take every second sample.
+        """
+        terrain = copy.copy(self)
+        terrain._native = self._native.with_tip(mm)
+        terrain.tip_mm = float(mm)
+        return terrain
+
     @property
     def size_mm(self) -> tuple[float, float]:
         """Extent east and north from the south-west sample, mm."""
         return self._native.size_mm
 
     def height_mm(self, east_mm: float, north_mm: float) -> float | None:
-        """The height of the surface at a place, mm; None in a hole and off the terrain."""
+        """The height of the surface at a place, mm, or of the ball's centre; None in a hole and off
+        the terrain."""
         return self._native.height_mm(east_mm, north_mm)
 
     def __repr__(self) -> str:
         rows, columns = self.shape
         scale = f"cell_mm={self.cell_mm:g}, height_mm_per_unit={self.height_mm_per_unit:g}"
+        tip = f", tip_mm={self.tip_mm:g}" if self.tip_mm else ""
         source = f", source={self.source}" if self.source else ""
-        return f"<Terrain of {rows} rows and {columns} columns, {scale}{source}>"
+        return f"<Terrain of {rows} rows and {columns} columns, {scale}{tip}{source}>"
 
 
 def _samples(heights: npt.ArrayLike) -> npt.NDArray[Any]:

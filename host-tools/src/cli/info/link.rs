@@ -7,7 +7,7 @@ use hapterra_core::wire::frame::{MAX_FRAME, encode};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::session::{InSession, SessionNumber};
 
-use crate::terrain::{FeltGrid, Scale, Terrain, TerrainError, TileBuffer};
+use crate::terrain::{FeltGrid, Terrain, TerrainError, TileBuffer};
 
 /// Tiles that are looked at, at most: of more, evenly spread ones.
 const MOST_TILES: u64 = 8192;
@@ -44,7 +44,7 @@ impl LinkFigures {
     /// # Errors
     /// Where the file cannot be felt true to scale.
     pub(super) fn of(grid: &FeltGrid<'_>, mb_per_s: f64) -> Result<Self, TerrainError> {
-        let scale = Scale::true_to(grid, 1.0)?;
+        let scale = grid.true_scale(1.0)?;
         let terrain = Terrain::over(*grid, scale, 0)?;
         let [columns, rows] = terrain
             .size()

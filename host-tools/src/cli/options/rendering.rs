@@ -10,7 +10,7 @@ use crate::cli::failure::{Failure, OrHint};
 use crate::place::{Heights, suited_height};
 use crate::raster::Raster;
 use crate::replay::Rule;
-use crate::terrain::{FeltCells, FeltGrid, MOST_TIP_CELLS, Scale, Terrain};
+use crate::terrain::{FeltCells, FeltGrid, MAX_TIP_CELLS, Scale, Terrain};
 
 /// Radius of the ball by which a hand feels the ground unless another is stated, mm: with a friction
 /// of 0.4 no ground that was tried holds it (docs/tip.md).
@@ -136,7 +136,7 @@ impl Rendering {
     /// Numbers that no terrain can be scaled with.
     pub fn scale(&self, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
         let cell_mm = self.cell_mm.unwrap_or(1.0);
-        let plain = Scale::true_to(grid, cell_mm);
+        let plain = grid.true_scale(cell_mm);
         let scale = match (
             self.height_mm_per_unit,
             self.exaggeration.unwrap_or_default(),
@@ -198,7 +198,7 @@ impl Rendering {
     /// # Errors
     /// Heights or a size that positions cannot say, or a level too high.
     pub fn terrain<'r>(&self, grid: FeltGrid<'r>, scale: Scale) -> Result<Terrain<'r>, Failure> {
-        let holds = |level: &u8| grid.tip_mm() / scale.at_level(*level).cell_mm() <= MOST_TIP_CELLS;
+        let holds = |level: &u8| grid.tip_mm() / scale.at_level(*level).cell_mm() <= MAX_TIP_CELLS;
         let level = self.level.or_else(|| (0..31).find(holds));
         Ok(Terrain::over(grid, scale, level.unwrap_or(0))?)
     }

@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use csv::{ByteRecord, ReaderBuilder, Trim};
 
 use super::comments::{self, Again};
-use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of};
+use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of, row};
 
 /// Rows of a CSV file that are read one by one.
 pub(super) struct Rows<R> {
@@ -81,7 +81,7 @@ impl<R: Read + Seek> Rows<R> {
             Some(column) => self.view(column)?,
             None => 0,
         };
-        Ok(Some(Row::new(numbers, view)))
+        Ok(Some(row(numbers, view)))
     }
 
     fn view(&mut self, column: usize) -> Result<u32, TrajectoryFault> {

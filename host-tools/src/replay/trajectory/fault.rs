@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use hapterra_touch::ticks::TimeFault;
+
 use crate::replay::settings::BadSettings;
 
 /// What is wrong with which trajectory.
@@ -61,27 +63,4 @@ pub(super) enum TrajectoryFault {
     Time { at: String, what: TimeFault },
     #[error("{0}")]
     Settings(BadSettings),
-}
-
-/// A time, s, that cannot follow on the time of the row before.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub(in crate::replay) enum TimeFault {
-    #[error("time goes back from {from} s to {to} s")]
-    Backwards { from: f64, to: f64 },
-    #[error("two places at {0} s: the HIP cannot be at both")]
-    TwoPlaces(f64),
-    #[error("time begins at {to} s, and all rows before, at several places, have {from} s")]
-    Begins { from: f64, to: f64 },
-    #[error(
-        "the HIP moves during a gap of {step} s, from {from} s to {to} s: where it was meanwhile is not known"
-    )]
-    Gap { from: f64, to: f64, step: f64 },
-    #[error("a gap of {step} s, from {from} s to {to} s")]
-    Rest { from: f64, to: f64, step: f64 },
-    #[error("numbers near {0} s are too far apart to tell ticks by them")]
-    TooLarge(f64),
-    #[error(
-        "{to} s is {ticks} ticks after the row before, where the settings say {tick_hz} ticks a second"
-    )]
-    OffTick { to: f64, ticks: f64, tick_hz: f64 },
 }

@@ -16,13 +16,14 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use hapterra_core::grid::{GridPoint, MAX_CELL};
+pub use hapterra_touch::ticks::Row;
+use hapterra_touch::ticks::TimeFault;
 
 pub use fault::TrajectoryError;
 pub use felt_rows::{FeltRow, FeltRows};
 
 use super::settings::Settings;
 use crate::terrain::Scale;
-pub(super) use fault::TimeFault;
 use fault::TrajectoryFault;
 
 /// The columns, in this order. A recording begins with them, too, and further
@@ -44,31 +45,17 @@ fn columns_of<N: AsRef<str>>(header: &[N]) -> Option<&'static [&'static str]> {
 /// The column that tells in which view a row was felt.
 const VIEW: &str = "view";
 
-/// A row as it stands in the file.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
-    /// Time, s; none in a file without the column.
-    pub t_s: Option<f64>,
-    /// Position of the HIP, mm: east, north, up.
-    pub hip_mm: [f64; 3],
-    /// The view that it was felt in; 0 for the view of the beginning, or where the file has no
-    /// such column.
-    pub view: u32,
-}
-
-impl Row {
-    /// A row of the values of the first columns, of which the time may be missing.
-    fn new(numbers: &[f64], view: u32) -> Self {
-        let (t_s, place) = match numbers {
-            [t_s, place @ ..] if place.len() == PLACE.len() => (Some(*t_s), place),
-            place => (None, place),
-        };
-        let number = |axis: usize| place.get(axis).copied().unwrap_or_default();
-        Self {
-            t_s,
-            hip_mm: std::array::from_fn(number),
-            view,
-        }
+/// A row of the values of the first columns, of which the time may be missing.
+fn row(numbers: &[f64], view: u32) -> Row {
+    let (t_s, place) = match numbers {
+        [t_s, place @ ..] if place.len() == PLACE.len() => (Some(*t_s), place),
+        place => (None, place),
+    };
+    let number = |axis: usize| place.get(axis).copied().unwrap_or_default();
+    Row {
+        t_s,
+        hip_mm: std::array::from_fn(number),
+        view,
     }
 }
 
@@ -199,6 +186,14 @@ fn far(hip_mm: [f64; 3], scale: &Scale) -> (&'static str, String) {
     let mm = hip_mm.get(axis).copied().unwrap_or_default();
     let what = format!("{mm} mm is farther than {MAX_CELL} cells of {cell_mm} mm from the origin");
     (PLACE.get(axis).copied().unwrap_or_default(), what)
+}
+
+impl Iterator for Trajectory {
+    type Item = Result<Row, TrajectoryError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_row().transpose()
+    }
 }
 
 /// What a CSV file says of views and marks between its rows; nothing where it cannot be wound back.

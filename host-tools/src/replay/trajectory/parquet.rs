@@ -8,7 +8,7 @@ use parquet::data_type::{DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
-use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of};
+use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of, row};
 use crate::replay::settings::KEY;
 
 /// Rows that are read at a time.
@@ -90,7 +90,7 @@ impl Rows {
         })?;
         self.next += 1;
         self.told += 1;
-        Ok(Some(Row::new(numbers, view)))
+        Ok(Some(row(numbers, view)))
     }
 
     /// The present row, for a message.

@@ -2,139 +2,26 @@
 
 // The viewer's tests use all of it.
 #[allow(dead_code, unreachable_pub)]
-#[path = "../../view/tests/common/browser.rs"]
+#[path = "../../../view/tests/common/browser.rs"]
 mod browser;
-#[path = "../src/page/server.rs"]
+mod hands;
+#[path = "../../src/page/server.rs"]
 mod server;
+mod site;
 #[allow(dead_code, unreachable_pub)]
-#[path = "../../tests/src/timeouts.rs"]
+#[path = "../../../tests/src/timeouts.rs"]
 mod timeouts;
 
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::sync::{Mutex, PoisonError};
+use std::path::Path;
 
-use base64::Engine as _;
-use base64::prelude::BASE64_STANDARD;
 use serde_json::json;
 
-use browser::{Browser, Page};
 use server::Server;
+use site::{GROUND, MARKS, Site, hapterra, one};
 use timeouts::{HANG, wait_until};
-
-/// Software draws the pages: one at a time, and small ones.
-static ONE: Mutex<()> = Mutex::new(());
-const SIZE: [u32; 2] = [720, 480];
-/// Colours of the proxy and of the force's arrow, as they are lit.
-const MARKS: [[u8; 3]; 2] = [[255, 140, 35], [255, 215, 50]];
-
-/// A page in a browser, and what it is served from.
-struct Site {
-    browser: Browser,
-    page: Page,
-    address: String,
-    folder: tempfile::TempDir,
-}
-
-/// What `cargo xtask page --test` has built; none, and a line that says so, without it.
-fn built(what: &str) -> Option<PathBuf> {
-    let found = std::env::var_os(what).map(PathBuf::from);
-    if found.is_none() {
-        println!("SKIPPED: {what} is not set; cargo xtask page --test sets it");
-    }
-    found
-}
-
-impl Site {
-    /// Serves the page, with a terrain where there is one, and waits until it is touched.
-    fn open(terrain: Option<&Path>) -> Option<Self> {
-        let built = built("HAPTERRA_PAGE")?;
-        let Some(program) = browser::program() else {
-            println!("SKIPPED: no Chromium here; HAPTERRA_BROWSER can name one");
-            return None;
-        };
-        let folder = tempfile::tempdir().expect("a folder");
-        let site = folder.path().join("site");
-        let copied = Command::new("cp").arg("-r").args([&built, &site]).status();
-        assert!(copied.expect("cp").success());
-        if let Some(terrain) = terrain {
-            let words = ["cut", "--most-samples", "5000", "--output"];
-            hapterra(folder.path(), &words, &[&site, terrain])?;
-        }
-        let server = Server::bind(&site).expect("a port");
-        let address = server.address();
-        std::thread::spawn(|| server.serve());
-        let mut browser = Browser::start(&program, folder.path());
-        let page = browser.open_sized(&address, SIZE);
-        let mut site = Self {
-            browser,
-            page,
-            address,
-            folder,
-        };
-        site.wait("globalThis.hapterra?.touch.path.rows > 0");
-        Some(site)
-    }
-
-    fn value(&mut self, expression: &str) -> serde_json::Value {
-        self.browser.value(&self.page, expression)
-    }
-
-    fn text(&mut self, id: &str) -> String {
-        let value = self.value(&format!("document.getElementById('{id}').textContent"));
-        value.as_str().unwrap_or_default().to_owned()
-    }
-
-    /// Waits until an expression is true.
-    fn wait(&mut self, expression: &str) {
-        wait_until(expression, || self.value(expression) == true);
-    }
-
-    /// Moves the mouse to a place, in shares of the page.
-    fn point(&mut self, [left, top]: [f64; 2]) {
-        let event = json!({ "type": "mouseMoved", "x": left * f64::from(SIZE[0]), "y": top * f64::from(SIZE[1]) });
-        let session = self.page.session().to_owned();
-        let _ = self
-            .browser
-            .call("Input.dispatchMouseEvent", event, Some(&session));
-    }
-
-    /// Drops a file on the page.
-    fn drop_file(&mut self, name: &str, bytes: &[u8]) {
-        let coded = BASE64_STANDARD.encode(bytes);
-        let _ = self.value(&format!(
-            "(() => {{
-                const bytes = Uint8Array.from(atob('{coded}'), (c) => c.charCodeAt(0));
-                const carried = new DataTransfer();
-                carried.items.add(new File([bytes], '{name}'));
-                dispatchEvent(new DragEvent('drop', {{ dataTransfer: carried, cancelable: true }}));
-            }})()"
-        ));
-    }
-
-    /// Fails if the page asked any other machine for anything.
-    fn check_requests(&self) {
-        let own = [self.address.as_str(), "data:", "blob:", "about:"];
-        let requests = &self.browser.requests;
-        let is_own = |asked: &&String| own.iter().any(|own| asked.starts_with(own));
-        let foreign: Vec<_> = requests.iter().filter(|asked| !is_own(asked)).collect();
-        assert!(foreign.is_empty(), "{foreign:?}");
-        assert!(requests.iter().any(|asked| asked.ends_with("/kernel.wasm")));
-    }
-}
-
-/// Runs the command in a folder; none where it was not built.
-fn hapterra(folder: &Path, words: &[&str], files: &[&Path]) -> Option<()> {
-    let mut command = Command::new(built("HAPTERRA")?);
-    command.current_dir(folder).args(words).args(files);
-    let done = command.output().expect("hapterra starts");
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(done.status.success(), "{words:?}: {said}");
-    Some(())
-}
 
 /// The rows of a CSV file's columns, as numbers of single precision.
 fn forces(path: &Path) -> Vec<[u32; 3]> {
@@ -151,55 +38,79 @@ fn forces(path: &Path) -> Vec<[u32; 3]> {
         .collect()
 }
 
-#[test]
-fn saved_path_feels_the_same_in_replay_bit_for_bit() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let Some(mut site) = Site::open(None) else {
-        return;
-    };
-    let saved = site.folder.path().join("saved");
+/// Saves the path into a folder beside the site, feels it again there, and fails unless the forces
+/// are the same, bit for bit. Returns the line that the page shows; none without the command.
+fn check_saved(site: &mut Site, folder: &str, least: usize) -> Option<String> {
+    let saved = site.folder.path().join(folder);
     fs::create_dir(&saved).expect("a folder");
     let allow = json!({ "behavior": "allow", "downloadPath": saved });
     let _ = site
         .browser
         .call("Browser.setDownloadBehavior", allow, None);
-    // Rough and grainy: every effect of the page.
-    let _ = site.value("[...document.querySelectorAll('#presets button')].at(-1).click()");
-    site.wait("hapterra.touch.surface.friction === 0.5 && hapterra.touch.surface.texture === 0.22");
+    let _ = site.value("document.getElementById('save').click()");
+    let files = ["path.csv", "terrain.npy"].map(|name| saved.join(name));
+    wait_until("the saved files", || {
+        files.iter().all(|file| file.is_file())
+    });
+    let line = site.text("command");
+    let words: Vec<_> = line.split(' ').skip(1).collect();
+    hapterra(&saved, &words, &[])?;
+    let (felt, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
+    let touching = felt.iter().filter(|force| **force != [0; 3]).count();
+    println!("{} rows, {touching} with a force: {line}", felt.len());
+    assert!(touching > least, "{touching} of {}", felt.len());
+    assert_eq!(felt.len(), replayed.len());
+    let differing = felt.iter().zip(&replayed).position(|(a, b)| a != b);
+    assert_eq!(differing, None, "{line}");
+    Some(line)
+}
+
+/// Moves the mouse over the ground for some 2,000 ticks.
+fn stroke(site: &mut Site) {
     for step in 1..40 {
         let share = f64::from(step) / 40.0;
         site.point([0.35 + 0.3 * share, 0.5 + 0.1 * (9.0 * share).sin()]);
         let rows = site.value("hapterra.touch.path.rows").as_u64().unwrap_or(0);
         site.wait(&format!("hapterra.touch.path.rows >= {}", rows + 50));
     }
+}
+
+#[test]
+fn saved_path_feels_the_same_in_replay_bit_for_bit() {
+    let _one = one();
+    let Some(mut site) = Site::open(None) else {
+        return;
+    };
+    // On the way it gets rough and grainy: every effect of the page.
+    site.point([0.35, 0.5]);
+    site.wait("hapterra.touch.state === 'touching'");
+    let _ = site.value("[...document.querySelectorAll('#presets button')].at(-1).click()");
+    site.wait("hapterra.touch.surface.friction === 0.5 && hapterra.touch.surface.texture === 0.22");
+    stroke(&mut site);
     let picture = site.browser.picture(&site.page);
-    let whole = [0.0, 0.0, 1.0, 1.0];
-    let colours = site.browser.colours(&site.page, &picture, whole, &MARKS);
+    let colours = site.browser.colours(&site.page, &picture, GROUND, &MARKS);
     assert!(colours.count > 400, "{colours:?}");
     assert!(colours.near.iter().all(|pixels| *pixels > 5), "{colours:?}");
-    let _ = site.value("document.getElementById('save').click()");
-    let files = ["path.csv", "terrain.npy"].map(|name| saved.join(name));
-    wait_until("the saved files", || {
-        files.iter().all(|file| file.is_file())
-    });
-    let line = site.text("saved");
-    let words: Vec<_> = line.split(' ').skip(1).collect();
-    if hapterra(&saved, &words, &[]).is_none() {
+    let Some(line) = check_saved(&mut site, "changed", 1000) else {
         return;
+    };
+    assert!(line.ends_with("--tip 2.5mm"), "{line}");
+    assert_eq!(site.value("document.getElementById('mixed').hidden"), false);
+    // A ball of more than 8 cells, and a point; the surface stays.
+    for (tip_mm, word) in [(5.0, "--tip 5mm"), (0.0, "--texture-wavelength 2")] {
+        site.slide("tip", tip_mm);
+        site.wait(&format!("hapterra.touch.tipMm === {tip_mm}"));
+        stroke(&mut site);
+        let line = check_saved(&mut site, word, 500).expect("the command");
+        assert!(line.ends_with(word), "{line}");
+        assert_eq!(site.value("document.getElementById('mixed').hidden"), true);
     }
-    let (felt, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
-    let touching = felt.iter().filter(|force| **force != [0; 3]).count();
-    println!("{} rows, {touching} with a force", felt.len());
-    assert!(touching > 1000, "{touching} of {}", felt.len());
-    assert_eq!(felt.len(), replayed.len());
-    let differing = felt.iter().zip(&replayed).position(|(a, b)| a != b);
-    assert_eq!(differing, None, "{line}");
     site.check_requests();
 }
 
 #[test]
 fn dropped_files_of_one_terrain_have_the_same_heights() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _one = one();
     let Some(mut site) = Site::open(None) else {
         return;
     };
@@ -252,7 +163,7 @@ fn dropped_files_of_one_terrain_have_the_same_heights() {
 
 #[test]
 fn cursor_stays_behind_the_hand_on_a_slope() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _one = one();
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("ramp.asc");
     // Up to the east, by one in two; 60,501 heights, of which the page gets every fourth.

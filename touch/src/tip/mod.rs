@@ -22,20 +22,44 @@
 //! nodes that are a fraction of its radius apart, whatever the samples are: **felt cells**, of which
 //! a whole number makes a cell of the ground. Lengths below are in felt cells.
 
-use std::sync::Arc;
+mod bearing;
 
-/// Largest radius, cells of the ground's level. A larger ball is felt on a coarser level.
-pub const MOST_CELLS: f64 = 8.0;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use bearing::{Axis, Bearing};
+pub use bearing::{Nodes, Samples};
+
+/// Largest radius, cells of the ground.
+pub const MAX_CELLS: f64 = 8.0;
 /// Felt cells in a radius, at least.
-pub(super) const FELT_CELLS: f64 = 32.0;
+pub const FELT_CELLS: f64 = 32.0;
 /// A felt cell is not made smaller than this, hand millimetres: half an encoder's count.
-pub(super) const FINEST_MM: f64 = 1.0 / 64.0;
+pub const FINEST_MM: f64 = 1.0 / 64.0;
+/// Heights of the centre are rounded to multiples of this, felt cells: slopes stay true to a
+/// thousandth, and tiles take half the bytes.
+pub const CENTRE_STEP: f64 = 1.0 / (1 << 10) as f64;
 /// What the ball may rest too low for want of a line, as a part of its radius.
 const SAG: f64 = 5e-3;
 
+/// A radius that no ball over cells of a size has.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "a tip of {tip_mm} mm: {cells:.1} cells of {cell_mm} mm, where 0 to {MAX_CELLS} can be felt"
+)]
+pub struct TipError {
+    /// The radius, mm.
+    pub tip_mm: f64,
+    /// The same in cells of the ground.
+    pub cells: f64,
+    /// Side of a cell of the ground, mm.
+    pub cell_mm: f64,
+}
+
 /// A ball over a grid.
 #[derive(Clone, Debug)]
-pub(super) struct Ball {
+pub struct Ball {
     /// Radius.
     radius: f64,
     /// Felt cells a cell of the ground.
@@ -48,82 +72,78 @@ pub(super) struct Ball {
     caps: Arc<[f64]>,
 }
 
-/// Samples of a rectangle, row by row from the south-west.
-pub(super) struct Block {
-    pub(super) columns: usize,
-    pub(super) rows: usize,
-    /// NaN where there is no data.
-    pub(super) heights: Vec<f64>,
+/// A height of the centre, felt cells, as tiles have it.
+#[must_use]
+pub fn rounded(centre: f64) -> f64 {
+    libm::round(centre / CENTRE_STEP) * CENTRE_STEP
 }
 
-/// Nodes of a square within a block.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Nodes {
-    /// The south-western one, from the block's first sample.
-    pub(super) first: [usize; 2],
-    /// Nodes along a side.
-    pub(super) side: usize,
-}
-
-impl Nodes {
-    /// Those within `reach` of a place along an axis, as the first and the one after the last.
-    fn near(&self, axis: usize, place: f64, reach: f64) -> (usize, usize) {
-        let node = |at: f64| {
-            let node = at - self.first[axis] as f64;
-            node.clamp(0.0, self.side as f64) as usize
-        };
-        (
-            node((place - reach).ceil()),
-            node((place + reach).floor() + 1.0),
-        )
-    }
-}
+/// Nodes along the sides of the square around one patch.
+pub const PATCH: usize = 2;
 
 impl Ball {
-    /// A ball of a radius in cells of the ground, positive and at most [`MOST_CELLS`]; a cell is
-    /// `cell_mm` large in the hand.
-    pub(super) fn new(cells: f64, cell_mm: f64) -> Self {
-        let most = (cell_mm / FINEST_MM).floor().max(1.0);
-        let parts = (FELT_CELLS / cells).ceil().clamp(1.0, most) as u32;
+    /// A ball of a radius in millimetres over cells of the ground; none for the radius 0, a point.
+    ///
+    /// # Errors
+    /// [`TipError`] for a radius below 0, above [`MAX_CELLS`] cells, or not a number.
+    pub fn new(tip_mm: f64, cell_mm: f64) -> Result<Option<Self>, TipError> {
+        let cells = tip_mm / cell_mm;
+        match (0.0..=MAX_CELLS).contains(&cells) {
+            true => Ok((cells > 0.0).then(|| Self::of(cells, cell_mm))),
+            false => Err(TipError {
+                tip_mm,
+                cells,
+                cell_mm,
+            }),
+        }
+    }
+
+    fn of(cells: f64, cell_mm: f64) -> Self {
+        let most = libm::floor(cell_mm / FINEST_MM).max(1.0);
+        let parts = libm::ceil(FELT_CELLS / cells).clamp(1.0, most) as u32;
         let radius = cells * f64::from(parts);
-        let reach = radius.floor() as i32;
+        let reach = radius as i32;
         let cap = |(x, y): (i32, i32)| {
-            let squared = radius * radius - f64::from(x).powi(2) - f64::from(y).powi(2);
+            let squared = radius * radius - f64::from(x * x) - f64::from(y * y);
             if squared >= 0.0 {
-                squared.sqrt()
+                libm::sqrt(squared)
             } else {
                 f64::NEG_INFINITY
             }
         };
         let places = (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| (x, y)));
-        let lines = 1.0 / ((4.0 * SAG).sqrt() * cells);
+        let lines = 1.0 / (libm::sqrt(4.0 * SAG) * cells);
         Self {
             radius,
             parts,
-            halo: cells.ceil() as usize + 1,
-            lines: lines.ceil().clamp(1.0, 64.0) as u32,
+            halo: libm::ceil(cells) as usize + 1,
+            lines: libm::ceil(lines).clamp(1.0, 64.0) as u32,
             caps: places.map(cap).collect(),
         }
     }
 
     /// Felt cells a cell of the ground, along a side.
-    pub(super) const fn parts(&self) -> u32 {
+    #[must_use]
+    pub const fn parts(&self) -> u32 {
         self.parts
     }
 
     /// Samples around a block that its nodes depend on.
-    pub(super) const fn halo(&self) -> usize {
+    #[must_use]
+    pub const fn halo(&self) -> usize {
         self.halo
     }
 
     /// Radius, felt cells.
-    pub(super) const fn radius(&self) -> f64 {
+    #[must_use]
+    pub const fn radius(&self) -> f64 {
         self.radius
     }
 
     /// The samples that nodes depend on, `side` of them along each axis from a felt node on: the
     /// first sample, which may lie beside the field, how many along a side, and where the nodes are.
-    pub(super) fn around(&self, first: [u32; 2], side: usize) -> ([i64; 2], usize, Nodes) {
+    #[must_use]
+    pub fn around(&self, first: [u32; 2], side: usize) -> ([i64; 2], usize, Nodes) {
         let (parts, halo) = (i64::from(self.parts), self.halo as i64);
         let from = first.map(|node| i64::from(node) / parts - halo);
         let nodes = Nodes {
@@ -137,7 +157,8 @@ impl Ball {
 
     /// The heights of the ball's centre over nodes of a block, row by row. A node on ground without
     /// data has none, and only patches with four samples bear the ball.
-    pub(super) fn centres(&self, block: &Block, nodes: Nodes) -> Vec<f64> {
+    #[must_use]
+    pub fn centres(&self, block: &Samples, nodes: Nodes) -> Vec<f64> {
         let bearing = Bearing::of(block);
         let mut centres = vec![f64::NEG_INFINITY; nodes.side * nodes.side];
         self.on_samples((block, &bearing), nodes, &mut centres);
@@ -160,9 +181,29 @@ impl Ball {
         centres
     }
 
+    /// The height of the bilinear surface between the four centres of a patch; none in a hole.
+    #[must_use]
+    pub fn between(&self, samples: &Samples, nodes: Nodes, [u, v]: [f64; 2]) -> Option<f64> {
+        let corners = self.centres(
+            samples,
+            Nodes {
+                side: PATCH,
+                ..nodes
+            },
+        );
+        let along = |at: usize| corners[at] * (1.0 - u) + corners[at + 1] * u;
+        let height = along(0) * (1.0 - v) + along(PATCH) * v;
+        Some(height).filter(|height| !height.is_nan())
+    }
+
     /// Where the ball rests on a sample.
-    fn on_samples(&self, (block, bearing): (&Block, &Bearing), nodes: Nodes, centres: &mut [f64]) {
-        let (parts, reach) = (self.parts as usize, self.radius.floor());
+    fn on_samples(
+        &self,
+        (block, bearing): (&Samples, &Bearing),
+        nodes: Nodes,
+        centres: &mut [f64],
+    ) {
+        let (parts, reach) = (self.parts as usize, libm::floor(self.radius));
         let width = 2 * reach as usize + 1;
         for (at, sample) in bearing.nodes.iter().enumerate() {
             if *sample == f64::NEG_INFINITY || bearing.is_between_stretches(block, at) {
@@ -190,7 +231,7 @@ impl Ball {
     /// Where the ball rests within a stretch of a line along an axis.
     fn on_lines(
         &self,
-        (block, bearing): (&Block, &Bearing),
+        (block, bearing): (&Samples, &Bearing),
         axis: Axis,
         nodes: Nodes,
         centres: &mut [f64],
@@ -214,12 +255,13 @@ impl Ball {
                         }
                     };
                     let (low, slope) = (at(0), (at(1) - at(0)) / parts);
-                    let steep = (1.0 + slope * slope).sqrt();
+                    let steep = libm::sqrt(1.0 + slope * slope);
                     let sine = slope / steep;
                     for beside in first..end {
                         let apart = (nodes.first[axis.across()] + beside) as f64 - place;
                         // The ball's circle over the line.
-                        let circle = (self.radius * self.radius - apart * apart).max(0.0).sqrt();
+                        let circle = self.radius * self.radius - apart * apart;
+                        let circle = libm::sqrt(circle.max(0.0));
                         let middle = (start as f64 + 0.5) * parts - circle * sine;
                         // Also where rounding puts a node beside both of its stretches.
                         let half = 0.5 * parts + 1e-9;
@@ -238,135 +280,5 @@ impl Ball {
     }
 }
 
-/// Which way a line runs.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Axis {
-    East,
-    North,
-}
-
-impl Axis {
-    /// Samples across lines of this axis, and along them.
-    const fn sizes(self, block: &Block) -> (usize, usize) {
-        match self {
-            Self::North => (block.columns, block.rows),
-            Self::East => (block.rows, block.columns),
-        }
-    }
-
-    const fn at(self, block: &Block, across: usize, along: usize) -> usize {
-        match self {
-            Self::North => block.at(across, along),
-            Self::East => block.at(along, across),
-        }
-    }
-
-    /// The axis of its nodes across lines: 0 east, 1 north.
-    const fn across(self) -> usize {
-        1 - self.along()
-    }
-
-    /// The axis of its nodes along lines.
-    const fn along(self) -> usize {
-        match self {
-            Self::East => 0,
-            Self::North => 1,
-        }
-    }
-
-    const fn node(self, side: usize, across: usize, along: usize) -> usize {
-        match self {
-            Self::North => along * side + across,
-            Self::East => across * side + along,
-        }
-    }
-}
-
-impl Block {
-    const fn at(&self, column: usize, row: usize) -> usize {
-        row * self.columns + column
-    }
-
-    /// The bilinear height at a node, in parts of a cell from the first sample; NaN in a hole.
-    fn between(&self, node: [usize; 2], parts: usize) -> f64 {
-        let [(column, east), (row, north)] = node.map(|node| (node / parts, node % parts));
-        let mix = |from: usize, to: usize, share: usize, at: &dyn Fn(usize) -> f64| match share {
-            // The next sample has no weight, also where it is a hole.
-            0 => at(from),
-            _ => {
-                let share = share as f64 / parts as f64;
-                at(from) * (1.0 - share) + at(to) * share
-            }
-        };
-        mix(row, row + 1, north, &|row| {
-            mix(column, column + 1, east, &|column| {
-                self.heights[self.at(column, row)]
-            })
-        })
-    }
-}
-
-/// What of a block bears a ball.
-struct Bearing {
-    columns: usize,
-    /// Whether the patch north-east of a sample has four samples.
-    patches: Vec<bool>,
-    /// Samples of such patches; less than everything where a sample is of none.
-    nodes: Vec<f64>,
-}
-
-impl Bearing {
-    fn of(block: &Block) -> Self {
-        let mut bearing = Self {
-            columns: block.columns,
-            patches: vec![false; block.heights.len()],
-            nodes: vec![f64::NEG_INFINITY; block.heights.len()],
-        };
-        for row in 0..block.rows.saturating_sub(1) {
-            for column in 0..block.columns.saturating_sub(1) {
-                let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
-                let corners = corners.map(|(x, y)| block.at(column + x, row + y));
-                if corners.iter().any(|at| block.heights[*at].is_nan()) {
-                    continue;
-                }
-                bearing.patches[corners[0]] = true;
-                for at in corners {
-                    bearing.nodes[at] = block.heights[at];
-                }
-            }
-        }
-        bearing
-    }
-
-    /// Returns true if a ball that touches a sample touches the ground beside it, too: along an axis
-    /// the ground turns up there, or goes straight on.
-    fn is_between_stretches(&self, block: &Block, at: usize) -> bool {
-        let (column, row) = (at % block.columns, at / block.columns);
-        [Axis::East, Axis::North].into_iter().any(|axis| {
-            let (line, place) = match axis {
-                Axis::East => (row, column),
-                Axis::North => (column, row),
-            };
-            let bears = |start: usize| self.bears(axis, line, start, false);
-            let last = axis.sizes(block).1 - 1;
-            if place == 0 || place == last || !bears(place - 1) || !bears(place) {
-                return false;
-            }
-            let height = |place: usize| block.heights[axis.at(block, line, place)];
-            height(place + 1) - height(place) >= height(place) - height(place - 1)
-        })
-    }
-
-    /// Returns true if a stretch of a line is in a patch with four samples, or on its edge.
-    fn bears(&self, axis: Axis, line: usize, start: usize, within: bool) -> bool {
-        let patch = |line: usize| match axis {
-            Axis::North => self.patches[start * self.columns + line],
-            Axis::East => self.patches[line * self.columns + start],
-        };
-        patch(line) || (!within && line > 0 && patch(line - 1))
-    }
-}
-
 #[cfg(test)]
-#[path = "tip_tests.rs"]
 mod tests;

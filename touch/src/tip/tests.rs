@@ -1,10 +1,12 @@
 //! Centres of balls against a search that shares nothing with them: the bilinear surface and the
 //! ball, place by place, in `f64`.
 
+use std::vec::Vec;
+
 use super::*;
 
 /// Where the bilinear surface of a block is at a place; none where a corner has no data.
-fn surface(block: &Block, [u, v]: [f64; 2]) -> Option<f64> {
+fn surface(block: &Samples, [u, v]: [f64; 2]) -> Option<f64> {
     let cell = |at: f64, samples: usize| {
         let inside = (0.0..=(samples - 1) as f64).contains(&at);
         let cell = (at.floor() as usize).min(samples - 2);
@@ -23,7 +25,7 @@ fn surface(block: &Block, [u, v]: [f64; 2]) -> Option<f64> {
 
 /// The height of a ball's centre over a place: the best of a fine grid, and then of finer ones
 /// around the best places of that.
-fn centre(block: &Block, [u, v]: [f64; 2], radius: f64) -> f64 {
+fn centre(block: &Samples, [u, v]: [f64; 2], radius: f64) -> f64 {
     let ball = |place: [f64; 2]| {
         let squared = radius * radius - (place[0] - u).powi(2) - (place[1] - v).powi(2);
         // On a grid line the patches on either side count.
@@ -94,7 +96,7 @@ struct Rest {
     /// Samples around that node.
     halo: usize,
     /// The samples, in cells.
-    block: Block,
+    block: Samples,
     /// Nodes along a side, and the centres over them, in cells.
     side: usize,
     centres: Vec<f64>,
@@ -103,13 +105,13 @@ struct Rest {
 impl Rest {
     /// Of a ball of a radius in cells of a millimetre, over so many cells each way.
     fn new(radius: f64, cells: usize, height: impl Fn(i32, i32) -> f64) -> Self {
-        let ball = Ball::new(radius, 1.0);
+        let ball = Ball::of(radius, 1.0);
         let parts = ball.parts() as usize;
         let side = cells * parts + 1;
         let (first, samples, nodes) = ball.around([0, 0], side);
         let place = |at: usize| at as i32 + first[0] as i32;
         let all = (0..samples * samples).map(|at| height(place(at % samples), place(at / samples)));
-        let block = |scale: f64, heights: &[f64]| Block {
+        let block = |scale: f64, heights: &[f64]| Samples {
             columns: samples,
             rows: samples,
             heights: heights.iter().map(|height| height * scale).collect(),

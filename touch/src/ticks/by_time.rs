@@ -1,7 +1,8 @@
 //! Ticks by the times of rows, and which times cannot be right.
 
 use super::counts::Untimed;
-use super::{ON_TICK, Pace, Row, Tick, Ticks, TimeFault, TrajectoryError};
+use super::fault::{TickError, TimeFault};
+use super::{ON_TICK, Pace, Row, Tick, Ticks};
 
 /// The HIP may move on one straight line for so long, s: what is seen less often than every 2 s
 /// is not a hand's path.
@@ -30,9 +31,12 @@ enum Next {
     End,
 }
 
-impl Ticks {
+impl<R, E> Ticks<R>
+where
+    R: Iterator<Item = Result<Row, E>>,
+{
     /// The next tick by the rows' own times.
-    pub(super) fn next_by_time(&mut self) -> Result<Option<Tick>, TrajectoryError> {
+    pub(super) fn next_by_time(&mut self) -> Result<Option<Tick>, TickError<E>> {
         let Some(mut before) = self.before else {
             return self.first();
         };
@@ -64,7 +68,7 @@ impl Ticks {
         }
     }
 
-    fn first(&mut self) -> Result<Option<Tick>, TrajectoryError> {
+    fn first(&mut self) -> Result<Option<Tick>, TickError<E>> {
         let Some(row) = self.read()? else {
             return Ok(None);
         };
@@ -80,9 +84,9 @@ impl Ticks {
     }
 
     /// Tick 0, at a row.
-    fn begin(&mut self, row: Timed) -> Result<Tick, TrajectoryError> {
+    fn begin(&mut self, row: Timed) -> Result<Tick, TickError<E>> {
         if self.due.is_coarse_at(row.t_s) {
-            return Err(self.trajectory.mistimed(TimeFault::TooLarge(row.t_s)));
+            return Err(self.mistimed(TimeFault::TooLarge(row.t_s)));
         }
         (self.due.begin_s, self.due.next) = (row.t_s, 0);
         let is_felt = true;
@@ -109,7 +113,7 @@ impl Ticks {
     }
 
     /// Reads the next row that is later than another.
-    fn follow(&mut self, before: &Timed) -> Result<Next, TrajectoryError> {
+    fn follow(&mut self, before: &Timed) -> Result<Next, TickError<E>> {
         let mut repeated = 0;
         // Rows at one time alone may be those of a file whose times say nothing.
         let is_begin = self.counts.rows == 1 && self.pace == Pace::ByTime;
@@ -131,7 +135,7 @@ impl Ticks {
                 return Ok(self.without_times(before, repeated, Some(row)));
             }
             if !is_still {
-                return Err(self.trajectory.mistimed(TimeFault::TwoPlaces(t_s)));
+                return Err(self.mistimed(TimeFault::TwoPlaces(t_s)));
             }
             repeated += 1;
         }
@@ -147,12 +151,7 @@ impl Ticks {
     }
 
     /// A row at another time than the one before it, if that can be right.
-    fn later(
-        &mut self,
-        before: &Timed,
-        row: Timed,
-        is_still: bool,
-    ) -> Result<Next, TrajectoryError> {
+    fn later(&mut self, before: &Timed, row: Timed, is_still: bool) -> Result<Next, TickError<E>> {
         let (from, to) = (before.t_s, row.t_s);
         let step = to - from;
         let fault = match self.pace {
@@ -163,7 +162,7 @@ impl Ticks {
             _ => None,
         };
         if let Some(fault) = fault {
-            return Err(self.trajectory.mistimed(fault));
+            return Err(self.mistimed(fault));
         }
         if self.pace == Pace::Recorded {
             let is_gap = step > LONGEST_MOVE_S;
@@ -180,8 +179,8 @@ impl Ticks {
     /// What contradicts the rate of a recording, if anything does.
     fn off_tick(&self, from: f64, to: f64) -> Option<TimeFault> {
         let late = self.due.late(to);
-        let is_tick = late >= -ON_TICK && (late - late.round()).abs() <= ON_TICK;
-        let ticks = ((to - from) * self.due.tick_hz * 1e3).round() / 1e3;
+        let is_tick = late >= -ON_TICK && (late - libm::round(late)).abs() <= ON_TICK;
+        let ticks = libm::round((to - from) * self.due.tick_hz * 1e3) / 1e3;
         let tick_hz = self.due.tick_hz;
         (!is_tick).then_some(TimeFault::OffTick { to, ticks, tick_hz })
     }

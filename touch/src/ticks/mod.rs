@@ -1,0 +1,228 @@
+//! A path at the ticks of a device.
+//!
+//! Tick `n` is at `t_s` of the first row plus `n` divided by the tick rate; the last one is not
+//! later than the last row. The HIP of a tick is that of the row at its time, bit for bit, if there
+//! is one within [`ON_TICK`]; else it lies on the straight line between the rows before and after
+//! it, passed at a constant speed. Rows between two ticks are not felt, as an arm's encoders are
+//! not read between them.
+//!
+//! So a path whose rows are a tick apart is felt row by row. The rows of a recording are whole
+//! ticks apart, mostly one: a device sends a sample a millisecond, and some may be lost on the
+//! link.
+
+mod by_time;
+mod counts;
+mod fault;
+
+use alloc::collections::VecDeque;
+
+use by_time::Timed;
+pub use counts::{Counts, ODD_MOVE_S, Untimed};
+pub use fault::{TickError, TimeFault};
+
+/// A row that is as near to a tick is at it, ticks: times are written with six digits, or in
+/// single precision.
+const ON_TICK: f64 = 0.01;
+
+/// How rows become ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// By the rows' own times. A file without times has one row a tick.
+    ByTime,
+    /// By the rows' own times, which are whole ticks: those of a recording that is felt with its
+    /// settings. Nothing is filled in between two views and in gaps of more than 2 s.
+    Recorded,
+    /// One row a tick, whatever times they have.
+    RowByRow,
+}
+
+/// A row of a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Time, s; none where the path has no times.
+    pub t_s: Option<f64>,
+    /// Position of the HIP, mm: east, north, up.
+    pub hip_mm: [f64; 3],
+    /// The view that it was felt in; 0 for the view of the beginning, or where there is no other.
+    pub view: u32,
+}
+
+/// Where the HIP is in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tick {
+    /// Time of the tick, s: that of its row to the bit, if it has one.
+    pub t_s: f64,
+    /// Position of the HIP, mm: east, north, up.
+    pub hip_mm: [f64; 3],
+    /// The view of its row, or of the rows between which it lies.
+    pub view: u32,
+}
+
+/// A path that is read tick by tick, from rows that are read one by one. The first error ends it.
+///
+/// ```
+/// use core::convert::Infallible;
+/// use hapterra_touch::ticks::{Pace, Row, Ticks};
+///
+/// // 1 mm in 2 ms: at 1 kHz a tick lies between.
+/// let row = |t_s, x| Ok::<_, Infallible>(Row { t_s: Some(t_s), hip_mm: [x, 0.0, 0.0], view: 0 });
+/// let ticks = Ticks::new([row(0.0, 4.0), row(0.002, 5.0)].into_iter(), Pace::ByTime, 1000);
+/// let x: Vec<_> = ticks.map(|tick| tick.unwrap().hip_mm[0]).collect();
+/// assert_eq!(x, [4.0, 4.5, 5.0]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Ticks<R> {
+    rows: R,
+    pace: Pace,
+    due: Due,
+    /// The last row whose time is not later than that of the latest tick.
+    before: Option<Timed>,
+    /// The row after it, if it was read already.
+    ahead: Option<Timed>,
+    /// Rows that were read, and how many times each stands there: a tick each.
+    held: VecDeque<(Row, u64)>,
+    counts: Counts,
+}
+
+impl<R> Ticks<R> {
+    /// The ticks of a device with `tick_hz` ticks a second, 1 at least.
+    #[must_use]
+    pub fn new(rows: R, pace: Pace, tick_hz: u32) -> Self {
+        let untimed = (pace == Pace::RowByRow).then_some(Untimed::Asked);
+        Self {
+            rows,
+            pace,
+            due: Due::new(tick_hz),
+            before: None,
+            ahead: None,
+            held: VecDeque::new(),
+            counts: Counts {
+                untimed,
+                ..Counts::default()
+            },
+        }
+    }
+
+    /// The rows, of which the latest is the one that the latest tick is at or before.
+    pub const fn rows(&mut self) -> &mut R {
+        &mut self.rows
+    }
+
+    /// What rows have been for ticks so far, and what is odd about their times.
+    #[must_use]
+    pub const fn counts(&self) -> &Counts {
+        &self.counts
+    }
+}
+
+impl<R, E> Iterator for Ticks<R>
+where
+    R: Iterator<Item = Result<Row, E>>,
+{
+    type Item = Result<Tick, TickError<E>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let tick = match self.pace {
+            Pace::RowByRow => self.next_row(),
+            Pace::ByTime | Pace::Recorded => self.next_by_time(),
+        };
+        self.counts.ticks += u64::from(matches!(tick, Ok(Some(_))));
+        tick.transpose()
+    }
+}
+
+impl<R, E> Ticks<R>
+where
+    R: Iterator<Item = Result<Row, E>>,
+{
+    /// The next row as the next tick.
+    fn next_row(&mut self) -> Result<Option<Tick>, TickError<E>> {
+        while self.held.front().is_some_and(|(_, times)| *times == 0) {
+            self.held.pop_front();
+        }
+        let row = match self.held.front_mut() {
+            Some((row, times)) => {
+                *times -= 1;
+                Some(*row)
+            }
+            None => self.read()?,
+        };
+        let Some(row) = row else {
+            return Ok(None);
+        };
+        if let (Some(Untimed::Same(from)), Some(to)) = (self.counts.untimed, row.t_s)
+            && from != to
+        {
+            return Err(self.mistimed(TimeFault::Begins { from, to }));
+        }
+        let t_s = row.t_s.unwrap_or_default();
+        if self.due.next == 0 && !self.due.is_coarse_at(t_s) {
+            self.due.begin_s = t_s;
+        }
+        Ok(Some(self.tick_at(&row)))
+    }
+
+    /// The next tick, at a row.
+    fn tick_at(&mut self, row: &Row) -> Tick {
+        let is_there = |t_s: &f64| self.due.late(*t_s).abs() <= ON_TICK;
+        let t_s = row.t_s.filter(is_there).unwrap_or(self.due.s());
+        self.due.next += 1;
+        Tick {
+            t_s,
+            hip_mm: row.hip_mm,
+            view: row.view,
+        }
+    }
+
+    fn read(&mut self) -> Result<Option<Row>, TickError<E>> {
+        let Some(row) = self.rows.next().transpose().map_err(TickError::Row)? else {
+            return Ok(None);
+        };
+        self.counts.rows += 1;
+        match row.t_s.is_none_or(f64::is_finite) {
+            true => Ok(Some(row)),
+            false => Err(self.mistimed(TimeFault::NotFinite)),
+        }
+    }
+
+    /// The latest row cannot follow on the one before it.
+    const fn mistimed(&self, fault: TimeFault) -> TickError<E> {
+        let row = self.counts.rows.saturating_sub(1);
+        TickError::Time { row, fault }
+    }
+}
+
+/// When the next tick is due.
+#[derive(Clone, Copy, Debug)]
+struct Due {
+    tick_hz: f64,
+    /// Time of tick 0, s.
+    begin_s: f64,
+    /// Number of the next tick.
+    next: u64,
+}
+
+impl Due {
+    fn new(tick_hz: u32) -> Self {
+        Self {
+            tick_hz: f64::from(tick_hz.max(1)),
+            begin_s: 0.0,
+            next: 0,
+        }
+    }
+
+    /// Time of the next tick, s.
+    fn s(&self) -> f64 {
+        self.begin_s + self.next as f64 / self.tick_hz
+    }
+
+    /// By how many ticks a time is later than the next tick.
+    fn late(&self, t_s: f64) -> f64 {
+        (t_s - self.s()) * self.tick_hz
+    }
+
+    /// Returns true if numbers near a time are too far apart to tell ticks by them.
+    fn is_coarse_at(&self, t_s: f64) -> bool {
+        t_s.abs() * f64::EPSILON * self.tick_hz > ON_TICK
+    }
+}

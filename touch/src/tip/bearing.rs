@@ -1,0 +1,166 @@
+//! Samples under a ball, and which of them bear it.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Samples of a rectangle, row by row from the south-west.
+pub struct Samples {
+    /// From west to east.
+    pub columns: usize,
+    /// From south to north.
+    pub rows: usize,
+    /// NaN where there is no data.
+    pub heights: Vec<f64>,
+}
+
+/// Nodes of a square within a rectangle of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Nodes {
+    /// The south-western one, from the block's first sample.
+    pub first: [usize; 2],
+    /// Nodes along a side.
+    pub side: usize,
+}
+
+impl Nodes {
+    /// Those within `reach` of a place along an axis, as the first and the one after the last.
+    pub(super) fn near(&self, axis: usize, place: f64, reach: f64) -> (usize, usize) {
+        let (first, side) = (self.first[axis] as f64, self.side as f64);
+        let from = (place - reach - first).clamp(0.0, side);
+        let to = place + reach - first;
+        // Rounded up, and down: a cast cuts off.
+        let whole = from as usize;
+        let from = whole + usize::from((whole as f64) < from);
+        let to = if to < 0.0 { 0 } else { to as usize + 1 };
+        (from, to.min(self.side))
+    }
+}
+
+/// Which way a line runs.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Axis {
+    East,
+    North,
+}
+
+impl Axis {
+    /// Samples across lines of this axis, and along them.
+    pub(super) const fn sizes(self, block: &Samples) -> (usize, usize) {
+        match self {
+            Self::North => (block.columns, block.rows),
+            Self::East => (block.rows, block.columns),
+        }
+    }
+
+    pub(super) const fn at(self, block: &Samples, across: usize, along: usize) -> usize {
+        match self {
+            Self::North => block.at(across, along),
+            Self::East => block.at(along, across),
+        }
+    }
+
+    /// The axis of its nodes across lines: 0 east, 1 north.
+    pub(super) const fn across(self) -> usize {
+        1 - self.along()
+    }
+
+    /// The axis of its nodes along lines.
+    pub(super) const fn along(self) -> usize {
+        match self {
+            Self::East => 0,
+            Self::North => 1,
+        }
+    }
+
+    pub(super) const fn node(self, side: usize, across: usize, along: usize) -> usize {
+        match self {
+            Self::North => along * side + across,
+            Self::East => across * side + along,
+        }
+    }
+}
+
+impl Samples {
+    pub(super) const fn at(&self, column: usize, row: usize) -> usize {
+        row * self.columns + column
+    }
+
+    /// The bilinear height at a node, in parts of a cell from the first sample; NaN in a hole.
+    pub(super) fn between(&self, node: [usize; 2], parts: usize) -> f64 {
+        let [(column, east), (row, north)] = node.map(|node| (node / parts, node % parts));
+        let mix = |from: usize, to: usize, share: usize, at: &dyn Fn(usize) -> f64| match share {
+            // The next sample has no weight, also where it is a hole.
+            0 => at(from),
+            _ => {
+                let share = share as f64 / parts as f64;
+                at(from) * (1.0 - share) + at(to) * share
+            }
+        };
+        mix(row, row + 1, north, &|row| {
+            mix(column, column + 1, east, &|column| {
+                self.heights[self.at(column, row)]
+            })
+        })
+    }
+}
+
+/// What of a block bears a ball.
+pub(super) struct Bearing {
+    pub(super) columns: usize,
+    /// Whether the patch north-east of a sample has four samples.
+    patches: Vec<bool>,
+    /// Samples of such patches; less than everything where a sample is of none.
+    pub(super) nodes: Vec<f64>,
+}
+
+impl Bearing {
+    pub(super) fn of(block: &Samples) -> Self {
+        let mut bearing = Self {
+            columns: block.columns,
+            patches: vec![false; block.heights.len()],
+            nodes: vec![f64::NEG_INFINITY; block.heights.len()],
+        };
+        for row in 0..block.rows.saturating_sub(1) {
+            for column in 0..block.columns.saturating_sub(1) {
+                let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
+                let corners = corners.map(|(x, y)| block.at(column + x, row + y));
+                if corners.iter().any(|at| block.heights[*at].is_nan()) {
+                    continue;
+                }
+                bearing.patches[corners[0]] = true;
+                for at in corners {
+                    bearing.nodes[at] = block.heights[at];
+                }
+            }
+        }
+        bearing
+    }
+
+    /// Returns true if a ball that touches a sample touches the ground beside it, too: along an axis
+    /// the ground turns up there, or goes straight on.
+    pub(super) fn is_between_stretches(&self, block: &Samples, at: usize) -> bool {
+        let (column, row) = (at % block.columns, at / block.columns);
+        [Axis::East, Axis::North].into_iter().any(|axis| {
+            let (line, place) = match axis {
+                Axis::East => (row, column),
+                Axis::North => (column, row),
+            };
+            let bears = |start: usize| self.bears(axis, line, start, false);
+            let last = axis.sizes(block).1 - 1;
+            if place == 0 || place == last || !bears(place - 1) || !bears(place) {
+                return false;
+            }
+            let height = |place: usize| block.heights[axis.at(block, line, place)];
+            height(place + 1) - height(place) >= height(place) - height(place - 1)
+        })
+    }
+
+    /// Returns true if a stretch of a line is in a patch with four samples, or on its edge.
+    pub(super) fn bears(&self, axis: Axis, line: usize, start: usize, within: bool) -> bool {
+        let patch = |line: usize| match axis {
+            Axis::North => self.patches[start * self.columns + line],
+            Axis::East => self.patches[line * self.columns + start],
+        };
+        patch(line) || (!within && line > 0 && patch(line - 1))
+    }
+}

@@ -1,0 +1,151 @@
+//! A page that is served to a browser and touched.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use serde_json::json;
+
+use crate::browser::{self, Browser, Page};
+use crate::server::Server;
+use crate::timeouts::wait_until;
+
+/// Software draws the pages: one at a time, and small ones.
+static ONE: Mutex<()> = Mutex::new(());
+pub(crate) const SIZE: [u32; 2] = [720, 480];
+/// The part of a picture with ground alone, which no slider is in: left, top, width, height.
+pub(crate) const GROUND: [f64; 4] = [0.1, 0.2, 0.52, 0.65];
+/// Colours of the proxy and of the force's arrow, as they are lit.
+pub(crate) const MARKS: [[u8; 3]; 2] = [[255, 140, 35], [255, 215, 50]];
+
+/// Waits until no other test has a page.
+pub(crate) fn one() -> MutexGuard<'static, ()> {
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A page in a browser, and what it is served from.
+pub(crate) struct Site {
+    pub(crate) browser: Browser,
+    pub(crate) page: Page,
+    address: String,
+    pub(crate) folder: tempfile::TempDir,
+}
+
+/// What `cargo xtask page --test` has built; none, and a line that says so, without it.
+fn built(what: &str) -> Option<PathBuf> {
+    let found = std::env::var_os(what).map(PathBuf::from);
+    if found.is_none() {
+        println!("SKIPPED: {what} is not set; cargo xtask page --test sets it");
+    }
+    found
+}
+
+impl Site {
+    /// Serves the page, with a terrain where there is one, and waits until it is touched.
+    pub(crate) fn open(terrain: Option<&Path>) -> Option<Self> {
+        let built = built("HAPTERRA_PAGE")?;
+        let Some(program) = browser::program() else {
+            println!("SKIPPED: no Chromium here; HAPTERRA_BROWSER can name one");
+            return None;
+        };
+        let folder = tempfile::tempdir().expect("a folder");
+        let site = folder.path().join("site");
+        let copied = Command::new("cp").arg("-r").args([&built, &site]).status();
+        assert!(copied.expect("cp").success());
+        if let Some(terrain) = terrain {
+            let words = ["cut", "--most-samples", "5000", "--output"];
+            hapterra(folder.path(), &words, &[&site, terrain])?;
+        }
+        let server = Server::bind(&site).expect("a port");
+        let address = server.address();
+        std::thread::spawn(|| server.serve());
+        let mut browser = Browser::start(&program, folder.path());
+        let page = browser.open_sized(&address, SIZE);
+        let mut site = Self {
+            browser,
+            page,
+            address,
+            folder,
+        };
+        site.wait("globalThis.hapterra?.touch.path.rows > 0");
+        Some(site)
+    }
+
+    pub(crate) fn value(&mut self, expression: &str) -> serde_json::Value {
+        self.browser.value(&self.page, expression)
+    }
+
+    pub(crate) fn text(&mut self, id: &str) -> String {
+        let value = self.value(&format!("document.getElementById('{id}').textContent"));
+        value.as_str().unwrap_or_default().to_owned()
+    }
+
+    /// Waits until an expression is true.
+    pub(crate) fn wait(&mut self, expression: &str) {
+        wait_until(expression, || self.value(expression) == true);
+    }
+
+    /// Moves the mouse to a place, in shares of the page.
+    pub(crate) fn point(&mut self, place: [f64; 2]) {
+        let [x, y] = px(place);
+        self.input("Mouse", json!({ "type": "mouseMoved", "x": x, "y": y }));
+    }
+
+    /// Sends an event of a device: `Mouse` or `Touch`.
+    pub(crate) fn input(&mut self, device: &str, event: serde_json::Value) {
+        let session = self.page.session().to_owned();
+        let method = format!("Input.dispatch{device}Event");
+        let _ = self.browser.call(&method, event, Some(&session));
+    }
+
+    /// Moves a slider as a person does.
+    pub(crate) fn slide(&mut self, id: &str, value: f64) {
+        let _ = self.value(&format!(
+            "(() => {{
+                const slider = document.getElementById('{id}');
+                slider.value = {value};
+                for (const name of ['input', 'change']) slider.dispatchEvent(new Event(name, {{ bubbles: true }}));
+            }})()"
+        ));
+    }
+
+    /// Drops a file on the page.
+    pub(crate) fn drop_file(&mut self, name: &str, bytes: &[u8]) {
+        let coded = BASE64_STANDARD.encode(bytes);
+        let _ = self.value(&format!(
+            "(() => {{
+                const bytes = Uint8Array.from(atob('{coded}'), (c) => c.charCodeAt(0));
+                const carried = new DataTransfer();
+                carried.items.add(new File([bytes], '{name}'));
+                dispatchEvent(new DragEvent('drop', {{ dataTransfer: carried, cancelable: true }}));
+            }})()"
+        ));
+    }
+
+    /// Fails if the page asked any other machine for anything.
+    pub(crate) fn check_requests(&self) {
+        let own = [self.address.as_str(), "data:", "blob:", "about:"];
+        let requests = &self.browser.requests;
+        let is_own = |asked: &&String| own.iter().any(|own| asked.starts_with(own));
+        let foreign: Vec<_> = requests.iter().filter(|asked| !is_own(asked)).collect();
+        assert!(foreign.is_empty(), "{foreign:?}");
+        assert!(requests.iter().any(|asked| asked.ends_with("/kernel.wasm")));
+    }
+}
+
+/// Runs the command in a folder; none where it was not built.
+pub(crate) fn hapterra(folder: &Path, words: &[&str], files: &[&Path]) -> Option<()> {
+    let mut command = Command::new(built("HAPTERRA")?);
+    command.current_dir(folder).args(words).args(files);
+    let done = command.output().expect("hapterra starts");
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{words:?}: {said}");
+    Some(())
+}
+
+/// A place in shares of the page, in its pixels.
+pub(crate) fn px(place: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|axis| place[axis] * f64::from(SIZE[axis]))
+}
