@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ._command import CommandError
     from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
     from ._native import Surface
+    from ._recording import Recording, read_recording
+    from ._stability import stability
     from ._terrain import Terrain
 
 #: Where each name is. The command starts without numpy.
@@ -29,11 +31,14 @@ _MODULES = {
     "CommandError": "_command",
     "STEP": "_contact",
     "Contact": "_contact",
+    "Recording": "_recording",
     "State": "_contact",
     "Step": "_contact",
     "StepError": "_contact",
     "Surface": "_native",
     "Terrain": "_terrain",
+    "read_recording": "_recording",
+    "stability": "_stability",
     "to_dataframe": "_contact",
 }
 
@@ -41,11 +46,14 @@ __all__ = [
     "STEP",
     "CommandError",
     "Contact",
+    "Recording",
     "State",
     "Step",
     "StepError",
     "Surface",
     "Terrain",
+    "read_recording",
+    "stability",
     "to_dataframe",
 ]
 

@@ -4,9 +4,15 @@ from collections.abc import Sequence
 from typing import Literal, final
 
 _Vector = tuple[float, float, float]
+_Pair = tuple[float, float]
 
 def main(arguments: Sequence[str], program: Sequence[str]) -> int:
     """Runs the command with these arguments, once a process; `program` starts it again."""
+
+def recording(
+    path: str,
+) -> tuple[str | None, list[tuple[str, str, bytes, list[str]]], bool]:
+    """Settings as JSON, columns as name, type, bytes and texts, and whether the last row was cut."""
 
 @final
 class Surface:
@@ -43,7 +49,19 @@ class Terrain:
         south_first: bool,
         materials: bytes | None = None,
     ) -> Terrain: ...
+    @staticmethod
+    def open(paths: Sequence[str], words: Sequence[str]) -> Terrain: ...
+    def window(
+        self, at: _Pair, lonlat: bool, size_mm: _Pair, words: Sequence[str]
+    ) -> Terrain: ...
+    def mm_at(self, at: _Pair, lonlat: bool) -> _Pair: ...
+    def ground_at(self, mm: _Pair, lonlat: bool) -> _Pair: ...
+    def stated(self) -> list[tuple[str, str]]: ...
     def height_mm(self, east_mm: float, north_mm: float) -> float | None: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def scale(self) -> _Pair: ...
     @property
     def size_mm(self) -> tuple[float, float]: ...
 
