@@ -200,6 +200,23 @@ def test_window_is_the_ground_round_a_place(tmp_path):
     assert finer.place(at, size_mm=(6, 6)).height_mm_per_unit == finer.height_mm_per_unit
 
 
+def test_cells_of_a_window_are_true_at_its_place(tmp_path):
+    heights = np.add.outer(np.zeros(3600), 0.1 * np.arange(240)).astype("f4")
+    transform = rasterio.Affine(1 / 360, 0, 7.6, 0, -1 / 360, 60.0)
+    file = written(tmp_path / "d.tif", heights, transform, "EPSG:4326")
+    whole = Terrain.open(file, scale="30 m/mm")
+    for latitude in (51.0, 59.0):
+        window = whole.place((7.9, latitude), size_mm=(60, 60))
+        east, north = window.mm_at(7.9, latitude)
+        assert window.ground_at(east, north) == pytest.approx((7.9, latitude), abs=1e-9)
+        # A degree of longitude, mm, and 36 m of height.
+        metres = 111_320 * np.cos(np.radians(latitude))
+        assert window.mm_at(8.9, latitude)[0] - east == pytest.approx(metres / 30, rel=4e-3)
+        rise = window.height_mm(east + 10, north) - window.height_mm(east, north)
+        assert rise == pytest.approx(10 * 36 / metres, rel=4e-3)
+    assert whole.place((7.9, 59), size_mm=(60, 60)).cell_mm < whole.place((7.9, 51), size_mm=(9, 9)).cell_mm
+
+
 def test_window_begins_where_its_contact_does(tmp_path):
     whole = Terrain.open(written(tmp_path / "hills.tif"), cell_mm=0.5)
     window = whole.place((501_800, 3_998_400), size_mm=(40, 30))
