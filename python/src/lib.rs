@@ -4,7 +4,11 @@
 //! CPython 3.9 has no buffers; `package/hapterra/*.py` has numpy on its side. Errors of the library are
 //! `ValueError`s with its texts.
 
+mod command;
 mod contact;
+mod notes;
+mod open;
+mod recording;
 mod surface;
 mod terrain;
 mod ticks;
@@ -16,7 +20,11 @@ use pyo3::{PyErr, PyResult, pymodule};
 #[pymodule]
 mod _native {
     #[pymodule_export]
+    use super::command::main;
+    #[pymodule_export]
     use super::contact::Contact;
+    #[pymodule_export]
+    use super::recording::recording;
     #[pymodule_export]
     use super::surface::Surface;
     #[pymodule_export]

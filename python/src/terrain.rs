@@ -1,13 +1,22 @@
-//! Terrains of arrays.
+//! Terrains of arrays, and of what the command opens.
 
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use hapterra::place::Coordinates;
 use hapterra_touch::{Height, RowOrder, Terrain as Touched};
 use pyo3::{PyResult, Python, pyclass, pymethods};
 
-use crate::{numbers, refused};
+use crate::open::Opened;
+use crate::{notes, numbers, refused};
 
-/// Heights of one of the types that the library keeps.
+/// Heights of one of the types that the library keeps, or a terrain that stays where it is.
 #[pyclass(frozen, module = "hapterra._native")]
-pub(crate) struct Terrain(pub(crate) Touched);
+pub(crate) struct Terrain {
+    pub(crate) touched: Touched,
+    pub(crate) opened: Option<Arc<Opened>>,
+}
 
 /// An array of heights as bytes, row by row.
 struct Samples<'a> {
@@ -77,24 +86,106 @@ impl Terrain {
                     .map_err(refused)?,
                 None => terrain,
             };
-            Ok(Self(terrain))
+            Ok(Self {
+                touched: terrain,
+                opened: None,
+            })
         })
     }
 
     /// The same ground under a ball of a radius.
     fn with_tip(&self, tip_mm: f64) -> PyResult<Self> {
-        let terrain = self.0.clone().with_tip(tip_mm);
-        terrain.map(Self).map_err(refused)
+        let touched = self.touched.clone().with_tip(tip_mm).map_err(refused)?;
+        let opened = self.opened.clone();
+        Ok(Self { touched, opened })
+    }
+
+    /// A terrain of files, by the command's options.
+    #[staticmethod]
+    fn open(py: Python<'_>, paths: Vec<PathBuf>, words: Vec<OsString>) -> PyResult<Self> {
+        notes::listen();
+        let opened = py.detach(|| Self::of(Opened::open(paths, words)?));
+        notes::warn(py)?;
+        opened
+    }
+
+    /// A window of an opened terrain round a place.
+    fn window(
+        &self,
+        py: Python<'_>,
+        at: [f64; 2],
+        lonlat: bool,
+        size_mm: [f64; 2],
+        words: Vec<OsString>,
+    ) -> PyResult<Self> {
+        let at = (at, coordinates(lonlat));
+        py.detach(|| Self::of(self.opened()?.window(at, size_mm, words)?))
+    }
+
+    /// Millimetres east and north of a place.
+    fn mm_at(&self, at: [f64; 2], lonlat: bool) -> PyResult<(f64, f64)> {
+        Ok(self.opened()?.mm_at(at, coordinates(lonlat))?.into())
+    }
+
+    /// The place of millimetres east and north.
+    fn ground_at(&self, mm: [f64; 2], lonlat: bool) -> PyResult<(f64, f64)> {
+        Ok(self.opened()?.ground_at(mm, coordinates(lonlat))?.into())
+    }
+
+    /// What the file states, as pairs of a name and a text.
+    fn stated(&self) -> PyResult<Vec<(&'static str, String)>> {
+        Ok(self.opened()?.stated())
     }
 
     /// The height of the surface, mm; none in a hole and off the terrain.
-    fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
-        self.0.height_mm(east_mm, north_mm)
+    fn height_mm(&self, py: Python<'_>, east_mm: f64, north_mm: f64) -> PyResult<Option<f64>> {
+        let height = || self.touched.height_mm(east_mm, north_mm);
+        let Some(opened) = &self.opened else {
+            return Ok(height());
+        };
+        let height_mm = py.detach(|| opened.check(height));
+        notes::warn(py)?;
+        height_mm
+    }
+
+    /// Rows and columns.
+    #[getter]
+    fn shape(&self) -> (u32, u32) {
+        let [columns, rows] = self.touched.samples();
+        (rows, columns)
+    }
+
+    /// Millimetres a cell, and a unit of the heights.
+    #[getter]
+    fn scale(&self) -> (f64, f64) {
+        let scale = self.touched.scale();
+        (scale.cell_mm(), scale.height_mm_per_unit())
     }
 
     /// Extent east and north, mm.
     #[getter]
     fn size_mm(&self) -> (f64, f64) {
-        self.0.size_mm().into()
+        self.touched.size_mm().into()
+    }
+}
+
+impl Terrain {
+    fn of(opened: Arc<Opened>) -> PyResult<Self> {
+        Ok(Self {
+            touched: opened.touched()?,
+            opened: Some(opened),
+        })
+    }
+
+    fn opened(&self) -> PyResult<&Arc<Opened>> {
+        let opened = self.opened.as_ref();
+        opened.ok_or_else(|| refused("a terrain of an array has no file"))
+    }
+}
+
+const fn coordinates(lonlat: bool) -> Coordinates {
+    match lonlat {
+        true => Coordinates::LonLat,
+        false => Coordinates::Own,
     }
 }

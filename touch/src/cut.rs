@@ -150,6 +150,11 @@ impl Terrain {
             let from = first.map(i64::from);
             let to = [0, 1].map(|axis| (from[axis] + POSTS as i64).min(end[axis]));
             let block = self.read(from, to, room)?;
+            if self.height_step > 0.0 {
+                for height in room.iter_mut() {
+                    *height = libm::round(*height / self.height_step) * self.height_step;
+                }
+            }
             return Ok(block.columns as usize);
         };
         let (samples, nodes) = self.samples_around(ball, first, POSTS, room)?;

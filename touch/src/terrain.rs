@@ -46,6 +46,8 @@ pub struct Terrain {
     /// What touches it, if it is no point.
     pub(crate) ball: Option<Ball>,
     tip_mm: f64,
+    /// Heights are rounded to multiples of this, cells; 0 where they stay as they are.
+    pub(crate) height_step: f64,
 }
 
 impl Terrain {
@@ -114,6 +116,7 @@ impl Terrain {
             materials: None,
             ball: None,
             tip_mm: 0.0,
+            height_step: 0.0,
         })
     }
 
@@ -177,6 +180,7 @@ impl Terrain {
             materials: None,
             ball: None,
             tip_mm: 0.0,
+            height_step: 0.0,
         })
     }
 
@@ -187,6 +191,17 @@ impl Terrain {
     pub fn with_height_scale(self, mm_per_unit: f64) -> Result<Self, TerrainError> {
         let scale = Scale::new(self.scale.cell_mm(), mm_per_unit)?;
         Ok(Self { scale, ..self })
+    }
+
+    /// The same terrain with heights rounded to multiples of a step in cells, 0 for none:
+    /// `hapterra replay` does so where it interpolates between the samples of a file.
+    #[must_use]
+    pub fn with_height_step(self, cells: f64) -> Self {
+        let height_step = if cells > 0.0 { cells } else { 0.0 };
+        Self {
+            height_step,
+            ..self
+        }
     }
 
     /// The same ground with a material for each sample: an index of the surface's table

@@ -5,6 +5,7 @@
 //! origin at the south-west sample at height zero.
 
 mod bounded;
+mod columns;
 mod comments;
 mod csv;
 mod fault;
@@ -19,6 +20,7 @@ use hapterra_core::grid::{GridPoint, MAX_CELL};
 pub use hapterra_touch::ticks::Row;
 use hapterra_touch::ticks::TimeFault;
 
+pub use columns::{ColumnValues, RecordedColumns};
 pub use fault::TrajectoryError;
 pub use felt_rows::{FeltRow, FeltRows};
 
