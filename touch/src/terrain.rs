@@ -319,6 +319,17 @@ impl Terrain {
         (!hole).then(|| mix(mix(sw, se, u), mix(nw, ne, u), v))
     }
 
+    /// Writes the heights of a block as they came, row by row from the south, in the vertical unit.
+    ///
+    /// # Errors
+    /// [`Unread`] of a callback.
+    ///
+    /// # Panics
+    /// A block beyond the terrain, or more heights than `heights` has room for.
+    pub fn read(&self, block: Block, heights: &mut [f64]) -> Result<(), Unread> {
+        self.heights.read(block, heights)
+    }
+
     pub(crate) fn size(&self) -> FieldSize {
         // Checked: at most MAX_CELL samples.
         FieldSize::new(self.columns as i32 - 1, self.rows as i32 - 1)

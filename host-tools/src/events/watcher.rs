@@ -1,11 +1,13 @@
 //! From samples to events: what has changed.
 
+use std::num::NonZeroU32;
+
 use hapterra_core::guard::{Fault, Limits, Mode};
 use hapterra_core::scene::Sample;
 
 use super::line::{At, Event, Line, Place};
 use super::server::Sender;
-use crate::replay::{Mark, Record, mode_name};
+use crate::replay::{Mark, Record, mode_name, state_name};
 use crate::terrain::Terrain;
 
 /// Between two places that are told, s of the device's time.
@@ -39,6 +41,10 @@ pub struct Watcher {
     readers: u64,
     /// The HIP of the sample before, with its view.
     before: Option<(usize, Record)>,
+    /// Every so many samples one is told.
+    every: Option<NonZeroU32>,
+    /// Samples since the last one that was told.
+    samples: u32,
 }
 
 impl Watcher {
@@ -57,7 +63,15 @@ impl Watcher {
             told: Told::default(),
             readers: 0,
             before: None,
+            every: None,
+            samples: 0,
         }
+    }
+
+    /// The same, which tells every so many samples one.
+    #[must_use]
+    pub fn with_samples(self, every: Option<NonZeroU32>) -> Self {
+        Self { every, ..self }
     }
 
     /// Takes a sample, its row and the view in which it was felt.
@@ -99,18 +113,42 @@ impl Watcher {
             self.tell_place(record, terrain);
         }
         self.before = Some((view, *record));
+        if let Some(every) = self.every {
+            self.tell_sample(every, sample, record, view);
+        }
     }
 
     /// Takes a mark.
     pub fn mark(&self, mark: &Mark) {
+        self.say(&Event::Mark {
+            marked_tick: mark.tick,
+            marked_t_s: mark.t_s,
+            host_unix_s: mark.host_unix_s,
+            text: &mark.text,
+        });
+    }
+
+    /// Takes what no sample shows, as of the latest tick.
+    pub fn say(&self, event: &Event<'_>) {
         if self.sender.readers_so_far().is_some() {
-            self.tell(&Event::Mark {
-                marked_tick: mark.tick,
-                marked_t_s: mark.t_s,
-                host_unix_s: mark.host_unix_s,
-                text: &mark.text,
-            });
+            self.tell(event);
         }
+    }
+
+    fn tell_sample(&mut self, every: NonZeroU32, sample: &Sample, record: &Record, view: usize) {
+        self.samples += 1;
+        if self.samples < every.get() {
+            return;
+        }
+        self.samples = 0;
+        self.tell(&Event::Sample {
+            hip_mm: record.hip_mm,
+            proxy_mm: record.proxy_mm,
+            force_n: record.force_n,
+            state: state_name(sample.state),
+            mode: mode_name(sample.mode),
+            view,
+        });
     }
 
     fn tell(&self, event: &Event<'_>) {
