@@ -4,6 +4,7 @@
 //! CPython 3.9 has no buffers; `package/hapterra/*.py` has numpy on its side. Errors of the library are
 //! `ValueError`s with its texts.
 
+mod command;
 mod contact;
 mod surface;
 mod terrain;
@@ -15,6 +16,8 @@ use pyo3::{PyErr, PyResult, pymodule};
 /// The module.
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::command::main;
     #[pymodule_export]
     use super::contact::Contact;
     #[pymodule_export]

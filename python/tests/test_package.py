@@ -67,7 +67,21 @@ def test_example_in_the_readme_draws_forces(tmp_path):
     assert (tmp_path / "forces.png").stat().st_size > 5000
 
 
-def test_numpy_is_all_that_an_import_takes():
-    code = "import sys, hapterra; print({'pandas', 'xarray', 'rasterio'} & set(sys.modules))"
+@pytest.mark.parametrize(
+    "code, free_of",
+    [
+        ("import hapterra", {"numpy", "pandas", "xarray", "rasterio"}),
+        ("from hapterra import *", {"pandas", "xarray", "rasterio"}),
+    ],
+)
+def test_imports_take_no_more_than_they_need(code, free_of):
+    code = f"import sys; {code}; print({free_of!r} & set(sys.modules))"
     told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert told.stdout.strip() == "set()"
+
+
+def test_names_are_all_there():
+    assert set(hapterra.__all__) == set(hapterra._MODULES)
+    assert set(hapterra.__all__) <= set(dir(hapterra))
+    with pytest.raises(AttributeError, match="module 'hapterra' has no attribute 'nothing'"):
+        hapterra.nothing

@@ -1,18 +1,13 @@
 """Runs against the command ``hapterra replay`` on the same heights: the same bits."""
 
 import csv
-import os
-import subprocess
 
 import numpy as np
 import pytest
 
 from hapterra import Contact, State, Surface, Terrain
+from hapterra._command import run
 
-HAPTERRA = os.environ.get("HAPTERRA")
-pytestmark = pytest.mark.skipif(
-    not HAPTERRA, reason="HAPTERRA does not name the command; cargo xtask python --test does"
-)
 CELL_MM = 0.7
 NAMES = {
     "free": {State.FREE},
@@ -66,7 +61,7 @@ def replayed(folder, heights, path, t=None, words=()):
     with (folder / "path.csv").open("w", newline="") as file:
         csv.writer(file).writerows([columns, *rows])
     files = [folder / "hills.npy", folder / "path.csv", "-o", folder / "felt.csv"]
-    subprocess.run([HAPTERRA, "replay", *files, *words], check=True, timeout=600)
+    run("replay", *files, *words)
     with (folder / "felt.csv").open(newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     return {name: [row[name] for row in rows] for name in rows[0]}

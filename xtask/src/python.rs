@@ -8,6 +8,10 @@ use anyhow::{Context, Result};
 use crate::deny;
 use crate::run::{cargo, output, root, run, run_quietly, say, target_dir, timed};
 
+/// How the wheel is built that is handed out, and the one that is tested: crates of the registry are
+/// those of the workspace's tests, since versions, features and profile are the same.
+const RELEASE: &str = "release";
+const TESTED: &str = "dev";
 /// Names the interpreter to use.
 const PYTHON: &str = "HAPTERRA_PYTHON";
 /// Prints the version of an interpreter that is new enough, and fails on others.
@@ -20,40 +24,39 @@ const VERSION: &str =
 /// # Errors
 /// What failed: the environment, which takes a network the first time, or the build.
 pub(crate) fn build() -> Result<Option<(PathBuf, PathBuf)>> {
+    build_by(RELEASE)
+}
+
+fn build_by(profile: &str) -> Result<Option<(PathBuf, PathBuf)>> {
     let Some(python) = interpreter()? else {
         say("SKIPPED: the Python package: there is no Python 3.9 or newer on the PATH");
         return Ok(None);
     };
     let python = environment(&python)?;
     install(&python, &["maturin>=1.8,<2"])?;
-    let wheel = timed("building the wheel", || wheel(&python))?;
+    let wheel = timed("building the wheel", || wheel(&python, profile))?;
     Ok(Some((python, wheel)))
 }
 
 /// Lints the package's crate, holds its dependencies to `deny.toml`, installs the wheel, and runs
-/// its tests with `hapterra` beside them. Without Python it ends well after one line.
+/// its tests. Without Python it ends well after one line.
 ///
 /// # Errors
 /// As [`build`], and what the tests say.
 pub(crate) fn test() -> Result<()> {
-    let Some((python, wheel)) = build()? else {
+    let Some((python, wheel)) = build_by(TESTED)? else {
         return Ok(());
     };
     timed("linting the Python package's crate", lint)?;
     deny::check_workspace("python/Cargo.toml")?;
-    timed("building the hapterra command", || {
-        run(cargo().args(["build", "--package", "hapterra", "--bin", "hapterra"]))
-    })?;
     install(&python, &[&format!("{}[test]", wheel.display())])?;
     // The version stays the same while one works on it.
     let again = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
     install(&python, &again)?;
-    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
     let mut tests = Command::new(&python);
     tests
         .args(["-m", "pytest"])
-        .current_dir(root().join("python"))
-        .env("HAPTERRA", target_dir().join("debug").join(program));
+        .current_dir(root().join("python"));
     timed("running the Python package's tests", || run(&mut tests))
 }
 
@@ -118,14 +121,14 @@ fn install(python: &Path, words: &[&str]) -> Result<()> {
 }
 
 /// The wheel, alone in its folder.
-fn wheel(python: &Path) -> Result<PathBuf> {
+fn wheel(python: &Path, profile: &str) -> Result<PathBuf> {
     let wheels = target_dir().join("wheels");
     if wheels.exists() {
         std::fs::remove_dir_all(&wheels).context("target/wheels cannot be emptied")?;
     }
     let mut maturin = Command::new(python);
     maturin
-        .args(["-m", "maturin", "build", "--release", "--locked"])
+        .args(["-m", "maturin", "build", "--locked", "--profile", profile])
         .arg("--interpreter")
         .arg(python)
         .arg("--out")
@@ -142,17 +145,48 @@ fn wheel(python: &Path) -> Result<PathBuf> {
 fn lint() -> Result<()> {
     let cargo = |words: &[&str]| {
         let mut command = cargo();
-        command.current_dir(root().join("python")).args(words);
+        command
+            .current_dir(root().join("python"))
+            .args(words)
+            .env("CARGO_TARGET_DIR", target_dir());
         command
     };
     run(&mut cargo(&["fmt", "--check"])).context("type: cd python && cargo fmt")?;
-    let clippy = ["clippy", "--release", "--locked", "--", "-D", "warnings"];
+    let clippy = ["clippy", "--locked", "--", "-D", "warnings"];
     run(&mut cargo(&clippy))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Names and versions of a lock file's packages.
+    fn locked(path: &str) -> Vec<(String, String)> {
+        let text = std::fs::read_to_string(root().join(path)).expect("a lock file");
+        let packages = text.split("[[package]]").skip(1);
+        let value = |package: &str, key: &str| {
+            let line = package.lines().find_map(|line| line.strip_prefix(key));
+            line.expect("name and version").to_owned()
+        };
+        packages
+            .map(|it| (value(it, "name = "), value(it, "version = ")))
+            .collect()
+    }
+
+    #[test]
+    fn crates_of_both_lock_files_have_the_same_versions() {
+        let (root, python) = (locked("Cargo.lock"), locked("python/Cargo.lock"));
+        let is_shared = |name: &str| root.iter().any(|(known, _)| known == name);
+        let other: Vec<_> = python
+            .iter()
+            .filter(|package| is_shared(&package.0) && !root.contains(package))
+            .collect();
+        assert!(python.len() > 200, "{}", python.len());
+        assert!(
+            other.is_empty(),
+            "{other:?} would be built twice: cp Cargo.lock python/ && cd python && cargo metadata --offline"
+        );
+    }
 
     #[test]
     fn programs_that_are_no_python_are_not_taken() {

@@ -35,6 +35,8 @@ mod terminal;
 pub mod view;
 pub mod viewing;
 
+use std::ffi::OsString;
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::{ArgAction, Parser, Subcommand};
@@ -87,12 +89,31 @@ pub enum Command {
     Bench(bench::Args),
 }
 
-/// Parses the command line, runs it and reports: 0 on success, 1 on failure,
-/// 2 on wrong usage.
+/// Runs the command with the arguments of this process: 0 on success, 1 on failure, 2 on wrong usage.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let mut words = std::env::args_os();
+    let name = words.next().unwrap_or_default();
+    let own = std::env::current_exe().map_or(name, OsString::from);
+    ExitCode::from(command_line(&[own], words))
+}
+
+/// Runs the command with these arguments and returns its exit code, as [`main`] does. `program` is
+/// what starts it again, with the same arguments: a program and the words before the arguments.
+///
+/// It listens to signals and starts the log of this process: one call a process.
+pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let words = ["hapterra".into()].into_iter().chain(arguments.clone());
+    let cli = match Cli::try_parse_from(words) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // A reader who goes away has seen enough of it.
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(2);
+        }
+    };
     let may_arm = matches!(cli.command, Command::Run(_) | Command::Bringup(_));
-    if may_arm && let Some(code) = guardian::watch() {
+    if may_arm && let Some(code) = guardian::watch(program, &arguments) {
         return code;
     }
     let log = log::to_stderr(cli.verbose);
@@ -114,11 +135,13 @@ pub fn main() -> ExitCode {
     };
     log.end();
     terminal::voice::finish();
+    // A process that is not this crate's own program does not do so at its end.
+    let _ = std::io::stdout().flush();
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             failure.report();
-            ExitCode::FAILURE
+            1
         }
     }
 }

@@ -14,12 +14,32 @@ and a spring between them makes the force. Forces are those of ``hapterra replay
 heights, bit for bit.
 """
 
-from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
-from ._native import Surface
-from ._terrain import Terrain
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ._command import CommandError
+    from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
+    from ._native import Surface
+    from ._terrain import Terrain
+
+#: Where each name is. The command starts without numpy.
+_MODULES = {
+    "CommandError": "_command",
+    "STEP": "_contact",
+    "Contact": "_contact",
+    "State": "_contact",
+    "Step": "_contact",
+    "StepError": "_contact",
+    "Surface": "_native",
+    "Terrain": "_terrain",
+    "to_dataframe": "_contact",
+}
 
 __all__ = [
     "STEP",
+    "CommandError",
     "Contact",
     "State",
     "Step",
@@ -28,3 +48,16 @@ __all__ = [
     "Terrain",
     "to_dataframe",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    globals()[name] = getattr(import_module(f".{_MODULES[name]}", __name__), name)
+    return globals()[name]
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -5,6 +5,9 @@ from typing import Literal, final
 
 _Vector = tuple[float, float, float]
 
+def main(arguments: Sequence[str], program: Sequence[str]) -> int:
+    """Runs the command with these arguments, once a process; `program` starts it again."""
+
 @final
 class Surface:
     """How a surface is rendered; `help(hapterra.Surface)` has units and bounds."""

@@ -31,20 +31,23 @@ mod process;
 #[cfg(unix)]
 mod worker;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
 
 pub(in crate::cli) use news::News;
 
-/// Starts this program again as the worker, and returns its exit code once it has ended;
-/// none in the worker itself.
-pub(in crate::cli) fn watch() -> Option<ExitCode> {
+/// Starts this program again as the worker, by the words that do so and its arguments, and returns
+/// its exit code once it has ended; none in the worker itself.
+pub(in crate::cli) fn watch(program: &[OsString], arguments: &[OsString]) -> Option<u8> {
     #[cfg(unix)]
     return match worker::begin() {
         true => None,
-        false => Some(process::watch()),
+        false => Some(process::watch(program, arguments)),
     };
     #[cfg(not(unix))]
-    None
+    {
+        let _ = (program, arguments);
+        None
+    }
 }
 
 /// Returns true in a worker, whose presses of Ctrl-C its guardian counts.

@@ -1,12 +1,13 @@
 //! The process that waits.
 
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs;
 use std::io::{self, ErrorKind, PipeReader, PipeWriter, Read, Write, pipe};
 use std::os::fd::AsRawFd;
 use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
-use std::process::{Child, Command, ExitCode, ExitStatus};
+use std::process::{Child, Command, ExitStatus};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -49,19 +50,19 @@ struct Watch {
 }
 
 /// Starts the worker and waits for its end; gives its exit code.
-pub(super) fn watch() -> ExitCode {
-    match Watch::begin() {
+pub(super) fn watch(program: &[OsString], arguments: &[OsString]) -> u8 {
+    match Watch::begin(program, arguments) {
         Ok(mut watch) => watch.until_end(),
         Err(error) => {
             let error = format!("cannot start the process that serves: {error}");
             Failure::new(error).report();
-            ExitCode::FAILURE
+            1
         }
     }
 }
 
 impl Watch {
-    fn begin() -> io::Result<Self> {
+    fn begin(program: &[OsString], arguments: &[OsString]) -> io::Result<Self> {
         let signals = Signals::new(ASK_FOR_AN_END)?;
         let (its_presses, presses) = pipe()?;
         let (news, its_news) = pipe()?;
@@ -73,8 +74,10 @@ impl Watch {
         let (me, (presses_fd, news_fd)) = (std::process::id(), descriptors);
         // Before the worker changes them.
         let terminal = tcgetattr(io::stdin()).ok();
-        let child = Command::new(std::env::current_exe()?)
-            .args(std::env::args_os().skip(1))
+        let (program, words) = program.split_first().ok_or(ErrorKind::NotFound)?;
+        let child = Command::new(program)
+            .args(words)
+            .args(arguments)
             .env(worker::VARIABLE, format!("{me}:{presses_fd}:{news_fd}"))
             .spawn()?;
         Ok(Self {
@@ -93,7 +96,7 @@ impl Watch {
         })
     }
 
-    fn until_end(&mut self) -> ExitCode {
+    fn until_end(&mut self) -> u8 {
         let mut was_killed = false;
         let status = loop {
             // Before the news: all of what the worker wrote is then there to read.
@@ -120,7 +123,7 @@ impl Watch {
             (false, Some(signal)) => 128 + signal,
             (false, None) => status.code().unwrap_or(1),
         };
-        ExitCode::from(u8::try_from(code).unwrap_or(1))
+        u8::try_from(code).unwrap_or(1)
     }
 
     /// Passes each signal on.

@@ -1,0 +1,127 @@
+"""The command that comes with the package."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapterra import CommandError, _command
+from hapterra._command import command, run
+
+OWN = [sys.executable, "-m", "hapterra"]
+
+
+@pytest.fixture
+def own(monkeypatch):
+    """The command of the package, also where another is named."""
+    monkeypatch.delenv("HAPTERRA", raising=False)
+
+
+def test_console_script_and_module_are_the_command(own):
+    script = Path(sys.executable).with_name("hapterra")
+    for words in (OWN, [script]):
+        told = subprocess.run([*words, "--version"], check=True, capture_output=True, text=True)
+        assert told.stdout.startswith("hapterra "), told
+    assert run("--version") == told.stdout
+
+
+def test_command_is_what_the_environment_names(monkeypatch, own):
+    assert command() == OWN
+    monkeypatch.setenv("HAPTERRA", "/opt/hapterra")
+    assert command() == ["/opt/hapterra"]
+
+
+def test_command_starts_without_numpy(own):
+    code = (
+        "import sys, runpy; sys.modules['numpy'] = None; sys.argv = ['hapterra', '--version'];"
+        "runpy.run_module('hapterra', run_name='__main__')"
+    )
+    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert told.stdout.startswith("hapterra ")
+
+
+def test_failures_have_the_text_and_the_hint(own, tmp_path):
+    with pytest.raises(CommandError) as failed:
+        run("info", tmp_path / "nothing.tif")
+    assert "nothing.tif" in failed.value.message and failed.value.hint
+    assert str(failed.value) == f"{failed.value.message}\nhint: {failed.value.hint}"
+    with pytest.raises(CommandError) as failed:
+        run("info", "--bnd", "2", "nothing.tif")
+    assert "unexpected argument '--bnd'" in failed.value.message
+    assert "Usage" not in failed.value.message and failed.value.hint is None
+    wrong = subprocess.run([*OWN, "inf"], capture_output=True)
+    assert wrong.returncode == 2
+
+
+def test_failure_without_an_error_line_has_the_exit_code():
+    failed = _command.error("something else\n", 101)
+    assert failed.message == "hapterra ended with exit code 101: something else"
+    several = _command.error("note: a\nerror: b\nerror: c: d\nhint: e\n", 1)
+    assert (several.message, several.hint) == ("c: d", "e")
+
+
+def test_command_runs_once_in_a_process():
+    code = (
+        "from hapterra import _native; assert _native.main(['--version'], []) == 0;"
+        "_native.main(['--version'], [])"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "RuntimeError: the command has run in this process" in told.stderr
+
+
+def serving(folder):
+    """Words of a command that serves until it is interrupted, and its recording."""
+    np.save(folder / "flat.npy", np.zeros((50, 50)))
+    words = ["run", folder / "flat.npy", "--device", "native", "--record", folder / "felt.csv"]
+    return list(map(str, words))
+
+
+def begun(folder):
+    """Waits until the recording of `serving` grows."""
+    while not any(it.stat().st_size for it in folder.iterdir() if "felt" in it.name):
+        time.sleep(0.02)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT there")
+def test_ctrl_c_ends_a_command_cleanly(tmp_path):
+    with subprocess.Popen(
+        [*OWN, *serving(tmp_path)], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as child:
+        begun(tmp_path)
+        child.send_signal(signal.SIGINT)
+        told = child.communicate()[1]
+    assert child.returncode == 0, told
+    assert "Traceback" not in told
+    assert (tmp_path / "felt.csv").read_text("utf-8").count("\n") > 10
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT there")
+def test_ctrl_c_ends_the_command_of_a_run(tmp_path, own, monkeypatch):
+    children, start = [], subprocess.Popen
+
+    def popen(*words, **how):
+        child = start(*words, **how)
+        children.append((child, os.getpgid(child.pid)))
+        return child
+
+    monkeypatch.setattr(_command.subprocess, "Popen", popen)
+
+    def interrupt():
+        begun(tmp_path)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt):
+        run(*serving(tmp_path))
+    thread.join()
+    [(child, group)] = children
+    # Not in the terminal's group, whose Ctrl-C would be a second one.
+    assert child.returncode == 0 and group == child.pid
+    assert (tmp_path / "felt.csv").exists()
