@@ -8,6 +8,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{JoinHandle, spawn};
 
 use hapterra::replay::Trajectory;
+use hapterra_core::wire::session::SessionEnd;
+use hapterra_tests::served::Served;
 use hapterra_tests::{hapterra_binary, repository};
 use serde_json::Value;
 
@@ -85,8 +87,8 @@ struct Telling {
     child: Child,
     stdin: Option<ChildStdin>,
     events: JoinHandle<Vec<Value>>,
-    /// Names the kind of each event as it comes.
-    kinds: Receiver<String>,
+    /// Each event as it comes.
+    coming: Receiver<Value>,
     /// Readers of events that never read.
     stuck: TcpStream,
     stderr: JoinHandle<Vec<String>>,
@@ -111,26 +113,28 @@ impl Telling {
         let address = address.expect("where it listens");
         let connect = || TcpStream::connect(&address).expect("connected");
         let (stream, stuck) = (connect(), connect());
-        let (name, kinds) = channel();
+        let (came, coming) = channel();
         let events = spawn(move || {
             let lines = BufReader::new(stream).lines().map_while(Result::ok);
             let parsed = lines.map(|line| serde_json::from_str(&line).expect("JSON"));
-            let named = |event: &Value| drop(name.send(event["event"].to_string()));
-            parsed.inspect(named).collect::<Vec<Value>>()
+            parsed
+                .inspect(|event: &Value| drop(came.send(event.clone())))
+                .collect::<Vec<Value>>()
         });
         Self {
             stdin: child.stdin.take(),
             child,
             events,
-            kinds,
+            coming,
             stuck,
             stderr: spawn(move || told.lines().map_while(Result::ok).collect()),
         }
     }
 
-    fn wait_for(&self, kind: &str) {
-        let kind = Value::from(kind).to_string();
-        assert!(self.kinds.iter().any(|it| it == kind), "no {kind}");
+    /// The next event of a kind.
+    fn wait_for(&self, kind: &str) -> Value {
+        let next = self.coming.iter().find(|event| event["event"] == *kind);
+        next.unwrap_or_else(|| panic!("no {kind}"))
     }
 
     /// All events, once it has ended well.
@@ -403,6 +407,29 @@ fn run_ends_disarmed_when_its_input_ends() {
     let refused = hapterra(&words).output().expect("started");
     let told = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(told.contains("hint: add --commands -"), "{told}");
+}
+
+/// A real arm is zeroed by the answer to the question that was asked, and by no other.
+#[test]
+fn enter_answers_the_question_of_its_number() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hills = hills_in(folder.path(), "64");
+    let served = Served::start();
+    let device = format!("tcp:{}", served.address);
+    let words = ["run", text(&hills), "--device", &device, "--unchecked"];
+    let mut run = Telling::start(&[&words[..], &["--commands", "-", "--end-with-input"]].concat());
+    let asks = run.wait_for("arming")["asks"].as_u64().expect("a question");
+    let mut stdin = run.stdin.take().expect("piped");
+    writeln!(stdin, "enter {}", asks + 1).expect("taken");
+    let refused = run.wait_for("refused")["text"].to_string();
+    assert!(refused.contains("is not open"), "{refused}");
+    writeln!(stdin, "enter {asks}").expect("taken");
+    let zeroed = run.wait_for("arming")["lines"].to_string();
+    assert!(zeroed.contains("zeroed at 0 0 0 counts"), "{zeroed}");
+    // Without its program it says goodbye.
+    drop(stdin);
+    assert_eq!(run.end().last().expect("events")["disarmed"], true);
+    assert_eq!(served.last_end(), SessionEnd::Goodbye);
 }
 
 #[test]

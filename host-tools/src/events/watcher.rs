@@ -41,6 +41,8 @@ pub struct Watcher {
     readers: u64,
     /// The HIP of the sample before, with its view.
     before: Option<(usize, Record)>,
+    /// The last lines about arming, and readers that had come when they were told.
+    arming: (Vec<String>, u64),
     /// Every so many samples one is told.
     every: Option<NonZeroU32>,
     /// Samples since the last one that was told.
@@ -63,6 +65,7 @@ impl Watcher {
             told: Told::default(),
             readers: 0,
             before: None,
+            arming: (vec![], 0),
             every: None,
             samples: 0,
         }
@@ -126,6 +129,26 @@ impl Watcher {
             host_unix_s: mark.host_unix_s,
             text: &mark.text,
         });
+    }
+
+    /// Takes new lines about arming, where there are any, and the question that is open now, of
+    /// which readers that come later are told, too.
+    pub fn arming(&mut self, new: Vec<String>, asks: Option<u32>) {
+        let Some(readers) = self.sender.readers_so_far() else {
+            if !new.is_empty() {
+                self.arming = (new, 0);
+            }
+            return;
+        };
+        let is_late = asks.is_some() && readers != self.arming.1;
+        if !new.is_empty() {
+            self.arming.0.clone_from(&new);
+        } else if !is_late {
+            return;
+        }
+        self.arming.1 = readers;
+        let lines = &self.arming.0;
+        self.tell(&Event::Arming { lines, asks });
     }
 
     /// Takes what no sample shows, as of the latest tick.

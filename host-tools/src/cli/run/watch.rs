@@ -202,16 +202,12 @@ impl<'t> Onlooker<'t> for Watch<'t> {
     }
 
     fn asks(&mut self) -> Vec<Ask> {
-        let (speaker, events) = (&self.speaker, &self.events);
         let lines = self.prompts.lines();
-        lines.iter().for_each(|line| speaker.tell(line));
-        if let (Some(events), false) = (events, lines.is_empty()) {
-            let asks = self.prompts.asks();
-            events.say(&Told::Arming {
-                lines: &lines,
-                asks,
-            });
+        lines.iter().for_each(|line| self.speaker.tell(line));
+        if let Some(events) = &mut self.events {
+            events.arming(lines, self.prompts.asks());
         }
+        let (speaker, events) = (&self.speaker, &self.events);
         let refuse = |text: String| {
             if let Some(events) = events {
                 events.say(&Told::Refused { text: &text });
