@@ -15,20 +15,20 @@ use crate::{numbers, refused};
 /// Bytes of a row of steps: `STEP` of `package/hapterra/_contact.py`.
 const ROW: usize = 72;
 /// Steps between two looks at whether Ctrl-C was pressed.
-const UNINTERRUPTED: usize = 4096;
+pub(crate) const UNINTERRUPTED: usize = 4096;
 
 /// One HIP over a terrain.
 #[pyclass(frozen, module = "hapterra._native")]
 pub(crate) struct Contact {
     contact: Mutex<Touched>,
-    rate_hz: u32,
+    pub(crate) rate_hz: u32,
 }
 
 /// Force, N, proxy, mm, number of the state, and the surface over a HIP that is below ground, mm.
 type Answer = ((f32, f32, f32), (f64, f64, f64), u8, Option<f64>);
 
 /// Rows of steps, remarks on times, and why the step after the rows has not happened.
-type Run<'py> = (Bound<'py, PyByteArray>, Vec<String>, Option<String>);
+pub(crate) type Run<'py> = (Bound<'py, PyByteArray>, Vec<String>, Option<String>);
 
 #[pymethods]
 impl Contact {
@@ -50,18 +50,7 @@ impl Contact {
     /// A step for each tick of a path of 3 f8 a row, by times of f8 where there are such.
     #[pyo3(signature = (path, t_s=None))]
     fn run<'py>(&self, py: Python<'py>, path: &[u8], t_s: Option<&[u8]>) -> PyResult<Run<'py>> {
-        let path = numbers(path, f64::from_ne_bytes)?;
-        let t_s = t_s
-            .map(|t_s| numbers(t_s, f64::from_ne_bytes))
-            .transpose()?;
-        let hz = f64::from(self.rate_hz);
-        let Ticks { ticks, remarks } = py.detach(|| {
-            let (path, _) = path.as_chunks();
-            match t_s {
-                None => Ok(by_row(path, 0.0, hz)),
-                Some(t_s) => by_time(&t_s, path, hz).map_err(refused),
-            }
-        })?;
+        let (ticks, remarks) = self.ticks(py, path, t_s)?;
         let contact = &mut *self.lock()?;
         let (mut rows, mut why) = (Vec::new(), None);
         for ticks in ticks.chunks(UNINTERRUPTED) {
@@ -82,7 +71,29 @@ impl Contact {
 }
 
 impl Contact {
-    fn lock(&self) -> PyResult<MutexGuard<'_, Touched>> {
+    /// The ticks of a path, and remarks on its times.
+    pub(crate) fn ticks(
+        &self,
+        py: Python<'_>,
+        path: &[u8],
+        t_s: Option<&[u8]>,
+    ) -> PyResult<(Vec<Tick>, Vec<String>)> {
+        let path = numbers(path, f64::from_ne_bytes)?;
+        let t_s = t_s
+            .map(|t_s| numbers(t_s, f64::from_ne_bytes))
+            .transpose()?;
+        let hz = f64::from(self.rate_hz);
+        let Ticks { ticks, remarks } = py.detach(|| {
+            let (path, _) = path.as_chunks();
+            match t_s {
+                None => Ok(by_row(path, 0.0, hz)),
+                Some(t_s) => by_time(&t_s, path, hz).map_err(refused),
+            }
+        })?;
+        Ok((ticks, remarks))
+    }
+
+    pub(crate) fn lock(&self) -> PyResult<MutexGuard<'_, Touched>> {
         self.contact.try_lock().map_err(|error| {
             PyRuntimeError::new_err(match error {
                 TryLockError::WouldBlock => {
@@ -116,7 +127,7 @@ fn write(rows: &mut Vec<u8>, (t_s, hip_mm): &Tick, step: &Step) {
 }
 
 /// The number of a state in `hapterra.State`, and the height of the surface over the HIP, mm.
-const fn number(state: State) -> (u8, Option<f64>) {
+pub(crate) const fn number(state: State) -> (u8, Option<f64>) {
     match state {
         State::Free => (0, None),
         State::Touching => (1, None),

@@ -1,7 +1,8 @@
 //! Terrains of arrays.
 
-use hapterra_touch::{Height, RowOrder, Terrain as Touched};
-use pyo3::{PyResult, Python, pyclass, pymethods};
+use hapterra_touch::{Block, Height, RowOrder, Terrain as Touched};
+use pyo3::types::PyBytes;
+use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
 
 use crate::{numbers, refused};
 
@@ -79,6 +80,26 @@ impl Terrain {
             };
             Ok(Self(terrain))
         })
+    }
+
+    /// Heights of some rows, counted from the south, as f8; none beyond the terrain.
+    fn rows<'py>(&self, py: Python<'py>, south: u32, count: u32) -> PyResult<Bound<'py, PyBytes>> {
+        let [columns, rows] = self.0.samples();
+        let count = count.min(rows.saturating_sub(south));
+        let block = Block {
+            column: 0,
+            row: south,
+            columns,
+            rows: count,
+        };
+        let mut heights = vec![0.0; columns as usize * count as usize];
+        let read = py.detach(|| self.0.read(block, &mut heights));
+        read.map_err(refused)?;
+        let bytes: Vec<u8> = heights
+            .iter()
+            .flat_map(|height| height.to_ne_bytes())
+            .collect();
+        Ok(PyBytes::new(py, &bytes))
     }
 
     /// The height of the surface, mm; none in a hole and off the terrain.

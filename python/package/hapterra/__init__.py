@@ -20,32 +20,53 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ._command import CommandError
+    from ._connect import Device, Mark, Params, Sample, connect
     from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
     from ._native import Surface
+    from ._session import DeviceError, NotDisarmedError
     from ._terrain import Terrain
+    from ._virtual_arm import ARM_STEP, VirtualArm
 
 #: Where each name is. The command starts without numpy.
 _MODULES = {
+    "ARM_STEP": "_virtual_arm",
     "CommandError": "_command",
     "STEP": "_contact",
     "Contact": "_contact",
+    "Device": "_connect",
+    "DeviceError": "_session",
+    "Mark": "_connect",
+    "NotDisarmedError": "_session",
+    "Params": "_connect",
+    "Sample": "_connect",
     "State": "_contact",
     "Step": "_contact",
     "StepError": "_contact",
     "Surface": "_native",
     "Terrain": "_terrain",
+    "VirtualArm": "_virtual_arm",
+    "connect": "_connect",
     "to_dataframe": "_contact",
 }
 
 __all__ = [
+    "ARM_STEP",
     "STEP",
     "CommandError",
     "Contact",
+    "Device",
+    "DeviceError",
+    "Mark",
+    "NotDisarmedError",
+    "Params",
+    "Sample",
     "State",
     "Step",
     "StepError",
     "Surface",
     "Terrain",
+    "VirtualArm",
+    "connect",
     "to_dataframe",
 ]
 

@@ -1,7 +1,7 @@
 """What is compiled. Use the names of `hapterra`."""
 
 from collections.abc import Sequence
-from typing import Literal, final
+from typing import Any, Literal, final
 
 _Vector = tuple[float, float, float]
 
@@ -29,6 +29,9 @@ class Surface:
         texture_seed: int = 0,
         materials: Sequence[Surface] = ...,
     ) -> Surface: ...
+    def params(self) -> dict[str, Any]:
+        """The parameters by their names, without those of a texture that is not there; of
+        `materials`, how many there are."""
 
 @final
 class Terrain:
@@ -43,6 +46,7 @@ class Terrain:
         south_first: bool,
         materials: bytes | None = None,
     ) -> Terrain: ...
+    def rows(self, south: int, count: int) -> bytes: ...
     def height_mm(self, east_mm: float, north_mm: float) -> float | None: ...
     @property
     def size_mm(self) -> tuple[float, float]: ...
@@ -57,3 +61,10 @@ class Contact:
         self, path: bytes, t_s: bytes | None = None
     ) -> tuple[bytearray, list[str], str | None]: ...
     def set_surface(self, surface: Surface) -> None: ...
+
+@final
+class VirtualArm:
+    def __new__(cls, home_mm: Sequence[float], hand: Sequence[float]) -> VirtualArm: ...
+    def run(
+        self, contact: Contact, targets: bytes, t_s: bytes | None = None
+    ) -> tuple[bytearray, list[str], str | None]: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Types of samples that are kept as they are; all others become f8.
 _KEPT = {"f8", "f4", "i4", "u4", "i2", "u2", "i1", "u1"}
+#: Samples that are written at a time.
+_WRITTEN = 1 << 20
 _SOUTH_FIRST = {"upper": False, "lower": True}
 
 
@@ -74,6 +77,7 @@ class Terrain:
         self.cell_mm = float(cell_mm)
         #: Millimetres of the hand for one unit of the heights.
         self.height_mm_per_unit = float(height_mm_per_unit)
+        self._has_materials = materials is not None
         #: What the data stated about itself; none of a plain array.
         self.source: dict[str, Any] | None = None
 
@@ -152,6 +156,22 @@ class Terrain:
     def height_mm(self, east_mm: float, north_mm: float) -> float | None:
         """The height of the surface at a place, mm; None in a hole and off the terrain."""
         return self._native.height_mm(east_mm, north_mm)
+
+    def _write(self, path: Path) -> tuple[str, dict[str, Any]]:
+        """Writes the heights as a file of the command. Returns it, and the options of its scale."""
+        if self._has_materials:
+            raise ValueError(
+                "materials of a Terrain cannot be loaded: give materials= and material_table=, files"
+            )
+        rows, columns = self.shape
+        heights = np.lib.format.open_memmap(path, "w+", "=f8", self.shape)
+        step = max(1, _WRITTEN // columns)
+        for south in range(0, rows, step):
+            block = np.frombuffer(self._native.rows(south, step), "=f8").reshape(-1, columns)
+            heights[rows - south - len(block) : rows - south] = block[::-1]
+        heights.flush()
+        scale = {"cell_mm": self.cell_mm, "height_mm_per_unit": self.height_mm_per_unit}
+        return str(path), scale
 
     def __repr__(self) -> str:
         rows, columns = self.shape
