@@ -16,7 +16,7 @@ use crate::{notes, numbers, refused};
 /// Bytes of a row of steps: `STEP` of `package/hapterra/_contact.py`.
 const ROW: usize = 72;
 /// Steps between two looks at whether Ctrl-C was pressed.
-const UNINTERRUPTED: usize = 4096;
+pub(crate) const UNINTERRUPTED: usize = 4096;
 
 /// One HIP over a terrain.
 #[pyclass(frozen, module = "hapterra._native")]
@@ -24,14 +24,14 @@ pub(crate) struct Contact {
     contact: Mutex<Touched>,
     /// What its terrain is read from, where that is a file.
     opened: Option<Arc<Opened>>,
-    rate_hz: u32,
+    pub(crate) rate_hz: u32,
 }
 
 /// Force, N, proxy, mm, number of the state, and the surface over a HIP that is below ground, mm.
 type Answer = ((f32, f32, f32), (f64, f64, f64), u8, Option<f64>);
 
 /// Rows of steps, remarks on times, and why the step after the rows has not happened.
-type Run<'py> = (Bound<'py, PyByteArray>, Vec<String>, Option<String>);
+pub(crate) type Run<'py> = (Bound<'py, PyByteArray>, Vec<String>, Option<String>);
 
 #[pymethods]
 impl Contact {
@@ -69,14 +69,7 @@ impl Contact {
     /// A step for each tick of a path of 3 f8 a row, by times of f8 where there are such.
     #[pyo3(signature = (path, t_s=None))]
     fn run<'py>(&self, py: Python<'py>, path: &[u8], t_s: Option<&[u8]>) -> PyResult<Run<'py>> {
-        let path = numbers(path, f64::from_ne_bytes)?;
-        let t_s = t_s
-            .map(|t_s| numbers(t_s, f64::from_ne_bytes))
-            .transpose()?;
-        let Ticks { ticks, remarks } = py.detach(|| {
-            let (path, _) = path.as_chunks();
-            Ticks::of(path, t_s.as_deref(), self.rate_hz).map_err(refused)
-        })?;
+        let (ticks, remarks) = self.ticks(py, path, t_s)?;
         let contact = &mut *self.lock()?;
         let (mut rows, mut why) = (Vec::new(), None);
         for ticks in ticks.chunks(UNINTERRUPTED) {
@@ -102,14 +95,32 @@ impl Contact {
 
 impl Contact {
     /// An error as Python has it: heights that cannot be read are an `OSError`.
-    fn raised(&self, error: StepError) -> PyErr {
+    pub(crate) fn raised(&self, error: StepError) -> PyErr {
         match (&self.opened, error) {
             (Some(opened), StepError::Unread(_)) => opened.unread(),
             _ => refused(error),
         }
     }
 
-    fn lock(&self) -> PyResult<MutexGuard<'_, Touched>> {
+    /// The ticks of a path, and remarks on its times.
+    pub(crate) fn ticks(
+        &self,
+        py: Python<'_>,
+        path: &[u8],
+        t_s: Option<&[u8]>,
+    ) -> PyResult<(Vec<Tick>, Vec<String>)> {
+        let path = numbers(path, f64::from_ne_bytes)?;
+        let t_s = t_s
+            .map(|t_s| numbers(t_s, f64::from_ne_bytes))
+            .transpose()?;
+        let Ticks { ticks, remarks } = py.detach(|| {
+            let (path, _) = path.as_chunks();
+            Ticks::of(path, t_s.as_deref(), self.rate_hz).map_err(refused)
+        })?;
+        Ok((ticks, remarks))
+    }
+
+    pub(crate) fn lock(&self) -> PyResult<MutexGuard<'_, Touched>> {
         self.contact.try_lock().map_err(|error| {
             PyRuntimeError::new_err(match error {
                 TryLockError::WouldBlock => {
@@ -143,7 +154,7 @@ fn write(rows: &mut Vec<u8>, (t_s, hip_mm): &Tick, step: &Step) {
 }
 
 /// The number of a state in `hapterra.State`, and the height of the surface over the HIP, mm.
-const fn number(state: State) -> (u8, Option<f64>) {
+pub(crate) const fn number(state: State) -> (u8, Option<f64>) {
     match state {
         State::Free => (0, None),
         State::Touching => (1, None),

@@ -12,6 +12,7 @@ mod recording;
 mod surface;
 mod terrain;
 mod ticks;
+mod virtual_arm;
 
 use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::{PyErr, PyResult, pymodule};
@@ -29,6 +30,8 @@ mod _native {
     use super::surface::Surface;
     #[pymodule_export]
     use super::terrain::Terrain;
+    #[pymodule_export]
+    use super::virtual_arm::VirtualArm;
 }
 
 /// An error of the library in Python.

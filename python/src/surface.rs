@@ -3,7 +3,8 @@
 use hapterra_touch::{
     Damping, ForceLaw, Friction, Material, Pattern, Shading, Surface as Touched, Texture,
 };
-use pyo3::{Py, PyResult, pyclass, pymethods};
+use pyo3::types::{PyDict, PyDictMethods};
+use pyo3::{Bound, Py, PyResult, Python, pyclass, pymethods};
 
 use crate::refused;
 
@@ -104,6 +105,31 @@ impl Surface {
         let materials: Vec<_> = materials.iter().map(of).collect();
         let surface = surface.with_materials(&materials).map_err(refused)?;
         Ok(Self { surface, others })
+    }
+
+    /// The parameters by the names of the constructor, without those of a texture that is not
+    /// there, and how many materials there are.
+    fn params<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let law = self.surface.params();
+        let params = PyDict::new(py);
+        params.set_item("stiffness", law.stiffness_n_per_mm)?;
+        params.set_item("max_force", law.max_force_n)?;
+        params.set_item("friction", law.friction.dynamic_mu)?;
+        params.set_item("static_friction", law.friction.static_mu)?;
+        params.set_item("viscous_friction", law.friction.viscous_s)?;
+        params.set_item("damping", law.damping.ns_per_m)?;
+        params.set_item("shading", name(SHADINGS, law.shading))?;
+        params.set_item("texture", name(PATTERNS, law.texture.pattern))?;
+        if !law.texture.is_none() {
+            params.set_item("texture_amplitude", law.texture.amplitude_mm)?;
+            params.set_item("texture_wavelength", law.texture.wavelength_mm)?;
+            params.set_item("texture_seed", law.texture.seed)?;
+        }
+        if law.texture.pattern == Pattern::Grating {
+            params.set_item("texture_direction", law.texture.direction_deg)?;
+        }
+        params.set_item("materials", self.others)?;
+        Ok(params)
     }
 
     fn __repr__(&self) -> String {

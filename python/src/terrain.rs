@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use hapterra::place::Coordinates;
-use hapterra_touch::{Height, RowOrder, Terrain as Touched};
-use pyo3::{PyResult, Python, pyclass, pymethods};
+use hapterra_touch::{Block, Height, RowOrder, Terrain as Touched};
+use pyo3::types::PyBytes;
+use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
 
 use crate::open::Opened;
 use crate::{notes, numbers, refused};
@@ -135,6 +136,29 @@ impl Terrain {
     /// What the file states, as pairs of a name and a text.
     fn stated(&self) -> PyResult<Vec<(&'static str, String)>> {
         Ok(self.opened()?.stated())
+    }
+
+    /// Heights of some rows, counted from the south, as f8; none beyond the terrain.
+    fn rows<'py>(&self, py: Python<'py>, south: u32, count: u32) -> PyResult<Bound<'py, PyBytes>> {
+        let [columns, rows] = self.touched.samples();
+        let count = count.min(rows.saturating_sub(south));
+        let block = Block {
+            column: 0,
+            row: south,
+            columns,
+            rows: count,
+        };
+        let mut heights = vec![0.0; columns as usize * count as usize];
+        let read = py.detach(|| self.touched.read(block, &mut heights));
+        read.map_err(|unread| match &self.opened {
+            Some(opened) => opened.unread(),
+            None => refused(unread),
+        })?;
+        let bytes: Vec<u8> = heights
+            .iter()
+            .flat_map(|height| height.to_ne_bytes())
+            .collect();
+        Ok(PyBytes::new(py, &bytes))
     }
 
     /// The height of the surface, mm; none in a hole and off the terrain.

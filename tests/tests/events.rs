@@ -2,11 +2,14 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::thread::spawn;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::{JoinHandle, spawn};
 
 use hapterra::replay::Trajectory;
+use hapterra_core::wire::session::SessionEnd;
+use hapterra_tests::served::Served;
 use hapterra_tests::{hapterra_binary, repository};
 use serde_json::Value;
 
@@ -71,40 +74,88 @@ fn near(told: &[f64], recorded: &[f64]) -> bool {
     told.len() == recorded.len() && told.iter().zip(recorded).all(is_near)
 }
 
+/// Hills in a folder.
+fn hills_in(folder: &Path, size: &str) -> PathBuf {
+    let hills = folder.join("hills.tif");
+    let made = hapterra(&["synth", "fractal", "-o", text(&hills), "--size", size]).status();
+    assert!(made.expect("started").success());
+    hills
+}
+
+/// A command that tells events, and what it tells.
+struct Telling {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    events: JoinHandle<Vec<Value>>,
+    /// Each event as it comes.
+    coming: Receiver<Value>,
+    /// Readers of events that never read.
+    stuck: TcpStream,
+    stderr: JoinHandle<Vec<String>>,
+}
+
+impl Telling {
+    fn start(words: &[&str]) -> Self {
+        let mut child = hapterra(&[words, &["--events", "0"]].concat())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("started");
+        let mut told = BufReader::new(child.stderr.take().expect("piped"));
+        let mut address = None;
+        while address.is_none() {
+            let mut line = String::new();
+            assert!(told.read_line(&mut line).expect("a line") > 0, "no address");
+            let rest = line.strip_prefix("events         ");
+            address = rest.map(|rest| rest.trim().to_owned());
+        }
+        let address = address.expect("where it listens");
+        let connect = || TcpStream::connect(&address).expect("connected");
+        let (stream, stuck) = (connect(), connect());
+        let (came, coming) = channel();
+        let events = spawn(move || {
+            let lines = BufReader::new(stream).lines().map_while(Result::ok);
+            let parsed = lines.map(|line| serde_json::from_str(&line).expect("JSON"));
+            parsed
+                .inspect(|event: &Value| drop(came.send(event.clone())))
+                .collect::<Vec<Value>>()
+        });
+        Self {
+            stdin: child.stdin.take(),
+            child,
+            events,
+            coming,
+            stuck,
+            stderr: spawn(move || told.lines().map_while(Result::ok).collect()),
+        }
+    }
+
+    /// The next event of a kind.
+    fn wait_for(&self, kind: &str) -> Value {
+        let next = self.coming.iter().find(|event| event["event"] == *kind);
+        next.unwrap_or_else(|| panic!("no {kind}"))
+    }
+
+    /// All events, once it has ended well.
+    fn end(mut self) -> Vec<Value> {
+        let stderr = self.stderr.join().expect("read to the end");
+        assert!(self.child.wait().expect("ended").success(), "{stderr:?}");
+        drop(self.stuck);
+        self.events.join().expect("read to the end")
+    }
+}
+
 /// All events of a run of five seconds over hills, its recording and what the examples said.
 #[test]
 fn a_run_tells_what_is_felt_and_examples_speak_and_sound_it() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [hills, record, commands] =
-        ["hills.tif", "felt.csv", "commands"].map(|name| folder.path().join(name));
-    let made = hapterra(&["synth", "fractal", "-o", text(&hills), "--size", "256"]).status();
-    assert!(made.expect("started").success());
+    let hills = hills_in(folder.path(), "256");
+    let [record, commands] = ["felt.csv", "commands"].map(|name| folder.path().join(name));
     std::fs::write(&commands, "at 4 mark a \"b\"\nat 4.1 zoom 1.5\n").expect("written");
     let words = ["run", text(&hills), "--device", "native", "--seconds", "6"];
     let more = ["--record", text(&record), "--commands", text(&commands)];
-    let mut run = hapterra(&[&words[..], &more, &["--events", "0"]].concat())
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("started");
-    let mut told = BufReader::new(run.stderr.take().expect("piped"));
-    let mut first = String::new();
-    told.read_line(&mut first).expect("a line");
-    let address = first
-        .strip_prefix("events         ")
-        .expect("where it listens");
-    let connect = || TcpStream::connect(address.trim()).expect("connected");
-    // Another reader never reads.
-    let (stream, stuck) = (connect(), connect());
-    let events = spawn(move || {
-        let lines = BufReader::new(stream).lines().map_while(Result::ok);
-        let parsed = lines.map(|line| serde_json::from_str(&line).expect("JSON"));
-        parsed.collect::<Vec<Value>>()
-    });
-    let told: Vec<_> = told.lines().map_while(Result::ok).collect();
-    assert!(run.wait().expect("ended").success(), "{told:?}");
-    drop(stuck);
-    let events = events.join().expect("read to the end");
+    let events = Telling::start(&[&words[..], &more, &["--event-samples", "10"]].concat()).end();
     judge(&events, &record);
     if let Some(example) = example("speak_heights.py") {
         let heights = said(example, &events);
@@ -163,7 +214,17 @@ fn judge(events: &[Value], record: &Path) {
                 "{event}: {force:?}"
             );
         }
-        if event["proxy_mm"].is_array() {
+        if event["event"] == "sample" {
+            let hip = ["x_mm", "y_mm", "z_mm"].map(number);
+            assert!(near(&numbers(&event["hip_mm"]), &hip), "{event}: {hip:?}");
+            let force = ["force_x_n", "force_y_n", "force_z_n"].map(number);
+            assert!(near(&numbers(&event["force_n"]), &force), "{event}");
+            for name in ["state", "mode"] {
+                assert_eq!(event[name], row_of(event)[column(name)], "{event}");
+            }
+            assert_eq!(event["view"].as_f64(), Some(number("view")), "{event}");
+        }
+        if event["ground"].is_array() {
             let proxy = ["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"].map(number);
             assert!(
                 near(&numbers(&event["proxy_mm"]), &proxy),
@@ -201,6 +262,24 @@ fn judge(events: &[Value], record: &Path) {
             );
         }
     }
+    let ticks = kind("sample").into_iter();
+    let ticks: Vec<_> = ticks.filter_map(|it| it["tick"].as_u64()).collect();
+    let first_tick = ticks.first().expect("samples");
+    let expected: Vec<_> = (0..ticks.len() as u64)
+        .map(|n| first_tick + 10 * n)
+        .collect();
+    assert_eq!(ticks, expected, "every tenth, and none is missing");
+    let last_row = rows.last().expect("rows")[column("tick")].parse::<u64>();
+    let since_sample = last_row.expect("a tick") - ticks.last().expect("samples");
+    assert!(
+        since_sample < 10,
+        "{since_sample} ticks after the last sample"
+    );
+    let last = events.last().expect("events");
+    assert_eq!(
+        (&last["event"], &last["disarmed"]),
+        (&"end".into(), &true.into())
+    );
     let contacts = kind("contact");
     assert!(
         contacts
@@ -240,12 +319,123 @@ fn judge(events: &[Value], record: &Path) {
     );
 }
 
+/// A demo tells what a run tells, refuses what it cannot do and has marks.
+#[test]
+fn demo_tells_samples_marks_and_refusals() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hills = hills_in(folder.path(), "64");
+    let out = folder.path().join("out");
+    let words = [
+        "demo",
+        text(&hills),
+        "--device",
+        "native",
+        "--out",
+        text(&out),
+    ];
+    let more = [
+        "--seconds",
+        "2.5",
+        "--event-samples",
+        "100",
+        "--commands",
+        "-",
+    ];
+    let mut demo = Telling::start(&[&words[..], &more].concat());
+    demo.wait_for("sample");
+    let mut stdin = demo.stdin.take().expect("piped");
+    stdin
+        .write_all(b"mark here\nenter 3\nnonsense\n")
+        .expect("taken");
+    drop(stdin);
+    let events = demo.end();
+    let kind = |kind: &str| -> Vec<_> { events.iter().filter(|it| it["event"] == *kind).collect() };
+    let samples = kind("sample").into_iter();
+    let ticks: Vec<_> = samples.filter_map(|it| it["tick"].as_u64()).collect();
+    assert!(
+        ticks.len() > 5 && ticks.windows(2).all(|pair| pair[1] - pair[0] == 100),
+        "{ticks:?}"
+    );
+    assert_eq!(kind("mark")[0]["text"], "here");
+    let refused: Vec<_> = kind("refused")
+        .iter()
+        .map(|it| it["text"].to_string())
+        .collect();
+    for why in ["asked nothing", "no such word"] {
+        assert!(refused.iter().any(|text| text.contains(why)), "{refused:?}");
+    }
+    assert_eq!(kind("end")[0]["disarmed"], true);
+}
+
+/// The program that gives commands is gone, and has left more undone than wait for a device.
+#[test]
+fn run_ends_disarmed_when_its_input_ends() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hills = hills_in(folder.path(), "64");
+    let record = folder.path().join("felt.csv");
+    let words = [
+        "run",
+        text(&hills),
+        "--device",
+        "native",
+        "--record",
+        text(&record),
+    ];
+    let mut run = Telling::start(&[&words[..], &["--commands", "-", "--end-with-input"]].concat());
+    run.wait_for("contact");
+    let mut stdin = run.stdin.take().expect("piped");
+    stdin
+        .write_all(&b"at 1000 zoom 2\n".repeat(2000))
+        .expect("taken");
+    drop(stdin);
+    let events = run.end();
+    let last = events.last().expect("events");
+    assert_eq!(last["disarmed"], true);
+    let t_s = last["t_s"].as_f64().expect("s");
+    assert!(
+        t_s < 9.0,
+        "it ended with its tour, {t_s} s, and not with its input"
+    );
+    assert!(record.is_file(), "the recording is complete");
+    let words = [
+        "run",
+        text(&hills),
+        "--commands",
+        text(&record),
+        "--end-with-input",
+    ];
+    let refused = hapterra(&words).output().expect("started");
+    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(told.contains("hint: add --commands -"), "{told}");
+}
+
+/// A real arm is zeroed by the answer to the question that was asked, and by no other.
+#[test]
+fn enter_answers_the_question_of_its_number() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hills = hills_in(folder.path(), "64");
+    let served = Served::start();
+    let device = format!("tcp:{}", served.address);
+    let words = ["run", text(&hills), "--device", &device, "--unchecked"];
+    let mut run = Telling::start(&[&words[..], &["--commands", "-", "--end-with-input"]].concat());
+    let asks = run.wait_for("arming")["asks"].as_u64().expect("a question");
+    let mut stdin = run.stdin.take().expect("piped");
+    writeln!(stdin, "enter {}", asks + 1).expect("taken");
+    let refused = run.wait_for("refused")["text"].to_string();
+    assert!(refused.contains("is not open"), "{refused}");
+    writeln!(stdin, "enter {asks}").expect("taken");
+    let zeroed = run.wait_for("arming")["lines"].to_string();
+    assert!(zeroed.contains("zeroed at 0 0 0 counts"), "{zeroed}");
+    // Without its program it says goodbye.
+    drop(stdin);
+    assert_eq!(run.end().last().expect("events")["disarmed"], true);
+    assert_eq!(served.last_end(), SessionEnd::Goodbye);
+}
+
 #[test]
 fn a_port_that_is_taken_is_an_error_before_anything_is_armed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let hills = folder.path().join("hills.tif");
-    let made = hapterra(&["synth", "fractal", "-o", text(&hills), "--size", "64"]).status();
-    assert!(made.expect("started").success());
+    let hills = hills_in(folder.path(), "64");
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port().to_string();
     let words = ["run", text(&hills), "--device", "native", "--events", &port];

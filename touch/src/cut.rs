@@ -149,7 +149,7 @@ impl Terrain {
             let end = [self.columns, self.rows].map(i64::from);
             let from = first.map(i64::from);
             let to = [0, 1].map(|axis| (from[axis] + POSTS as i64).min(end[axis]));
-            let block = self.read(from, to, room)?;
+            let block = self.read_cells(from, to, room)?;
             if self.height_step > 0.0 {
                 for height in room.iter_mut() {
                     *height = libm::round(*height / self.height_step) * self.height_step;
@@ -177,7 +177,7 @@ impl Terrain {
         let (from, along, nodes) = ball.around(first, side);
         let end = [self.columns, self.rows].map(i64::from);
         let to = [0, 1].map(|axis| (from[axis] + along as i64).min(end[axis]));
-        let block = self.read(from.map(|first| first.max(0)), to, room)?;
+        let block = self.read_cells(from.map(|first| first.max(0)), to, room)?;
         let mut heights = vec![f64::NAN; along * along];
         let beside = from.map(|first| first.min(0).unsigned_abs() as usize);
         let rows = heights.chunks_exact_mut(along).skip(beside[1]);
@@ -195,7 +195,7 @@ impl Terrain {
     }
 
     /// Reads samples of the field from one to before another, in felt cells: NaN in holes.
-    fn read(&self, from: [i64; 2], to: [i64; 2], room: &mut Vec<f64>) -> Result<Block, Unread> {
+    fn read_cells(&self, from: [i64; 2], to: [i64; 2], room: &mut Vec<f64>) -> Result<Block, Unread> {
         // Both are within the field.
         let count = |axis: usize| (to[axis] - from[axis]).max(0) as u32;
         let block = Block {

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use hapterra_core::grid::MAX_CELL;
 
 use crate::checks::{TerrainError, check_count, check_size, room_for};
-use crate::heights::{Array, Height, Heights, RowOrder, Steepest, survey};
+use crate::heights::{Array, Block, Height, Heights, RowOrder, Steepest, Unread, survey};
 use crate::scale::Scale;
 use crate::tip::Ball;
 
@@ -287,6 +287,17 @@ impl Terrain {
     #[must_use]
     pub const fn scale(&self) -> &Scale {
         &self.scale
+    }
+
+    /// Writes the heights of a block as they came, row by row from the south, in the vertical unit.
+    ///
+    /// # Errors
+    /// [`Unread`] of a callback.
+    ///
+    /// # Panics
+    /// A block beyond the terrain, or more heights than `heights` has room for.
+    pub fn read(&self, block: Block, heights: &mut [f64]) -> Result<(), Unread> {
+        self.heights.read(block, heights)
     }
 }
 

@@ -9,6 +9,7 @@ use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, OrHint};
 use super::options::emulated_board::{EmulatedBoard, RunsOn};
+use super::options::events::{self, EventOptions};
 use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
 use super::options::steering::{self, Commands, ViewControl};
@@ -16,6 +17,7 @@ use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::session_summary::{self, SessionSummary};
 use super::terminal::{interrupt, left_behind, progress, voice};
 use super::viewing::{Shown, ToBeShown, Viewing};
+use crate::events::{Event as Told, Watcher};
 use crate::link::{
     Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
 };
@@ -77,6 +79,10 @@ pub struct Args {
     /// How the view may be changed meanwhile.
     #[command(flatten)]
     pub commands: Commands,
+
+    /// Whether other programs are told what happens.
+    #[command(flatten)]
+    pub events: EventOptions,
 
     /// The emulated board.
     #[command(flatten)]
@@ -173,6 +179,7 @@ fn show(
         println!("{line}");
     }
     left_behind::tell([outputs.recording.as_path(), &outputs.picture]);
+    let server = args.events.listen()?;
     let (runs_on, mut control) = (device(args), control(args, placed, view)?);
     if let Some(line) = control.listen(&args.commands) {
         voice::put(std::io::stderr(), &format!("{line}\n"));
@@ -188,17 +195,19 @@ fn show(
         stop_s,
         control: &mut control,
         shown,
+        events: server.as_ref().map(|server| args.events.watcher(server, 1)),
     };
     let (toured, shown) = match runs_on {
         RunsOn::Native => {
             let mut device = Native::new(HostClock::default(), Some(Box::new(arm)));
-            if args.viewing.view {
+            if args.viewing.view || args.events.events.is_some() {
                 device = device.in_real_time();
             }
             tour.go(Box::new(device), Patience::EMULATED)?
         }
         RunsOn::Emulated => tour_emulated(args, tour, arm)?,
     };
+    server.into_iter().for_each(events::end);
     // The terminal is as it was.
     drop(control);
     let file = args.file.as_ref();
@@ -314,6 +323,7 @@ struct Tour<'p, 't> {
     control: &'p mut ViewControl<'t>,
     /// What shows it.
     shown: Option<ToBeShown<'t>>,
+    events: Option<Watcher>,
 }
 
 impl<'t> Tour<'_, 't> {
@@ -324,7 +334,8 @@ impl<'t> Tour<'_, 't> {
         patience: Patience,
     ) -> Result<(Toured<'t>, Option<Shown<'t>>), LinkError> {
         let (terrain, scene) = (self.placed.terrain(), self.placed.scene());
-        let (control, arming) = (self.control, Some(Arming::VIRTUAL));
+        let (control, mut events) = (self.control, self.events);
+        let arming = Some(Arming::VIRTUAL);
         let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
         let line = format!("device         {}\n", session_summary::device(&device));
         voice::put(std::io::stdout(), &line);
@@ -350,15 +361,29 @@ impl<'t> Tour<'_, 't> {
                     if let Some(shown) = &mut shown {
                         shown.take(sample, &record, log.view());
                     }
+                    if let Some(events) = &mut events {
+                        let (view, felt) = log.view();
+                        events.take(sample, &record, (view, &felt.terrain));
+                    }
                     rows.push((record, LoopColumns::of(sample, log.view().0)));
                 }
             });
-            control.look(log.t_s(), &mut |line| {
-                progress.suspend(|| voice::put(std::io::stderr(), &format!("{line}\n")));
-            });
+            let say = |line: String| progress.suspend(|| tell(line));
+            let refuse = |text: String| {
+                if let Some(events) = &events {
+                    events.say(&Told::Refused { text: &text });
+                }
+                say(text);
+            };
+            control.look(log.t_s(), &mut |text| refuse(text));
+            if control.entered().is_some() {
+                refuse("a virtual arm has asked nothing that `enter` answers".into());
+            }
             for mark in control.marks(&log, false) {
-                progress
-                    .suspend(|| voice::put(std::io::stderr(), &(steering::marked(&mark) + "\n")));
+                say(steering::marked(&mark));
+                if let Some(events) = &events {
+                    events.mark(&mark);
+                }
                 marks.push(mark);
             }
             for ask in control.asks() {
@@ -379,6 +404,10 @@ impl<'t> Tour<'_, 't> {
         // However the tour ended, the board is told; what it felt after the tour's end
         // is not shown.
         let left = session.say_goodbye(&mut |_| {});
+        if let Some(events) = &events {
+            let disarmed = left.is_ok();
+            events.say(&Told::End { disarmed });
+        }
         toured.and(left)?;
         let summary = SessionSummary {
             ticks,

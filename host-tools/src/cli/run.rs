@@ -27,6 +27,7 @@ use clap::ValueHint;
 use hapterra_core::wire::session::SILENCE_S;
 
 use super::failure::{Failure, OrHint};
+use super::options::events::{self, EventOptions};
 use super::options::placing::Placing;
 use super::options::rendering::Rendering;
 use super::options::steering::Commands;
@@ -36,7 +37,6 @@ use super::terminal::speaker::Speaker;
 use super::terminal::voice::tell;
 use super::terminal::{interrupt, left_behind};
 use super::viewing::{ToBeShown, Viewing};
-use crate::events::{Server, Watcher};
 use crate::link::{DeviceAddress, Patience};
 use crate::output::keep_apart;
 use crate::steering::keys::KEYS;
@@ -101,10 +101,9 @@ pub struct Args {
     #[command(flatten)]
     pub commands: Commands,
 
-    /// Tell what happens in lines of JSON on this port of 127.0.0.1, to any program of this
-    /// machine that connects; 0 takes a free one
-    #[arg(long, value_name = "PORT")]
-    pub events: Option<u16>,
+    /// Whether other programs are told what happens.
+    #[command(flatten)]
+    pub events: EventOptions,
 
     /// Whether it is shown.
     #[command(flatten)]
@@ -144,7 +143,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     inputs.extend(args.rendering.materials.inputs());
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
     left_behind::tell(outputs.iter().map(PathBuf::as_path));
-    let events = args.events.map(listen).transpose()?;
+    let events = args.events.listen()?;
     let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;
     let of_ground = (&args.rendering, &args.terrain.reading);
@@ -180,11 +179,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut seats = seats_for(args, &devices).into_iter();
     let each = devices.iter().zip(&placed).zip(met);
     let servings = each.zip(recordings.into_iter().zip(commands));
-    let senders = (1..).map(|number| {
-        let sender = events.as_ref().map(Server::sender);
-        sender.map(|sender| Watcher::new(sender, number))
+    let watchers = (1..).map(|number| {
+        let server = events.as_ref();
+        server.map(|server| args.events.watcher(server, number))
     });
-    let servings = servings.zip(senders);
+    let servings = servings.zip(watchers);
     let servings = servings.map(
         |((((device, placed), met), (recording, commands)), events)| Serving {
             args,
@@ -199,21 +198,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         },
     );
     let ended = serve_each(servings.collect());
-    if let Some(dropped) = events.map(Server::end).filter(|dropped| *dropped > 0) {
-        tell(format!(
-            "events         {dropped} lines were dropped: a reader was too slow"
-        ));
-    }
+    events.into_iter().for_each(events::end);
     ended
-}
-
-/// Listens for readers of events.
-fn listen(port: u16) -> Result<Server, Failure> {
-    let server = Server::listen(port)
-        .map_err(|why| format!("events cannot be told on port {port} of 127.0.0.1: {why}"))
-        .or_hint("name another port with --events, or 0 for any that is free")?;
-    tell(format!("events         {}", server.address()));
-    Ok(server)
 }
 
 /// Checks that an arm can be meant by a stiffness.

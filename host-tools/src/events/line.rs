@@ -66,6 +66,38 @@ pub enum Event<'e> {
         /// Number of the latched fault.
         fault: Option<u8>,
     },
+    /// What the loop did in a tick.
+    Sample {
+        /// The HIP, device millimetres of the view: east, north, up.
+        hip_mm: [f64; 3],
+        /// The proxy, mm; the HIP where nothing is touched.
+        proxy_mm: [f64; 3],
+        /// Force on the hand, N: east, north, up.
+        force_n: [f64; 3],
+        /// State of the contact, as the column `state` of a recording.
+        state: &'static str,
+        /// As the column `mode`.
+        mode: &'static str,
+        /// The view, counted from 0.
+        view: usize,
+    },
+    /// What there is to say to who arms the arm.
+    Arming {
+        /// Lines for the user.
+        lines: &'e [String],
+        /// Number of the question that is open now, which the command `enter` answers.
+        asks: Option<u32>,
+    },
+    /// A command was not done.
+    Refused {
+        /// Why.
+        text: &'e str,
+    },
+    /// The session with the device is over.
+    End {
+        /// Whether the device has confirmed that it is disarmed.
+        disarmed: bool,
+    },
     /// A mark was made.
     Mark {
         /// The tick that was marked; none where the device has not answered.

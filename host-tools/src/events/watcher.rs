@@ -1,11 +1,13 @@
 //! From samples to events: what has changed.
 
+use std::num::NonZeroU32;
+
 use hapterra_core::guard::{Fault, Limits, Mode};
 use hapterra_core::scene::Sample;
 
 use super::line::{At, Event, Line, Place};
 use super::server::Sender;
-use crate::replay::{Mark, Record, mode_name};
+use crate::replay::{Mark, Record, mode_name, state_name};
 use crate::terrain::Terrain;
 
 /// Between two places that are told, s of the device's time.
@@ -39,6 +41,12 @@ pub struct Watcher {
     readers: u64,
     /// The HIP of the sample before, with its view.
     before: Option<(usize, Record)>,
+    /// The last lines about arming, and readers that had come when they were told.
+    arming: (Vec<String>, u64),
+    /// Every so many samples one is told.
+    every: Option<NonZeroU32>,
+    /// Samples since the last one that was told.
+    samples: u32,
 }
 
 impl Watcher {
@@ -57,7 +65,16 @@ impl Watcher {
             told: Told::default(),
             readers: 0,
             before: None,
+            arming: (vec![], 0),
+            every: None,
+            samples: 0,
         }
+    }
+
+    /// The same, which tells every so many samples one.
+    #[must_use]
+    pub fn with_samples(self, every: Option<NonZeroU32>) -> Self {
+        Self { every, ..self }
     }
 
     /// Takes a sample, its row and the view in which it was felt.
@@ -99,18 +116,62 @@ impl Watcher {
             self.tell_place(record, terrain);
         }
         self.before = Some((view, *record));
+        if let Some(every) = self.every {
+            self.tell_sample(every, sample, record, view);
+        }
     }
 
     /// Takes a mark.
     pub fn mark(&self, mark: &Mark) {
-        if self.sender.readers_so_far().is_some() {
-            self.tell(&Event::Mark {
-                marked_tick: mark.tick,
-                marked_t_s: mark.t_s,
-                host_unix_s: mark.host_unix_s,
-                text: &mark.text,
-            });
+        self.say(&Event::Mark {
+            marked_tick: mark.tick,
+            marked_t_s: mark.t_s,
+            host_unix_s: mark.host_unix_s,
+            text: &mark.text,
+        });
+    }
+
+    /// Takes new lines about arming, where there are any, and the question that is open now, of
+    /// which readers that come later are told, too.
+    pub fn arming(&mut self, new: Vec<String>, asks: Option<u32>) {
+        let Some(readers) = self.sender.readers_so_far() else {
+            if !new.is_empty() {
+                self.arming = (new, 0);
+            }
+            return;
+        };
+        let is_late = asks.is_some() && readers != self.arming.1;
+        if !new.is_empty() {
+            self.arming.0.clone_from(&new);
+        } else if !is_late {
+            return;
         }
+        self.arming.1 = readers;
+        let lines = &self.arming.0;
+        self.tell(&Event::Arming { lines, asks });
+    }
+
+    /// Takes what no sample shows, as of the latest tick.
+    pub fn say(&self, event: &Event<'_>) {
+        if self.sender.readers_so_far().is_some() {
+            self.tell(event);
+        }
+    }
+
+    fn tell_sample(&mut self, every: NonZeroU32, sample: &Sample, record: &Record, view: usize) {
+        self.samples += 1;
+        if self.samples < every.get() {
+            return;
+        }
+        self.samples = 0;
+        self.tell(&Event::Sample {
+            hip_mm: record.hip_mm,
+            proxy_mm: record.proxy_mm,
+            force_n: record.force_n,
+            state: state_name(sample.state),
+            mode: mode_name(sample.mode),
+            view,
+        });
     }
 
     fn tell(&self, event: &Event<'_>) {

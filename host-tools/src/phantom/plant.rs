@@ -171,6 +171,12 @@ impl Plant {
             .map_or([0.0; 3], |hand| hand.force_on_tip(tip, speed).to_array())
     }
 
+    /// True position of the hand, m, device frame; none without a hand.
+    #[must_use]
+    pub fn hand_m(&self) -> Option<[f64; 3]> {
+        self.hand.map(|hand| hand.at.to_array())
+    }
+
     /// Winding temperatures, °C.
     #[must_use]
     pub fn winding_c(&self) -> [f64; 3] {

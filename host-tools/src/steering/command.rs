@@ -10,7 +10,7 @@ use crate::place::{SurfaceChange, ViewChange};
 pub const UNDERSTOOD: &str = "pan EAST NORTH (hand mm), pan-m EAST NORTH (ground m), zoom TIMES, \
      exaggerate TIMES, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
      shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
-     clutch on, clutch off, mark TEXT; `at SECONDS` before any of them, and before that \
+     clutch on, clutch off, mark TEXT, enter QUESTION; `at SECONDS` before any of them, and before that \
      `on NUMBER` for one device of several";
 
 /// A command, and when it is to be done.
@@ -55,7 +55,15 @@ pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
     if words.is_empty() && at_s.is_none() {
         return Ok(None);
     }
-    let wanted = read(&words).map(Wanted::Steer).map_err(refused)?;
+    let wanted = match words[..] {
+        ["enter", number] => number
+            .parse()
+            .map(Wanted::Enter)
+            .map_err(|_| "a number is wanted"),
+        ["enter", ..] => Err("it takes the number of a question"),
+        _ => read(&words).map(Wanted::Steer),
+    };
+    let wanted = wanted.map_err(refused)?;
     Ok(Some(Command { at_s, wanted }))
 }
 
@@ -264,6 +272,8 @@ mod tests {
             let wanted = Wanted::Steer(steer);
             assert_eq!(parse(line), Ok(Some(Command { at_s, wanted })), "{line}");
         }
+        let wanted = Wanted::Enter(7);
+        assert_eq!(parse("enter 7"), Ok(Some(Command { at_s: None, wanted })));
         for nothing in ["", "  \r", "# a remark", "   # another"] {
             assert_eq!(parse(nothing), Ok(None));
         }
@@ -319,6 +329,8 @@ mod tests {
             ("texture grain 0.1 1 30", "none, or grain or grating"),
             ("texture grating 0.1 1 30 2", "two or three numbers"),
             ("clutch", "on or off"),
+            ("enter", "number of a question"),
+            ("enter now", "a number"),
             ("at 2", "missing"),
             ("at -1 reset", "below zero"),
             ("at soon reset", "a number"),

@@ -32,6 +32,8 @@ pub enum Wanted {
     Steer(Steer),
     /// A mark with this text.
     Mark(String),
+    /// The user's Enter, as an answer to the question of this number.
+    Enter(u32),
 }
 
 /// What the user wants of the view.

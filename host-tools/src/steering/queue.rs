@@ -61,10 +61,11 @@ impl CommandQueue {
     /// A file that cannot be opened.
     pub fn of(origin: &Origin) -> io::Result<Self> {
         let (send, lines) = sync_channel(WAITING);
-        read_lines(origin, move |line, number| {
+        let take = move |line: &str, number| {
             let read = for_each(line, number, 1).transpose();
             read.is_none_or(|read| send.send(read.map(|(_, command)| command)).is_ok())
-        })?;
+        };
+        read_lines(origin, take, || {})?;
         Ok(Self {
             lines: Some(lines),
             ..Self::default()
@@ -73,11 +74,16 @@ impl CommandQueue {
 
     /// Reads commands for so many devices from now on, in a thread of its own, a queue for
     /// each: `on 2 zoom 2` is for the second one, and a command without `on` for each. No
-    /// device's commands wait for another device.
+    /// device's commands wait for another device. No line waits either, so the end of the input,
+    /// when `at_end` is called, is seen whatever was left undone.
     ///
     /// # Errors
     /// A file that cannot be opened.
-    pub fn of_several(origin: &Origin, devices: usize) -> io::Result<Vec<Self>> {
+    pub fn of_several(
+        origin: &Origin,
+        devices: usize,
+        at_end: impl FnOnce() + Send + 'static,
+    ) -> io::Result<Vec<Self>> {
         let (sends, queues): (Vec<_>, Vec<_>) = (0..devices)
             .map(|_| {
                 let (send, lines) = sync_channel(WAITING_EACH);
@@ -88,7 +94,8 @@ impl CommandQueue {
                 ((send, Arc::clone(&queue.left_out)), queue)
             })
             .unzip();
-        read_lines(origin, move |line, number| hand_out(line, number, &sends))?;
+        let take = move |line: &str, number| hand_out(line, number, &sends);
+        read_lines(origin, take, at_end)?;
         Ok(queues)
     }
 
@@ -163,6 +170,13 @@ fn for_each(
     let wrong = |why: String| format!("line {number} of the commands: {why}");
     let (device, command) = addressed(line, devices).map_err(wrong)?;
     let command = parse(command).map_err(|why| wrong(why.to_string()))?;
+    // The questions of two devices may have the same number.
+    let is_enter = |command: &Command| matches!(command.wanted, Wanted::Enter(_));
+    if devices > 1 && device.is_none() && command.as_ref().is_some_and(is_enter) {
+        return Err(wrong(
+            "`enter` is for one device: `on NUMBER enter QUESTION`".into(),
+        ));
+    }
     Ok(command.map(|command| (device, command)))
 }
 
@@ -186,6 +200,7 @@ fn addressed(line: &str, devices: usize) -> Result<(Option<usize>, &str), String
 fn read_lines(
     origin: &Origin,
     mut take: impl FnMut(&str, u64) -> bool + Send + 'static,
+    at_end: impl FnOnce() + Send + 'static,
 ) -> io::Result<()> {
     let input: Box<dyn io::Read + Send> = match origin {
         Origin::StandardInput => Box::new(io::stdin()),
@@ -200,9 +215,10 @@ fn read_lines(
             // Where a line has no end, nor has what follows a meaning.
             let goes_on = matches!(read, Ok(1..)) && take(line.trim_end_matches('\n'), number);
             if !goes_on || !is_whole {
-                return;
+                break;
             }
         }
+        at_end();
     });
     Ok(())
 }
@@ -224,7 +240,7 @@ mod tests {
         let (send, lines) = sync_channel(4);
         let take = move |line: &str, number| send.send((line.len(), number)).is_ok();
         let endless = Origin::File("/dev/zero".into());
-        read_lines(&endless, take).expect("opened");
+        read_lines(&endless, take, || {}).expect("opened");
         assert_eq!(next(&lines), Some((LONGEST as usize, 1)));
         assert_eq!(next(&lines), None);
     }
@@ -279,22 +295,26 @@ mod tests {
     fn a_command_is_for_each_device_or_for_the_one_that_it_names() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("commands");
-        let text =
-            "zoom 2\non 2 zoom 3\non 3 zoom 9\non x reset\non 1 at 0 zoom 4\non 2 nonsense\nzoom 5";
+        let text = "zoom 2\non 2 zoom 3\non 3 zoom 9\non x reset\non 1 at 0 zoom 4\non 2 nonsense\nenter 7\non 2 enter 7\nzoom 5";
         std::fs::write(&path, text).expect("written");
-        let mut queues = CommandQueue::of_several(&Origin::File(path), 2).expect("opened");
-        let (due, told) = all_due(&mut queues, &[3, 3]);
+        let mut queues = CommandQueue::of_several(&Origin::File(path), 2, || {}).expect("opened");
+        let (due, told) = all_due(&mut queues, &[3, 4]);
         let zoom = |times| change(ViewChange::Zoom(times));
         assert_eq!(due[0], [2.0, 4.0, 5.0].map(zoom));
-        assert_eq!(due[1], [2.0, 3.0, 5.0].map(zoom));
+        let [first, second, enter, last] = &due[1][..] else {
+            panic!("{due:?}");
+        };
+        assert_eq!([first, second, last], [2.0, 3.0, 5.0].map(zoom).each_ref());
+        assert_eq!(*enter, Wanted::Enter(7));
         // What is wrong is told once, and not by each device.
-        let [third, fourth, sixth] = &told[..] else {
+        let [third, fourth, sixth, seventh] = &told[..] else {
             panic!("{told:?}");
         };
         assert!(third.starts_with("line 3 of the commands: `on` is followed"));
         assert!(third.contains("1 to 2"), "{third}");
         assert!(fourth.starts_with("line 4 "), "{fourth}");
         assert!(sixth.starts_with("line 6 of the commands: `nonsense`"));
+        assert!(seventh.starts_with("line 7 of the commands: `enter` is for one device"));
     }
 
     #[test]
@@ -304,7 +324,7 @@ mod tests {
         let count = WAITING_EACH + 1000;
         let text = "on 2 reset\n".repeat(count) + "on 1 reset\nnonsense\n";
         std::fs::write(&path, text).expect("written");
-        let mut queues = CommandQueue::of_several(&Origin::File(path), 3).expect("opened");
+        let mut queues = CommandQueue::of_several(&Origin::File(path), 3, || {}).expect("opened");
         let mut second = queues.remove(1);
         // The third one is not served any more, and the first one has its command.
         drop(queues.pop());

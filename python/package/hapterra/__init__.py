@@ -20,38 +20,59 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ._command import CommandError
+    from ._connect import Device, Mark, Params, Sample, connect
     from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
     from ._native import Surface
     from ._recording import Recording, read_recording
     from ._stability import stability
+    from ._session import DeviceError, NotDisarmedError
     from ._terrain import Terrain
+    from ._virtual_arm import ARM_STEP, VirtualArm
 
 #: Where each name is. The command starts without numpy.
 _MODULES = {
-    "CommandError": "_command",
+    "ARM_STEP": "_virtual_arm",
     "STEP": "_contact",
+    "CommandError": "_command",
     "Contact": "_contact",
+    "Device": "_connect",
+    "DeviceError": "_session",
+    "Mark": "_connect",
+    "NotDisarmedError": "_session",
+    "Params": "_connect",
     "Recording": "_recording",
+    "Sample": "_connect",
     "State": "_contact",
     "Step": "_contact",
     "StepError": "_contact",
     "Surface": "_native",
     "Terrain": "_terrain",
+    "VirtualArm": "_virtual_arm",
+    "connect": "_connect",
     "read_recording": "_recording",
     "stability": "_stability",
     "to_dataframe": "_contact",
 }
 
 __all__ = [
+    "ARM_STEP",
     "STEP",
     "CommandError",
     "Contact",
+    "Device",
+    "DeviceError",
+    "Mark",
+    "NotDisarmedError",
+    "Params",
     "Recording",
+    "Sample",
     "State",
     "Step",
     "StepError",
     "Surface",
     "Terrain",
+    "VirtualArm",
+    "connect",
     "read_recording",
     "stability",
     "to_dataframe",

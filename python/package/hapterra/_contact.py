@@ -72,6 +72,17 @@ class StepError(ValueError):
         self.steps = steps
 
 
+def arguments(path_mm: npt.ArrayLike, t: npt.ArrayLike | None) -> tuple[bytes, bytes | None]:
+    """A path and its times as they are taken by what is compiled."""
+    path = np.asarray(path_mm, "=f8")
+    if path.ndim != 2 or path.shape[1] != 3:
+        raise ValueError(f"the path has the shape {path.shape}: give (N, 3), east, north, up")
+    times = None if t is None else np.asarray(t, "=f8")
+    if times is not None and times.shape != path.shape[:1]:
+        raise ValueError(f"t has the shape {times.shape}, and the path has {len(path)} rows")
+    return path.tobytes(), None if times is None else times.tobytes()
+
+
 class Contact:
     """A haptic interface point (HIP) and its proxy over a terrain.
 
@@ -129,14 +140,7 @@ class Contact:
         StepError
             At the first step that cannot happen, with those before it.
         """
-        path = np.asarray(path_mm, "=f8")
-        if path.ndim != 2 or path.shape[1] != 3:
-            raise ValueError(f"the path has the shape {path.shape}: give (N, 3), east, north, up")
-        times = None if t is None else np.asarray(t, "=f8")
-        if times is not None and times.shape != path.shape[:1]:
-            raise ValueError(f"t has the shape {times.shape}, and the path has {len(path)} rows")
-        ran = self._native.run(path.tobytes(), None if times is None else times.tobytes())
-        rows, remarks, error = ran
+        rows, remarks, error = self._native.run(*arguments(path_mm, t))
         for remark in remarks:
             warnings.warn(remark, stacklevel=2)
         steps = np.frombuffer(rows, STEP)

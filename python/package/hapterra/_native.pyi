@@ -1,7 +1,7 @@
 """What is compiled. Use the names of `hapterra`."""
 
 from collections.abc import Sequence
-from typing import Literal, final
+from typing import Any, Literal, final
 
 _Vector = tuple[float, float, float]
 _Pair = tuple[float, float]
@@ -35,6 +35,9 @@ class Surface:
         texture_seed: int = 0,
         materials: Sequence[Surface] = ...,
     ) -> Surface: ...
+    def params(self) -> dict[str, Any]:
+        """The parameters by their names, without those of a texture that is not there; of
+        `materials`, how many there are."""
 
 @final
 class Terrain:
@@ -58,6 +61,7 @@ class Terrain:
     def mm_at(self, at: _Pair, lonlat: bool) -> _Pair: ...
     def ground_at(self, mm: _Pair, lonlat: bool) -> _Pair: ...
     def stated(self) -> list[tuple[str, str]]: ...
+    def rows(self, south: int, count: int) -> bytes: ...
     def height_mm(self, east_mm: float, north_mm: float) -> float | None: ...
     @property
     def shape(self) -> tuple[int, int]: ...
@@ -76,3 +80,10 @@ class Contact:
         self, path: bytes, t_s: bytes | None = None
     ) -> tuple[bytearray, list[str], str | None]: ...
     def set_surface(self, surface: Surface) -> None: ...
+
+@final
+class VirtualArm:
+    def __new__(cls, home_mm: Sequence[float], hand: Sequence[float]) -> VirtualArm: ...
+    def run(
+        self, contact: Contact, targets: bytes, t_s: bytes | None = None
+    ) -> tuple[bytearray, list[str], str | None]: ...

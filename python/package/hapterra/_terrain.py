@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
 #: Types of samples that are kept as they are; all others become f8.
 _KEPT = {"f8", "f4", "i4", "u4", "i2", "u2", "i1", "u1"}
+#: Samples that are written at a time.
+_WRITTEN = 1 << 20
+#: More are left in their file: 1 GiB.
+_MOST_WRITTEN = 1 << 27
 _SOUTH_FIRST = {"upper": False, "lower": True}
 
 
@@ -78,6 +83,7 @@ class Terrain:
         self.cell_mm = float(cell_mm)
         #: Millimetres of the hand for one unit of the heights.
         self.height_mm_per_unit = float(height_mm_per_unit)
+        self._has_materials = materials is not None
         #: What the data stated about itself; none of a plain array.
         self.source: dict[str, Any] | None = None
         #: Radius of the ball that touches it, mm; 0 for a point.
@@ -159,10 +165,12 @@ class Terrain:
         place, lonlat, size = pair("at", at), is_lonlat(crs), pair("size_mm", size_mm)
         lies = self._lies()
         if isinstance(lies, Ground):
-            return self._of(*lies.window(place, lonlat, size, cell_mm, scale, exaggeration))
-        how = resized(self._opened or {}, cell_mm, scale, exaggeration)
-        native = lies.window(place, lonlat, size, options(**_size(how)))
-        return self._of_file(native, self.source or {}, how)
+            window = self._of(*lies.window(place, lonlat, size, cell_mm, scale, exaggeration))
+        else:
+            how = resized(self._opened or {}, cell_mm, scale, exaggeration)
+            native = lies.window(place, lonlat, size, options(**_size(how)))
+            window = self._of_file(native, self.source or {}, how)
+        return window.with_tip(self.tip_mm) if self.tip_mm else window
 
     def mm_at(self, x: float, y: float, crs: str | None = None) -> tuple[float, float]:
         """Millimetres east and north of the south-west sample, of a place in the terrain's own
@@ -269,6 +277,28 @@ class Terrain:
         """The height of the surface at a place, mm, or of the ball's centre; None in a hole and off
         the terrain."""
         return self._native.height_mm(east_mm, north_mm)
+
+    def _write(self, path: Path) -> tuple[str, dict[str, Any]]:
+        """Writes the heights as a file of the command. Returns it, and the options of its scale."""
+        if self._has_materials:
+            raise ValueError(
+                "materials of a Terrain cannot be loaded: give materials= and material_table=, files"
+            )
+        rows, columns = self.shape
+        if rows * columns > _MOST_WRITTEN:
+            raise ValueError(
+                f"{rows} rows of {columns} samples are too many to be written for a device:"
+                ' load the file itself, as device.load("dem.tif", ...), or a window by place()'
+            )
+        heights = np.lib.format.open_memmap(path, "w+", "=f8", self.shape)
+        step = max(1, _WRITTEN // columns)
+        for south in range(0, rows, step):
+            block = np.frombuffer(self._native.rows(south, step), "=f8").reshape(-1, columns)
+            heights[rows - south - len(block) : rows - south] = block[::-1]
+        heights.flush()
+        scale = {"cell_mm": self.cell_mm, "height_mm_per_unit": self.height_mm_per_unit}
+        tip = {"tip": f"{self.tip_mm}mm"} if self.tip_mm else {}
+        return os.fspath(path), {**scale, **tip}
 
     def __repr__(self) -> str:
         rows, columns = self.shape

@@ -9,6 +9,8 @@ pub(in crate::cli) enum News {
     Listening,
     /// A key asked for an end.
     Pressed,
+    /// The program that gives commands is gone, which asks for an end, too.
+    InputEnded,
     /// The device at this address may be armed.
     MayBeArmed(String),
     /// The thread that serves this device has seen that an end is asked for.
@@ -32,6 +34,7 @@ mod lines {
             let (word, rest): (&str, &[u8]) = match self {
                 Self::Listening => ("listening", b""),
                 Self::Pressed => ("pressed", b""),
+                Self::InputEnded => ("ended", b""),
                 Self::MayBeArmed(address) => ("armed", address.as_bytes()),
                 Self::Leaving(address) => ("leaving", address.as_bytes()),
                 Self::Settled(address) => ("settled", address.as_bytes()),
@@ -48,6 +51,7 @@ mod lines {
             Some(match word {
                 b"listening" => Self::Listening,
                 b"pressed" => Self::Pressed,
+                b"ended" => Self::InputEnded,
                 b"armed" => Self::MayBeArmed(text()),
                 b"leaving" => Self::Leaving(text()),
                 b"settled" => Self::Settled(text()),
@@ -62,6 +66,7 @@ mod lines {
         for news in [
             News::Listening,
             News::Pressed,
+            News::InputEnded,
             News::MayBeArmed("usb:0039".into()),
             News::Leaving("tcp:localhost:4000".into()),
             News::Settled(String::new()),

@@ -43,8 +43,10 @@ struct Watch {
     may_be_armed: BTreeSet<String>,
     leaving: BTreeSet<String>,
     recordings: Vec<PathBuf>,
-    /// When an end was asked for, each time.
+    /// When an end was asked for by a press, each time.
     pressed: Vec<Instant>,
+    /// When the input ended, which asks for an end.
+    input_ended: Option<Instant>,
 }
 
 /// Starts the worker and waits for its end; gives its exit code.
@@ -90,6 +92,7 @@ impl Watch {
             leaving: BTreeSet::new(),
             recordings: vec![],
             pressed: vec![],
+            input_ended: None,
         })
     }
 
@@ -139,9 +142,10 @@ impl Watch {
     }
 
     fn is_stuck(&self) -> bool {
-        let since = |pressed: &Instant| pressed.elapsed();
+        let since = |asked: &Instant| asked.elapsed();
         let is_deaf = !self.may_be_armed.is_subset(&self.leaving);
-        is_deaf && self.pressed.first().map(since) > Some(DEAF)
+        let mut asked = self.pressed.first().into_iter().chain(&self.input_ended);
+        is_deaf && asked.any(|asked| since(asked) > DEAF)
             || self.pressed.get(1).map(since) > Some(AT_ONCE)
     }
 
@@ -166,6 +170,7 @@ impl Watch {
         match news {
             News::Listening => self.is_listening = true,
             News::Pressed => self.pressed.push(Instant::now()),
+            News::InputEnded => self.input_ended = Some(Instant::now()),
             News::MayBeArmed(address) => drop(self.may_be_armed.insert(address)),
             News::Leaving(address) => drop(self.leaving.insert(address)),
             News::Settled(address) => drop(self.may_be_armed.remove(&address)),

@@ -3,6 +3,7 @@
 
 pub mod device;
 pub mod emulated_board;
+pub mod events;
 pub mod exaggeration;
 pub mod materials;
 pub mod placing;

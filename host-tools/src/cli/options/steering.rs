@@ -10,6 +10,7 @@ use hapterra_core::phantom::Calibration;
 use super::placing::{self, scale_in_words, short};
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::terminal::desk::Seat;
+use crate::cli::terminal::interrupt;
 use crate::cli::terminal::keyboard::keyboard;
 use crate::cli::terminal::raw_keys::RawMode;
 use crate::link::{Ask, Event};
@@ -29,6 +30,11 @@ pub struct Commands {
     /// `clutch off`, `reset`, `mark TEXT`
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub commands: Option<Origin>,
+
+    /// End as after Ctrl-C when standard input ends, because the program that gives commands is
+    /// gone; with `--commands -`
+    #[arg(long, requires = "commands")]
+    pub end_with_input: bool,
 }
 
 impl Commands {
@@ -45,6 +51,11 @@ impl Commands {
     /// # Errors
     /// A file that cannot be opened.
     pub(in crate::cli) fn open(&self) -> Result<CommandQueue, Failure> {
+        if self.end_with_input {
+            return self
+                .open_for(1)
+                .map(|queues| queues.into_iter().next().unwrap_or_default());
+        }
         let queue = self.commands.as_ref().map(CommandQueue::of);
         self.opened(queue.transpose())
             .map(Option::unwrap_or_default)
@@ -55,10 +66,20 @@ impl Commands {
     /// # Errors
     /// A file that cannot be opened.
     pub(in crate::cli) fn open_for(&self, devices: usize) -> Result<Vec<CommandQueue>, Failure> {
-        if devices == 1 {
+        if devices == 1 && !self.end_with_input {
             return self.open().map(|queue| vec![queue]);
         }
-        let several = |origin| CommandQueue::of_several(origin, devices);
+        if self.end_with_input && !self.are_typed() {
+            return Err("--end-with-input is for commands from standard input")
+                .or_hint("add --commands -");
+        }
+        let ends = self.end_with_input;
+        let at_end = move || {
+            if ends {
+                interrupt::input_ended();
+            }
+        };
+        let several = |origin| CommandQueue::of_several(origin, devices, at_end);
         let queues = self.commands.as_ref().map(several);
         let none = || (0..devices).map(|_| CommandQueue::default()).collect();
         self.opened(queues.transpose())
@@ -89,6 +110,8 @@ pub(in crate::cli) struct ViewControl<'t> {
     keys: Keys,
     typing: Typing,
     began: Instant,
+    /// The question that was answered since the last look.
+    entered: Option<u32>,
 }
 
 /// Where keys come from.
@@ -131,7 +154,13 @@ impl<'t> ViewControl<'t> {
             keys: Keys::default(),
             typing: Typing::Nobody,
             began: Instant::now(),
+            entered: None,
         }
+    }
+
+    /// The number of the question that a command has answered since the last look.
+    pub(in crate::cli) fn entered(&mut self) -> Option<u32> {
+        self.entered.take()
     }
 
     /// Takes keys from the terminal from now on, until this is dropped, where there is one
@@ -171,6 +200,7 @@ impl<'t> ViewControl<'t> {
         match self.commands.due(t_s, is_free, tell) {
             Some(Wanted::Steer(steer)) => self.take(Some(steer)),
             Some(Wanted::Mark(text)) => self.marks.mark(text).into_iter().for_each(&mut *tell),
+            Some(Wanted::Enter(number)) => self.entered = Some(number),
             None => {}
         }
         self.steering.lines().into_iter().for_each(tell);

@@ -135,6 +135,8 @@ impl<'t> Serving<'_, 't> {
         let watch = Watch::new(args, (placed, speaker), &hello, recording, control);
         let mut watch = watch.shown(shown).with_events(self.events);
         let end = served.serve(&mut watch);
+        let is_others = matches!(end.why, Err(LinkError::Taken));
+        watch.ended(end.disarmed.is_ok() && !is_others);
         // What was recorded is kept, however it ended, and before anything else is done.
         let log = watch.finish();
         let kept = log.kept.or_hint(OTHER_FILE);
@@ -295,7 +297,7 @@ fn connect<'t>(
     let native = || {
         let arm = placed.tour.as_ref().map(PlacedTerrain::held_phantom);
         let device = Native::new(HostClock::default(), arm.map(|arm| Box::new(arm) as _));
-        match args.viewing.view || args.events.is_some() {
+        match args.viewing.view || args.events.events.is_some() {
             true => device.in_real_time(),
             false => device,
         }

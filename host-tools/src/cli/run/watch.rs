@@ -14,7 +14,7 @@ use crate::cli::terminal::arming_prompts::ArmingPrompts;
 use crate::cli::terminal::desk::Seat;
 use crate::cli::terminal::speaker::Speaker;
 use crate::cli::viewing::Shown;
-use crate::events::Watcher;
+use crate::events::{Event as Told, Watcher};
 use crate::link::{Ask, Event, Tally};
 use crate::output::OutputError;
 use crate::replay::settings::ViewSettings;
@@ -100,6 +100,13 @@ impl<'t> Watch<'t> {
     /// The same, and readers of events are told what happens.
     pub(super) fn with_events(self, events: Option<Watcher>) -> Self {
         Self { events, ..self }
+    }
+
+    /// Tells readers of events that the session is over.
+    pub(super) fn ended(&self, disarmed: bool) {
+        if let Some(events) = &self.events {
+            events.say(&Told::End { disarmed });
+        }
     }
 
     /// Ends the recording, and takes the line at the bottom of the terminal away.
@@ -195,12 +202,26 @@ impl<'t> Onlooker<'t> for Watch<'t> {
     }
 
     fn asks(&mut self) -> Vec<Ask> {
-        for line in self.prompts.lines() {
-            self.speaker.tell(line);
+        let lines = self.prompts.lines();
+        lines.iter().for_each(|line| self.speaker.tell(line));
+        if let Some(events) = &mut self.events {
+            events.arming(lines, self.prompts.asks());
         }
-        let speaker = &self.speaker;
-        self.control
-            .look(self.log.t_s(), &mut |line| speaker.tell(line));
+        let (speaker, events) = (&self.speaker, &self.events);
+        let refuse = |text: String| {
+            if let Some(events) = events {
+                events.say(&Told::Refused { text: &text });
+            }
+            speaker.tell(text);
+        };
+        self.control.look(self.log.t_s(), &mut |text| refuse(text));
+        if let Some(number) = self.control.entered()
+            && !self.prompts.answer(number)
+        {
+            refuse(format!(
+                "question {number} is not open: answer the one that was asked last"
+            ));
+        }
         self.take_marks(false);
         let mut asks = self.prompts.messages();
         asks.extend(self.control.asks());

@@ -2,7 +2,8 @@
 //! Enter for "go on": clear the fault, zero the arm, ask to arm.
 //!
 //! Enter answers the question that was shown last, and nothing else: what was typed before
-//! it is forgotten, and a fault that came after it is shown first.
+//! it is forgotten, and a fault that came after it is shown first. A program that answers for its
+//! user names the question by a number, which begins at random: what was not asked has no answer.
 
 use std::io::{self, IsTerminal};
 use std::sync::Arc;
@@ -87,6 +88,8 @@ pub(in crate::cli) struct ArmingPrompts {
     press_enter: String,
     /// What was asked last and not answered yet.
     question: Option<Question>,
+    /// Number of the question that was asked last.
+    number: u32,
     report: Option<Report>,
     /// The device has come back: its first report tells whether the arm is armed.
     is_back: bool,
@@ -130,6 +133,7 @@ impl ArmingPrompts {
             enter: Box::new(enter),
             press_enter: "press Enter".into(),
             question: None,
+            number: fastrand::u32(..1 << 30),
             report: None,
             is_back: false,
             zeroing: false,
@@ -254,6 +258,20 @@ impl ArmingPrompts {
         std::mem::take(&mut self.say)
     }
 
+    /// Number of the question that is open now.
+    pub(in crate::cli) fn asks(&self) -> Option<u32> {
+        self.question.map(|_| self.number)
+    }
+
+    /// Enter as an answer to the question of a number. Returns false if that one is not open.
+    pub(in crate::cli) fn answer(&mut self, number: u32) -> bool {
+        let is_open = self.asks() == Some(number);
+        if is_open && let Some(question) = self.question.take() {
+            self.on_enter(question);
+        }
+        is_open
+    }
+
     fn on_enter(&mut self, question: Question) {
         let fault = self.report.and_then(|report| report.fault);
         // Nobody has read of a fault that came after the question.
@@ -287,6 +305,7 @@ impl ArmingPrompts {
             }
             if line.asks.is_some() {
                 self.question = line.asks;
+                self.number = self.number.wrapping_add(1);
                 self.enter.forget();
             }
             said.push(line.text);
@@ -343,6 +362,23 @@ mod tests {
         // It is answered once.
         press.send(()).expect("listening");
         assert_eq!(prompts.messages(), []);
+    }
+
+    #[test]
+    fn answer_counts_for_the_question_it_names() {
+        let mut prompts = ArmingPrompts::listening(Nobody);
+        prompts.on_event(&Event::Guard(&not_zeroed()));
+        prompts.on_event(&REFUSED);
+        assert_eq!(prompts.asks(), None, "before it is shown");
+        prompts.lines();
+        let first = prompts.asks().expect("a question");
+        assert!(!prompts.answer(first.wrapping_add(1)));
+        prompts.on_event(&REFUSED);
+        prompts.lines();
+        let second = prompts.asks().expect("another");
+        assert!(!prompts.answer(first), "one that was asked before");
+        assert!(prompts.answer(second) && !prompts.answer(second));
+        assert_eq!(prompts.messages(), [Ask::Status]);
     }
 
     #[test]

@@ -104,6 +104,13 @@ pub(super) fn press_key() {
     press();
 }
 
+/// Asks for an end because the program that gives commands is gone. A press beside it is the
+/// first: in a terminal Ctrl-C reaches both programs.
+pub(in crate::cli) fn input_ended() {
+    guardian::report(&News::InputEnded);
+    REQUESTED.store(true, Ordering::Relaxed);
+}
+
 /// Ctrl-C, from wherever it is heard: the first asks for an end, the second ends at once.
 fn press() {
     REQUESTED.store(true, Ordering::Relaxed);

@@ -1,0 +1,146 @@
+//! A virtual arm in a hand, in a closed loop with a contact.
+
+use hapterra::phantom::{HandModel, PhantomModel, Placement, Plant};
+use hapterra_core::Vec3;
+use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_touch::{Contact as Touched, StepError};
+use pyo3::types::PyByteArray;
+use pyo3::{PyResult, Python, pyclass, pymethods};
+
+use crate::contact::{Contact, Run, UNINTERRUPTED, number};
+use crate::refused;
+use crate::ticks::Tick;
+
+/// Bytes of a row: `ARM_STEP` of `package/hapterra/_virtual_arm.py`.
+const ROW: usize = 104;
+
+/// A Premium 1.5 and who holds it.
+#[pyclass(frozen, module = "hapterra._native")]
+pub(crate) struct VirtualArm {
+    hand: HandModel,
+    placement: Placement,
+    mechanism: Mechanism,
+}
+
+#[pymethods]
+impl VirtualArm {
+    /// The terrain point at the tip in the arm's home pose, mm, and the hand's `HandModel`: kg, N/m
+    /// and N·s/m towards the target, the same of the grip.
+    #[new]
+    fn new(home_mm: [f64; 3], hand: [f64; 5]) -> PyResult<Self> {
+        let [
+            mass_kg,
+            arm_n_per_m,
+            arm_ns_per_m,
+            grip_n_per_m,
+            grip_ns_per_m,
+        ] = hand;
+        Ok(Self {
+            hand: HandModel {
+                mass_kg,
+                arm_n_per_m,
+                arm_ns_per_m,
+                grip_n_per_m,
+                grip_ns_per_m,
+            },
+            placement: Placement { home_mm },
+            mechanism: Mechanism::new(&Calibration::PREMIUM_1_5).map_err(refused)?,
+        })
+    }
+
+    /// A tick for each target, as `Contact.run` takes its path.
+    #[pyo3(signature = (contact, targets, t_s=None))]
+    fn run<'py>(
+        &self,
+        py: Python<'py>,
+        contact: &Contact,
+        targets: &[u8],
+        t_s: Option<&[u8]>,
+    ) -> PyResult<Run<'py>> {
+        let (targets, remarks) = contact.ticks(py, targets, t_s)?;
+        let touched = &mut *contact.lock()?;
+        let mut rows = Vec::new();
+        let Some(mut held) = py.detach(|| self.held(&targets))? else {
+            return Ok((PyByteArray::new(py, &rows), remarks, None));
+        };
+        let tick_s = 1.0 / f64::from(contact.rate_hz);
+        let mut why = None;
+        for at in (0..targets.len()).step_by(UNINTERRUPTED) {
+            let ahead = targets.get(at..).unwrap_or_default();
+            let ran = py.detach(|| self.touch(&mut held, touched, ahead, tick_s, &mut rows));
+            if let Err(error) = ran {
+                why = Some(contact.raised(error).value(py).to_string());
+                break;
+            }
+            py.check_signals()?;
+        }
+        Ok((PyByteArray::new(py, &rows), remarks, why))
+    }
+}
+
+impl VirtualArm {
+    /// The arm at rest at the first target, and the hand on it; none without targets.
+    fn held(&self, targets: &[Tick]) -> PyResult<Option<Plant>> {
+        let model = PhantomModel::premium_1_5();
+        for (_, at_mm) in targets {
+            self.placement.joints_at(&model, *at_mm).map_err(refused)?;
+        }
+        let Some((_, first_mm)) = targets.first() else {
+            return Ok(None);
+        };
+        let q = self
+            .placement
+            .joints_at(&model, *first_mm)
+            .map_err(refused)?;
+        Ok(Some(Plant::new(model, q).held_by(self.hand)))
+    }
+
+    /// Ticks at the first of these targets, as many as run without a look at Ctrl-C.
+    fn touch(
+        &self,
+        plant: &mut Plant,
+        contact: &mut Touched,
+        targets: &[Tick],
+        tick_s: f64,
+        rows: &mut Vec<u8>,
+    ) -> Result<(), StepError> {
+        rows.reserve(ROW * targets.len().min(UNINTERRUPTED));
+        for (index, (t_s, target_mm)) in targets.iter().enumerate().take(UNINTERRUPTED) {
+            let pose = self.mechanism.pose(plant.counts(), [0; 3]);
+            let moved = pose.tip_mm() - self.mechanism.home_mm();
+            // East is the device's y, north its -x.
+            let moved = [moved.y, -moved.x, moved.z].map(f64::from);
+            let hip_mm: [f64; 3] = std::array::from_fn(|i| self.placement.home_mm[i] + moved[i]);
+            let hand_m = plant.hand_m().unwrap_or_else(|| plant.tip_m());
+            let hand_mm = self.placement.to_terrain_mm(plant.model(), hand_m);
+            let step = contact.step(hip_mm)?;
+            let [east, north, up] = step.force_n;
+            let torques = pose.torques_nm(Vec3::new(-north, east, up));
+            let currents = self
+                .mechanism
+                .currents_a(torques + self.mechanism.gravity_nm(&pose));
+            let next_mm = targets.get(index + 1).map_or(target_mm, |(_, next)| next);
+            let speed: [f64; 3] = std::array::from_fn(|i| (next_mm[i] - target_mm[i]) / tick_s);
+            let target_m = self.placement.to_device_m(plant.model(), *target_mm);
+            plant.aim(
+                target_m,
+                Placement::turn_to_device(speed).map(|mm_s| 1e-3 * mm_s),
+            );
+            plant.step(currents.to_array().map(f64::from), tick_s);
+
+            let doubles = [*t_s]
+                .into_iter()
+                .chain(hip_mm)
+                .chain(step.proxy_mm)
+                .chain(hand_mm);
+            doubles.for_each(|number| rows.extend(number.to_ne_bytes()));
+            step.force_n
+                .iter()
+                .for_each(|number| rows.extend(number.to_ne_bytes()));
+            let tick = (rows.len() / ROW) as u32;
+            rows.extend(tick.to_ne_bytes());
+            rows.extend([number(step.state).0, 0, 0, 0, 0, 0, 0, 0]);
+        }
+        Ok(())
+    }
+}
