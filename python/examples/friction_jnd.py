@@ -24,8 +24,8 @@ import hapterra
 REFERENCE = 0.4
 #: Deviation of what the simulated observer perceives of a coefficient of friction. A stated choice.
 NOISE = 0.03
-#: The first difference, the factor of a step, and reversals that are left out of the mean.
-FIRST, STEP, LEFT_OUT = 0.2, 1.26, 4
+#: The first and the largest difference, the factor of a step, and reversals left out of the mean.
+FIRST, LARGEST, STEP, LEFT_OUT = 0.2, 1.0, 1.26, 4
 #: The share of right answers that 2-down-1-up settles at.
 SETTLES_AT = 0.5**0.5
 
@@ -48,7 +48,7 @@ def staircase(judge, trials, random):
         if turn != direction:
             reversals.append(difference)
         direction = turn
-        difference *= STEP**turn
+        difference = min(difference * STEP**turn, LARGEST)
     return differences, reversals
 
 

@@ -1,7 +1,9 @@
 """Devices: a native one through the command, and a command that a test plays."""
 
+import itertools
 import os
 import re
+import runpy
 import signal
 import subprocess
 import sys
@@ -331,6 +333,35 @@ def test_board_that_the_guardian_has_disarmed_is_disarmed(played):
         with pytest.raises(DeviceError, match="exit code 137") as failed:
             device.disarm()
         assert device.is_disarmed and not isinstance(failed.value, NotDisarmedError)
+
+
+@posix
+def test_staircase_asks_a_person_on_an_arm(played, tmp_path, monkeypatch, capsys):
+    played("""
+    mode("armed")
+    log, view = open("log", "w"), 0
+    for line in sys.stdin:
+        print(line, end="", file=log, flush=True)
+        if line.startswith("mark "):
+            tell("mark", marked_tick=7, marked_t_s=0.007, host_unix_s=1.0, text=line[5:-1])
+        else:
+            view += 1
+            tell("view", view=view)
+    tell("end", disarmed=True)
+    """)
+    monkeypatch.chdir(tmp_path)
+    words = ["friction_jnd.py", "--device", "usb", "--trials", "40", "--out", "jnd.png"]
+    monkeypatch.setattr(sys, "argv", words)
+    answers = itertools.cycle(["", "", "neither", "1", "", "", "2"])
+    monkeypatch.setattr("builtins.input", lambda said: next(answers))
+    example = Path(__file__).parent.parent / "examples" / "friction_jnd.py"
+    runpy.run_path(str(example), run_name="__main__")
+    assert "Weber fraction" in capsys.readouterr().out
+    log = (tmp_path / "log").read_text().splitlines()
+    frictions = [float(line.split()[1]) for line in log if line.startswith("friction ")]
+    pairs = list(zip(frictions[::2], frictions[1::2]))
+    assert len(pairs) == 40 and all(min(pair) == 0.4 < max(pair) <= 1.4 for pair in pairs)
+    assert [line for line in log if "answer" in line][:2] == ["mark answer 1", "mark answer 2"]
 
 
 @posix

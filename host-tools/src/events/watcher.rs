@@ -278,3 +278,36 @@ fn speed_into(before: &Record, now: &Record) -> Option<f64> {
     let into: f64 = (0..3).map(|axis| moved(axis) * along(axis)).sum();
     Some(into / depth_mm / dt_s)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Server;
+    use super::*;
+    use crate::timeouts::wait_until;
+    use std::io::{BufRead, BufReader};
+    use std::net::TcpStream;
+
+    #[test]
+    fn late_readers_are_told_the_open_question_once() {
+        let server = Server::listen(0).expect("listens");
+        let mut watcher = Watcher::new(server.sender(), 1);
+        watcher.arming(vec!["press Enter".into()], Some(7));
+        let reader = TcpStream::connect(server.address()).expect("connected");
+        wait_until("the reader is seen", || {
+            watcher.sender.readers_so_far().is_some()
+        });
+        for asks in [Some(7), Some(7), None] {
+            watcher.arming(vec![], asks);
+        }
+        drop(watcher);
+        assert_eq!(server.end(), 0);
+        let lines: Vec<_> = BufReader::new(reader).lines().map(Result::unwrap).collect();
+        let [_hello, arming] = &lines[..] else {
+            panic!("{lines:?}");
+        };
+        assert!(
+            arming.contains(r#""lines":["press Enter"],"asks":7"#),
+            "{arming}"
+        );
+    }
+}

@@ -185,7 +185,9 @@ class Device:
         self._surface = (surface or Surface()).params()
         if self._surface.pop("materials"):
             raise ValueError("materials of a surface cannot be loaded: give materials= and material_table=, files")
-        if surface is not None:
+        if surface is None:
+            self._surface["static_friction"] = options.get("friction", 0.0)
+        else:
             words.update((_OPTIONS.get(name, name), it) for name, it in self._surface.items())
         words.update(options)
         names = {option: name for name, option in _OPTIONS.items()}
