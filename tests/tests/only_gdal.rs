@@ -59,12 +59,18 @@ fn files_that_only_gdal_reads_are_exact_and_in_place() {
 }
 
 #[test]
-fn overviews_of_gdal_serve_the_coarse_levels() {
+fn large_files_stay_on_disk_and_overviews_survey_them() {
     if !has_gdal() {
         return;
     }
-    let raster = open("overviews.img", None).expect("read");
+    let options = OpenOptions {
+        most_in_memory_bytes: 0,
+        ..OpenOptions::default()
+    };
+    let raster = Raster::open(file("overviews.img"), &options).expect("read");
     assert_eq!((raster.columns(), raster.rows()), (600, 500));
+    // The coarsest overview has every fourth sample.
+    assert_eq!(raster.summary().looked_at, 150 * 125);
     for (column, row) in [(0, 0), (599, 499), (17, 300), (512, 33)] {
         let wanted = column / 16 + row / 16;
         assert_eq!(raster.height(column, 499 - row), f64::from(wanted));

@@ -82,10 +82,13 @@ pub(super) fn or_by_gdal(
 ) -> Result<Decoded, BadRaster> {
     use BadRaster::{HeaderMissing, UnknownFormat, Unsupported};
     match (decoded, input.data()) {
-        (
-            Err(fault @ (UnknownFormat | HeaderMissing(_) | Unsupported { .. })),
-            Data::File(_, path),
-        ) => gdal::decode(path, options)?.ok_or(fault),
+        (Err(fault @ (HeaderMissing(_) | Unsupported { .. })), Data::File(_, path)) => {
+            // Where GDAL fails, too, what is missing here is the better thing to say.
+            gdal::decode(path, options).ok().flatten().ok_or(fault)
+        }
+        (Err(fault @ UnknownFormat), Data::File(_, path)) => {
+            gdal::decode(path, options)?.ok_or(fault)
+        }
         (decoded, _) => decoded,
     }
 }

@@ -22,8 +22,7 @@ use crate::raster::{BadRaster, OpenOptions, ReferenceSystem, thinned};
 
 /// The format's name in messages.
 const NAME: &str = "GDAL";
-/// When a file of more samples than this is opened, so many places each way are looked at.
-const FEW_SAMPLES: u64 = 1 << 20;
+/// When a file that stays on disk is opened, so many places each way are looked at.
 const PLACES: u32 = 6;
 /// Colour pictures have three bands, or four, of bytes.
 const COLOURS: std::ops::RangeInclusive<u32> = 3..=4;
@@ -112,7 +111,16 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
     let (driver, map, wkt) = (dataset.driver(), dataset.geo_transform(), dataset.wkt());
     let blocks = GdalBlocks::new(dataset, number, held(stored))?;
     let format = format!("{driver} by GDAL, {}", blocks.held.none().type_name());
-    let mut decoded = Decoded::new(format, size, blocks);
+    let samples = u64::from(columns) * u64::from(rows);
+    let mut decoded = match samples * blocks.held.bytes() > options.most_in_memory_bytes {
+        true => Decoded::new(format, size, blocks),
+        false => {
+            let all = blocks.read(0, &Part::whole(columns, rows))?;
+            let mut decoded = Decoded::new(format, size, all.samples);
+            decoded.storage.set_holes(all.holes);
+            decoded
+        }
+    };
     decoded.no_data = no_data;
     decoded.scale = scale.unwrap_or(1.0);
     decoded.offset = offset.unwrap_or(0.0);
@@ -272,9 +280,7 @@ impl BlockReader for GdalBlocks {
     fn looks(&self) -> Option<Looks> {
         // Overviews show all of it at once.
         match &self.images[..] {
-            [full] if u64::from(full.columns) * u64::from(full.rows) > FEW_SAMPLES => {
-                Some(thinned::places(full, PLACES))
-            }
+            [full] => Some(thinned::places(full, PLACES)),
             _ => None,
         }
     }
