@@ -1,9 +1,9 @@
-//! Who reads a terrain file: this program, and GDAL in builds that have it. The same tests
-//! hold for both.
+//! Who reads a terrain file: this program, and GDAL where there is a libgdal. The same tests hold for
+//! both.
 
 use std::path::Path;
 
-use hapterra::raster::{Error, OpenOptions, Raster};
+use hapterra::raster::{Error, OpenOptions, Raster, gdal};
 
 /// A reader of terrain files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,17 +11,20 @@ pub enum Reader {
     /// What `hapterra` reads by itself.
     Own,
     /// GDAL, asked for a file that `hapterra` reads by itself.
-    #[cfg(feature = "gdal")]
     Gdal,
 }
 
 impl Reader {
-    /// All that this build has.
-    pub const ALL: &[Self] = &[
-        Self::Own,
-        #[cfg(feature = "gdal")]
-        Self::Gdal,
-    ];
+    /// All that this machine has; says so where there is no GDAL.
+    pub fn all() -> Vec<Self> {
+        match gdal() {
+            Ok(_) => vec![Self::Own, Self::Gdal],
+            Err(why) => {
+                eprintln!("skipped: GDAL as a second reader: {why}");
+                vec![Self::Own]
+            }
+        }
+    }
 
     /// Opens a file.
     ///
@@ -30,7 +33,6 @@ impl Reader {
     pub fn open(self, path: &Path, options: &OpenOptions) -> Result<Raster, Error> {
         match self {
             Self::Own => Raster::open(path, options),
-            #[cfg(feature = "gdal")]
             Self::Gdal => Raster::open_by_gdal(path, options),
         }
     }

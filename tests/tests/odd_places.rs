@@ -104,7 +104,7 @@ fn cells_are_as_large_as_on_their_own_body() {
     for row in rows() {
         // GDAL 3.6 finds no place in these NetCDF files, as `gdalinfo` shows.
         let is_placed = |reader: &&Reader| **reader == Reader::Own || !row.file.ends_with(".nc");
-        for reader in Reader::ALL.iter().filter(is_placed) {
+        for reader in Reader::all().iter().filter(is_placed) {
             let raster = row.raster_by(*reader);
             let cell = raster
                 .cell()

@@ -80,7 +80,10 @@ fn files_lie_where_gdal_sees_them() {
         if !row.is_a_surface() || !path.is_file() {
             continue;
         }
-        for reader in Reader::ALL.iter().filter(|reader| reader.knows(&row.file)) {
+        for reader in Reader::all()
+            .iter()
+            .filter(|reader| reader.knows(&row.file))
+        {
             let raster = match reader.open(&path, &OpenOptions::default()) {
                 Ok(raster) => raster,
                 // Colours and nothing but no-data.

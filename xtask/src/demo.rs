@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use crate::board::EMULATED;
 use crate::image;
 use crate::run::{cargo, root, run, say, shown, target_dir, timed};
-use crate::setup::{qemu, toolchain};
+use crate::setup::{gdal, qemu, toolchain};
 use crate::view;
 
 /// What the user asked for.
@@ -40,6 +40,13 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
         Some("emulated") => Some(emulation()?),
         Some(_) => None,
     };
+    if request
+        .file
+        .as_ref()
+        .is_some_and(|file| gdal::is_wanted_for(file.as_ref()))
+    {
+        gdal::ready_or_say_why();
+    }
     timed("building the hapterra command", || {
         let words = [
             "build",

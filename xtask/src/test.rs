@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::board::{BOARDS, Board};
 use crate::run::{cargo, say, shown, timed};
-use crate::setup::{emulator, qemu, toolchain};
+use crate::setup::{emulator, gdal, qemu, toolchain};
 use crate::{counts, deny, image, panics, size};
 
 /// A board and the ELF of its image.
@@ -43,6 +43,7 @@ pub(crate) struct Request {
 /// All that failed, with the commands that repeat it.
 pub(crate) fn test(request: &Request) -> Result<()> {
     let qemu = qemu::ready()?;
+    gdal::ready_or_say_why();
     if !request.quick {
         emulator::ready()?;
     }

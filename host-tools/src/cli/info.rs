@@ -1,5 +1,6 @@
 //! `hapterra info`: what a terrain file holds and how it would be streamed.
 
+mod formats;
 mod link;
 mod place;
 
@@ -26,6 +27,10 @@ pub struct Args {
     /// The terrain file.
     #[command(flatten)]
     pub terrain: TerrainFile,
+
+    /// List the formats of terrain files that are read on this machine
+    #[arg(long, num_args = 0, default_missing_value = "", value_parser = formats::Printed)]
+    pub formats: Option<formats::Printed>,
 
     /// Which cells of the file are felt
     #[arg(long, value_enum, default_value_t)]

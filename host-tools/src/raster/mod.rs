@@ -12,6 +12,7 @@
 //! | NetCDF 3 and 4 `.nc`, `.grd` | `netcdf-reader` | |
 //! | USGS ASCII `.dem` | here | |
 //! | NumPy `.npy`, `.npz` | `npyz` | |
+//! | all others that GDAL knows | `heightfield-gdal` | where the machine has a libgdal |
 //!
 //! Each format is one file or folder of `formats`, and one line in its table. From a
 //! path to samples: `open` unpacks (`archive`), asks the table, and lets the format
@@ -78,6 +79,19 @@ use place::Place;
 use samples::{SampleValue, with_samples};
 use storage::Storage;
 
+/// The libgdal of this machine, which reads what nothing here does; it is loaded the first time.
+///
+/// # Errors
+/// Why there is none that can be used.
+pub fn gdal() -> Result<heightfield_gdal::Library, heightfield_gdal::Error> {
+    formats::gdal::library()
+}
+
+/// Names of the formats that are read without GDAL.
+pub fn own_formats() -> impl Iterator<Item = &'static str> {
+    formats::FORMATS.iter().map(|format| format.name)
+}
+
 /// A height field held once, in the compact type of its file.
 ///
 /// Column 0 is the westernmost, row 0 the **southernmost**, whatever the file's
@@ -117,8 +131,7 @@ impl Raster {
     /// are to say the same of it.
     ///
     /// # Errors
-    /// As [`Raster::open`]; what comes in an archive is no file that GDAL could open.
-    #[cfg(feature = "gdal")]
+    /// As [`Raster::open`]; [`BadRaster::UnknownFormat`] where there is no libgdal, too.
     pub fn open_by_gdal(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
         Self::opened(path.as_ref(), options, open::decode_by_gdal)
     }

@@ -2,9 +2,9 @@
 
 use super::archive::{self, Zip};
 use super::format::{Claim, Format, Parts};
-use super::formats::{FORMATS, claim_of, headered, npy, raw};
+use super::formats::{FORMATS, claim_of, gdal, headered, npy, raw};
 use super::guard::guarded;
-use super::input::FileBytes;
+use super::input::{Data, FileBytes};
 use super::{BadRaster, Decoded, OpenOptions};
 
 /// Enough of a file to tell every format by its beginning.
@@ -74,34 +74,23 @@ fn decode_plain(
     or_by_gdal(decoded, input, options)
 }
 
-/// What is not known or not supported here is given to GDAL, in builds that have it.
-#[cfg(feature = "gdal")]
+/// What is not known or not supported here is given to GDAL, where there is a libgdal.
 pub(super) fn or_by_gdal(
     decoded: Result<Decoded, BadRaster>,
     input: &FileBytes,
     options: &OpenOptions,
 ) -> Result<Decoded, BadRaster> {
     use BadRaster::{HeaderMissing, UnknownFormat, Unsupported};
-    match decoded {
-        Err(UnknownFormat | HeaderMissing(_) | Unsupported { .. })
-            if options.variable.is_none() =>
-        {
-            match guarded("GDAL", || super::formats::gdal::decode(input, options))? {
-                Some(decoded) => Ok(decoded),
-                None => decoded,
-            }
+    match (decoded, input.data()) {
+        (Err(fault @ (HeaderMissing(_) | Unsupported { .. })), Data::File(_, path)) => {
+            // Where GDAL fails, too, what is missing here is the better thing to say.
+            gdal::decode(path, options).ok().flatten().ok_or(fault)
         }
-        decoded => decoded,
+        (Err(fault @ UnknownFormat), Data::File(_, path)) => {
+            gdal::decode(path, options)?.ok_or(fault)
+        }
+        (decoded, _) => decoded,
     }
-}
-
-#[cfg(not(feature = "gdal"))]
-pub(super) fn or_by_gdal(
-    decoded: Result<Decoded, BadRaster>,
-    _: &FileBytes,
-    _: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
-    decoded
 }
 
 fn decode_as(

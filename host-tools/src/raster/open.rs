@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::formats::gdal;
 use super::guard::guarded;
 use super::input::FileBytes;
 use super::one_file::{self, or_by_gdal};
@@ -10,7 +11,11 @@ use super::{BadRaster, Decoded, OpenOptions, mosaic};
 /// Decodes a terrain: a file, which may be packed, or many that are one.
 pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     if let Some(files) = mosaic::named(path)? {
-        return decode_all(&files, options);
+        return match decode_all(&files, options) {
+            // Some formats are folders.
+            Err(fault @ BadRaster::NoTiles(_)) => gdal::decode(path, options)?.ok_or(fault),
+            decoded => decoded,
+        };
     }
     let input = FileBytes::open(path, &options.elsewhere)?;
     if options.raw.is_none() && mosaic::is_json(&input)? {
@@ -45,9 +50,6 @@ fn check_no_asset(options: &OpenOptions, of: &str) -> Result<(), BadRaster> {
 }
 
 /// Decodes a file by GDAL alone.
-#[cfg(feature = "gdal")]
 pub(super) fn decode_by_gdal(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
-    let input = FileBytes::open(path, &options.elsewhere)?;
-    let decoded = guarded("GDAL", || super::formats::gdal::decode(&input, options))?;
-    decoded.ok_or(BadRaster::UnknownFormat)
+    gdal::decode(path, options)?.ok_or(BadRaster::UnknownFormat)
 }

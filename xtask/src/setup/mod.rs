@@ -2,6 +2,7 @@
 
 mod distribution;
 pub(crate) mod emulator;
+pub(crate) mod gdal;
 pub(crate) mod packages;
 pub(crate) mod qemu;
 pub(crate) mod toolchain;

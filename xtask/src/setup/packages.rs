@@ -26,6 +26,8 @@ pub(crate) const QEMU: Packages = [
     "qemu-system-arm",
     "qemu",
 ];
+/// The programs bring the library, whose own name has a number in it.
+pub(crate) const GDAL: Packages = ["gdal-bin", "gdal-libs", "gdal", "gdal"];
 /// For the page's own test.
 pub(crate) const BROWSER: Packages = [
     "chromium-headless-shell",

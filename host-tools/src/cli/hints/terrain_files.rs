@@ -6,8 +6,10 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
+use heightfield_gdal::Error as GdalError;
+
 use crate::cli::failure::Hint;
-use crate::raster::{BadRaster, Encoding, Error};
+use crate::raster::{BadRaster, Encoding, Error, gdal};
 use crate::remote::is_url;
 
 impl Hint for Error {
@@ -20,7 +22,8 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
     let hint = match fault {
         BadRaster::UnknownFormat => {
             return format!(
-                "{}; or say how raw samples lie with --raw-size WxH",
+                "{}{}; or say how raw samples lie with --raw-size WxH",
+                with_gdal(path),
                 converted(path, "")
             );
         }
@@ -28,7 +31,7 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         BadRaster::Unsupported {
             format: "NetCDF", ..
         } => return unpacked_netcdf(path),
-        BadRaster::Unsupported { .. } => return converted(path, PLAIN),
+        BadRaster::Unsupported { .. } => return with_gdal(path) + &converted(path, PLAIN),
         BadRaster::InTile { file, fault } => return hint(file, fault),
         BadRaster::TilesDiffer { file, other, .. } => {
             return brought_together(path, file, other);
@@ -160,6 +163,17 @@ fn elsewhere(path: &Path, error: &std::io::Error) -> &'static str {
 fn extension(path: &Path) -> String {
     let extension = path.extension().unwrap_or_default();
     extension.to_string_lossy().to_lowercase()
+}
+
+/// What makes GDAL read the file as it is, where that is missing and might do.
+fn with_gdal(path: &Path) -> String {
+    match is_known_to_gdal(path) && gdal().is_err() {
+        true => format!(
+            "{}, and name the file again; or ",
+            GdalError::how_to_install()
+        ),
+        false => String::new(),
+    }
 }
 
 fn is_known_to_gdal(path: &Path) -> bool {

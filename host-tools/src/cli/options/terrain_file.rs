@@ -21,7 +21,7 @@ const INPUT: &str = "Input";
 /// A terrain file, and what the user says about it that it does not say itself.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TerrainFile {
-    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, DTED, .flt, .bil, ENVI,
+    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, DTED, .flt, .bil, ENVI, what GDAL reads,
     /// .npy/.npz, or raw samples; or many as one: a folder, a quoted pattern ('tiles/*.tif'), a
     /// GDAL .vrt, a STAC's .json; or one of these at a URL (https, s3, gs, az), in builds with them
     #[arg(value_hint = ValueHint::FilePath)]

@@ -4,6 +4,9 @@ use super::super::BadRaster;
 use super::super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
 use super::survey::Looks;
 
+/// Side of a usual block: where blocks of a file are smaller, several are read at once.
+pub(in crate::raster) const USUAL_BLOCK: u32 = 256;
+
 /// Reads parts of a file's images.
 pub(in crate::raster) trait BlockReader: Send + Sync {
     /// Name of the format, in messages.
@@ -151,6 +154,48 @@ impl BlockImage {
             row,
             columns: self.block[0].min(self.columns - column),
             rows: self.block[1].min(self.rows - row),
+        }
+    }
+}
+
+/// Columns and rows of a block: as few whole chunks as make a usual one.
+pub(in crate::raster) fn usual_block([columns, rows]: [u32; 2]) -> [u32; 2] {
+    let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
+    // Of wide chunks fewer rows make a usual block, and of high ones fewer columns.
+    let filled = |chunk: u32, other: u32| {
+        let usual = (USUAL_BLOCK * USUAL_BLOCK / other.clamp(1, USUAL_BLOCK * USUAL_BLOCK)).max(1);
+        chunk.saturating_mul(usual.div_ceil(chunk))
+    };
+    match (columns > USUAL_BLOCK, rows > USUAL_BLOCK) {
+        (true, true) => [columns, rows],
+        (true, false) => [columns, filled(rows, columns)],
+        (false, true) => [filled(columns, rows), rows],
+        (false, false) => [several(columns), several(rows)],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_is_as_few_chunks_as_make_a_usual_one() {
+        assert_eq!(usual_block([256, 256]), [256, 256]);
+        assert_eq!(usual_block([100, 300]), [300, 300]);
+        assert_eq!(usual_block([1000, 1000]), [1000, 1000]);
+        assert_eq!(usual_block([20_000, 1]), [20_000, 3]);
+        assert_eq!(usual_block([1, 20_000]), [3, 20_000]);
+        assert_eq!(usual_block([16, 12]), [256, 264]);
+        assert_eq!(usual_block([32_768, 2]), [32_768, 2]);
+        for columns in [1, 7, 255, 256, 257, 5000, 1 << 22] {
+            for rows in [1, 7, 255, 256, 257, 5000, 1 << 22] {
+                let samples = |[columns, rows]: [u32; 2]| u64::from(columns) * u64::from(rows);
+                let block = samples(usual_block([columns, rows]));
+                assert!(
+                    block <= (1 << 18).max(4 * samples([columns, rows])),
+                    "{columns} {rows}"
+                );
+            }
         }
     }
 }

@@ -1,227 +1,317 @@
-//! What GDAL reads and nothing here does: a feature of the build (`gdal`), as it needs
-//! GDAL's C library. It is asked last, so that a build with it reads nothing in another
-//! way than one without.
+//! What GDAL reads and nothing here does, block by block, through a libgdal that is found when a
+//! file wants it. It is asked last, so that a machine with it reads nothing in another way than one
+//! without.
 
-use ::gdal::raster::{GdalDataType, GdalType, RasterBand};
-use ::gdal::{Dataset, errors::GdalError};
+use std::hash::Hasher;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use heightfield_gdal::{
+    Band, Dataset, Error, Library, Mask, Sample, SampleType as Stored, Settings, Window,
+};
+use twox_hash::XxHash64;
+
+use crate::raster::blocks::{
+    Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, usual_block,
+};
 use crate::raster::decoded::{Decoded, sides};
 use crate::raster::geometry::metres_in;
 use crate::raster::ground_map::GroundMap;
-use crate::raster::input::{Data, FileBytes};
-use crate::raster::samples::{HoleMask, Samples};
-use crate::raster::{BadRaster, OpenOptions, ReferenceSystem};
+use crate::raster::samples::{HoleMask, SampleType, with_samples};
+use crate::raster::{BadRaster, OpenOptions, ReferenceSystem, thinned};
 
-/// More samples than this are not held in memory.
-const MOST_BYTES: u64 = 16 << 30;
+/// The format's name in messages.
+const NAME: &str = "GDAL";
+/// When a file that stays on disk is opened, so many places each way are looked at.
+const PLACES: u32 = 6;
+/// Colour pictures have three bands, or four, of bytes.
+const COLOURS: std::ops::RangeInclusive<u32> = 3..=4;
 
-/// Reads a file with GDAL; `None` where GDAL does not know it either. What comes out of
-/// an archive has no path that GDAL could open.
+/// The libgdal of this machine; it is loaded the first time.
+///
+/// # Errors
+/// Why there is none that can be used.
+pub(in crate::raster) fn library() -> Result<Library, Error> {
+    Library::load(Settings::default())
+}
+
+/// Reads a file, folder or whatever else a driver opens; none where no driver does, or there is no
+/// libgdal.
+///
+/// # Errors
+/// What is wrong with it, once a driver has opened it.
 pub(in crate::raster) fn decode(
-    input: &FileBytes,
+    path: &Path,
     options: &OpenOptions,
 ) -> Result<Option<Decoded>, BadRaster> {
-    let Data::File(_, path) = input.data() else {
+    let library = match library() {
+        Ok(library) => library,
+        Err(why) => {
+            tracing::debug!("{} is not given to GDAL: {why}", path.display());
+            return Ok(None);
+        }
+    };
+    let Ok(dataset) = library.open(path, &[]) else {
         return Ok(None);
     };
-    let Ok(dataset) = Dataset::open(path) else {
-        return Ok(None);
+    let dataset = match chosen(&dataset, options)? {
+        Some(name) => library.open(Path::new(&name), &[]).map_err(fault)?,
+        None => dataset,
     };
-    match dataset.raster_count() {
-        // A container of several: which one is for GDAL's own tools to say.
-        0 => Ok(None),
-        bands => field(&dataset, bands, options).map(Some),
+    decoded(dataset, options).map(Some)
+}
+
+/// The name of the raster to take, where the file holds several.
+fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, BadRaster> {
+    let parts = dataset.subdatasets();
+    // As `depth` of `NETCDF:"ocean.nc":depth`.
+    let short = |name: &str| name.rsplit([':', '/']).next().unwrap_or(name).to_owned();
+    let names: Vec<_> = parts.iter().map(|part| short(&part.name)).collect();
+    match &options.variable {
+        Some(asked) => {
+            let is_asked = |name: &str| name == asked || short(name) == *asked;
+            let part = parts.iter().find(|part| is_asked(&part.name));
+            let part = part.ok_or_else(|| BadRaster::NoSuchPart {
+                asked: format!("variable {asked}"),
+                there: match parts.is_empty() {
+                    true => "the file holds one raster".to_owned(),
+                    false => format!("the file holds {}", names.join(", ")),
+                },
+            })?;
+            Ok(Some(part.name.clone()))
+        }
+        None if dataset.bands() > 0 => Ok(None),
+        None => match &parts[..] {
+            [] => Err(BadRaster::NoNumbers("it holds no raster".into())),
+            [only] => Ok(Some(only.name.clone())),
+            _ => Err(BadRaster::SeveralHeights {
+                kind: "raster",
+                names,
+            }),
+        },
     }
 }
 
-fn field(dataset: &Dataset, bands: usize, options: &OpenOptions) -> Result<Decoded, BadRaster> {
-    let asked = options.band.unwrap_or(1) as usize;
-    if asked > bands {
-        return Err(BadRaster::NoSuchPart {
-            asked: format!("band {asked}"),
-            there: format!("the file has bands 1 to {bands}"),
+fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    let bands = dataset.bands();
+    let number = options.band.unwrap_or(1);
+    let band = dataset.band(number).map_err(fault)?;
+    let stored = band.sample_type();
+    let stored = stored.map_err(|name| BadRaster::NotAHeightField(format!("samples of {name}")))?;
+    if options.band.is_none() && stored == Stored::U8 && COLOURS.contains(&bands) {
+        return Err(BadRaster::ColourBands {
+            what: format!("a picture of {bands} bands of bytes"),
+            bands: bands as u16,
         });
     }
-    let band = dataset.rasterband(asked).map_err(fault)?;
-    let (columns, rows) = dataset.raster_size();
-    let size = sides(columns as u64, rows as u64)?;
-    let samples = samples(&band, (columns, rows))?;
-    let driver = dataset.driver().short_name();
-    let format = format!("{driver} by GDAL, {}", samples.type_name());
-    let mut decoded = Decoded::new(format, size, samples);
-    decoded.no_data = band.no_data_value();
-    decoded.scale = band.scale().unwrap_or(1.0);
-    decoded.offset = band.offset().unwrap_or(0.0);
-    decoded.storage.set_holes(holes(&band, (columns, rows))?);
+    let [columns, rows] = band.size();
+    let size = sides(columns.into(), rows.into())?;
+    let (no_data, scale, offset) = (band.no_data(), band.scale(), band.offset());
+    let unit = band.unit();
+    let (driver, map, wkt) = (dataset.driver(), dataset.geo_transform(), dataset.wkt());
+    let blocks = GdalBlocks::new(dataset, number, held(stored))?;
+    let format = format!("{driver} by GDAL, {}", blocks.held.none().type_name());
+    let samples = u64::from(columns) * u64::from(rows);
+    let mut decoded = match samples * blocks.held.bytes() > options.most_in_memory_bytes {
+        true => Decoded::new(format, size, blocks),
+        false => {
+            let all = blocks.read(0, &Part::whole(columns, rows))?;
+            let mut decoded = Decoded::new(format, size, all.samples);
+            decoded.storage.set_holes(all.holes);
+            decoded
+        }
+    };
+    decoded.no_data = no_data;
+    decoded.scale = scale.unwrap_or(1.0);
+    decoded.offset = offset.unwrap_or(0.0);
     if bands > 1 && options.band.is_none() {
         decoded.remarks.push(format!(
             "it has {bands} bands: the first is taken for the height (--band)"
         ));
     }
-    let wkt = dataset
-        .spatial_ref()
-        .and_then(|system| system.to_wkt())
-        .ok();
-    let (system, vertical) = wkt.map_or((None, None), |wkt| ReferenceSystem::from_wkt(&wkt));
+    let of_wkt = wkt.map(|wkt| ReferenceSystem::from_wkt(&wkt));
+    let (system, vertical) = of_wkt.unwrap_or((None, None));
     decoded.system = system;
-    decoded.set_vertical(vertical, metres_in(&band.unit()));
-    if let Ok([x, per_column_x, per_row_x, y, per_column_y, per_row_y]) = dataset.geo_transform() {
-        let map = GroundMap::new([x, per_column_x, per_row_x], [y, per_column_y, per_row_y]);
-        if let Some(map) = map {
-            decoded.lay_out(map, None);
-        }
+    decoded.set_vertical(vertical, unit.as_deref().and_then(metres_in));
+    if let Some([x, x_column, x_row, y, y_column, y_row]) = map
+        && let Some(map) = GroundMap::new([x, x_column, x_row], [y, y_column, y_row])
+    {
+        decoded.lay_out(map, None);
     }
     Ok(decoded)
 }
 
-fn samples(band: &RasterBand<'_>, size: (usize, usize)) -> Result<Samples, BadRaster> {
-    let kind = band.band_type();
-    let bytes = (size.0 as u64 * size.1 as u64).saturating_mul(u64::from(kind.bytes()));
-    if bytes > MOST_BYTES {
-        return Err(BadRaster::TooLarge {
-            columns: size.0 as u64,
-            rows: size.1 as u64,
-            gigabytes: bytes.div_ceil(1_000_000_000),
-        });
+/// The type in which samples are held.
+const fn held(stored: Stored) -> SampleType {
+    match stored {
+        Stored::U8 => SampleType::U8,
+        Stored::I8 => SampleType::I8,
+        Stored::U16 => SampleType::U16,
+        Stored::I16 => SampleType::I16,
+        Stored::U32 => SampleType::U32,
+        Stored::I32 => SampleType::I32,
+        Stored::F16 | Stored::F32 => SampleType::F32,
+        // Exact to 2^53.
+        Stored::U64 | Stored::I64 | Stored::F64 => SampleType::F64,
     }
-    Ok(match kind {
-        GdalDataType::UInt8 => read::<u8>(band, size)?.into(),
-        GdalDataType::UInt16 => read::<u16>(band, size)?.into(),
-        GdalDataType::Int16 => read::<i16>(band, size)?.into(),
-        GdalDataType::UInt32 => read::<u32>(band, size)?.into(),
-        GdalDataType::Int32 => read::<i32>(band, size)?.into(),
-        GdalDataType::Float32 => read::<f32>(band, size)?.into(),
-        GdalDataType::Unknown => {
-            return Err(BadRaster::NotAHeightField(
-                "samples of an unknown type".into(),
-            ));
-        }
-        // 64-bit integers become doubles, exact to 2^53.
-        _ => read::<f64>(band, size)?.into(),
-    })
 }
 
-/// Samples that a mask or an alpha band calls no data.
-fn holes(band: &RasterBand<'_>, size: (usize, usize)) -> Result<Option<HoleMask>, BadRaster> {
-    let flags = band.mask_flags().map_err(fault)?;
-    if flags.is_all_valid() || flags.is_nodata() {
-        return Ok(None);
-    }
-    let mask = band.open_mask_band().map_err(fault)?;
-    let mut holes = HoleMask::with_capacity(size.0 * size.1);
-    for (index, valid) in read::<u8>(&mask, size)?.iter().enumerate() {
-        holes.set(index, *valid == 0);
-    }
-    Ok(Some(holes).filter(|holes| !holes.is_clear()))
+/// A band in its file.
+struct GdalBlocks {
+    /// GDAL is used by one thread at a time.
+    dataset: Mutex<Dataset>,
+    /// Number of the band.
+    number: u32,
+    held: SampleType,
+    images: Vec<BlockImage>,
+    /// Of each image but the full one, its number among the band's overviews.
+    overviews: Vec<usize>,
+    is_masked: bool,
+    index: u64,
 }
 
-fn read<T: Copy + GdalType>(
-    band: &RasterBand<'_>,
-    size: (usize, usize),
-) -> Result<Vec<T>, BadRaster> {
-    let buffer = band.read_as::<T>((0, 0), size, size, None).map_err(fault)?;
-    Ok(buffer.into_shape_and_vec().1)
-}
-
-fn fault(error: GdalError) -> BadRaster {
-    BadRaster::Damaged(format!("GDAL: {error}"))
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use ::gdal::DriverManager;
-    use ::gdal::raster::Buffer;
-    use ::gdal::spatial_ref::SpatialRef;
-
-    use super::*;
-    use crate::raster::{Error, Raster};
-
-    fn height(column: usize, row: usize) -> f32 {
-        100.5 + 7.0 * column as f32 - 3.0 * row as f32
-    }
-
-    /// Two bands of 5 × 4 samples, the second 1000 higher, in a format of GDAL's.
-    fn write(path: &Path, driver: &str) {
-        let driver = DriverManager::get_driver_by_name(driver).expect("a driver");
-        let created = driver.create_with_band_type::<f32, _>(path, 5, 4, 2);
-        let mut dataset = created.expect("a file");
-        let system = SpatialRef::from_epsg(32611).expect("known");
-        dataset.set_spatial_ref(&system).expect("set");
-        let place = [400_000.0, 30.0, 0.0, 3_800_000.0, 0.0, -30.0];
-        dataset.set_geo_transform(&place).expect("set");
-        for number in 1..=2 {
-            let places = (0..4).flat_map(|row| (0..5).map(move |column| (column, row)));
-            let above = 1000.0 * (number - 1) as f32;
-            let values = places.map(|(column, row)| match (column, row) {
-                (3, 1) => -9999.0,
-                _ => height(column, row) + above,
+impl GdalBlocks {
+    fn new(dataset: Dataset, number: u32, held: SampleType) -> Result<Self, BadRaster> {
+        let band = dataset.band(number).map_err(fault)?;
+        let is_masked = band.mask() == Mask::Band;
+        let full = image(&band);
+        let samples = band.block_size().map(u64::from).iter().product::<u64>();
+        if samples.saturating_mul(held.bytes()) > LARGEST_BLOCK_BYTES {
+            let [columns, rows] = band.block_size();
+            return Err(BadRaster::Unsupported {
+                format: NAME,
+                feature: format!("a file that is read {columns} × {rows} samples at once"),
             });
-            let mut buffer = Buffer::new((5, 4), values.collect::<Vec<f32>>());
-            let mut band = dataset.rasterband(number).expect("a band");
-            band.set_no_data_value(Some(-9999.0)).expect("set");
-            band.write((0, 0), (5, 4), &mut buffer).expect("written");
         }
+        // Those that GDAL would serve a coarse view of the band by.
+        let overviews = band.overviews();
+        let mut coarser: Vec<_> = (0..overviews.len())
+            .filter(|at| {
+                let [own, of_full] = [&overviews[*at], &band].map(Band::size);
+                own < of_full && (own[0] > 1 && own[1] > 1)
+            })
+            .filter(|at| !is_masked || overviews[*at].mask() == Mask::Band)
+            .collect();
+        coarser.sort_by_key(|at| std::cmp::Reverse(overviews[*at].size()));
+        coarser.dedup_by_key(|at| overviews[*at].size());
+        let images: Vec<_> = (coarser.iter().map(|at| image(&overviews[*at]))).collect();
+        let mut hasher = XxHash64::with_seed(0);
+        for side in full
+            .block
+            .iter()
+            .chain([&full.columns, &full.rows, &number])
+        {
+            hasher.write_u32(*side);
+        }
+        hasher.write(dataset.driver().as_bytes());
+        Ok(Self {
+            number,
+            held,
+            images: [full].into_iter().chain(images).collect(),
+            overviews: coarser,
+            is_masked,
+            index: hasher.finish(),
+            dataset: Mutex::new(dataset),
+        })
     }
 
-    fn open(path: &Path, band: Option<u32>) -> Result<Raster, Error> {
-        let options = OpenOptions {
-            band,
-            ..OpenOptions::default()
+    fn dataset(&self) -> MutexGuard<'_, Dataset> {
+        // A panic in between has changed nothing of it.
+        self.dataset.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// An image as the rest of the program knows it, in blocks of a few of GDAL's.
+fn image(band: &Band<'_>) -> BlockImage {
+    let [columns, rows] = band.size();
+    let [across, down] = band.block_size();
+    BlockImage {
+        columns,
+        rows,
+        block: usual_block([across.min(columns.max(1)), down.min(rows.max(1))]),
+        every: None,
+        first: [0; 2],
+    }
+}
+
+impl BlockReader for GdalBlocks {
+    fn format(&self) -> &'static str {
+        NAME
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.held
+    }
+
+    fn is_stored(&self, _: usize, _: &Part) -> bool {
+        true
+    }
+
+    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let dataset = self.dataset();
+        let full = dataset.band(self.number).map_err(fault)?;
+        let band = match image.checked_sub(1) {
+            None => full,
+            Some(coarser) => {
+                let overviews = full.overviews();
+                let overview = (self.overviews.get(coarser)).and_then(|at| overviews.get(*at));
+                *overview.ok_or_else(|| BadRaster::damaged("GDAL: an overview has gone"))?
+            }
         };
-        Raster::open(path, &options)
+        let mut samples = self.held.none();
+        with_samples!(&mut samples, values => *values = read(&band, part)?);
+        let mask = self.is_masked.then(|| band.mask_band()).flatten();
+        let holes = mask.map(|mask| holes(&mask, part)).transpose()?;
+        Ok(Block {
+            samples,
+            holes: holes.filter(|holes| !holes.is_clear()),
+            is_lacking: false,
+        })
     }
 
-    #[test]
-    fn what_only_gdal_reads_is_exact_and_in_its_place() {
-        let folder = tempfile::tempdir().expect("a folder");
-        for (driver, name) in [
-            ("HFA", "erdas.img"),
-            ("PCIDSK", "geomatica.pix"),
-            ("KEA", "kea.kea"),
-        ] {
-            if DriverManager::get_driver_by_name(driver).is_err() {
-                eprintln!("skipped: this GDAL has no {driver}");
-                continue;
-            }
-            let path = folder.path().join(name);
-            write(&path, driver);
-            for (band, above) in [(None, 0.0), (Some(2), 1000.0)] {
-                let raster = open(&path, band).expect(driver);
-                assert_eq!((raster.columns(), raster.rows()), (5, 4));
-                assert_eq!(raster.summary().holes, 1, "{driver}");
-                assert!(raster.height(3, 2).is_nan(), "{driver}");
-                for (column, row) in [(0, 0), (4, 3), (2, 1)] {
-                    let found = raster.height(column, 3 - row);
-                    let wanted = f64::from(height(column as usize, row as usize)) + above;
-                    assert_eq!(found, wanted, "{driver}");
-                }
-                let bounds = raster.bounds().expect("placed");
-                assert_eq!((bounds.west, bounds.south), (400_000.0, 3_799_880.0));
-                // Some formats keep a system's parameters and lose its code.
-                let degrees = raster.bounds_lonlat().expect("a known projection");
-                assert!(
-                    (degrees.west + 118.0873).abs() < 1e-3,
-                    "{driver}: {degrees:?}"
-                );
-            }
-            let error = open(&path, Some(3)).expect_err("two bands");
-            assert!(error.to_string().contains("bands 1 to 2"), "{error}");
+    fn index(&self) -> u64 {
+        self.index
+    }
+
+    fn looks(&self) -> Option<Looks> {
+        // Overviews show all of it at once.
+        match &self.images[..] {
+            [full] => Some(thinned::places(full, PLACES)),
+            _ => None,
         }
     }
+}
 
-    #[test]
-    fn what_gdal_does_not_know_keeps_its_own_error() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("letter.doc");
-        std::fs::write(&path, "Dear friend").expect("written");
-        let error = open(&path, None).expect_err("no terrain");
-        assert!(matches!(error.fault(), BadRaster::UnknownFormat), "{error}");
-        let cut = folder.path().join("cut.img");
-        write(&cut, "HFA");
-        let bytes = std::fs::read(&cut).expect("readable");
-        std::fs::write(&cut, &bytes[..bytes.len() / 2]).expect("written");
-        open(&cut, None).expect_err("half of a file");
+fn read<T: Sample>(band: &Band<'_>, part: &Part) -> Result<Vec<T>, BadRaster> {
+    let count = part.columns as usize * part.rows as usize;
+    let mut samples = vec![T::default(); count];
+    let window = Window {
+        column: part.column,
+        row: part.row,
+        columns: part.columns,
+        rows: part.rows,
+    };
+    band.read(window, &mut samples).map_err(fault)?;
+    Ok(samples)
+}
+
+/// Samples that a mask or an alpha band calls none.
+fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, BadRaster> {
+    let valid = read::<u8>(mask, part)?;
+    let mut holes = HoleMask::with_capacity(valid.len());
+    for (at, valid) in valid.iter().enumerate() {
+        holes.set(at, *valid == 0);
+    }
+    Ok(holes)
+}
+
+fn fault(error: Error) -> BadRaster {
+    match error {
+        Error::NoSuchPart { asked, there } => BadRaster::NoSuchPart { asked, there },
+        error => BadRaster::Damaged(error.to_string()),
     }
 }

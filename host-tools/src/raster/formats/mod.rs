@@ -3,7 +3,6 @@
 
 mod asc;
 mod dted;
-#[cfg(feature = "gdal")]
 pub(super) mod gdal;
 mod grass;
 pub(super) mod headered;

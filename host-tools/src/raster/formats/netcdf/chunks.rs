@@ -7,15 +7,15 @@ use twox_hash::XxHash64;
 
 use super::access::{Access, CHUNK_CACHE_BYTES};
 use super::{fault, of_the_other_sign};
-use crate::raster::blocks::{Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part};
+use crate::raster::blocks::{
+    Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, USUAL_BLOCK, usual_block,
+};
 use crate::raster::guard::guarded;
 use crate::raster::samples::{HoleMask, with_samples};
 use crate::raster::unread::Unread;
 use crate::raster::{BadRaster, SampleType, Samples, thinned};
 use crate::remote::RemoteFile;
 
-/// Small chunks are read several at once, samples each way.
-const USUAL_BLOCK: u32 = 256;
 /// Blocks of coarse images, whose samples are of many chunks.
 const COARSE_BLOCK: u32 = 32;
 /// Samples of a block of a file that is elsewhere and has no chunks: what lies together comes
@@ -257,22 +257,6 @@ impl Chunks {
     }
 }
 
-/// Columns and rows of a block: as few whole chunks as make a usual one.
-fn usual_block([columns, rows]: [u32; 2]) -> [u32; 2] {
-    let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
-    // Of wide chunks fewer rows make a usual block, and of high ones fewer columns.
-    let filled = |chunk: u32, other: u32| {
-        let usual = (USUAL_BLOCK * USUAL_BLOCK / other.clamp(1, USUAL_BLOCK * USUAL_BLOCK)).max(1);
-        chunk.saturating_mul(usual.div_ceil(chunk))
-    };
-    match (columns > USUAL_BLOCK, rows > USUAL_BLOCK) {
-        (true, true) => [columns, rows],
-        (true, false) => [columns, filled(rows, columns)],
-        (false, true) => [filled(columns, rows), rows],
-        (false, false) => [several(columns), several(rows)],
-    }
-}
-
 /// The samples of a range, each so many of the file apart, by chunks of so many of the file.
 fn pieces(range: std::ops::Range<u32>, first: u32, every: u32, chunk: u32) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
@@ -380,26 +364,5 @@ mod tests {
             [(0, 1, 0, 0), (1, 1, 64, 4), (2, 1, 128, 8)]
         );
         assert_eq!(of(3..3, 0, 1), []);
-    }
-
-    #[test]
-    fn a_block_is_as_few_chunks_as_make_a_usual_one() {
-        assert_eq!(usual_block([256, 256]), [256, 256]);
-        assert_eq!(usual_block([100, 300]), [300, 300]);
-        assert_eq!(usual_block([1000, 1000]), [1000, 1000]);
-        assert_eq!(usual_block([20_000, 1]), [20_000, 3]);
-        assert_eq!(usual_block([1, 20_000]), [3, 20_000]);
-        assert_eq!(usual_block([16, 12]), [256, 264]);
-        assert_eq!(usual_block(WIDE_BLOCK), WIDE_BLOCK);
-        for columns in [1, 7, 255, 256, 257, 5000, 1 << 22] {
-            for rows in [1, 7, 255, 256, 257, 5000, 1 << 22] {
-                let samples = |[columns, rows]: [u32; 2]| u64::from(columns) * u64::from(rows);
-                let block = samples(usual_block([columns, rows]));
-                assert!(
-                    block <= (1 << 18).max(4 * samples([columns, rows])),
-                    "{columns} {rows}"
-                );
-            }
-        }
     }
 }

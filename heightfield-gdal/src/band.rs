@@ -1,0 +1,312 @@
+//! A band of a raster: its samples, and what they mean.
+
+use std::ffi::{c_int, c_void};
+use std::marker::PhantomData;
+
+use crate::dataset::Dataset;
+use crate::error::Error;
+use crate::functions::Handle;
+use crate::library::Loaded;
+use crate::text::from_c;
+
+/// `GF_Read`.
+const READ: c_int = 0;
+/// `CE_None`, and `CE_Warning`, with which samples have come.
+const WARNING: c_int = 2;
+/// `GMF_ALL_VALID` and `GMF_NODATA`.
+const ALL_VALID: c_int = 1;
+const NO_DATA: c_int = 8;
+
+/// A band of an open raster, or an overview or mask of one.
+#[derive(Clone, Copy)]
+pub struct Band<'d> {
+    loaded: &'d Loaded,
+    handle: Handle,
+    dataset: PhantomData<&'d Dataset>,
+}
+
+/// A rectangle of samples; column 0, row 0 is the file's first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Its first column.
+    pub column: u32,
+    /// Its first row.
+    pub row: u32,
+    /// Samples a row.
+    pub columns: u32,
+    /// Rows.
+    pub rows: u32,
+}
+
+/// The type in which a band stores samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleType {
+    /// Unsigned, 8 bits.
+    U8,
+    /// Signed, 8 bits (from GDAL 3.7 on).
+    I8,
+    /// Unsigned, 16 bits.
+    U16,
+    /// Signed, 16 bits.
+    I16,
+    /// Unsigned, 32 bits.
+    U32,
+    /// Signed, 32 bits.
+    I32,
+    /// Unsigned, 64 bits.
+    U64,
+    /// Signed, 64 bits.
+    I64,
+    /// Floats of 16 bits (from GDAL 3.11 on).
+    F16,
+    /// Floats of 32 bits.
+    F32,
+    /// Floats of 64 bits.
+    F64,
+}
+
+/// What marks samples as none, beside a no-data value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mask {
+    /// Nothing, or the no-data value alone.
+    None,
+    /// A band of its own, or an alpha band: 0 marks none.
+    Band,
+}
+
+/// A type that samples can be read as. GDAL converts, and brings what does not fit within the
+/// type's range.
+pub trait Sample: Copy + Default + sealed::Code {}
+
+mod sealed {
+    pub trait Code {
+        /// GDAL's number of the type.
+        const CODE: std::ffi::c_int;
+    }
+}
+
+macro_rules! samples {
+    ($($type:ty = $code:literal),*) => {
+        $(
+            impl sealed::Code for $type {
+                const CODE: c_int = $code;
+            }
+            impl Sample for $type {}
+        )*
+    };
+}
+
+// 14 is known from GDAL 3.7 on, as are bands of that type.
+samples!(
+    u8 = 1,
+    i8 = 14,
+    u16 = 2,
+    i16 = 3,
+    u32 = 4,
+    i32 = 5,
+    f32 = 6,
+    f64 = 7
+);
+
+impl SampleType {
+    const fn of(code: c_int) -> Option<Self> {
+        Some(match code {
+            1 => Self::U8,
+            2 => Self::U16,
+            3 => Self::I16,
+            4 => Self::U32,
+            5 => Self::I32,
+            6 => Self::F32,
+            7 => Self::F64,
+            12 => Self::U64,
+            13 => Self::I64,
+            14 => Self::I8,
+            15 => Self::F16,
+            _ => return None,
+        })
+    }
+}
+
+impl<'d> Band<'d> {
+    /// A band by its handle; none for a null one.
+    pub(crate) fn of(
+        loaded: &'d Loaded,
+        handle: Handle,
+        dataset: PhantomData<&'d Dataset>,
+    ) -> Option<Self> {
+        (!handle.is_null()).then_some(Self {
+            loaded,
+            handle,
+            dataset,
+        })
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        let functions = &self.loaded.functions;
+        // SAFETY: the band's dataset is open.
+        let size = unsafe {
+            [
+                (functions.GDALGetRasterBandXSize)(self.handle),
+                (functions.GDALGetRasterBandYSize)(self.handle),
+            ]
+        };
+        size.map(|count| count.max(0) as u32)
+    }
+
+    /// Columns and rows of a block, which GDAL reads as one, however little of it is asked for.
+    #[must_use]
+    pub fn block_size(&self) -> [u32; 2] {
+        let (mut columns, mut rows) = (0, 0);
+        // SAFETY: room for two numbers.
+        unsafe {
+            (self.loaded.functions.GDALGetBlockSize)(self.handle, &raw mut columns, &raw mut rows);
+        }
+        [columns, rows].map(|count| count.max(1) as u32)
+    }
+
+    /// The type of its samples.
+    ///
+    /// # Errors
+    /// Complex numbers, and types of a GDAL that is newer than this crate, by name.
+    pub fn sample_type(&self) -> Result<SampleType, String> {
+        let functions = &self.loaded.functions;
+        // SAFETY: the band's dataset is open; the name stays, and is copied.
+        unsafe {
+            let code = (functions.GDALGetRasterDataType)(self.handle);
+            SampleType::of(code).ok_or_else(|| {
+                let name = from_c((functions.GDALGetDataTypeName)(code));
+                name.unwrap_or_else(|| format!("type {code}"))
+            })
+        }
+    }
+
+    /// The value that marks a sample as none.
+    #[must_use]
+    pub fn no_data(&self) -> Option<f64> {
+        self.number(self.loaded.functions.GDALGetRasterNoDataValue)
+    }
+
+    /// What samples are multiplied by, before the [offset](Self::offset) is added.
+    #[must_use]
+    pub fn scale(&self) -> Option<f64> {
+        self.number(self.loaded.functions.GDALGetRasterScale)
+    }
+
+    /// What is added to samples.
+    #[must_use]
+    pub fn offset(&self) -> Option<f64> {
+        self.number(self.loaded.functions.GDALGetRasterOffset)
+    }
+
+    fn number(&self, of: unsafe extern "C" fn(Handle, *mut c_int) -> f64) -> Option<f64> {
+        let mut is_stated = 0;
+        // SAFETY: one of the three functions above; room for one number.
+        let number = unsafe { of(self.handle, &raw mut is_stated) };
+        (is_stated != 0).then_some(number)
+    }
+
+    /// The unit of the heights, as the file calls it.
+    #[must_use]
+    pub fn unit(&self) -> Option<String> {
+        // SAFETY: the band's dataset is open; the text is copied.
+        unsafe { from_c((self.loaded.functions.GDALGetRasterUnitType)(self.handle)) }
+    }
+
+    /// What the file calls the band.
+    #[must_use]
+    pub fn description(&self) -> Option<String> {
+        // SAFETY: as above.
+        unsafe { from_c((self.loaded.functions.GDALGetDescription)(self.handle)) }
+    }
+
+    /// Its overviews, in the file's order.
+    #[must_use]
+    pub fn overviews(&self) -> Vec<Self> {
+        let functions = &self.loaded.functions;
+        // SAFETY: the band's dataset is open; overviews are counted from 0, and are the dataset's.
+        unsafe {
+            let count = (functions.GDALGetOverviewCount)(self.handle);
+            let overviews =
+                (0..count).map(|number| (functions.GDALGetOverview)(self.handle, number));
+            let bands = overviews.filter_map(|handle| Self::of(self.loaded, handle, self.dataset));
+            bands.collect()
+        }
+    }
+
+    /// What marks samples as none, beside the no-data value.
+    #[must_use]
+    pub fn mask(&self) -> Mask {
+        // SAFETY: the band's dataset is open.
+        let flags = unsafe { (self.loaded.functions.GDALGetMaskFlags)(self.handle) };
+        match flags & (ALL_VALID | NO_DATA) {
+            0 => Mask::Band,
+            _ => Mask::None,
+        }
+    }
+
+    /// The band of its mask: 0 where a sample is none.
+    #[must_use]
+    pub fn mask_band(&self) -> Option<Self> {
+        // SAFETY: the band's dataset is open, and the mask is its.
+        let handle = unsafe { (self.loaded.functions.GDALGetMaskBand)(self.handle) };
+        Self::of(self.loaded, handle, self.dataset)
+    }
+
+    /// Reads a window, row after row, each `samples` of it once.
+    ///
+    /// # Errors
+    /// [`Error::Window`] where it is not inside of the band, or `samples` has another size;
+    /// [`Error::Refused`] in GDAL's words.
+    pub fn read<T: Sample>(&self, window: Window, samples: &mut [T]) -> Result<(), Error> {
+        let Window {
+            column,
+            row,
+            columns,
+            rows,
+        } = window;
+        let misfit = |why: String| Error::Window {
+            window: [column, row, columns, rows],
+            why,
+        };
+        let [across, down] = self.size();
+        let ends = [column.checked_add(columns), row.checked_add(rows)];
+        let is_inside = ends
+            .iter()
+            .zip([across, down])
+            .all(|(end, size)| end.is_some_and(|end| end <= size));
+        if !is_inside || columns == 0 || rows == 0 {
+            return Err(misfit(format!("the band has {across} × {down} samples")));
+        }
+        if samples.len() as u64 != u64::from(columns) * u64::from(rows) {
+            return Err(misfit(format!("there is room for {}", samples.len())));
+        }
+        // At most the band's size, which is a number of GDAL's.
+        let [x, y, width, height] = [column, row, columns, rows].map(|count| count as c_int);
+        let buffer = samples.as_mut_ptr().cast::<c_void>();
+        let functions = &self.loaded.functions;
+        // SAFETY: the buffer holds as many samples of that type as the window has, without gaps.
+        let said = unsafe {
+            (functions.CPLErrorReset)();
+            (functions.GDALRasterIO)(
+                self.handle,
+                READ,
+                x,
+                y,
+                width,
+                height,
+                buffer,
+                width,
+                height,
+                T::CODE,
+                0,
+                0,
+            )
+        };
+        match said <= WARNING {
+            true => Ok(()),
+            false => Err(self.loaded.refused("the samples cannot be read")),
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! An open raster.
+
+use std::ffi::{CStr, c_char};
+use std::fmt;
+use std::marker::PhantomData;
+use std::path::Path;
+use std::ptr;
+use std::sync::Arc;
+
+use crate::band::Band;
+use crate::error::Error;
+use crate::functions::Handle;
+use crate::library::Loaded;
+use crate::text::{from_c, list_from_c, path_to_c, to_c};
+
+/// `GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR`, for reading.
+const OPEN_FLAGS: u32 = 0x02 | 0x40;
+/// `CE_None`.
+const FINE: i32 = 0;
+
+/// An open raster, closed when it is dropped.
+pub struct Dataset {
+    pub(crate) loaded: Arc<Loaded>,
+    handle: Handle,
+}
+
+// SAFETY: GDAL lets a dataset go to another thread as long as one thread at a time uses it, which
+// is what `Send` without `Sync` says.
+unsafe impl Send for Dataset {}
+
+/// One of several rasters in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Subdataset {
+    /// What opens it, as `NETCDF:"ocean.nc":depth`.
+    pub name: String,
+    /// As `[180x360] depth (32-bit floating-point)`.
+    pub title: String,
+}
+
+impl Dataset {
+    pub(crate) fn open(loaded: Arc<Loaded>, path: &Path, options: &[&str]) -> Result<Self, Error> {
+        let path = path_to_c(path)?;
+        let options: Result<Vec<_>, _> = options.iter().map(|option| to_c(option)).collect();
+        let options = options?;
+        let list = options.iter().map(|option| option.as_ptr());
+        let list: Vec<*const c_char> = list.chain([ptr::null()]).collect();
+        let functions = &loaded.functions;
+        // SAFETY: texts and list stay for the call; all drivers are asked, and siblings looked for.
+        let handle = unsafe {
+            (functions.CPLErrorReset)();
+            let (drivers, siblings) = (ptr::null(), ptr::null());
+            (functions.GDALOpenEx)(path.as_ptr(), OPEN_FLAGS, drivers, list.as_ptr(), siblings)
+        };
+        match handle.is_null() {
+            true => Err(loaded.refused("no driver knows the file")),
+            false => Ok(Self { loaded, handle }),
+        }
+    }
+
+    /// The driver's short name, as `HFA`.
+    #[must_use]
+    pub fn driver(&self) -> String {
+        let functions = &self.loaded.functions;
+        // SAFETY: the dataset is open, and its driver stays.
+        let name = unsafe {
+            let driver = (functions.GDALGetDatasetDriver)(self.handle);
+            if driver.is_null() {
+                return String::new();
+            }
+            from_c((functions.GDALGetDriverShortName)(driver))
+        };
+        name.unwrap_or_default()
+    }
+
+    /// Bands of its own; none of a file that holds several rasters
+    /// ([`subdatasets`](Self::subdatasets)).
+    #[must_use]
+    pub fn bands(&self) -> u32 {
+        // SAFETY: the dataset is open.
+        let count = unsafe { (self.loaded.functions.GDALGetRasterCount)(self.handle) };
+        count.max(0) as u32
+    }
+
+    /// A band by its number, 1 first.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchPart`].
+    pub fn band(&self, number: u32) -> Result<Band<'_>, Error> {
+        let no_such = || Error::NoSuchPart {
+            asked: format!("band {number}"),
+            there: match self.bands() {
+                0 => "the file holds no band of its own".to_owned(),
+                1 => "the file has band 1 alone".to_owned(),
+                bands => format!("the file has bands 1 to {bands}"),
+            },
+        };
+        if number == 0 || number > self.bands() {
+            return Err(no_such());
+        }
+        // SAFETY: the number is one of the open dataset's.
+        let handle =
+            unsafe { (self.loaded.functions.GDALGetRasterBand)(self.handle, number as i32) };
+        Band::of(&self.loaded, handle, PhantomData).ok_or_else(no_such)
+    }
+
+    /// What columns and rows are for coordinates: x = `[0]` + column · `[1]` + row · `[2]`,
+    /// y = `[3]` + column · `[4]` + row · `[5]`, from the outer corner of the first sample's cell.
+    #[must_use]
+    pub fn geo_transform(&self) -> Option<[f64; 6]> {
+        let mut numbers = [0.0; 6];
+        // SAFETY: room for six numbers.
+        let said = unsafe {
+            (self.loaded.functions.GDALGetGeoTransform)(self.handle, numbers.as_mut_ptr())
+        };
+        (said == FINE && numbers.iter().all(|number| number.is_finite())).then_some(numbers)
+    }
+
+    /// The reference system, WKT as GDAL writes it.
+    #[must_use]
+    pub fn wkt(&self) -> Option<String> {
+        // SAFETY: the dataset is open; the text is copied.
+        unsafe { from_c((self.loaded.functions.GDALGetProjectionRef)(self.handle)) }
+    }
+
+    /// An item of its metadata, of the domain of that name or the default one.
+    ///
+    /// # Errors
+    /// [`Error::ZeroByte`].
+    pub fn metadata(&self, name: &str, domain: Option<&str>) -> Result<Option<String>, Error> {
+        let (name, domain) = (to_c(name)?, domain.map(to_c).transpose()?);
+        let domain = domain
+            .as_ref()
+            .map_or(ptr::null(), |domain| domain.as_ptr());
+        let functions = &self.loaded.functions;
+        // SAFETY: the texts stay for the call; what is given is copied.
+        Ok(unsafe {
+            from_c((functions.GDALGetMetadataItem)(
+                self.handle,
+                name.as_ptr(),
+                domain,
+            ))
+        })
+    }
+
+    /// The rasters that a file of several holds; each is opened by its name.
+    #[must_use]
+    pub fn subdatasets(&self) -> Vec<Subdataset> {
+        let lines = self.list(c"SUBDATASETS");
+        let value = |key: &str| {
+            let mut lines = lines.iter().filter_map(|line| line.split_once('='));
+            lines.find(|(name, _)| *name == key).map(|(_, value)| value)
+        };
+        let numbered = (1..=lines.len()).map_while(|number| {
+            Some(Subdataset {
+                name: value(&format!("SUBDATASET_{number}_NAME"))?.to_owned(),
+                title: value(&format!("SUBDATASET_{number}_DESC"))
+                    .unwrap_or_default()
+                    .to_owned(),
+            })
+        });
+        numbered.collect()
+    }
+
+    fn list(&self, domain: &CStr) -> Vec<String> {
+        let functions = &self.loaded.functions;
+        // SAFETY: the dataset is open; the list is copied.
+        unsafe { list_from_c((functions.GDALGetMetadata)(self.handle, domain.as_ptr())) }
+    }
+}
+
+impl Drop for Dataset {
+    fn drop(&mut self) {
+        // SAFETY: opened, and closed once; bands borrow the dataset. What closing says is of no
+        // use: nothing was written.
+        unsafe { (self.loaded.functions.GDALClose)(self.handle) };
+    }
+}
+
+impl fmt::Debug for Dataset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of {} bands", self.driver(), self.bands())
+    }
+}

@@ -1,0 +1,65 @@
+//! What can go wrong.
+
+use std::path::PathBuf;
+
+use crate::library::Version;
+
+/// Why a raster cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There is no libgdal on this machine, or not where it is looked for.
+    #[error("no libgdal was found ({tried})")]
+    NotFound {
+        /// What was tried last, and what the system said.
+        tried: String,
+    },
+    /// A library is there that this crate cannot use.
+    #[error("{} is GDAL {version}: versions from {} are read", path.display(), Version::OLDEST)]
+    Version {
+        /// The library.
+        path: PathBuf,
+        /// Its version.
+        version: String,
+    },
+    /// A library is there that lacks a function of GDAL's.
+    #[error("{} is no complete libgdal: it lacks {function}", path.display())]
+    Incomplete {
+        /// The library.
+        path: PathBuf,
+        /// The first function that it lacks.
+        function: &'static str,
+    },
+    /// GDAL refuses, in its own words.
+    #[error("GDAL: {0}")]
+    Refused(String),
+    /// A text for GDAL has a zero byte in it.
+    #[error("{0:?} has a zero byte: GDAL cannot be told that")]
+    ZeroByte(String),
+    /// A part of a raster that is not there.
+    #[error("there is no {asked}: {there}")]
+    NoSuchPart {
+        /// What was asked for.
+        asked: String,
+        /// What there is.
+        there: String,
+    },
+    /// A window or a buffer that does not fit.
+    #[error("a window of {window:?} does not fit: {why}")]
+    Window {
+        /// First column and row, columns and rows.
+        window: [u32; 4],
+        /// Why.
+        why: String,
+    },
+}
+
+impl Error {
+    /// What to type so that libgdal is there, one line a system.
+    #[must_use]
+    pub const fn how_to_install() -> &'static str {
+        "install GDAL: apt install gdal-bin (Debian, Ubuntu), dnf install gdal-libs (Fedora), \
+         brew install gdal (macOS), conda install gdal, or OSGeo4W on Windows; \
+         or name the library in the environment variable GDAL_LIBRARY"
+    }
+}

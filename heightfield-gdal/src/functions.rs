@@ -1,0 +1,74 @@
+//! The functions of GDAL's C interface that are called, with the types of its headers
+//! (`gdal.h`, `cpl_error.h`, `cpl_conv.h`), unchanged from 3.4 on.
+
+use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
+
+/// A `GDALDatasetH`, `GDALRasterBandH` or `GDALDriverH`; GDAL calls what they have in common a
+/// `GDALMajorObjectH`.
+pub(crate) type Handle = *mut c_void;
+
+macro_rules! functions {
+    ($($name:ident: ($($argument:ty),*) $(-> $result:ty)?;)*) => {
+        /// Each function by its name in C.
+        #[allow(non_snake_case)]
+        pub(crate) struct Functions {
+            $(pub(crate) $name: unsafe extern "C" fn($($argument),*) $(-> $result)?,)*
+        }
+
+        impl Functions {
+            /// Looks all of them up.
+            ///
+            /// # Errors
+            /// The name of the first that is not there.
+            ///
+            /// # Safety
+            /// The library is GDAL's, and stays loaded as long as the functions are called.
+            pub(crate) unsafe fn of(library: &libloading::Library) -> Result<Self, &'static str> {
+                Ok(Self {
+                    // SAFETY: the types are those of GDAL's headers.
+                    $($name: unsafe {
+                        *library.get(stringify!($name)).map_err(|_| stringify!($name))?
+                    },)*
+                })
+            }
+        }
+    };
+}
+
+functions! {
+    GDALVersionInfo: (*const c_char) -> *const c_char;
+    CPLSetConfigOption: (*const c_char, *const c_char);
+    CPLSetErrorHandler: (*const c_void) -> *const c_void;
+    CPLQuietErrorHandler: (c_int, c_int, *const c_char);
+    CPLErrorReset: ();
+    CPLGetLastErrorMsg: () -> *const c_char;
+    GDALAllRegister: ();
+    GDALGetDriverCount: () -> c_int;
+    GDALGetDriver: (c_int) -> Handle;
+    GDALGetDriverShortName: (Handle) -> *const c_char;
+    GDALGetDriverLongName: (Handle) -> *const c_char;
+    GDALGetMetadataItem: (Handle, *const c_char, *const c_char) -> *const c_char;
+    GDALGetMetadata: (Handle, *const c_char) -> *const *const c_char;
+    GDALGetDescription: (Handle) -> *const c_char;
+    GDALOpenEx: (*const c_char, c_uint, *const *const c_char, *const *const c_char, *const *const c_char) -> Handle;
+    GDALClose: (Handle) -> c_int;
+    GDALGetDatasetDriver: (Handle) -> Handle;
+    GDALGetRasterCount: (Handle) -> c_int;
+    GDALGetGeoTransform: (Handle, *mut c_double) -> c_int;
+    GDALGetProjectionRef: (Handle) -> *const c_char;
+    GDALGetRasterBand: (Handle, c_int) -> Handle;
+    GDALGetRasterBandXSize: (Handle) -> c_int;
+    GDALGetRasterBandYSize: (Handle) -> c_int;
+    GDALGetBlockSize: (Handle, *mut c_int, *mut c_int);
+    GDALGetRasterDataType: (Handle) -> c_int;
+    GDALGetDataTypeName: (c_int) -> *const c_char;
+    GDALGetRasterNoDataValue: (Handle, *mut c_int) -> c_double;
+    GDALGetRasterScale: (Handle, *mut c_int) -> c_double;
+    GDALGetRasterOffset: (Handle, *mut c_int) -> c_double;
+    GDALGetRasterUnitType: (Handle) -> *const c_char;
+    GDALGetOverviewCount: (Handle) -> c_int;
+    GDALGetOverview: (Handle, c_int) -> Handle;
+    GDALGetMaskFlags: (Handle) -> c_int;
+    GDALGetMaskBand: (Handle) -> Handle;
+    GDALRasterIO: (Handle, c_int, c_int, c_int, c_int, c_int, *mut c_void, c_int, c_int, c_int, c_int, c_int) -> c_int;
+}

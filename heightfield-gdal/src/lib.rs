@@ -1,0 +1,33 @@
+//! Rasters of every format that GDAL reads, block by block, through a libgdal that is found when
+//! the program runs. Nothing is linked: a program builds and starts without GDAL.
+//!
+//! ```no_run
+//! use heightfield_gdal::{Library, Settings, Window};
+//!
+//! let gdal = Library::load(Settings::default())?;
+//! let dataset = gdal.open("dem.img".as_ref(), &[])?;
+//! let band = dataset.band(1)?;
+//! let [columns, rows] = band.block_size();
+//! let mut heights = vec![0.0_f32; (columns * rows) as usize];
+//! band.read(Window { column: 0, row: 0, columns, rows }, &mut heights)?;
+//! # Ok::<(), heightfield_gdal::Error>(())
+//! ```
+//!
+//! - [`Library`]: finds and loads libgdal, versions 3.4 and newer, and lists its drivers;
+//! - [`Dataset`]: a file, a folder or whatever else a driver opens, for reading;
+//! - [`Band`]: its samples, overviews and masks, and what they mean.
+//!
+//! A dataset is used by one thread at a time, and may go from thread to thread. A call takes as long
+//! as GDAL takes: no thread that must not wait may read.
+
+mod band;
+mod dataset;
+mod error;
+mod functions;
+mod library;
+mod text;
+
+pub use band::{Band, Mask, Sample, SampleType, Window};
+pub use dataset::{Dataset, Subdataset};
+pub use error::Error;
+pub use library::{Driver, Library, Settings, Version};

@@ -1,0 +1,284 @@
+//! Finds libgdal, loads it once, and lists its drivers.
+
+use std::ffi::OsString;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::dataset::Dataset;
+use crate::error::Error;
+use crate::functions::Functions;
+use crate::text::{from_c, to_c};
+
+/// Names the library itself, before all places where it is looked for.
+const NAMED_BY: &str = "GDAL_LIBRARY";
+/// Numbers of the library's interface on Linux, newest first: 3.4 has 30, and each minor version
+/// one more.
+const SONAMES: std::ops::RangeInclusive<u32> = 30..=60;
+/// Drivers that would go out to a network by themselves, or run what a file says.
+const SKIPPED: &str = "HTTP WMS WMTS WCS EEDA EEDAI PLMOSAIC PLScenes NGW OGCAPI DAAS";
+
+/// A version of GDAL.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Version {
+    /// 3 of 3.6.2.
+    pub major: u32,
+    /// 6 of 3.6.2.
+    pub minor: u32,
+    /// 2 of 3.6.2.
+    pub patch: u32,
+}
+
+impl Version {
+    /// The oldest that is read.
+    pub const OLDEST: Self = Self {
+        major: 3,
+        minor: 4,
+        patch: 0,
+    };
+
+    /// GDAL's number, as 3060200.
+    fn of(number: u32) -> Self {
+        Self {
+            major: number / 1_000_000,
+            minor: number / 10_000 % 100,
+            patch: number / 100 % 100,
+        }
+    }
+}
+
+impl fmt::Display for Version {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}.{}", self.major, self.minor, self.patch)
+    }
+}
+
+/// How GDAL is to work. It is one for the process: the settings of the first that loads it hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Bytes of blocks that GDAL keeps.
+    pub cache_bytes: u64,
+    /// Whether a file may name what is elsewhere, as a VRT does, and GDAL fetches it.
+    pub may_fetch: bool,
+}
+
+impl Default for Settings {
+    /// 64 MiB, and nothing is fetched.
+    fn default() -> Self {
+        Self {
+            cache_bytes: 64 << 20,
+            may_fetch: false,
+        }
+    }
+}
+
+/// A driver of GDAL's that reads rasters.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Driver {
+    /// As `HFA`.
+    pub name: String,
+    /// As `Erdas Imagine Images (.img)`.
+    pub title: String,
+}
+
+/// A libgdal that is loaded; it stays loaded until the process ends. Clones are the same one.
+#[derive(Clone)]
+pub struct Library {
+    loaded: Arc<Loaded>,
+}
+
+/// What stays.
+pub(crate) struct Loaded {
+    pub(crate) functions: Functions,
+    path: PathBuf,
+    version: Version,
+    // Last: the functions are its.
+    _library: libloading::Library,
+}
+
+impl Library {
+    /// Loads libgdal: the one that the environment variable `GDAL_LIBRARY` names, else that of an
+    /// active conda environment, else the newest that the system finds. Once it is loaded the same
+    /// one is given again.
+    ///
+    /// # Errors
+    /// [`Error::NotFound`], [`Error::Version`], [`Error::Incomplete`]. The next call tries again.
+    pub fn load(settings: Settings) -> Result<Self, Error> {
+        static LOADED: Mutex<Option<Library>> = Mutex::new(None);
+        let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(library) = &*loaded {
+            return Ok(library.clone());
+        }
+        let (library, path) = found(std::env::var_os(NAMED_BY))?;
+        let library = Self::of(library, path, settings)?;
+        *loaded = Some(library.clone());
+        Ok(library)
+    }
+
+    fn of(library: libloading::Library, path: PathBuf, settings: Settings) -> Result<Self, Error> {
+        // SAFETY: it calls itself libgdal, or the user does; it is kept beside the functions.
+        let functions = unsafe { Functions::of(&library) };
+        let functions = match functions {
+            Ok(functions) => functions,
+            Err(function) => return Err(Error::Incomplete { path, function }),
+        };
+        let number = c"VERSION_NUM".as_ptr();
+        // SAFETY: the text that GDAL gives stays, and is copied.
+        let number = unsafe { from_c((functions.GDALVersionInfo)(number)) }.unwrap_or_default();
+        let version = number.parse().map(Version::of);
+        let version = match version {
+            Ok(version) if version >= Version::OLDEST => version,
+            _ => {
+                let version = version.map_or(number, |version| version.to_string());
+                return Err(Error::Version { path, version });
+            }
+        };
+        settings.apply(&functions)?;
+        // SAFETY: once, before anything is opened.
+        unsafe { (functions.GDALAllRegister)() };
+        Ok(Self {
+            loaded: Arc::new(Loaded {
+                functions,
+                path,
+                version,
+                _library: library,
+            }),
+        })
+    }
+
+    /// Where it was found: a path, or the name that the system knows it by.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.loaded.path
+    }
+
+    /// Its version.
+    #[must_use]
+    pub fn version(&self) -> Version {
+        self.loaded.version
+    }
+
+    /// The drivers that read rasters, in GDAL's order.
+    #[must_use]
+    pub fn drivers(&self) -> Vec<Driver> {
+        let functions = &self.loaded.functions;
+        // SAFETY: drivers are counted from 0, and stay.
+        let count = unsafe { (functions.GDALGetDriverCount)() };
+        let drivers = (0..count).filter_map(|number| {
+            // SAFETY: as above; texts are copied.
+            unsafe {
+                let driver = (functions.GDALGetDriver)(number);
+                if driver.is_null() {
+                    return None;
+                }
+                let raster = c"DCAP_RASTER".as_ptr();
+                from_c((functions.GDALGetMetadataItem)(
+                    driver,
+                    raster,
+                    std::ptr::null(),
+                ))?;
+                Some(Driver {
+                    name: from_c((functions.GDALGetDriverShortName)(driver))?,
+                    title: from_c((functions.GDALGetDriverLongName)(driver)).unwrap_or_default(),
+                })
+            }
+        });
+        drivers.collect()
+    }
+
+    /// Opens a raster for reading, with a driver's open options, each as `NAME=VALUE`.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] in GDAL's words, [`Error::ZeroByte`].
+    pub fn open(&self, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
+        Dataset::open(self.loaded.clone(), path, options)
+    }
+}
+
+impl fmt::Debug for Library {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "GDAL {} ({})", self.version(), self.path().display())
+    }
+}
+
+impl Loaded {
+    /// What GDAL said last on this thread.
+    pub(crate) fn refused(&self, otherwise: &str) -> Error {
+        // SAFETY: the text stays until the next call on this thread, and is copied.
+        let said = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };
+        let said = said.unwrap_or_else(|| otherwise.to_owned());
+        // What a file says comes along: it must not steer a terminal.
+        let plain = said.trim().chars().map(|c| match c {
+            '\n' | '\t' => ' ',
+            c if c.is_control() => '\u{fffd}',
+            c => c,
+        });
+        Error::Refused(plain.collect())
+    }
+}
+
+impl Settings {
+    fn apply(self, functions: &Functions) -> Result<(), Error> {
+        let cache = format!("{}MB", (self.cache_bytes >> 20).max(1));
+        let mut options = vec![
+            ("GDAL_CACHEMAX", cache.as_str()),
+            ("GDAL_SKIP", SKIPPED),
+            ("GDAL_VRT_ENABLE_PYTHON", "NO"),
+            ("GDAL_MAX_DATASET_POOL_SIZE", "64"),
+            ("GDAL_NUM_THREADS", "1"),
+        ];
+        if !self.may_fetch {
+            // No address ends so.
+            options.push(("CPL_VSIL_CURL_ALLOWED_EXTENSIONS", ".nothing-is-fetched"));
+        }
+        for (name, value) in options {
+            let (name, value) = (to_c(name)?, to_c(value)?);
+            // SAFETY: both are copied by GDAL.
+            unsafe { (functions.CPLSetConfigOption)(name.as_ptr(), value.as_ptr()) };
+        }
+        let quiet = functions.CPLQuietErrorHandler as *const std::ffi::c_void;
+        // SAFETY: GDAL's own handler, which says nothing on standard error.
+        unsafe { (functions.CPLSetErrorHandler)(quiet) };
+        Ok(())
+    }
+}
+
+/// The library that is named, or the first that is there.
+fn found(named: Option<OsString>) -> Result<(libloading::Library, PathBuf), Error> {
+    let candidates = match named {
+        Some(named) => vec![PathBuf::from(named)],
+        None => candidates(std::env::var_os("CONDA_PREFIX")),
+    };
+    let mut tried = String::new();
+    for path in candidates {
+        // SAFETY: what libgdal does while it is loaded is registering itself.
+        match unsafe { libloading::Library::new(&path) } {
+            Ok(library) => return Ok((library, path)),
+            Err(error) => tried = error.to_string(),
+        }
+    }
+    Err(Error::NotFound { tried })
+}
+
+/// Where libgdal may be, in the order in which it is tried.
+fn candidates(conda: Option<OsString>) -> Vec<PathBuf> {
+    let conda = conda.map(PathBuf::from);
+    let mut paths = Vec::new();
+    if cfg!(windows) {
+        paths.extend(conda.map(|home| home.join("Library").join("bin").join("gdal.dll")));
+        paths.extend(["gdal.dll", r"C:\OSGeo4W\bin\gdal.dll"].map(PathBuf::from));
+        let numbered = (304..=340).rev().map(|of| format!("gdal{of}.dll"));
+        paths.extend(numbered.map(PathBuf::from));
+    } else if cfg!(target_os = "macos") {
+        paths.extend(conda.map(|home| home.join("lib/libgdal.dylib")));
+        let homes = ["/opt/homebrew/lib", "/usr/local/lib", "/opt/local/lib"];
+        paths.push("libgdal.dylib".into());
+        paths.extend(homes.map(|home| Path::new(home).join("libgdal.dylib")));
+    } else {
+        paths.extend(conda.map(|home| home.join("lib/libgdal.so")));
+        let numbered = SONAMES.rev().map(|of| format!("libgdal.so.{of}"));
+        paths.extend(numbered.map(PathBuf::from));
+        paths.push("libgdal.so".into());
+    }
+    paths
+}

@@ -1,0 +1,58 @@
+//! The library of GDAL, which reads terrain files of formats that nothing here reads.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use heightfield_gdal::{Error, Library, Settings};
+
+use super::packages::{self, found_or_installed};
+use crate::run::say;
+
+/// Extensions of files that are read without GDAL.
+const OWN: [&str; 16] = [
+    "tif", "tiff", "hgt", "npy", "npz", "asc", "png", "flt", "bil", "bip", "bsq", "hdr", "raw",
+    "zip", "gz", "json",
+];
+
+/// Sees to it that there is a libgdal, or says why not: without one, files of other formats are
+/// refused with what to install, and their tests are skipped.
+pub(crate) fn ready_or_say_why() {
+    if let Err(why) = found_or_installed(find, &packages::GDAL) {
+        say(format!(
+            "terrain files of other formats are not read: {why:#}"
+        ));
+    }
+}
+
+/// Whether a terrain's name says that GDAL reads it.
+pub(crate) fn is_wanted_for(file: &Path) -> bool {
+    let extension = file
+        .extension()
+        .map(|end| end.to_string_lossy().to_lowercase());
+    extension.is_some_and(|end| !OWN.contains(&end.as_str()))
+}
+
+fn find() -> Result<Library> {
+    Library::load(Settings::default()).context(Error::how_to_install())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_are_read_anyway_want_no_gdal() {
+        for name in [
+            "dem.tif",
+            "N34W119.HGT",
+            "tiles",
+            "a.b/dem",
+            "https://host/dem.tiff",
+        ] {
+            assert!(!is_wanted_for(Path::new(name)), "{name}");
+        }
+        for name in ["erdas.img", "dem.gpkg", "depth.JP2"] {
+            assert!(is_wanted_for(Path::new(name)), "{name}");
+        }
+    }
+}
