@@ -54,10 +54,15 @@ export class Touch {
     }
     this.tipMm = tipMm;
     this.arm.hoverMm = this.terrain.topMm + tipMm + HOVER_MM;
-    const [x, y, z] = this.arm.at;
-    const ground = this.kernel.heightAt(x, y);
-    if (z <= ground + ABOVE_MM) this.arm.put([x, y, ground + ABOVE_MM]);
+    this.#lift();
     this.#begin();
+  }
+
+  /** Puts an arm inside the ground right above it. */
+  #lift() {
+    const [x, y, z] = this.arm.at;
+    const above = this.kernel.heightAt(x, y) + ABOVE_MM;
+    if (z <= above) this.arm.put([x, y, above]);
   }
 
   /** Where the ball is above the ground, or the point: the proxy without the radius. */
@@ -87,5 +92,7 @@ export class Touch {
     this.proxy = felt.proxy;
     this.state = felt.state;
     this.path.add(this.arm.at, felt.force);
+    // The ground let go: of a ball's proxy that stays behind by more than 15 radii, or at a hole.
+    if (felt.state === "waiting") this.#lift();
   }
 }

@@ -97,7 +97,7 @@ def test_run_is_a_replay(tmp_path, surface, flags):
     assert 2_000 < touching < 18_000, touching
 
 
-@pytest.mark.parametrize("tip_mm", [0.5, 2, 8 * CELL_MM])
+@pytest.mark.parametrize("tip_mm", [1, 2, 8 * CELL_MM])
 def test_run_under_a_tip_is_a_replay(tmp_path, tip_mm):
     path = stroke(20_000) + [0, 0, tip_mm]
     words = [f"--cell-mm={CELL_MM}", f"--tip={tip_mm}mm", *FLAGS]

@@ -229,8 +229,11 @@ impl Terrain {
     /// A ball on a height field has its centre on another height field, and a point touches that one.
     /// **The HIP and the proxy are then the ball's centre**, which over flat ground is one radius above
     /// it, and so is [`Self::height_mm`]. The centre is within 2 % of the radius of where it belongs.
-    /// Materials are those under the centre. A ball that touches makes the forces of
-    /// `hapterra replay --tip`, bit for bit.
+    /// Materials are those under the centre. Forces are those of `hapterra replay --tip`, bit for bit.
+    ///
+    /// Felt cells are a 32nd of the radius, and the window of a contact has 512 of them. A proxy that
+    /// stays more than 15 radii behind its HIP, east or north, is let go
+    /// ([`State::Fading`](crate::State::Fading)), where a replay may begin anew beside the HIP.
     ///
     /// ```
     /// use hapterra_touch::Terrain;

@@ -17,7 +17,7 @@ const BLOCK_MM = 14;
 /** Length of the arrow for a newton, mm. */
 const ARROW_MM = 14;
 /** Radius of the ball that marks a point, mm. */
-const POINT_MM = 1.2;
+const POINT_MM = 1.6;
 const TRAIL_POINTS = 240;
 const COLOURS = { proxy: [1, 0.5, 0.12, 1], hip: [0.25, 0.65, 1, 1], force: [1, 0.85, 0.2, 1], pen: [0.82, 0.85, 0.9, 1], block: [0.37, 0.33, 0.31, 1], scale: [0.9, 0.93, 0.96, 1] };
 

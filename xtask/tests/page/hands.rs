@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::site::{GROUND, MARKS, Site, one, px};
+use crate::site::{Site, one, px};
 
 /// Up to the east, by one in two.
 fn on_a_ramp() -> Option<Site> {
@@ -157,9 +157,7 @@ fn ball_rests_by_its_radius_and_is_drawn_in_its_size() {
             (above - expected).abs() < 0.02 * tip_mm + 1e-3,
             "{above}, not {expected}"
         );
-        let picture = site.browser.picture(&site.page);
-        let colours = site.browser.colours(&site.page, &picture, GROUND, &MARKS);
-        pixels.push(colours.near[0]);
+        pixels.push(site.seen_near_the_ball().near[0]);
     }
     assert!(
         pixels[0] > 0 && 4 * pixels[0] < pixels[2] && 3 * pixels[1] < pixels[2],

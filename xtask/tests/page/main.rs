@@ -20,7 +20,7 @@ use std::path::Path;
 use serde_json::json;
 
 use server::Server;
-use site::{GROUND, MARKS, Site, hapterra, one};
+use site::{Site, hapterra, one};
 use timeouts::{HANG, wait_until};
 
 /// The rows of a CSV file's columns, as numbers of single precision.
@@ -87,14 +87,13 @@ fn saved_path_feels_the_same_in_replay_bit_for_bit() {
     let _ = site.value("[...document.querySelectorAll('#presets button')].at(-1).click()");
     site.wait("hapterra.touch.surface.friction === 0.5 && hapterra.touch.surface.texture === 0.22");
     stroke(&mut site);
-    let picture = site.browser.picture(&site.page);
-    let colours = site.browser.colours(&site.page, &picture, GROUND, &MARKS);
+    let colours = site.seen_near_the_ball();
     assert!(colours.count > 400, "{colours:?}");
     assert!(colours.near.iter().all(|pixels| *pixels > 5), "{colours:?}");
     let Some(line) = check_saved(&mut site, "changed", 1000) else {
         return;
     };
-    assert!(line.ends_with("--tip 2.5mm"), "{line}");
+    assert!(line.ends_with("--tip 3mm"), "{line}");
     assert_eq!(site.value("document.getElementById('mixed').hidden"), false);
     // A ball of more than 8 cells, and a point; the surface stays.
     for (tip_mm, word) in [(5.0, "--tip 5mm"), (0.0, "--texture-wavelength 2")] {
@@ -187,6 +186,7 @@ fn cursor_stays_behind_the_hand_on_a_slope() {
             && name.contains("true to scale"),
         "{name}"
     );
+    site.slide("tip", 0.0);
     site.point([0.5, 0.5]);
     // One newton on a slope of one in two pushes by half a newton: 4.2 mm of the hand's spring.
     site.wait("(({ arm, state }) => state === 'touching' && Math.hypot(...arm.speed) < 0.01 && Math.abs(arm.hand[0] - arm.at[0] - 0.5 / 0.12) < 0.05)(hapterra.touch)");

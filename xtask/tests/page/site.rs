@@ -8,7 +8,7 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use serde_json::json;
 
-use crate::browser::{self, Browser, Page};
+use crate::browser::{self, Browser, Colours, Page};
 use crate::server::Server;
 use crate::timeouts::wait_until;
 
@@ -16,9 +16,9 @@ use crate::timeouts::wait_until;
 static ONE: Mutex<()> = Mutex::new(());
 pub(crate) const SIZE: [u32; 2] = [720, 480];
 /// The part of a picture with ground alone, which no slider is in: left, top, width, height.
-pub(crate) const GROUND: [f64; 4] = [0.1, 0.2, 0.52, 0.65];
+const GROUND: [f64; 4] = [0.1, 0.2, 0.52, 0.65];
 /// Colours of the proxy and of the force's arrow, as they are lit.
-pub(crate) const MARKS: [[u8; 3]; 2] = [[255, 140, 35], [255, 215, 50]];
+const MARKS: [[u8; 3]; 2] = [[255, 140, 35], [255, 215, 50]];
 
 /// Waits until no other test has a page.
 pub(crate) fn one() -> MutexGuard<'static, ()> {
@@ -109,6 +109,20 @@ impl Site {
                 for (const name of ['input', 'change']) slider.dispatchEvent(new Event(name, {{ bubbles: true }}));
             }})()"
         ));
+    }
+
+    /// Counts colours of the ground seen from above the ball, near and with the hand at rest.
+    pub(crate) fn seen_near_the_ball(&mut self) -> Colours {
+        let _ = self.value(
+            "(({ scene, pointer, touch }) => {
+                pointer.at = [];
+                Object.assign(scene.camera, { distance: 150, pitch: 1.2, centre: [...touch.proxy] });
+            })(hapterra)",
+        );
+        let drawn = "new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(() => drawn(true))))";
+        self.wait(drawn);
+        let picture = self.browser.picture(&self.page);
+        self.browser.colours(&self.page, &picture, GROUND, &MARKS)
     }
 
     /// Drops a file on the page.
