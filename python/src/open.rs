@@ -218,7 +218,9 @@ impl Opened {
     pub(crate) fn check<T>(&self, of: impl FnOnce() -> T) -> PyResult<T> {
         self.why().clear();
         let value = of();
-        match self.why().is_empty() {
+        // Unlocked again, since the error locks it, too.
+        let is_read = self.why().is_empty();
+        match is_read {
             true => Ok(value),
             false => Err(self.unread()),
         }
