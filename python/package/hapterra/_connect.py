@@ -102,7 +102,8 @@ class Params:
             now[name] = value
 
     def __repr__(self) -> str:
-        return f"Params({', '.join(f'{name}={self.__dict__[name]!r}' for name in type(self).__annotations__)})"
+        each = (f"{name}={self.__dict__[name]!r}" for name in type(self).__annotations__)
+        return f"Params({', '.join(each)})"
 
 
 def connect(
@@ -145,7 +146,8 @@ class Device:
     ) -> None:
         kinds = ("usb", "native", "emulated")
         if name not in kinds and not name.startswith(("usb:", "tcp:")):
-            raise ValueError(f'{name!r} is no device: give "usb", "usb:SERIAL", "tcp:HOST:PORT", "native" or "emulated"')
+            known = '"usb", "usb:SERIAL", "tcp:HOST:PORT", "native" or "emulated"'
+            raise ValueError(f"{name!r} is no device: give {known}")
         if name == "emulated" and record is not None and Path(record).suffix == ".parquet":
             raise ValueError("an emulated board records CSV: name a file that ends in .csv")
         self.name = name
@@ -184,7 +186,9 @@ class Device:
             file = os.fspath(terrain)
         self._surface = (surface or Surface()).params()
         if self._surface.pop("materials"):
-            raise ValueError("materials of a surface cannot be loaded: give materials= and material_table=, files")
+            raise ValueError(
+                "materials of a surface cannot be loaded: give materials= and material_table=, files"
+            )
         if surface is None:
             self._surface["static_friction"] = options.get("friction", 0.0)
         else:

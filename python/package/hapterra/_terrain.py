@@ -48,6 +48,9 @@ class Terrain:
         by ``Contact``.
     """
 
+    #: Whether samples have numbers of materials.
+    _has_materials = False
+
     def __init__(
         self,
         heights: npt.ArrayLike,
