@@ -1,16 +1,17 @@
 //! Contacts.
 
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 use hapterra_touch::{Contact as Touched, State, Step, StepError};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::types::PyByteArray;
-use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
+use pyo3::{Bound, PyErr, PyResult, Python, pyclass, pymethods};
 
+use crate::open::Opened;
 use crate::surface::Surface;
 use crate::terrain::Terrain;
 use crate::ticks::{Tick, Ticks, by_row, by_time};
-use crate::{numbers, refused};
+use crate::{notes, numbers, refused};
 
 /// Bytes of a row of steps: `STEP` of `package/hapterra/_contact.py`.
 const ROW: usize = 72;
@@ -21,6 +22,8 @@ pub(crate) const UNINTERRUPTED: usize = 4096;
 #[pyclass(frozen, module = "hapterra._native")]
 pub(crate) struct Contact {
     contact: Mutex<Touched>,
+    /// What its terrain is read from, where that is a file.
+    opened: Option<Arc<Opened>>,
     pub(crate) rate_hz: u32,
 }
 
@@ -34,15 +37,31 @@ pub(crate) type Run<'py> = (Bound<'py, PyByteArray>, Vec<String>, Option<String>
 impl Contact {
     #[new]
     fn new(terrain: &Terrain, surface: &Surface, rate_hz: u32) -> PyResult<Self> {
-        let contact = Touched::at_rate(terrain.0.clone(), surface.surface.clone(), rate_hz);
+        let touched = terrain.touched.clone();
+        let contact = Touched::at_rate(touched, surface.surface.clone(), rate_hz);
         let contact = Mutex::new(contact.map_err(refused)?);
-        Ok(Self { contact, rate_hz })
+        let opened = terrain.opened.clone();
+        Ok(Self {
+            contact,
+            opened,
+            rate_hz,
+        })
     }
 
     /// One step.
-    fn step(&self, east_mm: f64, north_mm: f64, up_mm: f64) -> PyResult<Answer> {
-        let step = self.lock()?.step([east_mm, north_mm, up_mm]);
-        let step = step.map_err(refused)?;
+    fn step(&self, py: Python<'_>, east_mm: f64, north_mm: f64, up_mm: f64) -> PyResult<Answer> {
+        let contact = &mut *self.lock()?;
+        let hip_mm = [east_mm, north_mm, up_mm];
+        let step = match &self.opened {
+            None => contact.step(hip_mm),
+            // It may wait for a file.
+            Some(_) => {
+                let step = py.detach(|| contact.step(hip_mm));
+                notes::warn(py)?;
+                step
+            }
+        };
+        let step = step.map_err(|error| self.raised(error))?;
         let (state, surface_mm) = number(step.state);
         Ok((step.force_n.into(), step.proxy_mm.into(), state, surface_mm))
     }
@@ -56,10 +75,14 @@ impl Contact {
         for ticks in ticks.chunks(UNINTERRUPTED) {
             let ran = py.detach(|| run(contact, ticks, &mut rows));
             if let Err(error) = ran {
-                why = Some(error.to_string());
+                let error = self.raised(error);
+                why = Some(error.value(py).to_string());
                 break;
             }
             py.check_signals()?;
+        }
+        if self.opened.is_some() {
+            notes::warn(py)?;
         }
         Ok((PyByteArray::new(py, &rows), remarks, why))
     }
@@ -71,6 +94,14 @@ impl Contact {
 }
 
 impl Contact {
+    /// An error as Python has it: heights that cannot be read are an `OSError`.
+    pub(crate) fn raised(&self, error: StepError) -> PyErr {
+        match (&self.opened, error) {
+            (Some(opened), StepError::Unread(_)) => opened.unread(),
+            _ => refused(error),
+        }
+    }
+
     /// The ticks of a path, and remarks on its times.
     pub(crate) fn ticks(
         &self,

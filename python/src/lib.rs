@@ -6,6 +6,9 @@
 
 mod command;
 mod contact;
+mod notes;
+mod open;
+mod recording;
 mod surface;
 mod terrain;
 mod ticks;
@@ -21,6 +24,8 @@ mod _native {
     use super::command::main;
     #[pymodule_export]
     use super::contact::Contact;
+    #[pymodule_export]
+    use super::recording::recording;
     #[pymodule_export]
     use super::surface::Surface;
     #[pymodule_export]

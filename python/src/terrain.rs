@@ -1,14 +1,23 @@
-//! Terrains of arrays.
+//! Terrains of arrays, and of what the command opens.
 
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use hapterra::place::Coordinates;
 use hapterra_touch::{Block, Height, RowOrder, Terrain as Touched};
 use pyo3::types::PyBytes;
 use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
 
-use crate::{numbers, refused};
+use crate::open::Opened;
+use crate::{notes, numbers, refused};
 
-/// Heights of one of the types that the library keeps.
+/// Heights of one of the types that the library keeps, or a terrain that stays where it is.
 #[pyclass(frozen, module = "hapterra._native")]
-pub(crate) struct Terrain(pub(crate) Touched);
+pub(crate) struct Terrain {
+    pub(crate) touched: Touched,
+    pub(crate) opened: Option<Arc<Opened>>,
+}
 
 /// An array of heights as bytes, row by row.
 struct Samples<'a> {
@@ -78,13 +87,16 @@ impl Terrain {
                     .map_err(refused)?,
                 None => terrain,
             };
-            Ok(Self(terrain))
+            Ok(Self {
+                touched: terrain,
+                opened: None,
+            })
         })
     }
 
     /// Heights of some rows, counted from the south, as f8; none beyond the terrain.
     fn rows<'py>(&self, py: Python<'py>, south: u32, count: u32) -> PyResult<Bound<'py, PyBytes>> {
-        let [columns, rows] = self.0.samples();
+        let [columns, rows] = self.touched.samples();
         let count = count.min(rows.saturating_sub(south));
         let block = Block {
             column: 0,
@@ -93,8 +105,11 @@ impl Terrain {
             rows: count,
         };
         let mut heights = vec![0.0; columns as usize * count as usize];
-        let read = py.detach(|| self.0.read(block, &mut heights));
-        read.map_err(refused)?;
+        let read = py.detach(|| self.touched.read(block, &mut heights));
+        read.map_err(|error| match &self.opened {
+            Some(opened) => opened.unread(),
+            None => refused(error),
+        })?;
         let bytes: Vec<u8> = heights
             .iter()
             .flat_map(|height| height.to_ne_bytes())
@@ -102,14 +117,92 @@ impl Terrain {
         Ok(PyBytes::new(py, &bytes))
     }
 
+    /// A terrain of files, by the command's options.
+    #[staticmethod]
+    fn open(py: Python<'_>, paths: Vec<PathBuf>, words: Vec<OsString>) -> PyResult<Self> {
+        notes::listen();
+        let opened = py.detach(|| Self::of(Opened::open(paths, words)?));
+        notes::warn(py)?;
+        opened
+    }
+
+    /// A window of an opened terrain round a place.
+    fn window(
+        &self,
+        py: Python<'_>,
+        at: [f64; 2],
+        lonlat: bool,
+        size_mm: [f64; 2],
+        words: Vec<OsString>,
+    ) -> PyResult<Self> {
+        let at = (at, coordinates(lonlat));
+        py.detach(|| Self::of(self.opened()?.window(at, size_mm, words)?))
+    }
+
+    /// Millimetres east and north of a place.
+    fn mm_at(&self, at: [f64; 2], lonlat: bool) -> PyResult<(f64, f64)> {
+        Ok(self.opened()?.mm_at(at, coordinates(lonlat))?.into())
+    }
+
+    /// The place of millimetres east and north.
+    fn ground_at(&self, mm: [f64; 2], lonlat: bool) -> PyResult<(f64, f64)> {
+        Ok(self.opened()?.ground_at(mm, coordinates(lonlat))?.into())
+    }
+
+    /// What the file states, as pairs of a name and a text.
+    fn stated(&self) -> PyResult<Vec<(&'static str, String)>> {
+        Ok(self.opened()?.stated())
+    }
+
     /// The height of the surface, mm; none in a hole and off the terrain.
-    fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
-        self.0.height_mm(east_mm, north_mm)
+    fn height_mm(&self, py: Python<'_>, east_mm: f64, north_mm: f64) -> PyResult<Option<f64>> {
+        let height = || self.touched.height_mm(east_mm, north_mm);
+        let Some(opened) = &self.opened else {
+            return Ok(height());
+        };
+        let height_mm = py.detach(|| opened.check(height));
+        notes::warn(py)?;
+        height_mm
+    }
+
+    /// Rows and columns.
+    #[getter]
+    fn shape(&self) -> (u32, u32) {
+        let [columns, rows] = self.touched.samples();
+        (rows, columns)
+    }
+
+    /// Millimetres a cell, and a unit of the heights.
+    #[getter]
+    fn scale(&self) -> (f64, f64) {
+        let scale = self.touched.scale();
+        (scale.cell_mm(), scale.height_mm_per_unit())
     }
 
     /// Extent east and north, mm.
     #[getter]
     fn size_mm(&self) -> (f64, f64) {
-        self.0.size_mm().into()
+        self.touched.size_mm().into()
+    }
+}
+
+impl Terrain {
+    fn of(opened: Arc<Opened>) -> PyResult<Self> {
+        Ok(Self {
+            touched: opened.touched()?,
+            opened: Some(opened),
+        })
+    }
+
+    fn opened(&self) -> PyResult<&Arc<Opened>> {
+        let opened = self.opened.as_ref();
+        opened.ok_or_else(|| refused("a terrain of an array has no file"))
+    }
+}
+
+const fn coordinates(lonlat: bool) -> Coordinates {
+    match lonlat {
+        true => Coordinates::LonLat,
+        false => Coordinates::Own,
     }
 }

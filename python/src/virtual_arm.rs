@@ -8,8 +8,8 @@ use pyo3::types::PyByteArray;
 use pyo3::{PyResult, Python, pyclass, pymethods};
 
 use crate::contact::{Contact, Run, UNINTERRUPTED, number};
-use crate::refused;
 use crate::ticks::Tick;
+use crate::{notes, refused};
 
 /// Bytes of a row: `ARM_STEP` of `package/hapterra/_virtual_arm.py`.
 const ROW: usize = 104;
@@ -69,11 +69,12 @@ impl VirtualArm {
             let ahead = targets.get(at..).unwrap_or_default();
             let ran = py.detach(|| self.touch(&mut held, touched, ahead, tick_s, &mut rows));
             if let Err(error) = ran {
-                why = Some(error.to_string());
+                why = Some(contact.raised(error).value(py).to_string());
                 break;
             }
             py.check_signals()?;
         }
+        notes::warn(py)?;
         Ok((PyByteArray::new(py, &rows), remarks, why))
     }
 }

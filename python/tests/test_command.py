@@ -82,9 +82,11 @@ def serving(folder):
     return list(map(str, words))
 
 
-def begun(folder):
-    """Waits until the recording of `serving` grows."""
+def begun(folder, has_ended):
+    """Waits until the recording of `serving` grows, or the command has ended."""
     while not any(it.stat().st_size for it in folder.iterdir() if "felt" in it.name):
+        if has_ended():
+            return
         time.sleep(0.02)
 
 
@@ -93,12 +95,26 @@ def test_ctrl_c_ends_a_command_cleanly(tmp_path):
     with subprocess.Popen(
         [*OWN, *serving(tmp_path)], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as child:
-        begun(tmp_path)
+        begun(tmp_path, lambda: child.poll() is not None)
         child.send_signal(signal.SIGINT)
         told = child.communicate()[1]
     assert child.returncode == 0, told
     assert "Traceback" not in told
     assert (tmp_path / "felt.csv").read_text("utf-8").count("\n") > 10
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="children are listed in /proc")
+def test_killed_worker_is_reported_by_its_guardian(tmp_path):
+    with subprocess.Popen(
+        [*OWN, *serving(tmp_path)], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as child:
+        begun(tmp_path, lambda: child.poll() is not None)
+        workers = Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split()
+        for worker in workers:
+            os.kill(int(worker), signal.SIGKILL)
+        told = child.communicate()[1]
+    assert len(workers) == 1 and child.returncode == 128 + signal.SIGKILL, told
+    assert "felt.csv" in told and "is what was written of it" in told
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT there")
@@ -113,7 +129,7 @@ def test_ctrl_c_ends_the_command_of_a_run(tmp_path, own, monkeypatch):
     monkeypatch.setattr(_command.subprocess, "Popen", popen)
 
     def interrupt():
-        begun(tmp_path)
+        begun(tmp_path, lambda: children and children[0][0].poll() is not None)
         os.kill(os.getpid(), signal.SIGINT)
 
     thread = threading.Thread(target=interrupt)

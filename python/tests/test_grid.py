@@ -94,6 +94,21 @@ def test_grids_that_are_no_squares_are_errors():
     assert touched.source["ground_unit"] == "degree"
 
 
+def test_xarray_has_the_places_of_its_coordinates():
+    for da in [array(), array(HEIGHTS[::-1], y=Y[::-1]), array(HEIGHTS[:, ::-1], x=X[::-1])]:
+        terrain = Terrain.from_xarray(da, cell_mm=0.5)
+        assert terrain.mm_at(500_030, 3_999_970) == (0.5, 1)
+        assert terrain.ground_at(0.5, 1) == (500_030, 3_999_970)
+        window = terrain.place((500_060, 3_999_970), size_mm=(1, 1), cell_mm=0.25)
+        assert window.shape == (4, 5) and window.mm_at(500_000, 3_999_910) == (0, 0)
+        window = terrain.place((500_060, 3_999_970), size_mm=(1, 1))
+        assert window.shape == (3, 3) and window.mm_at(500_030, 3_999_940) == (0, 0)
+        assert window.height_mm(0.5, 0.5) == terrain.height_mm(1, 1)
+    fixed = Terrain.from_xarray(array(), cell_mm=0.5, height_mm_per_unit=0.1)
+    finer = fixed.place((500_060, 3_999_970), size_mm=(9, 9), cell_mm=1)
+    assert finer.height_mm_per_unit == 0.2
+
+
 def dataset(heights=HEIGHTS, transform=None, crs="EPSG:32633", nodata=None, unit="m", scale=1.0):
     transform = transform or rasterio.Affine(30, 0, 500_000, 0, -30, 4_000_000)
     memory = rasterio.MemoryFile()

@@ -23,6 +23,8 @@ def test_stubs_have_the_compiled_names_and_parameters():
     classes = {node.name: node for node in stub.body if isinstance(node, ast.ClassDef)}
     compiled = {name: it for name, it in vars(_native).items() if inspect.isclass(it)}
     assert classes.keys() == compiled.keys()
+    functions = {node.name for node in stub.body if isinstance(node, ast.FunctionDef)}
+    assert functions == {name for name, it in vars(_native).items() if inspect.isbuiltin(it)}
     for name, stated in classes.items():
         methods = {node.name: node for node in stated.body if isinstance(node, ast.FunctionDef)}
         found = {it for it in vars(compiled[name]) if not it.startswith("_")}

@@ -52,15 +52,18 @@ def stroke(rows):
 
 
 def replayed(folder, heights, path, t=None, words=()):
-    """What the command writes."""
-    np.save(folder / "hills.npy", heights)
+    """What the command writes, of an array or a file."""
+    ground = heights
+    if isinstance(heights, np.ndarray):
+        ground = folder / "hills.npy"
+        np.save(ground, heights)
     columns = {} if t is None else {"t_s": t}
     columns |= dict(zip(("x_mm", "y_mm", "z_mm"), path.T))
     # By the shortest digits that read back to the same value, as the command writes them, too.
     rows = zip(*(column.tolist() for column in columns.values()))
     with (folder / "path.csv").open("w", newline="") as file:
         csv.writer(file).writerows([columns, *rows])
-    files = [folder / "hills.npy", folder / "path.csv", "-o", folder / "felt.csv"]
+    files = [ground, folder / "path.csv", "-o", folder / "felt.csv"]
     run("replay", *files, *words)
     with (folder / "felt.csv").open(newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))

@@ -41,6 +41,8 @@ pub struct Terrain {
     /// Largest difference of neighbouring heights, and the sample.
     step: Option<Steepest>,
     materials: Option<Arc<Array<u8>>>,
+    /// Heights are rounded to multiples of this, cells; 0 where they stay as they are.
+    height_step: f64,
 }
 
 /// Heights that are no terrain.
@@ -185,6 +187,7 @@ impl Terrain {
             range,
             step,
             materials: None,
+            height_step: 0.0,
         })
     }
 
@@ -246,6 +249,7 @@ impl Terrain {
             range: None,
             step: None,
             materials: None,
+            height_step: 0.0,
         })
     }
 
@@ -256,6 +260,17 @@ impl Terrain {
     pub fn with_height_scale(self, mm_per_unit: f64) -> Result<Self, TerrainError> {
         let scale = Scale::new(self.scale.cell_mm(), mm_per_unit)?;
         Ok(Self { scale, ..self })
+    }
+
+    /// The same terrain with heights rounded to multiples of a step in cells, 0 for none:
+    /// `hapterra replay` does so where it interpolates between the samples of a file.
+    #[must_use]
+    pub fn with_height_step(self, cells: f64) -> Self {
+        let height_step = if cells > 0.0 { cells } else { 0.0 };
+        Self {
+            height_step,
+            ..self
+        }
     }
 
     /// The same ground with a material for each sample: an index of the surface's table
@@ -382,7 +397,11 @@ impl Terrain {
         for height in room.iter_mut() {
             let cells = self.scale.height_cells(*height);
             let is_within = cells.abs() <= f64::from(MAX_CELL);
-            *height = if is_within { cells } else { f64::NAN };
+            *height = match self.height_step {
+                _ if !is_within => f64::NAN,
+                0.0 => cells,
+                step => libm::round(cells / step) * step,
+            };
         }
         let base = base(room);
         let width = block.columns as usize;

@@ -102,6 +102,17 @@ impl Raster {
         Self::opened(path.as_ref(), options, open::decode)
     }
 
+    /// Opens files as one terrain, as those of a folder are.
+    ///
+    /// # Errors
+    /// As [`Raster::open`].
+    pub fn open_all(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Self, Error> {
+        let first = files.first().cloned().unwrap_or_default();
+        Self::opened(&first, options, |_, options| {
+            open::decode_all(&files, options)
+        })
+    }
+
     /// Opens a terrain file with GDAL, also one that [`Raster::open`] reads by itself: both
     /// are to say the same of it.
     ///

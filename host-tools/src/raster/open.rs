@@ -1,6 +1,6 @@
 //! From a path to decoded samples: tells many files from one.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::guard::guarded;
 use super::input::FileBytes;
@@ -10,8 +10,7 @@ use super::{BadRaster, Decoded, OpenOptions, mosaic};
 /// Decodes a terrain: a file, which may be packed, or many that are one.
 pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     if let Some(files) = mosaic::named(path)? {
-        check_no_asset(options, "many files")?;
-        return mosaic::of_files(files, options);
+        return decode_all(&files, options);
     }
     let input = FileBytes::open(path, &options.elsewhere)?;
     if options.raw.is_none() && mosaic::is_json(&input)? {
@@ -23,6 +22,15 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadR
         return or_by_gdal(decoded, &input, options);
     }
     one_file::decode(&input, options)
+}
+
+/// Decodes files as one terrain.
+pub(super) fn decode_all(files: &[PathBuf], options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    check_no_asset(options, "many files")?;
+    if files.is_empty() {
+        return Err(BadRaster::NoTiles("no file is named".into()));
+    }
+    mosaic::of_files(files.to_vec(), options)
 }
 
 /// Checks that no asset is asked for of what has none.

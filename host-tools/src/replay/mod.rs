@@ -22,7 +22,9 @@ pub use marks::Mark;
 pub use recording::{Column, Record, Recording, Value};
 pub use settings::{Rule, Settings};
 pub use ticks::{Pace, Tick, Ticks};
-pub use trajectory::{FeltRow, FeltRows, Row, Trajectory, TrajectoryError};
+pub use trajectory::{
+    ColumnValues, FeltRow, FeltRows, RecordedColumns, Row, Trajectory, TrajectoryError,
+};
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from ._connect import Device, Mark, Params, Sample, connect
     from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
     from ._native import Surface
+    from ._recording import Recording, read_recording
     from ._session import DeviceError, NotDisarmedError
+    from ._stability import stability
     from ._terrain import Terrain
     from ._virtual_arm import ARM_STEP, VirtualArm
 
@@ -38,6 +40,7 @@ _MODULES = {
     "Mark": "_connect",
     "NotDisarmedError": "_session",
     "Params": "_connect",
+    "Recording": "_recording",
     "Sample": "_connect",
     "State": "_contact",
     "Step": "_contact",
@@ -46,6 +49,8 @@ _MODULES = {
     "Terrain": "_terrain",
     "VirtualArm": "_virtual_arm",
     "connect": "_connect",
+    "read_recording": "_recording",
+    "stability": "_stability",
     "to_dataframe": "_contact",
 }
 
@@ -59,6 +64,7 @@ __all__ = [
     "Mark",
     "NotDisarmedError",
     "Params",
+    "Recording",
     "Sample",
     "State",
     "Step",
@@ -67,6 +73,8 @@ __all__ = [
     "Terrain",
     "VirtualArm",
     "connect",
+    "read_recording",
+    "stability",
     "to_dataframe",
 ]
 

@@ -6,7 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-from typing import Union
+from collections.abc import Iterable
+from typing import Any, Union
 
 Word = Union[str, "os.PathLike[str]"]
 
@@ -35,6 +36,22 @@ def command() -> list[str]:
     """The words that start the command: the environment variable HAPTERRA, else this package."""
     named = os.environ.get("HAPTERRA")
     return [named] if named else [sys.executable, "-m", "hapterra"]
+
+
+def options(**given: Any) -> list[str]:
+    """Options of the command: ``friction=0.1`` is ``--friction=0.1``, ``[1, 2]`` is ``1,2``, True is a
+    flag, and None or False is none."""
+    return [
+        f"--{name.replace('_', '-')}" + ("" if value is True else f"={_text(value)}")
+        for name, value in given.items()
+        if value is not None and value is not False
+    ]
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    return ",".join(map(_text, value)) if isinstance(value, Iterable) else str(value)
 
 
 def run(*words: Word) -> str:

@@ -39,6 +39,8 @@ class Grid:
     ground_unit: str | None
     height_unit: str | None
     nodata: float | None
+    #: Where the south-west sample lies, in the unit of the ground.
+    corner: tuple[float, float]
 
     def source(self) -> dict[str, Any]:
         """What was stated, and how many samples are holes."""
@@ -115,6 +117,7 @@ def of_xarray(da: Any, x: Any, y: Any) -> Grid:
         _unit(da[x].attrs.get("units")),
         _unit(attrs.get("units")),
         None if nodata is None else float(nodata),
+        (float(np.min(da[x].values)), float(np.min(da[y].values))),
     )
 
 
@@ -170,6 +173,8 @@ def of_rasterio(ds: Any, band: int) -> Grid:
         unit = _DEGREES
     elif ds.crs is not None and ds.crs.is_projected:
         unit = _unit(ds.crs.linear_units)
+    x = [to_ground.c + to_ground.a * column for column in (0.5, ds.width - 0.5)]
+    y = [to_ground.f + to_ground.e * row for row in (0.5, ds.height - 0.5)]
     return Grid(
         heights[:, :: 1 if to_ground.a > 0 else -1],
         "lower" if to_ground.e > 0 else "upper",
@@ -177,4 +182,5 @@ def of_rasterio(ds: Any, band: int) -> Grid:
         unit,
         _unit(ds.units[band - 1]),
         ds.nodatavals[band - 1],
+        (min(x), min(y)),
     )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import pathlib
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._command import options
 from ._grid import Grid, of_rasterio, of_xarray
+from ._place import Ground, Laid, Pair, Path, files, ground_m_per_mm, is_lonlat, pair, resized
 
 if TYPE_CHECKING:
     import rasterio.io
@@ -83,6 +86,110 @@ class Terrain:
         self._has_materials = materials is not None
         #: What the data stated about itself; none of a plain array.
         self.source: dict[str, Any] | None = None
+        self._ground: Ground | None = None
+        self._opened: dict[str, Any] | None = None
+
+    @classmethod
+    def open(
+        cls,
+        source: Path | Iterable[Path],
+        *,
+        cell_mm: float | None = None,
+        scale: str | float | None = None,
+        exaggeration: float | str | None = None,
+        **reading: Any,
+    ) -> Terrain:
+        """A terrain of anything that the command ``hapterra`` opens, of any size: what is touched
+        is read, and nothing is copied.
+
+        Parameters
+        ----------
+        source : path, or paths of several files that are one terrain
+            A file, a folder, a pattern as "tiles/*.tif", a GDAL .vrt, a STAC's .json; a URL where
+            the package is built with ``remote``.
+        cell_mm : float
+            Millimetres of the hand from a sample to the next; 1, as of ``hapterra replay``. Cells that
+            are no squares on the ground are resampled to squares of their shorter side.
+        scale : "100 m/mm", or metres as a number
+            Ground for a millimetre of the hand, in place of ``cell_mm``.
+        exaggeration : float or "auto"
+            Times true to scale. A unit of heights is a millimetre times this where the file does
+            not know how large its cells are.
+        **reading
+            The command's options on how a file is read, by their names: ``band=2``,
+            ``no_data=-9999``, ``vertical_unit="ft"``, ... (``hapterra info --help``)
+
+        Raises
+        ------
+        ValueError, OSError
+            With the command's text and hint.
+
+        What has to be fetched is waited for. Where that fails, a step is an OSError and may be
+        tried again. Damaged parts of a file are holes, and warnings.
+        """
+        how = {"cell_mm": cell_mm, "scale": scale, "exaggeration": exaggeration}
+        paths = files(source)
+        native = _native.Terrain.open(paths, options(**reading, **_size(how)))
+        return cls._of_file(native, {"file": paths[0] if len(paths) == 1 else paths}, how)
+
+    @classmethod
+    def _of_file(cls, native: _native.Terrain, source: dict[str, Any], how: dict[str, Any]) -> Terrain:
+        terrain = cls.__new__(cls)
+        terrain._native, terrain.shape = native, native.shape
+        terrain.cell_mm, terrain.height_mm_per_unit = native.scale
+        terrain.source = {**source, **dict(native.stated())}
+        terrain._ground, terrain._opened = None, how
+        return terrain
+
+    def place(
+        self,
+        at: Pair,
+        crs: str | None = None,
+        *,
+        size_mm: Pair,
+        cell_mm: float | None = None,
+        scale: str | float | None = None,
+        exaggeration: float | str | None = None,
+    ) -> Terrain:
+        """A terrain of the window round a place; its origin is the window's south-west sample.
+
+        ``at`` is (x, y) in the terrain's own coordinates, or with ``crs="lonlat"`` in degrees.
+        ``size_mm`` is the extent east and north in the hand, mm, to the nearest cell, within the
+        terrain. ``cell_mm``, ``scale`` and ``exaggeration`` are as of ``open``, and this terrain's own
+        where they are left out; cells are true to scale at the place.
+
+        Raises ValueError for a place outside or in a hole, and a terrain without coordinates.
+        """
+        place, lonlat, size = pair("at", at), is_lonlat(crs), pair("size_mm", size_mm)
+        lies = self._lies()
+        if isinstance(lies, Ground):
+            return self._of(*lies.window(place, lonlat, size, cell_mm, scale, exaggeration))
+        how = resized(self._opened or {}, cell_mm, scale, exaggeration)
+        native = lies.window(place, lonlat, size, options(**_size(how)))
+        return self._of_file(native, self.source or {}, how)
+
+    def mm_at(self, x: float, y: float, crs: str | None = None) -> tuple[float, float]:
+        """Millimetres east and north of the south-west sample, of a place in the terrain's own
+        coordinates, or with ``crs="lonlat"`` in degrees. It may lie outside of the terrain."""
+        return self._lies().mm_at((x, y), is_lonlat(crs))
+
+    def ground_at(
+        self, east_mm: float, north_mm: float, crs: str | None = None
+    ) -> tuple[float, float]:
+        """The place in the terrain's own coordinates, or with ``crs="lonlat"`` in degrees, of
+        millimetres east and north of the south-west sample."""
+        return self._lies().ground_at((east_mm, north_mm), is_lonlat(crs))
+
+    def _lies(self) -> Ground | _native.Terrain:
+        """What knows where it lies."""
+        if self._opened is not None:
+            return self._native
+        if self._ground is None:
+            raise ValueError(
+                "the terrain is of an array without coordinates: take Terrain.open, from_xarray or"
+                " from_rasterio"
+            )
+        return self._ground
 
     @classmethod
     def from_xarray(
@@ -105,8 +212,8 @@ class Terrain:
         ``height_unit`` are "m", "km", "ft" and the like, and ``height_mm_per_unit`` takes the place
         of both units and of the exaggeration.
         """
-        grid = of_xarray(da, x, y)
-        return cls._of(grid, cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
+        how = Laid(cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
+        return cls._of(of_xarray(da, x, y), how)
 
     @classmethod
     def from_rasterio(
@@ -126,29 +233,23 @@ class Terrain:
         and of the band; its no-data value or mask makes holes, and its scale and offset are
         applied. ``source`` of the result reports them. The rest is as in ``from_xarray``.
         """
-        grid = of_rasterio(ds, band)
-        return cls._of(grid, cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
+        how = Laid(cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
+        return cls._of(of_rasterio(ds, band), how)
 
     @classmethod
-    def _of(
-        cls,
-        grid: Grid,
-        cell_mm: float,
-        exaggeration: float,
-        height_mm_per_unit: float | None,
-        ground_unit: str | None,
-        height_unit: str | None,
-    ) -> Terrain:
+    def _of(cls, grid: Grid, laid: Laid) -> Terrain:
+        height_mm_per_unit = laid.height_mm_per_unit
         if height_mm_per_unit is None:
-            metres = grid.metres(ground_unit, height_unit)
-            height_mm_per_unit = cell_mm * metres.height / metres.cell * exaggeration
+            metres = grid.metres(laid.ground_unit, laid.height_unit)
+            height_mm_per_unit = laid.cell_mm * metres.height / metres.cell * laid.exaggeration
         terrain = cls(
             grid.heights,
-            cell_mm=cell_mm,
+            cell_mm=laid.cell_mm,
             height_mm_per_unit=height_mm_per_unit,
             origin=grid.origin,
         )
         terrain.source = grid.source()
+        terrain._ground = Ground(grid, laid)
         return terrain
 
     @property
@@ -160,7 +261,7 @@ class Terrain:
         """The height of the surface at a place, mm; None in a hole and off the terrain."""
         return self._native.height_mm(east_mm, north_mm)
 
-    def _write(self, path: Path) -> tuple[str, dict[str, Any]]:
+    def _write(self, path: pathlib.Path) -> tuple[str, dict[str, Any]]:
         """Writes the heights as a file of the command. Returns it, and the options of its scale."""
         if self._has_materials:
             raise ValueError(
@@ -204,3 +305,9 @@ def _materials(materials: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[
     if of.dtype.kind not in "iub" or (of.size and not 0 <= of.min() <= of.max() <= 15):
         raise ValueError("materials are integers from 0 to 15")
     return of.astype(np.uint8)
+
+
+def _size(how: dict[str, Any]) -> dict[str, Any]:
+    """Size in the hand, by the command's names."""
+    scale = ground_m_per_mm(how["scale"])
+    return {"cell_mm": how["cell_mm"], "ground_m_per_mm": scale, "exaggeration": how["exaggeration"]}

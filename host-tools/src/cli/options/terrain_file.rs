@@ -154,7 +154,9 @@ impl ReadingOptions {
         }
     }
 
-    fn options(&self) -> OpenOptions {
+    /// The same for the library.
+    #[must_use]
+    pub fn options(&self) -> OpenOptions {
         OpenOptions {
             raw: self.raw_size.map(|(columns, rows)| RawLayout {
                 columns,
@@ -177,9 +179,10 @@ impl ReadingOptions {
     }
 }
 
-/// What to say where heights are only assumed to be metres, and the ground is not in
-/// metres: feet would be felt 3.28 times too steep.
-fn assumed_unit(raster: &Raster) -> Option<String> {
+/// A note where heights are only assumed to be metres, and the ground is not in metres: feet would be
+/// rendered 3.28 times too steep.
+#[must_use]
+pub fn assumed_unit(raster: &Raster) -> Option<String> {
     let assumed = "the file does not state the unit of its heights: they are taken to be metres";
     if raster.vertical_unit_from() != Certainty::Assumed {
         return None;

@@ -5,6 +5,7 @@
 //! origin at the south-west sample at height zero.
 
 mod bounded;
+mod columns;
 mod comments;
 mod csv;
 mod fault;
@@ -17,6 +18,7 @@ use std::path::{Path, PathBuf};
 
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 
+pub use columns::{ColumnValues, RecordedColumns};
 pub use fault::TrajectoryError;
 pub use felt_rows::{FeltRow, FeltRows};
 

@@ -1,0 +1,149 @@
+"""Places of terrains that know where they lie: windows round a place, and coordinates."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, Union
+
+from ._grid import Grid
+
+Path = Union[str, "os.PathLike[str]"]
+Pair = Sequence[float]
+
+_SCALE = re.compile(r"\s*([0-9.eE+-]+)\s*(m|km)\s*/\s*mm\s*")
+
+
+def ground_m_per_mm(scale: str | float | None) -> float | None:
+    """Ground metres a millimetre of the hand, of "100 m/mm" or the number itself."""
+    if scale is None or isinstance(scale, (int, float)):
+        return scale
+    found = _SCALE.fullmatch(scale)
+    try:
+        metres = float(found[1]) if found else None
+    except ValueError:
+        metres = None
+    if not found or metres is None:
+        raise ValueError(f'scale is {scale!r}: give ground a millimetre, as "100 m/mm" or "1 km/mm"')
+    return metres * (1000 if found[2] == "km" else 1)
+
+
+def files(source: Path | Iterable[Path]) -> list[str]:
+    """The files of one source or of several."""
+    if isinstance(source, (str, os.PathLike)):
+        return [os.fspath(source)]
+    return [os.fspath(path) for path in source]
+
+
+def pair(name: str, values: Pair) -> tuple[float, float]:
+    """Two numbers."""
+    numbers = tuple(map(float, values))
+    if len(numbers) != 2:
+        raise ValueError(f"{name} has {len(numbers)} numbers: give 2")
+    return numbers[0], numbers[1]
+
+
+def is_lonlat(crs: str | None) -> bool:
+    """Whether coordinates are longitude and latitude, and not the terrain's own."""
+    if crs not in (None, "lonlat"):
+        raise ValueError(f'crs is {crs!r}: give "lonlat", or leave it out for the terrain\'s own')
+    return crs == "lonlat"
+
+
+def resized(
+    how: dict[str, Any],
+    cell_mm: float | None,
+    scale: str | float | None,
+    exaggeration: float | str | None,
+) -> dict[str, Any]:
+    """Size of an opened terrain, with what is given in place of its own."""
+    if not (cell_mm is None and scale is None):
+        how = {**how, "cell_mm": cell_mm, "scale": scale}
+    return how if exaggeration is None else {**how, "exaggeration": exaggeration}
+
+
+class Laid(NamedTuple):
+    """How the terrain of a grid is made."""
+
+    cell_mm: float
+    exaggeration: float
+    height_mm_per_unit: float | None
+    ground_unit: str | None
+    height_unit: str | None
+
+
+class Ground:
+    """Where the terrain of an array lies, in the coordinates of its data."""
+
+    def __init__(self, grid: Grid, laid: Laid) -> None:
+        self._grid, self._laid = grid, laid
+
+    def mm_at(self, at: tuple[float, float], lonlat: bool) -> tuple[float, float]:
+        """Millimetres east and north of a place."""
+        _check_own(lonlat)
+        (west, south), (east, north) = self._grid.corner, self._grid.cell
+        cell_mm = self._laid.cell_mm
+        return (at[0] - west) / east * cell_mm, (at[1] - south) / north * cell_mm
+
+    def ground_at(self, mm: tuple[float, float], lonlat: bool) -> tuple[float, float]:
+        """The place of millimetres east and north."""
+        _check_own(lonlat)
+        (west, south), (east, north) = self._grid.corner, self._grid.cell
+        cell_mm = self._laid.cell_mm
+        return west + mm[0] / cell_mm * east, south + mm[1] / cell_mm * north
+
+    def window(
+        self,
+        at: tuple[float, float],
+        lonlat: bool,
+        size_mm: tuple[float, float],
+        cell_mm: float | None,
+        scale: str | float | None,
+        exaggeration: float | str | None,
+    ) -> tuple[Grid, Laid]:
+        """The samples round a place, and how a terrain is made of them."""
+        grid, laid = self._grid, self._laid
+        metres = ground_m_per_mm(scale)
+        if metres is not None:
+            cell_mm = grid.metres(laid.ground_unit, laid.height_unit).cell / metres
+        middle = [mm / laid.cell_mm for mm in self.mm_at(at, lonlat)]
+        if cell_mm is not None:
+            height = laid.height_mm_per_unit
+            height = None if height is None else height * cell_mm / laid.cell_mm
+            laid = laid._replace(cell_mm=cell_mm, height_mm_per_unit=height)
+        if exaggeration is not None:
+            laid = laid._replace(exaggeration=float(exaggeration))
+        rows, columns = grid.heights.shape
+        west, east = _span(at, middle[0], size_mm[0] / laid.cell_mm, columns - 1)
+        south, north = _span(at, middle[1], size_mm[1] / laid.cell_mm, rows - 1)
+        first, end = south, north + 1
+        if grid.origin == "upper":
+            first, end = rows - 1 - north, rows - south
+        (x, y), (wide, high) = grid.corner, grid.cell
+        corner = (x + west * wide, y + south * high)
+        heights = grid.heights[first:end, west : east + 1]
+        return replace(grid, heights=heights, corner=corner), laid
+
+
+def _span(
+    at: tuple[float, float], middle: float, cells: float, last: int
+) -> tuple[int, int]:
+    """The first and the last sample of a window."""
+    if not 0 <= middle <= last:
+        raise ValueError(f"{at} is outside of the terrain")
+    if not 1 <= cells < 2**31:
+        raise ValueError(f"size_mm is {cells:g} cells: give one at least, millimetres of the hand")
+    begin = math.floor(middle - cells / 2 + 0.5)
+    end = min(max(begin + math.floor(cells + 0.5), 1), last)
+    return min(max(begin, 0), end - 1), end
+
+
+def _check_own(lonlat: bool) -> None:
+    if lonlat:
+        raise ValueError(
+            'the coordinates of an array are its own: leave crs="lonlat" out, or take Terrain.open,'
+            " which knows projections"
+        )

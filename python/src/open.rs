@@ -1,0 +1,314 @@
+//! Terrains that the command opens: read where they are touched.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use clap::Parser;
+use hapterra::cli::Failure;
+use hapterra::cli::options::exaggeration::Exaggeration;
+use hapterra::cli::options::terrain_file::{ReadingOptions, assumed_unit};
+use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, View, ViewOptions};
+use hapterra::raster::{BadRaster, Error, Raster};
+use hapterra::terrain::{FeltCells, INTERPOLATED_STEP, Terrain as Laid};
+use hapterra_core::phantom::Calibration;
+use hapterra_touch::{Block, Heights, Terrain as Touched, Unread};
+use pyo3::exceptions::{PyFileNotFoundError, PyOSError};
+use pyo3::{PyErr, PyResult};
+use self_cell::self_cell;
+
+use crate::{notes, refused};
+
+/// What is said of a terrain in words, by the command's own definitions.
+#[derive(Parser)]
+#[command(name = "open", no_binary_name = true, disable_help_flag = true)]
+struct Words {
+    #[command(flatten)]
+    reading: ReadingOptions,
+    #[command(flatten)]
+    size: Size,
+}
+
+/// How large it is in the hand.
+#[derive(Clone, clap::Args)]
+pub(crate) struct Size {
+    #[arg(long)]
+    cell_mm: Option<f64>,
+    #[arg(long, allow_negative_numbers = true, conflicts_with = "cell_mm")]
+    ground_m_per_mm: Option<f64>,
+    #[arg(long, allow_negative_numbers = true)]
+    exaggeration: Option<Exaggeration>,
+    #[arg(long, allow_negative_numbers = true, conflicts_with = "exaggeration")]
+    height_mm_per_unit: Option<f64>,
+}
+
+self_cell!(
+    /// A raster, and the grid over it.
+    struct Over {
+        owner: Arc<Raster>,
+        #[covariant]
+        dependent: Laid,
+    }
+);
+
+/// A part of a raster at a scale.
+pub(crate) struct Opened {
+    over: Over,
+    /// Column and row of its south-west sample in the grid.
+    first: [u32; 2],
+    /// Samples from west to east, and from south to north.
+    samples: [u32; 2],
+    /// Why something was not read last.
+    why: Mutex<String>,
+}
+
+impl Opened {
+    /// Opens a file, or several as one, by the command's options, and lays all of it.
+    pub(crate) fn open(paths: Vec<PathBuf>, words: Vec<OsString>) -> PyResult<Arc<Self>> {
+        let Words { reading, size } = parsed(words)?;
+        let raster = match &paths[..] {
+            [path] => Raster::open(path, &reading.options()),
+            _ => Raster::open_all(paths, &reading.options()),
+        };
+        let raster = raster.map_err(unread)?;
+        if let Some(note) = assumed_unit(&raster) {
+            notes::add(&note);
+        }
+        Ok(Arc::new(Self::laid(
+            Arc::new(raster),
+            &size,
+            Target::Whole,
+        )?))
+    }
+
+    /// A window of a size in the hand round a place of the same raster, within its bounds.
+    pub(crate) fn window(
+        &self,
+        at: ([f64; 2], Coordinates),
+        size_mm: [f64; 2],
+        words: Vec<OsString>,
+    ) -> PyResult<Arc<Self>> {
+        let Words { size, .. } = parsed(words)?;
+        let raster = Arc::clone(self.over.borrow_owner());
+        let whole = Self::laid(raster, &size, Target::At(at.0, at.1))?;
+        let middle = whole.mm_at(at.0, at.1)?;
+        let cell_mm = whole.terrain().scale().cell_mm();
+        let (mut first, mut samples) = ([0; 2], whole.samples);
+        for axis in 0..2 {
+            let (size, last) = (size_mm[axis], f64::from(whole.samples[axis] - 1));
+            if !(size.is_finite() && size >= cell_mm) {
+                return Err(refused(format!(
+                    "size_mm is {size_mm:?}: give millimetres of the hand, a cell of {cell_mm} at least"
+                )));
+            }
+            let begin = ((middle[axis] - 0.5 * size) / cell_mm + 0.5).floor();
+            let end = (begin + (size / cell_mm + 0.5).floor()).clamp(1.0, last);
+            // Within the grid, whose last sample is a u32.
+            first[axis] = begin.clamp(0.0, end - 1.0) as u32;
+            samples[axis] = end as u32 - first[axis] + 1;
+        }
+        Ok(Arc::new(Self {
+            first,
+            samples,
+            ..whole
+        }))
+    }
+
+    fn laid(raster: Arc<Raster>, size: &Size, target: Target) -> PyResult<Self> {
+        let read = Arc::clone(&raster);
+        let over = Over::try_new(raster, |raster| {
+            let grid = target.grid(raster, FeltCells::Square)?;
+            let options = ViewOptions {
+                target,
+                sizing: size.sizing(),
+                heights: size.heights(),
+                level: Some(0),
+            };
+            // What lies where in the reach of an arm does not matter here.
+            let view = View::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options)?;
+            Ok::<_, Failure>(view.terrain(grid)?)
+        });
+        // What has not come is no hole.
+        let over = over.map_err(|failure| match read.check_came() {
+            Err(error) => unread(error),
+            Ok(()) => failed(failure),
+        })?;
+        let samples = over
+            .borrow_dependent()
+            .size()
+            .map(|patches| patches as u32 + 1);
+        Ok(Self {
+            over,
+            first: [0, 0],
+            samples,
+            why: Mutex::default(),
+        })
+    }
+
+    pub(crate) fn terrain(&self) -> &Laid<'_> {
+        self.over.borrow_dependent()
+    }
+
+    /// The same as a terrain that is touched.
+    pub(crate) fn touched(self: &Arc<Self>) -> PyResult<Touched> {
+        let ([columns, rows], terrain) = (self.samples, self.terrain());
+        let scale = terrain.scale();
+        let part = Part(Arc::clone(self));
+        let touched = Touched::from_tiles(columns, rows, scale.cell_mm(), part);
+        let touched = touched.and_then(|it| it.with_height_scale(scale.height_mm_per_unit()));
+        let step = match terrain.grid().is_resampled() {
+            true => INTERPOLATED_STEP,
+            false => 0.0,
+        };
+        Ok(touched.map_err(refused)?.with_height_step(step))
+    }
+
+    /// Millimetres east and north of the south-west sample, of a place that may lie outside.
+    pub(crate) fn mm_at(&self, at: [f64; 2], coordinates: Coordinates) -> PyResult<[f64; 2]> {
+        let terrain = self.terrain();
+        let ground = Target::At(at, coordinates).middle(&terrain.raster().georeference());
+        let ground = ground.map_err(|error| failed(error.into()))?.unwrap_or(at);
+        let cells = terrain.grid().of_ground(ground);
+        Ok([0, 1]
+            .map(|axis| (cells[axis] - f64::from(self.first[axis])) * terrain.scale().cell_mm()))
+    }
+
+    /// A place in the file's coordinates, or in longitude and latitude.
+    pub(crate) fn ground_at(&self, mm: [f64; 2], coordinates: Coordinates) -> PyResult<[f64; 2]> {
+        let terrain = self.terrain();
+        let cell_mm = terrain.scale().cell_mm();
+        let cells = [0, 1].map(|axis| mm[axis] / cell_mm + f64::from(self.first[axis]));
+        let ground = terrain.grid().to_ground(cells);
+        let file = terrain.raster().georeference();
+        match coordinates {
+            Coordinates::Own => Ok(ground),
+            Coordinates::LonLat => file.to_lonlat(ground).ok_or_else(|| {
+                let bounds = place::bounds_in_words(&file);
+                failed(PlaceError::NoSystem { bounds }.into())
+            }),
+        }
+    }
+
+    /// What the file states about itself, in words.
+    pub(crate) fn stated(&self) -> Vec<(&'static str, String)> {
+        let raster = self.terrain().raster();
+        let crs = raster.reference_system().map(|system| match system.code() {
+            Some(code) => format!("EPSG:{code}"),
+            None => system.name().to_owned(),
+        });
+        let side_m = self.terrain().grid().side_m().map(|side| side.to_string());
+        let unit_m = raster.stated_metres_per_vertical_unit();
+        let stated = [
+            ("format", Some(raster.format().to_owned())),
+            ("crs", crs),
+            ("cell_m", side_m),
+            ("height_unit_m", unit_m.map(|unit| unit.to_string())),
+            (
+                "covers",
+                Some(place::bounds_in_words(&raster.georeference())),
+            ),
+        ];
+        let stated = stated.into_iter();
+        stated
+            .filter_map(|(name, text)| Some((name, text?)))
+            .collect()
+    }
+
+    /// What is worked out with heights, if all of them were read.
+    pub(crate) fn check<T>(&self, of: impl FnOnce() -> T) -> PyResult<T> {
+        self.why().clear();
+        let value = of();
+        match self.why().is_empty() {
+            true => Ok(value),
+            false => Err(self.unread()),
+        }
+    }
+
+    /// The error of heights that were not read.
+    pub(crate) fn unread(&self) -> PyErr {
+        PyOSError::new_err(self.why().clone())
+    }
+
+    fn why(&self) -> MutexGuard<'_, String> {
+        self.why.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What is read of an opened terrain.
+struct Part(Arc<Opened>);
+
+impl Heights for Part {
+    fn read(&self, block: Block, heights: &mut [f64]) -> Result<(), Unread> {
+        let opened = &*self.0;
+        let (terrain, [west, south]) = (opened.terrain(), opened.first);
+        let raster = terrain.raster();
+        let before = raster.not_yet();
+        let lines = heights.chunks_exact_mut(block.columns.max(1) as usize);
+        for (row, line) in (south + block.row..).zip(lines) {
+            terrain.grid().copy_row(0, row, west + block.column, line);
+        }
+        if raster.not_yet() == before {
+            return Ok(());
+        }
+        // Another thread may have taken the reason.
+        let why = match raster.check_came() {
+            Err(error) => text(&error.into()),
+            Ok(()) => "the heights have not come: try again".to_owned(),
+        };
+        *opened.why() = why;
+        Err(Unread(0))
+    }
+}
+
+impl Size {
+    fn sizing(&self) -> Sizing {
+        match self.ground_m_per_mm {
+            Some(scale) => Sizing::GroundMPerMm(scale),
+            None => Sizing::CellMm(self.cell_mm.unwrap_or(1.0)),
+        }
+    }
+
+    fn heights(&self) -> place::Heights {
+        match (
+            self.height_mm_per_unit,
+            self.exaggeration.unwrap_or_default(),
+        ) {
+            (Some(height), _) => place::Heights::MmPerUnit(height),
+            (None, Exaggeration::Times(times)) => place::Heights::Exaggerated(times),
+            (None, Exaggeration::Auto) => place::Heights::Suited,
+        }
+    }
+}
+
+fn parsed(words: Vec<OsString>) -> PyResult<Words> {
+    Words::try_parse_from(words).map_err(|error| {
+        let text = error.to_string();
+        let text = text.split("\n\nUsage: ").next().unwrap_or(&text);
+        refused(text.strip_prefix("error: ").unwrap_or(text))
+    })
+}
+
+/// What the command says, as the text of an exception.
+fn text(failure: &Failure) -> String {
+    let text = failure.text();
+    text.strip_prefix("error: ").unwrap_or(&text).to_owned()
+}
+
+/// A failure of the command as a `ValueError`.
+pub(crate) fn failed(failure: Failure) -> PyErr {
+    refused(text(&failure))
+}
+
+/// A file that cannot be opened: `OSError` where it cannot be read, else `ValueError`.
+fn unread(error: Error) -> PyErr {
+    let raised = match error.fault() {
+        BadRaster::Unreadable(io) if io.kind() == std::io::ErrorKind::NotFound => {
+            PyFileNotFoundError::new_err
+        }
+        BadRaster::Unreadable(_) | BadRaster::Elsewhere(_) | BadRaster::NotYet => {
+            PyOSError::new_err
+        }
+        _ => pyo3::exceptions::PyValueError::new_err,
+    };
+    raised(text(&error.into()))
+}

@@ -1,0 +1,31 @@
+"""The map of stability."""
+
+import sys
+
+import pytest
+
+import hapterra
+from hapterra import CommandError, stability
+
+
+def test_trials_are_those_that_were_asked_for():
+    trials = stability(rate=1000, stiffness=[0.5, 20], passivity="off", arm_friction=0.1)
+    assert set(trials["stiffness_n_per_mm"]) == {0.5, 20}
+    assert set(trials["tick_hz"]) == {1000} and set(trials["controller"]) == {False}
+    assert set(trials["texture"]) == {"none"}
+    soft, hard = (trials[trials["stiffness_n_per_mm"] == it]["swing_mm"] for it in (0.5, 20))
+    assert soft.max() < 0.1 and not hard.max() < soft.max()
+    assert "1000 Hz" in trials.attrs["summary"] or "1 kHz" in trials.attrs["summary"]
+
+
+def test_bad_numbers_have_the_text_of_the_command():
+    with pytest.raises(CommandError, match="expected 0.001 to 100 N/mm"):
+        stability(stiffness=[0.5, -1])
+    with pytest.raises(CommandError, match="unexpected argument '--stifness'"):
+        stability(stifness=1)
+
+
+def test_without_pandas_the_error_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pip install pandas"):
+        hapterra.stability()
