@@ -8,8 +8,8 @@ use pyo3::types::PyByteArray;
 use pyo3::{PyResult, Python, pyclass, pymethods};
 
 use crate::contact::{Contact, Run, UNINTERRUPTED, number};
-use crate::refused;
 use crate::ticks::Tick;
+use crate::{notes, refused};
 
 /// Bytes of a row: `ARM_STEP` of `package/hapterra/_virtual_arm.py`.
 const ROW: usize = 104;
@@ -74,6 +74,7 @@ impl VirtualArm {
             }
             py.check_signals()?;
         }
+        notes::warn(py)?;
         Ok((PyByteArray::new(py, &rows), remarks, why))
     }
 }

@@ -180,7 +180,9 @@ def script(folder, fork=False):
     """Python that serves a native device, armed; in a process group of its own."""
     text = textwrap.dedent(SCRIPT).format(tests=str(Path(__file__).parent), fork=fork)
     words = [sys.executable, "-c", text]
-    child = subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    child = subprocess.Popen(
+        words, cwd=folder, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
     assert child.stdout.readline() == "armed\n"
     return child
 
@@ -226,7 +228,8 @@ server = socket.create_server(("127.0.0.1", 0))
 print("events         127.0.0.1:%d" % server.getsockname()[1], file=sys.stderr, flush=True)
 reader = server.accept()[0].makefile("w")
 def tell(event, **fields):
-    print(json.dumps(dict(event=event, device=1, tick=7, t_s=0.007, **fields)), file=reader, flush=True)
+    line = dict(event=event, device=1, tick=7, t_s=0.007, **fields)
+    print(json.dumps(line), file=reader, flush=True)
 def mode(name):
     tell("limits", limits=[], mode=name, fault=None)
 tell("view", view=0)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
     from ._native import Surface
     from ._recording import Recording, read_recording
-    from ._stability import stability
     from ._session import DeviceError, NotDisarmedError
+    from ._stability import stability
     from ._terrain import Terrain
     from ._virtual_arm import ARM_STEP, VirtualArm
 

@@ -7,14 +7,14 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from numbers import Integral
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Union
 
 import numpy as np
 
+from ._command import options as options_of
 from ._native import Surface
 from ._session import Buffer, DeviceError, Session
 from ._terrain import Terrain
@@ -102,7 +102,8 @@ class Params:
             now[name] = value
 
     def __repr__(self) -> str:
-        return f"Params({', '.join(f'{name}={self.__dict__[name]!r}' for name in type(self).__annotations__)})"
+        each = (f"{name}={self.__dict__[name]!r}" for name in type(self).__annotations__)
+        return f"Params({', '.join(each)})"
 
 
 def connect(
@@ -145,7 +146,8 @@ class Device:
     ) -> None:
         kinds = ("usb", "native", "emulated")
         if name not in kinds and not name.startswith(("usb:", "tcp:")):
-            raise ValueError(f'{name!r} is no device: give "usb", "usb:SERIAL", "tcp:HOST:PORT", "native" or "emulated"')
+            known = '"usb", "usb:SERIAL", "tcp:HOST:PORT", "native" or "emulated"'
+            raise ValueError(f"{name!r} is no device: give {known}")
         if name == "emulated" and record is not None and Path(record).suffix == ".parquet":
             raise ValueError("an emulated board records CSV: name a file that ends in .csv")
         self.name = name
@@ -167,7 +169,8 @@ class Device:
 
         Parameters
         ----------
-        terrain : a Terrain, or whatever ``hapterra run`` opens: a file, a folder, a URL.
+        terrain : a Terrain, or whatever ``hapterra run`` opens: a file, a folder, a URL. A Terrain
+            is written to a file of 8 bytes a sample; give the path of a large one.
         surface : Surface, optional
             Materials of a surface cannot be loaded: give ``materials=`` and ``material_table=``.
         options
@@ -184,7 +187,9 @@ class Device:
             file = os.fspath(terrain)
         self._surface = (surface or Surface()).params()
         if self._surface.pop("materials"):
-            raise ValueError("materials of a surface cannot be loaded: give materials= and material_table=, files")
+            raise ValueError(
+                "materials of a surface cannot be loaded: give materials= and material_table=, files"
+            )
         if surface is None:
             self._surface["static_friction"] = options.get("friction", 0.0)
         else:
@@ -192,7 +197,7 @@ class Device:
         words.update(options)
         names = {option: name for name, option in _OPTIONS.items()}
         self._surface.update((names.get(name, name), it) for name, it in options.items())
-        self._loaded = [file, *_words(words)]
+        self._loaded = [file, *options_of(**words)]
 
     def arm(self, timeout: float = 120.0, ask: Callable[[str], bool] | None = None) -> None:
         """Serves the terrain and arms the arm. A person presses the dead-man switch: what there
@@ -240,7 +245,7 @@ class Device:
         elif self._record is not None:
             words += ["--record", str(self._record)]
         assert self._loaded is not None
-        words += [*self._loaded, *_words(self._options), "--event-samples", str(self._every)]
+        words += [*self._loaded, *options_of(**self._options), "--event-samples", str(self._every)]
         self._confirmed = False
         self._samples, self._events = Buffer(self._buffer), Buffer(self._buffer)
         self._session = session = Session(words, self._take)
@@ -389,16 +394,3 @@ def _at_the_terminal(said: str) -> bool:
 
 def _word(value: Any) -> str:
     return repr(float(value)) if isinstance(value, (float, int, np.number)) else str(value)
-
-
-def _words(options: dict[str, Any]) -> list[str]:
-    """Options of the command."""
-    words = []
-    for name, value in options.items():
-        if value is None or value is False:
-            continue
-        values: Sequence[Any] = value if isinstance(value, (tuple, list)) else (value,)
-        text = ",".join(str(it) if isinstance(it, Integral) else _word(it) for it in values)
-        option = "--" + name.replace("_", "-")
-        words.append(option if value is True else f"{option}={text}")
-    return words

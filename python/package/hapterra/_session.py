@@ -1,4 +1,4 @@
-"""A session of the command ``hapterra run`` or ``demo``, which drives the device in its own process.
+"""A session of ``hapterra run`` or ``demo``, which drives the device in a process of its own.
 
     Python ── commands (standard input) ──▶ hapterra run ═══ device
        ◀──────── events (a local socket) ──────┘
@@ -122,7 +122,7 @@ class Session:
         _SESSIONS.add(self)
 
     def _read_stderr(self) -> None:
-        """Passes on what the command says, but for its lines of figures and its error, which is raised."""
+        """Passes on what the command says, but for figures and its error, which is raised."""
         assert self._child.stderr
         is_error = False
         for raw in self._child.stderr:

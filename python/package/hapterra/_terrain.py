@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
+import pathlib
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -53,6 +54,9 @@ class Terrain:
         For an array that is no terrain. Heights too tall or too steep at this scale are refused
         by ``Contact``.
     """
+
+    #: Whether samples have numbers of materials.
+    _has_materials = False
 
     def __init__(
         self,
@@ -278,7 +282,7 @@ class Terrain:
         the terrain."""
         return self._native.height_mm(east_mm, north_mm)
 
-    def _write(self, path: Path) -> tuple[str, dict[str, Any]]:
+    def _write(self, path: pathlib.Path) -> tuple[str, dict[str, Any]]:
         """Writes the heights as a file of the command. Returns it, and the options of its scale."""
         if self._has_materials:
             raise ValueError(
