@@ -50,7 +50,12 @@ fn open(path: impl AsRef<Path>) -> Raster {
 
 fn refused(path: impl AsRef<Path>) -> String {
     let path = path.as_ref();
-    match Raster::open(path, &OpenOptions::default()) {
+    // GDAL reads some of them.
+    let options = OpenOptions {
+        gdal: false,
+        ..OpenOptions::default()
+    };
+    match Raster::open(path, &options) {
         Ok(_) => panic!("{} opens", path.display()),
         Err(error) => error.to_string(),
     }

@@ -195,7 +195,12 @@ impl Terrain {
     }
 
     /// Reads samples of the field from one to before another, in felt cells: NaN in holes.
-    fn read_cells(&self, from: [i64; 2], to: [i64; 2], room: &mut Vec<f64>) -> Result<Block, Unread> {
+    fn read_cells(
+        &self,
+        from: [i64; 2],
+        to: [i64; 2],
+        room: &mut Vec<f64>,
+    ) -> Result<Block, Unread> {
         // Both are within the field.
         let count = |axis: usize| (to[axis] - from[axis]).max(0) as u32;
         let block = Block {

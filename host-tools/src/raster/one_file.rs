@@ -82,6 +82,7 @@ pub(super) fn or_by_gdal(
 ) -> Result<Decoded, BadRaster> {
     use BadRaster::{HeaderMissing, UnknownFormat, Unsupported};
     match (decoded, input.data()) {
+        (decoded, _) if !options.gdal => decoded,
         (Err(fault @ (HeaderMissing(_) | Unsupported { .. })), Data::File(_, path)) => {
             // Where GDAL fails, too, what is missing here is the better thing to say.
             gdal::decode(path, options).ok().flatten().ok_or(fault)

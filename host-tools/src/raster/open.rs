@@ -13,7 +13,9 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadR
     if let Some(files) = mosaic::named(path)? {
         return match decode_all(&files, options) {
             // Some formats are folders.
-            Err(fault @ BadRaster::NoTiles(_)) => gdal::decode(path, options)?.ok_or(fault),
+            Err(fault @ BadRaster::NoTiles(_)) if options.gdal => {
+                gdal::decode(path, options)?.ok_or(fault)
+            }
             decoded => decoded,
         };
     }

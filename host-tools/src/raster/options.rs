@@ -30,6 +30,8 @@ pub struct OpenOptions {
     pub encoding: Option<Encoding>,
     /// The numbers are classes and no heights: those of a palette are taken as they are.
     pub classes: bool,
+    /// What nothing here reads is given to GDAL, where there is a libgdal.
+    pub gdal: bool,
     /// Samples that take more bytes than this stay in the file, where its format allows it,
     /// and are read in blocks when they are touched.
     pub most_in_memory_bytes: u64,
@@ -59,6 +61,7 @@ impl Default for OpenOptions {
             vertical_unit_m: None,
             encoding: None,
             classes: false,
+            gdal: true,
             most_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
             elsewhere: Elsewhere::default(),
             disk_cache: DiskCache::off(),

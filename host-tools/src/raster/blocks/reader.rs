@@ -147,7 +147,7 @@ impl BlockImage {
     }
 
     /// What a block covers.
-    pub(super) fn part(&self, [across, down]: [u32; 2]) -> Part {
+    pub(in crate::raster) fn part(&self, [across, down]: [u32; 2]) -> Part {
         let [column, row] = [across * self.block[0], down * self.block[1]];
         Part {
             column,

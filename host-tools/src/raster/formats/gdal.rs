@@ -113,7 +113,11 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
     let format = format!("{driver} by GDAL, {}", blocks.held.none().type_name());
     let samples = u64::from(columns) * u64::from(rows);
     let mut decoded = match samples * blocks.held.bytes() > options.most_in_memory_bytes {
-        true => Decoded::new(format, size, blocks),
+        true => {
+            // A packing that GDAL cannot undo is known here, and is no hole.
+            blocks.read(0, &blocks.images[0].part([0, 0]))?;
+            Decoded::new(format, size, blocks)
+        }
         false => {
             let all = blocks.read(0, &Part::whole(columns, rows))?;
             let mut decoded = Decoded::new(format, size, all.samples);
