@@ -58,8 +58,8 @@ pub(crate) struct Opened {
     first: [u32; 2],
     /// Samples from west to east, and from south to north.
     samples: [u32; 2],
-    /// Why something was not read last.
-    why: Mutex<String>,
+    /// How often something was not read, and why last.
+    unread: Mutex<(u64, String)>,
 }
 
 impl Opened {
@@ -141,7 +141,7 @@ impl Opened {
             over,
             first: [0, 0],
             samples,
-            why: Mutex::default(),
+            unread: Mutex::default(),
         })
     }
 
@@ -216,11 +216,10 @@ impl Opened {
 
     /// What is worked out with heights, if all of them were read.
     pub(crate) fn check<T>(&self, of: impl FnOnce() -> T) -> PyResult<T> {
-        self.why().clear();
+        let before = self.lock().0;
         let value = of();
-        // Unlocked again, since the error locks it, too.
-        let is_read = self.why().is_empty();
-        match is_read {
+        let after = self.lock().0;
+        match after == before {
             true => Ok(value),
             false => Err(self.unread()),
         }
@@ -228,11 +227,11 @@ impl Opened {
 
     /// The error of heights that were not read.
     pub(crate) fn unread(&self) -> PyErr {
-        PyOSError::new_err(self.why().clone())
+        PyOSError::new_err(self.lock().1.clone())
     }
 
-    fn why(&self) -> MutexGuard<'_, String> {
-        self.why.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, (u64, String)> {
+        self.unread.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -252,12 +251,14 @@ impl Heights for Part {
         if raster.not_yet() == before {
             return Ok(());
         }
-        // Another thread may have taken the reason.
-        let why = match raster.check_came() {
-            Err(error) => text(&error.into()),
-            Ok(()) => "the heights have not come: try again".to_owned(),
-        };
-        *opened.why() = why;
+        // A line that is down is not asked each time: the reason stays.
+        let (count, why) = &mut *opened.lock();
+        *count += 1;
+        match raster.check_came() {
+            Err(error) => *why = text(&error.into()),
+            Ok(()) if why.is_empty() => *why = "the heights have not come: try again".to_owned(),
+            Ok(()) => {}
+        }
         Err(Unread(0))
     }
 }

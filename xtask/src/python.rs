@@ -8,10 +8,10 @@ use anyhow::{Context, Result};
 use crate::deny;
 use crate::run::{cargo, output, root, run, run_quietly, say, target_dir, timed};
 
-/// How the wheel is built that is handed out, and the one that is tested: crates of the registry are
-/// those of the workspace's tests, since versions, features and profile are the same.
-const RELEASE: &str = "release";
-const TESTED: &str = "dev";
+/// How the wheel is built that is handed out, and the one that is tested: most crates of the registry
+/// are those of the workspace's tests, since versions, features and profile are the same.
+const RELEASE: &[&str] = &["--release"];
+const TESTED: &[&str] = &["--profile", "dev", "--features", "remote"];
 /// Names the interpreter to use.
 const PYTHON: &str = "HAPTERRA_PYTHON";
 /// Prints the version of an interpreter that is new enough, and fails on others.
@@ -27,14 +27,14 @@ pub(crate) fn build() -> Result<Option<(PathBuf, PathBuf)>> {
     build_by(RELEASE)
 }
 
-fn build_by(profile: &str) -> Result<Option<(PathBuf, PathBuf)>> {
+fn build_by(how: &[&str]) -> Result<Option<(PathBuf, PathBuf)>> {
     let Some(python) = interpreter()? else {
         say("SKIPPED: the Python package: there is no Python 3.9 or newer on the PATH");
         return Ok(None);
     };
     let python = environment(&python)?;
     install(&python, &["maturin>=1.8,<2"])?;
-    let wheel = timed("building the wheel", || wheel(&python, profile))?;
+    let wheel = timed("building the wheel", || wheel(&python, how))?;
     Ok(Some((python, wheel)))
 }
 
@@ -121,14 +121,15 @@ fn install(python: &Path, words: &[&str]) -> Result<()> {
 }
 
 /// The wheel, alone in its folder.
-fn wheel(python: &Path, profile: &str) -> Result<PathBuf> {
+fn wheel(python: &Path, how: &[&str]) -> Result<PathBuf> {
     let wheels = target_dir().join("wheels");
     if wheels.exists() {
         std::fs::remove_dir_all(&wheels).context("target/wheels cannot be emptied")?;
     }
     let mut maturin = Command::new(python);
     maturin
-        .args(["-m", "maturin", "build", "--locked", "--profile", profile])
+        .args(["-m", "maturin", "build", "--locked"])
+        .args(how)
         .arg("--interpreter")
         .arg(python)
         .arg("--out")
@@ -152,7 +153,15 @@ fn lint() -> Result<()> {
         command
     };
     run(&mut cargo(&["fmt", "--check"])).context("type: cd python && cargo fmt")?;
-    let clippy = ["clippy", "--locked", "--", "-D", "warnings"];
+    let clippy = [
+        "clippy",
+        "--locked",
+        "--features",
+        "remote",
+        "--",
+        "-D",
+        "warnings",
+    ];
     run(&mut cargo(&clippy))
 }
 
