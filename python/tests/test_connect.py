@@ -91,6 +91,9 @@ def test_array_is_loaded_as_it_lies(tmp_path):
     path, scale = Terrain(heights, cell_mm=2, origin="lower")._write(tmp_path / "a.npy")
     assert np.array_equal(np.load(path), heights[::-1], equal_nan=True)
     assert scale == {"cell_mm": 2, "height_mm_per_unit": 1}
+    opened = Terrain.open(path, cell_mm=2)
+    again, _ = opened._write(tmp_path / "b.npy")
+    assert np.array_equal(np.load(again), heights[::-1], equal_nan=True)
     with connect("native") as device:
         with pytest.raises(ValueError, match="materials of a Terrain"):
             device.load(Terrain(heights, cell_mm=2, materials=np.zeros((3, 4), int)))

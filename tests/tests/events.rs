@@ -1,6 +1,7 @@
 //! Events on a local socket: what a native run tells, and the examples that listen to it.
 
 use std::io::{BufRead, BufReader, Write};
+use std::iter::from_fn;
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -10,6 +11,7 @@ use std::thread::{JoinHandle, spawn};
 use hapterra::replay::Trajectory;
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::served::Served;
+use hapterra_tests::timeouts::next;
 use hapterra_tests::{hapterra_binary, repository};
 use serde_json::Value;
 
@@ -133,8 +135,8 @@ impl Telling {
 
     /// The next event of a kind.
     fn wait_for(&self, kind: &str) -> Value {
-        let next = self.coming.iter().find(|event| event["event"] == *kind);
-        next.unwrap_or_else(|| panic!("no {kind}"))
+        let found = from_fn(|| next(&self.coming)).find(|event| event["event"] == *kind);
+        found.unwrap_or_else(|| panic!("no {kind}"))
     }
 
     /// All events, once it has ended well.
