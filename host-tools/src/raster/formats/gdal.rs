@@ -133,6 +133,12 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
             "it has {bands} bands: the first is taken for the height (--band)"
         ));
     }
+    if driver == "VRT" && no_data.is_none() {
+        decoded.remarks.push(
+            "it is read by GDAL, which has height 0 where no file of a VRT is: for holes, make it with a no-data value (gdalbuildvrt -vrtnodata)"
+                .into(),
+        );
+    }
     let of_wkt = wkt.map(|wkt| ReferenceSystem::from_wkt(&wkt));
     let (system, vertical) = of_wkt.unwrap_or((None, None));
     decoded.system = system;
