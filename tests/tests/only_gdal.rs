@@ -89,3 +89,29 @@ fn what_gdal_does_not_know_keeps_its_own_error() {
     std::fs::write(&cut, &bytes[..bytes.len() / 2]).expect("written");
     Raster::open(&cut, &OpenOptions::default()).expect_err("half of a file");
 }
+
+#[test]
+fn gaps_of_a_vrt_that_gdal_reads_are_said_to_be_heights() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("smoothed.vrt");
+    // Filters are not read here.
+    let text = format!(
+        "<VRTDataset rasterXSize=\"5\" rasterYSize=\"8\"><VRTRasterBand dataType=\"Float32\" band=\"1\">\
+         <KernelFilteredSource><SourceFilename>{}</SourceFilename><SourceBand>1</SourceBand>\
+         <SrcRect xOff=\"0\" yOff=\"0\" xSize=\"5\" ySize=\"4\"/><DstRect xOff=\"0\" yOff=\"0\" xSize=\"5\" ySize=\"4\"/>\
+         <Kernel><Size>1</Size><Coefs>1</Coefs></Kernel></KernelFilteredSource>\
+         </VRTRasterBand></VRTDataset>",
+        file("erdas.img").display()
+    );
+    std::fs::write(&path, text).expect("written");
+    let raster = Raster::open(&path, &OpenOptions::default()).expect("read by GDAL");
+    assert_eq!((raster.height(0, 7), raster.height(0, 0)), (100.5, 0.0));
+    let said = raster
+        .remarks()
+        .iter()
+        .any(|remark| remark.contains("-vrtnodata"));
+    assert!(said, "{:?}", raster.remarks());
+}

@@ -46,10 +46,10 @@ cargo xtask COMMAND
                          it in an environment of its own and run its tests; without Python
                          3.9 it says so
   test [--quick] [-- ARGS]
-                         all tests, with images, budgets and dependencies; what failed is
-                         listed at the end; --quick: the emulated board only, no
-                         dependencies; ARGS go to `cargo test` and select programs, as
-                         `--test usb`
+                         all tests, with images, budgets, dependencies, the page and the
+                         Python package; what failed is listed at the end; --quick: the
+                         emulated board only, no dependencies, page and Python; ARGS go to
+                         `cargo test` and select programs, as `--test usb`
   lint                   formatting, clippy and documentation, warnings as errors
   setup                  only find or install what the commands need
   size [BOARD]           build the images and hold them to their flash and RAM budgets

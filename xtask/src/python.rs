@@ -5,8 +5,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::deny;
+use crate::board::EMULATED;
 use crate::run::{cargo, output, root, run, run_quietly, say, target_dir, timed};
+use crate::{demo, deny};
 
 /// How the wheel is built that is handed out, and the one that is tested: most crates of the registry
 /// are those of the workspace's tests, since versions, features and profile are the same.
@@ -57,6 +58,13 @@ pub(crate) fn test() -> Result<()> {
     tests
         .args(["-m", "pytest"])
         .current_dir(root().join("python"));
+    match demo::emulation() {
+        Ok(board) => {
+            tests.env(EMULATED.elf_variable, board.image);
+            tests.env("HAPTERRA_QEMU", board.qemu);
+        }
+        Err(why) => say(format!("SKIPPED: the emulated board from Python: {why:#}")),
+    }
     timed("running the Python package's tests", || run(&mut tests))
 }
 

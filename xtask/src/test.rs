@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 use crate::board::{BOARDS, Board};
 use crate::run::{cargo, say, shown, timed};
 use crate::setup::{emulator, gdal, qemu, toolchain};
-use crate::{counts, deny, image, panics, size};
+use crate::{counts, deny, image, page, panics, python, size};
 
 /// A board and the ELF of its image.
 pub(crate) type Image = (&'static Board, PathBuf);
@@ -29,14 +29,15 @@ const WITH_PROBES: [&str; 2] = ["--features", "hapterra/probe"];
 /// What is to be tested.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Request {
-    /// Neither the boards that are not emulated nor the dependencies.
+    /// Neither the boards that are not emulated nor the dependencies, the page and the Python package.
     pub(crate) quick: bool,
     /// Arguments of `cargo test`, which select programs and tests; all where there are none.
     pub(crate) only: Vec<OsString>,
 }
 
 /// Builds the images, holds them to their budgets, runs every test of the workspace on the host
-/// with QEMU beside it, and checks the dependencies. Runs each step and each program to its end.
+/// with QEMU beside it, checks the dependencies, and tests the page and the Python package. Runs each
+/// step and each program to its end.
 /// With [`Request::only`] runs these programs alone.
 ///
 /// # Errors
@@ -83,6 +84,18 @@ pub(crate) fn test(request: &Request) -> Result<()> {
         failed_targets(&mut command)
     })?;
     failures.extend(failed.iter().map(|target| repeat(target, request.quick)));
+    if request.only.is_empty() && !request.quick {
+        // The other ways in: each says what it skips where there is no browser or no Python.
+        for (repeat, test) in [
+            ("cargo xtask page --test", page::test as fn() -> Result<()>),
+            ("cargo xtask python --test", python::test),
+        ] {
+            if let Err(why) = test() {
+                say(format!("error: {why:#}"));
+                failures.push(repeat.to_owned());
+            }
+        }
+    }
     if failures.is_empty() {
         return Ok(());
     }

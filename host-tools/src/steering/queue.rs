@@ -116,6 +116,11 @@ impl CommandQueue {
                 "{left_out} commands were left out: this device was too far behind"
             ));
         }
+        // An answer of a person's is for now, whatever waits before it.
+        let is_answer = |it: &Command| matches!(it.wanted, Wanted::Enter(_)) && it.at_s.is_none();
+        if let Some(answer) = self.waiting.iter().position(is_answer) {
+            return self.waiting.remove(answer).map(|command| command.wanted);
+        }
         let next = self.waiting.front()?;
         let is_due = is_free && next.at_s.is_none_or(|at_s| t_s >= at_s);
         match is_due {
@@ -301,11 +306,11 @@ mod tests {
         let (due, told) = all_due(&mut queues, &[3, 4]);
         let zoom = |times| change(ViewChange::Zoom(times));
         assert_eq!(due[0], [2.0, 4.0, 5.0].map(zoom));
-        let [first, second, enter, last] = &due[1][..] else {
-            panic!("{due:?}");
-        };
-        assert_eq!([first, second, last], [2.0, 3.0, 5.0].map(zoom).each_ref());
-        assert_eq!(*enter, Wanted::Enter(7));
+        // An answer does not wait for what is before it.
+        let is_answer = |it: &&Wanted| matches!(it, Wanted::Enter(_));
+        let (answers, others): (Vec<_>, Vec<_>) = due[1].iter().partition(is_answer);
+        assert_eq!(others, [2.0, 3.0, 5.0].map(zoom).each_ref());
+        assert_eq!(answers, [&Wanted::Enter(7)]);
         // What is wrong is told once, and not by each device.
         let [third, fourth, sixth, seventh] = &told[..] else {
             panic!("{told:?}");
@@ -315,6 +320,25 @@ mod tests {
         assert!(fourth.starts_with("line 4 "), "{fourth}");
         assert!(sixth.starts_with("line 6 of the commands: `nonsense`"));
         assert!(seventh.starts_with("line 7 of the commands: `enter` is for one device"));
+    }
+
+    #[test]
+    fn an_answer_waits_neither_for_a_change_nor_for_what_is_before_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("commands");
+        std::fs::write(&path, "zoom 2\nenter 7\n").expect("written");
+        let mut queues = CommandQueue::of_several(&Origin::File(path), 1, || {}).expect("opened");
+        let queue = &mut queues[0];
+        let mut answer = None;
+        while answer.is_none() {
+            // A change is under way.
+            answer = queue.due(0.0, false, &mut |why| panic!("{why}"));
+            std::thread::yield_now();
+        }
+        assert_eq!(answer, Some(Wanted::Enter(7)));
+        assert_eq!(queue.due(0.0, false, &mut |why| panic!("{why}")), None);
+        let zoom = queue.due(0.0, true, &mut |why| panic!("{why}"));
+        assert_eq!(zoom, Some(change(ViewChange::Zoom(2.0))));
     }
 
     #[test]

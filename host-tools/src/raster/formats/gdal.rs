@@ -15,8 +15,10 @@ use crate::raster::blocks::{
     Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, usual_block,
 };
 use crate::raster::decoded::{Decoded, sides};
+use crate::raster::formats::headered;
 use crate::raster::geometry::metres_in;
 use crate::raster::ground_map::GroundMap;
+use crate::raster::input::FileBytes;
 use crate::raster::samples::{HoleMask, SampleType, with_samples};
 use crate::raster::{BadRaster, OpenOptions, ReferenceSystem, thinned};
 
@@ -24,6 +26,10 @@ use crate::raster::{BadRaster, OpenOptions, ReferenceSystem, thinned};
 const NAME: &str = "GDAL";
 /// When a file that stays on disk is opened, so many places each way are looked at.
 const PLACES: u32 = 6;
+/// Drivers that take any file for samples that has a header beside it.
+const BY_HEADER: [&str; 2] = ["ENVI", "EHdr"];
+/// Enough to tell a file's kind.
+const HEAD_BYTES: u64 = 1024;
 /// Colour pictures have three bands, or four, of bytes.
 const COLOURS: std::ops::RangeInclusive<u32> = 3..=4;
 
@@ -54,11 +60,20 @@ pub(in crate::raster) fn decode(
     let Ok(dataset) = library.open(path, &[]) else {
         return Ok(None);
     };
+    if BY_HEADER.contains(&dataset.driver().as_str()) && is_of_another_kind(path, options)? {
+        return Ok(None);
+    }
     let dataset = match chosen(&dataset, options)? {
         Some(name) => library.open(Path::new(&name), &[]).map_err(fault)?,
         None => dataset,
     };
     decoded(dataset, options).map(Some)
+}
+
+/// Whether the content is of a kind that has no samples by a header beside it.
+fn is_of_another_kind(path: &Path, options: &OpenOptions) -> Result<bool, BadRaster> {
+    let input = FileBytes::open(path, &options.elsewhere)?;
+    Ok(headered::is_of_another_kind(&input.head(HEAD_BYTES)?))
 }
 
 /// The name of the raster to take, where the file holds several.
@@ -132,6 +147,12 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
         decoded.remarks.push(format!(
             "it has {bands} bands: the first is taken for the height (--band)"
         ));
+    }
+    if driver == "VRT" && no_data.is_none() {
+        decoded.remarks.push(
+            "it is read by GDAL, which has height 0 where no file of a VRT is: for holes, make it with a no-data value (gdalbuildvrt -vrtnodata)"
+                .into(),
+        );
     }
     let of_wkt = wkt.map(|wkt| ReferenceSystem::from_wkt(&wkt));
     let (system, vertical) = of_wkt.unwrap_or((None, None));
