@@ -2,7 +2,7 @@
 //!
 //! Tick `n` is at `t_s` of the first row plus `n` divided by the tick rate; the last one is not
 //! later than the last row. The HIP of a tick is that of the row at its time, bit for bit, if there
-//! is one within [`ON_TICK`]; else it lies on the straight line between the rows before and after
+//! is one within a hundredth of a tick; else it lies on the straight line between the rows before and after
 //! it, passed at a constant speed. Rows between two ticks are not felt, as an arm's encoders are
 //! not read between them.
 //!
