@@ -168,8 +168,8 @@ if __name__ == "__main__":
         device.arm()
         if {fork} and os.fork() == 0:
             time.sleep(600)
-        print("armed", flush=True)
         try:
+            print("armed", flush=True)
             for sample in device.samples():
                 pass
         except KeyboardInterrupt:
@@ -294,7 +294,10 @@ def test_question_without_a_yes_arms_nothing(played, monkeypatch, ask):
 
 @posix
 def test_arm_that_is_not_armed_in_time_is_disarmed(played):
-    played('tell("arming", lines=["  DEAD_MAN_RELEASED: press it"], asks=None)\nsys.stdin.read()')
+    played(
+        'tell("arming", lines=["  DEAD_MAN_RELEASED: press it"], asks=None)\n'
+        'sys.stdin.read()\ntell("end", disarmed=True)'
+    )
     with connect("usb") as device:
         device.load(hills())
         with pytest.raises(DeviceError, match="(?s)not after 1 s.*DEAD_MAN_RELEASED"):
