@@ -216,9 +216,9 @@ class Session:
             elif kind == "mark":
                 self.marks.append(event)
             elif kind == "end":
-                self._disarmed = event["disarmed"]
-                if self._disarmed:
-                    self.mode = "disarmed"
+                # The guardian may have confirmed it meanwhile.
+                if event["disarmed"]:
+                    self.mode, self._disarmed = "disarmed", True
             self._changed.notify_all()
 
     def take_question(self) -> tuple[int, str] | None:
@@ -271,8 +271,8 @@ class Session:
         """An error with what the command said of it: its own error, where it has ended with one."""
         told = list(self._told)
         if self.is_over and any(line.startswith("error: ") for line in told):
-            own = error("\n".join(told), self._child.wait())
-            return DeviceError(own.message, own.hint)
+            its = error("\n".join(told), self._child.wait())
+            return DeviceError(its.message, its.hint)
         reasons = self.arming[-8:] + self.refused[-1:]
         return DeviceError("\n".join([message, *reasons]))
 
