@@ -641,6 +641,29 @@ def test_surface_is_set_by_params_alone_and_unknown_after_a_time_out(played, tmp
 
 # Who ends it.
 
+
+@posix
+def test_viewer_that_goes_on_does_not_hold_the_end_up(played, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    played("""
+    import subprocess
+    viewer = 'sleep 6; touch closed'
+    subprocess.Popen(["sh", "-c", viewer], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    mode("armed")
+    sys.stdin.read()
+    tell("end", disarmed=True)
+    print("error: disk full", file=sys.stderr)
+    sys.exit(1)
+    """)
+    with connect("usb") as device:
+        device.load(hills())
+        device.arm()
+        with pytest.raises(DeviceError, match="disk full"):
+            device.disarm()
+        assert device.is_disarmed and list(device.samples()) == []
+    assert not Path("closed").exists()
+
+
 ENDS = """
 import atexit, gc, os, sys, threading, time, hapterra
 sys.path.insert(0, {tests!r})

@@ -318,7 +318,7 @@ class Device:
     def params(self) -> Params:
         """The surface, which may be changed while it is touched."""
         self._serving()
-        return Params(self._change, self._touched)
+        return Params(self._change, self._touched, self._changing)
 
     @property
     def dropped(self) -> int:
@@ -344,7 +344,7 @@ class Device:
         self._change(line, self._surface if first == "reset" else {})
 
     def _change(self, line: str, changed: dict[str, Any]) -> None:
-        """Gives a command, and notes what it changes of the surface once that is in force."""
+        """Gives a command, and notes what it changes of the surface once it is in force."""
         session = self._serving()
         with self._changing:
             before, surface = dict(self._touched), self._touched

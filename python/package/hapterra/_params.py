@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,13 @@ class Params:
     shading: str
     texture: Any
 
-    def __init__(self, change: Callable[..., None], surface: dict[str, Any]) -> None:
-        self.__dict__.update(_change=change, _surface=surface)
+    def __init__(
+        self,
+        change: Callable[[str, dict[str, Any]], None],
+        surface: dict[str, Any],
+        changing: AbstractContextManager[Any],
+    ) -> None:
+        self.__dict__.update(_change=change, _surface=surface, _changing=changing)
 
     def __getattr__(self, name: str) -> Any:
         if name not in type(self).__annotations__:
@@ -49,6 +55,11 @@ class Params:
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in type(self).__annotations__:
             raise AttributeError(f"{name} cannot be set while it is touched: load() it")
+        # What is set by its ratio must not change meanwhile.
+        with self.__dict__["_changing"]:
+            self._set(name, value)
+
+    def _set(self, name: str, value: Any) -> None:
         words = value if isinstance(value, (tuple, list)) else (value,)
         changed, option = {name: value}, name.replace("_", "-")
         if name == "stiffness":

@@ -270,7 +270,8 @@ class Session:
     def error(self, message: str) -> DeviceError:
         """An error with what the command said of it: its own error, where it has ended with one."""
         told = list(self._told)
-        if self.is_over and any(line.startswith("error: ") for line in told):
+        has_ended = self.is_over or self._child.returncode is not None
+        if has_ended and any(line.startswith("error: ") for line in told):
             its = error("\n".join(told), self._child.wait())
             return DeviceError(its.message, its.hint)
         reasons = self.arming[-8:] + self.refused[-1:]
