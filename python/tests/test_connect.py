@@ -16,7 +16,7 @@ import pytest
 
 import hapterra
 from hapterra import DeviceError, NotDisarmedError, Surface, Terrain, connect
-from hapterra._session import Buffer, Session
+from hapterra._session import Buffer, Session, _end_all
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and scripts of POSIX")
 #: A tour of the virtual hand over this takes longer, s.
@@ -578,13 +578,14 @@ def test_closed_stderr_and_half_a_line_keep_the_session(played, monkeypatch):
         device.load(hills())
         device.arm()
         assert device.mark("mine").tick == 2
-        assert device.is_armed
+        session = device._session
+        assert not session.wait(lambda: session.is_over, 0.5) and device.is_armed
     assert device.is_disarmed
 
 
 @posix
 @pytest.mark.parametrize("quiet", [False, True])
-def test_warnings_are_passed_on_and_the_view_where_it_is_not_quiet(capsys, quiet):
+def test_quiet_session_passes_on_what_is_warned_of(capsys, quiet):
     lines = ["view 1: friction 0.6", "mark           `a` at tick 7", "  12.0 s free",
              "error: another host has taken the device", "  DEAD_MAN_RELEASED: press it"]  # fmt: skip
     session = faked(code=line_of("\n".join(lines)), is_quiet=quiet)
@@ -597,7 +598,7 @@ def test_warnings_are_passed_on_and_the_view_where_it_is_not_quiet(capsys, quiet
 
 
 @posix
-def test_surface_is_set_by_params_alone_and_unknown_after_a_time_out(played, tmp_path, monkeypatch):
+def test_surface_is_set_by_params_and_unknown_after_a_time_out(played, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     played("""
     mode("armed")
@@ -733,3 +734,19 @@ def test_fork_leaves_the_arm_and_its_folder_to_the_parent(played, tmp_path, monk
     print(device.is_disarmed)
     """)
     assert told == ["[True, True, True, True]", "True False", "True"]
+
+
+@posix
+def test_all_sessions_are_asked_to_end_before_one_is_awaited(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # Each ends when both were asked to.
+    code = """
+    import os, sys, time
+    sys.stdin.read()
+    open(sys.argv[1], "w")
+    while len(os.listdir()) < 2:
+        time.sleep(0.05)
+    """
+    sessions = [faked([name], textwrap.dedent(code)) for name in "ab"]
+    _end_all()
+    assert [session._child.returncode for session in sessions] == [0, 0]
