@@ -38,9 +38,10 @@ _CONFIRMS_S = 20.0
 _TOLD_S = 1.0
 #: Lines of the command that an error may quote.
 _KEPT = 200
-#: Lines that are never passed on, and those that a session passes on where it is not quiet.
+#: Lines that are never passed on, and those that a quiet session does not pass on. A recording that
+#: was cut is named.
 _FIGURES = re.compile(r"\s*\d")
-_NEWS = re.compile(r"view \d|the view stays as it was|[a-z]+  ")
+_NEWS = re.compile(r"view \d|the view stays as it was|(?!recording)[a-z]+  ")
 
 
 class DeviceError(CommandError):
@@ -161,8 +162,8 @@ class Session:
                 host, _, port = line.split()[-1].rpartition(":")
                 try:
                     stream = socket.create_connection((host, int(port)))
-                except ConnectionError:
-                    # It has ended already, and says why.
+                except (ConnectionError, ValueError):
+                    # It has ended already, and says why, or how many lines were dropped.
                     continue
                 except OSError:
                     # A session that nobody listens to must not arm.
