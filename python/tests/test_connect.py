@@ -21,6 +21,7 @@ from hapterra._session import Buffer, Session, _end_all
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and scripts of POSIX")
 #: A tour of the virtual hand over this takes longer, s.
 TOUR_S = 9.0
+STAIRCASE = Path(__file__).parent.parent / "examples" / "friction_jnd.py"
 
 
 def hills():
@@ -373,8 +374,7 @@ def test_staircase_asks_a_person_on_an_arm(played, tmp_path, monkeypatch, capsys
     monkeypatch.setattr(
         "builtins.input", lambda said: "" if said.startswith("Stroke") else next(answers)
     )
-    example = Path(__file__).parent.parent / "examples" / "friction_jnd.py"
-    runpy.run_path(str(example), run_name="__main__")
+    runpy.run_path(str(STAIRCASE), run_name="__main__")
     told = capsys.readouterr()
     assert "Weber fraction" in told.out and "friction" not in told.err
     log = (tmp_path / "log").read_text().splitlines()
@@ -750,3 +750,10 @@ def test_all_sessions_are_asked_to_end_before_one_is_awaited(tmp_path, monkeypat
     sessions = [faked([name], textwrap.dedent(code)) for name in "ab"]
     _end_all()
     assert [session._child.returncode for session in sessions] == [0, 0]
+
+
+def test_staircase_averages_as_many_upper_as_lower_reversals():
+    jnd_of = runpy.run_path(str(STAIRCASE))["jnd_of"]
+    first = [9.0] * 4
+    assert jnd_of([*first, 1.0, 4.0]) == pytest.approx(2.0)
+    assert jnd_of([*first, 9.0, 1.0, 4.0]) == pytest.approx(2.0)
