@@ -53,10 +53,10 @@ def staircase(judge, trials, random):
 
 
 def jnd_of(reversals):
-    """The JND: the geometric mean of the reversals after the first."""
+    """The JND: the geometric mean of the reversals after the first, as many upper as lower ones."""
     if len(reversals) < LEFT_OUT + 2:
         raise SystemExit(f"only {len(reversals)} reversals: give more --trials")
-    return statistics.geometric_mean(reversals[LEFT_OUT:])
+    return statistics.geometric_mean(reversals[LEFT_OUT + len(reversals) % 2 :])
 
 
 def own_threshold():
@@ -88,13 +88,23 @@ def simulated(random):
 
 
 def person(device):
-    """A person on an arm that serves level ground: the function that judges."""
+    """A person on an arm that serves level ground: the function that judges. What the person can
+    read, and the marks, do not say which stroke has more friction."""
+
+    def feels(number, friction):
+        """Lets the person feel a stroke. Returns whether the force was in to its end."""
+        if not device.is_armed:
+            device.arm()
+        device.params.friction = friction
+        device.mark(f"stroke {number}")
+        input(f"Stroke the surface, then press Enter ({number} of 2). ")
+        # A dead-man switch that was let go is a fault, which only arm() clears.
+        return device.is_armed
 
     def judge(first, second):
-        for number, friction in ((1, first), (2, second)):
-            device.params.friction = friction
-            device.mark(f"stroke {number} friction {friction:.4f}")
-            input(f"Stroke the surface, then press Enter ({number} of 2). ")
+        while not (feels(1, first) and feels(2, second)):
+            device.mark("repeated")
+            print("The force went out: once more from the first stroke.")
         answer = ""
         while answer not in ("1", "2"):
             answer = input("Which had more friction, 1 or 2? ").strip()
@@ -131,7 +141,7 @@ def main():
         differences, reversals = staircase(simulated(random), given.trials, random)
         print(f"the observer's own threshold: {own_threshold():.4f}")
     else:
-        with hapterra.connect(given.device, record="friction_jnd.csv") as device:
+        with hapterra.connect(given.device, record="friction_jnd.csv", quiet=True) as device:
             device.load(level_ground(), hapterra.Surface(friction=REFERENCE))
             device.arm()
             differences, reversals = staircase(person(device), given.trials, random)

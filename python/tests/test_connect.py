@@ -16,11 +16,12 @@ import pytest
 
 import hapterra
 from hapterra import DeviceError, NotDisarmedError, Surface, Terrain, connect
-from hapterra._session import Buffer
+from hapterra._session import Buffer, Session, _end_all
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and scripts of POSIX")
 #: A tour of the virtual hand over this takes longer, s.
 TOUR_S = 9.0
+STAIRCASE = Path(__file__).parent.parent / "examples" / "friction_jnd.py"
 
 
 def hills():
@@ -168,8 +169,8 @@ if __name__ == "__main__":
         device.arm()
         if {fork} and os.fork() == 0:
             time.sleep(600)
-        print("armed", flush=True)
         try:
+            print("armed", flush=True)
             for sample in device.samples():
                 pass
         except KeyboardInterrupt:
@@ -294,7 +295,10 @@ def test_question_without_a_yes_arms_nothing(played, monkeypatch, ask):
 
 @posix
 def test_arm_that_is_not_armed_in_time_is_disarmed(played):
-    played('tell("arming", lines=["  DEAD_MAN_RELEASED: press it"], asks=None)\nsys.stdin.read()')
+    played(
+        'tell("arming", lines=["  DEAD_MAN_RELEASED: press it"], asks=None)\n'
+        'sys.stdin.read()\ntell("end", disarmed=True)'
+    )
     with connect("usb") as device:
         device.load(hills())
         with pytest.raises(DeviceError, match="(?s)not after 1 s.*DEAD_MAN_RELEASED"):
@@ -345,27 +349,39 @@ def test_board_that_the_guardian_has_disarmed_is_disarmed(played):
 def test_staircase_asks_a_person_on_an_arm(played, tmp_path, monkeypatch, capsys):
     played("""
     mode("armed")
-    log, view = open("log", "w"), 0
+    log, view, is_out = open("log", "w"), 0, False
     for line in sys.stdin:
         print(line, end="", file=log, flush=True)
         if line.startswith("mark "):
+            if "stroke 2" in line and not is_out:
+                is_out = True
+                mode("disarmed")
+                tell("arming", lines=["FAULT 6"], asks=6)
             tell("mark", marked_tick=7, marked_t_s=0.007, host_unix_s=1.0, text=line[5:-1])
+        elif line == "enter 6\\n":
+            mode("armed")
         else:
             view += 1
             tell("view", view=view)
+            print("view %d: friction 0.6" % view, file=sys.stderr, flush=True)
     tell("end", disarmed=True)
     """)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("hapterra._connect.at_the_terminal", lambda said: said == "FAULT 6")
     words = ["friction_jnd.py", "--device", "usb", "--trials", "40", "--out", "jnd.png"]
     monkeypatch.setattr(sys, "argv", words)
-    answers = itertools.cycle(["", "", "neither", "1", "", "", "2"])
-    monkeypatch.setattr("builtins.input", lambda said: next(answers))
-    example = Path(__file__).parent.parent / "examples" / "friction_jnd.py"
-    runpy.run_path(str(example), run_name="__main__")
-    assert "Weber fraction" in capsys.readouterr().out
+    answers = itertools.cycle(["neither", "1", "2"])
+    monkeypatch.setattr(
+        "builtins.input", lambda said: "" if said.startswith("Stroke") else next(answers)
+    )
+    runpy.run_path(str(STAIRCASE), run_name="__main__")
+    told = capsys.readouterr()
+    assert "Weber fraction" in told.out and "friction" not in told.err
     log = (tmp_path / "log").read_text().splitlines()
     frictions = [float(line.split()[1]) for line in log if line.startswith("friction ")]
     pairs = list(zip(frictions[::2], frictions[1::2]))
+    # The trial in which the dead-man switch was let go is repeated.
+    assert pairs[0] == pairs.pop(1) and log.count("mark repeated") == 1
     assert len(pairs) == 40 and all(min(pair) == 0.4 < max(pair) <= 1.4 for pair in pairs)
     assert [line for line in log if "answer" in line][:2] == ["mark answer 1", "mark answer 2"]
 
@@ -399,3 +415,345 @@ def test_samples_that_nobody_takes_are_dropped_and_counted(played):
         device.disarm()
         assert [sample.view for sample in device.samples()] == list(range(4900, 5000))
         assert device.dropped == 4900
+
+
+# Who is asked.
+
+TERMINAL = """
+import sys, time
+from hapterra._terminal import at_the_terminal
+sys.stdin.readline()
+time.sleep(0.5)
+print("answer", at_the_terminal("is it in its zero pose?"))
+"""
+
+
+@posix
+@pytest.mark.parametrize("typed, answer", [("\n", "True"), ("no\n", "False"), ("\x04", "False")])
+def test_enter_counts_after_the_question_is_shown(typed, answer):
+    import pty
+
+    ours, theirs = pty.openpty()
+    with subprocess.Popen([sys.executable, "-c", TERMINAL], stdin=theirs, stdout=theirs,
+                          stderr=theirs) as child:  # fmt: skip
+        os.close(theirs)
+        # The first line lets it begin; the others are typed before the question.
+        os.write(ours, b"begin\n\n\n")
+        shown = b""
+        while b"zero pose?" not in shown:
+            shown += os.read(ours, 1000)
+        with pytest.raises(subprocess.TimeoutExpired):
+            child.wait(1)
+        os.write(ours, typed.encode())
+        while not re.search(rb"answer \w+\s", shown):
+            shown += os.read(ours, 1000)
+    os.close(ours)
+    assert shown.decode().split()[-1] == answer
+
+
+@posix
+def test_question_is_not_asked_where_nobody_sees_it():
+    import pty
+
+    ours, theirs = pty.openpty()
+    os.write(ours, b"begin\n\n")
+    told = subprocess.run([sys.executable, "-c", TERMINAL], stdin=theirs, capture_output=True)
+    os.close(ours)
+    os.close(theirs)
+    assert told.stdout == b"answer False\n", told
+
+
+def test_question_is_taken_once_with_all_of_its_lines():
+    session = faked()
+    assert session.take_question() is None
+    for asks, lines in [(7, ["a", "b"]), (7, ["a", "b"]), (7, ["c"])]:
+        session._take({"event": "arming", "lines": lines, "asks": asks})
+    assert session.take_question() == (7, "a\nb\nc") and session.take_question() is None
+    session._take({"event": "arming", "lines": ["a"], "asks": 7})
+    assert session.take_question() is None
+    session._take({"event": "arming", "lines": ["d"], "asks": 8})
+    assert session.take_question() == (8, "d")
+
+
+def faked(words=("run",), code="pass", **options):
+    """A session of a Python that runs some code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hapterra._session.command", lambda: [sys.executable, "-c", code])
+        return Session(words, lambda event: None, **options)
+
+
+def line_of(told):
+    return f"import sys; print({told!r}, file=sys.stderr)"
+
+
+# What is known.
+
+
+@posix
+def test_device_that_is_not_confirmed_stays_an_error(played):
+    played('mode("armed")\nsys.stdin.read()')
+    device = connect("usb")
+    device.load(hills())
+    device.arm()
+    for _ in range(2):
+        with pytest.raises(NotDisarmedError, match="switch the amplifiers off"):
+            device.disarm()
+    with pytest.raises(NotDisarmedError):
+        device.__exit__(None, None, None)
+    assert not device.is_disarmed
+    played('mode("armed")\nsys.stdin.read()\ntell("end", disarmed=True)')
+    with connect("usb") as again:
+        again._unconfirmed = "as before"
+        again.load(hills())
+        again.arm()
+        again.disarm()
+        again.disarm()
+        assert again.is_disarmed
+
+
+@posix
+def test_exit_code_0_confirms_nothing():
+    session = faked()
+    session.view = 0
+    with pytest.raises(NotDisarmedError):
+        session.end()
+    session = faked(code=line_of("usb: the board has confirmed that it is disarmed"))
+    session.view = 0
+    session.end()
+    assert session.is_disarmed
+    session = faked(code=line_of("mark `the board has confirmed that it is disarmed` at tick 7"))
+    session.view = 0
+    with pytest.raises(NotDisarmedError):
+        session.end()
+
+
+@posix
+def test_ctrl_c_while_it_ends_does_not_lose_the_session(played, monkeypatch):
+    played('mode("armed")\nsys.stdin.read()\ntell("end", disarmed=True)')
+    with connect("usb") as device:
+        device.load(hills())
+        device.arm()
+        end = Session.end
+
+        def interrupted(session):
+            monkeypatch.setattr(Session, "end", end)
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(Session, "end", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            device.disarm()
+        assert not device.is_disarmed
+        device.disarm()
+        assert device.is_disarmed
+
+
+@posix
+def test_mode_and_view_come_from_samples_too():
+    session = faked()
+    session._take({"event": "sample", "mode": "armed", "view": 3})
+    assert (session.mode, session.view) == ("armed", 3)
+    session._take({"event": "end", "disarmed": False})
+    assert session.mode == "armed" and not session.is_disarmed
+
+
+class Closed:
+    def write(self, text):
+        raise BrokenPipeError
+
+
+@posix
+def test_closed_stderr_and_half_a_line_keep_the_session(played, monkeypatch):
+    played("""
+    print("a line", file=sys.stderr, flush=True)
+    print('{"event": "li', file=reader, flush=True)
+    mode("armed")
+    sys.stdin.readline()
+    tell("mark", marked_tick=1, marked_t_s=0.1, host_unix_s=1.0, text="another")
+    tell("mark", marked_tick=2, marked_t_s=0.2, host_unix_s=1.0, text="mine")
+    sys.stdin.read()
+    tell("end", disarmed=True)
+    """)
+    monkeypatch.setattr(sys, "stderr", Closed())
+    with connect("usb") as device:
+        device.load(hills())
+        device.arm()
+        assert device.mark("mine").tick == 2
+        session = device._session
+        assert not session.wait(lambda: session.is_over, 0.5) and device.is_armed
+    assert device.is_disarmed
+
+
+@posix
+@pytest.mark.parametrize("quiet", [False, True])
+def test_quiet_session_passes_on_what_is_warned_of(capsys, quiet):
+    lines = ["view 1: friction 0.6", "mark           `a` at tick 7", "  12.0 s free",
+             "error: another host has taken the device", "  DEAD_MAN_RELEASED: press it"]  # fmt: skip
+    session = faked(code=line_of("\n".join(lines)), is_quiet=quiet)
+    session.end() if quiet else session._stderr.join()
+    told = capsys.readouterr().err.splitlines()
+    assert told == [f"hapterra: {line}" for line in lines[3 if quiet else 0 :] if "12.0" not in line]
+
+
+# Params.
+
+
+@posix
+def test_surface_is_set_by_params_and_unknown_after_a_time_out(played, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    played("""
+    mode("armed")
+    open("log", "w").close()
+    for line in sys.stdin:
+        print(line, end="", file=open("log", "a"))
+        if line[:5] in ("reset", "stiff"):
+            tell("view", view=7 + len(open("log").read()))
+        if line == "friction 20.0\\n":
+            tell("refused", text="a friction of 20")
+    tell("end", disarmed=True)
+    """)
+    monkeypatch.setattr("hapterra._connect._DONE_S", 0.5)
+    with connect("usb") as device:
+        with pytest.raises(ValueError, match="connect"):
+            device.load(hills(), device="usb")
+        device.load(hills(), Surface(stiffness=0.5, friction=0.3))
+        device.arm()
+        params = device.params
+        for line in ("stiffness 2", " damping 1", "at 2 reset", "on 1 friction 0.2", "enter 7"):
+            with pytest.raises(DeviceError, match="not given as a command"):
+                device.command(line)
+        params.stiffness = 1.0
+        device.command("reset")
+        params.stiffness = 0.25
+        with pytest.raises(DeviceError, match="a friction of 20"):
+            params.friction = 20.0
+        assert params.friction == pytest.approx(0.3)
+        with pytest.raises(DeviceError, match="may still come"):
+            params.friction = 0.2
+        with pytest.raises(DeviceError, match="friction is not known"):
+            params.static_friction = 0.5
+        device._touched["stiffness"] = None
+        with pytest.raises(DeviceError, match="stiffness is not known"):
+            params.stiffness = 0.5
+        device.command("reset")
+        assert (params.stiffness, params.friction) == pytest.approx((0.5, 0.3))
+    log = Path("log").read_text().splitlines()
+    assert [line for line in log if line[0] == "s"] == ["stiffness 2.0", "stiffness 0.5"]
+
+
+# Who ends it.
+
+
+@posix
+def test_viewer_that_goes_on_does_not_hold_the_end_up(played, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    played("""
+    import subprocess
+    viewer = 'sleep 6; touch closed'
+    subprocess.Popen(["sh", "-c", viewer], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    mode("armed")
+    sys.stdin.read()
+    tell("end", disarmed=True)
+    print("error: disk full", file=sys.stderr)
+    sys.exit(1)
+    """)
+    with connect("usb") as device:
+        device.load(hills())
+        device.arm()
+        with pytest.raises(DeviceError, match="disk full"):
+            device.disarm()
+        assert device.is_disarmed and list(device.samples()) == []
+    assert not Path("closed").exists()
+
+
+ENDS = """
+import atexit, gc, os, sys, threading, time, hapterra
+sys.path.insert(0, {tests!r})
+from test_connect import hills
+device = hapterra.connect("usb")
+device.load(hills())
+device.arm()
+folder = device._folder
+"""
+
+
+def ends(text):
+    """Runs Python that has armed a device that is played. Returns what it prints."""
+    text = ENDS.format(tests=str(Path(__file__).parent)) + textwrap.dedent(text)
+    words = [sys.executable, "-c", text]
+    told = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert told.returncode == 0, told.stderr
+    return told.stdout.splitlines()
+
+
+ENDED = 'mode("armed")\nsys.stdin.read()\nopen("ended", "w")\ntell("end", disarmed=True)'
+
+
+@posix
+def test_thread_that_reads_samples_does_not_keep_the_arm_armed(played, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    played(ENDED)
+    ends("threading.Thread(target=lambda: list(device.samples())).start()")
+    assert Path("ended").exists()
+
+
+@posix
+def test_device_that_is_replaced_ends_its_session(played, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    played(ENDED)
+    told = ends("""
+    device.params
+    gc.disable()
+    device = None
+    until = time.monotonic() + 20
+    while not os.path.exists("ended") and time.monotonic() < until:
+        time.sleep(0.05)
+    print(os.path.exists("ended"))
+    """)
+    assert told == ["True"]
+
+
+@posix
+def test_fork_leaves_the_arm_and_its_folder_to_the_parent(played, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    played(ENDED)
+    told = ends("""
+    def refused(what):
+        try:
+            what()
+        except hapterra.DeviceError as why:
+            return "fork" in str(why)
+    child = os.fork()
+    if child == 0:
+        session = device._session
+        asked = [device.disarm, session.end, lambda: device.is_disarmed, device.arm]
+        print([refused(it) for it in asked], flush=True)
+        sys.exit()
+    os.waitpid(child, 0)
+    print(os.path.exists(folder), os.path.exists("ended"))
+    device.disarm()
+    print(device.is_disarmed)
+    """)
+    assert told == ["[True, True, True, True]", "True False", "True"]
+
+
+@posix
+def test_all_sessions_are_asked_to_end_before_one_is_awaited(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # Each ends when both were asked to.
+    code = """
+    import os, sys, time
+    sys.stdin.read()
+    open(sys.argv[1], "w")
+    while len(os.listdir()) < 2:
+        time.sleep(0.05)
+    """
+    sessions = [faked([name], textwrap.dedent(code)) for name in "ab"]
+    _end_all()
+    assert [session._child.returncode for session in sessions] == [0, 0]
+
+
+def test_staircase_averages_as_many_upper_as_lower_reversals():
+    jnd_of = runpy.run_path(str(STAIRCASE))["jnd_of"]
+    first = [9.0] * 4
+    assert jnd_of([*first, 1.0, 4.0]) == pytest.approx(2.0)
+    assert jnd_of([*first, 9.0, 1.0, 4.0]) == pytest.approx(2.0)

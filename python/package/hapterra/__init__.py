@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ._command import CommandError
-    from ._connect import Device, Mark, Params, Sample, connect
+    from ._connect import Device, Mark, Sample, connect
     from ._contact import STEP, Contact, State, Step, StepError, to_dataframe
     from ._native import Surface
+    from ._params import Params
     from ._recording import Recording, read_recording
     from ._session import DeviceError, NotDisarmedError
     from ._stability import stability
@@ -39,7 +40,7 @@ _MODULES = {
     "DeviceError": "_session",
     "Mark": "_connect",
     "NotDisarmedError": "_session",
-    "Params": "_connect",
+    "Params": "_params",
     "Recording": "_recording",
     "Sample": "_connect",
     "State": "_contact",

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import shutil
-import sys
 import tempfile
+import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Union
 
-import numpy as np
-
 from ._command import options as options_of
 from ._native import Surface
-from ._session import Buffer, DeviceError, Session
+from ._params import Params
+from ._session import Buffer, DeviceError, NotDisarmedError, Session, own
+from ._terminal import at_the_terminal
 from ._terrain import Terrain
 
 _Path = Union[str, "os.PathLike[str]"]
@@ -28,6 +30,17 @@ _OPTIONS = {
     "stiffness": "stiffness_n_per_mm",
     "max_force": "max_force_n",
     "damping": "damping_ns_per_m",
+}
+#: Commands that change no view, or the surface of ``params``, and what is there for them.
+_NOT_HERE = {
+    **dict.fromkeys(
+        ("stiffness", "friction", "viscous-friction", "damping", "shading", "texture"),
+        "set it by device.params",
+    ),
+    "mark": "use device.mark()",
+    "enter": "device.arm() asks and answers",
+    "at": "each command is done at once",
+    "on": "there is one device",
 }
 
 
@@ -64,54 +77,13 @@ class Mark(NamedTuple):
     host_unix_s: float
 
 
-class Params:
-    """The surface while it is touched: ``device.params.friction = 0.2``.
-
-    stiffness, N/mm; friction and static_friction; viscous_friction, s; damping, N·s/m; shading,
-    "none" or "smooth"; texture, "none", ("grain", AMPLITUDE, WAVELENGTH) or ("grating", AMPLITUDE,
-    WAVELENGTH, DIRECTION), mm and degrees. Setting one returns once the force has gone out and
-    the surface has changed; the force then comes in over half a second. What the device refuses is
-    a DeviceError, and the surface stays as it was. Setting friction sets static_friction, too.
-    """
-
-    stiffness: float
-    friction: float
-    static_friction: float
-    viscous_friction: float
-    damping: float
-    shading: str
-    texture: Any
-
-    def __init__(self, command: Callable[[str], None], surface: dict[str, Any]) -> None:
-        self.__dict__.update(surface, _command=command)
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name not in type(self).__annotations__:
-            raise AttributeError(f"{name} cannot be set while it is touched: load() it")
-        now = self.__dict__
-        words = value if isinstance(value, (tuple, list)) else (value,)
-        if name == "stiffness":
-            words = (float(value) / now["stiffness"],)
-        elif name == "static_friction":
-            name, words = "friction", (now["friction"], value)
-        line = [name.replace("_", "-"), *map(_word, words)]
-        now["_command"](" ".join(line))
-        if name == "friction":
-            now.update(friction=words[0], static_friction=words[-1])
-        else:
-            now[name] = value
-
-    def __repr__(self) -> str:
-        each = (f"{name}={self.__dict__[name]!r}" for name in type(self).__annotations__)
-        return f"Params({', '.join(each)})"
-
-
 def connect(
     device: str = "usb",
     *,
     record: _Path | None = None,
     sample_every: int = 1,
     buffer: int = 60_000,
+    quiet: bool = False,
     **options: Any,
 ) -> Device:
     """A device, to load a terrain on and arm.
@@ -131,18 +103,30 @@ def connect(
         Every so many of the thousand samples a second one comes to ``samples()``.
     buffer : int
         Samples, and events, that wait to be taken; beyond them the oldest are dropped.
+    quiet : bool
+        Pass on only what a person has to do or is warned of, as in an experiment, where a person
+        must not read which surface it is.
     options
         Options of ``hapterra run`` (``hapterra demo`` for "emulated") with underscores:
         ``silence_s=10``, ``image="board.elf"``, ``view=True``.
     """
-    return Device(device, record, sample_every, buffer, options)
+    return Device(device, record, sample_every, buffer, quiet, options)
 
 
 class Device:
-    """A device of ``connect``. Use it with ``with``: its end disarms the arm."""
+    """A device of ``connect``. Use it with ``with``: its end disarms the arm.
+
+    It belongs to the process that made it: a fork can neither arm nor disarm it.
+    """
 
     def __init__(
-        self, name: str, record: _Path | None, every: int, buffer: int, options: dict[str, Any]
+        self,
+        name: str,
+        record: _Path | None,
+        every: int,
+        buffer: int,
+        quiet: bool,
+        options: dict[str, Any],
     ) -> None:
         kinds = ("usb", "native", "emulated")
         if name not in kinds and not name.startswith(("usb:", "tcp:")):
@@ -153,14 +137,22 @@ class Device:
         self.name = name
         self._record = None if record is None else Path(record)
         self._every, self._buffer, self._options = int(every), buffer, options
+        self._quiet = quiet
         self._loaded: list[str] | None = None
         self._surface: dict[str, Any] = {}
         self._session: Session | None = None
-        self._params: Params | None = None
+        #: The surface that is touched: None is what a change was not confirmed of.
+        self._touched: dict[str, Any] = {}
         self._samples: Buffer[Sample] = Buffer(buffer)
         self._events: Buffer[dict[str, Any]] = Buffer(buffer)
-        self._folder = tempfile.TemporaryDirectory(prefix="hapterra-")
         self._confirmed = False
+        #: Why the session before was not confirmed to be disarmed; None since one was.
+        self._unconfirmed: str | None = None
+        self._ending, self._changing, self._marking = (threading.RLock() for _ in range(3))
+        self._pid = os.getpid()
+        self._folder = tempfile.mkdtemp(prefix="hapterra-")
+        self._remove_folder = weakref.finalize(self, _remove, self._folder, self._pid)
+        self._abandon: Callable[[], object] | None = None
 
     def load(
         self, terrain: Terrain | _Path, surface: Surface | None = None, **options: Any
@@ -180,9 +172,11 @@ class Device:
         """
         if self._session is not None:
             raise DeviceError("a terrain is touched: disarm() before another is loaded")
+        if "device" in options:
+            raise ValueError("load() takes no device=: the device is that of connect()")
         words: dict[str, Any] = {}
         if isinstance(terrain, Terrain):
-            file, words = terrain._write(Path(self._folder.name) / "terrain.npy")
+            file, words = terrain._write(Path(self._folder) / "terrain.npy")
         else:
             file = os.fspath(terrain)
         self._surface = (surface or Surface()).params()
@@ -196,7 +190,8 @@ class Device:
             words.update((_OPTIONS.get(name, name), it) for name, it in self._surface.items())
         words.update(options)
         names = {option: name for name, option in _OPTIONS.items()}
-        self._surface.update((names.get(name, name), it) for name, it in options.items())
+        given = {names.get(name, name): it for name, it in options.items() if it is not None}
+        self._surface.update(given)
         self._loaded = [file, *options_of(**words)]
 
     def arm(self, timeout: float = 120.0, ask: Callable[[str], bool] | None = None) -> None:
@@ -207,7 +202,8 @@ class Device:
         ----------
         timeout : seconds, from the last answer on.
         ask : called with what the person has to do or to look at before the arm is zeroed, or
-            before a fault is cleared. True goes on. Without it, Enter at the terminal does.
+            before a fault is cleared. True goes on. Without it, Enter at the terminal does, if it
+            was pressed after the question was shown and nothing was typed before it.
 
         Raises
         ------
@@ -216,18 +212,22 @@ class Device:
         """
         if self._loaded is None:
             raise DeviceError("there is nothing to touch: load() a terrain first")
+        own(self._pid)
         session = self._session or self._begin()
         until = time.monotonic() + timeout
 
         def is_news() -> bool:
-            return session.mode == "armed" or session.asks is not None
+            return session.mode == "armed" or session.asks
 
         try:
             while session.wait(is_news, until - time.monotonic()) and session.mode != "armed":
-                number, said = session.asks, "\n".join(session.question)
-                session.asks, session.answered = None, number
-                if not (ask or _at_the_terminal)(said):
-                    raise session.error("not armed: the question was not answered with yes")
+                question = session.take_question()
+                if question is None:
+                    continue
+                number, said = question
+                if not (ask or at_the_terminal)(said):
+                    hint = "" if ask else " by Enter at a terminal: elsewhere give arm() an ask="
+                    raise session.error(f"not armed: the question was not answered{hint}")
                 session.send(f"enter {number}")
                 until = time.monotonic() + timeout
             if session.mode != "armed":
@@ -238,7 +238,7 @@ class Device:
             raise
 
     def _begin(self) -> Session:
-        out = Path(self._folder.name) / "demo"
+        out = Path(self._folder) / "demo"
         words = ["run", "--device", self.name]
         if self.name == "emulated":
             words = ["demo", "--device", "emulated", "--out", str(out)]
@@ -248,21 +248,12 @@ class Device:
         words += [*self._loaded, *options_of(**self._options), "--event-samples", str(self._every)]
         self._confirmed = False
         self._samples, self._events = Buffer(self._buffer), Buffer(self._buffer)
-        self._session = session = Session(words, self._take)
-        self._params = Params(self.command, dict(self._surface))
+        take = functools.partial(_take, self._samples, self._events)
+        self._touched = dict(self._surface)
+        # A device that nobody has any more, as one that a notebook has replaced, ends its session.
+        self._session = session = Session(words, take, self._quiet)
+        self._abandon = weakref.finalize(self, session.close_input).detach
         return session
-
-    def _take(self, event: dict[str, Any]) -> None:
-        kind = event["event"]
-        if kind == "over":
-            self._samples.close()
-            self._events.close()
-        elif kind != "sample":
-            self._events.put(event)
-        else:
-            hip, proxy, force = (tuple(event[name]) for name in ("hip_mm", "proxy_mm", "force_n"))
-            what = (event[name] for name in ("state", "mode", "view"))
-            self._samples.put(Sample(event["tick"], event["t_s"], hip, proxy, force, *what))
 
     def disarm(self) -> None:
         """Ends the session. Returns when the board has confirmed that it is disarmed.
@@ -277,29 +268,45 @@ class Device:
         self._end(None)
 
     def _end(self, why: BaseException | None) -> None:
-        session, self._session = self._session, None
-        if session is None:
-            return
+        own(self._pid)
+        with self._ending:
+            if self._session is not None:
+                self._end_session(self._session, why)
+            elif self._unconfirmed is not None:
+                raise NotDisarmedError(self._unconfirmed)
+
+    def _end_session(self, session: Session, why: BaseException | None) -> None:
+        error: DeviceError | None = None
+        # What is raised otherwise, as by Ctrl-C, leaves the session to be ended again.
         try:
             session.end()
-            self._confirmed = True
-            made = list(Path(self._folder.name, "demo").glob("*.csv"))
-            if self._record is not None and made:
-                shutil.move(made[0], self._record)
-        except DeviceError as error:
-            self._confirmed = session.is_disarmed
-            if why is None or not self._confirmed:
-                raise
+        except DeviceError as raised:
+            error = raised
+        self._confirmed = session.is_disarmed
+        if isinstance(error, NotDisarmedError):
+            self._unconfirmed = str(error)
+        elif self._confirmed:
+            self._unconfirmed = None
+        self._session = None
+        if self._abandon is not None:
+            self._abandon()
+        made = list(Path(self._folder, "demo").glob("*.csv"))
+        if error is None and self._record is not None and made:
+            shutil.move(made[0], self._record)
+        if error is not None and (why is None or not self._confirmed):
+            raise error
 
     @property
     def is_armed(self) -> bool:
         """Whether the force is in, as far as is known."""
+        own(self._pid)
         session = self._session
         return session is not None and not session.is_over and session.mode == "armed"
 
     @property
     def is_disarmed(self) -> bool:
         """Whether the board has confirmed at the end of the last session that it is disarmed."""
+        own(self._pid)
         return self._session is None and self._confirmed
 
     @property
@@ -311,8 +318,7 @@ class Device:
     def params(self) -> Params:
         """The surface, which may be changed while it is touched."""
         self._serving()
-        assert self._params is not None
-        return self._params
+        return Params(self._change, self._touched, self._changing)
 
     @property
     def dropped(self) -> int:
@@ -330,17 +336,37 @@ class Device:
 
     def command(self, line: str) -> None:
         """Gives a command of ``hapterra run`` that changes the view, as "zoom 2" or "pan 5 0", and
-        waits until that is in force. Raises DeviceError where it is refused."""
+        waits until that is in force. Raises DeviceError where it is refused. "reset" puts
+        ``params`` back to what was loaded; commands of the surface are refused."""
+        first = [*line.partition("#")[0].split(), ""][0]
+        if first in _NOT_HERE:
+            raise DeviceError(f"{line!r} is not given as a command: {_NOT_HERE[first]}")
+        self._change(line, self._surface if first == "reset" else {})
+
+    def _change(self, line: str, changed: dict[str, Any]) -> None:
+        """Gives a command, and notes what it changes of the surface once it is in force."""
         session = self._serving()
-        view, refused = session.view, len(session.refused)
-        session.send(line)
-        done = session.wait(
-            lambda: session.view != view or len(session.refused) > refused, _DONE_S
-        )
-        if len(session.refused) > refused:
-            raise DeviceError(session.refused[-1])
-        if not done:
-            raise session.error(f"{line!r} is not done after {_DONE_S:g} s")
+        with self._changing:
+            before, surface = dict(self._touched), self._touched
+            view, refused = session.view, len(session.refused)
+            # Where it is not known whether it is done, it may still come.
+            surface.update(dict.fromkeys(changed))
+            try:
+                session.send(line)
+            except ValueError:
+                surface.update(before)
+                raise
+            done = session.wait(
+                lambda: session.view != view or len(session.refused) > refused, _DONE_S
+            )
+            if len(session.refused) > refused:
+                surface.update(before)
+                raise DeviceError(session.refused[-1])
+            if not done:
+                raise session.error(
+                    f"{line!r} is not done after {_DONE_S:g} s; the change may still come"
+                )
+            surface.update(changed)
 
     def mark(self, text: str) -> Mark:
         """Marks this moment, in the recording and on the board's mark pin.
@@ -350,12 +376,17 @@ class Device:
         """
         session = self._serving()
         text = text.strip()
-        made, refused = len(session.marks), len(session.refused)
-        session.send(f"mark {text}")
-        session.wait(lambda: len(session.marks) > made or len(session.refused) > refused, _DONE_S)
-        if len(session.refused) > refused:
+        with self._marking:
+            made, refused = len(session.marks), len(session.refused)
+
+            def mine() -> list[dict[str, Any]]:
+                return [mark for mark in session.marks[made:] if mark["text"] == text]
+
+            session.send(f"mark {text}")
+            session.wait(lambda: bool(mine()) or len(session.refused) > refused, _DONE_S)
+            mark = [*mine(), {}][0]
+        if not mark and len(session.refused) > refused:
             raise DeviceError(session.refused[-1])
-        mark = session.marks[-1] if len(session.marks) > made else {}
         if mark.get("marked_tick") is None:
             raise session.error(f"the device has not said which tick {text!r} marks")
         return Mark(text, mark["marked_tick"], mark["marked_t_s"], mark["host_unix_s"])
@@ -377,20 +408,28 @@ class Device:
         try:
             self._end(why)
         finally:
-            self._folder.cleanup()
+            self._remove_folder()
 
     def __repr__(self) -> str:
         mode = self._session.mode if self._session else "not served"
         return f"<Device {self.name!r}, {mode}>"
 
 
-def _at_the_terminal(said: str) -> bool:
-    """Enter at the terminal; nobody is asked where there is none."""
-    if not sys.stdin.isatty():
-        return False
-    input()
-    return True
+def _take(samples: Buffer[Sample], events: Buffer[dict[str, Any]], event: dict[str, Any]) -> None:
+    """Puts an event where it is taken from. Knows no device, so one may be forgotten."""
+    kind = event["event"]
+    if kind == "over":
+        samples.close()
+        events.close()
+    elif kind != "sample":
+        events.put(event)
+    else:
+        hip, proxy, force = (tuple(event[name]) for name in ("hip_mm", "proxy_mm", "force_n"))
+        what = (event[name] for name in ("state", "mode", "view"))
+        samples.put(Sample(event["tick"], event["t_s"], hip, proxy, force, *what))
 
 
-def _word(value: Any) -> str:
-    return repr(float(value)) if isinstance(value, (float, int, np.number)) else str(value)
+def _remove(folder: str, pid: int) -> None:
+    """Removes the temporary folder of a device. A fork must not remove its parent's."""
+    if os.getpid() == pid:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -14,6 +14,7 @@ import collections
 import contextlib
 import json
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -32,8 +33,15 @@ _NOT_CONFIRMED = "switch the amplifiers off"
 _CONFIRMED = "the board has confirmed that it is disarmed"
 #: For so long a board may take to confirm that it is disarmed, s; then once more with a signal.
 _CONFIRMS_S = 20.0
+#: For so long its last lines are waited for where it is known to be disarmed, s: a viewer that goes
+#: on keeps standard error open.
+_TOLD_S = 1.0
 #: Lines of the command that an error may quote.
 _KEPT = 200
+#: Lines that are never passed on, and those that a quiet session does not pass on. A recording that
+#: was cut is named.
+_FIGURES = re.compile(r"\s*\d")
+_NEWS = re.compile(r"view \d|the view stays as it was|(?!recording)[a-z]+  ")
 
 
 class DeviceError(CommandError):
@@ -43,6 +51,14 @@ class DeviceError(CommandError):
 class NotDisarmedError(DeviceError):
     """A session has ended, and the board has not confirmed that it is disarmed: switch the
     amplifiers off."""
+
+
+def own(pid: int) -> None:
+    """Refuses what a fork asks of a session of its parent, of which it can know nothing."""
+    if os.getpid() != pid:
+        raise DeviceError(
+            "this process is a fork, and the arm is driven by the process that made it: disarm() there"
+        )
 
 
 class Buffer(Generic[_T]):
@@ -86,10 +102,17 @@ class Session:
     words : the subcommand and its arguments.
     on_event : called with each event by the thread that reads them, and at last with one of the
         kind "over".
+    is_quiet : pass on only what a person has to do or is warned of.
     """
 
-    def __init__(self, words: Sequence[str], on_event: Callable[[dict[str, Any]], None]) -> None:
-        self._on_event = on_event
+    def __init__(
+        self,
+        words: Sequence[str],
+        on_event: Callable[[dict[str, Any]], None],
+        is_quiet: bool = False,
+    ) -> None:
+        self._on_event, self._is_quiet = on_event, is_quiet
+        self._pid = os.getpid()
         self._changed = threading.Condition()
         self._told: collections.deque[str] = collections.deque(maxlen=_KEPT)
         #: As the column ``mode`` of a recording.
@@ -97,10 +120,10 @@ class Session:
         self.fault: int | None = None
         #: The view in force, counted from 0.
         self.view = -1
-        #: Number of the question that is open, its lines, and the one that was answered last.
-        self.asks: int | None = None
-        self.question: list[str] = []
-        self.answered: int | None = None
+        #: Number of the question that was asked last, its lines, and whether it is to be answered.
+        self._asked: int | None = None
+        self._question: list[str] = []
+        self.asks = False
         #: The last lines about arming.
         self.arming: list[str] = []
         self.refused: list[str] = []
@@ -120,65 +143,99 @@ class Session:
         self._stderr = threading.Thread(target=self._read_stderr, daemon=True)
         self._stderr.start()
         _SESSIONS.add(self)
+        _end_with_main_thread()
 
     def _read_stderr(self) -> None:
-        """Passes on what the command says, but for figures and its error, which is raised."""
+        try:
+            self._pass_on()
+            if self._events is not None:
+                self._events.join()
+        finally:
+            self._on_event({"event": "over"})
+
+    def _pass_on(self) -> None:
+        """Passes on what the command says, to its end: it must not wait for its reader."""
         assert self._child.stderr
-        is_error = False
         for raw in self._child.stderr:
             line = raw.decode("utf-8", "replace").rstrip()
             if line.startswith("events         ") and self._events is None:
                 host, _, port = line.split()[-1].rpartition(":")
                 try:
                     stream = socket.create_connection((host, int(port)))
+                except (ConnectionError, ValueError):
+                    # It has ended already, and says why, or how many lines were dropped.
+                    continue
                 except OSError:
-                    # It has ended already, and says why.
+                    # A session that nobody listens to must not arm.
+                    self.close_input()
                     continue
                 self._events = threading.Thread(target=self._read, args=(stream,), daemon=True)
                 self._events.start()
                 continue
             self._told.append(line)
-            is_error = is_error or line.startswith("error: ")
-            if not (is_error or line.lstrip()[:1].isdigit()):
-                print(f"hapterra: {line}", file=sys.stderr)
-        if self._events is not None:
-            self._events.join()
-        self._on_event({"event": "over"})
+            self._disarmed = self._disarmed or line.endswith(_CONFIRMED)
+            if not (_FIGURES.match(line) or self._is_quiet and _NEWS.match(line)):
+                # What stands there for standard error may raise anything.
+                with contextlib.suppress(Exception):
+                    print(f"hapterra: {line}", file=sys.stderr)
 
     def _read(self, stream: socket.socket) -> None:
         # A process that is killed resets the line; its end is seen otherwise.
         with contextlib.suppress(OSError), stream, stream.makefile("rb") as lines:
             for line in lines:
-                event = json.loads(line)
-                self._take(event)
-                self._on_event(event)
+                # Its last line may be cut.
+                with contextlib.suppress(ValueError):
+                    event = json.loads(line)
+                    self._take(event)
+                    self._on_event(event)
 
     def _take(self, event: dict[str, Any]) -> None:
         kind = event["event"]
-        if kind in ("sample", "place", "contact", "material"):
+        if kind in ("place", "contact", "material"):
+            return
+        if kind == "sample" and (event["mode"], event["view"]) == (self.mode, self.view):
             return
         with self._changed:
-            if kind == "limits":
+            if kind == "sample":
+                # The lines that told of a change may have been dropped.
+                self.mode, self.view = event["mode"], event["view"]
+            elif kind == "limits":
                 self.mode, self.fault = event["mode"], event["fault"]
             elif kind == "view":
                 self.view = event["view"]
             elif kind == "arming":
-                self.arming = (self.arming + event["lines"])[-_KEPT:]
-                self.question = event["lines"]
-                self.asks = event["asks"] if event["asks"] != self.answered else None
+                lines, asked = event["lines"], event["asks"]
+                self.arming = (self.arming + lines)[-_KEPT:]
+                if asked is None:
+                    self.asks = False
+                elif asked == self._asked:
+                    self._question += [line for line in lines if line not in self._question]
+                else:
+                    self._asked, self._question, self.asks = asked, list(lines), True
             elif kind == "refused":
                 self.refused.append(event["text"])
             elif kind == "mark":
                 self.marks.append(event)
             elif kind == "end":
-                self.mode, self._disarmed = "disarmed", event["disarmed"]
+                # The guardian may have confirmed it meanwhile.
+                if event["disarmed"]:
+                    self.mode, self._disarmed = "disarmed", True
             self._changed.notify_all()
+
+    def take_question(self) -> tuple[int, str] | None:
+        """The number and the lines of the question that is open, once."""
+        with self._changed:
+            if not self.asks or self._asked is None:
+                return None
+            self.asks = False
+            return self._asked, "\n".join(self._question)
 
     @property
     def is_disarmed(self) -> bool:
         """Whether the board has confirmed, at the end, that it is disarmed."""
-        told = any(_CONFIRMED in line for line in list(self._told))
-        return self._disarmed or told or self._child.poll() == 0
+        # No exit code says so: it is 0 for a child that another has waited for, too.
+        own(self._pid)
+        return self._disarmed
 
     @property
     def is_over(self) -> bool:
@@ -189,11 +246,17 @@ class Session:
         """Gives a command. Raises ValueError for what is not one line."""
         if not line.isprintable():
             raise ValueError(f"{line!r} has characters that no command can have")
+        own(self._pid)
         assert self._child.stdin
         try:
             self._child.stdin.write(f"{line}\n".encode())
-        except OSError:
+        except (OSError, ValueError):
             raise self.error("the session is over") from None
+
+    def close_input(self) -> None:
+        """Asks for the end, as Ctrl-C does, and waits for nothing."""
+        if self._child.stdin:
+            self._child.stdin.close()
 
     def wait(self, is_it: Callable[[], bool], timeout: float) -> bool:
         """Waits until something is so, the session is over, or for so many seconds. Returns
@@ -208,9 +271,10 @@ class Session:
     def error(self, message: str) -> DeviceError:
         """An error with what the command said of it: its own error, where it has ended with one."""
         told = list(self._told)
-        if self.is_over and any(line.startswith("error: ") for line in told):
-            own = error("\n".join(told), self._child.wait())
-            return DeviceError(own.message, own.hint)
+        has_ended = self.is_over or self._child.returncode is not None
+        if has_ended and any(line.startswith("error: ") for line in told):
+            its = error("\n".join(told), self._child.wait())
+            return DeviceError(its.message, its.hint)
         reasons = self.arming[-8:] + self.refused[-1:]
         return DeviceError("\n".join([message, *reasons]))
 
@@ -224,8 +288,8 @@ class Session:
         DeviceError
             The board is disarmed, and the command has failed.
         """
-        assert self._child.stdin
-        self._child.stdin.close()
+        own(self._pid)
+        self.close_input()
         for _ in range(3):
             try:
                 self._child.wait(_CONFIRMS_S)
@@ -236,7 +300,9 @@ class Session:
         else:
             self._child.kill()
         code = self._child.wait()
-        self._stderr.join(_CONFIRMS_S)
+        self.wait(lambda: self.is_disarmed, _CONFIRMS_S)
+        self._stderr.join(_TOLD_S)
+        self._on_event({"event": "over"})
         _SESSIONS.discard(self)
         if not self.is_disarmed:
             told = "\n".join(self._told)
@@ -250,10 +316,32 @@ class Session:
 
 #: Those that have not ended.
 _SESSIONS: weakref.WeakSet[Session] = weakref.WeakSet()
+#: The process whose main thread is waited for.
+_waits_in: int | None = None
+
+
+def _close_inputs() -> None:
+    for session in list(_SESSIONS):
+        session.close_input()
+
+
+def _end_with_main_thread() -> None:
+    """Asks for the end of all sessions when the main thread is over: Python waits for its other
+    threads, which may read samples, before it calls what is registered by atexit."""
+    global _waits_in
+
+    def wait() -> None:
+        threading.main_thread().join()
+        _close_inputs()
+
+    if _waits_in != os.getpid():
+        _waits_in = os.getpid()
+        threading.Thread(target=wait, daemon=True).start()
 
 
 @atexit.register
 def _end_all() -> None:
+    _close_inputs()
     for session in list(_SESSIONS):
         try:
             session.end()
@@ -263,9 +351,7 @@ def _end_all() -> None:
 
 def _leave_to_parent() -> None:
     """A fork must not keep the input of a session open whose Python is killed."""
-    for session in list(_SESSIONS):
-        if session._child.stdin:
-            session._child.stdin.close()
+    _close_inputs()
     _SESSIONS.clear()
 
 
