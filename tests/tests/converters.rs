@@ -59,11 +59,12 @@ fn hint(file: &Path) -> String {
     hint_of(&["info"], file)
 }
 
-/// The hint of a command that refuses a file.
+/// The hint of a command that refuses a file, where the program finds no libgdal.
 fn hint_of(words: &[&str], file: &Path) -> String {
     let output = Command::new(hapterra_binary())
         .args(words)
         .arg(file)
+        .env("GDAL_LIBRARY", "none")
         .output();
     let output = output.expect("it runs");
     let opens = output.status.success();
