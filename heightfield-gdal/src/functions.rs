@@ -1,5 +1,5 @@
 //! The functions of GDAL's C interface that are called, with the types of its headers
-//! (`gdal.h`, `cpl_error.h`, `cpl_conv.h`), unchanged from 3.4 on.
+//! (`gdal.h`, `ogr_srs_api.h`, `cpl_error.h`, `cpl_conv.h`), unchanged from 3.4 on.
 
 use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
 
@@ -70,5 +70,26 @@ functions! {
     GDALGetOverview: (Handle, c_int) -> Handle;
     GDALGetMaskFlags: (Handle) -> c_int;
     GDALGetMaskBand: (Handle) -> Handle;
+    OSRNewSpatialReference: (*const c_char) -> Handle;
+    OSRDestroySpatialReference: (Handle);
+    OSRImportFromWkt: (Handle, *mut *mut c_char) -> c_int;
+    OSRImportFromEPSG: (Handle, c_int) -> c_int;
+    OSRCloneGeogCS: (Handle) -> Handle;
+    OSRFindMatches: (Handle, *const *const c_char, *mut c_int, *mut *mut c_int) -> *mut Handle;
+    OSRFreeSRSArray: (*mut Handle);
+    OSRExportToProj4: (Handle, *mut *mut c_char) -> c_int;
+    OSRGetName: (Handle) -> *const c_char;
+    OSRGetAttrValue: (Handle, *const c_char, c_int) -> *const c_char;
+    OSRGetAuthorityName: (Handle, *const c_char) -> *const c_char;
+    OSRGetAuthorityCode: (Handle, *const c_char) -> *const c_char;
+    OSRIsGeographic: (Handle) -> c_int;
+    OSRIsProjected: (Handle) -> c_int;
+    OSRGetLinearUnits: (Handle, *mut *mut c_char) -> c_double;
+    OSRGetAngularUnits: (Handle, *mut *mut c_char) -> c_double;
+    OSRGetPrimeMeridian: (Handle, *mut *mut c_char) -> c_double;
+    OSRGetSemiMajor: (Handle, *mut c_int) -> c_double;
+    OSRGetInvFlattening: (Handle, *mut c_int) -> c_double;
+    OSRGetTOWGS84: (Handle, *mut c_double, c_int) -> c_int;
+    VSIFree: (*mut c_void);
     GDALRasterIO: (Handle, c_int, c_int, c_int, c_int, c_int, *mut c_void, c_int, c_int, c_int, c_int, c_int) -> c_int;
 }

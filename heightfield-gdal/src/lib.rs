@@ -15,7 +15,8 @@
 //!
 //! - [`Library`]: finds and loads libgdal, versions 3.4 and newer, and lists its drivers;
 //! - [`Dataset`]: a file, a folder or whatever else a driver opens, for reading;
-//! - [`Band`]: its samples, overviews and masks, and what they mean.
+//! - [`Band`]: its samples, overviews and masks, and what they mean;
+//! - [`SpatialReference`]: a reference system by its text or code, as PROJ knows it.
 //!
 //! A dataset is used by one thread at a time, and may go from thread to thread. A call takes as long
 //! as GDAL takes: no thread that must not wait may read.
@@ -25,9 +26,11 @@ mod dataset;
 mod error;
 mod functions;
 mod library;
+mod srs;
 mod text;
 
 pub use band::{Band, Mask, Sample, SampleType, Window};
 pub use dataset::{Dataset, Subdataset};
 pub use error::Error;
 pub use library::{Driver, Library, Settings, Version};
+pub use srs::{AxisUnit, SpatialReference};

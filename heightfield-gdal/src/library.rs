@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::functions::Functions;
+use crate::srs::SpatialReference;
 use crate::text::{from_c, to_c};
 
 /// Names the library itself, before all places where it is looked for.
@@ -192,6 +193,23 @@ impl Library {
     /// [`Error::Refused`] in GDAL's words, [`Error::ZeroByte`].
     pub fn open(&self, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
         Dataset::open(self.loaded.clone(), path, options)
+    }
+
+    /// A reference system by its text.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] in GDAL's words, also where it is neither geographic nor projected;
+    /// [`Error::ZeroByte`].
+    pub fn reference_of_text(&self, text: &str) -> Result<SpatialReference, Error> {
+        SpatialReference::of_text(&self.loaded, text)
+    }
+
+    /// A reference system by its code of EPSG's.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] in GDAL's words.
+    pub fn reference_of_epsg(&self, code: u16) -> Result<SpatialReference, Error> {
+        SpatialReference::of_epsg(&self.loaded, code)
     }
 }
 

@@ -1,27 +1,26 @@
 //! Coordinate reference systems by EPSG code or as text: what they are called, their
 //! units, how long a unit is on the ground, and where that is on the globe.
 //!
-//! `epsg-utils` knows the codes, `proj4wkt` reads texts, `proj4rs` has the projections,
-//! `crs-definitions` the shifts between datums; they are named in this file and its folder
-//! only.
+//! `crs-definitions` and two tables know the codes, `proj4rs` has the projections, and the
+//! shifts between datums come from `crs-definitions`. Texts without a code, systems that keys spell
+//! out and codes that are not known are described by libgdal's PROJ, where there is one (`by_gdal`).
+//! These crates are named in this folder only.
 
-mod bound;
+mod by_gdal;
 mod datum;
-mod names;
+mod definition;
 mod projection;
 mod shift;
 mod system;
+mod transform;
 mod wkt;
-
-use epsg_utils::Crs;
-use epsg_utils::crs::{CoordinateSystem, Unit as EpsgUnit};
 
 use super::globe::Globe;
 pub(super) use datum::Datum;
 pub use datum::LonLat;
-pub(super) use shift::Shift;
 pub use system::ReferenceSystem;
 pub(super) use system::Unit;
+pub(crate) use definition::{vertical, vertical_beside};
 use wkt::Node;
 
 /// A vertical reference system.
@@ -37,55 +36,25 @@ pub(super) struct Vertical {
     pub(super) is_depth: bool,
 }
 
-/// The vertical reference system with an EPSG code.
-pub(super) fn vertical(code: u16) -> Option<Vertical> {
-    let Crs::VertCrs(crs) = crs(code)? else {
-        return None;
-    };
-    let axis = crs.coordinate_system.axes.first();
-    Some(Vertical {
-        code: Some(code),
-        metres: metres(&crs.coordinate_system)?,
-        is_depth: axis.is_some_and(|axis| axis.direction == "down"),
-        name: crs.name,
-    })
-}
-
-/// Metres in the unit of the projected system with an EPSG code.
-pub(super) fn metres_per_unit(code: u16) -> Option<f64> {
-    match crs(code)? {
-        Crs::ProjectedCrs(crs) => metres(&crs.coordinate_system),
-        _ => None,
-    }
-}
-
 impl Vertical {
-    /// A vertical system that is described without a known code.
-    fn from_node(node: &Node) -> Option<Self> {
-        Some(Self {
-            code: None,
-            name: node.name()?.to_owned(),
-            metres: node.unit()?,
-            is_depth: node.has_axis("down"),
-        })
+    /// The one that a text names beside a horizontal system.
+    fn beside(root: &Node) -> Option<Self> {
+        let node = root.child(&["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"])?;
+        Self::of(node)
     }
-}
 
-fn crs(code: u16) -> Option<Crs> {
-    epsg_utils::parse_wkt2(code_wkt(code)?).ok()
-}
-
-/// The text (WKT 2) of a code.
-fn code_wkt(code: u16) -> Option<&'static str> {
-    epsg_utils::epsg_to_wkt2(code.into()).ok()
-}
-
-/// The unit stands with the system or with its axes.
-fn metres(system: &CoordinateSystem) -> Option<f64> {
-    let of_axis = system.axes.first().and_then(|axis| axis.unit.as_ref());
-    let unit: Option<&EpsgUnit> = system.cs_unit.as_ref().or(of_axis);
-    unit.and_then(|unit| unit.conversion_factor)
-        .filter(|metres| metres.is_finite() && *metres > 0.0)
+    /// The one that a node describes.
+    fn of(node: &Node) -> Option<Self> {
+        let described = || {
+            Some(Self {
+                code: None,
+                name: node.name()?.to_owned(),
+                metres: node.unit()?,
+                is_depth: node.has_axis("down"),
+            })
+        };
+        node.epsg().and_then(vertical).or_else(described)
+    }
 }
 
 #[cfg(test)]

@@ -62,33 +62,15 @@ impl Datum {
         }
     }
 
-    /// The same with longitudes that begin at a meridian in degrees.
-    pub(crate) const fn with_meridian(mut self, meridian: f64) -> Self {
-        self.meridian = meridian;
-        self
-    }
-
-    /// The same with a shift of three or seven parameters, where those numbers are one.
-    pub(super) fn shifted_by(mut self, numbers: &[f64]) -> Self {
-        if self.globe.is_earth() {
-            self.shift = Shift::by_numbers(&self.globe, numbers).or(self.shift);
-        }
-        self
-    }
-
-    /// Of a node of a geographic system, which may have a code; `meridian` is where its
-    /// longitudes begin.
-    pub(super) fn of(base: &Node, code: Option<u16>, meridian: f64) -> Option<Self> {
+    /// Of a node of a geographic system, and its shift.
+    pub(super) fn of(base: &Node, shift: Option<Shift>) -> Option<Self> {
         let node = base.child(&["DATUM", "ENSEMBLE", "GEODETICDATUM", "TRF"])?;
         let ellipsoid = node.child(&["ELLIPSOID", "SPHEROID"])?;
         let metres = ellipsoid.unit().unwrap_or(1.0);
         let globe = Globe::new(ellipsoid.number(1)? * metres, ellipsoid.number(2)?)?;
-        let name = node.name()?;
-        let code = base.epsg().or(code);
-        let own = node.child(&["TOWGS84"]).map(Node::numbers);
-        let shift = own.and_then(|numbers| Shift::by_numbers(&globe, &numbers));
-        let shift = shift.or_else(|| Shift::of(name, code));
-        Some(Self::new(name.to_owned(), globe, meridian, shift))
+        let meridian = base.child(&["PRIMEM"]).and_then(|node| node.number(1));
+        let name = node.name()?.to_owned();
+        Some(Self::new(name, globe, meridian.unwrap_or(0.0), shift))
     }
 
     /// The body that it is a datum of.

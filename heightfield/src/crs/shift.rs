@@ -1,20 +1,18 @@
 //! The way from one datum's longitudes and latitudes to those of WGS 84.
 
-use proj4rs::Proj;
-use proj4rs::transform::transform;
+use super::transform::Transform;
 
-use super::names::code_of_datum;
 use crate::globe::Globe;
 
 /// A way to WGS 84.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Shift {
+pub(super) enum Shift {
     /// No way at all: the datum counts as WGS 84.
     None,
     /// A shift, as PROJ writes it, with the ellipsoid that it is for.
     Parameters {
-        /// `+ellps=intl +towgs84=-87,-98,-121`
-        words: String,
+        /// From longitude and latitude of the datum to those of WGS 84.
+        way: Transform,
         /// Usually not farther off than this, m.
         within_m: f64,
     },
@@ -35,15 +33,9 @@ const NAD27: [f64; 3] = [-8.0, 160.0, 176.0];
 const NOT_TRUSTED: [u16; 5] = [4161, 4240, 4688, 4805, 4751];
 
 impl Shift {
-    /// Of a datum by its name, or by the code of a system that has it.
-    pub(crate) fn of(name: &str, code: Option<u16>) -> Option<Self> {
-        let of_code = code.and_then(Self::by_code);
-        of_code.or_else(|| Self::by_code(code_of_datum(name)?))
-    }
-
     /// Three or seven parameters for an ellipsoid: metres, seconds of arc, and parts in a
     /// million, as PROJ has them.
-    pub(crate) fn by_numbers(globe: &Globe, numbers: &[f64]) -> Option<Self> {
+    pub(super) fn of_numbers(globe: &Globe, numbers: &[f64]) -> Option<Self> {
         if !matches!(numbers.len(), 3 | 7) || !numbers.iter().all(|number| number.is_finite()) {
             return None;
         }
@@ -52,17 +44,23 @@ impl Shift {
             return Some(Self::None);
         }
         let listed: Vec<String> = numbers.iter().map(f64::to_string).collect();
-        Some(Self::Parameters {
-            words: format!("{} +towgs84={}", globe.in_proj(), listed.join(",")),
-            within_m: match is_zero(&numbers[3..]) {
+        Self::by(
+            &format!("{} +towgs84={}", globe.in_proj(), listed.join(",")),
+            match is_zero(&numbers[3..]) {
                 true => THREE_WITHIN_M,
                 false => SEVEN_WITHIN_M,
             },
-        })
+        )
+    }
+
+    fn by(words: &str, within_m: f64) -> Option<Self> {
+        let from = format!("+proj=longlat {words}");
+        let way = Transform::new(from, "+proj=longlat +datum=WGS84".into())?;
+        Some(Self::Parameters { way, within_m })
     }
 
     /// Of the system with a code of EPSG's.
-    fn by_code(code: u16) -> Option<Self> {
+    pub(super) fn of_code(code: u16) -> Option<Self> {
         if NOT_TRUSTED.contains(&code) {
             return None;
         }
@@ -70,7 +68,7 @@ impl Shift {
         let words = || text.split_whitespace();
         let value = |key: &str| words().find_map(|word| word.strip_prefix(key));
         if let Some(datum) = value("+datum=") {
-            return Some(Self::by_datum(datum));
+            return Self::by_datum(datum);
         }
         let numbers: Option<Vec<f64>> = value("+towgs84=")?
             .split(',')
@@ -82,33 +80,24 @@ impl Shift {
             keys.iter().any(|key| word.starts_with(key))
         });
         let globe = globe.collect::<Vec<_>>().join(" ");
-        match Self::by_numbers(&Globe::EARTH, &numbers)? {
+        match Self::of_numbers(&Globe::EARTH, &numbers)? {
             Self::None => Some(Self::None),
-            Self::Parameters { within_m, .. } => Some(Self::Parameters {
-                words: format!("{globe} +towgs84={}", value("+towgs84=")?),
-                within_m,
-            }),
+            Self::Parameters { within_m, .. } => {
+                Self::by(&format!("{globe} +towgs84={}", value("+towgs84=")?), within_m)
+            }
         }
     }
 
     /// Of a datum that `proj4rs` has a name for.
-    fn by_datum(datum: &str) -> Self {
+    fn by_datum(datum: &str) -> Option<Self> {
         match datum {
-            "WGS84" | "NAD83" => Self::None,
+            "WGS84" | "NAD83" => Some(Self::None),
             "NAD27" => {
                 let [x, y, z] = NAD27;
-                Self::Parameters {
-                    words: format!("+ellps=clrk66 +towgs84={x},{y},{z}"),
-                    within_m: THREE_WITHIN_M,
-                }
+                Self::by(&format!("+ellps=clrk66 +towgs84={x},{y},{z}"), THREE_WITHIN_M)
             }
-            datum => Self::Parameters {
-                words: format!("+datum={datum}"),
-                within_m: match datum {
-                    "carthage" | "GGRS87" => THREE_WITHIN_M,
-                    _ => SEVEN_WITHIN_M,
-                },
-            },
+            "carthage" | "GGRS87" => Self::by(&format!("+datum={datum}"), THREE_WITHIN_M),
+            datum => Self::by(&format!("+datum={datum}"), SEVEN_WITHIN_M),
         }
     }
 
@@ -122,31 +111,25 @@ impl Shift {
 
     /// Longitude and latitude of WGS 84 of those of the datum, degrees.
     pub(super) fn to_wgs84(&self, own: (f64, f64)) -> Option<(f64, f64)> {
-        between(&self.own()?, &wgs84()?, own)
+        match self {
+            Self::None => Some(own),
+            Self::Parameters { way, .. } => in_degrees(own, |place| way.forward(place)),
+        }
     }
 
     /// The inverse of [`Shift::to_wgs84`].
     pub(super) fn of_wgs84(&self, lonlat: (f64, f64)) -> Option<(f64, f64)> {
-        between(&wgs84()?, &self.own()?, lonlat)
-    }
-
-    fn own(&self) -> Option<Proj> {
         match self {
-            Self::None => wgs84(),
-            Self::Parameters { words, .. } => {
-                Proj::from_proj_string(&format!("+proj=longlat {words}")).ok()
-            }
+            Self::None => Some(lonlat),
+            Self::Parameters { way, .. } => in_degrees(lonlat, |place| way.back(place)),
         }
     }
 }
 
-fn wgs84() -> Option<Proj> {
-    Proj::from_proj_string("+proj=longlat +datum=WGS84").ok()
-}
-
-fn between(from: &Proj, to: &Proj, (longitude, latitude): (f64, f64)) -> Option<(f64, f64)> {
-    let mut place = (longitude.to_radians(), latitude.to_radians(), 0.0);
-    transform(from, to, &mut place).ok()?;
-    let found = (place.0.to_degrees(), place.1.to_degrees());
-    (found.0.is_finite() && found.1.is_finite()).then_some(found)
+fn in_degrees(
+    (longitude, latitude): (f64, f64),
+    moved: impl Fn((f64, f64)) -> Option<(f64, f64)>,
+) -> Option<(f64, f64)> {
+    let (longitude, latitude) = moved((longitude.to_radians(), latitude.to_radians()))?;
+    Some((longitude.to_degrees(), latitude.to_degrees()))
 }

@@ -1,12 +1,10 @@
 //! A horizontal reference system: its name, its code, and where its coordinates are
 //! in longitude and latitude.
 
-use super::bound;
-use super::code_wkt;
 use super::datum::{Datum, LonLat};
 use super::projection::Projection;
 use super::wkt::Node;
-use super::{Globe, Vertical};
+use super::{Globe, Vertical, by_gdal, definition};
 use crate::tangents::Tangents;
 
 /// Where a map's units are shorter or longer than this on the ground, the place is
@@ -23,6 +21,8 @@ pub struct ReferenceSystem {
     code: Option<u16>,
     name: String,
     unit: Unit,
+    /// The projection's units in a unit of coordinates.
+    scale: f64,
     /// `None` where it is not known.
     projection: Option<Projection>,
     /// `None` where the file does not tell it.
@@ -41,78 +41,62 @@ pub(crate) enum Unit {
 impl ReferenceSystem {
     /// The system with a code of EPSG's; `None` where the code is not known.
     pub(crate) fn from_code(code: u16) -> Option<Self> {
-        let text = code_wkt(code)?;
-        Self::described(&Node::parse(text)?, text, Some(code))
+        definition::of_code(code)
     }
 
     /// The system that a text describes, and the vertical one that may stand beside
-    /// it; the code in the text wins over its parameters, which other programs round.
+    /// it; the code in the text wins over its parameters, which other programs round. Without a
+    /// code its projection is known through libgdal, where there is one.
     pub(crate) fn from_wkt(text: &str) -> (Option<Self>, Option<Vertical>) {
         let text = text.trim().trim_end_matches('\0');
-        let Some(root) = Node::parse(text) else {
+        let Some((root, beside)) = Node::parse_both(text) else {
             return (None, None);
         };
-        let up = root.child(&["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"]);
-        let up = up.and_then(|node| {
-            let known = node.epsg().and_then(super::vertical);
-            known.or_else(|| Vertical::from_node(node))
-        });
-        if let Some((source, shift)) = bound::parts(&root, text) {
-            let (across, of_source) = Self::from_wkt(source);
-            let across = across.map(|system| system.shifted_by(&shift));
-            return (across, up.or(of_source));
-        }
-        let compound = root.is(&["COMPD_CS", "COMPOUNDCRS"]);
-        let across = match compound {
-            true => root.child(&HORIZONTAL),
-            false => Some(&root),
-        };
-        let by_code = |node: &Node| node.epsg().and_then(Self::from_code);
-        let across =
-            across.and_then(|node| by_code(node).or_else(|| Self::described(node, text, None)));
-        (across, up)
+        let up = beside.as_ref().and_then(Vertical::of);
+        (
+            root.horizontal().and_then(|node| Self::of_node(node, text)),
+            up.or_else(|| Vertical::beside(&root)),
+        )
     }
 
-    fn described(node: &Node, text: &str, code: Option<u16>) -> Option<Self> {
-        let unit = match node.is(&GEOGRAPHIC) {
-            true => Unit::Angle(node.unit().map_or(1.0, degrees)),
-            false if node.is(&PROJECTED) => Unit::Length(node.unit()),
-            false => return None,
-        };
-        let projection = proj4wkt::wkt_to_projstring(text).ok();
-        let meridian = projection.as_deref().map_or(0.0, Projection::meridian_of);
-        let base = node.child(&BASES).unwrap_or(node);
-        let datum = Datum::of(base, code, meridian);
-        let globe = datum.as_ref().map_or(Globe::EARTH, Datum::globe);
-        Some(Self {
-            code,
-            name: node.name()?.to_owned(),
-            unit,
-            projection: projection.map(|text| Projection::new(&text, globe)),
-            datum,
+    fn of_node(node: &Node, text: &str) -> Option<Self> {
+        let by_code = node.epsg().and_then(Self::from_code);
+        by_code.or_else(|| by_gdal::of_text(text)).or_else(|| {
+            let unit = node.unit_of_places().unwrap_or(Unit::Angle(1.0));
+            Some(Self::new(node.name()?, unit, Datum::of(node.base(), None)))
         })
     }
 
     /// A system of which only the name, the unit and perhaps the datum are known.
-    pub(crate) fn named(name: &str, unit: Unit, datum: Option<Datum>) -> Self {
+    pub(crate) fn new(name: &str, unit: Unit, datum: Option<Datum>) -> Self {
         Self {
             code: None,
             name: name.to_owned(),
             unit,
+            scale: 1.0,
             projection: None,
             datum,
         }
     }
 
-    /// The same system with a projection, as PROJ writes it.
-    pub(crate) fn with_projection(mut self, projection: &str) -> Self {
-        self.projection = Some(Projection::new(projection, self.globe()));
+    /// The same system with a code of EPSG's.
+    pub(super) const fn with_code(mut self, code: u16) -> Self {
+        self.code = Some(code);
         self
     }
 
-    /// The same system with a shift to WGS 84 of its own, where those numbers are one.
-    fn shifted_by(mut self, numbers: &[f64]) -> Self {
-        self.datum = self.datum.map(|datum| datum.shifted_by(numbers));
+    /// The same system with a projection, as PROJ writes it, where that is known here.
+    pub(super) fn with_projection(mut self, projection: &str) -> Self {
+        self.projection = Projection::new(projection, self.globe());
+        self
+    }
+
+    /// The same system, whose coordinates are in units of so many metres, whatever its own unit is.
+    pub(crate) fn in_units_of(mut self, metres: f64) -> Self {
+        if let Unit::Length(own) = self.unit {
+            self.scale = metres / own.unwrap_or(metres);
+            self.unit = Unit::Length(Some(metres));
+        }
         self
     }
 
@@ -180,7 +164,7 @@ impl ReferenceSystem {
     pub(super) fn own_degrees(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         match self.unit {
             Unit::Angle(degrees) => Some((x * degrees + self.meridian(), y * degrees)),
-            Unit::Length(_) => self.projection.as_ref()?.degrees((x, y)),
+            Unit::Length(_) => self.projected((x, y)),
         }
     }
 
@@ -194,8 +178,17 @@ impl ReferenceSystem {
         };
         match self.unit {
             Unit::Angle(degrees) => Some(((own.0 - self.meridian()) / degrees, own.1 / degrees)),
-            Unit::Length(_) => self.projection.as_ref()?.of_degrees(own),
+            Unit::Length(_) => {
+                let (x, y) = self.projection.as_ref()?.of_degrees(own)?;
+                Some((x / self.scale, y / self.scale))
+            }
         }
+    }
+
+    /// Degrees of the system's own datum of a place on its map.
+    fn projected(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
+        let place = (x * self.scale, y * self.scale);
+        self.projection.as_ref()?.degrees(place)
     }
 
     /// Degrees east of Greenwich at which its longitudes begin.
@@ -211,9 +204,8 @@ impl ReferenceSystem {
             return None;
         };
         let step = STEP_M / metres.unwrap_or(1.0);
-        let projection = self.projection.as_ref()?;
         let globe = self.globe();
-        let place = |x: f64, y: f64| Some(globe.surface(projection.degrees((x, y))?));
+        let place = |x: f64, y: f64| Some(globe.surface(self.projected((x, y))?));
         let between = |from: [f64; 3], to: [f64; 3]| {
             let lead = [0, 1, 2].map(|axis| (to[axis] - from[axis]) / (2.0 * step));
             let length = lead.iter().map(|part| part * part).sum::<f64>().sqrt();
@@ -226,40 +218,11 @@ impl ReferenceSystem {
     }
 }
 
-/// Degrees in an angle of radians; one, where rounding is all that is between.
-fn degrees(radians: f64) -> f64 {
-    let degrees = radians.to_degrees();
-    let whole = |part: f64| (degrees / part - 1.0).abs() < 1e-9;
-    [1.0, 0.9]
-        .into_iter()
-        .find(|part| whole(*part))
-        .unwrap_or(degrees)
+impl Unit {
+    /// An angle of radians; of a degree or a grad, where rounding is all that is between.
+    pub(super) fn of_radians(radians: f64) -> Self {
+        let degrees = radians.to_degrees();
+        let whole = |part: &f64| (degrees / part - 1.0).abs() < 1e-9;
+        Self::Angle([1.0, 0.9].into_iter().find(whole).unwrap_or(degrees))
+    }
 }
-
-const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
-const GEOGRAPHIC: [&str; 5] = [
-    "GEOGCS",
-    "GEOGCRS",
-    "GEOGRAPHICCRS",
-    "GEODCRS",
-    "GEODETICCRS",
-];
-/// The geographic system under a projected one.
-const BASES: [&str; 6] = [
-    "GEOGCS",
-    "BASEGEOGCRS",
-    "BASEGEODCRS",
-    "GEOGCRS",
-    "GEODCRS",
-    "GEODETICCRS",
-];
-const HORIZONTAL: [&str; 8] = [
-    "PROJCS",
-    "PROJCRS",
-    "PROJECTEDCRS",
-    "GEOGCS",
-    "GEOGCRS",
-    "GEOGRAPHICCRS",
-    "GEODCRS",
-    "GEODETICCRS",
-];

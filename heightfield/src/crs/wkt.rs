@@ -1,15 +1,31 @@
-//! Reference systems as text (WKT 1 of OGC, GDAL and Esri, WKT 2), as the tree that
-//! `proj4wkt`'s parser finds.
+//! Reference systems as text (WKT 1 of OGC, GDAL and Esri, WKT 2), as a tree.
 
-use proj4wkt::parser::{Attribute, Processor, parse};
+use super::system::Unit;
 
-/// Texts that are longer than this describe no reference system.
-const LONGEST: usize = 1 << 16;
-/// Real systems nest to about 8 brackets; the parser calls itself for each.
-const DEEPEST: usize = 32;
-/// Real systems have some hundred brackets. However a text hides how deep it nests, a
-/// thread's stack is enough for the parser to call itself so often.
-const MOST: usize = 512;
+/// Longer texts describe no reference system, bytes.
+const MAX_BYTES: usize = 1 << 16;
+/// Real systems nest to about 8 brackets.
+const MAX_LEVELS: usize = 32;
+/// Real systems have some hundred nodes.
+const MAX_NODES: usize = 512;
+
+const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
+const GEOGRAPHIC: [&str; 5] = [
+    "GEOGCS",
+    "GEOGCRS",
+    "GEOGRAPHICCRS",
+    "GEODCRS",
+    "GEODETICCRS",
+];
+/// The geographic system under a projected one.
+const BASES: [&str; 6] = [
+    "GEOGCS",
+    "BASEGEOGCRS",
+    "BASEGEODCRS",
+    "GEOGCRS",
+    "GEODCRS",
+    "GEODETICCRS",
+];
 
 /// A node, as `UNIT["metre", 1]`.
 #[derive(Debug)]
@@ -20,39 +36,131 @@ pub(super) struct Node {
     children: Vec<Node>,
 }
 
-/// Puts the parser's nodes together.
-struct Tree;
+/// Reads a text from its beginning.
+struct Reader<'t> {
+    left: &'t str,
+    /// Nodes that may still be opened.
+    nodes: usize,
+}
 
-impl<'a> Processor<'a> for Tree {
-    // One of the kinds that the parser takes; there is no error here.
-    type Err = std::io::Error;
-    type Output = Node;
-
-    fn process<I>(&self, key: &'a str, _: usize, attributes: I) -> std::io::Result<Node>
-    where
-        I: Iterator<Item = Attribute<'a, Node>>,
-    {
+impl<'t> Reader<'t> {
+    /// A node that begins here, of which so many more levels may nest.
+    fn node(&mut self, levels: usize) -> Option<Node> {
+        let keyword = self.word();
+        self.nodes = self.nodes.checked_sub(1)?;
+        if keyword.is_empty() || !self.takes(&['[', '(']) {
+            return None;
+        }
         let mut node = Node {
-            keyword: key.to_ascii_uppercase(),
+            keyword: keyword.to_ascii_uppercase(),
             values: Vec::new(),
             children: Vec::new(),
         };
-        for attribute in attributes {
-            match attribute {
-                Attribute::Quoted(text) | Attribute::Number(text) | Attribute::Label(text) => {
-                    node.values.push(text.to_owned());
+        loop {
+            let before = self.left;
+            if self.takes(&['"']) {
+                node.values.push(self.quoted()?);
+            } else {
+                let word = self.word();
+                if self.left.starts_with(['[', '(']) {
+                    self.left = before;
+                    node.children.push(self.node(levels.checked_sub(1)?)?);
+                } else if !word.is_empty() {
+                    node.values.push(word.to_owned());
                 }
-                Attribute::Keyword(_, child) => node.children.push(child),
+            }
+            if self.takes(&[']', ')']) {
+                let is_empty = node.values.is_empty() && node.children.is_empty();
+                return (!is_empty).then_some(node);
+            }
+            if !self.takes(&[',']) {
+                return None;
             }
         }
-        Ok(node)
+    }
+
+    /// Takes one of some characters, behind spaces.
+    fn takes(&mut self, characters: &[char]) -> bool {
+        let left = self.left.trim_start();
+        let rest = left.strip_prefix(characters);
+        self.left = rest.unwrap_or(left);
+        rest.is_some()
+    }
+
+    /// Takes a keyword or a number.
+    fn word(&mut self) -> &'t str {
+        let left = self.left.trim_start();
+        let end = left.find(['[', ']', '(', ')', ',', '"']);
+        let (word, rest) = left.split_at(end.unwrap_or(left.len()));
+        self.left = rest;
+        word.trim_end()
+    }
+
+    /// Takes what is in quotes, of which the first was taken; two in a row are one of the text.
+    fn quoted(&mut self) -> Option<String> {
+        let mut text = String::new();
+        loop {
+            let (part, rest) = self.left.split_once('"')?;
+            text += part;
+            self.left = rest;
+            match rest.strip_prefix('"') {
+                Some(rest) => self.left = rest,
+                None => return Some(text),
+            }
+            text.push('"');
+        }
     }
 }
 
 impl Node {
     /// The tree of a text; `None` where it is no such text.
     pub(super) fn parse(text: &str) -> Option<Self> {
-        is_sensible(text).then(|| parse(text, &Tree).ok()).flatten()
+        Self::parse_both(text).map(|(first, _)| first)
+    }
+
+    /// The two trees of a text: of a vertical system that Esri's programs write behind the other,
+    /// after a comma.
+    pub(super) fn parse_both(text: &str) -> Option<(Self, Option<Self>)> {
+        let mut reader = Reader {
+            left: text,
+            nodes: MAX_NODES,
+        };
+        if text.len() > MAX_BYTES {
+            return None;
+        }
+        let first = reader.node(MAX_LEVELS)?;
+        let second = reader.takes(&[',']).then(|| reader.node(MAX_LEVELS));
+        Some((first, second.flatten()))
+    }
+
+    /// The geographic or projected system in it: itself, or a part of a compound or bound one.
+    pub(super) fn horizontal(&self) -> Option<&Self> {
+        match self.keyword.as_str() {
+            "BOUNDCRS" => self.child(&["SOURCECRS"])?.children.first()?.horizontal(),
+            "COMPD_CS" | "COMPOUNDCRS" => {
+                let mut parts = self.children.iter();
+                parts.find_map(Self::horizontal)
+            }
+            _ => (self.is_projected() || self.is(&GEOGRAPHIC)).then_some(self),
+        }
+    }
+
+    /// Returns true if it is a system of a map.
+    pub(super) fn is_projected(&self) -> bool {
+        self.is(&PROJECTED)
+    }
+
+    /// The geographic system that a projected one stands on; itself where it is one.
+    pub(super) fn base(&self) -> &Self {
+        self.child(&BASES).unwrap_or(self)
+    }
+
+    /// The unit of coordinates; `None` of an angle that is not stated.
+    pub(super) fn unit_of_places(&self) -> Option<Unit> {
+        match self.is_projected() {
+            true => Some(Unit::Length(self.unit())),
+            false => self.unit().map(Unit::of_radians),
+        }
     }
 
     /// Whether its keyword is one of some.
@@ -63,11 +171,6 @@ impl Node {
     /// The first node directly below it with one of some keywords.
     pub(super) fn child(&self, keywords: &[&str]) -> Option<&Self> {
         self.children.iter().find(|child| child.is(keywords))
-    }
-
-    /// The nodes directly below it with one of some keywords.
-    pub(super) fn all<'n>(&'n self, keywords: &'n [&str]) -> impl Iterator<Item = &'n Self> {
-        self.children.iter().filter(|child| child.is(keywords))
     }
 
     /// Its name: the first of its values.
@@ -113,23 +216,6 @@ impl Node {
     }
 }
 
-/// Returns true if the parser may read a text: it is short, has brackets, and these nest
-/// as those of real systems do. What stands in quotes is no bracket.
-fn is_sensible(text: &str) -> bool {
-    let (mut opened, mut depth, mut deepest) = (0_usize, 0_usize, 0);
-    let mut is_quoted = false;
-    for byte in text.bytes() {
-        match byte {
-            b'"' => is_quoted = !is_quoted,
-            b'[' | b'(' if !is_quoted => (opened, depth) = (opened + 1, depth + 1),
-            b']' | b')' if !is_quoted => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-        deepest = deepest.max(depth);
-    }
-    text.len() <= LONGEST && (1..=MOST).contains(&opened) && deepest <= DEEPEST
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,12 +236,12 @@ mod tests {
         let deep = format!("{}\"x\"{}", "A[".repeat(40), "]".repeat(40));
         assert!(
             Node::parse(&deep).is_none(),
-            "too deep for the stack of a thread"
+            "too deep"
         );
         // Brackets in quotes close nothing.
         let hidden = "A[\"]\",".repeat(40) + "\"x\"" + &"]".repeat(40);
         assert!(Node::parse(&hidden).is_none(), "deep");
-        let wide = format!("A[\"x\"{}]", ",B[1]".repeat(MOST));
+        let wide = format!("A[\"x\"{}]", ",B[1]".repeat(MAX_NODES));
         assert!(Node::parse(&wide).is_none(), "wide");
     }
 

@@ -1,0 +1,46 @@
+//! Reference systems that nothing here knows, through libgdal's PROJ, where there is one.
+
+use heightfield_gdal::{AxisUnit, SpatialReference};
+
+use super::datum::Datum;
+use super::shift::Shift;
+use super::system::{ReferenceSystem, Unit};
+use crate::formats::gdal::library;
+use crate::globe::Globe;
+
+/// The system with a code of EPSG's.
+pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
+    let found = library().ok()?.reference_of_epsg(code).ok()?;
+    described(&found).map(|system| system.with_code(code))
+}
+
+/// The system of a text.
+pub(super) fn of_text(text: &str) -> Option<ReferenceSystem> {
+    let found = library().ok()?.reference_of_text(text).ok()?;
+    let code = found.epsg.and_then(|code| u16::try_from(code).ok());
+    let known = code.and_then(ReferenceSystem::from_code);
+    known.or_else(|| described(&found))
+}
+
+fn described(found: &SpatialReference) -> Option<ReferenceSystem> {
+    let unit = match found.unit {
+        AxisUnit::Radians(radians) => Unit::of_radians(radians),
+        AxisUnit::Metres(metres) => Unit::Length(Some(metres)),
+    };
+    let [major, inverse] = found.ellipsoid;
+    let globe = Globe::new(major, inverse)?;
+    let own = found.to_wgs84.map(|numbers| match numbers[3..] {
+        [0.0, 0.0, 0.0, 0.0] => numbers[..3].to_vec(),
+        _ => numbers.to_vec(),
+    });
+    let own = own.and_then(|numbers| Shift::of_numbers(&globe, &numbers));
+    let base = found.base_epsg.and_then(|code| u16::try_from(code).ok());
+    let shift = own.or_else(|| base.and_then(Shift::of_code));
+    let datum = found.datum.clone().unwrap_or_default();
+    let datum = Datum::new(datum, globe, found.meridian, shift);
+    let system = ReferenceSystem::new(&found.name, unit, Some(datum));
+    Some(match &found.proj {
+        Some(projection) => system.with_projection(projection),
+        None => system,
+    })
+}

@@ -1,0 +1,69 @@
+//! Reference systems by EPSG's code: `crs-definitions` has most, the two tables beside this file
+//! the newer projected ones and the vertical ones, and libgdal, where there is one, the rest.
+
+use super::datum::Datum;
+use super::shift::Shift;
+use super::system::{ReferenceSystem, Unit};
+use super::wkt::Node;
+use super::{Vertical, by_gdal};
+use crate::globe::Globe;
+
+/// Vertical systems: code, metres in the unit, 1 where numbers grow downwards, name.
+const VERTICAL: &str = include_str!("vertical.txt");
+/// Projected systems that `crs-definitions` does not have: code, metres in the unit, code of the
+/// geographic system, its ellipsoid and datum, the projection as PROJ writes it, name.
+const PROJECTED: &str = include_str!("projected.txt");
+
+/// The system with a code; `None` where nothing here knows it, or it is not one of places.
+pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
+    let defined = || defined(code);
+    defined()
+        .or_else(|| newer(code))
+        .or_else(|| by_gdal::of_code(code))
+}
+
+/// The vertical system with a code.
+pub(crate) fn vertical(code: u16) -> Option<Vertical> {
+    let [metres, down, name] = row(VERTICAL, code)?;
+    Some(Vertical {
+        code: Some(code),
+        name: name.to_owned(),
+        metres: metres.parse().ok()?,
+        is_depth: down == "1",
+    })
+}
+
+/// The vertical system beside a horizontal one, where the code is that of both.
+pub(crate) fn vertical_beside(code: u16) -> Option<Vertical> {
+    let root = Node::parse(crs_definitions::from_code(code)?.wkt)?;
+    Vertical::beside(&root)
+}
+
+fn defined(code: u16) -> Option<ReferenceSystem> {
+    let definition = crs_definitions::from_code(code)?;
+    let root = Node::parse(definition.wkt)?;
+    let node = root.horizontal()?;
+    let base = node.base();
+    let code_of_base = base.epsg().unwrap_or(code);
+    let datum = Datum::of(base, Shift::of_code(code_of_base));
+    let system = ReferenceSystem::new(node.name()?, node.unit_of_places()?, datum);
+    Some(system.with_code(code).with_projection(definition.proj4))
+}
+
+fn newer(code: u16) -> Option<ReferenceSystem> {
+    let [metres, base, major, inverse, datum, projection, name] = row(PROJECTED, code)?;
+    let globe = Globe::new(major.parse().ok()?, inverse.parse().ok()?)?;
+    let shift = base.parse().ok().and_then(Shift::of_code);
+    let datum = Datum::new(datum.to_owned(), globe, 0.0, shift);
+    let unit = Unit::Length(metres.parse().ok());
+    let system = ReferenceSystem::new(name, unit, Some(datum));
+    Some(system.with_code(code).with_projection(projection))
+}
+
+/// What stands behind a code in a table.
+fn row<const N: usize>(table: &'static str, code: u16) -> Option<[&'static str; N]> {
+    let code = code.to_string();
+    let mut rows = table.lines().map(|line| line.split('|'));
+    let row = rows.find_map(|mut row| (row.next() == Some(&code)).then_some(row))?;
+    row.collect::<Vec<_>>().try_into().ok()
+}
