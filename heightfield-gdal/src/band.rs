@@ -221,6 +221,15 @@ impl<'d> Band<'d> {
         unsafe { from_c((self.loaded.functions.GDALGetDescription)(self.handle)) }
     }
 
+    /// An item of its metadata, of the default domain.
+    ///
+    /// # Errors
+    /// [`Error::ZeroByte`].
+    pub fn metadata(&self, name: &str) -> Result<Option<String>, Error> {
+        // SAFETY: the band's dataset is open.
+        unsafe { self.loaded.metadata(self.handle, name, None) }
+    }
+
     /// Its overviews, in the file's order.
     #[must_use]
     pub fn overviews(&self) -> Vec<Self> {

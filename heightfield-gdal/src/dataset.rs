@@ -3,7 +3,7 @@
 use std::ffi::{CStr, c_char};
 use std::fmt;
 use std::marker::PhantomData;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::ptr;
 use std::sync::Arc;
 
@@ -51,10 +51,31 @@ impl Dataset {
             let (drivers, siblings) = (ptr::null(), ptr::null());
             (functions.GDALOpenEx)(path.as_ptr(), OPEN_FLAGS, drivers, list.as_ptr(), siblings)
         };
-        match handle.is_null() {
-            true => Err(loaded.refused("no driver knows the file")),
-            false => Ok(Self { loaded, handle }),
+        if handle.is_null() {
+            return Err(loaded.refused("no driver knows the file"));
         }
+        let dataset = Self { loaded, handle };
+        match (options.is_empty(), dataset.loaded.last_words()) {
+            // GDAL warns, and opens the file without it.
+            (false, Some(words)) if words.contains("does not support open option") => {
+                Err(Error::OpenOption(words))
+            }
+            _ => Ok(dataset),
+        }
+    }
+
+    /// The files that belong to it: its own, those beside it, and those that it names.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        let functions = &self.loaded.functions;
+        // SAFETY: the dataset is open; the list is copied, and given back once.
+        let names = unsafe {
+            let list = (functions.GDALGetFileList)(self.handle);
+            let names = list_from_c(list.cast());
+            (functions.CSLDestroy)(list);
+            names
+        };
+        names.into_iter().map(PathBuf::from).collect()
     }
 
     /// The driver's short name, as `HFA`.
@@ -127,19 +148,19 @@ impl Dataset {
     /// # Errors
     /// [`Error::ZeroByte`].
     pub fn metadata(&self, name: &str, domain: Option<&str>) -> Result<Option<String>, Error> {
-        let (name, domain) = (to_c(name)?, domain.map(to_c).transpose()?);
-        let domain = domain
-            .as_ref()
-            .map_or(ptr::null(), |domain| domain.as_ptr());
-        let functions = &self.loaded.functions;
-        // SAFETY: the texts stay for the call; what is given is copied.
-        Ok(unsafe {
-            from_c((functions.GDALGetMetadataItem)(
-                self.handle,
-                name.as_ptr(),
-                domain,
-            ))
-        })
+        // SAFETY: the dataset is open.
+        unsafe { self.loaded.metadata(self.handle, name, domain) }
+    }
+
+    /// Items of its own metadata whose names end so, each with what stands before that.
+    #[must_use]
+    pub fn metadata_items(&self, end: &str) -> Vec<(String, String)> {
+        let lines = self.list(c"");
+        let items = lines.iter().filter_map(|line| line.split_once('='));
+        let items = items.filter_map(|(name, value)| {
+            Some((name.strip_suffix(end)?.to_owned(), value.to_owned()))
+        });
+        items.collect()
     }
 
     /// The rasters that a file of several holds; each is opened by its name.

@@ -33,6 +33,17 @@ pub enum Error {
     /// GDAL refuses, in its own words.
     #[error("GDAL: {0}")]
     Refused(String),
+    /// A file that must not be opened, or that names one.
+    #[error("{}: {why}", path.display())]
+    NotOpened {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The driver does not know an open option.
+    #[error("{0}")]
+    OpenOption(String),
     /// A text for GDAL has a zero byte in it.
     #[error("{0:?} has a zero byte: GDAL cannot be told that")]
     ZeroByte(String),

@@ -1,11 +1,23 @@
 //! The functions of GDAL's C interface that are called, with the types of its headers
-//! (`gdal.h`, `ogr_srs_api.h`, `cpl_error.h`, `cpl_conv.h`), unchanged from 3.4 on.
+//! (`gdal.h`, `ogr_srs_api.h`, `cpl_error.h`, `cpl_conv.h`, `cpl_minixml.h`, `cpl_vsi.h`), unchanged
+//! from 3.4 on.
 
 use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
 
 /// A `GDALDatasetH`, `GDALRasterBandH` or `GDALDriverH`; GDAL calls what they have in common a
 /// `GDALMajorObjectH`.
 pub(crate) type Handle = *mut c_void;
+
+/// A node of XML as `cpl_minixml.h` has it.
+#[repr(C)]
+pub(crate) struct XmlNode {
+    /// `CXT_Element` and so on.
+    pub(crate) kind: c_int,
+    /// An element's or attribute's name, or a text.
+    pub(crate) value: *const c_char,
+    pub(crate) next: *const XmlNode,
+    pub(crate) child: *const XmlNode,
+}
 
 macro_rules! functions {
     ($($name:ident: ($($argument:ty),*) $(-> $result:ty)?;)*) => {
@@ -36,7 +48,6 @@ macro_rules! functions {
 }
 
 functions! {
-    GDALVersionInfo: (*const c_char) -> *const c_char;
     CPLSetConfigOption: (*const c_char, *const c_char);
     CPLSetErrorHandler: (*const c_void) -> *const c_void;
     CPLQuietErrorHandler: (c_int, c_int, *const c_char);
@@ -92,4 +103,13 @@ functions! {
     OSRGetTOWGS84: (Handle, *mut c_double, c_int) -> c_int;
     VSIFree: (*mut c_void);
     GDALRasterIO: (Handle, c_int, c_int, c_int, c_int, c_int, *mut c_void, c_int, c_int, c_int, c_int, c_int) -> c_int;
+    GDALGetFileList: (Handle) -> *mut *mut c_char;
+    CSLDestroy: (*mut *mut c_char);
+    CPLParseXMLString: (*const c_char) -> *mut XmlNode;
+    CPLDestroyXMLNode: (*mut XmlNode);
+    VSIReadDirRecursive: (*const c_char) -> *mut *mut c_char;
+    VSIFOpenL: (*const c_char, *const c_char) -> Handle;
+    VSIFSeekL: (Handle, u64, c_int) -> c_int;
+    VSIFTellL: (Handle) -> u64;
+    VSIFCloseL: (Handle) -> c_int;
 }

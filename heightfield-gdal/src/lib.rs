@@ -15,22 +15,30 @@
 //!
 //! - [`Library`]: finds and loads libgdal, versions 3.4 and newer, and lists its drivers;
 //! - [`Dataset`]: a file, a folder or whatever else a driver opens, for reading;
+//! - [`Library::entries`], [`Library::length`]: what is in an archive;
 //! - [`Band`]: its samples, overviews and masks, and what they mean;
 //! - [`SpatialReference`]: a reference system by its text or code, as PROJ knows it.
 //!
 //! A dataset is used by one thread at a time, and may go from thread to thread. A call takes as long
 //! as GDAL takes: no thread that must not wait may read.
+//!
+//! Before a file is opened, it, what lies beside it and what it names as a VRT are looked at: pipes
+//! and devices are refused ([`Error::NotOpened`]). [`Settings`] lists GDAL's own settings.
 
 mod band;
+mod beforehand;
 mod dataset;
 mod error;
 mod functions;
 mod library;
+mod settings;
 mod srs;
 mod text;
+mod virtual_files;
 
 pub use band::{Band, Mask, Sample, SampleType, Window};
 pub use dataset::{Dataset, Subdataset};
 pub use error::Error;
-pub use library::{Driver, Library, Settings, Version};
+pub use library::{Driver, Library, Version};
+pub use settings::Settings;
 pub use srs::{AxisUnit, SpatialReference};

@@ -1,13 +1,15 @@
 //! Finds libgdal, loads it once, and lists its drivers.
 
-use std::ffi::OsString;
+use std::ffi::{OsString, c_char};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::beforehand;
 use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::functions::Functions;
+use crate::functions::{Functions, Handle};
+use crate::settings::Settings;
 use crate::srs::SpatialReference;
 use crate::text::{from_c, to_c};
 
@@ -16,9 +18,6 @@ const NAMED_BY: &str = "GDAL_LIBRARY";
 /// Numbers of the library's interface on Linux, newest first: 3.4 has 30, and each minor version
 /// one more.
 const SONAMES: std::ops::RangeInclusive<u32> = 30..=60;
-/// Drivers that would go out to a network by themselves, or run what a file says.
-const SKIPPED: &str = "HTTP WMS WMTS WCS EEDA EEDAI PLMOSAIC PLScenes NGW OGCAPI DAAS";
-
 /// A version of GDAL.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
@@ -54,25 +53,6 @@ impl fmt::Display for Version {
     }
 }
 
-/// How GDAL is to work. It is one for the process: the settings of the first that loads it hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
-    /// Bytes of blocks that GDAL keeps.
-    pub cache_bytes: u64,
-    /// Whether a file may name what is elsewhere, as a VRT does, and GDAL fetches it.
-    pub may_fetch: bool,
-}
-
-impl Default for Settings {
-    /// 64 MiB, and nothing is fetched.
-    fn default() -> Self {
-        Self {
-            cache_bytes: 64 << 20,
-            may_fetch: false,
-        }
-    }
-}
-
 /// A driver of GDAL's that reads rasters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Driver {
@@ -85,7 +65,7 @@ pub struct Driver {
 /// A libgdal that is loaded; it stays loaded until the process ends. Clones are the same one.
 #[derive(Clone)]
 pub struct Library {
-    loaded: Arc<Loaded>,
+    pub(crate) loaded: Arc<Loaded>,
 }
 
 /// What stays.
@@ -117,15 +97,12 @@ impl Library {
     }
 
     fn of(library: libloading::Library, path: PathBuf, settings: Settings) -> Result<Self, Error> {
-        // SAFETY: it calls itself libgdal, or the user does; it is kept beside the functions.
-        let functions = unsafe { Functions::of(&library) };
-        let functions = match functions {
-            Ok(functions) => functions,
-            Err(function) => return Err(Error::Incomplete { path, function }),
+        let incomplete = |function| Error::Incomplete {
+            path: path.clone(),
+            function,
         };
-        let number = c"VERSION_NUM".as_ptr();
-        // SAFETY: the text that GDAL gives stays, and is copied.
-        let number = unsafe { from_c((functions.GDALVersionInfo)(number)) }.unwrap_or_default();
+        // SAFETY: it calls itself libgdal, or the user does.
+        let number = unsafe { version_number(&library) }.map_err(incomplete)?;
         let version = number.parse().map(Version::of);
         let version = match version {
             Ok(version) if version >= Version::OLDEST => version,
@@ -134,6 +111,8 @@ impl Library {
                 return Err(Error::Version { path, version });
             }
         };
+        // SAFETY: as above; it is kept beside the functions.
+        let functions = unsafe { Functions::of(&library) }.map_err(incomplete)?;
         settings.apply(&functions)?;
         // SAFETY: once, before anything is opened.
         unsafe { (functions.GDALAllRegister)() };
@@ -190,8 +169,10 @@ impl Library {
     /// Opens a raster for reading, with a driver's open options, each as `NAME=VALUE`.
     ///
     /// # Errors
-    /// [`Error::Refused`] in GDAL's words, [`Error::ZeroByte`].
+    /// [`Error::Refused`] in GDAL's words, [`Error::NotOpened`], [`Error::OpenOption`],
+    /// [`Error::ZeroByte`].
     pub fn open(&self, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
+        beforehand::check(self, path)?;
         Dataset::open(self.loaded.clone(), path, options)
     }
 
@@ -211,6 +192,15 @@ impl Library {
     pub fn reference_of_epsg(&self, code: u16) -> Result<SpatialReference, Error> {
         SpatialReference::of_epsg(&self.loaded, code)
     }
+
+    /// Opens what a driver or an archive names, as `NETCDF:"ocean.nc":depth` of a file that was
+    /// opened, or `/vsizip/{tiles.zip}/a.tif`.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), but nothing is looked at before.
+    pub fn open_part(&self, name: &str, options: &[&str]) -> Result<Dataset, Error> {
+        Dataset::open(self.loaded.clone(), Path::new(name), options)
+    }
 }
 
 impl fmt::Debug for Library {
@@ -221,43 +211,59 @@ impl fmt::Debug for Library {
 
 impl Loaded {
     /// What GDAL said last on this thread.
-    pub(crate) fn refused(&self, otherwise: &str) -> Error {
+    pub(crate) fn last_words(&self) -> Option<String> {
         // SAFETY: the text stays until the next call on this thread, and is copied.
         let said = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };
-        let said = said.unwrap_or_else(|| otherwise.to_owned());
         // What a file says comes along: it must not steer a terminal.
-        let plain = said.trim().chars().map(|c| match c {
+        let plain = |c: char| match c {
             '\n' | '\t' => ' ',
             c if c.is_control() => '\u{fffd}',
             c => c,
-        });
-        Error::Refused(plain.collect())
+        };
+        Some(said?.trim().chars().map(plain).collect())
+    }
+
+    /// An error in GDAL's words.
+    pub(crate) fn refused(&self, otherwise: &str) -> Error {
+        Error::Refused(self.last_words().unwrap_or_else(|| otherwise.to_owned()))
+    }
+
+    /// An item of the metadata of a dataset or band.
+    ///
+    /// # Safety
+    /// The handle is of an open dataset.
+    pub(crate) unsafe fn metadata(
+        &self,
+        of: Handle,
+        name: &str,
+        domain: Option<&str>,
+    ) -> Result<Option<String>, Error> {
+        let (name, domain) = (to_c(name)?, domain.map(to_c).transpose()?);
+        let domain = domain
+            .as_ref()
+            .map_or(std::ptr::null(), |domain| domain.as_ptr());
+        // SAFETY: the texts stay for the call; what is given is copied.
+        Ok(unsafe {
+            from_c((self.functions.GDALGetMetadataItem)(
+                of,
+                name.as_ptr(),
+                domain,
+            ))
+        })
     }
 }
 
-impl Settings {
-    fn apply(self, functions: &Functions) -> Result<(), Error> {
-        let cache = format!("{}MB", (self.cache_bytes >> 20).max(1));
-        let mut options = vec![
-            ("GDAL_CACHEMAX", cache.as_str()),
-            ("GDAL_SKIP", SKIPPED),
-            ("GDAL_VRT_ENABLE_PYTHON", "NO"),
-            ("GDAL_MAX_DATASET_POOL_SIZE", "64"),
-            ("GDAL_NUM_THREADS", "1"),
-        ];
-        if !self.may_fetch {
-            // No address ends so.
-            options.push(("CPL_VSIL_CURL_ALLOWED_EXTENSIONS", ".nothing-is-fetched"));
-        }
-        for (name, value) in options {
-            let (name, value) = (to_c(name)?, to_c(value)?);
-            // SAFETY: both are copied by GDAL.
-            unsafe { (functions.CPLSetConfigOption)(name.as_ptr(), value.as_ptr()) };
-        }
-        let quiet = functions.CPLQuietErrorHandler as *const std::ffi::c_void;
-        // SAFETY: GDAL's own handler, which says nothing on standard error.
-        unsafe { (functions.CPLSetErrorHandler)(quiet) };
-        Ok(())
+/// GDAL's number of its version, as 3060200.
+///
+/// # Safety
+/// The library is GDAL's.
+unsafe fn version_number(library: &libloading::Library) -> Result<String, &'static str> {
+    type VersionInfo = unsafe extern "C" fn(*const c_char) -> *const c_char;
+    const NAME: &str = "GDALVersionInfo";
+    // SAFETY: the type is that of GDAL's headers; the text that GDAL gives stays, and is copied.
+    unsafe {
+        let info: libloading::Symbol<'_, VersionInfo> = library.get(NAME).map_err(|_| NAME)?;
+        Ok(from_c(info(c"VERSION_NUM".as_ptr())).unwrap_or_default())
     }
 }
 

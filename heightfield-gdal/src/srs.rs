@@ -95,7 +95,10 @@ impl<'l> Owned<'l> {
     fn read(&self, said: c_int) -> Result<SpatialReference, Error> {
         let functions = &self.loaded.functions;
         let handle = self.handle;
-        let refused = || self.loaded.refused("PROJ does not know the reference system");
+        let refused = || {
+            self.loaded
+                .refused("PROJ does not know the reference system")
+        };
         // SAFETY: here and below, the system stays, and each function reads it; null stands for a name
         // that is not wanted, and numbers have room.
         let kind = unsafe {
@@ -108,9 +111,9 @@ impl<'l> Owned<'l> {
             _ if said != FINE => return Err(refused()),
             [0, 0] => return Err(refused()),
             // SAFETY: as above.
-            [0, _] => AxisUnit::Metres(unsafe {
-                (functions.OSRGetLinearUnits)(handle, ptr::null_mut())
-            }),
+            [0, _] => {
+                AxisUnit::Metres(unsafe { (functions.OSRGetLinearUnits)(handle, ptr::null_mut()) })
+            }
             // SAFETY: as above.
             _ => AxisUnit::Radians(unsafe {
                 (functions.OSRGetAngularUnits)(handle, ptr::null_mut())
@@ -143,7 +146,13 @@ impl<'l> Owned<'l> {
 
     fn attribute(&self, name: &CStr) -> Option<String> {
         // SAFETY: the system stays; the text is copied.
-        unsafe { from_c((self.loaded.functions.OSRGetAttrValue)(self.handle, name.as_ptr(), 0)) }
+        unsafe {
+            from_c((self.loaded.functions.OSRGetAttrValue)(
+                self.handle,
+                name.as_ptr(),
+                0,
+            ))
+        }
     }
 
     /// The geographic system that it stands on.

@@ -16,11 +16,12 @@ mod transform;
 mod wkt;
 
 use super::globe::Globe;
+pub(crate) use by_gdal::of_file;
 pub(super) use datum::Datum;
 pub use datum::LonLat;
+pub(crate) use definition::{vertical, vertical_beside};
 pub use system::ReferenceSystem;
 pub(super) use system::Unit;
-pub(crate) use definition::{vertical, vertical_beside};
 use wkt::Node;
 
 /// A vertical reference system.
@@ -71,16 +72,14 @@ mod tests {
         assert_eq!(vertical(5773), Some((1.0, false)));
         assert_eq!(vertical(6357), Some((1.0, true)));
         assert_eq!(vertical(26911), None);
-        let feet = metres_per_unit(2229).expect("California zone 5");
+        let feet = ReferenceSystem::from_code(2229).map(|system| system.unit());
+        let Some(Unit::Length(Some(feet))) = feet else {
+            panic!("California zone 5: {feet:?}");
+        };
         assert!((feet - 1200.0 / 3937.0).abs() < 1e-12);
-        assert_eq!(metres_per_unit(32767), None);
         let named = ReferenceSystem::from_code(26911);
         let named = named.as_ref().map(ReferenceSystem::name);
         assert_eq!(named, Some("NAD83 / UTM zone 11N"));
-    }
-
-    fn wkt_of(code: u16) -> &'static str {
-        code_wkt(code).expect("a known code")
     }
 
     /// Against PROJ's own scale factors (`proj -S`).
@@ -134,7 +133,8 @@ mod tests {
         ];
         for (code, place, wanted) in cases {
             let by_code = ReferenceSystem::from_code(code).expect("known");
-            let (by_text, _) = ReferenceSystem::from_wkt(wkt_of(code));
+            let wkt = crs_definitions::from_code(code).expect("known").wkt;
+            let (by_text, _) = ReferenceSystem::from_wkt(wkt);
             assert_eq!(Some(&by_code), by_text.as_ref(), "the text names its code");
             let found = by_code.own_degrees(place).expect("in reach");
             let off = (found.0 - wanted.0).abs().max((found.1 - wanted.1).abs());
@@ -162,11 +162,17 @@ mod tests {
 
     #[test]
     fn a_text_without_a_code_has_its_own_numbers() {
+        if !lonlat_tests::has_libgdal() {
+            return;
+        }
         let text = r#"PROJCS["my feet",GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",1640416.6666666667],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",-117.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Foot_US",0.3048006096012192]]"#;
         let (system, vertical) = ReferenceSystem::from_wkt(text);
         let system = system.expect("a system");
         assert_eq!((system.code(), system.name()), (None, "my feet"));
-        assert_eq!(system.unit(), Unit::Length(Some(0.304_800_609_601_219_2)));
+        let Unit::Length(Some(metres)) = system.unit() else {
+            panic!("{:?}", system.unit());
+        };
+        assert!((metres - 1200.0 / 3937.0).abs() < 1e-15);
         assert_eq!(vertical, None);
         let (longitude, latitude) = system
             .to_lonlat((1_640_416.666_666_666_7, 0.0))
@@ -187,5 +193,32 @@ mod tests {
             ReferenceSystem::from_wkt("LOCAL_CS[\"here\",UNIT[\"m\",1]]").0,
             None
         );
+    }
+
+    /// Against PROJ 9.5 (pyproj), from the datum's own degrees, by `tests/data/epsg_places.py`: a place
+    /// of every twentieth projected system.
+    #[test]
+    fn codes_are_where_proj_has_them() {
+        let places = include_str!("crs/places.txt").lines().skip(1);
+        let mut unplaced = vec![];
+        for line in places {
+            let numbers: Vec<f64> = line
+                .split(' ')
+                .map(|n| n.parse().expect("a number"))
+                .collect();
+            let &[code, longitude, latitude, x, y] = &numbers[..] else {
+                panic!("{line}");
+            };
+            let system = ReferenceSystem::from_code(code as u16);
+            let Some(found) = system.and_then(|system| system.own_degrees((x, y))) else {
+                unplaced.push(code);
+                continue;
+            };
+            let east = (found.0 - longitude) * latitude.to_radians().cos();
+            let off_m = 111_000.0 * east.hypot(found.1 - latitude);
+            assert!(off_m < 1.0, "{code}: {off_m} m off");
+        }
+        // Two urban grids of Colombia, whose projection is of no other map.
+        assert_eq!(unplaced, [6255.0, 6275.0]);
     }
 }

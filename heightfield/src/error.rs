@@ -48,6 +48,17 @@ pub enum BadRaster {
     /// Neither content nor extension say what it is.
     #[error("unknown file format")]
     UnknownFormat,
+    /// GDAL reads it, and there is no libgdal.
+    #[error("{format} is read through GDAL: {why}")]
+    WantsGdal {
+        /// Name of the format.
+        format: &'static str,
+        /// Why GDAL cannot be asked.
+        why: heightfield_gdal::Error,
+    },
+    /// GDAL knows the format, and refuses the file.
+    #[error("{0}")]
+    ByGdal(heightfield_gdal::Error),
     /// Raw samples carry no header, and none was stated.
     #[error("raw samples, but nothing says how many: no size was stated")]
     RawSizeMissing,
@@ -138,7 +149,7 @@ pub enum BadRaster {
         /// The sample.
         value: f64,
     },
-    /// A folder, pattern or VRT without a file that could be read.
+    /// A folder or pattern without a file that could be read.
     #[error("no terrain: {0}")]
     NoTiles(String),
     /// Of a STAC item none or several assets could be the heights; none was chosen.
@@ -148,6 +159,14 @@ pub enum BadRaster {
         why: String,
         /// Names of the assets that it has, or of those that could be it.
         names: Vec<String>,
+    },
+    /// Items of a STAC of which GDAL makes no terrain, but of their files it does.
+    #[error("no terrain: {why}")]
+    ToBuild {
+        /// What is wrong.
+        why: String,
+        /// The files, as GDAL calls them.
+        files: Vec<String>,
     },
     /// One file of many is at fault.
     #[error("{fault}; it is in {}", without_key(file))]

@@ -25,8 +25,6 @@ pub(super) enum Parts {
     One,
     /// Numbered bands.
     Bands,
-    /// Variables with names.
-    Variables,
 }
 
 /// What an extension says about a file whose beginning says nothing.
@@ -52,37 +50,27 @@ impl Format {
                 there: format!("the file is {}", self.name),
             });
         }
-        self.parts.check_choice(self.name, options)
+        let refused = |asked: String| {
+            let has = match self.parts {
+                Parts::One => "one field of heights",
+                Parts::Bands => "bands, chosen by number",
+            };
+            let there = format!("{} has {has}", self.name);
+            Err(BadRaster::NoSuchPart { asked, there })
+        };
+        match (&options.variable, options.band) {
+            (Some(variable), _) => refused(format!("variable {variable}")),
+            (_, Some(band)) if band > 1 && self.parts == Parts::One => {
+                refused(format!("band {band}"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// What an extension says, if it is one of this format's.
     pub(super) fn claim(&self, extension: &str) -> Option<Claim> {
         let own = self.extensions.iter().find(|(own, _)| *own == extension);
         own.map(|(_, claim)| *claim)
-    }
-}
-
-impl Parts {
-    /// Checks that the user chooses by what the format of a name has.
-    ///
-    /// # Errors
-    /// [`BadRaster::NoSuchPart`].
-    pub(super) fn check_choice(self, name: &str, options: &OpenOptions) -> Result<(), BadRaster> {
-        let refused = |asked: String, there: String| Err(BadRaster::NoSuchPart { asked, there });
-        let has = match self {
-            Self::One => "one field of heights",
-            Self::Bands => "bands, chosen by number",
-            Self::Variables => "variables, chosen by name",
-        };
-        match (&options.variable, options.band) {
-            (Some(variable), _) if self != Self::Variables => {
-                refused(format!("variable {variable}"), format!("{name} has {has}"))
-            }
-            (_, Some(band)) if self == Self::Variables || (band > 1 && self == Self::One) => {
-                refused(format!("band {band}"), format!("{name} has {has}"))
-            }
-            _ => Ok(()),
-        }
     }
 }
 
@@ -112,7 +100,7 @@ mod tests {
         assert_eq!(accepting(&options), ["TIFF", "raster with a .hdr"]);
         options.band = None;
         options.variable = Some("z".into());
-        assert_eq!(accepting(&options), ["NetCDF"]);
+        assert!(accepting(&options).is_empty());
         options.variable = None;
         options.encoding = Some(Encoding::Terrarium);
         assert_eq!(accepting(&options), ["PNG"]);

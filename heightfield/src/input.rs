@@ -1,7 +1,7 @@
-//! The bytes to decode: a file, here or at a URL, or what was packed inside one.
+//! The bytes to decode: a file, here or at a URL.
 
 use std::fs::{File, FileType, Metadata};
-use std::io::{BufRead, BufReader, Cursor, Error, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Error, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -62,7 +62,8 @@ pub(super) struct FileBytes {
 pub(super) enum Data {
     /// In an open file at a path.
     File(File, PathBuf),
-    /// In memory.
+    /// In memory, for tests.
+    #[cfg(test)]
     Memory(Vec<u8>),
     /// At a server, and its URL.
     Remote(Arc<RemoteFile>, String),
@@ -98,7 +99,8 @@ impl FileBytes {
         Ok(Self::new(&name, metadata.len(), data))
     }
 
-    /// Bytes unpacked from another file.
+    /// Bytes in memory.
+    #[cfg(test)]
     pub(super) fn unpacked(name: &str, bytes: Vec<u8>) -> Self {
         let name = name.rsplit(['/', '\\']).next().unwrap_or(name);
         Self::new(name, bytes.len() as u64, Data::Memory(bytes))
@@ -156,7 +158,9 @@ impl FileBytes {
     pub(super) fn remote(&self) -> Option<Arc<RemoteFile>> {
         match &self.data {
             Data::Remote(file, _) => Some(file.clone()),
-            Data::File(..) | Data::Memory(_) => None,
+            Data::File(..) => None,
+            #[cfg(test)]
+            Data::Memory(_) => None,
         }
     }
 
@@ -169,7 +173,8 @@ impl FileBytes {
                     .map_err(BadRaster::Unreadable)?;
                 Box::new(BufReader::with_capacity(1 << 16, file))
             }
-            Data::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
+            #[cfg(test)]
+            Data::Memory(bytes) => Box::new(std::io::Cursor::new(bytes.as_slice())),
             Data::Remote(file, _) => {
                 let reader = RemoteReader::new(file.clone());
                 Box::new(BufReader::with_capacity(1 << 16, reader))
@@ -185,6 +190,7 @@ impl FileBytes {
                 Data::File(file, path.clone())
             }
             Data::Remote(file, url) => Data::Remote(file.clone(), url.clone()),
+            #[cfg(test)]
             Data::Memory(_) => return Ok(None),
         };
         let own = Self::new(&self.name, self.len, data);
@@ -199,6 +205,7 @@ impl FileBytes {
         match &self.data {
             Data::File(file, path) => Some(FileStamp::of(path, &file.metadata().ok()?)),
             Data::Remote(file, _) => file.stamp(),
+            #[cfg(test)]
             Data::Memory(_) => None,
         }
     }
@@ -208,6 +215,7 @@ impl FileBytes {
         match &self.data {
             Data::File(_, path) => FileStamp::at(path) == self.stamp(),
             Data::Remote(..) => true,
+            #[cfg(test)]
             Data::Memory(_) => false,
         }
     }
@@ -223,6 +231,7 @@ impl FileBytes {
                 let mut bytes = vec![0; room];
                 read_exact_at(file, &mut bytes, at).map(|()| bytes)
             }
+            #[cfg(test)]
             Data::Memory(bytes) => Ok(bytes[at as usize..end as usize].to_vec()),
             Data::Remote(file, _) => file.read_at(at, room),
         };
@@ -237,18 +246,6 @@ impl FileBytes {
             .read_to_end(&mut head)
             .map_err(|error| BadRaster::from_io(error, "its beginning"))?;
         Ok(head)
-    }
-
-    /// All bytes, for decoders that cannot wait for some.
-    pub(super) fn all(&self) -> Result<Vec<u8>, BadRaster> {
-        const LARGEST: u64 = 1 << 30;
-        if self.len > LARGEST {
-            return Err(BadRaster::Unsupported {
-                format: "a file at a URL",
-                feature: format!("{} MB in a format that is read as a whole", self.len >> 20),
-            });
-        }
-        self.head(self.len)
     }
 
     /// Checks that so many samples, packed with deflate at its best, fit into the

@@ -3,21 +3,18 @@
 //! | format | read by | notes |
 //! |---|---|---|
 //! | GeoTIFF, TIFF, BigTIFF, COG | `tiff-reader` | first full image; a band by number |
-//! | SRTM `.hgt`, also zipped or gzipped | here | place from the name |
-//! | DTED 0 to 2 | here | |
-//! | Esri ASCII `.asc`, GRASS ASCII | here | |
-//! | `.flt`, `.bil`, `.bip`, `.bsq`, ENVI | here | by the `.hdr` beside them |
+//! | SRTM `.hgt` | here | place from the name |
+//! | Esri ASCII `.asc` | here | |
+//! | `.flt`, `.bil`, `.bip`, `.bsq` | here | by the `.hdr` beside them |
 //! | PNG | `png` | grey, grey + alpha, depth in the alpha of a colour picture, encoded in its colours |
 //! | raw samples | here | with a stated [`RawLayout`] |
-//! | NetCDF 3 and 4 `.nc`, `.grd` | `netcdf-reader` | |
-//! | USGS ASCII `.dem` | here | |
-//! | NumPy `.npy`, `.npz` | `npyz` | |
+//! | NumPy `.npy` | here | |
 //! | all others that GDAL knows | `heightfield-gdal` | where the machine has a libgdal |
 //!
 //! Each format is one file or folder of `formats`, and one line in its table. From a
-//! path to samples: `open` unpacks (`archive`), asks the table, and lets the format
-//! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that. A folder, a pattern
-//! of names, a GDAL VRT and a STAC are many files as one terrain (`mosaic`).
+//! path to samples: `open` asks the table, and lets the format
+//! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that. A folder or a pattern
+//! of names is many files as one terrain (`mosaic`).
 //!
 //! **Places.** A format hands over its map from columns and rows to coordinates
 //! (`ground_map`) and its reference system (`crs`); what follows from these is worked out
@@ -30,7 +27,6 @@
 
 #![forbid(unsafe_code)]
 
-mod archive;
 mod beside;
 pub mod bilinear;
 mod blocks;

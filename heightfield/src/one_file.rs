@@ -1,8 +1,7 @@
-//! From one file to decoded samples: unpacks, tells the format, decodes.
+//! From one file to decoded samples: tells the format, decodes.
 
-use super::archive::{self, Zip};
-use super::format::{Claim, Format, Parts};
-use super::formats::{FORMATS, claim_of, gdal, headered, npy, raw};
+use super::format::{Claim, Format};
+use super::formats::{FORMATS, gdal, headered, raw};
 use super::guard::guarded;
 use super::input::{Data, FileBytes};
 use super::{BadRaster, Decoded, OpenOptions};
@@ -10,63 +9,24 @@ use super::{BadRaster, Decoded, OpenOptions};
 /// Enough of a file to tell every format by its beginning.
 const HEAD_BYTES: u64 = 1024;
 
-/// Decodes a file, which may be packed.
+/// Decodes a file, by GDAL where nothing here reads it.
 pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     if let Some(layout) = options.raw {
+        check_no_open_options("raw samples", options)?;
         return raw::decode(input, layout, options);
     }
     let head = input.head(HEAD_BYTES)?;
-    if archive::is_zip(&head) {
-        let mut zip = guarded("ZIP", || Zip::open(input))?;
-        if zip.is_numpy(input.extension()) {
-            Parts::Variables.check_choice("a NumPy archive", options)?;
-            return guarded("NumPy", || npy::decode_npz(&mut zip, options));
-        }
-        let unpacked = guarded("ZIP", || zip.only_entry(claim_of))?;
-        let unpacked = unpacked.in_outline(input.is_outline());
-        decode_packed("ZIP", &unpacked, options)
-    } else if archive::is_gzip(&head) {
-        let unpacked = guarded("gzip", || archive::unpack_gzip(input))?;
-        let unpacked = unpacked.in_outline(input.is_outline());
-        decode_packed("gzip", &unpacked, options)
-    } else {
-        decode_plain(input, &head, options)
-    }
-}
-
-/// Archives inside archives are not opened, so that unpacking ends.
-fn decode_packed(
-    packing: &str,
-    input: &FileBytes,
-    options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
-    let head = input.head(HEAD_BYTES)?;
-    if archive::is_zip(&head) || archive::is_gzip(&head) {
-        return Err(BadRaster::Unsupported {
-            format: "archive",
-            feature: "an archive inside an archive".into(),
-        });
-    }
-    let mut decoded = decode_plain(input, &head, options)?;
-    decoded.format = format!("{} in {packing}", decoded.format);
-    Ok(decoded)
-}
-
-fn decode_plain(
-    input: &FileBytes,
-    head: &[u8],
-    options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
     if head.is_empty() {
         return Err(BadRaster::Truncated("it is empty".into()));
     }
-    if let Some(format) = by_content(head) {
+    if let Some(format) = by_content(&head) {
         return or_by_gdal(decode_as(format, input, options), input, options);
     }
     // A header beside a file tells more than the file's extension.
-    if !headered::is_of_another_kind(head)
+    if !headered::is_of_another_kind(&head)
         && let Some(decoded) = guarded("raw", || headered::decode_by_header(input, options))?
     {
+        check_no_open_options("plain samples with a header", options)?;
         return Ok(decoded);
     }
     let format = by_extension(input.extension());
@@ -74,23 +34,27 @@ fn decode_plain(
     or_by_gdal(decoded, input, options)
 }
 
-/// What is not known or not supported here is given to GDAL, where there is a libgdal.
-pub(super) fn or_by_gdal(
+/// What is not known or not supported here is given to GDAL.
+fn or_by_gdal(
     decoded: Result<Decoded, BadRaster>,
     input: &FileBytes,
     options: &OpenOptions,
 ) -> Result<Decoded, BadRaster> {
-    use BadRaster::{HeaderMissing, UnknownFormat, Unsupported};
-    match (decoded, input.data()) {
-        (decoded, _) if !options.gdal => decoded,
-        (Err(fault @ (HeaderMissing(_) | Unsupported { .. })), Data::File(_, path)) => {
-            // Where GDAL fails, too, what is missing here is the better thing to say.
-            gdal::decode(path, options).ok().flatten().ok_or(fault)
-        }
-        (Err(fault @ UnknownFormat), Data::File(_, path)) => {
-            gdal::decode(path, options)?.ok_or(fault)
-        }
-        (decoded, _) => decoded,
+    use BadRaster::{ByGdal, HeaderMissing, UnknownFormat, Unsupported};
+    let (fault, path) = match (decoded, input.data()) {
+        (
+            Err(fault @ (HeaderMissing(_) | UnknownFormat | Unsupported { .. })),
+            Data::File(_, path),
+        ) if options.gdal => (fault, path),
+        (decoded, _) => return decoded,
+    };
+    match (gdal::decode(path, options), fault) {
+        (Ok(decoded), _) => Ok(decoded),
+        (Err(by_gdal), UnknownFormat) => Err(by_gdal),
+        (Err(by_gdal @ BadRaster::WantsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
+        // GDAL's words on what is known here, or a refusal that says what is missing.
+        (Err(UnknownFormat | ByGdal(_) | BadRaster::WantsGdal { .. }), fault) => Err(fault),
+        (Err(by_gdal), _) => Err(by_gdal),
     }
 }
 
@@ -101,7 +65,19 @@ fn decode_as(
 ) -> Result<Decoded, BadRaster> {
     tracing::debug!(format.name, name = input.name(), "recognised");
     format.check_choice(options)?;
+    check_no_open_options(format.name, options)?;
     guarded(format.name, || (format.decode)(input, options))
+}
+
+/// Checks that no open option is given for a file that is read without GDAL.
+fn check_no_open_options(format: &str, options: &OpenOptions) -> Result<(), BadRaster> {
+    match &options.open_options[..] {
+        [] => Ok(()),
+        [first, ..] => Err(BadRaster::NoSuchPart {
+            asked: format!("open option {first}"),
+            there: format!("the file is {format}, which is read without GDAL"),
+        }),
+    }
 }
 
 fn by_content(head: &[u8]) -> Option<&'static Format> {

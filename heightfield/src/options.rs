@@ -16,12 +16,11 @@ pub struct OpenOptions {
     pub no_data: Option<f64>,
     /// Which band holds the height, the first being 1. Without it: the first.
     pub band: Option<u32>,
-    /// Which variable of a NetCDF file or array of an `.npz` holds the height. Without
-    /// it: the one that is named as heights are, or the only one.
+    /// Which raster of several holds the height: a variable of a NetCDF file, a file of an archive,
+    /// an asset of a STAC's items. Without it: the one that is named as heights are, or the only one.
     pub variable: Option<String>,
-    /// Which asset of a STAC's items holds the heights. Without it: the one whose role or
-    /// name says so, or the only raster.
-    pub asset: Option<String>,
+    /// Options of the GDAL driver that opens the file, each as `NAME=VALUE`.
+    pub open_options: Vec<String>,
     /// Side of a cell on the ground, metres, of a file that does not state it.
     pub ground_cell_m: Option<f64>,
     /// Metres in a unit of the heights; replaces what the file says.
@@ -56,7 +55,7 @@ impl Default for OpenOptions {
             no_data: None,
             band: None,
             variable: None,
-            asset: None,
+            open_options: Vec::new(),
             ground_cell_m: None,
             vertical_unit_m: None,
             encoding: None,

@@ -20,8 +20,6 @@ pub(super) struct GroundUnit {
 impl GroundUnit {
     /// Degrees, which the file or its format states.
     pub(super) const DEGREE: Self = Self::angle(1.0);
-    /// Metres, which the file or its format states.
-    pub(super) const METRE: Self = Self::length(1.0, Certainty::Stated);
 
     /// A stated angle of so many degrees.
     pub(super) const fn angle(degrees: f64) -> Self {

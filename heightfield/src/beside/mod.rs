@@ -1,6 +1,6 @@
 //! What lies beside a file under the same name: a header (`.hdr`), a reference system
 //! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`). A file on disk or at a URL has
-//! neighbours; what comes out of an archive has none.
+//! neighbours.
 
 mod prj;
 mod world_file;

@@ -43,7 +43,7 @@ use cache::Key;
 use coarse::{Coarse, Found};
 pub(super) use kept::not_yet;
 use kept::{Kept, count_not_yet};
-pub(super) use reader::{Block, BlockImage, BlockReader, Part, USUAL_BLOCK, usual_block};
+pub(super) use reader::{Block, BlockImage, BlockReader, Part, usual_block};
 pub(super) use survey::{Looks, Survey, stored_parts};
 
 /// Blocks of a larger size than this are not read one by one, bytes.

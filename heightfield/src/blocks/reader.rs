@@ -5,7 +5,7 @@ use super::super::samples::{HoleMask, SampleType, SampleValue, Samples, with_sam
 use super::survey::Looks;
 
 /// Side of a usual block: where blocks of a file are smaller, several are read at once.
-pub(crate) const USUAL_BLOCK: u32 = 256;
+const USUAL_BLOCK: u32 = 256;
 
 /// Reads parts of a file's images.
 pub(crate) trait BlockReader: Send + Sync {

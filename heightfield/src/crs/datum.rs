@@ -52,7 +52,7 @@ pub enum LonLat<'r> {
 
 impl Datum {
     /// Of a globe, with longitudes that begin at a meridian in degrees.
-    pub(crate) fn new(name: String, globe: Globe, meridian: f64, shift: Option<Shift>) -> Self {
+    pub(super) fn new(name: String, globe: Globe, meridian: f64, shift: Option<Shift>) -> Self {
         let like_wgs84 = || globe.is_wgs84().then_some(Shift::None);
         Self {
             name,
@@ -60,6 +60,11 @@ impl Datum {
             meridian,
             shift: shift.or_else(like_wgs84).filter(|_| globe.is_earth()),
         }
+    }
+
+    /// Of a globe whose way to WGS 84 is not known, with longitudes from its own zero.
+    pub(crate) fn unplaced(name: &str, globe: Globe) -> Self {
+        Self::new(name.to_owned(), globe, 0.0, None)
     }
 
     /// Of a node of a geographic system, and its shift.

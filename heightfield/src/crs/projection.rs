@@ -10,15 +10,15 @@ use super::transform::Transform;
 const SAME_RADIANS: f64 = 1e-5;
 
 /// A projection and the globe that it projects, both as PROJ writes them. Its longitudes count
-/// from Greenwich.
+/// from the prime meridian of its datum.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Projection(Transform);
 
 impl Projection {
-    /// Of a text as PROJ writes it. What it says of datums is left out: shifts are made
-    /// between longitudes and latitudes. `None` of one that `proj4rs` does not know.
+    /// Of a text as PROJ writes it. What it says of datums is left out: shifts, and turns to
+    /// Greenwich, are made between longitudes and latitudes. `None` of one that `proj4rs` does not know.
     pub(super) fn new(text: &str, globe: Globe) -> Option<Self> {
-        const DATUM: [&str; 3] = ["+datum=", "+towgs84=", "+nadgrids="];
+        const DATUM: [&str; 4] = ["+datum=", "+towgs84=", "+nadgrids=", "+pm="];
         const SIZE: [&str; 4] = ["+a=", "+R=", "+ellps=", "+b="];
         let is_of = |word: &str, keys: &[&str]| keys.iter().any(|key| word.starts_with(key));
         let words = text.split_whitespace();
@@ -45,7 +45,9 @@ impl Projection {
     /// The place on the map of a longitude and latitude in degrees; `None` where the map
     /// does not have it.
     pub(super) fn of_degrees(&self, degrees: (f64, f64)) -> Option<(f64, f64)> {
-        let place = self.0.back((degrees.0.to_radians(), degrees.1.to_radians()))?;
+        let place = self
+            .0
+            .back((degrees.0.to_radians(), degrees.1.to_radians()))?;
         // Far outside of what a projection is for its formulas give numbers all the same.
         are_same(degrees, self.degrees(place)?).then_some(place)
     }

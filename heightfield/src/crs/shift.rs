@@ -82,9 +82,10 @@ impl Shift {
         let globe = globe.collect::<Vec<_>>().join(" ");
         match Self::of_numbers(&Globe::EARTH, &numbers)? {
             Self::None => Some(Self::None),
-            Self::Parameters { within_m, .. } => {
-                Self::by(&format!("{globe} +towgs84={}", value("+towgs84=")?), within_m)
-            }
+            Self::Parameters { within_m, .. } => Self::by(
+                &format!("{globe} +towgs84={}", value("+towgs84=")?),
+                within_m,
+            ),
         }
     }
 
@@ -94,7 +95,10 @@ impl Shift {
             "WGS84" | "NAD83" => Some(Self::None),
             "NAD27" => {
                 let [x, y, z] = NAD27;
-                Self::by(&format!("+ellps=clrk66 +towgs84={x},{y},{z}"), THREE_WITHIN_M)
+                Self::by(
+                    &format!("+ellps=clrk66 +towgs84={x},{y},{z}"),
+                    THREE_WITHIN_M,
+                )
             }
             "carthage" | "GGRS87" => Self::by(&format!("+datum={datum}"), THREE_WITHIN_M),
             datum => Self::by(&format!("+datum={datum}"), SEVEN_WITHIN_M),

@@ -91,6 +91,12 @@ impl ReferenceSystem {
         self
     }
 
+    /// The same system, whose projection is not known.
+    pub(super) fn without_projection(mut self) -> Self {
+        self.projection = None;
+        self
+    }
+
     /// The same system, whose coordinates are in units of so many metres, whatever its own unit is.
     pub(crate) fn in_units_of(mut self, metres: f64) -> Self {
         if let Unit::Length(own) = self.unit {
@@ -179,16 +185,18 @@ impl ReferenceSystem {
         match self.unit {
             Unit::Angle(degrees) => Some(((own.0 - self.meridian()) / degrees, own.1 / degrees)),
             Unit::Length(_) => {
+                let own = (own.0 - self.meridian(), own.1);
                 let (x, y) = self.projection.as_ref()?.of_degrees(own)?;
                 Some((x / self.scale, y / self.scale))
             }
         }
     }
 
-    /// Degrees of the system's own datum of a place on its map.
+    /// Degrees of the system's own datum, from Greenwich, of a place on its map.
     fn projected(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         let place = (x * self.scale, y * self.scale);
-        self.projection.as_ref()?.degrees(place)
+        let (longitude, latitude) = self.projection.as_ref()?.degrees(place)?;
+        Some((longitude + self.meridian(), latitude))
     }
 
     /// Degrees east of Greenwich at which its longitudes begin.

@@ -192,13 +192,6 @@ impl Node {
         number.is_finite().then_some(number)
     }
 
-    /// Those of its values that are numbers.
-    pub(super) fn numbers(&self) -> Vec<f64> {
-        (self.values.iter())
-            .filter_map(|value| value.parse().ok())
-            .collect()
-    }
-
     /// Size of its unit in metres or radians, by a node of its own or of an axis.
     pub(super) fn unit(&self) -> Option<f64> {
         const UNITS: [&str; 4] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT", "SCALEUNIT"];
@@ -234,10 +227,7 @@ mod tests {
         }
         assert!(Node::parse(&format!("{}\"x\"{}", "A[".repeat(20), "]".repeat(20))).is_some());
         let deep = format!("{}\"x\"{}", "A[".repeat(40), "]".repeat(40));
-        assert!(
-            Node::parse(&deep).is_none(),
-            "too deep"
-        );
+        assert!(Node::parse(&deep).is_none(), "too deep");
         // Brackets in quotes close nothing.
         let hidden = "A[\"]\",".repeat(40) + "\"x\"" + &"]".repeat(40);
         assert!(Node::parse(&hidden).is_none(), "deep");

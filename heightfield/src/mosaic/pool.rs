@@ -12,7 +12,7 @@ use lru::LruCache;
 use super::super::guard::guarded;
 use super::super::storage::Storage;
 use super::super::{BadRaster, Decoded, OpenOptions};
-use super::source::{Opened, Source, Values};
+use super::source::{Opened, Source};
 use super::tile_file;
 use crate::remote::{is_url, without_key};
 
@@ -93,8 +93,7 @@ impl Pool {
     }
 
     fn opened(&mut self, number: usize, source: &Source) -> Result<Opened, BadRaster> {
-        let mut options = self.options.clone();
-        options.band = source.band.or(options.band);
+        let options = self.options.clone();
         let stamps = source.stamps();
         let (path, by) = (source.path.clone(), options.clone());
         let outline = in_time(source, OPEN_WITHIN, move || tile_file::outline(&path, &by))?;
@@ -104,22 +103,20 @@ impl Pool {
         let decode = move || guarded("terrain", || tile_file::decode(&path, &by));
         let mut decoded = in_time(source, OPEN_WITHIN, decode)?;
         let found = (decoded.columns, decoded.rows);
-        if let Some((columns, rows)) = source.size.filter(|size| *size != found) {
+        let (columns, rows) = (source.covers.columns, source.covers.rows);
+        if found != (columns, rows) {
             return Err(BadRaster::damaged(format!(
                 "it had {columns} × {rows} samples and now has {} × {}",
                 found.0, found.1
             )));
         }
-        decoded.settle_no_data(match source.values {
-            Values::Heights => options.no_data,
-            Values::Stored { .. } => None,
-        });
+        decoded.settle_no_data(options.no_data);
         if let Storage::Blocks(blocks) = &decoded.storage {
             blocks.set_path(&source.path);
             let unread = self.unread.get(&number).copied().unwrap_or_default();
             blocks.set_share(SHARE_BYTES, unread);
         }
-        Ok(Opened::new(decoded, source.values, stamps))
+        Ok(Opened::new(decoded, stamps))
     }
 
     /// Closes files until those that stay, and `more` bytes, are within bounds. The last one
@@ -201,30 +198,15 @@ pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, BadRaster> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SampleType;
     use crate::blocks::Part;
-    use crate::mosaic::source::Axis;
 
     #[test]
     fn file_that_never_opens_is_given_up() {
-        let axis = Axis {
-            start: 0.0,
-            step: 1.0,
-        };
         let source = Source {
             path: "never.tif".into(),
             bytes: 1,
-            band: None,
             covers: Part::whole(2, 2),
-            axes: [axis; 2],
-            size: None,
-            values: Values::Stored {
-                no_data: None,
-                covers: false,
-                scale: 1.0,
-                offset: 0.0,
-                sample: SampleType::F32,
-            },
+            turned: [false; 2],
         };
         let (ends, never) = sync_channel::<()>(0);
         let open = move || {

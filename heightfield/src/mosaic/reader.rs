@@ -124,16 +124,11 @@ impl<'p> Filling<'p> {
 
     /// Fills places from a file.
     fn fill(&mut self, level: u8, source: &Source, opened: &Opened, places: &[[u32; 3]]) {
-        let [columns, rows] = opened.size();
         for &[column, row, index] in places {
             // Both fit: they are inside the terrain.
-            let [column, row] = [column, row].map(|index| index << level);
-            let column = source.axes[0].of(column, columns);
-            let row = source.axes[1].of(row, rows);
-            let value = column.zip(row);
-            let value = value.and_then(|(column, row)| opened.value(level, column, row));
-            if let Some(value) = value {
-                self.values[index as usize] = value;
+            let place = source.place([column, row].map(|index| index << level));
+            if let Some(height) = opened.height(level, place) {
+                self.values[index as usize] = height;
                 self.done.insert(index as usize);
                 self.left -= 1;
             }

@@ -7,7 +7,7 @@ use super::super::samples::SampleType;
 use super::super::{OpenOptions, Raster};
 use super::pool::Pool;
 use super::reader::Mosaic;
-use super::source::{Axis, Source, Values};
+use super::source::Source;
 
 /// Samples of a tile each way.
 const SIDE: u32 = 40;
@@ -41,25 +41,13 @@ fn source(folder: &Path, name: &str, column: u32, row: u32) -> Source {
     Source {
         path: folder.join(name),
         bytes: 0,
-        band: None,
         covers: Part {
             column,
             row,
             columns: SIDE,
             rows: SIDE,
         },
-        axes: [
-            Axis {
-                start: -f64::from(column),
-                step: 1.0,
-            },
-            Axis {
-                start: f64::from(row + SIDE),
-                step: -1.0,
-            },
-        ],
-        size: Some((SIDE, SIDE)),
-        values: Values::Heights,
+        turned: [false, true],
     }
 }
 

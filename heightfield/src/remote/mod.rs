@@ -52,7 +52,7 @@ pub use elsewhere::Elsewhere;
 #[cfg(feature = "remote")]
 pub(crate) use file::RemoteFile;
 pub(crate) use reader::RemoteReader;
-pub(crate) use url::{beside, escaped, neighbour};
+pub(crate) use url::neighbour;
 pub use url::{file_name, is_url, without_key};
 
 /// A failure of the line or the server: another try may go well.

@@ -51,39 +51,6 @@ pub(crate) fn neighbour(url: &str, extension: &str) -> [String; 2] {
     ]
 }
 
-/// The URL of a file of a name in the folder of another.
-pub(crate) fn beside(url: &str, name: &str) -> String {
-    let (path, rest) = split(url);
-    let mut folder = &path[..path.len() - file_name(url).len()];
-    let mut steps = vec![];
-    for step in name.split('/') {
-        match step {
-            "" | "." => {}
-            ".." if steps.pop().is_none() => folder = above(folder),
-            ".." => {}
-            step => steps.push(step),
-        }
-    }
-    format!("{folder}{}{rest}", escaped(&steps.join("/")))
-}
-
-/// A name with escapes for what would mean something in a URL.
-pub(crate) fn escaped(name: &str) -> String {
-    let name = name.replace('%', "%25").replace('#', "%23");
-    name.replace('?', "%3F")
-}
-
-/// The folder in which a folder lies; the host's own where there is none.
-fn above(folder: &str) -> &str {
-    let inner = folder.strip_suffix('/').unwrap_or(folder);
-    let above = inner.rfind('/').map_or(folder, |at| &folder[..=at]);
-    if above.ends_with("://") {
-        folder
-    } else {
-        above
-    }
-}
-
 /// Up to the path's end, and what follows.
 fn split(url: &str) -> (&str, &str) {
     url.split_at(url.find(['?', '#']).unwrap_or(url.len()))
@@ -131,14 +98,6 @@ mod tests {
                 "https://h/d.e/a.b.tif.prj?sig=x/y.z"
             ]
         );
-        for (name, there) in [
-            ("c.tif", "https://h/a/b/c.tif?k"),
-            ("./d/../c.tif", "https://h/a/b/c.tif?k"),
-            ("../c#1.tif", "https://h/a/c%231.tif?k"),
-            ("../../../../c.tif", "https://h/c.tif?k"),
-        ] {
-            assert_eq!(beside("https://h/a/b/x.vrt?k", name), there);
-        }
         assert_eq!(
             neighbour("s3://b.c/dem", "hdr"),
             ["s3://b.c/dem.hdr", "s3://b.c/dem.hdr"]

@@ -4,6 +4,7 @@
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use etcetera::{AppStrategy, AppStrategyArgs, choose_app_strategy};
 use hapterra_core::phantom::{Calibration, RECORD_BYTES};
@@ -11,6 +12,7 @@ use hapterra_core::wire::hello::DeviceHello;
 use serde::{Deserialize, Serialize};
 
 use super::step::Step;
+use super::utc::utc;
 use crate::output::{Output, OutputError};
 
 /// Which board, and which record in it.
@@ -211,9 +213,7 @@ impl Log {
         self.entries.push(Entry {
             step,
             passed,
-            at: jiff::Timestamp::now()
-                .strftime("%Y-%m-%dT%H:%M:%SZ")
-                .to_string(),
+            at: utc(SystemTime::now()),
             result,
         });
     }

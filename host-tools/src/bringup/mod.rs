@@ -20,6 +20,7 @@ mod halt;
 mod log;
 mod step;
 mod steps;
+mod utc;
 mod virtual_bench;
 mod virtual_user;
 mod walk;

@@ -13,7 +13,7 @@ use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::{BadRaster, CellSize, SampleType, beside};
 use header::{Header, looks_like_header};
-pub(super) use tokens::Tokens;
+use tokens::Tokens;
 
 /// Esri ASCII grids.
 pub(super) const FORMAT: Format = Format {

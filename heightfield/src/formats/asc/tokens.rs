@@ -8,7 +8,7 @@ use crate::BadRaster;
 const LONGEST_WORD: usize = 128;
 
 /// Hands out one word at a time.
-pub(in crate::formats) struct Tokens<R> {
+pub(super) struct Tokens<R> {
     bytes: Bytes<BufReader<R>>,
     word: Vec<u8>,
     /// The current word is handed out once more.
@@ -16,7 +16,7 @@ pub(in crate::formats) struct Tokens<R> {
 }
 
 impl<R: Read> Tokens<R> {
-    pub(in crate::formats) fn new(reader: R) -> Self {
+    pub(super) fn new(reader: R) -> Self {
         Self {
             // Its own buffer makes a byte cheap, whatever the reader is.
             bytes: BufReader::with_capacity(1 << 16, reader).bytes(),
@@ -26,7 +26,7 @@ impl<R: Read> Tokens<R> {
     }
 
     /// The next word, or `None` at the end of the file.
-    pub(in crate::formats) fn next(&mut self) -> Result<Option<&str>, BadRaster> {
+    pub(super) fn next(&mut self) -> Result<Option<&str>, BadRaster> {
         if !std::mem::take(&mut self.again) {
             self.read_word()?;
         }
@@ -40,7 +40,7 @@ impl<R: Read> Tokens<R> {
     }
 
     /// The word handed out last is handed out again.
-    pub(in crate::formats) fn put_back(&mut self) {
+    pub(super) fn put_back(&mut self) {
         self.again = true;
     }
 

@@ -1,7 +1,6 @@
 //! Plain samples whose header is a text of its own beside them: Esri's `.flt`, `.bil`,
-//! `.bip` and `.bsq`, and ENVI's, whose data may have any extension.
+//! `.bip` and `.bsq`.
 
-mod envi;
 mod esri;
 mod layout;
 
@@ -68,14 +67,10 @@ pub(crate) fn decode_by_header(
         return Ok(None);
     };
     let band = options.band.unwrap_or(1);
-    let header = if envi::is_header(&text) {
-        envi::read(&text, band)
-    } else if esri::is_header(&text) {
-        esri::read(&text, input.extension())
-    } else {
+    if !esri::is_header(&text) {
         return Ok(None);
-    };
-    let header = header.map_err(|fault| in_header(fault, &name))?;
+    }
+    let header = esri::read(&text, input.extension()).map_err(|fault| in_header(fault, &name))?;
     FORMAT.check_choice(options)?;
     header.layout.check(band, input.len(), &name)?;
     let storage = header.layout.plain(band)?.storage(input, options)?;

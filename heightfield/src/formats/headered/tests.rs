@@ -61,7 +61,7 @@ fn a_float_grid_with_its_place_and_holes() {
     let stored = [1.5, -2.0, 3.0, -9999.0, 5.25, 6.0];
     for (big, header) in [(false, FLT.to_owned()), (true, FLT.replace("LSB", "MSB"))] {
         let pair = Pair::new("dem.flt", &floats(stored, big), "dem.hdr", &header);
-        let wkt = epsg_utils::epsg_to_wkt2(32611).expect("known");
+        let wkt = r#"PROJCS["WGS 84 / UTM zone 11N",AUTHORITY["EPSG","32611"]]"#;
         fs::write(pair.path("dem.prj"), wkt).expect("written");
         let raster = pair.open(None).expect("a grid");
         let found = heights(&raster);

@@ -1,5 +1,7 @@
 //! Where the image lies: reference system, map to the ground, units.
 
+use std::path::Path;
+
 use geotiff_core::geokeys::{
     GEODETIC_CRS_TYPE, GEOG_ANGULAR_UNITS, GEOG_CITATION, GT_CITATION, GT_MODEL_TYPE,
     GT_RASTER_TYPE, GeoKeyDirectory, PROJ_CITATION, PROJ_LINEAR_UNITS, PROJECTED_CRS_TYPE,
@@ -9,7 +11,7 @@ use tiff_reader::Ifd;
 
 use super::user_defined;
 use crate::Certainty;
-use crate::crs::{self, ReferenceSystem};
+use crate::crs::{self, ReferenceSystem, Unit};
 use crate::decoded::Decoded;
 use crate::ground_map::GroundMap;
 use crate::placed::GroundUnit;
@@ -23,12 +25,18 @@ const GEO_ASCII_PARAMS: u16 = 34737;
 
 /// Sets reference system, place, cell size, units and orientation as far as the file
 /// states them. `stated` are the metres in a vertical unit by the file's own notes.
-pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>) {
+/// `file` is where libgdal may read what keys spell out.
+pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>, file: Option<&Path>) {
     let keys = GeoKeys::read(image);
-    let system = keys.code(VERTICAL_CS_TYPE).and_then(crs::vertical);
-    let stated = stated.or_else(|| keys.code(VERTICAL_UNITS).and_then(metres_of_code));
+    let of_code = |key| keys.code(key);
+    let beside = || of_code(PROJECTED_CRS_TYPE).and_then(crs::vertical_beside);
+    let system = of_code(VERTICAL_CS_TYPE)
+        .and_then(crs::vertical)
+        .or_else(beside);
+    let stated = stated.or_else(|| of_code(VERTICAL_UNITS).and_then(metres_of_code));
     decoded.set_vertical(system, stated);
-    decoded.system = keys.system();
+    decoded.system = keys.system(file);
+    decoded.remarks.extend(keys.other_unit());
     if let Some(map) = ground_map(image, &keys) {
         decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
         decoded.lay_out(map, keys.unit());
@@ -101,12 +109,6 @@ impl GeoKeys {
         self.0.as_ref()?.get_double(key)?.first().copied()
     }
 
-    /// All numbers of a key.
-    pub(super) fn numbers(&self, key: u16) -> &[f64] {
-        let numbers = self.0.as_ref().and_then(|keys| keys.get_double(key));
-        numbers.unwrap_or_default()
-    }
-
     /// The first line of a text.
     pub(super) fn text(&self, key: u16) -> Option<&str> {
         let text = self.whole_text(key)?.split('|').next()?.trim();
@@ -126,14 +128,17 @@ impl GeoKeys {
     }
 
     /// The horizontal reference system: by its code, or by what it is called.
-    fn system(&self) -> Option<ReferenceSystem> {
+    fn system(&self, file: Option<&Path>) -> Option<ReferenceSystem> {
         let code = match self.is_projected()? {
             true => self.known(PROJECTED_CRS_TYPE),
             false => self.known(GEODETIC_CRS_TYPE),
         };
         let known = code.and_then(ReferenceSystem::from_code);
         if let Some(system) = known.or_else(|| self.system_in_text()) {
-            return Some(system);
+            return Some(match self.stated_metres() {
+                Some(metres) => system.in_units_of(metres),
+                None => system,
+            });
         }
         let is_projected = self.is_projected()?;
         let own_name = self.text(match is_projected {
@@ -142,10 +147,33 @@ impl GeoKeys {
         });
         let unknown = code.map(|code| format!("EPSG:{code}, not known here"));
         let name = unknown.as_deref().or(own_name).or(self.text(GT_CITATION));
-        Some(match is_projected {
-            true => user_defined::projected(self, name, self.known(GEODETIC_CRS_TYPE)),
-            false => user_defined::geographic(self, name),
+        Some(user_defined::system(self, is_projected, name, file))
+    }
+
+    /// What is said where the code of the system has another unit than the keys: these count, as for
+    /// GDAL.
+    fn other_unit(&self) -> Option<String> {
+        let code = self.known(PROJECTED_CRS_TYPE)?;
+        let own = self.metres_of_system()?;
+        let stated = self
+            .stated_metres()
+            .filter(|_| self.is_projected() == Some(true))?;
+        ((stated / own - 1.0).abs() > 1e-9).then(|| {
+            format!(
+                "EPSG:{code} counts in units of {own} m, the file states units of {stated} m: its coordinates are taken to be in those that it states"
+            )
         })
+    }
+
+    /// Metres in the unit of the projected system with the file's code.
+    fn metres_of_system(&self) -> Option<f64> {
+        let system = self
+            .known(PROJECTED_CRS_TYPE)
+            .and_then(ReferenceSystem::from_code)?;
+        match system.unit() {
+            Unit::Length(metres) => metres,
+            Unit::Angle(_) => None,
+        }
     }
 
     /// Projections that no keys are made for are written as Esri's text into the citation.
@@ -157,7 +185,7 @@ impl GeoKeys {
     }
 
     /// A code that is one of EPSG's.
-    fn known(&self, key: u16) -> Option<u16> {
+    pub(super) fn known(&self, key: u16) -> Option<u16> {
         const USER_DEFINED: u16 = 32767;
         self.code(key).filter(|code| *code != USER_DEFINED)
     }
@@ -187,14 +215,11 @@ impl GeoKeys {
         if !self.is_projected()? {
             return Some(GroundUnit::angle(self.degrees()));
         }
-        let code = self.known(PROJECTED_CRS_TYPE);
-        Some(
-            match (self.stated_metres(), code.and_then(crs::metres_per_unit)) {
-                (Some(metres), _) => GroundUnit::length(metres, Certainty::Stated),
-                (None, Some(metres)) => GroundUnit::length(metres, Certainty::FromCode),
-                (None, None) => GroundUnit::length(1.0, Certainty::Assumed),
-            },
-        )
+        Some(match (self.stated_metres(), self.metres_of_system()) {
+            (Some(metres), _) => GroundUnit::length(metres, Certainty::Stated),
+            (None, Some(metres)) => GroundUnit::length(metres, Certainty::FromCode),
+            (None, None) => GroundUnit::length(1.0, Certainty::Assumed),
+        })
     }
 
     /// Degrees in the angular unit.
@@ -209,18 +234,59 @@ impl GeoKeys {
     }
 }
 
+/// EPSG's units of length: code, metres.
+const LENGTHS: [(u16, f64); 47] = [
+    (1025, 0.001),
+    (1033, 0.01),
+    (9001, 1.0),
+    (9002, 0.304_8),
+    (9003, 1200.0 / 3937.0),
+    (9005, 0.304_797_265_4),
+    (9014, 1.828_8),
+    (9030, 1_852.0),
+    (9031, 1.000_013_596_5),
+    (9033, 20.116_840_233_680_5),
+    (9034, 0.201_168_402_336_805),
+    (9035, 1_609.347_218_694_44),
+    (9036, 1_000.0),
+    (9037, 0.914_391_796_2),
+    (9038, 20.116_619_516_4),
+    (9039, 0.201_166_195_164),
+    (9040, 0.914_398_414_616_029),
+    (9041, 0.304_799_471_538_676),
+    (9042, 20.116_765_121_552_6),
+    (9043, 0.201_167_651_215_526),
+    (9050, 0.914_399_2),
+    (9051, 0.304_799_733_333_333),
+    (9052, 20.116_782_4),
+    (9053, 0.201_167_824),
+    (9060, 0.914_399_204_289_812),
+    (9061, 0.304_799_734_763_271),
+    (9062, 20.116_782_494_375_9),
+    (9063, 0.201_167_824_943_759),
+    (9070, 0.304_800_833_333_333),
+    (9080, 0.304_799_510_248_147),
+    (9081, 0.304_798_41),
+    (9082, 0.304_799_6),
+    (9083, 0.304_799_5),
+    (9084, 0.914_398_530_744_441),
+    (9085, 0.914_395_23),
+    (9086, 0.914_398_8),
+    (9087, 0.914_398_5),
+    (9093, 1_609.344),
+    (9094, 0.304_799_710_181_509),
+    (9095, 0.304_800_749_1),
+    (9096, 0.914_4),
+    (9097, 20.116_8),
+    (9098, 0.201_168),
+    (9099, 0.914_398),
+    (9300, 0.304_799_333_333_333),
+    (9301, 20.116_756),
+    (9302, 0.201_167_56),
+];
+
 /// Metres in a unit of length by its EPSG code.
 fn metres_of_code(code: u16) -> Option<f64> {
-    Some(match code {
-        9001 => 1.0,
-        9002 => 0.3048,
-        9003 => 1200.0 / 3937.0,
-        9005 => 0.304_797_265_4,
-        9014 => 1.8288,
-        9030 => 1852.0,
-        9036 => 1000.0,
-        1025 => 0.001,
-        1033 => 0.01,
-        _ => return None,
-    })
+    let found = LENGTHS.iter().find(|(known, _)| *known == code);
+    found.map(|(_, metres)| *metres)
 }

@@ -22,7 +22,7 @@ mod user_defined;
 use std::iter::once;
 use std::sync::Arc;
 
-use tiff_reader::source::{BytesSource, FileSource, SharedSource};
+use tiff_reader::source::{FileSource, SharedSource};
 use tiff_reader::{ParseBudgets, TiffError, TiffFile};
 
 use crate::beside::{find_appended, lay_out_by_world_file};
@@ -100,7 +100,12 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     decoded.no_data = metadata.no_data;
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
-    georef::apply(full.ifd(), &mut decoded, metadata.metres_per_vertical_unit);
+    let file = match input.data() {
+        Data::File(_, path) if options.gdal => Some(path.as_path()),
+        _ => None,
+    };
+    let metres = metadata.metres_per_vertical_unit;
+    georef::apply(full.ifd(), &mut decoded, metres, file);
     if decoded.place.is_none() {
         lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
     }
@@ -210,7 +215,8 @@ fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
     };
     let source: SharedSource = match input.data() {
         Data::File(_, path) => Arc::new(FileSource::open(path).map_err(fault)?),
-        Data::Memory(bytes) => Arc::new(BytesSource::new(bytes.clone())),
+        #[cfg(test)]
+        Data::Memory(bytes) => Arc::new(tiff_reader::source::BytesSource::new(bytes.clone())),
         Data::Remote(file, _) => Arc::new(RemoteSource(file.clone())),
     };
     TiffFile::from_source_with_options(source, options).map_err(|error| match &error {

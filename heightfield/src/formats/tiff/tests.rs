@@ -476,7 +476,7 @@ fn a_world_file_places_what_has_no_place_of_its_own() {
     let open = || Raster::open(&path, &crate::OpenOptions::default());
     assert!(open().expect("opens").bounds().is_none());
     std::fs::write(folder.path().join("plain.TFW"), "30\n0\n0\n-30\n515\n985\n").expect("written");
-    let wkt = epsg_utils::epsg_to_wkt2(32611).expect("known");
+    let wkt = r#"PROJCS["WGS 84 / UTM zone 11N",AUTHORITY["EPSG","32611"]]"#;
     std::fs::write(folder.path().join("plain.prj"), wkt).expect("written");
     let raster = open().expect("opens");
     let bounds = raster.bounds().expect("placed");

@@ -27,10 +27,23 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
                 converted(path, "")
             );
         }
-        // The same samples in a type and a packing that are read.
-        BadRaster::Unsupported {
-            format: "NetCDF", ..
-        } => return unpacked_netcdf(path),
+        BadRaster::WantsGdal { .. } => {
+            return format!(
+                "{}; then this works: hapterra info {}",
+                GdalError::how_to_install(),
+                names(path).0
+            );
+        }
+        BadRaster::ByGdal(GdalError::OpenOption(_)) => {
+            "leave that option out, or name one of the driver's: gdalinfo --format DRIVER lists them"
+        }
+        BadRaster::ByGdal(_) => {
+            return format!(
+                "see whether GDAL's own program reads it: gdalinfo {}; a newer GDAL may",
+                names(path).0
+            );
+        }
+        BadRaster::ToBuild { files, .. } => return built(path, files),
         BadRaster::Unsupported { .. } => return with_gdal(path) + &converted(path, PLAIN),
         BadRaster::InTile { file, fault } => return hint(file, fault),
         BadRaster::TilesDiffer { file, other, .. } => {
@@ -44,13 +57,16 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             );
         }
         BadRaster::NoTiles(_) => {
-            "name a folder with terrain files, a pattern in quotes, as 'tiles/*.tif' or 'tiles/**/*.tif', or a STAC item collection"
+            "name a folder with terrain files, or a pattern in quotes, as 'tiles/*.tif' or 'tiles/**/*.tif'"
         }
         BadRaster::WhichAsset { names, .. } if names.is_empty() => {
             "take a STAC whose items have assets with heights"
         }
         BadRaster::WhichAsset { names, .. } => {
-            return format!("name the one with the heights: --asset {}", names.join("|"));
+            return format!(
+                "name the one with the heights, or a pattern in quotes for one of each item: --variable {}",
+                names.join("|")
+            );
         }
         // Palettes and single bits do not outlive another type of samples.
         BadRaster::NotAHeightField(_) => {
@@ -175,7 +191,7 @@ fn with_gdal(path: &Path) -> String {
 
 fn is_known_to_gdal(path: &Path) -> bool {
     let others = [
-        "npy", "npz", "las", "laz", "zip", "gz", "raw", "bin", "r16", "r32",
+        "npy", "npz", "las", "laz", "zip", "gz", "tar", "tgz", "raw", "bin", "r16", "r32",
     ];
     !others.contains(&extension(path).as_str())
 }
@@ -189,9 +205,6 @@ const FROM_NPY: &str = "import sys, numpy as n; a = n.squeeze(n.load(sys.argv[1]
 /// The same of the first array of several.
 const FROM_NPZ: &str = "import sys, numpy as n; f = n.load(sys.argv[1]); a = n.squeeze(f[f.files[0]]); \
     n.save('heights.npy', a.reshape(-1, *a.shape[-2:])[0].astype('f4'))";
-/// Stores all of a NetCDF file without compression. GDAL and `nccopy` of most systems have
-/// fewer of HDF5's filters than this package of Python's brings along.
-const UNPACK_NETCDF: &str = "import sys, netCDF4 as c; f, t = c.Dataset(sys.argv[1]), c.Dataset(sys.argv[2], 'w'); f.set_auto_maskandscale(False); copy = lambda a, b: b.setncatts({k: a.getncattr(k) for k in a.ncattrs() if k != '_FillValue'}); copy(f, t); [t.createDimension(n, len(d)) for n, d in f.dimensions.items()]; [(w := t.createVariable(n, v.dtype, v.dimensions, fill_value=getattr(v, '_FillValue', None)), w.set_auto_maskandscale(False), copy(v, w), w.__setitem__(..., v[...])) for n, v in f.variables.items()]; t.close()";
 /// Lays a grid over points: each cell has the mean height of the ground points in it, or of
 /// all points where none are marked as ground. Cells without points are holes. The points'
 /// reference system is kept in a `.prj`.
@@ -213,6 +226,7 @@ fn converted(path: &Path, options: &str) -> String {
         ),
         "zip" => format!("unpack it and name one of its files: python3 -m zipfile -e {from} ."),
         "gz" => format!("unpack it and name what comes out: gzip -dk {from}"),
+        "tar" | "tgz" => format!("unpack it and name one of its files: tar -xf {from}"),
         "nc" | "grd" if options.contains("-b") => format!(
             "make a GeoTIFF of one of its variables, by its name for NAME (gdalinfo lists them): \
              gdal_translate {options} {} {to}",
@@ -222,12 +236,19 @@ fn converted(path: &Path, options: &str) -> String {
     }
 }
 
-/// The command that takes a packing off a NetCDF file that nothing here unpacks.
-fn unpacked_netcdf(path: &Path) -> String {
+/// The command that makes a VRT of files.
+fn built(path: &Path, files: &[String]) -> String {
+    /// More names make no command that somebody reads.
+    const SHOWN: usize = 20;
+    let each: Vec<_> = files.iter().take(SHOWN).map(|file| quoted(file)).collect();
+    let more = match files.len() {
+        0..=SHOWN => String::new(),
+        count => format!(" … (all {count} files)"),
+    };
+    let to = quoted(&format!("{}.vrt", stem(path)));
     format!(
-        "pip install netCDF4, and store it without that packing: python3 -c \"{UNPACK_NETCDF}\" {} {}",
-        names(path).0,
-        quoted(&format!("{}.nc", stem(path)))
+        "make one terrain of its files, each where it says itself: gdalbuildvrt -vrtnodata -32768 {to} {}{more}; and name {to}",
+        each.join(" ")
     )
 }
 
@@ -253,11 +274,8 @@ fn brought_together(path: &Path, file: &Path, other: &Path) -> String {
         );
     }
     if !name.contains(['*', '?', '[']) || is_url(&name) {
-        // A STAC: each item is a file somewhere.
         let files = [other, file].map(|file| names(file).0).join(" ");
-        return format!(
-            "leave that item out of the document; or lay its files and those of the others onto one grid: {ONTO_ONE} {files} one.tif"
-        );
+        return format!("lay them onto one grid: {ONTO_ONE} {files} one.tif");
     }
     let files = name.replace(' ', "\\ ");
     format!(

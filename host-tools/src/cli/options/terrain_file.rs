@@ -22,9 +22,9 @@ const INPUT: &str = "Input";
 /// A terrain file, and what the user says about it that it does not say itself.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TerrainFile {
-    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, NetCDF, USGS .dem, DTED, .flt, .bil, ENVI, what GDAL reads,
-    /// .npy/.npz, or raw samples; or many as one: a folder, a quoted pattern ('tiles/*.tif'), a
-    /// GDAL .vrt, a STAC's .json; or one of these at a URL (https, s3, gs, az), in builds with them
+    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, .flt, .bil, .npy, or raw samples; many as one: a folder
+    /// or a quoted pattern ('tiles/*.tif'); one of these at a URL (https, s3, gs, az), in builds with
+    /// them; or what GDAL reads, where it is installed: VRT, STAC, NetCDF, DTED, archives and more
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
@@ -52,17 +52,17 @@ pub struct ReadingOptions {
     #[arg(long, allow_negative_numbers = true, value_name = "VALUE", help_heading = INPUT)]
     pub no_data: Option<f64>,
 
-    /// Band that holds the height, the first being 1 (TIFF, .bil, ENVI)
+    /// Band that holds the height, the first being 1
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = INPUT)]
     pub band: Option<u32>,
 
-    /// Variable of a NetCDF file, or array of an .npz, that holds the height
+    /// Which raster of several holds the height: a NetCDF variable, a file of an archive, a STAC asset
     #[arg(long, value_name = "NAME", help_heading = INPUT)]
     pub variable: Option<String>,
 
-    /// Asset of a STAC's items that holds the height
-    #[arg(long, value_name = "NAME", help_heading = INPUT)]
-    pub asset: Option<String>,
+    /// Option of the GDAL driver that opens the file; may be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = parse_open_option, help_heading = INPUT)]
+    pub open_option: Vec<String>,
 
     /// Side of a cell on the ground in metres, for files that do not state it
     #[arg(long, value_name = "M", value_parser = parse_side, help_heading = INPUT)]
@@ -82,8 +82,7 @@ pub struct ReadingOptions {
     pub png_channel: Option<PngChannel>,
 
     /// A terrain whose samples take more megabytes than this stays in its file and is read
-    /// where it is touched, if its format allows it (TIFF, NetCDF, raw samples, .hgt, .flt, .bil, ENVI, .npy); many files always
-    /// do
+    /// where it is touched, if its format allows it (all but .asc and PNG); many files always do
     #[arg(long, value_name = "MB", default_value_t = OpenOptions::IN_MEMORY_MB, help_heading = INPUT)]
     pub in_memory_mb: u32,
 
@@ -169,7 +168,7 @@ impl ReadingOptions {
             no_data: self.no_data,
             band: self.band,
             variable: self.variable.clone(),
-            asset: self.asset.clone(),
+            open_options: self.open_option.clone(),
             ground_cell_m: self.ground_cell_m,
             vertical_unit_m: self.vertical_unit,
             encoding: self.encoding,
@@ -224,6 +223,14 @@ fn parse_unit(text: &str) -> Result<f64, String> {
     metres
         .filter(|metres| (1e-6..=1e6).contains(metres))
         .ok_or_else(|| "a unit of height is m, ft, us-ft, or metres in a unit, as 0.01".into())
+}
+
+/// An option of a GDAL driver.
+fn parse_open_option(text: &str) -> Result<String, String> {
+    match text.split_once('=') {
+        Some((name, _)) if !name.is_empty() => Ok(text.to_owned()),
+        _ => Err("an open option is NAME=VALUE, as HONOUR_VALID_RANGE=NO".into()),
+    }
 }
 
 /// A length of the ground in metres.

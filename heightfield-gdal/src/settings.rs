@@ -1,0 +1,68 @@
+//! GDAL's own settings, all of them in one place.
+
+use std::ffi::c_void;
+
+use crate::error::Error;
+use crate::functions::Functions;
+use crate::text::to_c;
+
+/// Drivers that ask a server or a data base by themselves.
+const SKIPPED: &str = "HTTP WMS WMTS WCS EEDA EEDAI PLMOSAIC PLScenes NGW OGCAPI DAAS \
+                       PostGISRaster GeoRaster";
+
+/// How GDAL is to work. It is one for the process: the settings of the first that loads it hold.
+///
+/// | of GDAL | set to | so that |
+/// |---|---|---|
+/// | `GDAL_CACHEMAX` | [`cache_bytes`](Self::cache_bytes) | its cache is bounded |
+/// | `GDAL_MAX_DATASET_POOL_SIZE` | 64 | a VRT opens few files at once |
+/// | `GDAL_NUM_THREADS` | 1 | it decodes on the caller's thread |
+/// | `GDAL_VRT_ENABLE_PYTHON` | `NO` | a VRT runs no program |
+/// | `GDAL_SKIP` | drivers of servers and data bases | a file leads to no network |
+/// | `CPL_VSIL_CURL_ALLOWED_EXTENSIONS` | none, unless [`may_fetch`](Self::may_fetch) | the same |
+/// | `CPL_VSIL_GZIP_WRITE_PROPERTIES` | `NO` | nothing is written beside an archive |
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Bytes of blocks that GDAL keeps.
+    pub cache_bytes: u64,
+    /// Whether a file may name what is elsewhere, as a VRT does, and GDAL fetches it.
+    pub may_fetch: bool,
+}
+
+impl Default for Settings {
+    /// 64 MiB, and nothing is fetched.
+    fn default() -> Self {
+        Self {
+            cache_bytes: 64 << 20,
+            may_fetch: false,
+        }
+    }
+}
+
+impl Settings {
+    /// Sets them, before drivers are registered.
+    pub(crate) fn apply(self, functions: &Functions) -> Result<(), Error> {
+        let cache = format!("{}MB", (self.cache_bytes >> 20).max(1));
+        let mut options = vec![
+            ("GDAL_CACHEMAX", cache.as_str()),
+            ("GDAL_MAX_DATASET_POOL_SIZE", "64"),
+            ("GDAL_NUM_THREADS", "1"),
+            ("GDAL_VRT_ENABLE_PYTHON", "NO"),
+            ("GDAL_SKIP", SKIPPED),
+            ("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO"),
+        ];
+        if !self.may_fetch {
+            // No address ends so.
+            options.push(("CPL_VSIL_CURL_ALLOWED_EXTENSIONS", ".nothing-is-fetched"));
+        }
+        for (name, value) in options {
+            let (name, value) = (to_c(name)?, to_c(value)?);
+            // SAFETY: both are copied by GDAL.
+            unsafe { (functions.CPLSetConfigOption)(name.as_ptr(), value.as_ptr()) };
+        }
+        let quiet = functions.CPLQuietErrorHandler as *const c_void;
+        // SAFETY: GDAL's own handler, which says nothing on standard error.
+        unsafe { (functions.CPLSetErrorHandler)(quiet) };
+        Ok(())
+    }
+}
