@@ -151,9 +151,10 @@ fn check_siblings(path: &Path) -> Result<(), Error> {
 /// Checks that what is at a path, if anything, is a file or a folder.
 fn check_kind(path: &Path) -> Result<(), Error> {
     match fs::metadata(path).map(|metadata| metadata.file_type()) {
-        Ok(kind) if !kind.is_file() && !kind.is_dir() => {
-            refused(path, &format!("it is {}, not a regular file", name_of(kind)))
-        }
+        Ok(kind) if !kind.is_file() && !kind.is_dir() => refused(
+            path,
+            &format!("it is {}, not a regular file", name_of(kind)),
+        ),
         _ => Ok(()),
     }
 }

@@ -1,0 +1,147 @@
+//! What lies beside a file under the same name: a header (`.hdr`), a reference system
+//! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`). A file on disk or at a URL has
+//! neighbours.
+
+mod prj;
+mod world_file;
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use super::BadRaster;
+use super::input::{Data, FileBytes};
+use crate::remote::{is_missing, neighbour};
+
+pub(super) use prj::reference_system;
+pub(super) use world_file::lay_out_by_world_file;
+
+/// No neighbour that is text is longer; what is longer is something else.
+const LONGEST_TEXT: u64 = 1 << 20;
+
+/// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so
+/// that no output comes to lie over one that [`files_read_with`] does not know.
+const NEIGHBOURS: [&str; 12] = [
+    "hdr", "prj", "msk", "ovr", "wld", "tfw", "tifw", "tiffw", "tfwx", "pgw", "pngw", "pgwx",
+];
+
+/// A terrain file and the files beside it that are read with it.
+#[must_use]
+pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
+    let beside = NEIGHBOURS
+        .iter()
+        .flat_map(|extension| candidates(path, extension));
+    let there = beside.filter(|other| other != path && other.is_file());
+    std::iter::once(path.to_owned()).chain(there).collect()
+}
+
+/// Files with these extensions are about to be asked for: at a server, all at once.
+fn look_for(input: &FileBytes, extensions: impl Iterator<Item = &'static str>) {
+    if let Data::Remote(_, url) = input.data() {
+        let urls: Vec<String> = extensions.flat_map(|end| neighbour(url, end)).collect();
+        input.elsewhere().look_for(&urls);
+    }
+}
+
+/// The file beside `input` whose extension is `extension`, in lower or upper case:
+/// `hills.hdr` beside `hills.flt`, or `hills.flt.hdr`.
+fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, BadRaster> {
+    match (input.data(), known(extension)) {
+        (Data::File(_, path), Some(known)) => on_disk(path, &candidates(path, known), input),
+        (Data::Remote(_, url), Some(known)) => elsewhere(url, &neighbour(url, known), input),
+        _ => Ok(None),
+    }
+}
+
+/// The file beside `input` whose name is that of `input` with `extension` behind it, as
+/// `hills.tif.msk`: what GDAL writes for one file alone.
+pub(super) fn find_appended(
+    input: &FileBytes,
+    extension: &str,
+) -> Result<Option<FileBytes>, BadRaster> {
+    match (input.data(), known(extension)) {
+        (Data::File(_, path), Some(known)) => on_disk(path, &[appended(path, known)], input),
+        (Data::Remote(_, url), Some(known)) => elsewhere(url, &neighbour(url, known)[1..], input),
+        _ => Ok(None),
+    }
+}
+
+/// An extension that no output may have.
+fn known(extension: &str) -> Option<&'static str> {
+    let known = NEIGHBOURS.iter().find(|known| **known == extension);
+    known.copied()
+}
+
+/// The first of some paths that is a file, and not `path` itself.
+fn on_disk(
+    path: &Path,
+    others: &[PathBuf],
+    input: &FileBytes,
+) -> Result<Option<FileBytes>, BadRaster> {
+    let mut others = others.iter().filter(|other| *other != path);
+    let found = others.find(|other| other.is_file());
+    let open = |other: &PathBuf| FileBytes::open(other, input.elsewhere());
+    found.map(open).transpose()
+}
+
+/// The first of some URLs at which there is a file. Where that cannot be told, the file that
+/// has them as neighbours cannot be read: a mask that is not known of would be felt.
+fn elsewhere(
+    own: &str,
+    urls: &[String],
+    input: &FileBytes,
+) -> Result<Option<FileBytes>, BadRaster> {
+    for url in urls.iter().filter(|url| *url != own) {
+        match FileBytes::open(Path::new(url), input.elsewhere()) {
+            Err(BadRaster::Elsewhere(error)) if is_missing(&error) => {}
+            Ok(found) if is_page(&found)? => {}
+            other => return other.map(Some),
+        }
+    }
+    Ok(None)
+}
+
+/// Whether a file is a page of a web site, or empty: some servers have one for every name.
+/// No neighbour begins like one.
+fn is_page(found: &FileBytes) -> Result<bool, BadRaster> {
+    let head = found.head(64)?;
+    let first = head.iter().find(|byte| !byte.is_ascii_whitespace());
+    Ok(first.is_none_or(|first| *first == b'<'))
+}
+
+/// The names that a file beside `path` may have.
+fn candidates(path: &Path, extension: &str) -> [PathBuf; 4] {
+    let upper = extension.to_uppercase();
+    [
+        path.with_extension(extension),
+        path.with_extension(&upper),
+        appended(path, extension),
+        appended(path, &upper),
+    ]
+}
+
+/// A path with an extension behind its own.
+fn appended(path: &Path, extension: &str) -> PathBuf {
+    let mut name: OsString = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(extension);
+    PathBuf::from(name)
+}
+
+/// The text of the file beside `input` with an extension, and that file's name.
+pub(super) fn text(
+    input: &FileBytes,
+    extension: &str,
+) -> Result<Option<(String, String)>, BadRaster> {
+    let Some(beside) = find(input, extension)? else {
+        return Ok(None);
+    };
+    let name = beside.name().to_owned();
+    let bytes = beside.head(LONGEST_TEXT + 1)?;
+    if bytes.len() as u64 > LONGEST_TEXT {
+        return Err(BadRaster::AbsurdSize(format!(
+            "{name} beside it is larger than {LONGEST_TEXT} bytes: no such text is"
+        )));
+    }
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    Ok(Some((text, name)))
+}

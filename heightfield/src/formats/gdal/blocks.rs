@@ -1,0 +1,186 @@
+//! A band that GDAL reads, block by block.
+
+use std::hash::Hasher;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use heightfield_gdal::{Band, Dataset, Mask, Sample, SampleType as Stored, Window};
+use twox_hash::XxHash64;
+
+use super::{NAME, fault};
+use crate::blocks::{
+    Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, usual_block,
+};
+use crate::samples::{HoleMask, SampleType, with_samples};
+use crate::{BadRaster, thinned};
+
+/// When a file that stays on disk is opened, so many places each way are looked at.
+const PLACES: u32 = 6;
+
+/// The type in which samples are held.
+pub(super) const fn held(stored: Stored) -> SampleType {
+    match stored {
+        Stored::U8 => SampleType::U8,
+        Stored::I8 => SampleType::I8,
+        Stored::U16 => SampleType::U16,
+        Stored::I16 => SampleType::I16,
+        Stored::U32 => SampleType::U32,
+        Stored::I32 => SampleType::I32,
+        Stored::F16 | Stored::F32 => SampleType::F32,
+        // Exact to 2^53.
+        Stored::U64 | Stored::I64 | Stored::F64 => SampleType::F64,
+    }
+}
+
+/// A band in its file. It is read by one thread, and nobody who is served waits for that one
+/// ([`Blocks`](crate::blocks::Blocks)).
+pub(super) struct GdalBlocks {
+    /// GDAL is used by one thread at a time.
+    dataset: Mutex<Dataset>,
+    /// Number of the band.
+    number: u32,
+    held: SampleType,
+    images: Vec<BlockImage>,
+    /// Of each image but the full one, its number among the band's overviews.
+    overviews: Vec<usize>,
+    is_masked: bool,
+    index: u64,
+}
+
+impl GdalBlocks {
+    pub(super) fn new(dataset: Dataset, number: u32, held: SampleType) -> Result<Self, BadRaster> {
+        let band = dataset.band(number).map_err(fault)?;
+        let is_masked = band.mask() == Mask::Band;
+        let full = image(&band);
+        let samples = band.block_size().map(u64::from).iter().product::<u64>();
+        if samples.saturating_mul(held.bytes()) > LARGEST_BLOCK_BYTES {
+            let [columns, rows] = band.block_size();
+            return Err(BadRaster::Unsupported {
+                format: NAME,
+                feature: format!("a file that is read {columns} × {rows} samples at once"),
+            });
+        }
+        // Those that GDAL would serve a coarse view of the band by.
+        let overviews = band.overviews();
+        let mut coarser: Vec<_> = (0..overviews.len())
+            .filter(|at| {
+                let [own, of_full] = [&overviews[*at], &band].map(Band::size);
+                own < of_full && (own[0] > 1 && own[1] > 1)
+            })
+            .filter(|at| !is_masked || overviews[*at].mask() == Mask::Band)
+            .collect();
+        coarser.sort_by_key(|at| std::cmp::Reverse(overviews[*at].size()));
+        coarser.dedup_by_key(|at| overviews[*at].size());
+        let images: Vec<_> = (coarser.iter().map(|at| image(&overviews[*at]))).collect();
+        let mut hasher = XxHash64::with_seed(0);
+        for side in full
+            .block
+            .iter()
+            .chain([&full.columns, &full.rows, &number])
+        {
+            hasher.write_u32(*side);
+        }
+        hasher.write(dataset.driver().as_bytes());
+        Ok(Self {
+            number,
+            held,
+            images: [full].into_iter().chain(images).collect(),
+            overviews: coarser,
+            is_masked,
+            index: hasher.finish(),
+            dataset: Mutex::new(dataset),
+        })
+    }
+
+    fn dataset(&self) -> MutexGuard<'_, Dataset> {
+        // A panic in between has changed nothing of it.
+        self.dataset.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// An image as the rest of the program knows it, in blocks of a few of GDAL's.
+fn image(band: &Band<'_>) -> BlockImage {
+    let [columns, rows] = band.size();
+    let [across, down] = band.block_size();
+    BlockImage {
+        columns,
+        rows,
+        block: usual_block([across.min(columns.max(1)), down.min(rows.max(1))]),
+        every: None,
+        first: [0; 2],
+    }
+}
+
+impl BlockReader for GdalBlocks {
+    fn format(&self) -> &'static str {
+        NAME
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.held
+    }
+
+    fn is_stored(&self, _: usize, _: &Part) -> bool {
+        true
+    }
+
+    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let dataset = self.dataset();
+        let full = dataset.band(self.number).map_err(fault)?;
+        let band = match image.checked_sub(1) {
+            None => full,
+            Some(coarser) => {
+                let overviews = full.overviews();
+                let overview = (self.overviews.get(coarser)).and_then(|at| overviews.get(*at));
+                *overview.ok_or_else(|| BadRaster::damaged("GDAL: an overview has gone"))?
+            }
+        };
+        let mut samples = self.held.none();
+        with_samples!(&mut samples, values => *values = read(&band, part)?);
+        let mask = self.is_masked.then(|| band.mask_band()).flatten();
+        let holes = mask.map(|mask| holes(&mask, part)).transpose()?;
+        Ok(Block {
+            samples,
+            holes: holes.filter(|holes| !holes.is_clear()),
+            is_lacking: false,
+        })
+    }
+
+    fn index(&self) -> u64 {
+        self.index
+    }
+
+    fn looks(&self) -> Option<Looks> {
+        // Overviews show all of it at once.
+        match &self.images[..] {
+            [full] => Some(thinned::places(full, PLACES)),
+            _ => None,
+        }
+    }
+}
+
+fn read<T: Sample>(band: &Band<'_>, part: &Part) -> Result<Vec<T>, BadRaster> {
+    let count = part.columns as usize * part.rows as usize;
+    let mut samples = vec![T::default(); count];
+    let window = Window {
+        column: part.column,
+        row: part.row,
+        columns: part.columns,
+        rows: part.rows,
+    };
+    band.read(window, &mut samples).map_err(fault)?;
+    Ok(samples)
+}
+
+/// Samples that a mask or an alpha band calls none.
+fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, BadRaster> {
+    let valid = read::<u8>(mask, part)?;
+    let mut holes = HoleMask::with_capacity(valid.len());
+    for (at, valid) in valid.iter().enumerate() {
+        holes.set(at, *valid == 0);
+    }
+    Ok(holes)
+}

@@ -1,0 +1,257 @@
+//! All formats that nothing here reads, block by block, through a libgdal that is found when a file
+//! wants it. It is asked last, so that a machine with it reads nothing in another way than one
+//! without.
+//!
+//! A file goes through here in this order: an archive is looked into (`packed`), GDAL opens what
+//! was named or its label, one of several rasters is chosen, and its first band becomes blocks
+//! (`blocks`). What GDAL reads otherwise than its file means it is put right: NetCDF's depths and
+//! places (`netcdf`), and STAC items that do not say where their files lie (`stac`).
+
+mod blocks;
+mod names;
+mod netcdf;
+mod packed;
+mod stac;
+
+use std::path::{Path, PathBuf};
+
+use heightfield_gdal::{Dataset, Error, Library, SampleType as Stored, Settings};
+
+use super::{headered, height_name, is_read_here};
+use crate::blocks::{BlockReader, Part};
+use crate::decoded::{Decoded, sides};
+use crate::geometry::metres_in;
+use crate::ground_map::GroundMap;
+use crate::input::FileBytes;
+use crate::{BadRaster, OpenOptions, ReferenceSystem};
+use blocks::{GdalBlocks, held};
+
+/// The name in messages.
+const NAME: &str = "GDAL";
+/// Drivers that take any file for samples that has a header beside it.
+const BY_HEADER: [&str; 2] = ["ENVI", "EHdr"];
+/// Drivers that put many files together.
+const OF_FILES: [&str; 3] = ["VRT", "STACIT", "STACTA"];
+/// Enough to tell a file's kind.
+const HEAD_BYTES: u64 = 1024;
+/// Colour pictures have three bands, or four, of bytes.
+const COLOURS: std::ops::RangeInclusive<u32> = 3..=4;
+/// The words with which GDAL says that no driver knows a file.
+const UNKNOWN: [&str; 2] = ["not recognized as", "no driver knows"];
+
+/// The libgdal of this machine; it is loaded the first time.
+///
+/// # Errors
+/// Why there is none that can be used.
+pub(crate) fn library() -> Result<Library, Error> {
+    Library::load(Settings::default())
+}
+
+/// Reads a file, folder or whatever else a driver opens.
+///
+/// # Errors
+/// [`BadRaster::UnknownFormat`] where no driver does; [`BadRaster::WantsGdal`] where there is no
+/// libgdal; else what is wrong with the file.
+pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    let head = head(path, options)?;
+    let library = library().map_err(|why| match names::of(path, &head) {
+        Some(format) => BadRaster::WantsGdal { format, why },
+        None => BadRaster::UnknownFormat,
+    })?;
+    match packed::Packing::of(&head) {
+        Some(packing) => {
+            let (entry, options) = packing.entry(&library, path, options)?;
+            let mut decoded = opened(&library, &entry, &head, &options)?;
+            decoded.format = format!("{} in {}", decoded.format, packing.name());
+            Ok(decoded)
+        }
+        None => opened(&library, path, &head, options),
+    }
+}
+
+/// The files that a file which only GDAL reads names, or that lie beside it.
+pub(crate) fn files_read_with(path: &Path) -> Vec<PathBuf> {
+    let options = OpenOptions::default();
+    let is_own = head(path, &options).is_ok_and(|head| is_read_here(&head));
+    match library() {
+        Ok(library) if !is_own => {
+            open(&library, path, &options).map_or(Vec::new(), |it| it.files())
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The first bytes; none of a folder.
+fn head(path: &Path, options: &OpenOptions) -> Result<Vec<u8>, BadRaster> {
+    match path.is_dir() {
+        true => Ok(Vec::new()),
+        false => FileBytes::open(path, &options.elsewhere)?.head(HEAD_BYTES),
+    }
+}
+
+fn opened(
+    library: &Library,
+    path: &Path,
+    head: &[u8],
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    let dataset = match open(library, path, options) {
+        Err(BadRaster::UnknownFormat) => match label_beside(path) {
+            Some(label) => {
+                let mut decoded = opened(library, &label, head, options)?;
+                let name = label.file_name().unwrap_or_default().display().to_string();
+                decoded
+                    .remarks
+                    .push(format!("it is read by its label {name}"));
+                return Ok(decoded);
+            }
+            None => return Err(stac::refused(path, options)?.unwrap_or(BadRaster::UnknownFormat)),
+        },
+        Err(fault @ BadRaster::ByGdal(_)) => {
+            return Err(stac::refused(path, options)?.unwrap_or(fault));
+        }
+        dataset => dataset?,
+    };
+    let driver = dataset.driver();
+    if BY_HEADER.contains(&driver.as_str()) && headered::is_of_another_kind(head) {
+        return Err(BadRaster::UnknownFormat);
+    }
+    let dataset = match chosen(&dataset, options)? {
+        Some(name) => library
+            .open_part(&name, &open_options(options))
+            .map_err(fault)?,
+        None => dataset,
+    };
+    if driver == "STACIT" {
+        stac::check_places(library, path, options)?;
+    }
+    decoded(dataset, options)
+}
+
+fn open_options(options: &OpenOptions) -> Vec<&str> {
+    options.open_options.iter().map(String::as_str).collect()
+}
+
+fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset, BadRaster> {
+    library.open(path, &open_options(options)).map_err(fault)
+}
+
+/// The label of a planetary image, in a file of its own beside it.
+fn label_beside(path: &Path) -> Option<PathBuf> {
+    let labels = ["lbl", "LBL", "xml", "XML"].map(|end| path.with_extension(end));
+    labels
+        .into_iter()
+        .find(|label| label != path && label.is_file())
+}
+
+/// The name of the raster to take, where the file holds several.
+fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, BadRaster> {
+    // As `depth` of `NETCDF:"ocean.nc":depth`.
+    let short = |name: &str| name.rsplit([':', '/']).next().unwrap_or(name).to_owned();
+    let asked = options.variable.as_deref();
+    let parts = dataset.subdatasets();
+    let names: Vec<_> = parts.iter().map(|part| short(&part.name)).collect();
+    let exact = parts
+        .iter()
+        .position(|part| Some(part.name.as_str()) == asked);
+    if dataset.bands() > 0 && (asked.is_none() || asked == netcdf::variable(dataset).as_deref()) {
+        return Ok(None);
+    }
+    if parts.is_empty() {
+        return Err(match asked {
+            Some(asked) => BadRaster::NoSuchPart {
+                asked: format!("variable {asked}"),
+                there: "the file holds one raster".into(),
+            },
+            None => BadRaster::NoNumbers(format!(
+                "{} finds no raster in it; a newer GDAL than this may",
+                dataset.driver()
+            )),
+        });
+    }
+    let at = match exact {
+        Some(at) => at,
+        None => {
+            // Limits of cells, and not what is in them.
+            let is_height = |name: &&String| !name.ends_with("_bnds") && !name.ends_with("_bounds");
+            let named: Vec<_> = names.iter().filter(is_height).map(String::as_str).collect();
+            let at = height_name::choose("raster", &named, netcdf::HEIGHT_NAMES, asked)?;
+            let is_it = |name: &String| name == named[at];
+            names.iter().position(is_it).unwrap_or_default()
+        }
+    };
+    Ok(Some(parts[at].name.clone()))
+}
+
+fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    let bands = dataset.bands();
+    let number = options.band.unwrap_or(1);
+    let band = dataset.band(number).map_err(fault)?;
+    let stored = band.sample_type();
+    let stored = stored.map_err(|name| BadRaster::NotAHeightField(format!("samples of {name}")))?;
+    if options.band.is_none() && stored == Stored::U8 && COLOURS.contains(&bands) {
+        return Err(BadRaster::ColourBands {
+            what: format!("a picture of {bands} bands of bytes"),
+            bands: bands as u16,
+        });
+    }
+    let [columns, rows] = band.size();
+    let size = sides(columns.into(), rows.into())?;
+    let (no_data, scale, offset) = (band.no_data(), band.scale(), band.offset());
+    let unit = band.unit();
+    let (driver, map, wkt) = (dataset.driver(), dataset.geo_transform(), dataset.wkt());
+    let conventions = netcdf::Conventions::of(&dataset, &band)?;
+    let blocks = GdalBlocks::new(dataset, number, held(stored))?;
+    let format = format!("{driver} by GDAL, {}", held(stored).none().type_name());
+    let samples = u64::from(columns) * u64::from(rows);
+    let mut decoded = match samples * held(stored).bytes() > options.most_in_memory_bytes {
+        true => {
+            // A packing that GDAL cannot undo is known here, and is no hole.
+            blocks.read(0, &blocks.images()[0].part([0, 0]))?;
+            Decoded::new(format, size, blocks)
+        }
+        false => {
+            let all = blocks.read(0, &Part::whole(columns, rows))?;
+            let mut decoded = Decoded::new(format, size, all.samples);
+            decoded.storage.set_holes(all.holes);
+            decoded
+        }
+    };
+    decoded.no_data = no_data;
+    decoded.scale = scale.unwrap_or(1.0);
+    decoded.offset = offset.unwrap_or(0.0);
+    if bands > 1 && options.band.is_none() {
+        decoded.remarks.push(format!(
+            "it has {bands} bands: the first is taken for the height (--band)"
+        ));
+    }
+    if OF_FILES.contains(&driver.as_str()) && no_data.is_none() {
+        decoded.remarks.push(
+            "it is read by GDAL, which has height 0 where none of its files is: for holes, make it with a no-data value (gdalbuildvrt -vrtnodata)"
+                .into(),
+        );
+    }
+    let of_wkt = wkt.map(|wkt| ReferenceSystem::from_wkt(&wkt));
+    let (system, vertical) = of_wkt.unwrap_or((None, None));
+    let map = conventions.placed(map, system.as_ref());
+    decoded.system = system;
+    decoded.set_vertical(vertical, unit.as_deref().and_then(metres_in));
+    conventions.describe(&mut decoded);
+    if let Some([x, x_column, x_row, y, y_column, y_row]) = map
+        && let Some(map) = GroundMap::new([x, x_column, x_row], [y, y_column, y_row])
+    {
+        decoded.lay_out(map, None);
+    }
+    Ok(decoded)
+}
+
+fn fault(error: Error) -> BadRaster {
+    match error {
+        Error::NoSuchPart { asked, there } => BadRaster::NoSuchPart { asked, there },
+        Error::Refused(words) if UNKNOWN.iter().any(|unknown| words.contains(unknown)) => {
+            BadRaster::UnknownFormat
+        }
+        Error::NotOpened { .. } => BadRaster::Unreadable(std::io::Error::other(error)),
+        error => BadRaster::ByGdal(error),
+    }
+}

@@ -1,0 +1,183 @@
+//! Archives, which GDAL looks into: one raster of those in them is read.
+
+use std::io::{Read, copy, sink};
+use std::path::{Path, PathBuf};
+
+use flate2::read::MultiGzDecoder;
+use heightfield_gdal::Library;
+
+use super::fault;
+use crate::format::Claim;
+use crate::formats::claim_of;
+use crate::{BadRaster, OpenOptions};
+
+/// No file that is larger is read inside of an archive: samples in it are found by unpacking what
+/// lies before them.
+const MAX_BYTES: u64 = 1 << 30;
+/// An archive of more files is no terrain's.
+const MAX_ENTRIES: usize = 1 << 14;
+/// Files that GDAL is asked for.
+const MAX_TRIED: usize = 64;
+/// Where a tar file says that it is one.
+const TAR_SIGN: usize = 257;
+/// How files are packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Packing {
+    Zip,
+    Gzip,
+    Tar,
+}
+
+impl Packing {
+    /// By the beginning of a file.
+    pub(super) fn of(head: &[u8]) -> Option<Self> {
+        match head {
+            _ if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") => {
+                Some(Self::Zip)
+            }
+            _ if head.starts_with(b"\x1f\x8b") => Some(Self::Gzip),
+            _ if head
+                .get(TAR_SIGN..)
+                .is_some_and(|rest| rest.starts_with(b"ustar")) =>
+            {
+                Some(Self::Tar)
+            }
+            _ => None,
+        }
+    }
+
+    /// The name in messages.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Zip => "ZIP",
+            Self::Gzip => "gzip",
+            Self::Tar => "tar",
+        }
+    }
+
+    /// What GDAL calls the raster in an archive, and the options that are left for it.
+    ///
+    /// # Errors
+    /// [`BadRaster::SeveralHeights`] where none of several is chosen by `--variable`.
+    pub(super) fn entry(
+        self,
+        library: &Library,
+        path: &Path,
+        options: &OpenOptions,
+    ) -> Result<(PathBuf, OpenOptions), BadRaster> {
+        let absolute = std::path::absolute(path).map_err(BadRaster::Unreadable)?;
+        let inside = absolute.display();
+        let is_tar = match self {
+            Self::Gzip => {
+                check_unpacked(path)?;
+                unpacked_head(path)?.is_some_and(|head| Self::of(&head) == Some(Self::Tar))
+            }
+            Self::Zip | Self::Tar => self == Self::Tar,
+        };
+        let folder = match (self, is_tar) {
+            (_, true) => format!("/vsitar/{{{inside}}}"),
+            (Self::Zip, _) => format!("/vsizip/{{{inside}}}"),
+            _ => return Ok((format!("/vsigzip/{inside}").into(), options.clone())),
+        };
+        let mut entries = library.entries(Path::new(&folder)).map_err(fault)?;
+        if entries.len() > MAX_ENTRIES {
+            return Err(BadRaster::AbsurdSize(format!(
+                "an archive of {} files",
+                entries.len()
+            )));
+        }
+        entries.retain(|name| !is_hidden(name));
+        let full = |name: &str| PathBuf::from(format!("{folder}/{name}"));
+        let mut left = options.clone();
+        let name = match options
+            .variable
+            .as_deref()
+            .and_then(|it| named(&entries, it))
+        {
+            Some(name) => {
+                left.variable = None;
+                name
+            }
+            None => only(library, &entries, &full)?,
+        };
+        let entry = full(&name);
+        match library.length(&entry) {
+            Some(bytes) if bytes > MAX_BYTES => Err(too_large(&name)),
+            _ => Ok((entry, left)),
+        }
+    }
+}
+
+/// Files and folders that some systems add.
+fn is_hidden(name: &str) -> bool {
+    name.split('/').any(|part| {
+        part.starts_with("__MACOSX")
+            || (part.starts_with('.') && part != ".")
+            || part == "@PaxHeader"
+    })
+}
+
+/// The entry that is asked for, by its whole name or what follows the last folder.
+fn named(entries: &[String], asked: &str) -> Option<String> {
+    let is_it = |name: &&String| *name == asked || name.rsplit('/').next() == Some(asked);
+    entries.iter().find(is_it).cloned()
+}
+
+/// The one raster among entries.
+fn only(
+    library: &Library,
+    entries: &[String],
+    full: &dyn Fn(&str) -> PathBuf,
+) -> Result<String, BadRaster> {
+    let is_likely = |name: &&String| claim_of(name).is_some_and(|claim| claim != Claim::Suggests);
+    let mut rasters: Vec<String> = entries.iter().filter(is_likely).cloned().collect();
+    if rasters.is_empty() {
+        let tried = entries.iter().take(MAX_TRIED);
+        let opens = |name: &&String| {
+            library
+                .open_part(&full(name).display().to_string(), &[])
+                .is_ok()
+        };
+        rasters = tried.filter(opens).cloned().collect();
+    }
+    match rasters.len() {
+        1 => Ok(rasters.remove(0)),
+        0 => Err(BadRaster::NotAHeightField(
+            "the archive holds no terrain file".into(),
+        )),
+        _ => Err(BadRaster::SeveralHeights {
+            kind: "file of the archive",
+            names: rasters,
+        }),
+    }
+}
+
+fn too_large(name: &str) -> BadRaster {
+    BadRaster::Unsupported {
+        format: "archive",
+        feature: format!(
+            "{name}, which has more than {} MB unpacked,",
+            MAX_BYTES >> 20
+        ),
+    }
+}
+
+/// Checks that a gzip file unpacks, to no more than [`MAX_BYTES`].
+fn check_unpacked(path: &Path) -> Result<(), BadRaster> {
+    let file = std::fs::File::open(path).map_err(BadRaster::Unreadable)?;
+    let unpacked = MultiGzDecoder::new(std::io::BufReader::new(file));
+    match copy(&mut unpacked.take(MAX_BYTES + 1), &mut sink()) {
+        Ok(bytes) if bytes > MAX_BYTES => Err(too_large("a file")),
+        Ok(_) => Ok(()),
+        Err(error) => Err(BadRaster::from_io(error, "the packed data")),
+    }
+}
+
+fn unpacked_head(path: &Path) -> Result<Option<Vec<u8>>, BadRaster> {
+    let file = std::fs::File::open(path).map_err(BadRaster::Unreadable)?;
+    let mut head = Vec::new();
+    let read = MultiGzDecoder::new(file)
+        .take(super::HEAD_BYTES)
+        .read_to_end(&mut head);
+    Ok(read.ok().map(|_| head))
+}

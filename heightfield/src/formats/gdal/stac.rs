@@ -1,0 +1,199 @@
+//! STAC items. GDAL's driver STACIT reads a collection of items that say where all their files lie.
+//! What it does not read is refused with the command that makes a VRT of the files themselves, and
+//! so is a collection of which an item lies elsewhere than its file.
+
+use std::path::Path;
+
+use glob::Pattern;
+use heightfield_gdal::Library;
+use serde_json::Value;
+
+use crate::{BadRaster, OpenOptions};
+
+/// A larger document is no list of items that can be opened.
+const MAX_BYTES: u64 = 16 << 20;
+/// A file lies where its item says within this share of a cell.
+const TOLERANCE: f64 = 0.05;
+/// What files of heights are.
+const MEDIA: [&str; 3] = ["tif", "jp2", "netcdf"];
+
+/// An item, and of its assets those that may be heights.
+struct Item {
+    id: String,
+    /// Names and files.
+    assets: Vec<(String, String)>,
+    /// Columns and rows, and x and y of a sample's corner, as it says.
+    stated: Option<([u32; 2], [f64; 6])>,
+}
+
+/// Why a document of items is not read; none where a file is something else.
+pub(super) fn refused(path: &Path, options: &OpenOptions) -> Result<Option<BadRaster>, BadRaster> {
+    let items = items(path, options)?;
+    items
+        .map(|items| to_build("GDAL does not open it as items of a STAC", &items))
+        .transpose()
+}
+
+/// Checks that files lie where their items say.
+///
+/// # Errors
+/// [`BadRaster::ToBuild`] where one does not.
+pub(super) fn check_places(
+    library: &Library,
+    path: &Path,
+    options: &OpenOptions,
+) -> Result<(), BadRaster> {
+    let items = items(path, options)?.unwrap_or_default();
+    for item in &items {
+        let (Some((size, stated)), [(_, file)]) = (&item.stated, &item.assets[..]) else {
+            continue;
+        };
+        let Some(dataset) = Some(file)
+            .filter(|file| !file.starts_with("/vsi"))
+            .and_then(|file| library.open(Path::new(file), &[]).ok())
+        else {
+            continue;
+        };
+        let found = dataset.band(1).map(|band| band.size());
+        let place = dataset.geo_transform();
+        let is_same = |found: [f64; 6]| {
+            let cell = stated[1].abs().max(stated[5].abs());
+            let corners = [0, 3].map(|at| (found[at] - stated[at]).abs() <= TOLERANCE * cell);
+            corners == [true; 2]
+        };
+        if found != Ok(*size) || !place.is_some_and(is_same) {
+            let why = format!("the item {} lies elsewhere than its file {file}", item.id);
+            return Err(to_build(&why, &items)?);
+        }
+    }
+    Ok(())
+}
+
+/// The refusal that names the files to make a VRT of.
+fn to_build(why: &str, items: &[Item]) -> Result<BadRaster, BadRaster> {
+    let mut files = Vec::new();
+    for item in items {
+        match &item.assets[..] {
+            [(_, file)] => files.push(file.clone()),
+            assets => {
+                return Err(BadRaster::WhichAsset {
+                    why: match assets {
+                        [] => format!(
+                            "the item {} has no asset of that name, or no raster",
+                            item.id
+                        ),
+                        _ => format!("several assets of the item {} may be the heights", item.id),
+                    },
+                    names: assets.iter().map(|(name, _)| name.clone()).collect(),
+                });
+            }
+        }
+    }
+    Ok(BadRaster::ToBuild {
+        why: why.to_owned(),
+        files,
+    })
+}
+
+/// The items of a document; none where it is something else.
+fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, BadRaster> {
+    let bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+    let is_named = path
+        .extension()
+        .is_some_and(|end| end == "json" || end == "geojson");
+    if !is_named || !path.is_file() {
+        return Ok(None);
+    }
+    if bytes > MAX_BYTES {
+        return Err(BadRaster::AbsurdSize(format!(
+            "a JSON document of {bytes} bytes"
+        )));
+    }
+    let text = std::fs::read(path).map_err(BadRaster::Unreadable)?;
+    let document: Value = serde_json::from_slice(&text)
+        .map_err(|error| BadRaster::Damaged(format!("it is no JSON: {error}")))?;
+    let asked = match &options.variable {
+        Some(name) => Some(Pattern::new(name).map_err(|error| BadRaster::NoSuchPart {
+            asked: format!("variable {name}"),
+            there: format!("it is no pattern: {error}"),
+        })?),
+        None => None,
+    };
+    let features = match &document["features"] {
+        Value::Array(features) => features.iter().collect(),
+        _ if document["assets"].is_object() => vec![&document],
+        _ => return Ok(None),
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let items = features
+        .into_iter()
+        .map(|item| Item::of(item, asked.as_ref(), folder));
+    Ok(Some(items.collect()))
+}
+
+impl Item {
+    fn of(item: &Value, asked: Option<&Pattern>, folder: &Path) -> Self {
+        let empty = serde_json::Map::new();
+        let assets = item["assets"].as_object().unwrap_or(&empty);
+        let is_asked = |(name, asset): &(&String, &Value)| match asked {
+            Some(asked) => asked.matches(name),
+            None => is_raster(asset),
+        };
+        let of_item = |key: &str| {
+            let own = assets.iter().filter(|asset| is_asked(asset));
+            let mut values = own
+                .map(|(_, asset)| &asset[key])
+                .chain([&item["properties"][key]]);
+            values.find(|value| value.is_array())
+        };
+        let numbers = |key: &str| -> Option<Vec<f64>> {
+            of_item(key)?
+                .as_array()?
+                .iter()
+                .map(Value::as_f64)
+                .collect()
+        };
+        let place = || {
+            let (shape, map) = (numbers("proj:shape")?, numbers("proj:transform")?);
+            let &[rows, columns] = &shape[..] else {
+                return None;
+            };
+            let [x_column, x_row, x, y_column, y_row, y] = *map.first_chunk::<6>()?;
+            Some((
+                [columns as u32, rows as u32],
+                [x, x_column, x_row, y, y_column, y_row],
+            ))
+        };
+        let named = assets.iter().filter(is_asked);
+        let files = named.filter_map(|(name, asset)| {
+            Some((name.clone(), file(asset["href"].as_str()?, folder)))
+        });
+        Self {
+            id: item["id"].as_str().unwrap_or("without a name").to_owned(),
+            assets: files.collect(),
+            stated: place(),
+        }
+    }
+}
+
+fn is_raster(asset: &Value) -> bool {
+    let is_one_of = |key: &str| {
+        let text = asset[key].as_str().unwrap_or_default().to_lowercase();
+        MEDIA.iter().any(|media| text.contains(media))
+    };
+    is_one_of("type") || (asset["type"].is_null() && is_one_of("href"))
+}
+
+/// What GDAL calls a file that an item names.
+fn file(href: &str, folder: &Path) -> String {
+    match href.split_once("://") {
+        Some(("s3", rest)) => format!("/vsis3/{rest}"),
+        Some(("gs", rest)) => format!("/vsigs/{rest}"),
+        Some(("file", rest)) => rest.to_owned(),
+        Some(_) => format!("/vsicurl/{href}"),
+        None => folder
+            .join(href.trim_start_matches("./"))
+            .display()
+            .to_string(),
+    }
+}

@@ -1,0 +1,42 @@
+//! The terrain formats, each in its own file or folder. To add one: write its
+//! file with a `FORMAT`, and name it in [`FORMATS`].
+
+mod asc;
+pub(super) mod gdal;
+pub(super) mod headered;
+mod height_name;
+mod hgt;
+mod npy;
+mod png;
+pub(super) mod raw;
+mod tiff;
+
+use super::format::{Claim, Format};
+
+/// All formats that are told by their content or their extension; the first that
+/// fits decides. Raw samples are not among them: only the user knows those.
+pub(super) const FORMATS: [Format; 6] = [
+    tiff::FORMAT,
+    png::FORMAT,
+    npy::FORMAT,
+    asc::FORMAT,
+    hgt::FORMAT,
+    headered::FORMAT,
+];
+
+/// Whether a file that begins with some bytes is read here, and not by GDAL.
+fn is_read_here(head: &[u8]) -> bool {
+    FORMATS.iter().any(|format| (format.begins)(head))
+}
+
+/// Extensions of files that GDAL reads and that hold heights more often than not.
+const BY_GDAL: [&str; 9] = ["bag", "dem", "dt0", "dt1", "dt2", "grd", "img", "jp2", "nc"];
+
+/// What the extension of a file in a folder or archive says, the strongest claim of any format.
+pub(super) fn claim_of(name: &str) -> Option<Claim> {
+    let extension = name.rsplit_once('.')?.1.to_lowercase();
+    let claims = FORMATS.iter().filter_map(|format| format.claim(&extension));
+    let by_gdal = BY_GDAL.contains(&extension.as_str());
+    let claims = claims.chain(by_gdal.then_some(Claim::Promises));
+    claims.min_by_key(|claim| *claim == Claim::Suggests)
+}

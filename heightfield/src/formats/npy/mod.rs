@@ -1,0 +1,179 @@
+//! NumPy arrays, one a file. The samples are read into their own type.
+
+mod header;
+
+use crate::decoded::{Decoded, sides};
+use crate::format::{Claim, Format, Parts};
+use crate::input::FileBytes;
+use crate::plain::Plain;
+use crate::read::Stored;
+use crate::{BadRaster, Endian, OpenOptions, SampleType};
+use header::Header;
+
+/// A NumPy array in a file of its own.
+pub(super) const FORMAT: Format = Format {
+    name: "NumPy",
+    begins: |head| head.starts_with(b"\x93NUMPY"),
+    extensions: &[("npy", Claim::Suggests)],
+    parts: Parts::One,
+    decode: |input, options| Array::in_file(input)?.heights(input, options),
+};
+
+/// Where an array's samples are.
+struct Array {
+    shape: Vec<u64>,
+    stored: Stored,
+    endian: Endian,
+    column_major: bool,
+    /// The first of them, bytes.
+    first: u64,
+}
+
+/// The type and order of samples that NumPy describes, as `<f4`.
+fn sample_type(descr: &str) -> Result<(Stored, Endian), BadRaster> {
+    let what = || format!("an array of {descr}");
+    let (order, kind) = match descr.split_at_checked(1) {
+        Some((order @ ("<" | ">" | "|" | "="), kind)) => (order, kind),
+        _ => ("<", descr),
+    };
+    let endian = match order {
+        ">" => Endian::Big,
+        _ => Endian::Little,
+    };
+    let held = match kind {
+        "i8" => return Ok((Stored::I64, endian)),
+        "u8" => return Ok((Stored::U64, endian)),
+        "f2" => return Ok((Stored::F16, endian)),
+        "i1" => SampleType::I8,
+        "i2" => SampleType::I16,
+        "i4" => SampleType::I32,
+        "u1" => SampleType::U8,
+        "u2" => SampleType::U16,
+        "u4" => SampleType::U32,
+        "f4" => SampleType::F32,
+        "f8" => SampleType::F64,
+        _ if kind.starts_with(['O', 'S', 'U', 'a']) => return Err(BadRaster::NoNumbers(what())),
+        _ => return Err(BadRaster::NotAHeightField(what())),
+    };
+    Ok((Stored::Held(held), endian))
+}
+
+impl Array {
+    /// Reads an array's header; the file holds its samples.
+    fn in_file(input: &FileBytes) -> Result<Self, BadRaster> {
+        let Header {
+            descr,
+            column_major,
+            shape,
+            bytes: first,
+        } = Header::read(&mut input.reader()?)?;
+        let (stored, endian) = sample_type(&descr)?;
+        let data = input.len().saturating_sub(first);
+        let count = shape
+            .iter()
+            .try_fold(1_u64, |count, &side| count.checked_mul(side))
+            .ok_or_else(|| BadRaster::AbsurdSize(format!("an array of {shape:?} samples")))?;
+        if count
+            .checked_mul(stored.bytes())
+            .is_none_or(|bytes| bytes > data)
+        {
+            return Err(BadRaster::Truncated(format!(
+                "an array of {shape:?} samples of {} bytes does not fit into {data} bytes",
+                stored.bytes()
+            )));
+        }
+        Ok(Self {
+            shape,
+            stored,
+            endian,
+            column_major,
+            first,
+        })
+    }
+
+    /// The array as heights, its first row the northernmost.
+    fn heights(&self, input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+        let &[rows, columns] = self.shape.as_slice() else {
+            let what = format!(
+                "an array of {} dimensions; heights have two",
+                self.shape.len()
+            );
+            return Err(match self.shape.len() {
+                0 | 1 => BadRaster::NoNumbers(what),
+                _ => BadRaster::NotAHeightField(what),
+            });
+        };
+        let (columns, rows) = sides(columns, rows)?;
+        let packed = |size| Plain::packed(size, self.stored, self.endian, self.first);
+        let plain = match self.column_major {
+            true => packed((rows, columns)).turned(),
+            false => packed((columns, rows)),
+        };
+        let format = format!("NumPy array, {}", self.stored.held().none().type_name());
+        let storage = plain.storage(input, options)?;
+        Ok(Decoded::new(format, (columns, rows), storage))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Samples;
+
+    /// A 2 × 3 array as numpy writes it.
+    fn npy(descr: &str, samples: &[u8]) -> FileBytes {
+        let mut header =
+            format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (2, 3), }}");
+        while (header.len() + 11) % 64 != 0 {
+            header.push(' ');
+        }
+        header.push('\n');
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.as_bytes());
+        bytes.extend(samples);
+        FileBytes::unpacked("test.npy", bytes)
+    }
+
+    fn samples(descr: &str, bytes: &[u8]) -> Result<Samples, BadRaster> {
+        let decoded = (FORMAT.decode)(&npy(descr, bytes), &crate::OpenOptions::default())?;
+        Ok(decoded.storage.held().expect("in memory").clone())
+    }
+
+    #[test]
+    fn integers_of_64_bits_and_halves_are_read() {
+        let numbers = [1_i64, -2, 8848, 1 << 40, -(1 << 53), 0];
+        let wanted = Samples::F64(numbers.map(|number| number as f64).to_vec());
+        let little: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+        assert_eq!(samples("<i8", &little).expect("int64"), wanted);
+        let big: Vec<u8> = numbers.iter().flat_map(|n| n.to_be_bytes()).collect();
+        assert_eq!(samples(">i8", &big).expect("int64"), wanted);
+        let large = u64::MAX.to_le_bytes().repeat(6);
+        let found = samples("<u8", &large).expect("uint64");
+        assert_eq!(found, Samples::F64(vec![u64::MAX as f64; 6]));
+        let halves = [0.5_f32, -1.25, 2048.0, 65504.0, 0.0, -0.0].map(half::f16::from_f32);
+        for (descr, bytes) in [
+            ("<f2", halves.map(half::f16::to_le_bytes).concat()),
+            (">f2", halves.map(half::f16::to_be_bytes).concat()),
+        ] {
+            let found = samples(descr, &bytes).expect("float16");
+            assert_eq!(found, Samples::F32(halves.map(half::f16::to_f32).to_vec()));
+        }
+    }
+
+    #[test]
+    fn an_array_that_the_file_does_not_hold_is_refused() {
+        let fault = samples("<i8", &[0; 47]).expect_err("too short");
+        assert!(matches!(fault, BadRaster::Truncated(_)), "{fault}");
+        let fault = samples("<c8", &[0; 48]).expect_err("complex numbers");
+        assert!(matches!(fault, BadRaster::NotAHeightField(_)), "{fault}");
+    }
+
+    #[test]
+    fn header_that_nests_deep_is_refused_at_once() {
+        for deep in ["{".repeat(30), "{\"}\":".repeat(30)] {
+            let fault = samples(&format!("', 'x': {deep}"), &[]).expect_err("deep");
+            assert!(matches!(fault, BadRaster::NotAHeightField(_)), "{fault}");
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! From one file to decoded samples: tells the format, decodes.
+
+use super::format::{Claim, Format};
+use super::formats::{FORMATS, gdal, headered, raw};
+use super::guard::guarded;
+use super::input::{Data, FileBytes};
+use super::{BadRaster, Decoded, OpenOptions};
+
+/// Enough of a file to tell every format by its beginning.
+const HEAD_BYTES: u64 = 1024;
+
+/// Decodes a file, by GDAL where nothing here reads it.
+pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    if let Some(layout) = options.raw {
+        check_no_open_options("raw samples", options)?;
+        return raw::decode(input, layout, options);
+    }
+    let head = input.head(HEAD_BYTES)?;
+    if head.is_empty() {
+        return Err(BadRaster::Truncated("it is empty".into()));
+    }
+    if let Some(format) = by_content(&head) {
+        return or_by_gdal(decode_as(format, input, options), input, options);
+    }
+    // A header beside a file tells more than the file's extension.
+    if !headered::is_of_another_kind(&head)
+        && let Some(decoded) = guarded("raw", || headered::decode_by_header(input, options))?
+    {
+        check_no_open_options("plain samples with a header", options)?;
+        return Ok(decoded);
+    }
+    let format = by_extension(input.extension());
+    let decoded = format.and_then(|format| decode_as(format, input, options));
+    or_by_gdal(decoded, input, options)
+}
+
+/// What is not known or not supported here is given to GDAL.
+fn or_by_gdal(
+    decoded: Result<Decoded, BadRaster>,
+    input: &FileBytes,
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    use BadRaster::{ByGdal, HeaderMissing, UnknownFormat, Unsupported};
+    let (fault, path) = match (decoded, input.data()) {
+        (
+            Err(fault @ (HeaderMissing(_) | UnknownFormat | Unsupported { .. })),
+            Data::File(_, path),
+        ) if options.gdal => (fault, path),
+        (decoded, _) => return decoded,
+    };
+    match (gdal::decode(path, options), fault) {
+        (Ok(decoded), _) => Ok(decoded),
+        (Err(by_gdal), UnknownFormat) => Err(by_gdal),
+        (Err(by_gdal @ BadRaster::WantsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
+        // GDAL's words on what is known here, or a refusal that says what is missing.
+        (Err(UnknownFormat | ByGdal(_) | BadRaster::WantsGdal { .. }), fault) => Err(fault),
+        (Err(by_gdal), _) => Err(by_gdal),
+    }
+}
+
+fn decode_as(
+    format: &Format,
+    input: &FileBytes,
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    tracing::debug!(format.name, name = input.name(), "recognised");
+    format.check_choice(options)?;
+    check_no_open_options(format.name, options)?;
+    guarded(format.name, || (format.decode)(input, options))
+}
+
+/// Checks that no open option is given for a file that is read without GDAL.
+fn check_no_open_options(format: &str, options: &OpenOptions) -> Result<(), BadRaster> {
+    match &options.open_options[..] {
+        [] => Ok(()),
+        [first, ..] => Err(BadRaster::NoSuchPart {
+            asked: format!("open option {first}"),
+            there: format!("the file is {format}, which is read without GDAL"),
+        }),
+    }
+}
+
+fn by_content(head: &[u8]) -> Option<&'static Format> {
+    FORMATS.iter().find(|format| (format.begins)(head))
+}
+
+fn by_extension(extension: &str) -> Result<&'static Format, BadRaster> {
+    let mut claims = FORMATS
+        .iter()
+        .filter_map(|format| Some((format, format.claim(extension)?)));
+    match claims.next() {
+        Some((format, Claim::Decides)) => Ok(format),
+        Some((format, Claim::Promises)) => Err(BadRaster::damaged(format!(
+            "its name says {}, its content does not begin like one",
+            format.name
+        ))),
+        _ if raw::EXTENSIONS.contains(&extension) => Err(BadRaster::RawSizeMissing),
+        _ => Err(BadRaster::UnknownFormat),
+    }
+}
