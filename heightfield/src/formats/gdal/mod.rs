@@ -25,6 +25,7 @@ use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::{BadRaster, OpenOptions, ReferenceSystem};
 use blocks::{GdalBlocks, held};
+pub(crate) use names::by_beginning;
 
 /// The name in messages.
 const NAME: &str = "GDAL";
