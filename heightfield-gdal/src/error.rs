@@ -42,8 +42,15 @@ pub enum Error {
         why: String,
     },
     /// The driver does not know an open option.
-    #[error("{0}")]
-    OpenOption(String),
+    #[error("GDAL's driver {driver} has no open option {name} (it has: {known})")]
+    OpenOption {
+        /// The option.
+        name: String,
+        /// The driver.
+        driver: String,
+        /// Those that it has.
+        known: String,
+    },
     /// A text for GDAL has a zero byte in it.
     #[error("{0:?} has a zero byte: GDAL cannot be told that")]
     ZeroByte(String),

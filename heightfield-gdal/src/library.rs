@@ -192,22 +192,18 @@ impl fmt::Debug for Library {
 }
 
 impl Loaded {
-    /// What GDAL said last on this thread.
-    pub(crate) fn last_words(&self) -> Option<String> {
+    /// An error in the words that GDAL said last on this thread.
+    pub(crate) fn refused(&self, otherwise: &str) -> Error {
         // SAFETY: the text stays until the next call on this thread, and is copied.
         let said = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };
+        let said = said.unwrap_or_else(|| otherwise.to_owned());
         // What a file says comes along: it must not steer a terminal.
         let plain = |c: char| match c {
             '\n' | '\t' => ' ',
             c if c.is_control() => '\u{fffd}',
             c => c,
         };
-        Some(said?.trim().chars().map(plain).collect())
-    }
-
-    /// An error in GDAL's words.
-    pub(crate) fn refused(&self, otherwise: &str) -> Error {
-        Error::Refused(self.last_words().unwrap_or_else(|| otherwise.to_owned()))
+        Error::Refused(said.trim().chars().map(plain).collect())
     }
 
     /// An item of the metadata of a dataset or band.

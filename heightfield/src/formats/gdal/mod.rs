@@ -32,7 +32,7 @@ const NAME: &str = "GDAL";
 /// Drivers that take any file for samples that has a header beside it.
 const BY_HEADER: [&str; 2] = ["ENVI", "EHdr"];
 /// Drivers that put many files together.
-const OF_FILES: [&str; 3] = ["VRT", "STACIT", "STACTA"];
+const OF_FILES: [&str; 2] = ["VRT", "STACIT"];
 /// Enough to tell a file's kind.
 const HEAD_BYTES: u64 = 1024;
 /// Colour pictures have three bands, or four, of bytes.
@@ -123,9 +123,7 @@ fn opened(
             .map_err(fault)?,
         None => dataset,
     };
-    if driver == "STACIT" {
-        stac::check_places(library, path, options)?;
-    }
+    stac::check_places(library, &dataset, path, options)?;
     decoded(dataset, options)
 }
 

@@ -35,8 +35,8 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
                 converted(path, "")
             );
         }
-        BadRaster::ByGdal(GdalError::OpenOption(_)) => {
-            "leave that option out, or name one of the driver's: gdalinfo --format DRIVER lists them"
+        BadRaster::ByGdal(GdalError::OpenOption { .. }) => {
+            "leave that option out, or name one that the driver has"
         }
         BadRaster::ByGdal(_) => {
             return format!(
