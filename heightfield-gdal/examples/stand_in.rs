@@ -98,6 +98,13 @@ silent! {
     VSIFSeekL(*mut c_void, u64, c_int) -> c_int = -1;
     VSIFTellL(*mut c_void) -> u64 = 0;
     VSIFCloseL(*mut c_void) -> c_int = 0;
+    GDALDatasetGetRootGroup(*mut c_void) -> *mut c_void = ptr::null_mut();
+    GDALGroupOpenMDArray(*mut c_void, *const c_char, *const *const c_char) -> *mut c_void = ptr::null_mut();
+    GDALGroupRelease(*mut c_void) -> () = ();
+    GDALMDArrayGetDimensions(*mut c_void, *mut usize) -> *mut *mut c_void = ptr::null_mut();
+    GDALMDArrayRelease(*mut c_void) -> () = ();
+    GDALDimensionGetType(*mut c_void) -> *const c_char = ptr::null();
+    GDALReleaseDimensions(*mut *mut c_void, usize) -> () = ();
     GDALOpenEx(
         *const c_char, c_uint, *const *const c_char, *const *const c_char, *const *const c_char
     ) -> *mut c_void = handle();

@@ -15,6 +15,8 @@ use crate::text::{from_c, list_from_c, path_to_c, to_c};
 
 /// `GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR`, for reading.
 const OPEN_FLAGS: u32 = 0x02 | 0x40;
+/// `GDAL_OF_MULTIDIM_RASTER`, for reading.
+const ARRAYS: u32 = 0x10;
 /// `CE_None`.
 const FINE: i32 = 0;
 
@@ -104,6 +106,25 @@ impl Dataset {
             names
         };
         names.into_iter().map(PathBuf::from).collect()
+    }
+
+    /// The same file as a tree of arrays.
+    pub(crate) fn open_arrays(loaded: Arc<Loaded>, path: &Path) -> Result<Self, Error> {
+        let path = path_to_c(path)?;
+        let none = ptr::null();
+        // SAFETY: the path stays for the call.
+        let handle = unsafe {
+            (loaded.functions.CPLErrorReset)();
+            (loaded.functions.GDALOpenEx)(path.as_ptr(), ARRAYS, none, none, none)
+        };
+        match handle.is_null() {
+            true => Err(loaded.refused("it has no arrays")),
+            false => Ok(Self { loaded, handle }),
+        }
+    }
+
+    pub(crate) const fn handle(&self) -> Handle {
+        self.handle
     }
 
     /// The driver's short name, as `HFA`.

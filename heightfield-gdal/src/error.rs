@@ -41,6 +41,14 @@ pub enum Error {
         /// What is wrong with it.
         why: String,
     },
+    /// GDAL takes too long to open a file.
+    #[error("GDAL has not opened {} after {seconds} s", path.display())]
+    Slow {
+        /// The file.
+        path: PathBuf,
+        /// How long it had.
+        seconds: u64,
+    },
     /// The driver does not know an open option.
     #[error("GDAL's driver {driver} has no open option {name} (it has: {known})")]
     OpenOption {

@@ -9,6 +9,7 @@ use crate::beforehand;
 use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::functions::{Functions, Handle};
+use crate::in_time;
 use crate::settings::Settings;
 use crate::text::{from_c, to_c};
 
@@ -169,10 +170,10 @@ impl Library {
     ///
     /// # Errors
     /// [`Error::Refused`] in GDAL's words, [`Error::NotOpened`], [`Error::OpenOption`],
-    /// [`Error::ZeroByte`].
+    /// [`Error::Slow`], [`Error::ZeroByte`].
     pub fn open(&self, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
         beforehand::check(self, path)?;
-        Dataset::open(self.loaded.clone(), path, options)
+        in_time::open(&self.loaded, path, options)
     }
 
     /// Opens what a driver or an archive names, as `NETCDF:"ocean.nc":depth` of a file that was
@@ -181,7 +182,7 @@ impl Library {
     /// # Errors
     /// As [`open`](Self::open), but nothing is looked at before.
     pub fn open_part(&self, name: &str, options: &[&str]) -> Result<Dataset, Error> {
-        Dataset::open(self.loaded.clone(), Path::new(name), options)
+        in_time::open(&self.loaded, Path::new(name), options)
     }
 }
 

@@ -41,8 +41,8 @@ impl Reader {
     #[must_use]
     pub fn knows(self, file: &str) -> bool {
         let foreign: &[&str] = match self {
-            Self::Own => &[".zip", ".gz", ".dat", ".dt0"],
-            Self::Gdal => &[".npy", ".raw", "in_alpha.png"],
+            Self::Own => &[".zip", ".gz", ".npz", ".dat", ".dt0", ".dem", ".nc", ".grd"],
+            Self::Gdal => &[".npy", ".npz", ".raw", "in_alpha.png"],
         };
         !foreign.iter().any(|end| file.ends_with(end))
     }
