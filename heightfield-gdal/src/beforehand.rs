@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::Error;
 use crate::library::Library;
+use crate::settings;
 
 /// VRTs inside VRTs.
 const MAX_NESTING: u32 = 16;
@@ -60,6 +61,11 @@ impl Names<'_> {
                 for (node, value) in self.library.xml_texts(&text)? {
                     if value.trim_start().starts_with(VRT) {
                         texts.push(value);
+                    } else if is_address(&node, &value) && !settings::is_fetching_allowed() {
+                        return refused(
+                            &path,
+                            "it names what is elsewhere, and nothing is fetched",
+                        );
                     } else if may_be_name(&node, &value) {
                         let found = self.named(&value, &folder)?;
                         open.extend(found.into_iter().map(|path| (path, depth + 1)));
@@ -91,6 +97,16 @@ impl Names<'_> {
         }
         Ok(found)
     }
+}
+
+/// Whether a text of a VRT names what a driver of its own would ask a server for. GDAL itself looks
+/// at addresses that begin with `/vsi`.
+fn is_address(node: &str, value: &str) -> bool {
+    let node = node.to_ascii_lowercase();
+    let is_local = ["/vsi", "vrt://"]
+        .iter()
+        .any(|local| value.starts_with(local));
+    (node.ends_with("filename") || node.ends_with("dataset")) && value.contains("://") && !is_local
 }
 
 /// Whether a text of a VRT may name a file. Most are numbers.

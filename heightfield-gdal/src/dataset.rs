@@ -1,6 +1,6 @@
 //! An open raster.
 
-use std::ffi::{CStr, c_char};
+use std::ffi::{CStr, CString, c_char};
 use std::fmt;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
@@ -15,8 +15,13 @@ use crate::text::{from_c, list_from_c, path_to_c, to_c};
 
 /// `GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR`, for reading.
 const OPEN_FLAGS: u32 = 0x02 | 0x40;
+/// `GDAL_OF_MULTIDIM_RASTER`, for reading.
+const ARRAYS: u32 = 0x10;
 /// `CE_None`.
 const FINE: i32 = 0;
+
+/// Open options that GDAL has for all drivers.
+const OF_ALL: [&str; 1] = ["OVERVIEW_LEVEL"];
 
 /// An open raster, closed when it is dropped.
 pub struct Dataset {
@@ -55,13 +60,38 @@ impl Dataset {
             return Err(loaded.refused("no driver knows the file"));
         }
         let dataset = Self { loaded, handle };
-        match (options.is_empty(), dataset.loaded.last_words()) {
-            // GDAL warns, and opens the file without it.
-            (false, Some(words)) if words.contains("does not support open option") => {
-                Err(Error::OpenOption(words))
+        dataset.check_options(&options)?;
+        Ok(dataset)
+    }
+
+    /// Checks that the driver has such open options: GDAL leaves out what it does not know.
+    fn check_options(&self, options: &[CString]) -> Result<(), Error> {
+        let functions = &self.loaded.functions;
+        // SAFETY: the dataset is open, and its driver stays.
+        let list = unsafe {
+            let driver = (functions.GDALGetDatasetDriver)(self.handle);
+            self.loaded.metadata(driver, "DMD_OPENOPTIONLIST", None)?
+        };
+        let list = list.unwrap_or_default().replace('"', "'");
+        let known = list.split("name='").skip(1);
+        let known: Vec<_> = known.filter_map(|rest| rest.split('\'').next()).collect();
+        for option in options {
+            let option = option.to_string_lossy();
+            let name = option.split('=').next().unwrap_or_default();
+            let is_known = |known: &str| known.eq_ignore_ascii_case(name);
+            if !OF_ALL
+                .into_iter()
+                .chain(known.iter().copied())
+                .any(is_known)
+            {
+                return Err(Error::OpenOption {
+                    name: name.to_owned(),
+                    driver: self.driver(),
+                    known: known.join(", "),
+                });
             }
-            _ => Ok(dataset),
         }
+        Ok(())
     }
 
     /// The files that belong to it: its own, those beside it, and those that it names.
@@ -76,6 +106,25 @@ impl Dataset {
             names
         };
         names.into_iter().map(PathBuf::from).collect()
+    }
+
+    /// The same file as a tree of arrays.
+    pub(crate) fn open_arrays(loaded: Arc<Loaded>, path: &Path) -> Result<Self, Error> {
+        let path = path_to_c(path)?;
+        let none = ptr::null();
+        // SAFETY: the path stays for the call.
+        let handle = unsafe {
+            (loaded.functions.CPLErrorReset)();
+            (loaded.functions.GDALOpenEx)(path.as_ptr(), ARRAYS, none, none, none)
+        };
+        match handle.is_null() {
+            true => Err(loaded.refused("it has no arrays")),
+            false => Ok(Self { loaded, handle }),
+        }
+    }
+
+    pub(crate) const fn handle(&self) -> Handle {
+        self.handle
     }
 
     /// The driver's short name, as `HFA`.

@@ -41,9 +41,24 @@ pub enum Error {
         /// What is wrong with it.
         why: String,
     },
+    /// GDAL takes too long to open a file.
+    #[error("GDAL has not opened {} after {seconds} s", path.display())]
+    Slow {
+        /// The file.
+        path: PathBuf,
+        /// How long it had.
+        seconds: u64,
+    },
     /// The driver does not know an open option.
-    #[error("{0}")]
-    OpenOption(String),
+    #[error("GDAL's driver {driver} has no open option {name} (it has: {known})")]
+    OpenOption {
+        /// The option.
+        name: String,
+        /// The driver.
+        driver: String,
+        /// Those that it has.
+        known: String,
+    },
     /// A text for GDAL has a zero byte in it.
     #[error("{0:?} has a zero byte: GDAL cannot be told that")]
     ZeroByte(String),

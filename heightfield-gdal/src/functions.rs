@@ -112,4 +112,11 @@ functions! {
     VSIFSeekL: (Handle, u64, c_int) -> c_int;
     VSIFTellL: (Handle) -> u64;
     VSIFCloseL: (Handle) -> c_int;
+    GDALDatasetGetRootGroup: (Handle) -> Handle;
+    GDALGroupOpenMDArray: (Handle, *const c_char, *const *const c_char) -> Handle;
+    GDALGroupRelease: (Handle);
+    GDALMDArrayGetDimensions: (Handle, *mut usize) -> *mut Handle;
+    GDALMDArrayRelease: (Handle);
+    GDALDimensionGetType: (Handle) -> *const c_char;
+    GDALReleaseDimensions: (*mut Handle, usize);
 }

@@ -25,17 +25,20 @@
 //! Before a file is opened, it, what lies beside it and what it names as a VRT are looked at: pipes
 //! and devices are refused ([`Error::NotOpened`]). [`Settings`] lists GDAL's own settings.
 
+mod axes;
 mod band;
 mod beforehand;
 mod dataset;
 mod error;
 mod functions;
+mod in_time;
 mod library;
 mod settings;
 mod srs;
 mod text;
 mod virtual_files;
 
+pub use axes::Axis;
 pub use band::{Band, Mask, Sample, SampleType, Window};
 pub use dataset::{Dataset, Subdataset};
 pub use error::Error;

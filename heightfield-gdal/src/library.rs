@@ -9,6 +9,7 @@ use crate::beforehand;
 use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::functions::{Functions, Handle};
+use crate::in_time;
 use crate::settings::Settings;
 use crate::srs::SpatialReference;
 use crate::text::{from_c, to_c};
@@ -170,10 +171,10 @@ impl Library {
     ///
     /// # Errors
     /// [`Error::Refused`] in GDAL's words, [`Error::NotOpened`], [`Error::OpenOption`],
-    /// [`Error::ZeroByte`].
+    /// [`Error::Slow`], [`Error::ZeroByte`].
     pub fn open(&self, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
         beforehand::check(self, path)?;
-        Dataset::open(self.loaded.clone(), path, options)
+        in_time::open(&self.loaded, path, options)
     }
 
     /// A reference system by its text.
@@ -199,7 +200,7 @@ impl Library {
     /// # Errors
     /// As [`open`](Self::open), but nothing is looked at before.
     pub fn open_part(&self, name: &str, options: &[&str]) -> Result<Dataset, Error> {
-        Dataset::open(self.loaded.clone(), Path::new(name), options)
+        in_time::open(&self.loaded, Path::new(name), options)
     }
 }
 
@@ -210,22 +211,18 @@ impl fmt::Debug for Library {
 }
 
 impl Loaded {
-    /// What GDAL said last on this thread.
-    pub(crate) fn last_words(&self) -> Option<String> {
+    /// An error in the words that GDAL said last on this thread.
+    pub(crate) fn refused(&self, otherwise: &str) -> Error {
         // SAFETY: the text stays until the next call on this thread, and is copied.
         let said = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };
+        let said = said.unwrap_or_else(|| otherwise.to_owned());
         // What a file says comes along: it must not steer a terminal.
         let plain = |c: char| match c {
             '\n' | '\t' => ' ',
             c if c.is_control() => '\u{fffd}',
             c => c,
         };
-        Some(said?.trim().chars().map(plain).collect())
-    }
-
-    /// An error in GDAL's words.
-    pub(crate) fn refused(&self, otherwise: &str) -> Error {
-        Error::Refused(self.last_words().unwrap_or_else(|| otherwise.to_owned()))
+        Error::Refused(said.trim().chars().map(plain).collect())
     }
 
     /// An item of the metadata of a dataset or band.

@@ -10,6 +10,9 @@ use crate::text::to_c;
 const SKIPPED: &str = "HTTP WMS WMTS WCS EEDA EEDAI PLMOSAIC PLScenes NGW OGCAPI DAAS \
                        PostGISRaster GeoRaster";
 
+/// Which addresses GDAL may fetch, by how they end.
+const FETCHED: &str = "CPL_VSIL_CURL_ALLOWED_EXTENSIONS";
+
 /// How GDAL is to work. It is one for the process: the settings of the first that loads it hold.
 ///
 /// | of GDAL | set to | so that |
@@ -19,7 +22,7 @@ const SKIPPED: &str = "HTTP WMS WMTS WCS EEDA EEDAI PLMOSAIC PLScenes NGW OGCAPI
 /// | `GDAL_NUM_THREADS` | 1 | it decodes on the caller's thread |
 /// | `GDAL_VRT_ENABLE_PYTHON` | `NO` | a VRT runs no program |
 /// | `GDAL_SKIP` | drivers of servers and data bases | a file leads to no network |
-/// | `CPL_VSIL_CURL_ALLOWED_EXTENSIONS` | none, unless [`may_fetch`](Self::may_fetch) | the same |
+/// | `CPL_VSIL_CURL_ALLOWED_EXTENSIONS` | none, unless [`may_fetch`](Self::may_fetch) or the environment has it | the same |
 /// | `CPL_VSIL_GZIP_WRITE_PROPERTIES` | `NO` | nothing is written beside an archive |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
@@ -39,6 +42,11 @@ impl Default for Settings {
     }
 }
 
+/// Whether the user's environment says what may be fetched.
+pub(crate) fn is_fetching_allowed() -> bool {
+    std::env::var_os(FETCHED).is_some()
+}
+
 impl Settings {
     /// Sets them, before drivers are registered.
     pub(crate) fn apply(self, functions: &Functions) -> Result<(), Error> {
@@ -51,9 +59,9 @@ impl Settings {
             ("GDAL_SKIP", SKIPPED),
             ("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO"),
         ];
-        if !self.may_fetch {
+        if !self.may_fetch && !is_fetching_allowed() {
             // No address ends so.
-            options.push(("CPL_VSIL_CURL_ALLOWED_EXTENSIONS", ".nothing-is-fetched"));
+            options.push((FETCHED, ".nothing-is-fetched"));
         }
         for (name, value) in options {
             let (name, value) = (to_c(name)?, to_c(value)?);

@@ -91,3 +91,45 @@ fn what_cannot_be_opened_is_said_in_words() {
     let zero = gdal.open("a\0b".as_ref(), &[]).expect_err("no path");
     assert!(matches!(zero, Error::ZeroByte(_)), "{zero}");
 }
+
+/// A VRT of one file that it names so.
+fn vrt(folder: &Path, source: &str) -> std::path::PathBuf {
+    let path = folder.join("named.vrt");
+    let text = format!(
+        "<VRTDataset rasterXSize=\"4\" rasterYSize=\"3\"><VRTRasterBand dataType=\"Float32\" band=\"1\">\
+         <SimpleSource><SourceFilename relativeToVRT=\"1\">{source}</SourceFilename></SimpleSource>\
+         </VRTRasterBand></VRTDataset>"
+    );
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+#[test]
+fn what_a_vrt_names_is_looked_at_before_it_is_opened() {
+    let Some(gdal) = gdal() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path());
+    let dataset = gdal
+        .open(&vrt(folder.path(), "field.dat"), &[])
+        .expect("a file");
+    let files = dataset.files();
+    let is_named = |file: &std::path::PathBuf| file.ends_with("field.dat");
+    assert!(files.iter().any(is_named), "{files:?}");
+    for source in ["NETCDF:&quot;http://localhost/a.nc&quot;:z", "/dev/zero"] {
+        let refused = gdal
+            .open(&vrt(folder.path(), source), &[])
+            .expect_err("refused");
+        let is_known = matches!(refused, Error::NotOpened { .. });
+        assert!(is_known || !cfg!(unix), "{source}: {refused}");
+    }
+}
+
+#[test]
+fn open_options_that_no_driver_knows_are_refused() {
+    let Some(gdal) = gdal() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let refused = gdal
+        .open(&write(folder.path()), &["NO_SUCH=1"])
+        .expect_err("unknown");
+    assert!(matches!(refused, Error::OpenOption { .. }), "{refused}");
+}

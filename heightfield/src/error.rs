@@ -77,7 +77,7 @@ pub enum BadRaster {
     #[error("not a height field: {0}")]
     NoNumbers(String),
     /// Several parts could hold the heights; none was chosen.
-    #[error("not a height field: of its two-dimensional {kind}s ({}) none is named as heights are", names.join(", "))]
+    #[error("several {kind}s may be the heights: {}", names.join(", "))]
     SeveralHeights {
         /// What the file calls its parts.
         kind: &'static str,

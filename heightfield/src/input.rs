@@ -222,8 +222,8 @@ impl FileBytes {
 
     /// Bytes at a place of the file.
     pub(super) fn read_at(&self, at: u64, count: u64) -> Result<Vec<u8>, BadRaster> {
-        let end = at.checked_add(count).filter(|end| *end <= self.len);
-        let (Some(end), Ok(room)) = (end, usize::try_from(count)) else {
+        let is_inside = at.checked_add(count).is_some_and(|end| end <= self.len);
+        let (true, Ok(room)) = (is_inside, usize::try_from(count)) else {
             return Err(BadRaster::Truncated("it ends before its samples do".into()));
         };
         let read = match &self.data {
@@ -232,7 +232,7 @@ impl FileBytes {
                 read_exact_at(file, &mut bytes, at).map(|()| bytes)
             }
             #[cfg(test)]
-            Data::Memory(bytes) => Ok(bytes[at as usize..end as usize].to_vec()),
+            Data::Memory(bytes) => Ok(bytes[at as usize..][..room].to_vec()),
             Data::Remote(file, _) => file.read_at(at, room),
         };
         read.map_err(|error| BadRaster::from_io(error, "the samples"))

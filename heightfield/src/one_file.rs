@@ -29,7 +29,10 @@ pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded
         check_no_open_options("plain samples with a header", options)?;
         return Ok(decoded);
     }
-    let format = by_extension(input.extension());
+    let format = match gdal::by_beginning(&head) {
+        Some(_) => Err(BadRaster::UnknownFormat),
+        None => by_extension(input.extension()),
+    };
     let decoded = format.and_then(|format| decode_as(format, input, options));
     or_by_gdal(decoded, input, options)
 }

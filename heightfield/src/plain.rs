@@ -193,7 +193,7 @@ impl Grain {
 }
 
 /// The same, rows taken for columns.
-const fn turned(part: &Part) -> Part {
+pub(super) const fn turned(part: &Part) -> Part {
     Part {
         column: part.row,
         row: part.column,
@@ -203,7 +203,7 @@ const fn turned(part: &Part) -> Part {
 }
 
 /// Rows of columns, of which there are so many of so many samples.
-fn transposed(samples: &Samples, columns: u32, rows: u32) -> Samples {
+pub(super) fn transposed(samples: &Samples, columns: u32, rows: u32) -> Samples {
     fn in_rows<T: Copy>(values: &[T], columns: usize, rows: usize) -> Vec<T> {
         let row = |row: usize| (0..columns).map(move |column| column * rows + row);
         let places = (0..rows).flat_map(row);

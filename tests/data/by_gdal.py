@@ -2,7 +2,7 @@
 """Writes one field in encodings that this repository has no encoder for, for
 `tests/tests/encodings.rs`:
 
-    python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 netCDF4==1.7.5.1
+    python3 -m venv venv && venv/bin/pip install rasterio==1.4.4
     venv/bin/python tests/data/by_gdal.py tests/data/by_gdal
 
 Row 0 is the northernmost; the height at a column and row is `height` below, and there
@@ -11,7 +11,6 @@ is none at HOLE.
 import os
 import sys
 
-import netCDF4
 import numpy as np
 import rasterio
 from rasterio.transform import from_origin
@@ -39,23 +38,6 @@ def write(folder, name, dtype, driver="GTiff", columns=COLUMNS, rows=ROWS, nodat
             dataset.write(samples, band + 1)
 
 
-def netcdf(folder, name, compression):
-    with netCDF4.Dataset(os.path.join(folder, name), "w") as dataset:
-        dataset.createDimension("y", ROWS)
-        dataset.createDimension("x", COLUMNS)
-        for axis, values in (("y", 3800000 - 15 - 30 * np.arange(ROWS)), ("x", 400015 + 30 * np.arange(COLUMNS))):
-            variable = dataset.createVariable(axis, "f8", (axis,))
-            variable.units = "m"
-            variable[:] = values
-        for band, kind in enumerate(("bed", "thickness")):
-            variable = dataset.createVariable(
-                kind, "i2", ("y", "x"), compression=compression, shuffle=True, fill_value=-1
-            )
-            samples = height(COLUMNS, ROWS) + 1000 * band
-            samples[HOLE[1], HOLE[0]] = -1
-            variable[:] = samples
-
-
 def main():
     folder = sys.argv[1]
     os.makedirs(folder, exist_ok=True)
@@ -74,9 +56,6 @@ def main():
         folder, "n34w119.dt0", "int16", driver="DTED", columns=121, rows=121, nodata=-32767,
         crs="EPSG:4326", transform=from_origin(-119 - 1 / 240, 35 + 1 / 240, 1 / 120, 1 / 120),
     )
-    netcdf(folder, "zstd.nc", "zstd")
-    # A packing that is not read here: for the hint.
-    netcdf(folder, "bzip2.nc", "bzip2")
     for name in os.listdir(folder):
         if name.endswith((".aux.xml", ".dt0.tmp")):
             os.remove(os.path.join(folder, name))

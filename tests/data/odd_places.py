@@ -2,7 +2,7 @@
 """Writes small terrains whose places are not plain, for `tests/tests/odd_places.rs`, and where
 GDAL and PROJ (without grids) see them:
 
-    python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2 netCDF4==1.7.5.1
+    python3 -m venv venv && venv/bin/pip install rasterio==1.4.4 pyproj==3.7.2
     venv/bin/python tests/data/odd_places.py tests/data/odd_places
 
 `lean` is the cosine of the angle between a row and a column on the ground. Longitudes and latitudes are those of WGS 84; of another body, and of a datum whose way to
@@ -11,7 +11,6 @@ WGS 84 PROJ does not know, its own.
 import os
 import sys
 
-import netCDF4
 import numpy as np
 import pyproj
 import rasterio
@@ -87,16 +86,6 @@ BOUND = {
     "bound": ("+proj=sterea +lat_0=52.15 +lon_0=5.38 +k=0.9999 +x_0=155000 +y_0=463000 +ellps=bessel +towgs84=565.2,50.1,465.5,-0.4,0.35,-1.87,4.07", (120000, 480000), square(100)),
     "bound_three": ("+proj=longlat +ellps=intl +towgs84=-87,-98,-121", (2.0, 45.0), square(0.01)),
 }
-# The same as NetCDF, whose grid mappings have attributes, and no text.
-MAPPINGS = {
-    "cf_polar": ("EPSG:3413", (-2e6, -1e6), square(1000)),
-    "cf_cone": ("+proj=lcc +lat_0=39 +lon_0=-96 +lat_1=33 +lat_2=45 +x_0=1000 +datum=NAD83", (1e5, 2e5), square(100)),
-    "cf_albers": ("+proj=aea +lat_0=23 +lon_0=-96 +lat_1=29.5 +lat_2=45.5 +datum=NAD83", (1e5, 2e5), square(100)),
-    "cf_utm": ("EPSG:32611", (4e5, 3.8e6), square(30)),
-    "cf_sphere": ("+proj=merc +lon_0=0 +lat_ts=20 +R=6371229", (1e6, 4e6), square(1000)),
-    "cf_sinusoidal": ("+proj=sinu +lon_0=0 +R=6371007.181", (1e6, 4e6), square(1000)),
-    "cf_moon": (MOON, (10.0, 60.0), square(0.01)),
-}
 
 
 def way(system):
@@ -114,26 +103,6 @@ def write_tiff(path, wanted, transform, samples):
         dataset.write(samples, 1)
 
 
-def write_netcdf(path, wanted, transform, samples):
-    system = pyproj.CRS.from_user_input(wanted)
-    units = ["degrees_north", "degrees_east"] if system.is_geographic else ["m", "m"]
-    with netCDF4.Dataset(path, "w", format="NETCDF3_CLASSIC") as dataset:
-        dataset.createDimension("y", ROWS)
-        dataset.createDimension("x", COLUMNS)
-        y = transform.f + transform.e * (np.arange(ROWS) + 0.5)
-        x = transform.c + transform.a * (np.arange(COLUMNS) + 0.5)
-        for axis, values, unit in (("y", y, units[0]), ("x", x, units[1])):
-            variable = dataset.createVariable(axis, "f8", (axis,))
-            variable.units = unit
-            variable[:] = values
-        mapping = dataset.createVariable("mapping", "i4")
-        attributes = {key: value for key, value in system.to_cf().items() if key != "crs_wkt"}
-        mapping.setncatts(attributes)
-        heights = dataset.createVariable("z", "i2", ("y", "x"))
-        heights.setncatts({"units": "m", "grid_mapping": "mapping"})
-        heights[:] = samples
-
-
 def write_grid(path, wanted, transform, samples):
     with open(path, "w") as grid:
         y = transform.f + transform.e * ROWS
@@ -145,7 +114,7 @@ def write_grid(path, wanted, transform, samples):
 
 
 # What each kind of file is called, and who writes it.
-KINDS = ((FILES, ".tif", write_tiff), (UNKNOWN, ".tif", write_tiff), (BOUND, ".asc", write_grid), (MAPPINGS, ".nc", write_netcdf))
+KINDS = ((FILES, ".tif", write_tiff), (UNKNOWN, ".tif", write_tiff), (BOUND, ".asc", write_grid))
 
 
 def row(folder, name):
@@ -187,7 +156,7 @@ def main():
     pyproj.network.set_network_enabled(False)
     with open(os.path.join(folder, "places.csv"), "w") as table:
         print("file,lon_west,lat_south,lon_east,lat_north,lon_middle,lat_middle,along_row_m,along_column_m,lean", file=table)
-        for name in [*FILES, *UNKNOWN, *BOUND, *MAPPINGS]:
+        for name in [*FILES, *UNKNOWN, *BOUND]:
             if (places := row(folder, name)) is not None:
                 print(",".join(places), file=table)
 

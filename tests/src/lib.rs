@@ -27,6 +27,7 @@ pub mod scene;
 pub mod served;
 pub mod slow_line;
 pub mod soak;
+pub mod stand_in;
 pub mod tiffs;
 pub mod timeouts;
 pub mod usb;

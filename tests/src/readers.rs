@@ -37,11 +37,13 @@ impl Reader {
         }
     }
 
-    /// Whether a file is one of its own: GDAL does not look into archives, and knows no
-    /// NumPy.
+    /// Whether it reads a file: GDAL knows no NumPy, and `hapterra` leaves to GDAL what is rare.
     #[must_use]
     pub fn knows(self, file: &str) -> bool {
-        let foreign = [".zip", ".gz", ".npy", ".npz", ".raw", "in_alpha.png"];
-        self == Self::Own || !foreign.iter().any(|end| file.ends_with(end))
+        let foreign: &[&str] = match self {
+            Self::Own => &[".zip", ".gz", ".npz", ".dat", ".dt0", ".dem", ".nc", ".grd"],
+            Self::Gdal => &[".npy", ".npz", ".raw", "in_alpha.png"],
+        };
+        !foreign.iter().any(|end| file.ends_with(end))
     }
 }

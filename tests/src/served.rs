@@ -177,9 +177,14 @@ pub fn terrain(folder: &Path) -> String {
 
 /// The command that serves terrain to the device at this address, and records.
 pub fn command(address: SocketAddr, folder: &Path) -> Command {
+    command_over(&terrain(folder), address, folder)
+}
+
+/// The same for a terrain of this path.
+pub fn command_over(terrain: &str, address: SocketAddr, folder: &Path) -> Command {
     let mut command = Command::new(hapterra_binary());
     command
-        .args(["run", &terrain(folder), "--cell-mm", "1"])
+        .args(["run", terrain, "--cell-mm", "1"])
         .args(["--height-mm-per-unit", "0.1"])
         .args(["--device", &format!("tcp:{address}")])
         .arg("--record")

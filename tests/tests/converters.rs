@@ -338,67 +338,6 @@ fn what_is_too_large_is_cut_or_made_coarser_by_the_hint() {
     }
 }
 
-/// The variable's name is the user's to put in.
-#[test]
-fn a_layer_of_a_netcdf_file_becomes_a_geotiff_by_the_hint() {
-    if !has_gdal() || !has_python("netCDF4") {
-        return;
-    }
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = folder.path();
-    python(
-        at,
-        "import netCDF4, numpy as n\n\
-         def fill(d):\n    \
-             for name, size in (('t', 3), ('y', 30), ('x', 40)):\n        \
-                 d.createDimension(name, size)\n    \
-             d.createVariable('z', 'f4', ('t', 'y', 'x'))[:] = n.arange(3600.0).reshape(3, 30, 40)\n\
-         with netCDF4.Dataset('months.nc', 'w') as d:\n    fill(d)\n\
-         with netCDF4.Dataset('deep.nc', 'w') as d:\n    fill(d.createGroup('inner'))\n",
-    );
-    for (name, variable) in [("months", "z"), ("deep", "/inner/z")] {
-        let hint = hint(&at.join(format!("{name}.nc")));
-        follow(
-            at,
-            &hint.replace(":NAME", &format!(":{variable}")),
-            "gdal_translate",
-        );
-        let raster = taken(&at.join(format!("{name}-converted.tif")));
-        assert_eq!((raster.columns(), raster.rows()), (40, 30), "{name}");
-        assert_eq!(
-            raster.summary().highest,
-            1199.0,
-            "the first layer of {name}"
-        );
-    }
-}
-
-/// What neither this nor most builds of GDAL can unpack: Python's package can.
-#[test]
-fn a_packing_of_netcdf_that_is_not_read_is_taken_off_by_the_hint() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = folder.path();
-    let file = at.join("bzip2.nc");
-    std::fs::copy(data("bzip2.nc"), &file).expect("copied");
-    let hint = hint_of(&["info", "--variable", "bed"], &file);
-    assert!(hint.contains("pip install netCDF4"), "{hint}");
-    if !has_python("netCDF4") {
-        return;
-    }
-    follow(at, &hint, "python3");
-    let bed = OpenOptions {
-        variable: Some("bed".into()),
-        ..OpenOptions::default()
-    };
-    let [found, wanted] = [at.join("bzip2-converted.nc"), data("zstd.nc")]
-        .map(|path| Raster::open(path, &bed).expect("opens"));
-    assert_eq!(found.bounds(), wanted.bounds());
-    assert_eq!(found.summary().holes, 1);
-    for (column, row) in [(0, 0), (20, 10), (39, 29)] {
-        assert_eq!(found.height(column, row), wanted.height(column, row));
-    }
-}
-
 /// GDAL knows nothing of NumPy's files; the hint is Python's.
 #[test]
 fn arrays_are_converted_by_numpy() {

@@ -1,12 +1,13 @@
 //! Many files as one terrain, judged by GDAL: what it makes one file of with `gdalwarp`, or
-//! with `gdal_translate` of a VRT, has the same samples as the folder, the pattern and the VRT.
+//! with `gdal_translate` of a VRT, has the same samples as the folder, the pattern and the VRT,
+//! which is read through libgdal.
 //! Where GDAL's programs are not installed this says so and is skipped.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use hapterra_tests::hapterra_binary;
-use heightfield::{OpenOptions, Raster, files_read_with};
+use hapterra_tests::{bounded, hapterra_binary};
+use heightfield::{OpenOptions, Raster, files_read_with, gdal};
 
 fn has_gdal() -> bool {
     let runs = Command::new("gdalbuildvrt").arg("--version").output();
@@ -327,9 +328,13 @@ fn gaps_are_holes_and_what_lies_outside_is_cut() {
     assert!(row[..4].iter().all(|height| *height == 5.0), "{row:?}");
     assert!(row[4..6].iter().all(|height| height.is_nan()), "{row:?}");
     assert!(row[6..].iter().all(|height| *height == 9.0), "{row:?}");
+    if gdal().is_err() {
+        eprintln!("skipped: there is no libgdal for a VRT");
+        return;
+    }
     let cut = source("a.asc", "xOff=\"-2\" yOff=\"1\" xSize=\"4\" ySize=\"3\"");
-    let far = source("b.asc", "xOff=\"9e9\" yOff=\"0\" xSize=\"4\" ySize=\"3\"");
-    let one = open(vrt(at, "cut.vrt", &(cut + &far)));
+    let none = "<NoDataValue>-1</NoDataValue>".to_owned();
+    let one = open(vrt(at, "cut.vrt", &(none + &cut)));
     let found = |column, row| one.height(column, row);
     // Row 2 is the northernmost, which the source begins below.
     assert!(found(0, 2).is_nan() && found(2, 0).is_nan());
@@ -411,156 +416,75 @@ fn what_does_not_fit_is_refused_with_the_file_and_the_reason() {
     assert!(refused(at.join("[")).contains("pattern"));
 }
 
+/// Whatever a VRT holds, it ends in a terrain or in an error with a hint, within the memory of a
+/// terrain.
 #[test]
-fn malformed_vrts_are_refused_at_once() {
+fn malformed_vrts_end_in_bounded_memory() {
     let place = folder();
     let at = place.path();
     two_tiles(at, 0);
     let whole = "xOff=\"0\" yOff=\"0\" xSize=\"4\" ySize=\"3\"";
-    let file = "<SourceFilename relativeToVRT=\"1\">a.asc</SourceFilename>";
     let entities: String = (1..30)
         .map(|level| format!("<!ENTITY e{level} \"&e{0};&e{0};&e{0};&e{0};\">", level - 1))
         .collect();
-    let deep = "<a>".repeat(100_000);
-    let wide = format!("<SimpleSource>{}</SimpleSource>", "<x/>".repeat(200_000));
-    let attributes: String = (0..100_000)
-        .map(|number| format!(" a{number}=\"\""))
-        .collect();
     let bands = [
-        ("self", source("self.vrt", whole), "a VRT as a source"),
-        ("hidden", source("circle.tif", whole), "hole"),
-        (
-            "negative",
-            source("a.asc", "xOff=\"0\" yOff=\"0\" xSize=\"-4\" ySize=\"3\""),
-            "of -4 × 3",
-        ),
+        ("self", source("self.vrt", whole)),
         (
             "nan",
             source("a.asc", "xOff=\"nan\" yOff=\"0\" xSize=\"4\" ySize=\"3\""),
-            "no place",
         ),
         (
             "giant",
             source("a.asc", "xOff=\"0\" yOff=\"0\" xSize=\"1e300\" ySize=\"3\""),
-            "no place",
         ),
-        (
-            "outside",
-            source("a.asc", "xOff=\"800\" yOff=\"0\" xSize=\"4\" ySize=\"3\""),
-            "no source",
-        ),
-        (
-            "none",
-            source("gone.tif", whole),
-            "none of the VRT's source files",
-        ),
-        ("empty", String::new(), "no source"),
-        (
-            "vsi",
-            source("/vsizip/a.zip/b.tif", whole),
-            "only GDAL finds",
-        ),
-        ("mask", "<MaskBand/>".into(), "mask band"),
-        (
-            "kernel",
-            "<KernelFilteredSource/>".into(),
-            "KernelFilteredSource",
-        ),
-        (
-            "lut",
-            format!("<ComplexSource>{file}<LUT>0:1</LUT></ComplexSource>"),
-            "LUT",
-        ),
+        ("none", source("gone.tif", whole)),
+        ("empty", String::new()),
         (
             "function",
             "<PixelFunctionType>sum</PixelFunctionType>".into(),
-            "pixel function",
         ),
-        ("unnamed", "<SimpleSource/>".into(), "names no file"),
+        ("unnamed", "<SimpleSource/>".into()),
+        ("deep", "<a>".repeat(100_000)),
         (
-            "band",
-            format!("<SimpleSource>{file}<SourceBand>mask,1</SourceBand></SimpleSource>"),
-            "mask,1",
+            "wide",
+            format!("<SimpleSource>{}</SimpleSource>", "<x/>".repeat(200_000)),
         ),
-        ("deep", deep, "too deep"),
-        ("wide", wide, "too large"),
-        (
-            "attributes",
-            format!("<SimpleSource{attributes}/>"),
-            "attributes",
-        ),
-        (
-            "entity",
-            "<Description>&lol;</Description>".into(),
-            "unknown entity",
-        ),
-        ("unclosed", "<Description>".into(), ""),
+        ("unclosed", "<Description>".into()),
     ];
-    for (name, inside, why) in bands {
-        let path = vrt(at, &format!("{name}.vrt"), &inside);
-        if name == "hidden" {
-            // A VRT under another name would lead back to itself.
-            std::fs::copy(&path, at.join("circle.tif")).expect("copied");
-            let output = info(&path);
-            assert!(!output.status.success(), "{output:?}");
-            assert!(
-                told(&output).contains("a VRT among the files"),
-                "{output:?}"
-            );
-            continue;
-        }
-        let found = refused(&path);
-        assert!(found.contains(why), "{name}: {found}");
-    }
-    let texts = [
+    let mut files: Vec<_> = bands
+        .map(|(name, inside)| vrt(at, &format!("{name}.vrt"), &inside))
+        .into();
+    for (name, text) in [
         (
             "bomb",
             format!("<!DOCTYPE V [<!ENTITY e0 \"x\">{entities}]><VRTDataset>&e29;</VRTDataset>"),
-            "document type",
-        ),
-        (
-            "warped",
-            "<VRTDataset subClass=\"VRTWarpedDataset\"/>".into(),
-            "VRTWarpedDataset is not supported",
         ),
         (
             "sizes",
             "<VRTDataset rasterXSize=\"99999999999\" rasterYSize=\"2\"/>".into(),
-            "absurd size",
         ),
-        (
-            "minus",
-            "<VRTDataset rasterXSize=\"-1\" rasterYSize=\"2\"/>".into(),
-            "absurd size",
-        ),
-        ("no", "<VRTDataset/>".into(), "rasterXSize"),
-        (
-            "other",
-            "<GDAL_WMS/>".into(),
-            "does not begin with VRTDataset",
-        ),
+        ("no", "<VRTDataset/>".into()),
         (
             "cut",
             "<VRTDataset rasterXSize=\"8\" rasterYSize=\"2\"><VRTRasterBand>".into(),
-            "too early",
         ),
-        (
-            "binary",
-            "<VRTDataset rasterXSize=\"8\" \0\u{1}\u{2}<<".into(),
-            "",
-        ),
-    ];
-    for (name, text, why) in texts {
+        ("large", format!("<VRTDataset>{}", " ".repeat(33 << 20))),
+    ] {
         let path = at.join(format!("{name}.vrt"));
         std::fs::write(&path, text).expect("written");
-        let found = refused(&path);
-        assert!(found.contains(why), "{name}: {found}");
-        let output = info(&path);
-        let error = told(&output);
-        assert!(
-            error.starts_with("error: ") && error.contains("hint: "),
-            "{error}"
-        );
+        files.push(path);
+    }
+    for path in files {
+        let output = bounded::info(&path, &[]);
+        let told = told(&output);
+        match output.status.code() {
+            Some(0) => {}
+            Some(1) => assert!(
+                told.contains("error: ") && told.contains("hint: "),
+                "{told}"
+            ),
+            code => panic!("{}: {code:?} {told}", path.display()),
+        }
     }
 }
 

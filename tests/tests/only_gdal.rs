@@ -3,7 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use heightfield::{BadRaster, OpenOptions, Raster, gdal};
+use hapterra_tests::{bounded, hapterra_binary, stand_in};
+use heightfield::{BadRaster, OpenOptions, Raster, files_read_with, gdal};
 
 /// Whether there is a libgdal; says so where not.
 fn has_gdal() -> bool {
@@ -79,6 +80,9 @@ fn large_files_stay_on_disk_and_overviews_survey_them() {
 
 #[test]
 fn what_gdal_does_not_know_keeps_its_own_error() {
+    if !has_gdal() {
+        return;
+    }
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("letter.doc");
     std::fs::write(&path, "Dear friend").expect("written");
@@ -91,22 +95,16 @@ fn what_gdal_does_not_know_keeps_its_own_error() {
 }
 
 #[test]
-fn gaps_of_a_vrt_that_gdal_reads_are_said_to_be_heights() {
+fn gaps_of_a_vrt_without_no_data_are_said_to_be_heights() {
     if !has_gdal() {
         return;
     }
     let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("smoothed.vrt");
-    // Filters are not read here.
-    let text = format!(
-        "<VRTDataset rasterXSize=\"5\" rasterYSize=\"8\"><VRTRasterBand dataType=\"Float32\" band=\"1\">\
-         <KernelFilteredSource><SourceFilename>{}</SourceFilename><SourceBand>1</SourceBand>\
-         <SrcRect xOff=\"0\" yOff=\"0\" xSize=\"5\" ySize=\"4\"/><DstRect xOff=\"0\" yOff=\"0\" xSize=\"5\" ySize=\"4\"/>\
-         <Kernel><Size>1</Size><Coefs>1</Coefs></Kernel></KernelFilteredSource>\
-         </VRTRasterBand></VRTDataset>",
-        file("erdas.img").display()
+    let path = vrt(
+        folder.path(),
+        "gap.vrt",
+        &file("erdas.img").display().to_string(),
     );
-    std::fs::write(&path, text).expect("written");
     let raster = Raster::open(&path, &OpenOptions::default()).expect("read by GDAL");
     assert_eq!((raster.height(0, 7), raster.height(0, 0)), (100.5, 0.0));
     let said = raster
@@ -114,4 +112,267 @@ fn gaps_of_a_vrt_that_gdal_reads_are_said_to_be_heights() {
         .iter()
         .any(|remark| remark.contains("-vrtnodata"));
     assert!(said, "{:?}", raster.remarks());
+}
+
+/// A VRT of 5 × 8 samples, of which a file has the northern half.
+fn vrt(folder: &Path, name: &str, of: &str) -> PathBuf {
+    let text = format!(
+        "<VRTDataset rasterXSize=\"5\" rasterYSize=\"8\"><VRTRasterBand dataType=\"Float32\" band=\"1\">\
+         <SimpleSource><SourceFilename relativeToVRT=\"1\">{of}</SourceFilename><SourceBand>1</SourceBand>\
+         <SrcRect xOff=\"0\" yOff=\"0\" xSize=\"5\" ySize=\"4\"/><DstRect xOff=\"0\" yOff=\"0\" xSize=\"5\" ySize=\"4\"/>\
+         </SimpleSource></VRTRasterBand></VRTDataset>"
+    );
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+#[test]
+fn vrts_name_files_beside_them_and_other_vrts() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let inner = folder.path().join("inner");
+    std::fs::create_dir(&inner).expect("a folder");
+    std::fs::copy(file("erdas.img"), inner.join("ground.img")).expect("copied");
+    vrt(&inner, "first.vrt", "ground.img");
+    let second = vrt(folder.path(), "second.vrt", "inner/first.vrt");
+    let raster = Raster::open(&second, &OpenOptions::default()).expect("a VRT of a VRT");
+    assert_eq!(raster.height(0, 7), 100.5);
+    let read = files_read_with(&second);
+    assert!(read.contains(&second) && read.len() == 2, "{read:?}");
+}
+
+/// To open a pipe waits for ever: neither a file, nor what lies beside it, nor what a VRT names in
+/// any way is one.
+#[cfg(unix)]
+#[test]
+fn pipes_are_not_opened_however_they_are_named() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let pipe = |name: &str| {
+        let path = at.join(name);
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(made.expect("mkfifo runs").success());
+        path
+    };
+    let named = pipe("pipe").display().to_string();
+    let mut files: Vec<_> = [
+        ("plain", "pipe"),
+        ("entity", "pip&#101;"),
+        ("whole", named.as_str()),
+        ("driver", "NETCDF:&quot;pipe&quot;:z"),
+        ("part", "/vsisubfile/0_100,pipe"),
+        ("nested", "plain.vrt"),
+        (
+            "inline",
+            "&lt;VRTDataset&gt;&lt;a&gt;pipe&lt;/a&gt;&lt;/VRTDataset&gt;",
+        ),
+    ]
+    .map(|(name, of)| vrt(at, &format!("{name}.vrt"), of))
+    .into();
+    std::fs::copy(file("erdas.img"), at.join("beside.img")).expect("copied");
+    pipe("beside.img.aux.xml");
+    files.push(at.join("beside.img"));
+    for path in files {
+        let error = Raster::open(&path, &OpenOptions::default()).expect_err("a pipe");
+        assert!(error.to_string().contains("a pipe (FIFO)"), "{error}");
+    }
+}
+
+fn packed(folder: &Path, command: &str) {
+    let done = std::process::Command::new("sh")
+        .args(["-c", command])
+        .current_dir(folder)
+        .status();
+    assert!(done.expect("a shell").success(), "{command}");
+}
+
+#[test]
+fn archives_of_one_raster_are_opened_and_of_several_it_is_named() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for (from, to) in [("erdas.img", "a.img"), ("overviews.img", "b.img")] {
+        std::fs::copy(file(from), at.join(to)).expect("copied");
+    }
+    std::fs::write(at.join("README.txt"), "read me").expect("written");
+    packed(
+        at,
+        "tar -cf one.tar a.img README.txt; tar -czf one.tgz ./a.img README.txt; gzip -k a.img; \
+         tar -cf two.tar a.img b.img; tar -cf none.tar README.txt; tar -cf nested.tar one.tar",
+    );
+    for name in ["one.tar", "one.tgz", "a.img.gz"] {
+        let raster = Raster::open(at.join(name), &OpenOptions::default());
+        let raster = raster.unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(
+            (raster.columns(), raster.height(0, 3)),
+            (5, 100.5),
+            "{name}"
+        );
+    }
+    let refused = |name: &str| {
+        let error = Raster::open(at.join(name), &OpenOptions::default()).expect_err(name);
+        error.to_string()
+    };
+    let why = refused("two.tar");
+    assert!(why.contains("a.img, b.img"), "{why}");
+    let chosen = OpenOptions {
+        variable: Some("b.img".into()),
+        ..OpenOptions::default()
+    };
+    let raster = Raster::open(at.join("two.tar"), &chosen).expect("b.img");
+    assert_eq!(raster.columns(), 600);
+    for name in ["none.tar", "nested.tar"] {
+        assert!(refused(name).contains("no terrain file"), "{name}");
+    }
+}
+
+/// A gzip file of a gigabyte of zeros is a megabyte.
+#[test]
+fn archives_that_unpack_to_gigabytes_are_refused() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    packed(
+        folder.path(),
+        "head -c 1100000000 /dev/zero | gzip -1 > bomb.img.gz",
+    );
+    let error = Raster::open(folder.path().join("bomb.img.gz"), &OpenOptions::default());
+    let error = error.expect_err("too large").to_string();
+    assert!(error.contains("1024 MB"), "{error}");
+}
+
+#[test]
+fn labels_beside_planetary_images_are_opened() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let label = "PDS_VERSION_ID = PDS3\r\nRECORD_TYPE = FIXED_LENGTH\r\nRECORD_BYTES = 8\r\n\
+                 FILE_RECORDS = 3\r\n^IMAGE = \"MOON.IMG\"\r\nOBJECT = IMAGE\r\nLINES = 3\r\n\
+                 LINE_SAMPLES = 4\r\nSAMPLE_TYPE = LSB_INTEGER\r\nSAMPLE_BITS = 16\r\nBANDS = 1\r\n\
+                 END_OBJECT = IMAGE\r\nEND\r\n";
+    std::fs::write(folder.path().join("MOON.LBL"), label).expect("written");
+    let samples: Vec<u8> = (0..12_i16).flat_map(i16::to_le_bytes).collect();
+    let image = folder.path().join("MOON.IMG");
+    std::fs::write(&image, samples).expect("written");
+    let raster = Raster::open(&image, &OpenOptions::default()).expect("by its label");
+    assert_eq!((raster.height(0, 2), raster.height(3, 0)), (0.0, 11.0));
+    let said = raster.remarks().join(" ");
+    assert!(said.contains("MOON.LBL"), "{said}");
+}
+
+/// ENVI's samples have any extension, and a unit beside a zone is the unit of the coordinates.
+#[test]
+fn envi_is_placed_by_its_own_unit() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let samples: Vec<u8> = (1..=4_u16).flat_map(u16::to_le_bytes).collect();
+    for (unit, metres) in [("Meters", 1.0), ("Feet", 0.3048)] {
+        for (name, header) in [("a.dat", "a.hdr"), ("b", "b.hdr"), ("c.bil", "c.bil.hdr")] {
+            let text = format!(
+                "ENVI\nsamples = 2\nlines = 2\nbands = 1\nheader offset = 0\ndata type = 12\n\
+                 interleave = bsq\nbyte order = 0\nmap info = {{UTM, 1, 1, {}, {}, {}, {}, 32, North, \
+                 WGS-84, units={unit}}}\n",
+                500_000.0 / metres,
+                5_000_000.0 / metres,
+                30.0 / metres,
+                30.0 / metres
+            );
+            let path = folder.path().join(name);
+            std::fs::write(&path, &samples).expect("written");
+            std::fs::write(folder.path().join(header), text).expect("written");
+            let raster = Raster::open(&path, &OpenOptions::default());
+            let raster = raster.unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(raster.height(0, 1), 1.0, "{name}");
+            let west = raster.bounds_lonlat().expect("known").west;
+            assert!((west - 9.0).abs() < 1e-4, "{name} {unit}: {west}");
+            let cell = raster.cell().expect("a cell").metres().0;
+            assert!((cell - 30.0).abs() < 0.05, "{name} {unit}: {cell}");
+        }
+    }
+}
+
+/// Without a libgdal a file of such a format is named, with what to install by system and the line
+/// that works then; a libgdal that is too old is named with its version.
+#[test]
+fn formats_are_named_where_there_is_no_libgdal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for (name, head, format) in [
+        ("a.nc", &b"CDF\x01"[..], "NetCDF"),
+        ("a.img", b"EHFA_HEADER_TAG", "Erdas Imagine"),
+        ("a.asc", b"north: 5\nsouth: 0\n", "GRASS ASCII"),
+        ("a.dt2", b"UHL1", "DTED"),
+        ("a.dem", b"a quadrangle", "USGS DEM"),
+        ("a.vrt", b"<VRTDataset/>", "VRT"),
+        ("a.json", b"{\"type\":\"FeatureCollection\"}", "STAC"),
+        ("a.zip", b"PK\x03\x04", "ZIP"),
+        ("a.jp2", b"\0\0\0\x0cjP  \r\n\x87\n", "JPEG 2000"),
+    ] {
+        let path = at.join(name);
+        std::fs::write(&path, head).expect("written");
+        let output = bounded::info_without_gdal(&path, &[]);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{told}");
+        for part in [
+            format,
+            "read through GDAL",
+            "apt install",
+            "then this works",
+        ] {
+            assert!(told.contains(part), "{name}: {part} in {told}");
+        }
+    }
+    let old = std::process::Command::new(hapterra_binary())
+        .arg("info")
+        .arg(at.join("a.nc"))
+        .env("GDAL_LIBRARY", stand_in::library(at))
+        .env("STAND_IN_VERSION", "3030200")
+        .output()
+        .expect("it runs");
+    let told = String::from_utf8_lossy(&old.stderr).into_owned();
+    for part in ["is GDAL 3.3.2", "from 3.4.0"] {
+        assert!(told.contains(part), "{told}");
+    }
+}
+
+/// A libgdal that takes 300 ms for each block holds up no tick, and the coarse fallback is below the
+/// hand until the blocks are there.
+#[test]
+fn slow_libgdal_holds_up_no_tick() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let output = std::process::Command::new(hapterra_binary())
+        .arg("demo")
+        .arg(stand_in::terrain(at))
+        .args([
+            "--device",
+            "native",
+            "--in-memory-mb",
+            "0",
+            "--cell-mm",
+            "1",
+        ])
+        .args(["--height-mm-per-unit", "0.1", "--seconds", "4", "--out"])
+        .arg(at.join("out"))
+        .env("GDAL_LIBRARY", stand_in::library(at))
+        .env("STAND_IN_SLEEP_MS", "300")
+        .output()
+        .expect("it runs");
+    let told = [output.stdout, output.stderr].concat();
+    let told = String::from_utf8_lossy(&told).into_owned();
+    println!("{told}");
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("0 missing ticks"), "{told}");
 }

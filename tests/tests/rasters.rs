@@ -9,7 +9,7 @@ use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::readers::Reader;
 use hapterra_tests::shared;
-use heightfield::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster};
+use heightfield::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster, gdal};
 
 const COLUMNS: usize = 512;
 const ROWS: usize = 400;
@@ -218,14 +218,29 @@ fn every_real_file_opens() {
     let Some(folder) = shared("dem/real") else {
         return;
     };
-    let files: [(&str, [u32; 2], u64, [f64; 2]); 19] = [
+    let by_gdal: [(&str, [u32; 2], u64, [f64; 2]); 6] = [
         ("HI_topo_02.nc", [725, 534], 0, [-7.438, 2.804]),
         ("Kilauea.utm.nc", [857, 793], 20656, [0.0, 1505.0]),
-        ("LisbonElevation.tif", [547, 421], 0, [-6.829, 217.941]),
         ("N10W110.hgt.zip", [1201, 1201], 0, [0.0, 9.0]),
+        // GDAL adds a row at either end, without heights.
+        (
+            "SainteHelens.dem",
+            [327, 468],
+            3497 + 2 * 327,
+            [682.0, 2543.0],
+        ),
+        (
+            "earth_relief_20m_holes.grd",
+            [31, 31],
+            171,
+            [-4929.5, 1601.0],
+        ),
+        ("tut_relief.nc", [600, 600], 0, [1052.0, 4328.0]),
+    ];
+    let own: [(&str, [u32; 2], u64, [f64; 2]); 12] = [
+        ("LisbonElevation.tif", [547, 421], 0, [-6.829, 217.941]),
         ("N44W072.hgt", [1201, 1201], 0, [115.0, 1908.0]),
         ("SRTMGL3_boulder.asc", [240, 144], 0, [1943.0, 3286.0]),
-        ("SainteHelens.dem", [327, 466], 3497, [682.0, 2543.0]),
         ("bigtujunga.tif", [1197, 643], 0, [315.0, 2295.0]),
         ("bijou_gully_5m.asc", [105, 77], 0, [1673.068, 1729.865]),
         (
@@ -234,14 +249,7 @@ fn every_real_file_opens() {
             0,
             [87.29, 167.74],
         ),
-        (
-            "earth_relief_20m_holes.grd",
-            [31, 31],
-            171,
-            [-4929.5, 1601.0],
-        ),
         ("hugo_site.asc", [76, 55], 2028, [1660.0, 1711.0]),
-        ("jacksboro_fault_dem.npz", [403, 344], 0, [236.0, 1076.0]),
         ("mt_everest_90m.tif", [1201, 1201], 130_953, [192.0, 8642.0]),
         ("mt_rainier_90m.tif", [1201, 1201], 9033, [263.0, 4371.0]),
         ("pre_runout_DEM.asc", [80, 122], 122, [189.028, 582.385]),
@@ -251,10 +259,10 @@ fn every_real_file_opens() {
             37948,
             [1580.229, 2520.133],
         ),
-        ("tut_relief.nc", [600, 600], 0, [1052.0, 4328.0]),
         ("west_bijou_gully.asc", [43, 89], 2739, [1680.779, 1725.433]),
     ];
-    for (name, [columns, rows], holes, [lowest, highest]) in files {
+    let by_gdal = by_gdal.into_iter().filter(|_| gdal().is_ok());
+    for (name, [columns, rows], holes, [lowest, highest]) in own.into_iter().chain(by_gdal) {
         let raster = open(&folder.join(name));
         let summary = raster.summary();
         assert_eq!([raster.columns(), raster.rows()], [columns, rows], "{name}");
@@ -285,6 +293,10 @@ fn real_files_are_the_right_way_up() {
     let Some(folder) = shared("dem/real") else {
         return;
     };
+    if gdal().is_err() {
+        eprintln!("skipped: there is no libgdal for these files");
+        return;
+    }
     let helens = open(&folder.join("SainteHelens.dem"));
     let places = (0..helens.rows()).flat_map(|row| (0..helens.columns()).map(move |c| (c, row)));
     let summit = places
@@ -293,7 +305,8 @@ fn real_files_are_the_right_way_up() {
         .expect("a summit");
     let place = [
         557.82 + 0.03 * f64::from(summit.0),
-        5108.01 + 0.03 * f64::from(summit.1),
+        // The lowest row is GDAL's.
+        5107.98 + 0.03 * f64::from(summit.1),
     ];
     assert!((place[0] - 562.2).abs() < 0.2, "east {}", place[0]);
     assert!((place[1] - 5115.4).abs() < 0.2, "north {}", place[1]);

@@ -37,7 +37,7 @@ fn rasters() -> Vec<(&'static str, Raster)> {
     let made = Synth::new(Kind::Fractal, 3, 25.0).raster(300, 200);
     let mut all = vec![("fractal", made.expect("raster"))];
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/dem/real");
-    for name in ["mt_rainier_90m.tif", "SainteHelens.dem"] {
+    for name in ["mt_rainier_90m.tif", "LisbonElevation.tif"] {
         let path = folder.join(name);
         match path.exists() {
             true => all.push((

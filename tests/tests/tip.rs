@@ -538,6 +538,11 @@ fn friction_holds_no_hand_on_ten_real_grounds() {
         let Some(file) = shared(&format!("dem/real/{name}")) else {
             return;
         };
+        let is_own = name.ends_with(".tif") || name.ends_with(".asc");
+        if !is_own && heightfield::gdal().is_err() {
+            println!("skipped: there is no libgdal for {name}");
+            continue;
+        }
         let folder = tempfile::tempdir().expect("a folder");
         let [ice, rough] = ["0", "0.4"].map(|mu| Touched::in_demo(folder.path(), &file, mu));
         let times = [0.95, 1.0].map(|share| rough.of_all(share) / ice.of_all(share));

@@ -17,8 +17,8 @@ pub(super) fn choose(
     if let Some(asked) = asked {
         let exact = names.iter().position(|name| *name == asked);
         let there = match names {
-            [] => format!("it has no two-dimensional {kind} of numbers"),
-            names => format!("its two-dimensional {kind}s are {}", names.join(", ")),
+            [] => format!("it has no {kind} of numbers"),
+            names => format!("its {kind}s are {}", names.join(", ")),
         };
         return exact.ok_or_else(|| BadRaster::NoSuchPart {
             asked: format!("{kind} {asked}"),
@@ -33,7 +33,7 @@ pub(super) fn choose(
         (Some(place), _) => Ok(place),
         (None, [_]) => Ok(0),
         (None, []) => Err(BadRaster::NotAHeightField(format!(
-            "it has no two-dimensional {kind} of numbers"
+            "it has no {kind} of numbers"
         ))),
         (None, several) => Err(BadRaster::SeveralHeights {
             kind,

@@ -54,5 +54,8 @@ pub fn files_read_with(path: &Path) -> Vec<PathBuf> {
             .collect(),
     };
     let each = files.iter().flat_map(|file| beside::files_read_with(file));
-    each.collect()
+    let mut each: Vec<_> = each.collect();
+    each.sort();
+    each.dedup();
+    each
 }

@@ -4,16 +4,19 @@
 
 use std::fs::File;
 use std::io::{Read, Write};
+use std::net::SocketAddr;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use hapterra::link::Native;
 use hapterra_core::guard::{Drive, Sense};
 use hapterra_core::wire::session::SessionEnd;
-use hapterra_tests::served::{Served, command, signal};
-use hapterra_tests::timeouts::{end_of, wait_for, wait_until};
+use hapterra_tests::served::{Served, command, command_over, signal};
+use hapterra_tests::stand_in;
+use hapterra_tests::timeouts::{end_of, pass, wait_for, wait_until};
 use rustix::termios::LocalModes;
 
 use super::terminal::{modes, shows, start_command_in, terminal};
@@ -40,19 +43,18 @@ struct Ended {
 
 impl Armed {
     fn new() -> Self {
-        Self::with(|_| {})
+        Self::by(command)
     }
 
-    /// With more options of the command.
-    fn with(more: impl FnOnce(&mut Command)) -> Self {
+    /// Served by this command, which gets the device's address and a folder.
+    fn by(command: impl FnOnce(SocketAddr, &Path) -> Command) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let (amplifiers, pressed) = (Arc::default(), Arc::default());
         let (is_on, is_pressed) = (Arc::clone(&amplifiers), Arc::clone(&pressed));
         let served = Served::with(move || (device(is_on, is_pressed), || {}));
         let (mut window, end) = terminal();
         let before = modes(&end);
-        let mut command = command(served.address, folder.path());
-        more(&mut command);
+        let command = command(served.address, folder.path());
         let guardian = start_command_in(&end, command);
         shows(&mut window, "hold it there and press");
         window.write_all(b"\r").expect("typed");
@@ -176,6 +178,42 @@ fn worker_killed_while_armed_is_disarmed_by_guardian() {
         let partial = partial(rest.folder.path()).expect("a recording");
         assert!(shown.contains(&partial), "{partial}: {shown}");
     }
+}
+
+/// A file that libgdal reads block by block, and a read that ends in SIGSEGV. Zooming out makes the
+/// thread in the background read what nothing has read before.
+#[test]
+fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
+    let place = tempfile::tempdir().expect("a folder");
+    let library = stand_in::library(place.path());
+    let ground = stand_in::terrain(place.path());
+    let crash = place.path().join("crash");
+    let armed = Armed::by(|address, folder| {
+        let ground = ground.to_str().expect("a plain path");
+        let mut command = command_over(ground, address, folder);
+        command.args(["--in-memory-mb", "0"]);
+        command.env("GDAL_LIBRARY", &library);
+        command.env("STAND_IN_CRASH", &crash);
+        command
+    });
+    std::fs::write(&crash, "now").expect("written");
+    let mut keys = armed.window.try_clone().expect("a terminal");
+    let zooming = std::thread::spawn(move || {
+        // Until the terminal is gone, or the farthest view is there.
+        for _ in 0..8 {
+            let _ = keys.write_all(b"-");
+            pass(Duration::from_secs(1));
+        }
+    });
+    let (ended, rest) = armed.end();
+    let shown = &ended.shown;
+    rest.is_disarmed("a crash of libgdal");
+    assert_eq!(ended.status.code(), Some(128 + 11), "{shown}");
+    assert!(shown.contains("ended by SIGSEGV"), "{shown}");
+    let confirmed = format!("tcp:{}: the board has confirmed", rest.served.address);
+    assert!(shown.contains(&confirmed), "{shown}");
+    assert!(partial(rest.folder.path()).is_some(), "{shown}");
+    zooming.join().expect("keys");
 }
 
 #[test]

@@ -9,9 +9,8 @@ use super::packages::{self, found_or_installed};
 use crate::run::say;
 
 /// Extensions of files that are read without GDAL.
-const OWN: [&str; 16] = [
-    "tif", "tiff", "hgt", "npy", "npz", "asc", "png", "flt", "bil", "bip", "bsq", "hdr", "raw",
-    "zip", "gz", "json",
+const OWN: [&str; 12] = [
+    "tif", "tiff", "hgt", "npy", "asc", "png", "flt", "bil", "bip", "bsq", "hdr", "raw",
 ];
 
 /// Sees to it that there is a libgdal, or says why not: without one, files of other formats are
@@ -51,7 +50,13 @@ mod tests {
         ] {
             assert!(!is_wanted_for(Path::new(name)), "{name}");
         }
-        for name in ["erdas.img", "dem.gpkg", "depth.JP2"] {
+        for name in [
+            "erdas.img",
+            "dem.gpkg",
+            "depth.JP2",
+            "N34W119.hgt.zip",
+            "all.vrt",
+        ] {
             assert!(is_wanted_for(Path::new(name)), "{name}");
         }
     }

@@ -10,6 +10,7 @@ use super::{NAME, fault};
 use crate::blocks::{
     Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, usual_block,
 };
+use crate::plain::{transposed, turned};
 use crate::samples::{HoleMask, SampleType, with_samples};
 use crate::{BadRaster, thinned};
 
@@ -183,4 +184,59 @@ fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, BadRaster> {
         holes.set(at, *valid == 0);
     }
     Ok(holes)
+}
+
+/// A band whose rows run from north to south: its samples are turned as they are read. Such bands
+/// have neither masks nor overviews.
+pub(super) struct Turned {
+    blocks: GdalBlocks,
+    images: [BlockImage; 1],
+}
+
+impl Turned {
+    pub(super) fn new(blocks: GdalBlocks) -> Self {
+        let full = blocks.images[0];
+        let [across, down] = full.block;
+        let images = [BlockImage {
+            columns: full.rows,
+            rows: full.columns,
+            block: [down, across],
+            ..full
+        }];
+        Self { blocks, images }
+    }
+}
+
+impl BlockReader for Turned {
+    fn format(&self) -> &'static str {
+        NAME
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.blocks.held
+    }
+
+    fn is_stored(&self, _: usize, _: &Part) -> bool {
+        true
+    }
+
+    fn read(&self, _: usize, part: &Part) -> Result<Block, BadRaster> {
+        let block = self.blocks.read(0, &turned(part))?;
+        Ok(Block {
+            samples: transposed(&block.samples, part.columns, part.rows),
+            ..block
+        })
+    }
+
+    fn index(&self) -> u64 {
+        self.blocks.index
+    }
+
+    fn looks(&self) -> Option<Looks> {
+        Some(thinned::places(&self.images[0], PLACES))
+    }
 }

@@ -24,14 +24,15 @@ use crate::geometry::metres_in;
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::{BadRaster, OpenOptions, ReferenceSystem};
-use blocks::{GdalBlocks, held};
+use blocks::{GdalBlocks, Turned, held};
+pub(crate) use names::by_beginning;
 
 /// The name in messages.
 const NAME: &str = "GDAL";
 /// Drivers that take any file for samples that has a header beside it.
 const BY_HEADER: [&str; 2] = ["ENVI", "EHdr"];
 /// Drivers that put many files together.
-const OF_FILES: [&str; 3] = ["VRT", "STACIT", "STACTA"];
+const OF_FILES: [&str; 2] = ["VRT", "STACIT"];
 /// Enough to tell a file's kind.
 const HEAD_BYTES: u64 = 1024;
 /// Colour pictures have three bands, or four, of bytes.
@@ -105,6 +106,9 @@ fn opened(
                     .push(format!("it is read by its label {name}"));
                 return Ok(decoded);
             }
+            None if path.is_dir() && names::of(path, head).is_some() => {
+                return Err(no_raster(&format!("version {}", library.version())));
+            }
             None => return Err(stac::refused(path, options)?.unwrap_or(BadRaster::UnknownFormat)),
         },
         Err(fault @ BadRaster::ByGdal(_)) => {
@@ -122,10 +126,8 @@ fn opened(
             .map_err(fault)?,
         None => dataset,
     };
-    if driver == "STACIT" {
-        stac::check_places(library, path, options)?;
-    }
-    decoded(dataset, options)
+    stac::check_places(library, &dataset, path, options)?;
+    decoded(library, path, dataset, options)
 }
 
 fn open_options(options: &OpenOptions) -> Vec<&str> {
@@ -142,6 +144,11 @@ fn label_beside(path: &Path) -> Option<PathBuf> {
     labels
         .into_iter()
         .find(|label| label != path && label.is_file())
+}
+
+/// A refusal of a file whose kind is known, and in which this GDAL finds nothing.
+fn no_raster(who: &str) -> BadRaster {
+    BadRaster::ByGdal(Error::Refused(format!("{who} finds no raster in it")))
 }
 
 /// The name of the raster to take, where the file holds several.
@@ -163,10 +170,7 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ba
                 asked: format!("variable {asked}"),
                 there: "the file holds one raster".into(),
             },
-            None => BadRaster::NoNumbers(format!(
-                "{} finds no raster in it; a newer GDAL than this may",
-                dataset.driver()
-            )),
+            None => no_raster(&format!("its driver {}", dataset.driver())),
         });
     }
     let at = match exact {
@@ -183,7 +187,12 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ba
     Ok(Some(parts[at].name.clone()))
 }
 
-fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+fn decoded(
+    library: &Library,
+    path: &Path,
+    dataset: Dataset,
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
     let bands = dataset.bands();
     let number = options.band.unwrap_or(1);
     let band = dataset.band(number).map_err(fault)?;
@@ -195,27 +204,14 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
             bands: bands as u16,
         });
     }
-    let [columns, rows] = band.size();
-    let size = sides(columns.into(), rows.into())?;
     let (no_data, scale, offset) = (band.no_data(), band.scale(), band.offset());
     let unit = band.unit();
     let (driver, map, wkt) = (dataset.driver(), dataset.geo_transform(), dataset.wkt());
-    let conventions = netcdf::Conventions::of(&dataset, &band)?;
+    let conventions = netcdf::Conventions::of(library, path, &dataset, &band)?;
     let blocks = GdalBlocks::new(dataset, number, held(stored))?;
-    let format = format!("{driver} by GDAL, {}", held(stored).none().type_name());
-    let samples = u64::from(columns) * u64::from(rows);
-    let mut decoded = match samples * held(stored).bytes() > options.most_in_memory_bytes {
-        true => {
-            // A packing that GDAL cannot undo is known here, and is no hole.
-            blocks.read(0, &blocks.images()[0].part([0, 0]))?;
-            Decoded::new(format, size, blocks)
-        }
-        false => {
-            let all = blocks.read(0, &Part::whole(columns, rows))?;
-            let mut decoded = Decoded::new(format, size, all.samples);
-            decoded.storage.set_holes(all.holes);
-            decoded
-        }
+    let mut decoded = match conventions.is_turned {
+        true => read(Turned::new(blocks), &driver, options)?,
+        false => read(blocks, &driver, options)?,
     };
     decoded.no_data = no_data;
     decoded.scale = scale.unwrap_or(1.0);
@@ -242,6 +238,28 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
     {
         decoded.lay_out(map, None);
     }
+    Ok(decoded)
+}
+
+/// Samples in memory where they are few, else in their file.
+fn read(
+    blocks: impl BlockReader + 'static,
+    driver: &str,
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    let full = blocks.images()[0];
+    let size = sides(full.columns.into(), full.rows.into())?;
+    let held = blocks.sample_type();
+    let format = format!("{driver} by GDAL, {}", held.none().type_name());
+    let samples = u64::from(full.columns) * u64::from(full.rows);
+    if samples * held.bytes() > options.most_in_memory_bytes {
+        // A packing that GDAL cannot undo is known here, and is no hole.
+        blocks.read(0, &full.part([0, 0]))?;
+        return Ok(Decoded::new(format, size, blocks));
+    }
+    let all = blocks.read(0, &Part::whole(full.columns, full.rows))?;
+    let mut decoded = Decoded::new(format, size, all.samples);
+    decoded.storage.set_holes(all.holes);
     Ok(decoded)
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::packed::Packing;
 
 /// Formats by how a file begins, or a part of its first kibibyte.
-const BEGINNINGS: [(&str, &[u8]); 13] = [
+const BEGINNINGS: [(&str, &[u8]); 18] = [
     ("NetCDF", b"CDF\x01"),
     ("NetCDF", b"CDF\x02"),
     ("NetCDF", b"CDF\x05"),
@@ -19,6 +19,11 @@ const BEGINNINGS: [(&str, &[u8]); 13] = [
     ("GRIB", b"GRIB"),
     ("WebP", b"RIFF"),
     ("GRASS ASCII", b"north:"),
+    ("GRASS ASCII", b"south:"),
+    ("GRASS ASCII", b"east:"),
+    ("GRASS ASCII", b"west:"),
+    ("GRASS ASCII", b"rows:"),
+    ("GRASS ASCII", b"cols:"),
 ];
 
 /// Formats by extension.
@@ -37,13 +42,19 @@ const EXTENSIONS: [(&str, &str); 12] = [
     ("zarr", "Zarr"),
 ];
 
+/// The format of a file that begins as no other.
+pub(crate) fn by_beginning(head: &[u8]) -> Option<&'static str> {
+    let mut known = BEGINNINGS.iter();
+    let known = known.find(|(_, bytes)| head.starts_with(bytes));
+    known.map(|(name, _)| *name)
+}
+
 /// The format of a file or folder that begins with some bytes; none where it may be anything.
 pub(super) fn of(path: &Path, head: &[u8]) -> Option<&'static str> {
     if let Some(packing) = Packing::of(head) {
         return Some(packing.name());
     }
-    let begins = BEGINNINGS.iter().find(|(_, bytes)| head.starts_with(bytes));
-    if let Some((name, _)) = begins {
+    if let Some(name) = by_beginning(head) {
         return Some(name);
     }
     let text = String::from_utf8_lossy(head);

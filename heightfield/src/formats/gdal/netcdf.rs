@@ -1,6 +1,8 @@
 //! What NetCDF's conventions (CF) say of heights and places, where GDAL leaves it to its callers.
 
-use heightfield_gdal::{Band, Dataset};
+use std::path::Path;
+
+use heightfield_gdal::{Axis, Band, Dataset, Library};
 
 use super::fault;
 use crate::crs::Unit;
@@ -13,6 +15,7 @@ pub(super) const HEIGHT_NAMES: &str = "z elevation elev topo topography height a
                                        bedrock surface band1";
 
 /// What a file says of its heights and axes.
+#[derive(Default)]
 pub(super) struct Conventions {
     /// The `standard_name` of the variable.
     name: String,
@@ -22,8 +25,8 @@ pub(super) struct Conventions {
     missing: Option<String>,
     /// Metres in a unit of the axes.
     axes_m: Option<f64>,
-    /// Whether both latitudes and longitudes are axes.
-    is_in_degrees: bool,
+    /// Whether the samples of a row lie from north to south.
+    pub(super) is_turned: bool,
 }
 
 /// The name of the variable that the first band of a file without parts is of.
@@ -33,53 +36,48 @@ pub(super) fn variable(dataset: &Dataset) -> Option<String> {
 
 impl Conventions {
     /// What the attributes of a NetCDF variable say; nothing in a file of another format.
-    pub(super) fn of(dataset: &Dataset, band: &Band<'_>) -> Result<Self, BadRaster> {
-        let is_netcdf = dataset.driver() == "netCDF";
-        let of_band = |name: &str| match is_netcdf {
-            true => band.metadata(name).map_err(fault),
-            false => Ok(None),
-        };
-        let of_axis = |name: &str| match is_netcdf {
-            true => dataset.metadata_items(name),
-            false => Vec::new(),
-        };
-        let units = of_axis("#units");
-        let is_in = |unit: &str| units.iter().any(|(_, own)| own.starts_with(unit));
-        let lengths = of_axis("#standard_name")
-            .into_iter()
-            .filter_map(|(axis, name)| {
-                let unit = units.iter().find(|(own, _)| *own == axis)?;
-                (name == "projection_x_coordinate").then(|| metres_in(&unit.1))?
-            });
-        let axes_m = lengths.into_iter().next();
-        Ok(Self {
-            name: of_band("standard_name")?.unwrap_or_default(),
-            positive: of_band("positive")?.unwrap_or_default().to_lowercase(),
-            missing: of_band("missing_value")?,
-            axes_m,
-            is_in_degrees: is_in("degrees_north") && is_in("degrees_east"),
-        })
+    pub(super) fn of(
+        library: &Library,
+        path: &Path,
+        dataset: &Dataset,
+        band: &Band<'_>,
+    ) -> Result<Self, BadRaster> {
+        let mut found = Self::default();
+        if dataset.driver() != "netCDF" {
+            return Ok(found);
+        }
+        let text = |name: &str| band.metadata(name).map_err(fault);
+        found.name = text("standard_name")?.unwrap_or_default();
+        found.positive = text("positive")?.unwrap_or_default().to_lowercase();
+        found.missing = text("missing_value")?;
+        if let Some(variable) = text("NETCDF_VARNAME")? {
+            found.is_turned = library.last_axis(path, &variable) == Axis::Y;
+        }
+        let units = dataset.metadata_items("#units");
+        let of_axes = dataset.metadata_items("#standard_name");
+        let x = of_axes
+            .iter()
+            .find(|(_, name)| name == "projection_x_coordinate");
+        let unit = x.and_then(|(axis, _)| units.iter().find(|(own, _)| own == axis));
+        found.axes_m = unit.and_then(|(_, unit)| metres_in(unit));
+        Ok(found)
     }
 
-    /// Where the samples lie: by axes in the unit of the reference system, and not with latitudes
-    /// for longitudes.
+    /// Where the samples lie, by axes in the unit of the reference system.
     pub(super) fn placed(
         &self,
         map: Option<[f64; 6]>,
         system: Option<&ReferenceSystem>,
     ) -> Option<[f64; 6]> {
-        let map = map?;
-        if self.is_in_degrees && system.is_none() {
-            // GDAL takes a variable's last dimension for longitude, and finds no system where it
-            // is not.
-            let [x, x_column, x_row, y, y_column, y_row] = map;
-            return Some([y, y_column, y_row, x, x_column, x_row]);
-        }
-        let of_system = match system.map(ReferenceSystem::unit) {
-            Some(Unit::Length(Some(metres))) => metres,
-            _ => return Some(map),
+        let [x, x_column, x_row, y, y_column, y_row] = map?;
+        let map = match self.is_turned {
+            true => [y, y_row, y_column, x, x_row, x_column],
+            false => [x, x_column, x_row, y, y_column, y_row],
         };
-        let times = self.axes_m.map_or(1.0, |metres| metres / of_system);
+        let times = match (system.map(ReferenceSystem::unit), self.axes_m) {
+            (Some(Unit::Length(Some(of_system))), Some(of_axes)) => of_axes / of_system,
+            _ => 1.0,
+        };
         Some(map.map(|number| number * times))
     }
 

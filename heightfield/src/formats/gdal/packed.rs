@@ -146,7 +146,7 @@ fn only(
             "the archive holds no terrain file".into(),
         )),
         _ => Err(BadRaster::SeveralHeights {
-            kind: "file of the archive",
+            kind: "file",
             names: rasters,
         }),
     }

@@ -2,10 +2,11 @@
 //! What it does not read is refused with the command that makes a VRT of the files themselves, and
 //! so is a collection of which an item lies elsewhere than its file.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use glob::Pattern;
-use heightfield_gdal::Library;
+use heightfield_gdal::{Dataset, Library};
 use serde_json::Value;
 
 use crate::{BadRaster, OpenOptions};
@@ -34,35 +35,40 @@ pub(super) fn refused(path: &Path, options: &OpenOptions) -> Result<Option<BadRa
         .transpose()
 }
 
-/// Checks that files lie where their items say.
+/// Checks that files lie where their items say, and that GDAL has found the same files.
 ///
 /// # Errors
 /// [`BadRaster::ToBuild`] where one does not.
 pub(super) fn check_places(
     library: &Library,
+    opened: &Dataset,
     path: &Path,
     options: &OpenOptions,
 ) -> Result<(), BadRaster> {
-    let items = items(path, options)?.unwrap_or_default();
+    let Some(items) = items(path, options)? else {
+        return Ok(());
+    };
+    let full = |path: &Path| std::fs::canonicalize(path).ok();
+    let files: HashSet<_> = opened
+        .files()
+        .iter()
+        .filter_map(|file| full(file))
+        .collect();
     for item in &items {
-        let (Some((size, stated)), [(_, file)]) = (&item.stated, &item.assets[..]) else {
+        let [(_, file)] = &item.assets[..] else {
             continue;
         };
-        let Some(dataset) = Some(file)
-            .filter(|file| !file.starts_with("/vsi"))
-            .and_then(|file| library.open(Path::new(file), &[]).ok())
-        else {
+        if file.starts_with("/vsi") {
             continue;
-        };
-        let found = dataset.band(1).map(|band| band.size());
-        let place = dataset.geo_transform();
-        let is_same = |found: [f64; 6]| {
-            let cell = stated[1].abs().max(stated[5].abs());
-            let corners = [0, 3].map(|at| (found[at] - stated[at]).abs() <= TOLERANCE * cell);
-            corners == [true; 2]
-        };
-        if found != Ok(*size) || !place.is_some_and(is_same) {
-            let why = format!("the item {} lies elsewhere than its file {file}", item.id);
+        }
+        let is_found = full(Path::new(file)).is_some_and(|file| files.contains(&file));
+        let dataset = library.open(Path::new(file), &[]);
+        let lies_there = dataset.is_ok_and(|dataset| item.is_place_of(&dataset));
+        if !(is_found && lies_there) {
+            let why = format!(
+                "the item {} does not lie where its file {file} does",
+                item.id
+            );
             return Err(to_build(&why, &items)?);
         }
     }
@@ -173,6 +179,23 @@ impl Item {
             assets: files.collect(),
             stated: place(),
         }
+    }
+}
+
+impl Item {
+    /// Whether a file lies where the item says, if it does.
+    fn is_place_of(&self, file: &Dataset) -> bool {
+        let Some((size, stated)) = self.stated else {
+            return true;
+        };
+        let has_size = file.band(1).is_ok_and(|band| band.size() == size);
+        let place = file.geo_transform();
+        has_size
+            && place.is_some_and(|found| {
+                let cell = stated[1].abs().max(stated[5].abs());
+                let is_near = |at: usize| (found[at] - stated[at]).abs() <= TOLERANCE * cell;
+                is_near(0) && is_near(3)
+            })
     }
 }
 

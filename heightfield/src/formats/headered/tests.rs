@@ -1,4 +1,4 @@
-//! Headers as GDAL, Esri's programs and ENVI write them, and what is refused.
+//! Headers as GDAL and Esri's programs write them, and what is refused.
 
 use std::fs;
 use std::path::Path;
@@ -92,65 +92,33 @@ fn bands_by_line_by_pixel_and_after_each_other() {
             "BYTEORDER M\nLAYOUT {layout}\nNROWS 2\nNCOLS 3\nNBANDS 2\nNBITS 16\n\
              PIXELTYPE SIGNEDINT\nULXMAP 10.5\nULYMAP 50\nXDIM 0.25\nYDIM 0.25\nNODATA 5\n"
         );
-        let envi = format!(
-            "ENVI\ndescription = {{\n two lines,\n of text}}\nsamples = 3\nlines = 2\nbands = 2\n\
-             header offset = 0\ndata type = 2\ninterleave = {}\nbyte order = 1\n\
-             data ignore value = 5\nmap info = {{Geographic Lat/Lon, 1, 1, 10.375, 50.125, 0.25, \
-             0.25, WGS-84, units=Degrees}}\n",
-            layout.to_lowercase()
-        );
         let bytes = samples.map(i16::to_be_bytes).concat();
-        for header in [esri, envi] {
-            let pair = Pair::new(name, &bytes, "dem.hdr", &header);
-            let raster = pair.open(None).expect("a grid");
-            let first = heights(&raster);
-            assert_eq!(first[..4], [1.0, 2.0, 3.0, 4.0], "{header}");
-            assert!(first[4].is_nan(), "{header}");
-            assert!(raster.remarks()[0].contains("2 bands"));
-            let second = heights(&pair.open(Some(2)).expect("its second band"));
-            assert_eq!(second, [-1.0, -2.0, -3.0, -4.0, -5.0, -6.0], "{header}");
-            assert_eq!(raster.cell().map(|cell| cell.unit), Some(CellUnit::Degree));
-            assert_eq!(
-                raster.bounds().map(|bounds| (bounds.west, bounds.north)),
-                Some((10.375, 50.125))
-            );
-            let error = pair.open(Some(3)).expect_err("two bands");
-            assert!(
-                matches!(error.fault(), BadRaster::NoSuchPart { .. }),
-                "{error}"
-            );
-            assert!(error.to_string().contains("bands 1 to 2"), "{error}");
-        }
-    }
-}
-
-/// ENVI's data may have any extension, or none, and a header's name appended to it.
-#[test]
-fn envi_data_has_any_name() {
-    let header = "ENVI\nsamples = 2\nlines = 2\nbands = 1\nheader offset = 3\ndata type = 12\n\
-                  interleave = bsq\nbyte order = 0\nmap info = {UTM, 1, 1, 400000, 5000000, 10, 10, \
-                  32, North, WGS-84, units=Meters}\n";
-    let bytes = [&[0; 3][..], &[1, 0, 2, 0, 3, 0, 0, 1]].concat();
-    for (data, beside) in [
-        ("dem.dat", "dem.hdr"),
-        ("dem", "dem.hdr"),
-        ("dem.img", "dem.img.hdr"),
-        ("dem.raw", "dem.hdr"),
-    ] {
-        let raster = Pair::new(data, &bytes, beside, header)
-            .open(None)
-            .expect(data);
-        assert_eq!(heights(&raster), [1.0, 2.0, 3.0, 256.0], "{data}");
-        let system = raster.reference_system().expect("by zone and datum");
-        assert_eq!(system.code(), Some(32632));
-        assert_eq!(raster.bounds().map(|bounds| bounds.west), Some(400_000.0));
+        let pair = Pair::new(name, &bytes, "dem.hdr", &esri);
+        let raster = pair.open(None).expect("a grid");
+        let first = heights(&raster);
+        assert_eq!(first[..4], [1.0, 2.0, 3.0, 4.0], "{esri}");
+        assert!(first[4].is_nan(), "{esri}");
+        assert!(raster.remarks()[0].contains("2 bands"));
+        let second = heights(&pair.open(Some(2)).expect("its second band"));
+        assert_eq!(second, [-1.0, -2.0, -3.0, -4.0, -5.0, -6.0], "{esri}");
+        assert_eq!(raster.cell().map(|cell| cell.unit), Some(CellUnit::Degree));
+        assert_eq!(
+            raster.bounds().map(|bounds| (bounds.west, bounds.north)),
+            Some((10.375, 50.125))
+        );
+        let error = pair.open(Some(3)).expect_err("two bands");
+        assert!(
+            matches!(error.fault(), BadRaster::NoSuchPart { .. }),
+            "{error}"
+        );
+        assert!(error.to_string().contains("bands 1 to 2"), "{error}");
     }
 }
 
 /// A folder may have a database or a picture of the name that a header has.
 #[test]
 fn a_file_of_another_kind_has_no_samples_by_a_header_beside_it() {
-    let header = "ENVI\nsamples = 2\nlines = 2\nbands = 1\ndata type = 1\n";
+    let header = "NROWS 2\nNCOLS 2\nNBITS 8\n";
     for (data, bytes) in [
         ("f.gpkg", &b"SQLite format 3\0 and more"[..]),
         ("f.img", b"EHFA_HEADER_TAG\0 and more"),
@@ -205,19 +173,6 @@ fn rows_may_be_padded() {
     assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
 }
 
-#[test]
-fn integers_of_64_bits_and_gains() {
-    let header = "ENVI\nsamples = 2\nlines = 2\nbands = 1\ndata type = 14\nbyte order = 0\n\
-                  data gain values = {0.5}\ndata offset values = {100}\n";
-    let bytes = [2_i64, -4, 1 << 40, 0].map(i64::to_le_bytes).concat();
-    let found = heights(
-        &Pair::new("a.dat", &bytes, "a.hdr", header)
-            .open(None)
-            .expect("a grid"),
-    );
-    assert_eq!(found, [101.0, 98.0, (1_u64 << 39) as f64 + 100.0, 100.0]);
-}
-
 fn told(data: &'static str, bytes: &[u8], header: &str) -> (String, Error) {
     let error = Pair::new(data, bytes, "a.hdr", header)
         .open(None)
@@ -256,25 +211,6 @@ fn what_is_wrong_is_named_and_no_room_is_made_for_it() {
         (
             "ncols 3\nnrows 2\ncellsize 0\nxllcorner 1\nyllcorner 1\n",
             "no size",
-        ),
-        ("ENVI\nsamples = 3\nlines = 2\n", "data type"),
-        ("ENVI\nsamples = 3\nlines = 2\ndata type = 6\n", "complex"),
-        ("ENVI\nsamples = 3\ndata type = 4\n", "no lines"),
-        (
-            "ENVI\nsamples = 3\nlines = 2.5\ndata type = 4\n",
-            "lines is 2.5",
-        ),
-        (
-            "ENVI\nsamples = 3\nlines = 2\ndata type = 4\nfile compression = 1\n",
-            "compressed",
-        ),
-        (
-            "ENVI\nsamples = 3\nlines = 2\ndata type = 4\nmap info = {UTM, 1, 1}\n",
-            "map info",
-        ),
-        (
-            "ENVI\nsamples = 3\nlines = 2\ndata type = 4\nbands = 4000000000\ninterleave = bip\n",
-            "truncated",
         ),
     ] {
         let (text, _) = told("a.flt", &whole, header);

@@ -29,13 +29,14 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         }
         BadRaster::WantsGdal { .. } => {
             return format!(
-                "{}; then this works: hapterra info {}",
+                "{}; then this works: hapterra info {}; or {}",
                 GdalError::how_to_install(),
-                names(path).0
+                names(path).0,
+                converted(path, "")
             );
         }
-        BadRaster::ByGdal(GdalError::OpenOption(_)) => {
-            "leave that option out, or name one of the driver's: gdalinfo --format DRIVER lists them"
+        BadRaster::ByGdal(GdalError::OpenOption { .. }) => {
+            "leave that option out, or name one that the driver has"
         }
         BadRaster::ByGdal(_) => {
             return format!(
@@ -227,11 +228,6 @@ fn converted(path: &Path, options: &str) -> String {
         "zip" => format!("unpack it and name one of its files: python3 -m zipfile -e {from} ."),
         "gz" => format!("unpack it and name what comes out: gzip -dk {from}"),
         "tar" | "tgz" => format!("unpack it and name one of its files: tar -xf {from}"),
-        "nc" | "grd" if options.contains("-b") => format!(
-            "make a GeoTIFF of one of its variables, by its name for NAME (gdalinfo lists them): \
-             gdal_translate {options} {} {to}",
-            quoted(&format!("NETCDF:{}:NAME", path.display()))
-        ),
         _ => format!("convert it to GeoTIFF: gdal_translate{space}{options} {from} {to}"),
     }
 }

@@ -1,0 +1,162 @@
+//! A stand-in for libgdal, for tests: a shared library with the functions that this crate calls.
+//!
+//! It opens any file as one band of 4096 × 4096 heights in blocks of 256 × 256, and makes trouble by
+//! environment variables:
+//!
+//! - `STAND_IN_VERSION`: the number that it gives for its version;
+//! - `STAND_IN_SLEEP_MS`: how long it takes to read a block;
+//! - `STAND_IN_CRASH`: a file; once that is there, the next read ends in SIGSEGV.
+
+#![allow(non_snake_case)]
+
+use std::ffi::{CString, c_char, c_double, c_int, c_uint, c_void};
+use std::path::Path;
+use std::ptr;
+use std::time::Duration;
+
+/// Columns and rows.
+const SIDE: c_int = 4096;
+const BLOCK: c_int = 256;
+/// `GDT_Float32`.
+const FLOAT: c_int = 6;
+const FINE: c_int = 0;
+const FAILED: c_int = 3;
+
+/// Stands for driver, dataset and band, which nothing looks into.
+static HANDLE: u8 = 0;
+
+fn handle() -> *mut c_void {
+    ptr::from_ref(&HANDLE).cast_mut().cast()
+}
+
+/// A text that stays for ever, as some of GDAL's do.
+fn text(of: &str) -> *const c_char {
+    CString::new(of).map_or(ptr::null(), |text| text.into_raw().cast_const())
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok()
+}
+
+/// A hill in each square of 1024 × 1024.
+fn height(column: c_int, row: c_int) -> f32 {
+    let part = |at: c_int| (at % 1024) as f32 / 1024.0;
+    let bump = |at: f32| 4.0 * at * (1.0 - at);
+    200.0 * bump(part(column)) * bump(part(row))
+}
+
+/// Functions that say nothing: each with its arguments, and what it gives.
+macro_rules! silent {
+    ($($name:ident($($argument:ty),*) -> $result:ty = $value:expr;)*) => {
+        $(
+            #[unsafe(no_mangle)]
+            extern "C" fn $name($(_: $argument),*) -> $result {
+                $value
+            }
+        )*
+    };
+}
+
+silent! {
+    CPLSetConfigOption(*const c_char, *const c_char) -> () = ();
+    CPLSetErrorHandler(*const c_void) -> *const c_void = ptr::null();
+    CPLQuietErrorHandler(c_int, c_int, *const c_char) -> () = ();
+    CPLErrorReset() -> () = ();
+    CPLGetLastErrorMsg() -> *const c_char = ptr::null();
+    GDALAllRegister() -> () = ();
+    GDALGetDriverCount() -> c_int = 1;
+    GDALGetDriver(c_int) -> *mut c_void = handle();
+    GDALGetDriverShortName(*mut c_void) -> *const c_char = text("StandIn");
+    GDALGetDriverLongName(*mut c_void) -> *const c_char = text("A stand-in for tests");
+    GDALGetMetadataItem(*mut c_void, *const c_char, *const c_char) -> *const c_char = ptr::null();
+    GDALGetMetadata(*mut c_void, *const c_char) -> *const *const c_char = ptr::null();
+    GDALGetDescription(*mut c_void) -> *const c_char = ptr::null();
+    GDALClose(*mut c_void) -> c_int = FINE;
+    GDALGetDatasetDriver(*mut c_void) -> *mut c_void = handle();
+    GDALGetRasterCount(*mut c_void) -> c_int = 1;
+    GDALGetGeoTransform(*mut c_void, *mut c_double) -> c_int = FAILED;
+    GDALGetProjectionRef(*mut c_void) -> *const c_char = ptr::null();
+    GDALGetRasterBand(*mut c_void, c_int) -> *mut c_void = handle();
+    GDALGetRasterBandXSize(*mut c_void) -> c_int = SIDE;
+    GDALGetRasterBandYSize(*mut c_void) -> c_int = SIDE;
+    GDALGetRasterDataType(*mut c_void) -> c_int = FLOAT;
+    GDALGetDataTypeName(c_int) -> *const c_char = text("Float32");
+    GDALGetRasterNoDataValue(*mut c_void, *mut c_int) -> c_double = 0.0;
+    GDALGetRasterScale(*mut c_void, *mut c_int) -> c_double = 1.0;
+    GDALGetRasterOffset(*mut c_void, *mut c_int) -> c_double = 0.0;
+    GDALGetRasterUnitType(*mut c_void) -> *const c_char = text("m");
+    GDALGetOverviewCount(*mut c_void) -> c_int = 0;
+    GDALGetOverview(*mut c_void, c_int) -> *mut c_void = ptr::null_mut();
+    GDALGetMaskFlags(*mut c_void) -> c_int = 1;
+    GDALGetMaskBand(*mut c_void) -> *mut c_void = ptr::null_mut();
+    GDALGetFileList(*mut c_void) -> *mut *mut c_char = ptr::null_mut();
+    CSLDestroy(*mut *mut c_char) -> () = ();
+    CPLParseXMLString(*const c_char) -> *mut c_void = ptr::null_mut();
+    CPLDestroyXMLNode(*mut c_void) -> () = ();
+    VSIReadDirRecursive(*const c_char) -> *mut *mut c_char = ptr::null_mut();
+    VSIFOpenL(*const c_char, *const c_char) -> *mut c_void = ptr::null_mut();
+    VSIFSeekL(*mut c_void, u64, c_int) -> c_int = -1;
+    VSIFTellL(*mut c_void) -> u64 = 0;
+    VSIFCloseL(*mut c_void) -> c_int = 0;
+    GDALDatasetGetRootGroup(*mut c_void) -> *mut c_void = ptr::null_mut();
+    GDALGroupOpenMDArray(*mut c_void, *const c_char, *const *const c_char) -> *mut c_void = ptr::null_mut();
+    GDALGroupRelease(*mut c_void) -> () = ();
+    GDALMDArrayGetDimensions(*mut c_void, *mut usize) -> *mut *mut c_void = ptr::null_mut();
+    GDALMDArrayRelease(*mut c_void) -> () = ();
+    GDALDimensionGetType(*mut c_void) -> *const c_char = ptr::null();
+    GDALReleaseDimensions(*mut *mut c_void, usize) -> () = ();
+    GDALOpenEx(
+        *const c_char, c_uint, *const *const c_char, *const *const c_char, *const *const c_char
+    ) -> *mut c_void = handle();
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn GDALVersionInfo(_: *const c_char) -> *const c_char {
+    text(&variable("STAND_IN_VERSION").unwrap_or_else(|| "3090000".into()))
+}
+
+/// # Safety
+/// There is room for two numbers.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn GDALGetBlockSize(_: *mut c_void, columns: *mut c_int, rows: *mut c_int) {
+    // SAFETY: by the caller.
+    unsafe {
+        *columns = BLOCK;
+        *rows = BLOCK;
+    }
+}
+
+/// # Safety
+/// There is room for a window of singles.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn GDALRasterIO(
+    _: *mut c_void,
+    _: c_int,
+    column: c_int,
+    row: c_int,
+    columns: c_int,
+    rows: c_int,
+    buffer: *mut c_void,
+    _: c_int,
+    _: c_int,
+    kind: c_int,
+    _: c_int,
+    _: c_int,
+) -> c_int {
+    if variable("STAND_IN_CRASH").is_some_and(|file| Path::new(&file).exists()) {
+        // SAFETY: there is none. This is what it is for.
+        unsafe { ptr::null_mut::<u8>().write_volatile(1) };
+    }
+    let pause = variable("STAND_IN_SLEEP_MS").and_then(|pause| pause.parse().ok());
+    std::thread::sleep(Duration::from_millis(pause.unwrap_or(0)));
+    if kind != FLOAT {
+        return FAILED;
+    }
+    let places =
+        (row..row + rows).flat_map(|row| (column..column + columns).map(move |at| (at, row)));
+    for (at, (column, row)) in places.enumerate() {
+        // SAFETY: by the caller.
+        unsafe { buffer.cast::<f32>().add(at).write(height(column, row)) };
+    }
+    FINE
+}

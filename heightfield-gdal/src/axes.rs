@@ -1,0 +1,59 @@
+//! Which axis of the ground a variable's samples run along.
+
+use std::path::Path;
+use std::ptr;
+
+use crate::dataset::Dataset;
+use crate::library::Library;
+use crate::text::{from_c, to_c};
+
+/// Along what the samples of a row lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// From west to east, or unknown.
+    X,
+    /// From north to south or back.
+    Y,
+}
+
+impl Library {
+    /// The axis of the last dimension of a variable in a file that GDAL has opened: as a raster it is
+    /// taken for x, whatever it is.
+    #[must_use]
+    pub fn last_axis(&self, path: &Path, variable: &str) -> Axis {
+        let Ok(dataset) = Dataset::open_arrays(self.loaded.clone(), path) else {
+            return Axis::X;
+        };
+        let Ok(name) = to_c(variable) else {
+            return Axis::X;
+        };
+        let functions = &self.loaded.functions;
+        // SAFETY: the dataset stays open until the end; each handle is used before it is given back,
+        // once; the list of dimensions has as many as GDAL says.
+        let kind = unsafe {
+            let group = (functions.GDALDatasetGetRootGroup)(dataset.handle());
+            if group.is_null() {
+                return Axis::X;
+            }
+            let array = (functions.GDALGroupOpenMDArray)(group, name.as_ptr(), ptr::null());
+            (functions.GDALGroupRelease)(group);
+            if array.is_null() {
+                return Axis::X;
+            }
+            let mut count = 0;
+            let dimensions = (functions.GDALMDArrayGetDimensions)(array, &raw mut count);
+            let last = count.checked_sub(1).filter(|_| !dimensions.is_null());
+            let kind = last
+                .and_then(|last| from_c((functions.GDALDimensionGetType)(*dimensions.add(last))));
+            if !dimensions.is_null() {
+                (functions.GDALReleaseDimensions)(dimensions, count);
+            }
+            (functions.GDALMDArrayRelease)(array);
+            kind
+        };
+        match kind.as_deref() {
+            Some("HORIZONTAL_Y") => Axis::Y,
+            _ => Axis::X,
+        }
+    }
+}
