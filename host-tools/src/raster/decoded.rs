@@ -1,8 +1,11 @@
 //! What a decoder hands over, and what every format's result must satisfy.
 
+use std::cell::Cell;
+
 use super::blocks::Survey;
 use super::crs::{ReferenceSystem, Vertical};
-use super::geometry::CellSize;
+use super::doubtful::Outermost;
+use super::geometry::{CellSize, metres_in, unknown_unit};
 use super::place::Place;
 use super::samples::{SampleValue, with_samples};
 use super::storage::Storage;
@@ -124,6 +127,17 @@ impl Decoded {
         });
     }
 
+    /// Takes the unit of the heights by its name, where the file states one.
+    pub(super) fn set_unit(&mut self, name: Option<&str>) {
+        let Some(name) = name.filter(|name| !name.is_empty()) else {
+            return;
+        };
+        match metres_in(name) {
+            None => self.remarks.push(unknown_unit(name)),
+            metres => self.metres_per_vertical_unit = metres,
+        }
+    }
+
     /// Takes the metres in a unit of the heights from the user, whatever the file says.
     pub(super) fn with_vertical_unit(mut self, metres: Option<f64>) -> Self {
         if metres.is_some() {
@@ -225,16 +239,19 @@ impl Decoded {
         self.settle_no_data(no_data);
         self.cell = self.cell.filter(CellSize::is_valid);
         self.storage.set_order(self.south_up, self.east_first);
+        let seen = Cell::new(Outermost::NONE);
         let survey = match &self.storage {
-            Storage::Held { .. } => Survey::of_all(self.summarise()?),
+            Storage::Held { .. } => Survey::of_all(self.summarise(&seen)),
             Storage::Blocks(blocks) => {
-                let survey = blocks.survey(|stored| self.height_in_file(stored));
+                let survey = blocks.survey(|stored| self.counted(stored, &seen));
                 if let Some(outage) = blocks.take_outage() {
                     return Err(outage);
                 }
                 survey
             }
         };
+        let doubts = seen.get().remarks(self.no_data.is_some());
+        self.remarks.extend(doubts);
         match survey.summary.has_none() {
             true => Err(BadRaster::AllNoData {
                 // Some were looked at twice.
@@ -251,53 +268,43 @@ impl Decoded {
             .and_then(|value| self.storage.sample_type().none().comparable_no_data(value));
     }
 
-    /// Height of a stored value; NaN in a hole.
+    /// Height of a stored value; NaN in a hole. A value that is no height is a hole.
     pub(super) fn height_of(&self, stored: f64) -> f64 {
-        match self.no_data == Some(stored) {
-            true => f64::NAN,
-            false => stored * self.scale + self.offset,
-        }
-    }
-
-    /// Height of a value read from the file when it is touched, if there is one. Not all
-    /// values were looked at before: one that is no height is a hole.
-    pub(super) fn height_in_file(&self, stored: Option<f64>) -> f64 {
-        let height = stored.map_or(f64::NAN, |stored| self.height_of(stored));
-        match height.abs() > LARGEST_HEIGHT {
+        let height = stored * self.scale + self.offset;
+        match self.no_data == Some(stored) || height.abs() > LARGEST_HEIGHT {
             true => f64::NAN,
             false => height,
         }
     }
 
-    /// One pass over all samples in memory: range, holes, and the first that is no height.
-    fn summarise(&self) -> Result<HeightSummary, BadRaster> {
+    /// Height of a value read from the file when it is touched, if there is one.
+    pub(super) fn height_in_file(&self, stored: Option<f64>) -> f64 {
+        stored.map_or(f64::NAN, |stored| self.height_of(stored))
+    }
+
+    /// The same; the value is counted among those that were looked at.
+    fn counted(&self, stored: Option<f64>, seen: &Cell<Outermost>) -> f64 {
+        if let Some(stored) = stored.filter(|stored| self.no_data != Some(*stored)) {
+            let mut outermost = seen.get();
+            outermost.add(stored);
+            seen.set(outermost);
+        }
+        self.height_in_file(stored)
+    }
+
+    /// One pass over all samples in memory: range and holes.
+    fn summarise(&self, seen: &Cell<Outermost>) -> HeightSummary {
         let mut summary = HeightSummary::EMPTY;
-        let mut absurd = None;
         let Storage::Held { samples, mask } = &self.storage else {
-            return Ok(summary);
+            return summary;
         };
         let hole = |index| mask.as_ref().is_some_and(|mask| mask.contains(index));
         with_samples!(samples, values => {
             for (index, value) in values.iter().enumerate() {
-                let height = match hole(index) {
-                    true => f64::NAN,
-                    false => self.height_of(value.widen()),
-                };
-                if height.abs() > LARGEST_HEIGHT {
-                    absurd = absurd.or(Some((index, value.widen())));
-                } else {
-                    summary.add(height);
-                }
+                let stored = (!hole(index)).then(|| value.widen());
+                summary.add(self.counted(stored, seen));
             }
         });
-        let Some((index, value)) = absurd else {
-            return Ok(summary);
-        };
-        let columns = self.columns as usize;
-        Err(BadRaster::NotANumber {
-            column: (index % columns) as u64,
-            row: (index / columns) as u64,
-            value,
-        })
+        summary
     }
 }

@@ -146,6 +146,11 @@ pub struct VerticalDatum {
     pub code: Option<u16>,
 }
 
+/// The remark on a unit of heights that [`metres_in`] does not know.
+pub(super) fn unknown_unit(name: &str) -> String {
+    format!("it states the unit of heights '{name}', which is not known here (--vertical-unit)")
+}
+
 /// Metres in a unit of length by the name files give it, as `ft` or `metre`.
 pub(crate) fn metres_in(unit: &str) -> Option<f64> {
     let name: String = unit

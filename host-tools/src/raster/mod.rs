@@ -25,8 +25,8 @@
 //! (`georeference`). World files and `.prj` files are read by `beside`.
 //!
 //! **Holes.** No-data as the format states it, NaN, masked samples and tiles
-//! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. An
-//! infinite sample is an error: it is neither a height nor a declared hole.
+//! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. So is a sample
+//! beyond [`LARGEST_HEIGHT`], with a remark.
 
 mod archive;
 mod beside;
@@ -34,6 +34,8 @@ pub(crate) mod bilinear;
 mod blocks;
 mod crs;
 mod decoded;
+mod doubtful;
+mod encoding;
 mod error;
 mod format;
 mod formats;
@@ -44,6 +46,7 @@ mod ground_map;
 mod guard;
 mod input;
 mod mosaic;
+mod numbers;
 mod one_file;
 mod open;
 mod options;
@@ -56,6 +59,7 @@ mod storage;
 mod tangents;
 mod thinned;
 mod unread;
+mod xml;
 
 use std::path::{Path, PathBuf};
 
@@ -164,7 +168,7 @@ impl Raster {
     /// southernmost; NaN is a hole. Cells are 1 m, heights in metres.
     ///
     /// # Errors
-    /// When there are fewer than 2 × 2 samples, no heights, or infinite ones.
+    /// When there are fewer than 2 × 2 samples, or no heights.
     pub fn from_fn(
         columns: u32,
         rows: u32,

@@ -1,6 +1,7 @@
 //! From one file to decoded samples: unpacks, tells the format, decodes.
 
 use super::archive::{self, Zip};
+use super::beside::{Notes, remark_unread};
 use super::format::{Claim, Format, Parts};
 use super::formats::{FORMATS, claim_of, gdal, headered, npy, raw};
 use super::guard::guarded;
@@ -13,7 +14,7 @@ const HEAD_BYTES: u64 = 1024;
 /// Decodes a file, which may be packed.
 pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     if let Some(layout) = options.raw {
-        return raw::decode(input, layout, options);
+        return with_notes(input, options, |options| raw::decode(input, layout, options));
     }
     let head = input.head(HEAD_BYTES)?;
     if archive::is_zip(&head) {
@@ -60,8 +61,34 @@ fn decode_plain(
     if head.is_empty() {
         return Err(BadRaster::Truncated("it is empty".into()));
     }
+    let decoded = with_notes(input, options, |options| decode_here(input, head, options));
+    or_by_gdal(decoded, input, options)
+}
+
+/// Decodes a file with what GDAL has noted beside it.
+fn with_notes(
+    input: &FileBytes,
+    options: &OpenOptions,
+    decode: impl FnOnce(&OpenOptions) -> Result<Decoded, BadRaster>,
+) -> Result<Decoded, BadRaster> {
+    let notes = Notes::read(input, options.band.unwrap_or(1))?;
+    let mut decoded = decode(&OpenOptions {
+        no_data: options.no_data.or(notes.no_data),
+        ..options.clone()
+    })?;
+    notes.apply(&mut decoded);
+    remark_unread(input, &mut decoded);
+    Ok(decoded)
+}
+
+/// Decodes a file without GDAL.
+fn decode_here(
+    input: &FileBytes,
+    head: &[u8],
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
     if let Some(format) = by_content(head) {
-        return or_by_gdal(decode_as(format, input, options), input, options);
+        return decode_as(format, input, options);
     }
     // A header beside a file tells more than the file's extension.
     if !headered::is_of_another_kind(head)
@@ -69,9 +96,7 @@ fn decode_plain(
     {
         return Ok(decoded);
     }
-    let format = by_extension(input.extension());
-    let decoded = format.and_then(|format| decode_as(format, input, options));
-    or_by_gdal(decoded, input, options)
+    decode_as(by_extension(input.extension())?, input, options)
 }
 
 /// What is not known or not supported here is given to GDAL, where there is a libgdal.

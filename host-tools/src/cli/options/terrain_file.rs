@@ -72,7 +72,7 @@ pub struct ReadingOptions {
     #[arg(long, value_name = "UNIT", value_parser = parse_unit, help_heading = INPUT)]
     pub vertical_unit: Option<f64>,
 
-    /// How the colours of a PNG encode heights
+    /// How the colours of a picture (PNG, TIFF, WebP by GDAL) encode heights
     #[arg(long, value_enum, conflicts_with = "png_channel", help_heading = INPUT)]
     pub encoding: Option<Encoding>,
 

@@ -1,6 +1,7 @@
 //! The index of files that share a grid: the header of each is read, or what a STAC says instead,
 //! and nothing else.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::super::blocks::Part;
@@ -9,6 +10,7 @@ use super::super::ground_map::GroundMap;
 use super::super::samples::SampleType;
 use super::super::{BadRaster, OpenOptions, ReferenceSystem};
 use super::grid::{Grid, Spot, unwrap_turns};
+use super::layers;
 use super::pool::{options_for_tiles, whole_bytes};
 use super::reader::Mosaic;
 use super::source::{Axis, Source, Values};
@@ -67,6 +69,7 @@ impl Stated {
 /// A file as it is on the grid.
 struct Tile {
     path: PathBuf,
+    sample: SampleType,
     bytes: u64,
     is_east_first: bool,
     is_south_up: bool,
@@ -84,10 +87,13 @@ struct Index {
 /// A terrain of files: where they overlap the last one with a height counts.
 pub(super) fn decoded(files: Vec<File>, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     let mut index = Index::read(files, options)?;
+    let layers = index.remove_layers(options)?;
     if let Some(around) = index.grid.columns_around() {
         unwrap_turns(&mut index.spots, around);
     }
-    index.decoded(options)
+    let mut decoded = index.decoded(options)?;
+    decoded.remarks.extend(layers::left_out(&layers));
+    Ok(decoded)
 }
 
 impl Index {
@@ -148,11 +154,42 @@ impl Index {
         let bytes = std::fs::metadata(&path).map_or(0, |metadata| metadata.len());
         self.tiles.push(Tile {
             path,
+            sample: outline.storage.sample_type(),
             bytes,
             is_east_first: outline.east_first,
             is_south_up: outline.south_up,
         });
         Ok(())
+    }
+
+    /// Leaves out what lies on the same samples as heights and is none, and tells its files.
+    fn remove_layers(&mut self, options: &OpenOptions) -> Result<Vec<PathBuf>, BadRaster> {
+        let mut at_spots: HashMap<Spot, Vec<usize>> = HashMap::new();
+        for (number, spot) in self.spots.iter().enumerate() {
+            at_spots.entry(*spot).or_default().push(number);
+        }
+        let mut is_layer = vec![false; self.tiles.len()];
+        for numbers in at_spots.values().filter(|numbers| numbers.len() > 1) {
+            let named = |number: &usize| {
+                let tile = &self.tiles[*number];
+                (tile.path.as_path(), tile.sample)
+            };
+            let files: Vec<_> = numbers.iter().map(named).collect();
+            if let Some(heights) = layers::heights_among(&files) {
+                for (at, number) in numbers.iter().enumerate() {
+                    is_layer[*number] = at != heights;
+                }
+            }
+        }
+        let mut each = is_layer.iter();
+        self.spots.retain(|_| each.next() == Some(&false));
+        let tiles = std::mem::take(&mut self.tiles).into_iter().zip(&is_layer);
+        let (layers, tiles): (Vec<_>, Vec<_>) = tiles.partition(|(_, is_layer)| **is_layer);
+        self.tiles = tiles.into_iter().map(|(tile, _)| tile).collect();
+        if is_layer.first() == Some(&true) {
+            self.grid.first = outline(&self.tiles[0].path, &options_for_tiles(options))?;
+        }
+        Ok(layers.into_iter().map(|(tile, _)| tile.path).collect())
     }
 
     fn decoded(self, options: &OpenOptions) -> Result<Decoded, BadRaster> {
@@ -176,7 +213,9 @@ impl Index {
             false => SampleType::F64,
         };
         let mosaic = Mosaic::new(size, sources.collect(), sample, options);
+        let remarks = differences(&mosaic)?;
         let mut decoded = Decoded::new(format, size, mosaic);
+        decoded.remarks = remarks;
         decoded.system = first.system.clone();
         decoded.system_from = first.system_from;
         decoded.metres_per_vertical_unit = first.metres_per_vertical_unit;
@@ -188,6 +227,35 @@ impl Index {
         decoded.lay_out(map, first.ground_unit());
         Ok(decoded)
     }
+}
+
+/// Remarks on files that overlap and have other heights there.
+///
+/// # Errors
+/// [`BadRaster::SamePlace`] where both lie on the same samples.
+fn differences(mosaic: &Mosaic) -> Result<Vec<String>, BadRaster> {
+    const MOST_NAMED: usize = 3;
+    let found = mosaic.disagreements()?;
+    let path = |number: usize| &mosaic.sources()[number].path;
+    if let Some(same) = found.iter().find(|it| it.is_on_same_samples) {
+        return Err(BadRaster::SamePlace {
+            files: same.files.map(|number| path(number).clone()),
+            difference: same.most,
+        });
+    }
+    let named = found.iter().take(MOST_NAMED);
+    Ok(named
+        .map(|it| {
+            let [one, other] = it.files.map(|number| {
+                let name = path(number).file_name().unwrap_or_default();
+                name.to_string_lossy().into_owned()
+            });
+            format!(
+                "{one} and {other} overlap and differ there by up to {} ({} of {} places compared): {other} is taken",
+                it.most, it.different, it.compared
+            )
+        })
+        .collect())
 }
 
 /// The same fault, with the name of the item whose file it is.

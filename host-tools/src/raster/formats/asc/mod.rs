@@ -38,6 +38,12 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     let format = format!("Esri ASCII grid, {}", samples.type_name());
     let mut decoded = Decoded::new(format, (columns, rows), samples);
     decoded.no_data = Some(header.no_data());
+    if let Some(word) = &header.no_data_word {
+        decoded.remarks.push(format!(
+            "its no-data value is the text '{word}', which is no number: samples with this text are holes, and those of {}",
+            header.no_data()
+        ));
+    }
     let (east, north) = header.cell()?;
     beside::reference_system(input, &mut decoded)?;
     match header.south_west((east, north)) {

@@ -71,7 +71,7 @@ pub(in crate::raster) fn decode_by_header(
     let header = if envi::is_header(&text) {
         envi::read(&text, band)
     } else if esri::is_header(&text) {
-        esri::read(&text, input.extension())
+        esri::read(&text, input.extension(), input.len())
     } else {
         return Ok(None);
     };

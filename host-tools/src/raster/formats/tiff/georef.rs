@@ -16,6 +16,8 @@ use crate::raster::placed::GroundUnit;
 
 const MODEL_PIXEL_SCALE: u16 = 33550;
 const MODEL_TIEPOINT: u16 = 33922;
+/// Column, row and level of a sample, and its three coordinates.
+const NUMBERS_OF_A_TIE: usize = 6;
 const MODEL_TRANSFORMATION: u16 = 34264;
 const GEO_KEY_DIRECTORY: u16 = 34735;
 const GEO_DOUBLE_PARAMS: u16 = 34736;
@@ -35,6 +37,8 @@ pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>) {
         if !has_place(image) {
             decoded.place = None;
         }
+    } else if let points @ 1.. = numbers(image, MODEL_TIEPOINT).len() / NUMBERS_OF_A_TIE {
+        decoded.remark_control_points(points);
     }
 }
 

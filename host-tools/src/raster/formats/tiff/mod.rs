@@ -3,6 +3,7 @@
 //!
 //! `tiff-reader` decodes; it is named in this folder only.
 
+mod blended;
 mod blocks;
 mod budget;
 mod fault;
@@ -23,18 +24,19 @@ use std::iter::once;
 use std::sync::Arc;
 
 use tiff_reader::source::{BytesSource, FileSource, SharedSource};
-use tiff_reader::{ParseBudgets, TiffError, TiffFile};
+use tiff_reader::{Ifd, ParseBudgets, TiffError, TiffFile};
 
-use crate::raster::beside::{find_appended, lay_out_by_world_file};
+use crate::raster::beside::{find_appended, lay_out_by_world_file, remark_other_place};
 use crate::raster::blocks::Part;
 use crate::raster::decoded::Decoded;
 use crate::raster::format::{Claim, Format, Parts, starts_with_any};
 use crate::raster::input::{Data, FileBytes};
 use crate::raster::storage::Storage;
 use crate::raster::{BadRaster, OpenOptions};
+use blended::blended;
 use blocks::{Image, Known, TiffBlocks};
 use fault::fault;
-use layout::Layout;
+use layout::{Layout, Wanted};
 use metadata::Metadata;
 use remote_source::RemoteSource;
 
@@ -67,8 +69,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     let mask = mask_file.as_ref().map(open).transpose()?.map(Arc::new);
     let known = Known {
         name: input.name(),
-        asked: options.band,
-        classes: options.classes,
+        wanted: wanted(options)?,
         mask: mask.as_ref(),
         disk: match input.remote() {
             Some(_) => Err("it is at a URL"),
@@ -83,47 +84,87 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     if options.band.is_some() {
         format += &format!(", band {} of {bands}", band + 1);
     }
+    let metadata = Metadata::read(full.ifd(), band, bands);
     let files: Vec<_> = once(input).chain(&mask_file).collect();
-    let (storage, told) = stored(&files, options, &file, image, &known)?;
+    let held = layout.held().none();
+    let no_data = options.no_data.or(metadata.no_data);
+    let no_data = no_data.and_then(|value| held.comparable_no_data(value));
+    let (storage, told) = stored(&files, options, &file, image, &known, no_data)?;
     let mut decoded = Decoded::new(format, size, storage);
-    match told {
-        Some(Told::Unpacked(remark)) => decoded.remarks.push(remark),
-        Some(Told::Whole(why)) => decoded.why_whole = Some(why),
-        None => {}
+    for told in told {
+        match told {
+            Told::Remark(remark) => decoded.remarks.push(remark),
+            Told::Whole(why) => decoded.why_whole = Some(why),
+        }
     }
-    if options.band.is_none() && bands > 1 + u16::from(has_alpha) {
+    if options.band.is_none() && options.encoding.is_none() && bands > 1 + u16::from(has_alpha) {
         decoded.remarks.push(format!(
             "it has {bands} bands: the first is taken for the height (--band)"
         ));
     }
-    let metadata = Metadata::read(full.ifd(), band)?;
     decoded.no_data = metadata.no_data;
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
+    decoded.remarks.extend(metadata.remarks);
     georef::apply(full.ifd(), &mut decoded, metadata.metres_per_vertical_unit);
-    if decoded.place.is_none() {
-        lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
+    match decoded.place {
+        None => lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?,
+        Some(_) => remark_other_place(input, &WORLD_FILES, &mut decoded),
     }
+    if let Some(encoding) = options.encoding {
+        decoded.take_codes(encoding);
+    }
+    remark_orientation(full.ifd(), &mut decoded);
     Ok(decoded)
+}
+
+/// What the user wants of the file.
+fn wanted(options: &OpenOptions) -> Result<Wanted, BadRaster> {
+    match (options.encoding, options.band) {
+        (Some(_), Some(band)) => Err(BadRaster::NoSuchPart {
+            asked: format!("band {band} with --encoding"),
+            there: "three bands together are one height".into(),
+        }),
+        (Some(_), None) => Ok(Wanted::Codes),
+        (None, band) if options.classes => Ok(Wanted::Classes(band)),
+        (None, band) => Ok(Wanted::Heights(band)),
+    }
+}
+
+/// Remarks on the tag that says where the first row and column lie: GDAL does not use it, either.
+fn remark_orientation(image: &Ifd, decoded: &mut Decoded) {
+    const ORIENTATION: u16 = 274;
+    let first = match image.tag(ORIENTATION).and_then(|tag| tag.value.as_u32()) {
+        None | Some(0 | 1) => return,
+        Some(2) => "the first row at the top, the first column at the right",
+        Some(3) => "the first row at the bottom, the first column at the right",
+        Some(4) => "the first row at the bottom, the first column at the left",
+        Some(_) => "rows and columns exchanged",
+    };
+    decoded.remarks.push(format!(
+        "its Orientation tag has {first}: it is not used, as in GDAL, and the first row is taken to be the northern one unless the file's place says otherwise"
+    ));
 }
 
 /// What the user is told of where the samples are.
 enum Told {
-    /// What is unpacked on disk.
-    Unpacked(String),
+    /// How they are read.
+    Remark(String),
     /// Why all are in memory.
     Whole(String),
 }
 
 /// The samples of the full image: left in the file where they are many and that can be, else all
-/// of them. `files` are the TIFF and the one of its mask, if it has one.
+/// of them. `files` are the TIFF and the one of its mask, if it has one; `no_data` is as a sample can
+/// hold it.
 fn stored(
     files: &[&FileBytes],
     options: &OpenOptions,
     file: &Arc<TiffFile>,
     mut image: Image,
     known: &Known<'_>,
-) -> Result<(Storage, Option<Told>), BadRaster> {
+    no_data: Option<f64>,
+) -> Result<(Storage, Vec<Told>), BadRaster> {
     let input = files[0];
     let most = match input.remote() {
         // What is not touched is not fetched, either.
@@ -149,8 +190,21 @@ fn stored(
                     None => None,
                 };
                 let file = (file.clone(), input.remote());
-                let blocks = TiffBlocks::new(file, image, overviews, known, files)?;
-                return Ok((blocks.into(), told));
+                let mut blocks = TiffBlocks::new(file, image, overviews, known, files)?;
+                let mut remarks: Vec<_> = told.into_iter().collect();
+                if options.encoding.is_some() && blocks.has_overviews() {
+                    blocks.leave_overviews_out();
+                    remarks.push(Told::Remark(
+                        "its overviews are not used: the mean of encoded colours is no height"
+                            .into(),
+                    ));
+                } else if let Some(no_data) = no_data.filter(|_| !input.is_outline())
+                    && let Some(remark) = blended(&blocks, no_data)?
+                {
+                    blocks.leave_overviews_out();
+                    remarks.push(Told::Remark(remark));
+                }
+                return Ok((blocks.into(), remarks));
             }
             Err(why) => told = Some(Told::Whole(why + at_once(&image.layout))),
         }
@@ -159,15 +213,15 @@ fn stored(
     budget::check_memory(layout)?;
     budget::check(layout, input.len(), false)?;
     if input.is_outline() {
-        return Ok((layout.sample().held().none().into(), told));
+        return Ok((layout.held().none().into(), told.into_iter().collect()));
     }
     let all = Part::whole(layout.columns, layout.rows);
     if let Some(remote) = input.remote() {
         remote.want(once(0..input.len()));
     }
-    let mut storage = Storage::from(samples::read(layout, layout.band, &all)?);
+    let mut storage = Storage::from(samples::heights(layout, &all)?);
     storage.set_holes(samples::holes(layout, &image.masks, &all)?);
-    Ok((storage, told))
+    Ok((storage, told.into_iter().collect()))
 }
 
 /// What is said of the memory that is taken while a file is read as a whole, where that is more
@@ -188,7 +242,7 @@ fn unpacked_told(image: &Image) -> Option<Told> {
         None => "the strips or tiles of its mask".into(),
     };
     (megabytes > 0).then(|| {
-        Told::Unpacked(format!(
+        Told::Remark(format!(
             "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache-dir), up to {megabytes} MB, until the program ends"
         ))
     })

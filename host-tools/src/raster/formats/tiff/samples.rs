@@ -10,11 +10,24 @@ use super::layout::{Layout, SampleFormat};
 use super::masks::Mask;
 use super::{uncompressed, unpack};
 use crate::raster::blocks::Part;
+use crate::raster::encoding::codes;
 use crate::raster::samples::{HoleMask, SampleValue, with_samples};
 use crate::raster::{BadRaster, Samples};
 
+/// Reads a part of the band that is the height, or of the codes of heights.
+pub(super) fn heights(layout: &Layout, part: &Part) -> Result<Samples, BadRaster> {
+    match layout.has_codes {
+        false => read(layout, layout.band, part),
+        true => Ok(codes([
+            read(layout, 0, part)?,
+            read(layout, 1, part)?,
+            read(layout, 2, part)?,
+        ])),
+    }
+}
+
 /// Reads a part of a band, the first being 0.
-pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
+fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
     use SampleFormat::{Float, Signed, Unsigned};
     if layout.is_read_by_rows() {
         return uncompressed::read(layout, band, part);
