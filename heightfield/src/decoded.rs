@@ -5,6 +5,7 @@ use std::cell::Cell;
 use super::blocks::Survey;
 use super::crs::{ReferenceSystem, Vertical};
 use super::doubtful::Outermost;
+use super::file_layout::FileLayout;
 use super::geometry::{CellSize, metres_in, unknown_unit};
 use super::place::Place;
 use super::samples::{SampleValue, with_samples};
@@ -53,6 +54,8 @@ pub(super) struct Decoded {
     pub(super) vertical_datum: Option<VerticalDatum>,
     /// Why all samples are in memory, where the format could have left them in the file.
     pub(super) why_whole: Option<String>,
+    /// How the file lays them out.
+    pub(super) file_layout: FileLayout,
     /// What the user should know.
     pub(super) remarks: Vec<String>,
 }
@@ -93,6 +96,7 @@ impl Decoded {
             vertical_unit_from: Certainty::Stated,
             vertical_datum: None,
             why_whole: None,
+            file_layout: FileLayout::default(),
             remarks: Vec::new(),
         }
     }
@@ -159,7 +163,6 @@ impl Decoded {
             let remark = format!(
                 "it is read as a whole, {megabytes} MB: {why}. As this it stays on the disk: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE IN OUT.tif"
             );
-            tracing::warn!("{remark}");
             self.remarks.push(remark);
         }
     }

@@ -1,7 +1,6 @@
 //! Heights encoded in the colours of a picture, as web maps hand them out.
 
 use super::decoded::Decoded;
-use super::samples::{SampleValue, with_samples};
 use super::{BadRaster, Encoding, Samples};
 
 impl Encoding {
@@ -26,15 +25,11 @@ pub(super) const fn code([red, green, blue]: [u8; 3]) -> i32 {
     i32::from_be_bytes([0, red, green, blue])
 }
 
-/// The codes of three bands of bytes.
-pub(super) fn codes([red, green, blue]: [Samples; 3]) -> Samples {
-    let values = |samples: &Samples| -> Vec<u8> {
-        with_samples!(samples, values => values.iter().map(|it| it.widen() as u8).collect())
-    };
-    let [red, green, blue] = [red, green, blue].map(|band| values(&band));
-    let all = red.iter().zip(&green).zip(&blue);
+/// The codes of three bands.
+pub(super) fn codes([red, green, blue]: [Vec<u8>; 3]) -> Samples {
+    let all = red.into_iter().zip(green).zip(blue);
     let codes: Vec<i32> = all
-        .map(|((red, green), blue)| code([*red, *green, *blue]))
+        .map(|((red, green), blue)| code([red, green, blue]))
         .collect();
     codes.into()
 }

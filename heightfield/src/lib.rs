@@ -40,6 +40,7 @@ pub mod disk_cache;
 mod doubtful;
 mod encoding;
 mod error;
+mod file_layout;
 mod format;
 mod formats;
 mod geometry;
@@ -76,6 +77,7 @@ use std::path::{Path, PathBuf};
 pub use crs::{LonLat, ReferenceSystem};
 pub use decoded::{HeightSummary, LARGEST_HEIGHT};
 pub use error::{BadRaster, Error};
+pub use file_layout::{FileLayout, SamplesAre};
 pub use geometry::metres_in;
 pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
 pub use georeference::around;
@@ -447,6 +449,21 @@ impl Raster {
     /// Name of the format and variant, as `GeoTIFF, int16, deflate`.
     pub fn format(&self) -> &str {
         &self.source.format
+    }
+
+    /// How the file lays its samples out.
+    pub fn file_layout(&self) -> &FileLayout {
+        &self.source.file_layout
+    }
+
+    /// The stored value that means no data, if one does.
+    pub fn no_data(&self) -> Option<f64> {
+        self.source.no_data
+    }
+
+    /// Scale and offset: a height is a stored value × scale + offset.
+    pub fn scale_and_offset(&self) -> (f64, f64) {
+        (self.source.scale, self.source.offset)
     }
 
     /// The horizontal reference system, where the file states it.

@@ -15,6 +15,8 @@ use crate::blocks::{
     Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, usual_block,
 };
 use crate::decoded::{Decoded, sides};
+use crate::encoding::{codes, no_codes};
+use crate::file_layout::FileLayout;
 use crate::formats::headered;
 use crate::geometry::metres_in;
 use crate::ground_map::GroundMap;
@@ -110,7 +112,9 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
     let band = dataset.band(number).map_err(fault)?;
     let stored = band.sample_type();
     let stored = stored.map_err(|name| BadRaster::NotAHeightField(format!("samples of {name}")))?;
-    if options.band.is_none() && stored == Stored::U8 && COLOURS.contains(&bands) {
+    if options.encoding.is_some() {
+        check_codes(stored, bands, options)?;
+    } else if options.band.is_none() && stored == Stored::U8 && COLOURS.contains(&bands) {
         return Err(BadRaster::ColourBands {
             what: format!("a picture of {bands} bands of bytes"),
             bands: bands as u16,
@@ -121,7 +125,16 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
     let (no_data, scale, offset) = (band.no_data(), band.scale(), band.offset());
     let unit = band.unit();
     let (driver, map, wkt) = (dataset.driver(), dataset.geo_transform(), dataset.wkt());
-    let blocks = GdalBlocks::new(dataset, number, held(stored))?;
+    let block = band.block_size();
+    let has_codes = options.encoding.is_some();
+    let blocks = GdalBlocks::new(dataset, number, held(stored), has_codes)?;
+    let overviews = blocks.images.iter().skip(1);
+    let file_layout = FileLayout {
+        bands,
+        block: Some(block),
+        overviews: overviews.map(|image| [image.columns, image.rows]).collect(),
+        samples_are: None,
+    };
     let format = format!("{driver} by GDAL, {}", blocks.held.none().type_name());
     let samples = u64::from(columns) * u64::from(rows);
     let mut decoded = match samples * blocks.held.bytes() > options.most_in_memory_bytes {
@@ -137,10 +150,11 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
             decoded
         }
     };
+    decoded.file_layout = file_layout;
     decoded.no_data = no_data;
     decoded.scale = scale.unwrap_or(1.0);
     decoded.offset = offset.unwrap_or(0.0);
-    if bands > 1 && options.band.is_none() {
+    if bands > 1 && options.band.is_none() && !has_codes {
         decoded.remarks.push(format!(
             "it has {bands} bands: the first is taken for the height (--band)"
         ));
@@ -160,7 +174,22 @@ fn decoded(dataset: Dataset, options: &OpenOptions) -> Result<Decoded, BadRaster
     {
         decoded.lay_out(map, None);
     }
+    if let Some(encoding) = options.encoding {
+        decoded.take_codes(encoding);
+    }
     Ok(decoded)
+}
+
+/// Checks that a file has colours that may be codes of heights.
+fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), BadRaster> {
+    match options.band {
+        Some(band) => Err(BadRaster::NoSuchPart {
+            asked: format!("band {band} with --encoding"),
+            there: "three bands together are one height".into(),
+        }),
+        None if stored == Stored::U8 && COLOURS.contains(&bands) => Ok(()),
+        None => Err(no_codes("the file has other bands")),
+    }
 }
 
 /// The type in which samples are held.
@@ -185,6 +214,8 @@ struct GdalBlocks {
     /// Number of the band.
     number: u32,
     held: SampleType,
+    /// The first three bands are colours, and together the code of a height.
+    has_codes: bool,
     images: Vec<BlockImage>,
     /// Of each image but the full one, its number among the band's overviews.
     overviews: Vec<usize>,
@@ -193,7 +224,13 @@ struct GdalBlocks {
 }
 
 impl GdalBlocks {
-    fn new(dataset: Dataset, number: u32, held: SampleType) -> Result<Self, BadRaster> {
+    fn new(
+        dataset: Dataset,
+        number: u32,
+        stored: SampleType,
+        has_codes: bool,
+    ) -> Result<Self, BadRaster> {
+        let held = if has_codes { SampleType::I32 } else { stored };
         let band = dataset.band(number).map_err(fault)?;
         let is_masked = band.mask() == Mask::Band;
         let full = image(&band);
@@ -216,6 +253,8 @@ impl GdalBlocks {
             .collect();
         coarser.sort_by_key(|at| std::cmp::Reverse(overviews[*at].size()));
         coarser.dedup_by_key(|at| overviews[*at].size());
+        // The mean of encoded colours is no height.
+        coarser.retain(|_| !has_codes);
         let images: Vec<_> = (coarser.iter().map(|at| image(&overviews[*at]))).collect();
         let mut hasher = XxHash64::with_seed(0);
         for side in full
@@ -229,6 +268,7 @@ impl GdalBlocks {
         Ok(Self {
             number,
             held,
+            has_codes,
             images: [full].into_iter().chain(images).collect(),
             overviews: coarser,
             is_masked,
@@ -284,8 +324,17 @@ impl BlockReader for GdalBlocks {
                 *overview.ok_or_else(|| BadRaster::damaged("GDAL: an overview has gone"))?
             }
         };
-        let mut samples = self.held.none();
-        with_samples!(&mut samples, values => *values = read(&band, part)?);
+        let samples = match self.has_codes {
+            true => {
+                let colour = |number| read::<u8>(&dataset.band(number).map_err(fault)?, part);
+                codes([colour(1)?, colour(2)?, colour(3)?])
+            }
+            false => {
+                let mut samples = self.held.none();
+                with_samples!(&mut samples, values => *values = read(&band, part)?);
+                samples
+            }
+        };
         let mask = self.is_masked.then(|| band.mask_band()).flatten();
         let holes = mask.map(|mask| holes(&mask, part)).transpose()?;
         Ok(Block {

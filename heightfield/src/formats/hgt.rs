@@ -2,6 +2,7 @@
 //! follow from the file's length and name.
 
 use crate::decoded::Decoded;
+use crate::file_layout::SamplesAre;
 use crate::format::{Claim, Format, Parts};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
@@ -32,6 +33,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     let format = "SRTM height tile, int16".to_owned();
     let mut decoded = Decoded::new(format, (columns, rows), plain.storage(input, options)?);
     decoded.no_data = Some(VOID);
+    decoded.file_layout.samples_are = Some(SamplesAre::Points);
     decoded.metres_per_vertical_unit = Some(1.0);
     // SRTM's heights are above the geoid EGM96, its places on WGS 84.
     decoded.set_vertical_datum(5773);

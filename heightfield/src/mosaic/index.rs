@@ -216,6 +216,7 @@ impl Index {
         let remarks = differences(&mosaic)?;
         let mut decoded = Decoded::new(format, size, mosaic);
         decoded.remarks = remarks;
+        decoded.file_layout = first.file_layout.clone();
         decoded.system = first.system.clone();
         decoded.system_from = first.system_from;
         decoded.metres_per_vertical_unit = first.metres_per_vertical_unit;

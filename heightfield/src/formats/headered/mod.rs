@@ -86,6 +86,7 @@ pub(crate) fn decode_by_header(
     };
     let format = format!("{}, {}{bands}", header.format, name_of_type);
     let mut decoded = Decoded::new(format, (header.layout.columns, header.layout.rows), storage);
+    decoded.file_layout.bands = header.layout.bands;
     beside::reference_system(input, &mut decoded)?;
     (header.describe)(&mut decoded).map_err(|fault| in_header(fault, &name))?;
     if header.layout.bands > 1 && options.band.is_none() {

@@ -11,6 +11,7 @@ use super::user_defined;
 use crate::Certainty;
 use crate::crs::{self, ReferenceSystem};
 use crate::decoded::Decoded;
+use crate::file_layout::SamplesAre;
 use crate::ground_map::GroundMap;
 use crate::placed::GroundUnit;
 
@@ -31,6 +32,7 @@ pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>) {
     let stated = stated.or_else(|| keys.code(VERTICAL_UNITS).and_then(metres_of_code));
     decoded.set_vertical(system, stated);
     decoded.system = keys.system();
+    decoded.file_layout.samples_are = keys.samples_are();
     if let Some(map) = ground_map(image, &keys) {
         decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
         decoded.lay_out(map, keys.unit());
@@ -66,7 +68,7 @@ fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
         (_, &[east, north, ..], _) => ([0.0, east, 0.0], [0.0, 0.0, -north]),
         _ => return None,
     };
-    match keys.are_points() {
+    match keys.samples_are() == Some(SamplesAre::Points) {
         true => GroundMap::from_centre(x, y),
         false => GroundMap::new(x, y),
     }
@@ -123,10 +125,14 @@ impl GeoKeys {
         Some(text.trim_matches(['\0', ' ']))
     }
 
-    /// Whether coordinates belong to the centres of samples, not to corners of cells.
-    fn are_points(&self) -> bool {
-        const PIXEL_IS_POINT: u16 = 2;
-        self.code(GT_RASTER_TYPE) == Some(PIXEL_IS_POINT)
+    /// What a sample stands for: coordinates belong to the centres of points, and to the corners
+    /// of areas.
+    fn samples_are(&self) -> Option<SamplesAre> {
+        match self.code(GT_RASTER_TYPE)? {
+            1 => Some(SamplesAre::Areas),
+            2 => Some(SamplesAre::Points),
+            _ => None,
+        }
     }
 
     /// The horizontal reference system: by its code, or by what it is called.

@@ -29,6 +29,7 @@ use tiff_reader::{Ifd, ParseBudgets, TiffError, TiffFile};
 use crate::beside::{find_appended, lay_out_by_world_file, remark_other_place};
 use crate::blocks::Part;
 use crate::decoded::Decoded;
+use crate::file_layout::FileLayout;
 use crate::format::{Claim, Format, Parts, starts_with_any};
 use crate::input::{Data, FileBytes};
 use crate::storage::Storage;
@@ -84,6 +85,12 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     if options.band.is_some() {
         format += &format!(", band {} of {bands}", band + 1);
     }
+    let file_layout = FileLayout {
+        bands: bands.into(),
+        block: Some(layout.chunk.into()),
+        overviews: overview_sizes(&file, input)?,
+        samples_are: None,
+    };
     let metadata = Metadata::read(full.ifd(), band, bands);
     let files: Vec<_> = once(input).chain(&mask_file).collect();
     let held = layout.held().none();
@@ -102,6 +109,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
             "it has {bands} bands: the first is taken for the height (--band)"
         ));
     }
+    decoded.file_layout = file_layout;
     decoded.no_data = metadata.no_data;
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
@@ -116,6 +124,19 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     }
     remark_orientation(full.ifd(), &mut decoded);
     Ok(decoded)
+}
+
+/// Columns and rows of the overviews in a file, and of those in one beside it on disk.
+fn overview_sizes(file: &Arc<TiffFile>, input: &FileBytes) -> Result<Vec<[u32; 2]>, BadRaster> {
+    let mut found = images::overviews(file);
+    if let Data::File(..) = input.data()
+        && let Some(beside) = find_appended(input, "ovr")?
+    {
+        // What is wrong with it is reported where it is used.
+        found.extend(open(&beside).map_or(vec![], |file| images::overviews(&Arc::new(file))));
+    }
+    let size = |image: &images::Directory| [image.ifd().width(), image.ifd().height()];
+    Ok(found.iter().map(size).collect())
 }
 
 /// What the user wants of the file.

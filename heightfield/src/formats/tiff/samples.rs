@@ -16,14 +16,14 @@ use crate::{BadRaster, Samples};
 
 /// Reads a part of the band that is the height, or of the codes of heights.
 pub(super) fn heights(layout: &Layout, part: &Part) -> Result<Samples, BadRaster> {
-    match layout.has_codes {
-        false => read(layout, layout.band, part),
-        true => Ok(codes([
-            read(layout, 0, part)?,
-            read(layout, 1, part)?,
-            read(layout, 2, part)?,
-        ])),
+    if !layout.has_codes {
+        return read(layout, layout.band, part);
     }
+    let colour = |band| match read(layout, band, part)? {
+        Samples::U8(values) => Ok(values),
+        _ => Err(BadRaster::damaged("TIFF: its bands are of several types")),
+    };
+    Ok(codes([colour(0)?, colour(1)?, colour(2)?]))
 }
 
 /// Reads a part of a band, the first being 0.
