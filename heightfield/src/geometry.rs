@@ -1,6 +1,7 @@
 //! What a cell measures on the ground, and a vertical unit in metres.
 
 use super::globe::Globe;
+use super::numbers::beginning;
 
 /// The unit of a cell's sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,6 +149,7 @@ pub struct VerticalDatum {
 
 /// The remark on a unit of heights that [`metres_in`] does not know.
 pub(super) fn unknown_unit(name: &str) -> String {
+    let name = beginning(name);
     format!("it states the unit of heights '{name}', which is not known here (--vertical-unit)")
 }
 

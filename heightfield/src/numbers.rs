@@ -32,6 +32,17 @@ fn not_a_number(word: &str) -> Option<f64> {
     begins(&["1.#inf"]).then_some(infinity)
 }
 
+/// The beginning of a text from a file, for a remark.
+pub(super) fn beginning(text: &str) -> String {
+    const MOST: usize = 40;
+    let shown = |c: char| if c.is_control() { '?' } else { c };
+    let mut beginning: String = text.chars().take(MOST).map(shown).collect();
+    if text.chars().nth(MOST).is_some() {
+        beginning.push('…');
+    }
+    beginning
+}
+
 /// A no-data value as a file writes it, and what is said about it where it is no plain number.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct NoDataText {
@@ -57,6 +68,7 @@ pub(super) fn no_data(text: &str, band: usize, bands: usize) -> NoDataText {
         .collect();
     let own = if words.len() == bands { band } else { 0 };
     let value = words.get(own).and_then(|word| number(word));
+    let text = beginning(text);
     let remark = match value {
         Some(value) => format!("its no-data value is the text '{text}': {value} is taken"),
         None => format!(

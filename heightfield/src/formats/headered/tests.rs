@@ -307,7 +307,10 @@ fn number_type_and_unit_are_read() {
     let header = "NCOLS 3\nNROWS 2\nXLLCENTER -10\nYLLCENTER 40\nCELLSIZE 0.5\n\
                   NODATA_VALUE -32768\nBYTEORDER LSBFIRST\nZUNITS FEET\n";
     let stored = [367.0, 960.0, -5.0, -32768.0, 1.0, 2.0];
-    let shorts: Vec<u8> = stored.iter().flat_map(|value| (*value as i16).to_le_bytes()).collect();
+    let shorts: Vec<u8> = stored
+        .iter()
+        .flat_map(|value| (*value as i16).to_le_bytes())
+        .collect();
     let floats = floats(stored.map(|value| value as f32), false);
     for (bytes, number_type) in [
         (&shorts, "NUMBERTYPE 2_BYTE_INTEGER\n"),
@@ -319,10 +322,17 @@ fn number_type_and_unit_are_read() {
         let raster = Pair::new("etopo1.bin", bytes, "etopo1.hdr", &header).open(None);
         let raster = raster.expect("a grid");
         let summary = raster.summary();
-        assert_eq!((summary.lowest, summary.highest, summary.holes), (-5.0, 960.0, 1));
+        assert_eq!(
+            (summary.lowest, summary.highest, summary.holes),
+            (-5.0, 960.0, 1)
+        );
         assert_eq!(raster.stated_metres_per_vertical_unit(), Some(0.3048));
         let said = raster.remarks().join(" ");
-        assert_eq!(said.contains("states no type"), number_type.is_empty(), "{said}");
+        assert_eq!(
+            said.contains("states no type"),
+            number_type.is_empty(),
+            "{said}"
+        );
     }
 }
 
@@ -335,7 +345,10 @@ fn length_that_contradicts_the_header_is_refused() {
         opened.map_or_else(|fault| fault.to_string(), |_| String::new())
     };
     let said = told("NBITS 16\n", 24);
-    assert!(said.contains("byte 12") && said.contains("has 24"), "{said}");
+    assert!(
+        said.contains("byte 12") && said.contains("has 24"),
+        "{said}"
+    );
     assert!(told("NBITS 8\nNUMBERTYPE 2_BYTE_INTEGER\n", 12).contains("nbits is 8"));
     assert!(told("NUMBERTYPE 3_BYTE_COLOUR\n", 12).contains("3_byte_colour"));
     // What some programs add behind the samples is less than a row.

@@ -133,3 +133,7 @@ fn for_each(
     }
     Ok(())
 }
+
+#[cfg(test)]
+#[path = "blended_tests.rs"]
+mod tests;
