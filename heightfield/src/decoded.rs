@@ -1,6 +1,6 @@
 //! What a decoder hands over, and what every format's result must satisfy.
 
-use std::cell::Cell;
+use std::cell::RefCell;
 
 use super::blocks::Survey;
 use super::crs::{ReferenceSystem, Vertical};
@@ -242,18 +242,18 @@ impl Decoded {
         self.settle_no_data(no_data);
         self.cell = self.cell.filter(CellSize::is_valid);
         self.storage.set_order(self.south_up, self.east_first);
-        let seen = Cell::new(Outermost::NONE);
+        let mut seen = RefCell::new(Outermost::NONE);
         let survey = match &self.storage {
-            Storage::Held { .. } => Survey::of_all(self.summarise(&seen)),
+            Storage::Held { .. } => Survey::of_all(self.summarise(seen.get_mut())),
             Storage::Blocks(blocks) => {
-                let survey = blocks.survey(|stored| self.counted(stored, &seen));
+                let survey = blocks.survey(|stored| self.counted(stored, &mut seen.borrow_mut()));
                 if let Some(outage) = blocks.take_outage() {
                     return Err(outage);
                 }
                 survey
             }
         };
-        let doubts = seen.get().remarks(self.no_data.is_some());
+        let doubts = seen.into_inner().remarks(self.no_data.is_some());
         self.remarks.extend(doubts);
         match survey.summary.has_none() {
             true => Err(BadRaster::AllNoData {
@@ -286,17 +286,15 @@ impl Decoded {
     }
 
     /// The same; the value is counted among those that were looked at.
-    fn counted(&self, stored: Option<f64>, seen: &Cell<Outermost>) -> f64 {
+    fn counted(&self, stored: Option<f64>, seen: &mut Outermost) -> f64 {
         if let Some(stored) = stored.filter(|stored| self.no_data != Some(*stored)) {
-            let mut outermost = seen.get();
-            outermost.add(stored);
-            seen.set(outermost);
+            seen.add(stored);
         }
         self.height_in_file(stored)
     }
 
     /// One pass over all samples in memory: range and holes.
-    fn summarise(&self, seen: &Cell<Outermost>) -> HeightSummary {
+    fn summarise(&self, seen: &mut Outermost) -> HeightSummary {
         let mut summary = HeightSummary::EMPTY;
         let Storage::Held { samples, mask } = &self.storage else {
             return summary;

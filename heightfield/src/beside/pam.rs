@@ -8,9 +8,9 @@ use crate::crs::ReferenceSystem;
 use crate::decoded::Decoded;
 use crate::geometry::metres_in;
 use crate::ground_map::GroundMap;
-use crate::input::FileBytes;
+use crate::input::{Data, FileBytes};
 use crate::numbers::{no_data, number};
-use crate::{BadRaster, xml};
+use crate::xml;
 
 /// What lies beside a file for one of its bands.
 #[derive(Debug, Default, PartialEq)]
@@ -29,22 +29,22 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
-    /// The notes on a band, the first being 1.
-    ///
-    /// # Errors
-    /// Where they are elsewhere and cannot be read at present.
-    pub(crate) fn read(input: &FileBytes, band: u32) -> Result<Self, BadRaster> {
+    /// The notes on a band, the first being 1, beside a file on disk: at a server they would be one
+    /// more request for every file.
+    pub(crate) fn read(input: &FileBytes, band: u32) -> Self {
+        if !matches!(input.data(), Data::File(..)) {
+            return Self::default();
+        }
         let (text, name) = match super::text_appended(input, "aux.xml") {
             Ok(Some(found)) => found,
-            Ok(None) => return Ok(Self::default()),
-            Err(fault) if fault.is_of_the_line() => return Err(fault),
-            Err(fault) => return Ok(Self::unread(&fault.to_string())),
+            Ok(None) => return Self::default(),
+            Err(fault) => return Self::unread(&fault.to_string()),
         };
         let mut notes = Self::of(&text, band).unwrap_or_else(|fault| {
             Self::unread(&format!("{name} beside it cannot be read ({fault})"))
         });
         notes.name = name;
-        Ok(notes)
+        notes
     }
 
     fn unread(why: &str) -> Self {

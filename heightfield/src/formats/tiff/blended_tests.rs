@@ -2,13 +2,8 @@
 
 use std::path::Path;
 
+use super::super::tiffs::{DATA, Values, floats_in_a_strip, tiff};
 use crate::{OpenOptions, Raster};
-
-#[path = "../../../../tests/src/tiffs.rs"]
-#[allow(dead_code, unreachable_pub)]
-mod tiffs;
-
-use tiffs::{DATA, Values, floats_in_a_strip, tiff};
 
 const SIDE: u32 = 64;
 const NO_DATA: f64 = -9999.0;

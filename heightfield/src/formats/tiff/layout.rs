@@ -450,7 +450,9 @@ fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, BadRaster> {
 
 /// Checks that an image has colours that may be codes of heights.
 fn check_codes(image: &Ifd, bands: u16) -> Result<(), BadRaster> {
-    let is_rgb = image.photometric_interpretation_enum() == Some(PhotometricInterpretation::Rgb);
+    use PhotometricInterpretation::{MinIsBlack, Rgb};
+    let meaning = image.photometric_interpretation_enum();
+    let is_rgb = matches!(meaning, Some(Rgb | MinIsBlack));
     let is_bytes = stored_type(image)? == (SampleFormat::Unsigned, 8);
     match is_rgb && is_bytes && usize::from(bands) >= COLOURS {
         true => Ok(()),

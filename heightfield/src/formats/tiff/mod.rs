@@ -309,4 +309,11 @@ fn is_long(reason: &str) -> bool {
 #[cfg(test)]
 mod made;
 #[cfg(test)]
+mod odd_tags_tests;
+#[cfg(test)]
 mod tests;
+/// TIFFs tag by tag, as the tests of all crates make them.
+#[cfg(test)]
+#[path = "../../../../tests/src/tiffs.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod tiffs;
