@@ -79,7 +79,9 @@ fn with_notes(
         ..options.clone()
     })?;
     notes.apply(&mut decoded);
-    remark_unread(input, &mut decoded);
+    if !input.is_outline() {
+        remark_unread(input, &mut decoded);
+    }
     Ok(decoded)
 }
 

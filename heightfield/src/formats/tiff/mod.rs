@@ -117,6 +117,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     georef::apply(full.ifd(), &mut decoded, metadata.metres_per_vertical_unit);
     match decoded.place {
         None => lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?,
+        Some(_) if input.is_outline() => {}
         Some(_) => remark_other_place(input, &WORLD_FILES, &mut decoded),
     }
     if let Some(encoding) = options.encoding {
@@ -129,7 +130,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
 /// Columns and rows of the overviews in a file, and of those in one beside it on disk.
 fn overview_sizes(file: &Arc<TiffFile>, input: &FileBytes) -> Result<Vec<[u32; 2]>, BadRaster> {
     let mut found = images::overviews(file);
-    if let Data::File(..) = input.data()
+    if let (Data::File(..), false) = (input.data(), input.is_outline())
         && let Some(beside) = find_appended(input, "ovr")?
     {
         // What is wrong with it is reported where it is used.
