@@ -213,7 +213,7 @@ impl Index {
             false => SampleType::F64,
         };
         let mosaic = Mosaic::new(size, sources.collect(), sample, options);
-        let remarks = differences(&mosaic)?;
+        let remarks = mosaic.remark_differences()?;
         let mut decoded = Decoded::new(format, size, mosaic);
         decoded.remarks = remarks;
         decoded.file_layout = first.file_layout.clone();
@@ -228,35 +228,6 @@ impl Index {
         decoded.lay_out(map, first.ground_unit());
         Ok(decoded)
     }
-}
-
-/// Remarks on files that overlap and have other heights there.
-///
-/// # Errors
-/// [`BadRaster::SamePlace`] where both lie on the same samples.
-fn differences(mosaic: &Mosaic) -> Result<Vec<String>, BadRaster> {
-    const MOST_NAMED: usize = 3;
-    let found = mosaic.disagreements()?;
-    let path = |number: usize| &mosaic.sources()[number].path;
-    if let Some(same) = found.iter().find(|it| it.is_on_same_samples) {
-        return Err(BadRaster::SamePlace {
-            files: same.files.map(|number| path(number).clone()),
-            difference: same.most,
-        });
-    }
-    let named = found.iter().take(MOST_NAMED);
-    Ok(named
-        .map(|it| {
-            let [one, other] = it.files.map(|number| {
-                let name = path(number).file_name().unwrap_or_default();
-                name.to_string_lossy().into_owned()
-            });
-            format!(
-                "{one} and {other} overlap and differ there by up to {} ({} of {} places compared): {other} is taken",
-                it.most, it.different, it.compared
-            )
-        })
-        .collect())
 }
 
 /// The same fault, with the name of the item whose file it is.

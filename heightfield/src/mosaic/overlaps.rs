@@ -20,26 +20,55 @@ const SAME: f64 = 1e-3;
 const SAME_SHARE: f64 = 1e-5;
 
 /// Two files with other heights at the same places.
-pub(super) struct Disagreement {
+struct Disagreement {
     /// Their numbers.
-    pub(super) files: [usize; 2],
+    files: [usize; 2],
     /// Returns true if both have all their samples at the same places.
-    pub(super) is_on_same_samples: bool,
+    is_on_same_samples: bool,
     /// Places with heights in both, and how many of them differ.
-    pub(super) compared: u32,
-    pub(super) different: u32,
+    compared: u32,
+    different: u32,
     /// The largest difference.
-    pub(super) most: f64,
+    most: f64,
 }
 
 impl Mosaic {
+    /// Remarks on files that overlap and have other heights there.
+    ///
+    /// # Errors
+    /// [`BadRaster::SamePlace`] where both lie on the same samples.
+    pub(super) fn remark_differences(&self) -> Result<Vec<String>, BadRaster> {
+        const MOST_NAMED: usize = 3;
+        let found = self.disagreements()?;
+        let path = |number: usize| &self.sources[number].path;
+        if let Some(same) = found.iter().find(|it| it.is_on_same_samples) {
+            return Err(BadRaster::SamePlace {
+                files: same.files.map(|number| path(number).clone()),
+                difference: same.most,
+            });
+        }
+        let named = found.iter().take(MOST_NAMED);
+        Ok(named
+        .map(|it| {
+            let [one, other] = it.files.map(|number| {
+                let name = path(number).file_name().unwrap_or_default();
+                name.to_string_lossy().into_owned()
+            });
+            format!(
+                "{one} and {other} overlap and differ there by up to {} ({} of {} places compared): {other} is taken",
+                it.most, it.different, it.compared
+            )
+        })
+        .collect())
+    }
+
     /// Compares files on disk that overlap.
     ///
     /// # Errors
     /// Files that cannot be read at present.
-    pub(super) fn disagreements(&self) -> Result<Vec<Disagreement>, BadRaster> {
+    fn disagreements(&self) -> Result<Vec<Disagreement>, BadRaster> {
         let mut found = Vec::new();
-        for pair in chosen_pairs(self.sources()) {
+        for pair in chosen_pairs(&self.sources) {
             found.extend(self.compared(pair)?.filter(|it| it.different > 0));
         }
         Ok(found)
@@ -47,7 +76,7 @@ impl Mosaic {
 
     /// Compares two files; `None` where one cannot be read.
     fn compared(&self, files: [usize; 2]) -> Result<Option<Disagreement>, BadRaster> {
-        let sources = files.map(|number| &self.sources()[number]);
+        let sources = files.map(|number| &self.sources[number]);
         let mut opened = Vec::new();
         for (number, source) in files.into_iter().zip(sources) {
             let Some(file) = self.opened(number, source)? else {

@@ -24,7 +24,7 @@ const PLACE: u32 = 64;
 
 /// The files of a terrain, the last on top.
 pub(super) struct Mosaic {
-    sources: Vec<Source>,
+    pub(super) sources: Vec<Source>,
     images: Vec<BlockImage>,
     sample: SampleType,
     pool: Mutex<Pool>,
@@ -75,11 +75,6 @@ impl Mosaic {
     fn pool(&self) -> MutexGuard<'_, Pool> {
         // What panics while this is held is a decoder, whose panics are caught.
         self.pool.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The files, the last on top.
-    pub(super) fn sources(&self) -> &[Source] {
-        &self.sources
     }
 
     /// A file, opened; `None`, with a warning the first time, where it cannot be read.

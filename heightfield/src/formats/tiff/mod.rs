@@ -6,6 +6,7 @@
 mod blended;
 mod blocks;
 mod budget;
+mod describe;
 mod fault;
 mod georef;
 mod images;
@@ -24,9 +25,9 @@ use std::iter::once;
 use std::sync::Arc;
 
 use tiff_reader::source::{BytesSource, FileSource, SharedSource};
-use tiff_reader::{Ifd, ParseBudgets, TiffError, TiffFile};
+use tiff_reader::{ParseBudgets, TiffError, TiffFile};
 
-use crate::beside::{find_appended, lay_out_by_world_file, remark_other_place};
+use crate::beside::find_appended;
 use crate::blocks::Part;
 use crate::decoded::Decoded;
 use crate::file_layout::FileLayout;
@@ -36,8 +37,9 @@ use crate::storage::Storage;
 use crate::{BadRaster, OpenOptions};
 use blended::blended;
 use blocks::{Image, Known, TiffBlocks};
+use describe::{describe, overview_sizes, wanted};
 use fault::fault;
-use layout::{Layout, Wanted};
+use layout::Layout;
 use metadata::Metadata;
 use remote_source::RemoteSource;
 
@@ -57,9 +59,6 @@ const FEW_BYTES: u64 = 1 << 20;
 /// a second in tiles of 256 × 256 samples has an index of 100 MB.
 const LONGEST_LIST: usize = 72 << 20;
 const ALL_LISTS: usize = 128 << 20;
-
-/// Extensions of a TIFF's world files.
-const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
 
 /// Reads the heights, or lets them stay in the file: of several bands the chosen one or
 /// the first, of several images the first that is neither an overview nor a mask.
@@ -110,62 +109,8 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
         ));
     }
     decoded.file_layout = file_layout;
-    decoded.no_data = metadata.no_data;
-    decoded.scale = metadata.scale.unwrap_or(1.0);
-    decoded.offset = metadata.offset.unwrap_or(0.0);
-    decoded.remarks.extend(metadata.remarks);
-    georef::apply(full.ifd(), &mut decoded, metadata.metres_per_vertical_unit);
-    match decoded.place {
-        None => lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?,
-        Some(_) if input.is_outline() => {}
-        Some(_) => remark_other_place(input, &WORLD_FILES, &mut decoded),
-    }
-    if let Some(encoding) = options.encoding {
-        decoded.take_codes(encoding);
-    }
-    remark_orientation(full.ifd(), &mut decoded);
+    describe(&mut decoded, full.ifd(), metadata, input, options)?;
     Ok(decoded)
-}
-
-/// Columns and rows of the overviews in a file, and of those in one beside it on disk.
-fn overview_sizes(file: &Arc<TiffFile>, input: &FileBytes) -> Result<Vec<[u32; 2]>, BadRaster> {
-    let mut found = images::overviews(file);
-    if let (Data::File(..), false) = (input.data(), input.is_outline())
-        && let Some(beside) = find_appended(input, "ovr")?
-    {
-        // What is wrong with it is reported where it is used.
-        found.extend(open(&beside).map_or(vec![], |file| images::overviews(&Arc::new(file))));
-    }
-    let size = |image: &images::Directory| [image.ifd().width(), image.ifd().height()];
-    Ok(found.iter().map(size).collect())
-}
-
-/// What the user wants of the file.
-fn wanted(options: &OpenOptions) -> Result<Wanted, BadRaster> {
-    match (options.encoding, options.band) {
-        (Some(_), Some(band)) => Err(BadRaster::NoSuchPart {
-            asked: format!("band {band} with --encoding"),
-            there: "three bands together are one height".into(),
-        }),
-        (Some(_), None) => Ok(Wanted::Codes),
-        (None, band) if options.classes => Ok(Wanted::Classes(band)),
-        (None, band) => Ok(Wanted::Heights(band)),
-    }
-}
-
-/// Remarks on the tag that says where the first row and column lie: GDAL does not use it, either.
-fn remark_orientation(image: &Ifd, decoded: &mut Decoded) {
-    const ORIENTATION: u16 = 274;
-    let first = match image.tag(ORIENTATION).and_then(|tag| tag.value.as_u32()) {
-        None | Some(0 | 1) => return,
-        Some(2) => "the first row at the top, the first column at the right",
-        Some(3) => "the first row at the bottom, the first column at the right",
-        Some(4) => "the first row at the bottom, the first column at the left",
-        Some(_) => "rows and columns exchanged",
-    };
-    decoded.remarks.push(format!(
-        "its Orientation tag has {first}: it is not used, as in GDAL, and the first row is taken to be the northern one unless the file's place says otherwise"
-    ));
 }
 
 /// What the user is told of where the samples are.

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use flate2::write::ZlibEncoder;
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 
+use super::super::images;
+use super::super::layout::Wanted;
 use super::super::made::{BAND, BANDS, KINDS, Made, ONE_STRIP, Packing, SIZE, check, open, value};
-use super::super::{Wanted, images};
 use super::super::{open as open_file, uncompressed};
 use super::*;
 use crate::input::FileBytes;
