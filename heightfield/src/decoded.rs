@@ -1,8 +1,13 @@
 //! What a decoder hands over, and what every format's result must satisfy.
 
+use std::cell::RefCell;
+
 use super::blocks::Survey;
 use super::crs::{ReferenceSystem, Vertical};
-use super::geometry::CellSize;
+use super::doubtful::Outermost;
+use super::file_layout::FileLayout;
+use super::geometry::{CellSize, metres_in, unknown_unit};
+use super::height_summary::HeightSummary;
 use super::place::Place;
 use super::samples::{SampleValue, with_samples};
 use super::storage::Storage;
@@ -50,6 +55,8 @@ pub(super) struct Decoded {
     pub(super) vertical_datum: Option<VerticalDatum>,
     /// Why all samples are in memory, where the format could have left them in the file.
     pub(super) why_whole: Option<String>,
+    /// How the file lays them out.
+    pub(super) file_layout: FileLayout,
     /// What the user should know.
     pub(super) remarks: Vec<String>,
 }
@@ -90,6 +97,7 @@ impl Decoded {
             vertical_unit_from: Certainty::Stated,
             vertical_datum: None,
             why_whole: None,
+            file_layout: FileLayout::default(),
             remarks: Vec::new(),
         }
     }
@@ -124,6 +132,17 @@ impl Decoded {
         });
     }
 
+    /// Takes the unit of the heights by its name, where the file states one.
+    pub(super) fn set_unit(&mut self, name: Option<&str>) {
+        let Some(name) = name.filter(|name| !name.is_empty()) else {
+            return;
+        };
+        match metres_in(name) {
+            None => self.remarks.push(unknown_unit(name)),
+            metres => self.metres_per_vertical_unit = metres,
+        }
+    }
+
     /// Takes the metres in a unit of the heights from the user, whatever the file says.
     pub(super) fn with_vertical_unit(mut self, metres: Option<f64>) -> Self {
         if metres.is_some() {
@@ -145,7 +164,6 @@ impl Decoded {
             let remark = format!(
                 "it is read as a whole, {megabytes} MB: {why}. As this it stays on the disk: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE IN OUT.tif"
             );
-            tracing::warn!("{remark}");
             self.remarks.push(remark);
         }
     }
@@ -157,46 +175,6 @@ impl Decoded {
         self.remarks.push(format!(
             "depths ({why}): they are felt as heights below zero"
         ));
-    }
-}
-
-/// Range of the heights and number of holes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeightSummary {
-    /// Lowest height in the file's vertical unit.
-    pub lowest: f64,
-    /// Highest height in the file's vertical unit.
-    pub highest: f64,
-    /// Samples without a height.
-    pub holes: u64,
-    /// Samples that were looked at: all, or those of a coarser image or of some places
-    /// where the raster stays in its file.
-    pub looked_at: u64,
-}
-
-impl HeightSummary {
-    /// Of no sample.
-    pub(super) const EMPTY: Self = Self {
-        lowest: f64::INFINITY,
-        highest: f64::NEG_INFINITY,
-        holes: 0,
-        looked_at: 0,
-    };
-
-    /// Counts a height; NaN is a hole.
-    pub(super) fn add(&mut self, height: f64) {
-        self.looked_at += 1;
-        if height.is_nan() {
-            self.holes += 1;
-        } else {
-            self.lowest = self.lowest.min(height);
-            self.highest = self.highest.max(height);
-        }
-    }
-
-    /// Whether no sample has a height.
-    pub(super) const fn has_none(&self) -> bool {
-        self.lowest > self.highest
     }
 }
 
@@ -225,16 +203,19 @@ impl Decoded {
         self.settle_no_data(no_data);
         self.cell = self.cell.filter(CellSize::is_valid);
         self.storage.set_order(self.south_up, self.east_first);
+        let mut seen = RefCell::new(Outermost::NONE);
         let survey = match &self.storage {
-            Storage::Held { .. } => Survey::of_all(self.summarise()?),
+            Storage::Held { .. } => Survey::of_all(self.summarise(seen.get_mut())),
             Storage::Blocks(blocks) => {
-                let survey = blocks.survey(|stored| self.height_in_file(stored));
+                let survey = blocks.survey(|stored| self.counted(stored, &mut seen.borrow_mut()));
                 if let Some(outage) = blocks.take_outage() {
                     return Err(outage);
                 }
                 survey
             }
         };
+        let doubts = seen.into_inner().remarks(self.no_data.is_some());
+        self.remarks.extend(doubts);
         match survey.summary.has_none() {
             true => Err(BadRaster::AllNoData {
                 // Some were looked at twice.
@@ -251,53 +232,41 @@ impl Decoded {
             .and_then(|value| self.storage.sample_type().none().comparable_no_data(value));
     }
 
-    /// Height of a stored value; NaN in a hole.
+    /// Height of a stored value; NaN in a hole. A value that is no height is a hole.
     pub(super) fn height_of(&self, stored: f64) -> f64 {
-        match self.no_data == Some(stored) {
-            true => f64::NAN,
-            false => stored * self.scale + self.offset,
-        }
-    }
-
-    /// Height of a value read from the file when it is touched, if there is one. Not all
-    /// values were looked at before: one that is no height is a hole.
-    pub(super) fn height_in_file(&self, stored: Option<f64>) -> f64 {
-        let height = stored.map_or(f64::NAN, |stored| self.height_of(stored));
-        match height.abs() > LARGEST_HEIGHT {
+        let height = stored * self.scale + self.offset;
+        match self.no_data == Some(stored) || height.abs() > LARGEST_HEIGHT {
             true => f64::NAN,
             false => height,
         }
     }
 
-    /// One pass over all samples in memory: range, holes, and the first that is no height.
-    fn summarise(&self) -> Result<HeightSummary, BadRaster> {
+    /// Height of a value read from the file when it is touched, if there is one.
+    pub(super) fn height_in_file(&self, stored: Option<f64>) -> f64 {
+        stored.map_or(f64::NAN, |stored| self.height_of(stored))
+    }
+
+    /// The same; the value is counted among those that were looked at.
+    fn counted(&self, stored: Option<f64>, seen: &mut Outermost) -> f64 {
+        if let Some(stored) = stored.filter(|stored| self.no_data != Some(*stored)) {
+            seen.add(stored);
+        }
+        self.height_in_file(stored)
+    }
+
+    /// One pass over all samples in memory: range and holes.
+    fn summarise(&self, seen: &mut Outermost) -> HeightSummary {
         let mut summary = HeightSummary::EMPTY;
-        let mut absurd = None;
         let Storage::Held { samples, mask } = &self.storage else {
-            return Ok(summary);
+            return summary;
         };
         let hole = |index| mask.as_ref().is_some_and(|mask| mask.contains(index));
         with_samples!(samples, values => {
             for (index, value) in values.iter().enumerate() {
-                let height = match hole(index) {
-                    true => f64::NAN,
-                    false => self.height_of(value.widen()),
-                };
-                if height.abs() > LARGEST_HEIGHT {
-                    absurd = absurd.or(Some((index, value.widen())));
-                } else {
-                    summary.add(height);
-                }
+                let stored = (!hole(index)).then(|| value.widen());
+                summary.add(self.counted(stored, seen));
             }
         });
-        let Some((index, value)) = absurd else {
-            return Ok(summary);
-        };
-        let columns = self.columns as usize;
-        Err(BadRaster::NotANumber {
-            column: (index % columns) as u64,
-            row: (index / columns) as u64,
-            value,
-        })
+        summary
     }
 }

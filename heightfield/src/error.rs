@@ -139,16 +139,6 @@ pub enum BadRaster {
         /// Number of samples.
         samples: u64,
     },
-    /// A sample is infinite, or so large that it cannot be a height.
-    #[error("the sample at column {column}, row {row} of the file is {value}: not a height")]
-    NotANumber {
-        /// Column in the file, 0 first.
-        column: u64,
-        /// Row in the file, 0 first.
-        row: u64,
-        /// The sample.
-        value: f64,
-    },
     /// A folder or pattern without a file that could be read.
     #[error("no terrain: {0}")]
     NoTiles(String),
@@ -188,6 +178,18 @@ pub enum BadRaster {
         other: PathBuf,
         /// What differs.
         why: String,
+    },
+    /// Two of many files have other heights on the same samples.
+    #[error(
+        "two rasters lie at one place and differ by up to {difference}: {} and {}",
+        without_key(&files[0]),
+        without_key(&files[1])
+    )]
+    SamePlace {
+        /// The files.
+        files: [PathBuf; 2],
+        /// The largest difference that was found.
+        difference: f64,
     },
     /// The header promises more than the file can hold or a machine should.
     #[error("absurd size in the header: {0}")]

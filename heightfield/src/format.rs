@@ -44,7 +44,7 @@ impl Format {
     /// # Errors
     /// [`BadRaster::NoSuchPart`].
     pub(super) fn check_choice(&self, options: &OpenOptions) -> Result<(), BadRaster> {
-        if options.encoding.is_some() && self.name != "PNG" {
+        if options.encoding.is_some() && !["PNG", "TIFF"].contains(&self.name) {
             return Err(BadRaster::NoSuchPart {
                 asked: "picture with heights in its colours".into(),
                 there: format!("the file is {}", self.name),
@@ -103,6 +103,6 @@ mod tests {
         assert!(accepting(&options).is_empty());
         options.variable = None;
         options.encoding = Some(Encoding::Terrarium);
-        assert_eq!(accepting(&options), ["PNG"]);
+        assert_eq!(accepting(&options), ["TIFF", "PNG"]);
     }
 }

@@ -1,6 +1,7 @@
 //! What a cell measures on the ground, and a vertical unit in metres.
 
 use super::globe::Globe;
+use super::numbers::beginning;
 
 /// The unit of a cell's sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,6 +145,12 @@ pub struct VerticalDatum {
     pub name: String,
     /// EPSG's code for it, where it is known.
     pub code: Option<u16>,
+}
+
+/// The remark on a unit of heights that [`metres_in`] does not know.
+pub(super) fn unknown_unit(name: &str) -> String {
+    let name = beginning(name);
+    format!("it states the unit of heights '{name}', which is not known here (--vertical-unit)")
 }
 
 /// Metres in a unit of length by the name files give it, as `ft` or `metre`.

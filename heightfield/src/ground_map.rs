@@ -46,6 +46,18 @@ impl Bounds {
 }
 
 impl GroundMap {
+    /// Returns true if both maps put samples into the same places, to a hundredth of a cell.
+    pub(super) fn is_near(&self, other: &Self) -> bool {
+        let steps = self.steps();
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
+        corners.into_iter().all(|(column, row)| {
+            let (own, theirs) = (self.at(column, row), other.at(column, row));
+            let is_near =
+                |own: f64, theirs: f64, step: f64| (own - theirs).abs() <= 0.01 * step.abs();
+            is_near(own.0, theirs.0, steps.0) && is_near(own.1, theirs.1, steps.1)
+        })
+    }
+
     /// Of x and y: the value at the outer corner of the first sample's cell, the step
     /// from column to column and from row to row. `None` unless these are a grid.
     pub(super) fn new(x: [f64; 3], y: [f64; 3]) -> Option<Self> {

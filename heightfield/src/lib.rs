@@ -22,8 +22,8 @@
 //! (`georeference`). World files and `.prj` files are read by `beside`.
 //!
 //! **Holes.** No-data as the format states it, NaN, masked samples and tiles
-//! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. An
-//! infinite sample is an error: it is neither a height nor a declared hole.
+//! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. So is a sample
+//! beyond [`LARGEST_HEIGHT`], with a remark.
 
 #![forbid(unsafe_code)]
 
@@ -33,7 +33,10 @@ mod blocks;
 mod crs;
 mod decoded;
 pub mod disk_cache;
+mod doubtful;
+mod encoding;
 mod error;
+mod file_layout;
 mod format;
 mod formats;
 mod geometry;
@@ -41,8 +44,10 @@ mod georeference;
 mod globe;
 mod ground_map;
 mod guard;
+mod height_summary;
 mod input;
 mod mosaic;
+mod numbers;
 mod one_file;
 mod open;
 mod options;
@@ -56,6 +61,7 @@ mod storage;
 mod tangents;
 mod thinned;
 mod unread;
+mod xml;
 
 // What the tests of all crates wait with, of which each uses its part.
 #[cfg(test)]
@@ -66,14 +72,16 @@ mod timeouts;
 use std::path::{Path, PathBuf};
 
 pub use crs::{LonLat, ReferenceSystem};
-pub use decoded::{HeightSummary, LARGEST_HEIGHT};
+pub use decoded::LARGEST_HEIGHT;
 pub use error::{BadRaster, Error};
+pub use file_layout::{FileLayout, SamplesAre};
 pub use geometry::metres_in;
 pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
 pub use georeference::around;
 pub use georeference::{Georeference, GroundTransform, Sides, System};
 pub use globe::Globe;
 pub use ground_map::Bounds;
+pub use height_summary::HeightSummary;
 pub use mosaic::files_read_with;
 pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
 pub use remote::{Elsewhere, file_name, is_url, without_key};
@@ -170,7 +178,7 @@ impl Raster {
     /// southernmost; NaN is a hole. Cells are 1 m, heights in metres.
     ///
     /// # Errors
-    /// When there are fewer than 2 × 2 samples, no heights, or infinite ones.
+    /// When there are fewer than 2 × 2 samples, or no heights.
     pub fn from_fn(
         columns: u32,
         rows: u32,
@@ -439,6 +447,21 @@ impl Raster {
     /// Name of the format and variant, as `GeoTIFF, int16, deflate`.
     pub fn format(&self) -> &str {
         &self.source.format
+    }
+
+    /// How the file lays its samples out.
+    pub fn file_layout(&self) -> &FileLayout {
+        &self.source.file_layout
+    }
+
+    /// The stored value that means no data, if one does.
+    pub fn no_data(&self) -> Option<f64> {
+        self.source.no_data
+    }
+
+    /// Scale and offset: a height is a stored value × scale + offset.
+    pub fn scale_and_offset(&self) -> (f64, f64) {
+        (self.source.scale, self.source.offset)
     }
 
     /// The horizontal reference system, where the file states it.

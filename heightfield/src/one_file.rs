@@ -1,5 +1,6 @@
 //! From one file to decoded samples: tells the format, decodes.
 
+use super::beside::{Notes, remark_unread};
 use super::format::{Claim, Format};
 use super::formats::{FORMATS, gdal, headered, raw};
 use super::guard::guarded;
@@ -13,28 +14,57 @@ const HEAD_BYTES: u64 = 1024;
 pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     if let Some(layout) = options.raw {
         check_no_open_options("raw samples", options)?;
-        return raw::decode(input, layout, options);
+        return with_notes(input, options, |options| {
+            raw::decode(input, layout, options)
+        });
     }
     let head = input.head(HEAD_BYTES)?;
     if head.is_empty() {
         return Err(BadRaster::Truncated("it is empty".into()));
     }
-    if let Some(format) = by_content(&head) {
-        return or_by_gdal(decode_as(format, input, options), input, options);
+    let decoded = with_notes(input, options, |options| decode_here(input, &head, options));
+    or_by_gdal(decoded, input, options)
+}
+
+/// Decodes a file with what GDAL has noted beside it.
+fn with_notes(
+    input: &FileBytes,
+    options: &OpenOptions,
+    decode: impl FnOnce(&OpenOptions) -> Result<Decoded, BadRaster>,
+) -> Result<Decoded, BadRaster> {
+    let notes = Notes::read(input, options.band.unwrap_or(1));
+    let mut decoded = decode(&OpenOptions {
+        no_data: options.no_data.or(notes.no_data),
+        ..options.clone()
+    })?;
+    notes.apply(&mut decoded);
+    if !input.is_outline() {
+        remark_unread(input, &mut decoded);
+    }
+    Ok(decoded)
+}
+
+/// Decodes a file without GDAL.
+fn decode_here(
+    input: &FileBytes,
+    head: &[u8],
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    if let Some(format) = by_content(head) {
+        return decode_as(format, input, options);
     }
     // A header beside a file tells more than the file's extension.
-    if !headered::is_of_another_kind(&head)
+    if !headered::is_of_another_kind(head)
         && let Some(decoded) = guarded("raw", || headered::decode_by_header(input, options))?
     {
         check_no_open_options("plain samples with a header", options)?;
         return Ok(decoded);
     }
-    let format = match gdal::by_beginning(&head) {
-        Some(_) => Err(BadRaster::UnknownFormat),
-        None => by_extension(input.extension()),
+    let format = match gdal::by_beginning(head) {
+        Some(_) => return Err(BadRaster::UnknownFormat),
+        None => by_extension(input.extension())?,
     };
-    let decoded = format.and_then(|format| decode_as(format, input, options));
-    or_by_gdal(decoded, input, options)
+    decode_as(format, input, options)
 }
 
 /// What is not known or not supported here is given to GDAL.

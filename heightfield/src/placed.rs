@@ -95,13 +95,24 @@ impl Decoded {
     pub(super) fn lay_out(&mut self, map: GroundMap, unit: Option<GroundUnit>) {
         self.south_up = map.is_south_up();
         self.east_first = map.is_east_first();
-        self.remarks.extend(turned(&map));
+        let turned = turned(&map);
+        let new = turned
+            .into_iter()
+            .filter(|line| !self.remarks.contains(line));
+        self.remarks.extend(new.collect::<Vec<_>>());
         let unit = unit.or(self.system.as_ref().map(GroundUnit::of));
         let degrees = unit.map_or(1.0, |unit| unit.degrees);
         let mut cell = self.cell_of(&map, unit);
         cell.lean = map.lean();
         self.cell = Some(self.on_ground(&map, cell, degrees).unwrap_or(cell));
         self.place = Some(Place { map, degrees });
+    }
+
+    /// Remarks on places of single samples, from which no grid follows.
+    pub(super) fn remark_control_points(&mut self, count: usize) {
+        self.remarks.push(format!(
+            "it states the places of {count} samples (tie points, ground control points) and no cell size: they are not used; this brings it onto a map: gdalwarp -r bilinear IN OUT.tif"
+        ));
     }
 
     /// Takes a side of the cells in metres from the user, where the file does not state

@@ -1,8 +1,10 @@
 //! What lies beside a file under the same name: a header (`.hdr`), a reference system
-//! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`). A file on disk or at a URL has
-//! neighbours.
+//! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`), GDAL's notes (`.aux.xml`). A file on
+//! disk or at a URL has neighbours.
 
+mod pam;
 mod prj;
+mod unread;
 mod world_file;
 
 use std::ffi::OsString;
@@ -12,16 +14,19 @@ use super::BadRaster;
 use super::input::{Data, FileBytes};
 use crate::remote::{is_missing, neighbour};
 
+pub(super) use pam::Notes;
 pub(super) use prj::reference_system;
-pub(super) use world_file::lay_out_by_world_file;
+pub(super) use unread::remark_unread;
+pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
 
 /// No neighbour that is text is longer; what is longer is something else.
 const LONGEST_TEXT: u64 = 1 << 20;
 
 /// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so
 /// that no output comes to lie over one that [`files_read_with`] does not know.
-const NEIGHBOURS: [&str; 12] = [
-    "hdr", "prj", "msk", "ovr", "wld", "tfw", "tifw", "tiffw", "tfwx", "pgw", "pngw", "pgwx",
+const NEIGHBOURS: [&str; 13] = [
+    "hdr", "prj", "msk", "ovr", "aux.xml", "wld", "tfw", "tifw", "tiffw", "tfwx", "pgw", "pngw",
+    "pgwx",
 ];
 
 /// A terrain file and the files beside it that are read with it.
@@ -132,9 +137,18 @@ pub(super) fn text(
     input: &FileBytes,
     extension: &str,
 ) -> Result<Option<(String, String)>, BadRaster> {
-    let Some(beside) = find(input, extension)? else {
-        return Ok(None);
-    };
+    find(input, extension)?.map(whole_text).transpose()
+}
+
+/// The same of the file whose name is that of `input` with the extension behind it.
+fn text_appended(
+    input: &FileBytes,
+    extension: &str,
+) -> Result<Option<(String, String)>, BadRaster> {
+    find_appended(input, extension)?.map(whole_text).transpose()
+}
+
+fn whole_text(beside: FileBytes) -> Result<(String, String), BadRaster> {
     let name = beside.name().to_owned();
     let bytes = beside.head(LONGEST_TEXT + 1)?;
     if bytes.len() as u64 > LONGEST_TEXT {
@@ -142,6 +156,5 @@ pub(super) fn text(
             "{name} beside it is larger than {LONGEST_TEXT} bytes: no such text is"
         )));
     }
-    let text = String::from_utf8_lossy(&bytes).into_owned();
-    Ok(Some((text, name)))
+    Ok((String::from_utf8_lossy(&bytes).into_owned(), name))
 }

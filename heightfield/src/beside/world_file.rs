@@ -4,7 +4,7 @@ use super::text;
 use crate::BadRaster;
 use crate::decoded::Decoded;
 use crate::ground_map::GroundMap;
-use crate::input::FileBytes;
+use crate::input::{Data, FileBytes};
 
 /// Lays the samples out by the world file beside a file, and the `.prj` that may lie
 /// there too. `own` are the extensions of the format's world files; `.wld` serves all.
@@ -16,6 +16,28 @@ pub(crate) fn lay_out_by_world_file(
     own: &[&'static str],
     decoded: &mut Decoded,
 ) -> Result<(), BadRaster> {
+    if let Some((map, name)) = find(input, own)? {
+        super::reference_system(input, decoded)?;
+        decoded.lay_out(map, None);
+        decoded.format += &format!(", placed by {name}");
+    }
+    Ok(())
+}
+
+/// Remarks on a world file beside a file on disk that states another place itself.
+pub(crate) fn remark_other_place(input: &FileBytes, own: &[&'static str], decoded: &mut Decoded) {
+    if let (Data::File(..), Some(place)) = (input.data(), decoded.place)
+        && let Ok(Some((map, name))) = find(input, own)
+        && !map.is_near(&place.map)
+    {
+        decoded.remarks.push(format!(
+            "place: the file and {name} beside it differ; the former is taken"
+        ));
+    }
+}
+
+/// The map of the world file beside a file, and that file's name.
+fn find(input: &FileBytes, own: &[&'static str]) -> Result<Option<(GroundMap, String)>, BadRaster> {
     let extensions = || own.iter().copied().chain(["wld"]);
     super::look_for(input, extensions());
     for extension in extensions() {
@@ -27,12 +49,9 @@ pub(crate) fn lay_out_by_world_file(
                 "{name} beside it is no world file: six numbers are wanted, the steps not zero"
             ))
         })?;
-        super::reference_system(input, decoded)?;
-        decoded.lay_out(map, None);
-        decoded.format += &format!(", placed by {name}");
-        return Ok(());
+        return Ok(Some((map, name)));
     }
-    Ok(())
+    Ok(None)
 }
 
 fn read(text: &str) -> Option<GroundMap> {

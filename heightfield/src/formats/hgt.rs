@@ -2,13 +2,16 @@
 //! follow from the file's length and name.
 
 use crate::decoded::Decoded;
+use crate::file_layout::SamplesAre;
 use crate::format::{Claim, Format, Parts};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::placed::GroundUnit;
 use crate::plain::Plain;
 use crate::read::Stored;
-use crate::{BadRaster, CellSize, CellUnit, Endian, OpenOptions, ReferenceSystem, SampleType};
+use crate::{
+    BadRaster, CellSize, CellUnit, Certainty, Endian, OpenOptions, ReferenceSystem, SampleType,
+};
 
 /// SRTM tiles: nothing but their name tells them.
 pub(super) const FORMAT: Format = Format {
@@ -30,6 +33,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     let format = "SRTM height tile, int16".to_owned();
     let mut decoded = Decoded::new(format, (columns, rows), plain.storage(input, options)?);
     decoded.no_data = Some(VOID);
+    decoded.file_layout.samples_are = Some(SamplesAre::Points);
     decoded.metres_per_vertical_unit = Some(1.0);
     // SRTM's heights are above the geoid EGM96, its places on WGS 84.
     decoded.set_vertical_datum(5773);
@@ -42,10 +46,13 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     if let Some(map) = map {
         decoded.lay_out(map, Some(GroundUnit::DEGREE));
     } else {
-        decoded.cell = Some(CellSize::stated((east, north), CellUnit::Degree, None));
+        decoded.cell = Some(CellSize {
+            certainty: Certainty::Assumed,
+            ..CellSize::stated((east, north), CellUnit::Degree, None)
+        });
         decoded.remarks.push(
-            "the name does not say where the tile is (as N44W072.hgt does): \
-             its cells are taken to be square"
+            "the name does not say where the tile is (as N44W072.hgt does): it is taken to be a \
+             degree high, its cells to be square (--ground-cell-m)"
                 .into(),
         );
     }
@@ -78,6 +85,10 @@ fn corner(name: &str) -> Option<(f64, f64)> {
         let all_digits = text.bytes().all(|byte| byte.is_ascii_digit());
         text.parse().ok().filter(|_| all_digits)
     };
+    // A longer name, as N45W074T86.hgt, is that of a part of a tile.
+    if bytes.get(7).is_some_and(u8::is_ascii_alphanumeric) {
+        return None;
+    }
     let latitude = digits(1..3).filter(|&degrees| degrees <= 90.0)?;
     let longitude = digits(4..7).filter(|&degrees| degrees <= 180.0)?;
     let signed = |letter, [plus, minus]: [u8; 2], degrees: f64| match letter {
@@ -97,6 +108,9 @@ mod tests {
     fn a_name_tells_the_place() {
         assert_eq!(corner("N44W072.hgt"), Some((-72.0, 44.0)));
         assert_eq!(corner("s05e100.SRTMGL1.hgt"), Some((100.0, -5.0)));
+        assert_eq!(corner("N45W074T86.hgt"), None);
+        assert_eq!(corner("n45w0741.hgt"), None);
+        assert_eq!(corner("N45W074_v3.hgt"), Some((-74.0, 45.0)));
         assert_eq!(corner("mountain.hgt"), None);
         assert_eq!(corner("N99E000.hgt"), None);
         assert_eq!(corner("N44X072.hgt"), None);

@@ -24,7 +24,7 @@ pub(super) struct Grid {
 
 /// Columns and rows of a grid: the south-western sample of a file, counted from that of the
 /// first one, and how many there are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Spot {
     /// Its first column, from the west.
     pub(super) column: i64,

@@ -1,5 +1,6 @@
 //! The index of files that share a grid: the header of each is read, and nothing else.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::super::blocks::Part;
@@ -8,6 +9,7 @@ use super::super::ground_map::GroundMap;
 use super::super::samples::SampleType;
 use super::super::{BadRaster, OpenOptions};
 use super::grid::{Grid, Spot, unwrap_turns};
+use super::layers;
 use super::pool::{options_for_tiles, whole_bytes};
 use super::reader::Mosaic;
 use super::source::Source;
@@ -16,6 +18,7 @@ use super::tile_file;
 /// A file as it is on the grid.
 struct Tile {
     path: PathBuf,
+    sample: SampleType,
     bytes: u64,
     is_east_first: bool,
     is_south_up: bool,
@@ -33,10 +36,13 @@ struct Index {
 /// A terrain of files: where they overlap the last one with a height counts.
 pub(super) fn decoded(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     let mut index = Index::read(files, options)?;
+    let layers = index.remove_layers(options)?;
     if let Some(around) = index.grid.columns_around() {
         unwrap_turns(&mut index.spots, around);
     }
-    index.decoded(options)
+    let mut decoded = index.decoded(options)?;
+    decoded.remarks.extend(layers::left_out(&layers));
+    Ok(decoded)
 }
 
 impl Index {
@@ -74,11 +80,42 @@ impl Index {
         let bytes = std::fs::metadata(&path).map_or(0, |metadata| metadata.len());
         self.tiles.push(Tile {
             path,
+            sample: outline.storage.sample_type(),
             bytes,
             is_east_first: outline.east_first,
             is_south_up: outline.south_up,
         });
         Ok(())
+    }
+
+    /// Leaves out what lies on the same samples as heights and is none, and tells its files.
+    fn remove_layers(&mut self, options: &OpenOptions) -> Result<Vec<PathBuf>, BadRaster> {
+        let mut at_spots: HashMap<Spot, Vec<usize>> = HashMap::new();
+        for (number, spot) in self.spots.iter().enumerate() {
+            at_spots.entry(*spot).or_default().push(number);
+        }
+        let mut is_layer = vec![false; self.tiles.len()];
+        for numbers in at_spots.values().filter(|numbers| numbers.len() > 1) {
+            let named = |number: &usize| {
+                let tile = &self.tiles[*number];
+                (tile.path.as_path(), tile.sample)
+            };
+            let files: Vec<_> = numbers.iter().map(named).collect();
+            if let Some(heights) = layers::heights_among(&files) {
+                for (at, number) in numbers.iter().enumerate() {
+                    is_layer[*number] = at != heights;
+                }
+            }
+        }
+        let mut each = is_layer.iter();
+        self.spots.retain(|_| each.next() == Some(&false));
+        let tiles = std::mem::take(&mut self.tiles).into_iter().zip(&is_layer);
+        let (layers, tiles): (Vec<_>, Vec<_>) = tiles.partition(|(_, is_layer)| **is_layer);
+        self.tiles = tiles.into_iter().map(|(tile, _)| tile).collect();
+        if is_layer.first() == Some(&true) {
+            self.grid.first = outline(&self.tiles[0].path, &options_for_tiles(options))?;
+        }
+        Ok(layers.into_iter().map(|(tile, _)| tile.path).collect())
     }
 
     fn decoded(self, options: &OpenOptions) -> Result<Decoded, BadRaster> {
@@ -102,7 +139,10 @@ impl Index {
             false => SampleType::F64,
         };
         let mosaic = Mosaic::new(size, sources.collect(), sample, options);
+        let remarks = mosaic.remark_differences()?;
         let mut decoded = Decoded::new(format, size, mosaic);
+        decoded.remarks = remarks;
+        decoded.file_layout = first.file_layout.clone();
         decoded.system = first.system.clone();
         decoded.system_from = first.system_from;
         decoded.metres_per_vertical_unit = first.metres_per_vertical_unit;

@@ -5,6 +5,9 @@
 //! behind [`super::blocks`]) is filled from the last source to the first. Files are opened when
 //! they are touched, and few at once (`pool`).
 //!
+//! Layers beside heights, as masks and counts of scenes, are left out (`layers`). Files that overlap
+//! and differ there are reported, and refused where they lie on the same samples (`overlaps`).
+//!
 //! Where no file has a height there is a hole. A file that cannot be read is one, too, with
 //! a warning: one bad file of thousands is no reason to feel nothing.
 //!
@@ -13,7 +16,9 @@
 
 mod grid;
 mod index;
+mod layers;
 mod names;
+mod overlaps;
 mod pool;
 mod reader;
 mod source;
@@ -36,7 +41,10 @@ pub(super) fn of_files(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Dec
                 .into(),
         ));
     }
-    index::decoded(files, options)
+    let (files, layers) = layers::split_by_name(files);
+    let mut decoded = index::decoded(files, options)?;
+    decoded.remarks.extend(layers::left_out(&layers));
+    Ok(decoded)
 }
 
 /// The files of a terrain, and those beside them, that are read: a file and those that it names as

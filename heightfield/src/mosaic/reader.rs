@@ -1,7 +1,7 @@
 //! Reads samples of a terrain of many files, from those files that have them.
 
 use std::hash::Hasher;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use fixedbitset::FixedBitSet;
 use twox_hash::XxHash64;
@@ -24,7 +24,7 @@ const PLACE: u32 = 64;
 
 /// The files of a terrain, the last on top.
 pub(super) struct Mosaic {
-    sources: Vec<Source>,
+    pub(super) sources: Vec<Source>,
     images: Vec<BlockImage>,
     sample: SampleType,
     pool: Mutex<Pool>,
@@ -75,6 +75,18 @@ impl Mosaic {
     fn pool(&self) -> MutexGuard<'_, Pool> {
         // What panics while this is held is a decoder, whose panics are caught.
         self.pool.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A file, opened; `None`, with a warning the first time, where it cannot be read.
+    ///
+    /// # Errors
+    /// Where it is elsewhere, and cannot be read at present.
+    pub(super) fn opened(
+        &self,
+        number: usize,
+        source: &Source,
+    ) -> Result<Option<Arc<Opened>>, BadRaster> {
+        self.pool().get(number, source)
     }
 
     /// Number of open files.
@@ -169,7 +181,7 @@ impl BlockReader for Mosaic {
                 continue;
             }
             // Only while it is opened: whoever else reads does not wait for all of this.
-            let opened = self.pool().get(number, source)?;
+            let opened = self.opened(number, source)?;
             if let Some(opened) = &opened {
                 let before = not_yet();
                 filling.fill(image as u8, source, opened, &places);

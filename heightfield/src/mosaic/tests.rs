@@ -187,3 +187,59 @@ fn the_same_files_are_the_same_terrain_and_changed_ones_another() {
     });
     assert!(prints[0].is_some() && prints[0] != prints[1] && prints[0] != prints[2]);
 }
+
+/// A tile of one height.
+fn flat(folder: &Path, name: &str, west: u32, height: i32) {
+    let header = format!("ncols 4\nnrows 3\nxllcorner {west}\nyllcorner 0\ncellsize 1\n");
+    let samples = format!("{height} ").repeat(12);
+    std::fs::write(folder.join(name), header + &samples).expect("written");
+}
+
+#[test]
+fn layers_beside_heights_are_left_out_and_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    flat(folder.path(), "n38_dem.asc", 0, 500);
+    flat(folder.path(), "n38_num.asc", 0, 12);
+    // Of no known name, but on the same samples.
+    flat(folder.path(), "n38_aux.asc", 0, 7);
+    let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
+    let summary = raster.summary();
+    assert_eq!((summary.lowest, summary.highest), (500.0, 500.0));
+    let said = raster.remarks().join(" ");
+    assert!(
+        said.contains("n38_num.asc") && said.contains("n38_aux.asc"),
+        "{said}"
+    );
+}
+
+#[test]
+fn rasters_that_differ_at_one_place_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    flat(folder.path(), "a_2019.asc", 0, 500);
+    flat(folder.path(), "a_2020.asc", 0, 503);
+    let fault = Raster::open(folder.path(), &OpenOptions::default()).expect_err("refused");
+    let fault = fault.to_string();
+    assert!(fault.contains("differ by up to 3"), "{fault}");
+    assert!(
+        fault.contains("a_2019.asc") && fault.contains("a_2020.asc"),
+        "{fault}"
+    );
+    // The same heights twice are no choice.
+    flat(folder.path(), "a_2020.asc", 0, 500);
+    let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
+    assert_eq!(raster.remarks(), [""; 0]);
+}
+
+#[test]
+fn tiles_that_differ_where_they_overlap_are_reported() {
+    let folder = tempfile::tempdir().expect("a folder");
+    flat(folder.path(), "a.asc", 0, 500);
+    flat(folder.path(), "b.asc", 3, 510);
+    let raster = Raster::open(folder.path(), &OpenOptions::default()).expect("a terrain");
+    let said = raster.remarks().join(" ");
+    assert!(
+        said.contains("a.asc and b.asc overlap") && said.contains("up to 10"),
+        "{said}"
+    );
+    assert_eq!(raster.height(3, 0), 510.0);
+}

@@ -17,7 +17,7 @@ use super::report::put;
 use crate::place::place_in_words;
 use crate::terrain::{Distortion, FeltCells, FeltGrid};
 use heightfield::without_key;
-use heightfield::{CellSize, CellUnit, Certainty, ReferenceSystem};
+use heightfield::{CellSize, CellUnit, Certainty, ReferenceSystem, SamplesAre};
 use link::LinkFigures;
 use place::{Rectangle, Vertical, from, told};
 
@@ -59,7 +59,7 @@ fn rate(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When the file cannot be opened as a height field.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let raster = args.terrain.open()?;
+    let raster = args.terrain.open_without_remarks()?;
     let grid = FeltGrid::new(&raster, args.cells);
     let link = args.link.map(|rate| LinkFigures::of(&grid, rate));
     let report = FileReport {
@@ -101,8 +101,21 @@ struct FileReport {
     /// In the file's vertical unit.
     lowest: f64,
     highest: f64,
+    /// Height = stored value × scale + offset.
+    scale: f64,
+    offset: f64,
     /// Among the samples that were looked at.
     no_data: u64,
+    /// The stored value that means no data.
+    no_data_value: Option<f64>,
+    /// Bands, of which one holds the heights.
+    bands: u32,
+    /// Columns and rows of a strip, tile or block.
+    block: Option<[u32; 2]>,
+    /// Columns and rows of each overview.
+    overviews: Vec<[u32; 2]>,
+    /// Whether a sample stands for an `area` or a `point`, where the file states it.
+    samples_are: Option<&'static str>,
     /// Samples that range and number of holes are from: all, or fewer where the raster
     /// stays in its file.
     looked_at: u64,
@@ -159,6 +172,8 @@ impl FileReport {
     fn new(input: &TerrainFile, grid: &FeltGrid<'_>) -> Self {
         let raster = grid.raster();
         let summary = raster.summary();
+        let layout = raster.file_layout();
+        let (scale, offset) = raster.scale_and_offset();
         let system = raster.reference_system();
         let code = system.and_then(|system| system.code());
         Self {
@@ -177,7 +192,17 @@ impl FileReport {
             vertical: Vertical::of(raster),
             lowest: summary.lowest,
             highest: summary.highest,
+            scale,
+            offset,
             no_data: summary.holes,
+            no_data_value: raster.no_data(),
+            bands: layout.bands,
+            block: layout.block,
+            overviews: layout.overviews.clone(),
+            samples_are: layout.samples_are.map(|samples| match samples {
+                SamplesAre::Areas => "area",
+                SamplesAre::Points => "point",
+            }),
             looked_at: summary.looked_at,
             known_whole: raster.is_known_whole(),
             bytes: raster.memory_bytes(),
@@ -233,6 +258,9 @@ impl FileReport {
             "no data",
             format!("{} samples ({share:.2} %){looked}", self.no_data),
         );
+        for (name, value) in self.stored() {
+            line(name, value);
+        }
         let at_most = if self.known_whole { "" } else { "at most " };
         line("memory", format!("{at_most}{} bytes", self.bytes));
         for level in &self.levels {
@@ -245,6 +273,45 @@ impl FileReport {
             line("remark", remark.clone());
         }
         text
+    }
+
+    /// How the file stores its samples.
+    fn stored(&self) -> [(&'static str, String); 4] {
+        let sides = |[columns, rows]: [u32; 2]| format!("{columns} × {rows}");
+        let no_data = self
+            .no_data_value
+            .map_or("none".into(), |value| value.to_string());
+        let overviews: Vec<_> = self.overviews.iter().map(|size| sides(*size)).collect();
+        [
+            (
+                "stored",
+                format!(
+                    "no-data value {no_data}, scale {}, offset {}",
+                    self.scale, self.offset
+                ),
+            ),
+            (
+                "bands",
+                match self.block {
+                    Some(block) => format!("{}, in blocks of {}", self.bands, sides(block)),
+                    None => self.bands.to_string(),
+                },
+            ),
+            (
+                "samples",
+                self.samples_are
+                    .map_or("area or point not stated".into(), |it| {
+                        format!("{it} (stated)")
+                    }),
+            ),
+            (
+                "overviews",
+                match overviews.is_empty() {
+                    true => "none".into(),
+                    false => overviews.join(", "),
+                },
+            ),
+        ]
     }
 
     /// As `EPSG:26911 NAD83 / UTM zone 11N (stated)`.

@@ -5,13 +5,20 @@ use std::io::Read;
 
 use super::tokens::Tokens;
 use crate::BadRaster;
+use crate::numbers::number;
 
+/// The key of the value that means no data.
+const NO_DATA: &str = "nodata";
 /// What Esri takes for no data where the header does not say.
 const DEFAULT_NO_DATA: f64 = -9999.0;
 
 /// The header's numbers, unchecked, each under the first of its key's spellings.
 #[derive(Debug, Default)]
-pub(super) struct Header(HashMap<&'static str, f64>);
+pub(super) struct Header {
+    numbers: HashMap<&'static str, f64>,
+    /// What it has for no data, where that is no number: samples have it, too.
+    pub(super) no_data_word: Option<String>,
+}
 
 /// A key in lower case as its first spelling; `None` where there is no such key.
 fn known(key: &str) -> Option<&'static str> {
@@ -25,7 +32,7 @@ fn known(key: &str) -> Option<&'static str> {
         "yllcorner" => "yllcorner",
         "xllcenter" | "xllcentre" => "xllcenter",
         "yllcenter" | "yllcentre" => "yllcenter",
-        "nodata_value" | "nodata" => "nodata",
+        "nodata_value" | "nodata" => NO_DATA,
         _ => return None,
     })
 }
@@ -39,14 +46,6 @@ pub(super) fn looks_like_header(head: &[u8]) -> bool {
         .next()
         .is_some_and(|word| known(&word.to_lowercase()).is_some())
         && words.next().is_some_and(|word| number(word).is_some())
-}
-
-/// A number as these files write them: also with a decimal comma.
-pub(super) fn number(word: &str) -> Option<f64> {
-    word.parse().ok().or_else(|| {
-        let one_comma = word.matches(',').count() == 1 && !word.contains('.');
-        word.replace(',', ".").parse().ok().filter(|_| one_comma)
-    })
 }
 
 impl Header {
@@ -66,16 +65,22 @@ impl Header {
             let value = tokens.next()?.ok_or_else(|| {
                 BadRaster::Truncated(format!("it ends after the header key '{key}'"))
             })?;
-            let value = number(value).ok_or_else(|| {
-                BadRaster::damaged(format!("header: {key} is '{value}', not a number"))
-            })?;
-            header.0.insert(known, value);
+            match number(value) {
+                Some(value) => {
+                    header.numbers.insert(known, value);
+                }
+                None if known == NO_DATA => header.no_data_word = Some(value.to_owned()),
+                None => {
+                    let what = format!("header: {key} is '{value}', not a number");
+                    return Err(BadRaster::damaged(what));
+                }
+            }
         }
         Ok(header)
     }
 
     fn get(&self, key: &str) -> Option<f64> {
-        self.0.get(key).copied()
+        self.numbers.get(key).copied()
     }
 
     /// Columns and rows, as far as numbers of samples go.
@@ -103,7 +108,12 @@ impl Header {
 
     /// The value that means no data.
     pub(super) fn no_data(&self) -> f64 {
-        self.get("nodata").unwrap_or(DEFAULT_NO_DATA)
+        self.get(NO_DATA).unwrap_or(DEFAULT_NO_DATA)
+    }
+
+    /// Returns true if a word that is no number is the header's for no data.
+    pub(super) fn means_none(&self, word: &str) -> bool {
+        self.no_data_word.as_deref() == Some(word)
     }
 
     fn count(&self, key: &str) -> Result<u32, BadRaster> {

@@ -84,7 +84,6 @@ fn what_is_wrong_is_named() {
     assert!(told(&format!("{square}1 2 3")).contains("3 follow"));
     assert!(told(&format!("{square}1 2 3 4 5")).contains("more numbers"));
     assert!(told(&format!("{square}1 2 3 x4")).contains("row 1, column 1: 'x4'"));
-    assert!(told(&format!("{square}1 2 3 inf")).contains("not a height"));
     assert!(told("nrows 2\ncellsize 1\n1 2 3 4").contains("no ncols"));
     assert!(told("ncols 2.5\nnrows 2\ncellsize 1\n1 2").contains("ncols is 2.5"));
     assert!(told("ncols 2\nnrows 2\ncellsize\n").contains("ends after"));
@@ -95,4 +94,25 @@ fn what_is_wrong_is_named() {
         "and no room was made for them"
     );
     assert!(told(&format!("{square}{}", "7".repeat(4000))).contains("more than 128 bytes"));
+}
+
+#[test]
+fn samples_that_are_no_heights_are_holes() {
+    let square = "ncols 3\nnrows 2\ncellsize 1\n";
+    for (header, samples, holes, remark) in [
+        ("", "1 2 3 4 inf -inf", 2, "infinite"),
+        ("", "1 2 3 4 1.#QNAN -1.#IND", 2, ""),
+        ("nodata_value null\n", "1 2 3 4 null -9999", 2, "'null'"),
+        ("nodata_value None\n", "1 2 3 4 5 None", 1, "'None'"),
+        ("nodata_value -9999,0\n", "1 2 3 4 5 -9999.00", 1, ""),
+    ] {
+        let raster = open(&format!("{square}{header}{samples}")).expect("a grid");
+        assert_eq!(raster.summary().holes, holes, "{header}{samples}");
+        assert_eq!(raster.summary().lowest, 1.0, "{header}{samples}");
+        let said = raster.remarks().join(" ");
+        assert!(said.contains(remark), "{said}");
+        assert_eq!(said.is_empty(), remark.is_empty(), "{said}");
+    }
+    let fortran = open(&format!("{square}1.0D+02 2 3 4 5 6")).expect("a grid");
+    assert_eq!(fortran.height(0, 1), 100.0);
 }

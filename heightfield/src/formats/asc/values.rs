@@ -2,8 +2,9 @@
 
 use std::io::Read;
 
-use super::header::{Header, number};
+use super::header::Header;
 use super::tokens::Tokens;
+use crate::numbers::number;
 use crate::samples::{SampleValue, with_samples};
 use crate::{BadRaster, Samples};
 
@@ -39,6 +40,7 @@ pub(super) fn read<R: Read>(
             )));
         }
         let value = number(word)
+            .or_else(|| header.means_none(word).then_some(f64::NAN))
             .ok_or_else(|| BadRaster::damaged(format!("{}: '{word}' is not a number", place())))?;
         growing.push(value);
         held += 1;

@@ -10,6 +10,7 @@ use super::{NAME, fault};
 use crate::blocks::{
     Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, usual_block,
 };
+use crate::encoding::codes;
 use crate::plain::{transposed, turned};
 use crate::samples::{HoleMask, SampleType, with_samples};
 use crate::{BadRaster, thinned};
@@ -40,6 +41,8 @@ pub(super) struct GdalBlocks {
     /// Number of the band.
     number: u32,
     held: SampleType,
+    /// The first three bands are colours, and together the code of a height.
+    has_codes: bool,
     images: Vec<BlockImage>,
     /// Of each image but the full one, its number among the band's overviews.
     overviews: Vec<usize>,
@@ -48,7 +51,13 @@ pub(super) struct GdalBlocks {
 }
 
 impl GdalBlocks {
-    pub(super) fn new(dataset: Dataset, number: u32, held: SampleType) -> Result<Self, BadRaster> {
+    pub(super) fn new(
+        dataset: Dataset,
+        number: u32,
+        stored: SampleType,
+        has_codes: bool,
+    ) -> Result<Self, BadRaster> {
+        let held = if has_codes { SampleType::I32 } else { stored };
         let band = dataset.band(number).map_err(fault)?;
         let is_masked = band.mask() == Mask::Band;
         let full = image(&band);
@@ -71,6 +80,8 @@ impl GdalBlocks {
             .collect();
         coarser.sort_by_key(|at| std::cmp::Reverse(overviews[*at].size()));
         coarser.dedup_by_key(|at| overviews[*at].size());
+        // The mean of encoded colours is no height.
+        coarser.retain(|_| !has_codes);
         let images: Vec<_> = (coarser.iter().map(|at| image(&overviews[*at]))).collect();
         let mut hasher = XxHash64::with_seed(0);
         for side in full
@@ -84,6 +95,7 @@ impl GdalBlocks {
         Ok(Self {
             number,
             held,
+            has_codes,
             images: [full].into_iter().chain(images).collect(),
             overviews: coarser,
             is_masked,
@@ -139,8 +151,17 @@ impl BlockReader for GdalBlocks {
                 *overview.ok_or_else(|| BadRaster::damaged("GDAL: an overview has gone"))?
             }
         };
-        let mut samples = self.held.none();
-        with_samples!(&mut samples, values => *values = read(&band, part)?);
+        let samples = match self.has_codes {
+            true => {
+                let colour = |number| read::<u8>(&dataset.band(number).map_err(fault)?, part);
+                codes([colour(1)?, colour(2)?, colour(3)?])
+            }
+            false => {
+                let mut samples = self.held.none();
+                with_samples!(&mut samples, values => *values = read(&band, part)?);
+                samples
+            }
+        };
         let mask = self.is_masked.then(|| band.mask_band()).flatten();
         let holes = mask.map(|mask| holes(&mask, part)).transpose()?;
         Ok(Block {

@@ -20,6 +20,8 @@ use heightfield_gdal::{Dataset, Error, Library, SampleType as Stored, Settings};
 use super::{headered, height_name, is_read_here};
 use crate::blocks::{BlockReader, Part};
 use crate::decoded::{Decoded, sides};
+use crate::encoding::no_codes;
+use crate::file_layout::FileLayout;
 use crate::geometry::metres_in;
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
@@ -198,7 +200,10 @@ fn decoded(
     let band = dataset.band(number).map_err(fault)?;
     let stored = band.sample_type();
     let stored = stored.map_err(|name| BadRaster::NotAHeightField(format!("samples of {name}")))?;
-    if options.band.is_none() && stored == Stored::U8 && COLOURS.contains(&bands) {
+    let has_codes = options.encoding.is_some();
+    if has_codes {
+        check_codes(stored, bands, options)?;
+    } else if options.band.is_none() && stored == Stored::U8 && COLOURS.contains(&bands) {
         return Err(BadRaster::ColourBands {
             what: format!("a picture of {bands} bands of bytes"),
             bands: bands as u16,
@@ -208,15 +213,24 @@ fn decoded(
     let unit = band.unit();
     let (driver, map, wkt) = (dataset.driver(), dataset.geo_transform(), dataset.wkt());
     let conventions = netcdf::Conventions::of(library, path, &dataset, &band)?;
-    let blocks = GdalBlocks::new(dataset, number, held(stored))?;
+    let block = band.block_size();
+    let blocks = GdalBlocks::new(dataset, number, held(stored), has_codes)?;
+    let overviews = blocks.images().iter().skip(1);
+    let file_layout = FileLayout {
+        bands,
+        block: Some(block),
+        overviews: overviews.map(|image| [image.columns, image.rows]).collect(),
+        samples_are: None,
+    };
     let mut decoded = match conventions.is_turned {
         true => read(Turned::new(blocks), &driver, options)?,
         false => read(blocks, &driver, options)?,
     };
+    decoded.file_layout = file_layout;
     decoded.no_data = no_data;
     decoded.scale = scale.unwrap_or(1.0);
     decoded.offset = offset.unwrap_or(0.0);
-    if bands > 1 && options.band.is_none() {
+    if bands > 1 && options.band.is_none() && !has_codes {
         decoded.remarks.push(format!(
             "it has {bands} bands: the first is taken for the height (--band)"
         ));
@@ -238,7 +252,22 @@ fn decoded(
     {
         decoded.lay_out(map, None);
     }
+    if let Some(encoding) = options.encoding {
+        decoded.take_codes(encoding);
+    }
     Ok(decoded)
+}
+
+/// Checks that a file has colours that may be codes of heights.
+fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), BadRaster> {
+    match options.band {
+        Some(band) => Err(BadRaster::NoSuchPart {
+            asked: format!("band {band} with --encoding"),
+            there: "three bands together are one height".into(),
+        }),
+        None if stored == Stored::U8 && COLOURS.contains(&bands) => Ok(()),
+        None => Err(no_codes("the file has other bands")),
+    }
 }
 
 /// Samples in memory where they are few, else in their file.

@@ -7,6 +7,7 @@ use super::Header;
 use super::layout::{Interleave, Layout};
 use crate::decoded::Decoded;
 use crate::ground_map::GroundMap;
+use crate::numbers::{self, NoDataText};
 use crate::read::Stored;
 use crate::{BadRaster, Endian, SampleType};
 
@@ -19,9 +20,10 @@ pub(super) fn is_header(text: &str) -> bool {
 /// The values by their keys in lower case.
 struct Keys(HashMap<String, String>);
 
-/// Reads a header for data with an extension. Where it does not say, a `.flt` has single
-/// floats, and other integers have a sign when the no-data value has one.
-pub(super) fn read(text: &str, extension: &str) -> Result<Header, BadRaster> {
+/// Reads a header for data with an extension, of so many bytes. Where it does not state the type,
+/// the length of the data tells the bytes of a sample: four and more are floats, as in GDAL, and
+/// integers have a sign when the no-data value has one.
+pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, BadRaster> {
     let keys = Keys::read(text);
     let (columns, rows) = (keys.count("ncols")?, keys.count("nrows")?);
     let (columns, rows) = match (columns, rows) {
@@ -38,24 +40,32 @@ pub(super) fn read(text: &str, extension: &str) -> Result<Header, BadRaster> {
         Some("bsq") => Interleave::Sequential,
         Some(other) => return Err(BadRaster::damaged(format!("layout {other} is not known"))),
     };
+    let bands = keys.count("nbands")?.unwrap_or(1).max(1);
+    let skip = keys.bytes("skipbytes")?.unwrap_or(0);
+    let samples = u64::from(columns) * u64::from(rows);
+    let samples = samples.saturating_mul(bands.into());
+    let by_length = bytes.checked_sub(skip).filter(|bytes| bytes % samples == 0);
+    let by_length = by_length.map(|bytes| bytes / samples);
+    let (stored, remark) = keys.stored(extension, by_length)?;
     let layout = Layout {
         columns,
         rows,
-        bands: keys.count("nbands")?.unwrap_or(1).max(1),
-        stored: keys.stored(extension)?,
+        bands,
+        stored,
         endian: match keys.text("byteorder") {
             Some("m" | "msbfirst" | "big_endian") => Endian::Big,
             _ => Endian::Little,
         },
         interleave,
-        skip: keys.bytes("skipbytes")?.unwrap_or(0),
+        skip,
         // Of one band the rows of all bands and of the band are the same.
         row_bytes: keys.bytes("totalrowbytes")?,
         band_row_bytes: keys.bytes("bandrowbytes")?,
         band_gap: keys.bytes("bandgapbytes")?.unwrap_or(0),
     };
-    let no_data = keys.number("nodata")?.or(keys.number("nodata_value")?);
+    let no_data = keys.no_data();
     let map = keys.map(rows)?;
+    let unit = keys.text("zunits").map(str::to_owned);
     Ok(Header {
         format: match extension {
             "flt" => "Esri float grid",
@@ -63,7 +73,10 @@ pub(super) fn read(text: &str, extension: &str) -> Result<Header, BadRaster> {
         },
         layout,
         describe: Box::new(move |decoded: &mut Decoded| {
-            decoded.no_data = no_data;
+            decoded.no_data = no_data.value;
+            decoded.remarks.extend(no_data.remark);
+            decoded.remarks.extend(remark);
+            decoded.set_unit(unit.as_deref());
             if let Some(map) = map {
                 decoded.lay_out(map, None);
             }
@@ -93,10 +106,8 @@ impl Keys {
         let Some(text) = self.text(key) else {
             return Ok(None);
         };
-        let number = text.replace(',', ".").parse();
-        number
-            .map(Some)
-            .map_err(|_| BadRaster::damaged(format!("{key} is '{text}', not a number")))
+        let wrong = || BadRaster::damaged(format!("{key} is '{text}', not a number"));
+        numbers::number(text).ok_or_else(wrong).map(Some)
     }
 
     fn bytes(&self, key: &str) -> Result<Option<u64>, BadRaster> {
@@ -117,35 +128,50 @@ impl Keys {
         u32::try_from(number).map(Some).map_err(absurd)
     }
 
-    fn stored(&self, extension: &str) -> Result<Stored, BadRaster> {
-        use SampleType::{F32, F64, I8, I16, I32, U8, U16, U32};
-        let is_flt = extension == "flt";
-        let bits = self.count("nbits")?.unwrap_or(if is_flt { 32 } else { 8 });
-        let negative = self.number("nodata")?.or(self.number("nodata_value")?);
-        let kind = match self.text("pixeltype") {
-            Some(kind) if kind.starts_with('f') => 'f',
-            Some(kind) if kind.starts_with('s') => 's',
-            Some(_) => 'u',
-            None if is_flt => 'f',
-            None if negative.is_some_and(|value| value < 0.0) => 's',
-            None => 'u',
-        };
-        Ok(Stored::Held(match (kind, bits) {
-            ('u', 8) => U8,
-            ('s', 8) => I8,
-            ('u', 16) => U16,
-            ('s', 16) => I16,
-            ('u', 32) => U32,
-            ('s', 32) => I32,
-            ('f', 32) => F32,
-            ('f', 64) => F64,
-            _ => {
-                return Err(BadRaster::Unsupported {
-                    format: "Esri band image",
-                    feature: format!("{bits} bits a sample"),
-                });
+    fn no_data(&self) -> NoDataText {
+        let text = self.text("nodata").or(self.text("nodata_value"));
+        text.map_or(NoDataText::default(), |text| numbers::no_data(text, 0, 1))
+    }
+
+    /// The type of a sample, and a remark where nothing states it; `by_length` are the bytes that
+    /// the length of the data leaves for one.
+    fn stored(
+        &self,
+        extension: &str,
+        by_length: Option<u64>,
+    ) -> Result<(Stored, Option<String>), BadRaster> {
+        let by_name = self.text("numbertype").map(number_type).transpose()?;
+        let stated = self.count("nbits")?;
+        let (bits, is_guess) = match (stated, by_name, by_length) {
+            (Some(bits), Some((other, _)), _) if bits != other => {
+                return Err(BadRaster::damaged(format!(
+                    "nbits is {bits} and numbertype is {}",
+                    self.text("numbertype").unwrap_or_default()
+                )));
             }
-        }))
+            (Some(bits), ..) | (None, Some((bits, _)), _) => (bits, false),
+            (None, None, Some(bytes @ (1 | 2 | 4 | 8))) => (8 * bytes as u32, true),
+            (None, None, _) => (if extension == "flt" { 32 } else { 8 }, false),
+        };
+        let negative = self.no_data().value.is_some_and(|value| value < 0.0);
+        let stated_kind = self.text("pixeltype").map(|kind| match kind {
+            kind if kind.starts_with('f') => 'f',
+            kind if kind.starts_with('s') => 's',
+            _ => 'u',
+        });
+        let is_float = bits >= 32 && (extension == "flt" || is_guess);
+        let kind = stated_kind.or(by_name.map(|(_, kind)| kind));
+        let kind = kind.unwrap_or(match (is_float, negative) {
+            (true, _) => 'f',
+            (false, true) => 's',
+            (false, false) => 'u',
+        });
+        let stored = Stored::Held(sample_type(kind, bits)?);
+        let remark = (is_guess && extension != "flt").then(|| {
+            let name = stored.held().none().type_name();
+            format!("its header states no type of samples: by the length of the data it is {name}")
+        });
+        Ok((stored, remark))
     }
 
     /// By the centre of the north-western sample (images) or the south-western corner
@@ -171,4 +197,41 @@ impl Keys {
         let nowhere = || BadRaster::damaged("its cells have no size");
         map.ok_or_else(nowhere).map(Some)
     }
+}
+
+fn sample_type(kind: char, bits: u32) -> Result<SampleType, BadRaster> {
+    use SampleType::{F32, F64, I8, I16, I32, U8, U16, U32};
+    Ok(match (kind, bits) {
+        ('u', 8) => U8,
+        ('s', 8) => I8,
+        ('u', 16) => U16,
+        ('s', 16) => I16,
+        ('u', 32) => U32,
+        ('s', 32) => I32,
+        ('f', 32) => F32,
+        ('f', 64) => F64,
+        _ => {
+            return Err(BadRaster::Unsupported {
+                format: "Esri band image",
+                feature: format!("{bits} bits a sample"),
+            });
+        }
+    })
+}
+
+/// Bits and kind of a type as NOAA names it: `2_BYTE_INTEGER`, `4_BYTE_FLOAT`.
+fn number_type(name: &str) -> Result<(u32, char), BadRaster> {
+    let (bytes, kind) = name.split_once("_byte_").unwrap_or_default();
+    let kind = match kind {
+        "float" | "real" => Some('f'),
+        "integer" | "signed_integer" => Some('s'),
+        "unsigned_integer" | "unsigned" => Some('u'),
+        _ => None,
+    };
+    let bits = bytes
+        .parse::<u32>()
+        .ok()
+        .and_then(|bytes| bytes.checked_mul(8));
+    let unknown = || BadRaster::damaged(format!("numbertype {name} is not known"));
+    bits.zip(kind).ok_or_else(unknown)
 }

@@ -66,6 +66,25 @@ impl Layout {
                 self.stored.bytes()
             )));
         }
+        self.check_rest(bytes, header)
+    }
+
+    /// Checks that no whole row lies behind what the header promises: it would be of another type
+    /// or size of samples.
+    fn check_rest(&self, bytes: u64, header: &str) -> Result<(), BadRaster> {
+        let (columns, rows, bands) = (self.columns, self.rows, self.bands);
+        let row = u64::from(columns).saturating_mul(self.stored.bytes());
+        let end = self.end(bands).unwrap_or(u64::MAX);
+        // What pads rows or bands pads the last one, too.
+        let padding = self.row_bytes.unwrap_or(0).saturating_add(self.band_gap);
+        if bytes > end && bytes - end >= row.max(padding) {
+            return Err(BadRaster::damaged(format!(
+                "{header} beside it promises {columns} × {rows} samples of {} bytes in {bands} \
+                 bands, which end at byte {end}; the file has {bytes}: correct the type or size \
+                 in the header",
+                self.stored.bytes()
+            )));
+        }
         Ok(())
     }
 

@@ -70,7 +70,8 @@ pub(crate) fn decode_by_header(
     if !esri::is_header(&text) {
         return Ok(None);
     }
-    let header = esri::read(&text, input.extension()).map_err(|fault| in_header(fault, &name))?;
+    let header = esri::read(&text, input.extension(), input.len())
+        .map_err(|fault| in_header(fault, &name))?;
     FORMAT.check_choice(options)?;
     header.layout.check(band, input.len(), &name)?;
     let storage = header.layout.plain(band)?.storage(input, options)?;
@@ -81,6 +82,7 @@ pub(crate) fn decode_by_header(
     };
     let format = format!("{}, {}{bands}", header.format, name_of_type);
     let mut decoded = Decoded::new(format, (header.layout.columns, header.layout.rows), storage);
+    decoded.file_layout.bands = header.layout.bands;
     beside::reference_system(input, &mut decoded)?;
     (header.describe)(&mut decoded).map_err(|fault| in_header(fault, &name))?;
     if header.layout.bands > 1 && options.band.is_none() {

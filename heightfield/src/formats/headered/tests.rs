@@ -126,7 +126,7 @@ fn a_file_of_another_kind_has_no_samples_by_a_header_beside_it() {
     ] {
         let opened = Pair::new(data, bytes, "f.hdr", header).open(None);
         assert!(opened.is_err(), "{data}");
-        let named_so = Pair::new("f.bil", bytes, "f.hdr", header).open(None);
+        let named_so = Pair::new("f.bil", &bytes[..4], "f.hdr", header).open(None);
         assert!(named_so.is_ok(), "by its name it is samples");
     }
 }
@@ -235,4 +235,58 @@ fn a_missing_header_is_named() {
         matches!(error.fault(), BadRaster::HeaderMissing(_)),
         "{error}"
     );
+}
+
+/// NOAA's ETOPO1 states the type in words of its own.
+#[test]
+fn number_type_and_unit_are_read() {
+    let header = "NCOLS 3\nNROWS 2\nXLLCENTER -10\nYLLCENTER 40\nCELLSIZE 0.5\n\
+                  NODATA_VALUE -32768\nBYTEORDER LSBFIRST\nZUNITS FEET\n";
+    let stored = [367.0, 960.0, -5.0, -32768.0, 1.0, 2.0];
+    let shorts: Vec<u8> = stored
+        .iter()
+        .flat_map(|value| (*value as i16).to_le_bytes())
+        .collect();
+    let floats = floats(stored.map(|value| value as f32), false);
+    for (bytes, number_type) in [
+        (&shorts, "NUMBERTYPE 2_BYTE_INTEGER\n"),
+        (&floats, "NUMBERTYPE 4_BYTE_FLOAT\n"),
+        (&shorts, ""),
+        (&floats, ""),
+    ] {
+        let header = format!("{header}{number_type}");
+        let raster = Pair::new("etopo1.bin", bytes, "etopo1.hdr", &header).open(None);
+        let raster = raster.expect("a grid");
+        let summary = raster.summary();
+        assert_eq!(
+            (summary.lowest, summary.highest, summary.holes),
+            (-5.0, 960.0, 1)
+        );
+        assert_eq!(raster.stated_metres_per_vertical_unit(), Some(0.3048));
+        let said = raster.remarks().join(" ");
+        assert_eq!(
+            said.contains("states no type"),
+            number_type.is_empty(),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn length_that_contradicts_the_header_is_refused() {
+    let header = "NCOLS 3\nNROWS 2\nBYTEORDER LSBFIRST\n";
+    let told = |kind: &str, bytes: usize| {
+        let header = format!("{header}{kind}");
+        let opened = Pair::new("x.bil", &vec![1; bytes], "x.hdr", &header).open(None);
+        opened.map_or_else(|fault| fault.to_string(), |_| String::new())
+    };
+    let said = told("NBITS 16\n", 24);
+    assert!(
+        said.contains("byte 12") && said.contains("has 24"),
+        "{said}"
+    );
+    assert!(told("NBITS 8\nNUMBERTYPE 2_BYTE_INTEGER\n", 12).contains("nbits is 8"));
+    assert!(told("NUMBERTYPE 3_BYTE_COLOUR\n", 12).contains("3_byte_colour"));
+    // What some programs add behind the samples is less than a row.
+    assert_eq!(told("NBITS 16\n", 14), "");
 }

@@ -4,38 +4,17 @@ use ::png::{BitDepth, ColorType};
 
 use super::{fault, reader};
 use crate::decoded::Decoded;
+use crate::encoding::code;
 use crate::input::FileBytes;
 use crate::samples::HoleMask;
 use crate::{BadRaster, Encoding, Samples};
 
-impl Encoding {
-    /// Height in metres of the code 0, and metres in a step of the code
-    /// 65536 R + 256 G + B.
-    const fn metres(self) -> (f64, f64) {
-        match self {
-            Self::TerrainRgb => (-10_000.0, 0.1),
-            Self::Terrarium => (-32_768.0, 1.0 / 256.0),
-        }
-    }
-
-    const fn title(self) -> &'static str {
-        match self {
-            Self::TerrainRgb => "Terrain-RGB",
-            Self::Terrarium => "Terrarium",
-        }
-    }
-}
-
-/// Reads a picture whose colours encode heights. The code 0, which is below all ground,
-/// and an alpha of 0 are no data.
+/// Reads a picture whose colours encode heights. An alpha of 0 is no data, too.
 pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, BadRaster> {
     let codes = Codes::read(input)?;
-    let format = format!("PNG, {} heights", encoding.title());
-    let mut decoded = Decoded::new(format, codes.size, Samples::from(codes.codes));
-    (decoded.offset, decoded.scale) = encoding.metres();
-    decoded.no_data = Some(0.0);
+    let mut decoded = Decoded::new("PNG".into(), codes.size, Samples::from(codes.codes));
+    decoded.take_codes(encoding);
     decoded.storage.set_holes(Some(codes.transparent));
-    decoded.metres_per_vertical_unit = Some(1.0);
     Ok(decoded)
 }
 
@@ -80,7 +59,7 @@ impl Codes {
         let mut codes = Vec::with_capacity(count);
         let mut transparent = HoleMask::with_capacity(count);
         for (index, bytes) in frame.chunks_exact(pixel).take(count).enumerate() {
-            codes.push(i32::from_be_bytes([0, bytes[0], bytes[1], bytes[2]]));
+            codes.push(code([bytes[0], bytes[1], bytes[2]]));
             transparent.set(index, bytes.get(3) == Some(&0));
         }
         Ok(Self {

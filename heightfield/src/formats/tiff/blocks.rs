@@ -9,9 +9,9 @@ use tiff_reader::{TagValue, TiffFile};
 use twox_hash::XxHash64;
 
 use super::images::Directory;
-use super::layout::Layout;
+use super::layout::{Layout, Wanted};
 use super::masks::Mask;
-use super::samples::{holes, read};
+use super::samples::{heights, holes};
 use super::uncompressed::rows;
 use super::{budget, images};
 use crate::blocks::{
@@ -117,10 +117,8 @@ const MAIN: usize = 0;
 pub(super) struct Known<'k> {
     /// Its name in warnings.
     pub(super) name: &'k str,
-    /// The band that the user chose, the first being 1.
-    pub(super) asked: Option<u32>,
-    /// Its numbers are classes.
-    pub(super) classes: bool,
+    /// What is wanted of it.
+    pub(super) wanted: Wanted,
     /// The file of a mask beside it.
     pub(super) mask: Option<&'k Arc<TiffFile>>,
     /// Where large strips and tiles may be unpacked, or why they may not.
@@ -140,7 +138,7 @@ impl Image {
     pub(super) fn of(directory: &Directory, known: &Known<'_>) -> Result<Self, BadRaster> {
         Ok(Self {
             file: MAIN,
-            layout: Layout::read(directory, known.asked, known.classes)?,
+            layout: Layout::read(directory, known.wanted)?,
             masks: Mask::all(directory, known.mask),
         })
     }
@@ -234,11 +232,22 @@ impl TiffBlocks {
         })
     }
 
+    /// Returns true if overviews serve coarse levels.
+    pub(super) fn has_overviews(&self) -> bool {
+        self.images.len() > 1
+    }
+
+    /// From now on coarse levels are made of the full image.
+    pub(super) fn leave_overviews_out(&mut self) {
+        self.images.truncate(1);
+        self.blocks.truncate(1);
+    }
+
     /// A part of an image.
     fn block(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
         let Image { layout, masks, .. } = &self.images[image];
         Ok(Block {
-            samples: read(layout, layout.band, part)?,
+            samples: heights(layout, part)?,
             holes: holes(layout, masks, part)?,
             is_lacking: false,
         })
@@ -279,7 +288,7 @@ impl TiffBlocks {
                 rows: 1,
                 ..*part
             };
-            let read = || read(layout, layout.band, &row);
+            let read = || heights(layout, &row);
             if let Some(samples) = self.try_read(image, &row, read)? {
                 let block = Block {
                     samples,
@@ -319,7 +328,7 @@ impl TiffBlocks {
     /// A part in which everything is a hole as yet.
     fn nothing_of(&self, part: &Part) -> Block {
         let count = part.columns as usize * part.rows as usize;
-        let mut samples = self.images[MAIN].layout.sample().held().none();
+        let mut samples = self.images[MAIN].layout.held().none();
         with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
         let mut holes = HoleMask::with_capacity(count);
         holes.insert_range(..);
@@ -440,7 +449,7 @@ impl BlockReader for TiffBlocks {
     }
 
     fn sample_type(&self) -> SampleType {
-        self.images[MAIN].layout.sample().held()
+        self.images[MAIN].layout.held()
     }
 
     fn is_stored(&self, image: usize, part: &Part) -> bool {

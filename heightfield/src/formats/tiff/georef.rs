@@ -13,11 +13,14 @@ use super::user_defined;
 use crate::Certainty;
 use crate::crs::{self, ReferenceSystem, Unit};
 use crate::decoded::Decoded;
+use crate::file_layout::SamplesAre;
 use crate::ground_map::GroundMap;
 use crate::placed::GroundUnit;
 
 const MODEL_PIXEL_SCALE: u16 = 33550;
 const MODEL_TIEPOINT: u16 = 33922;
+/// Column, row and level of a sample, and its three coordinates.
+const NUMBERS_OF_A_TIE: usize = 6;
 const MODEL_TRANSFORMATION: u16 = 34264;
 const GEO_KEY_DIRECTORY: u16 = 34735;
 const GEO_DOUBLE_PARAMS: u16 = 34736;
@@ -37,12 +40,15 @@ pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>, fil
     decoded.set_vertical(system, stated);
     decoded.system = keys.system(file);
     decoded.remarks.extend(keys.other_unit());
+    decoded.file_layout.samples_are = keys.samples_are();
     if let Some(map) = ground_map(image, &keys) {
         decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
         decoded.lay_out(map, keys.unit());
         if !has_place(image) {
             decoded.place = None;
         }
+    } else if let points @ 1.. = numbers(image, MODEL_TIEPOINT).len() / NUMBERS_OF_A_TIE {
+        decoded.remark_control_points(points);
     }
 }
 
@@ -70,7 +76,7 @@ fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
         (_, &[east, north, ..], _) => ([0.0, east, 0.0], [0.0, 0.0, -north]),
         _ => return None,
     };
-    match keys.are_points() {
+    match keys.samples_are() == Some(SamplesAre::Points) {
         true => GroundMap::from_centre(x, y),
         false => GroundMap::new(x, y),
     }
@@ -121,10 +127,14 @@ impl GeoKeys {
         Some(text.trim_matches(['\0', ' ']))
     }
 
-    /// Whether coordinates belong to the centres of samples, not to corners of cells.
-    fn are_points(&self) -> bool {
-        const PIXEL_IS_POINT: u16 = 2;
-        self.code(GT_RASTER_TYPE) == Some(PIXEL_IS_POINT)
+    /// What a sample stands for: coordinates belong to the centres of points, and to the corners
+    /// of areas.
+    fn samples_are(&self) -> Option<SamplesAre> {
+        match self.code(GT_RASTER_TYPE)? {
+            1 => Some(SamplesAre::Areas),
+            2 => Some(SamplesAre::Points),
+            _ => None,
+        }
     }
 
     /// The horizontal reference system: by its code, or by what it is called.

@@ -13,6 +13,7 @@ use super::unpack;
 use super::unpacked::Unpacked;
 use crate::blocks::Part;
 use crate::disk_cache::DiskCache;
+use crate::encoding::no_codes;
 use crate::read::Stored;
 use crate::{BadRaster, SampleType};
 
@@ -30,6 +31,8 @@ pub(super) struct Layout {
     pub(super) bands: u16,
     /// The band that is the height, the first being 0.
     pub(super) band: usize,
+    /// The first three bands are red, green and blue, and together the code of a height.
+    pub(super) has_codes: bool,
     /// The band that says what is transparent, if one does.
     pub(super) alpha: Option<usize>,
     /// Name, and how many bytes one stored byte may hold.
@@ -55,6 +58,29 @@ pub(super) struct Chunk {
     pub(super) bytes: u64,
     /// Its samples.
     pub(super) covers: Part,
+}
+
+/// Bands of a code.
+pub(super) const COLOURS: usize = 3;
+
+/// What is wanted of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// Heights in a band, the first being 1; in the first one where the user chose none.
+    Heights(Option<u32>),
+    /// The same of numbers that are classes: a palette is taken for what it is.
+    Classes(Option<u32>),
+    /// Heights that are encoded in colours.
+    Codes,
+}
+
+impl Wanted {
+    const fn band(self) -> Option<u32> {
+        match self {
+            Self::Heights(band) | Self::Classes(band) => band,
+            Self::Codes => None,
+        }
+    }
 }
 
 /// What the bits of a sample mean.
@@ -87,25 +113,25 @@ fn compression(code: u16) -> Result<(&'static str, u64), BadRaster> {
 }
 
 impl Layout {
-    /// Reads and checks the layout of an image; `asked` is the band that the user chose,
-    /// the first being 1; a palette is taken for what it is where the numbers are
-    /// `classes`.
-    pub(super) fn read(
-        directory: &Directory,
-        asked: Option<u32>,
-        classes: bool,
-    ) -> Result<Self, BadRaster> {
+    /// Reads and checks the layout of an image for what is wanted of it.
+    pub(super) fn read(directory: &Directory, wanted: Wanted) -> Result<Self, BadRaster> {
         let image = directory.ifd();
         let bands = image.samples_per_pixel();
-        if !(classes && is_palette(image)) {
-            refuse_colour(image, bands, asked.is_some())?;
+        match wanted {
+            Wanted::Codes => check_codes(image, bands)?,
+            Wanted::Classes(_) if is_palette(image) => {}
+            Wanted::Heights(band) | Wanted::Classes(band) => {
+                refuse_colour(image, bands, band.is_some())?;
+            }
         }
-        let band = chosen_band(asked, bands)?;
+        let band = chosen_band(wanted.band(), bands)?;
         let layout = Self {
             band,
+            has_codes: wanted == Wanted::Codes,
             alpha: alpha(image, bands).filter(|alpha| *alpha != band),
             ..Self::of(directory, stored_type(image)?)?
         };
+        check_predictor(image, layout.stored.0)?;
         // What the decoder refuses is refused here, too, where it does not come to decode.
         image.raster_layout().map_err(fault)?;
         Ok(layout)
@@ -151,6 +177,7 @@ impl Layout {
             stored,
             bands: image.samples_per_pixel(),
             band: 0,
+            has_codes: false,
             alpha: None,
             compression: compression(image.compression())?,
             planar: image.planar_configuration() == 2,
@@ -244,6 +271,14 @@ impl Layout {
         }
     }
 
+    /// The type in which heights are held.
+    pub(super) const fn held(&self) -> SampleType {
+        match self.has_codes {
+            true => SampleType::I32,
+            false => self.sample().held(),
+        }
+    }
+
     /// Chunks from west to east.
     pub(super) fn chunks_across(&self) -> u32 {
         self.columns.div_ceil(self.chunk.0)
@@ -284,7 +319,7 @@ impl Layout {
     /// Bytes that all samples take in memory.
     pub(super) fn bytes(&self) -> u64 {
         let samples = u64::from(self.columns) * u64::from(self.rows);
-        samples.saturating_mul(self.sample().held().bytes())
+        samples.saturating_mul(self.held().bytes())
     }
 
     /// Place and bytes of each chunk with samples of the band that is the height; `None` when the
@@ -328,7 +363,12 @@ impl Layout {
     /// The bands of which chunks are read for heights: with them lies what is transparent.
     pub(super) fn bands_read(&self) -> impl Iterator<Item = usize> + use<> {
         let apart = self.alpha.filter(|_| self.planar);
-        std::iter::once(self.band).chain(apart)
+        let colours = if self.has_codes && self.planar {
+            1..COLOURS
+        } else {
+            1..1
+        };
+        std::iter::once(self.band).chain(colours).chain(apart)
     }
 
     /// Bytes of a texel that come before a band's sample.
@@ -368,6 +408,17 @@ impl Layout {
     }
 }
 
+/// Checks that differences are taken of samples that can have such: of floats only in predictor 3.
+fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), BadRaster> {
+    const OF_FLOATS: u16 = 3;
+    match (image.predictor(), format) {
+        (OF_FLOATS, SampleFormat::Signed | SampleFormat::Unsigned) => Err(BadRaster::damaged(
+            "TIFF: its samples are whole numbers and its predictor is 3, which is for floats",
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Whether bytes are samples: neither packed, nor differences, nor with their bits turned.
 fn has_plain_samples(image: &Ifd) -> bool {
     (image.compression(), image.predictor(), image.fill_order()) == (1, 1, 1)
@@ -395,6 +446,18 @@ fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, BadRaster> {
         return Err(BadRaster::NoSuchPart { asked, there });
     }
     Ok(band as usize - 1)
+}
+
+/// Checks that an image has colours that may be codes of heights.
+fn check_codes(image: &Ifd, bands: u16) -> Result<(), BadRaster> {
+    use PhotometricInterpretation::{MinIsBlack, Rgb};
+    let meaning = image.photometric_interpretation_enum();
+    let is_rgb = matches!(meaning, Some(Rgb | MinIsBlack));
+    let is_bytes = stored_type(image)? == (SampleFormat::Unsigned, 8);
+    match is_rgb && is_bytes && usize::from(bands) >= COLOURS {
+        true => Ok(()),
+        false => Err(no_codes("the file has other bands")),
+    }
 }
 
 fn is_palette(image: &Ifd) -> bool {

@@ -2,8 +2,9 @@
 
 use tiff_reader::Ifd;
 
-use crate::BadRaster;
-use crate::geometry::metres_in;
+use crate::geometry::{metres_in, unknown_unit};
+use crate::numbers::{no_data, number};
+use crate::xml;
 
 const GDAL_METADATA: u16 = 42112;
 const GDAL_NODATA: u16 = 42113;
@@ -17,43 +18,57 @@ pub(super) struct Metadata {
     pub(super) scale: Option<f64>,
     pub(super) offset: Option<f64>,
     pub(super) metres_per_vertical_unit: Option<f64>,
+    /// What the user should know of them.
+    pub(super) remarks: Vec<String>,
 }
 
 impl Metadata {
-    /// The notes on a band, the first being 0.
-    pub(super) fn read(image: &Ifd, band: usize) -> Result<Self, BadRaster> {
+    /// The notes on one of some bands, the first being 0.
+    pub(super) fn read(image: &Ifd, band: usize, bands: u16) -> Self {
         let mut metadata = match text(image, GDAL_METADATA) {
             Some(xml) => Self::from_xml(xml, band),
             None => Self::default(),
         };
-        if let Some(no_data) = text(image, GDAL_NODATA) {
-            metadata.no_data = Some(no_data.parse().map_err(|_| {
-                BadRaster::damaged(format!("its no-data value '{no_data}' is not a number"))
-            })?);
+        if let Some(stated) = text(image, GDAL_NODATA) {
+            let stated = no_data(stated, band, bands.into());
+            metadata.no_data = stated.value;
+            metadata.remarks.extend(stated.remark);
         }
-        Ok(metadata)
+        metadata
     }
 
     /// `<Item name="SCALE" sample="0" role="scale">0.3048</Item>` and its like.
-    fn from_xml(xml: &str, band: usize) -> Self {
+    fn from_xml(text: &str, band: usize) -> Self {
         let mut metadata = Self::default();
-        let Ok(document) = roxmltree::Document::parse(xml) else {
-            tracing::warn!("the file's GDAL metadata is no XML: it is not used");
-            return metadata;
-        };
-        for item in document.descendants() {
+        let read = xml::for_each(text, |open| {
+            let Some(item) = open.last() else { return };
             if item.attribute("sample").unwrap_or("0").parse() != Ok(band) {
-                continue;
+                return;
             }
-            let value = item.text().unwrap_or_default().trim();
+            let value = item.text.trim();
             match item.attribute("role") {
-                Some("scale") => metadata.scale = value.parse().ok(),
-                Some("offset") => metadata.offset = value.parse().ok(),
-                Some("unittype") => metadata.metres_per_vertical_unit = metres_in(value),
+                Some("scale") => metadata.scale = number(value),
+                Some("offset") => metadata.offset = number(value),
+                Some("unittype") => metadata.set_unit(value),
                 _ => {}
             }
+        });
+        match read {
+            Ok(()) => metadata,
+            Err(fault) => Self {
+                remarks: vec![format!(
+                    "its GDAL metadata cannot be read ({fault}): it is not used"
+                )],
+                ..Self::default()
+            },
         }
-        metadata
+    }
+
+    fn set_unit(&mut self, unit: &str) {
+        self.metres_per_vertical_unit = metres_in(unit);
+        if self.metres_per_vertical_unit.is_none() && !unit.is_empty() {
+            self.remarks.push(unknown_unit(unit));
+        }
     }
 }
 
@@ -81,6 +96,7 @@ mod tests {
             scale: Some(0.5),
             offset: Some(100.0),
             metres_per_vertical_unit: Some(0.3048),
+            remarks: Vec::new(),
         };
         assert_eq!(Metadata::from_xml(xml, 0), expected);
         assert_eq!(Metadata::from_xml(xml, 1).scale, Some(7.0));
@@ -88,6 +104,10 @@ mod tests {
 
     #[test]
     fn notes_that_are_no_xml_are_left_alone() {
-        assert_eq!(Metadata::from_xml("<a", 0), Metadata::default());
+        let read = Metadata::from_xml("<a", 0);
+        assert_eq!(
+            (read.scale, read.offset, read.remarks.len()),
+            (None, None, 1)
+        );
     }
 }

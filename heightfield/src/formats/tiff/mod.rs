@@ -3,8 +3,10 @@
 //!
 //! `tiff-reader` decodes; it is named in this folder only.
 
+mod blended;
 mod blocks;
 mod budget;
+mod describe;
 mod fault;
 mod georef;
 mod images;
@@ -25,14 +27,17 @@ use std::sync::Arc;
 use tiff_reader::source::{FileSource, SharedSource};
 use tiff_reader::{ParseBudgets, TiffError, TiffFile};
 
-use crate::beside::{find_appended, lay_out_by_world_file};
+use crate::beside::find_appended;
 use crate::blocks::Part;
 use crate::decoded::Decoded;
+use crate::file_layout::FileLayout;
 use crate::format::{Claim, Format, Parts, starts_with_any};
 use crate::input::{Data, FileBytes};
 use crate::storage::Storage;
 use crate::{BadRaster, OpenOptions};
+use blended::blended;
 use blocks::{Image, Known, TiffBlocks};
+use describe::{describe, overview_sizes, wanted};
 use fault::fault;
 use layout::Layout;
 use metadata::Metadata;
@@ -55,9 +60,6 @@ const FEW_BYTES: u64 = 1 << 20;
 const LONGEST_LIST: usize = 72 << 20;
 const ALL_LISTS: usize = 128 << 20;
 
-/// Extensions of a TIFF's world files.
-const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
-
 /// Reads the heights, or lets them stay in the file: of several bands the chosen one or
 /// the first, of several images the first that is neither an overview nor a mask.
 fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
@@ -67,8 +69,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     let mask = mask_file.as_ref().map(open).transpose()?.map(Arc::new);
     let known = Known {
         name: input.name(),
-        asked: options.band,
-        classes: options.classes,
+        wanted: wanted(options)?,
         mask: mask.as_ref(),
         disk: match input.remote() {
             Some(_) => Err("it is at a URL"),
@@ -83,52 +84,54 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     if options.band.is_some() {
         format += &format!(", band {} of {bands}", band + 1);
     }
+    let file_layout = FileLayout {
+        bands: bands.into(),
+        block: Some(layout.chunk.into()),
+        overviews: overview_sizes(&file, input)?,
+        samples_are: None,
+    };
+    let metadata = Metadata::read(full.ifd(), band, bands);
     let files: Vec<_> = once(input).chain(&mask_file).collect();
-    let (storage, told) = stored(&files, options, &file, image, &known)?;
+    let held = layout.held().none();
+    let no_data = options.no_data.or(metadata.no_data);
+    let no_data = no_data.and_then(|value| held.comparable_no_data(value));
+    let (storage, told) = stored(&files, options, &file, image, &known, no_data)?;
     let mut decoded = Decoded::new(format, size, storage);
-    match told {
-        Some(Told::Unpacked(remark)) => decoded.remarks.push(remark),
-        Some(Told::Whole(why)) => decoded.why_whole = Some(why),
-        None => {}
+    for told in told {
+        match told {
+            Told::Remark(remark) => decoded.remarks.push(remark),
+            Told::Whole(why) => decoded.why_whole = Some(why),
+        }
     }
-    if options.band.is_none() && bands > 1 + u16::from(has_alpha) {
+    if options.band.is_none() && options.encoding.is_none() && bands > 1 + u16::from(has_alpha) {
         decoded.remarks.push(format!(
             "it has {bands} bands: the first is taken for the height (--band)"
         ));
     }
-    let metadata = Metadata::read(full.ifd(), band)?;
-    decoded.no_data = metadata.no_data;
-    decoded.scale = metadata.scale.unwrap_or(1.0);
-    decoded.offset = metadata.offset.unwrap_or(0.0);
-    let file = match input.data() {
-        Data::File(_, path) if options.gdal => Some(path.as_path()),
-        _ => None,
-    };
-    let metres = metadata.metres_per_vertical_unit;
-    georef::apply(full.ifd(), &mut decoded, metres, file);
-    if decoded.place.is_none() {
-        lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
-    }
+    decoded.file_layout = file_layout;
+    describe(&mut decoded, full.ifd(), metadata, input, options)?;
     Ok(decoded)
 }
 
 /// What the user is told of where the samples are.
 enum Told {
-    /// What is unpacked on disk.
-    Unpacked(String),
+    /// How they are read.
+    Remark(String),
     /// Why all are in memory.
     Whole(String),
 }
 
 /// The samples of the full image: left in the file where they are many and that can be, else all
-/// of them. `files` are the TIFF and the one of its mask, if it has one.
+/// of them. `files` are the TIFF and the one of its mask, if it has one; `no_data` is as a sample can
+/// hold it.
 fn stored(
     files: &[&FileBytes],
     options: &OpenOptions,
     file: &Arc<TiffFile>,
     mut image: Image,
     known: &Known<'_>,
-) -> Result<(Storage, Option<Told>), BadRaster> {
+    no_data: Option<f64>,
+) -> Result<(Storage, Vec<Told>), BadRaster> {
     let input = files[0];
     let most = match input.remote() {
         // What is not touched is not fetched, either.
@@ -154,8 +157,21 @@ fn stored(
                     None => None,
                 };
                 let file = (file.clone(), input.remote());
-                let blocks = TiffBlocks::new(file, image, overviews, known, files)?;
-                return Ok((blocks.into(), told));
+                let mut blocks = TiffBlocks::new(file, image, overviews, known, files)?;
+                let mut remarks: Vec<_> = told.into_iter().collect();
+                if options.encoding.is_some() && blocks.has_overviews() {
+                    blocks.leave_overviews_out();
+                    remarks.push(Told::Remark(
+                        "its overviews are not used: the mean of encoded colours is no height"
+                            .into(),
+                    ));
+                } else if let Some(no_data) = no_data.filter(|_| !input.is_outline())
+                    && let Some(remark) = blended(&blocks, no_data)?
+                {
+                    blocks.leave_overviews_out();
+                    remarks.push(Told::Remark(remark));
+                }
+                return Ok((blocks.into(), remarks));
             }
             Err(why) => told = Some(Told::Whole(why + at_once(&image.layout))),
         }
@@ -164,15 +180,15 @@ fn stored(
     budget::check_memory(layout)?;
     budget::check(layout, input.len(), false)?;
     if input.is_outline() {
-        return Ok((layout.sample().held().none().into(), told));
+        return Ok((layout.held().none().into(), told.into_iter().collect()));
     }
     let all = Part::whole(layout.columns, layout.rows);
     if let Some(remote) = input.remote() {
         remote.want(once(0..input.len()));
     }
-    let mut storage = Storage::from(samples::read(layout, layout.band, &all)?);
+    let mut storage = Storage::from(samples::heights(layout, &all)?);
     storage.set_holes(samples::holes(layout, &image.masks, &all)?);
-    Ok((storage, told))
+    Ok((storage, told.into_iter().collect()))
 }
 
 /// What is said of the memory that is taken while a file is read as a whole, where that is more
@@ -193,7 +209,7 @@ fn unpacked_told(image: &Image) -> Option<Told> {
         None => "the strips or tiles of its mask".into(),
     };
     (megabytes > 0).then(|| {
-        Told::Unpacked(format!(
+        Told::Remark(format!(
             "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache-dir), up to {megabytes} MB, until the program ends"
         ))
     })
@@ -240,4 +256,11 @@ fn is_long(reason: &str) -> bool {
 #[cfg(test)]
 mod made;
 #[cfg(test)]
+mod odd_tags_tests;
+#[cfg(test)]
 mod tests;
+/// TIFFs tag by tag, as the tests of all crates make them.
+#[cfg(test)]
+#[path = "../../../../tests/src/tiffs.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod tiffs;

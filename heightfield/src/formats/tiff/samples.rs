@@ -10,11 +10,24 @@ use super::layout::{Layout, SampleFormat};
 use super::masks::Mask;
 use super::{uncompressed, unpack};
 use crate::blocks::Part;
+use crate::encoding::codes;
 use crate::samples::{HoleMask, SampleValue, with_samples};
 use crate::{BadRaster, Samples};
 
+/// Reads a part of the band that is the height, or of the codes of heights.
+pub(super) fn heights(layout: &Layout, part: &Part) -> Result<Samples, BadRaster> {
+    if !layout.has_codes {
+        return read(layout, layout.band, part);
+    }
+    let colour = |band| match read(layout, band, part)? {
+        Samples::U8(values) => Ok(values),
+        _ => Err(BadRaster::damaged("TIFF: its bands are of several types")),
+    };
+    Ok(codes([colour(0)?, colour(1)?, colour(2)?]))
+}
+
 /// Reads a part of a band, the first being 0.
-pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
+fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
     use SampleFormat::{Float, Signed, Unsigned};
     if layout.is_read_by_rows() {
         return uncompressed::read(layout, band, part);

@@ -7,6 +7,7 @@ use flate2::write::ZlibEncoder;
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 
 use super::super::images;
+use super::super::layout::Wanted;
 use super::super::made::{BAND, BANDS, KINDS, Made, ONE_STRIP, Packing, SIZE, check, open, value};
 use super::super::{open as open_file, uncompressed};
 use super::*;
@@ -52,7 +53,7 @@ fn layout(made: &Made, bytes: Vec<u8>, most_bytes: u64) -> (tempfile::TempDir, L
     let file = Arc::new(open_file(&input).expect("a TIFF"));
     let full = images::full(&file).expect("an image");
     let asked = (made.bands > 1).then_some(BAND);
-    let mut layout = Layout::read(&full, asked, false).expect("a layout");
+    let mut layout = Layout::read(&full, Wanted::Heights(asked)).expect("a layout");
     layout.unpack_into(&disk).expect("a file");
     (folder, layout)
 }
@@ -267,7 +268,7 @@ fn what_lerc_has_packed_is_not_unpacked_by_rows() {
     let input = FileBytes::unpacked("test.tif", made.bytes());
     let file = Arc::new(open_file(&input).expect("a TIFF"));
     let full = images::full(&file).expect("an image");
-    let mut layout = Layout::read(&full, None, false).expect("a layout");
+    let mut layout = Layout::read(&full, Wanted::Heights(None)).expect("a layout");
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1);
     let error = layout.unpack_into(&disk).expect_err("it comes as a whole");

@@ -50,6 +50,9 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         BadRaster::TilesDiffer { file, other, .. } => {
             return brought_together(path, file, other);
         }
+        BadRaster::SamePlace { .. } => {
+            "name the file with the heights, or a pattern of names in quotes that leaves the other out, as '*_dem.tif'"
+        }
         BadRaster::NoPlace(_) => {
             return format!(
                 "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or bring it onto rows and columns of its map: gdalwarp -r bilinear {} {}",
@@ -79,7 +82,9 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         }
         BadRaster::NoNumbers(_) => "take a file with heights",
         BadRaster::ColourBands { bands, .. } => {
-            return format!("if one of its bands holds heights, name it: --band 1 to {bands}");
+            return format!(
+                "if one of its bands holds heights, name it: --band 1 to {bands}; if its colours encode heights: --encoding terrain-rgb or terrarium"
+            );
         }
         BadRaster::SeveralHeights { names, .. } => {
             return format!(
@@ -105,9 +110,6 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         BadRaster::TooLarge { columns, rows, .. } => {
             let (width, height) = (columns.min(&20_000), rows.min(&20_000));
             return cut(path, (*width, *height));
-        }
-        BadRaster::NotANumber { value, .. } => {
-            return format!("if that stands for no data, say so: --no-data {value}");
         }
         BadRaster::DecoderFailed(_) => {
             return format!("get the file again; or {}", converted(path, ""));

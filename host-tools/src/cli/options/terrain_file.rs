@@ -73,7 +73,7 @@ pub struct ReadingOptions {
     #[arg(long, value_name = "UNIT", value_parser = parse_unit, help_heading = INPUT)]
     pub vertical_unit: Option<f64>,
 
-    /// How the colours of a PNG encode heights
+    /// How the colours of a picture (PNG, TIFF, WebP by GDAL) encode heights
     #[arg(long, value_parser = one_of(Encoding::ALL, Encoding::name), conflicts_with = "png_channel", help_heading = INPUT)]
     pub encoding: Option<Encoding>,
 
@@ -99,11 +99,23 @@ pub struct ReadingOptions {
 }
 
 impl TerrainFile {
-    /// Opens the terrain, showing on a terminal that it takes a while.
+    /// Opens the terrain, and notes what the user should know of it.
     ///
     /// # Errors
     /// What is wrong with the file, and what to do next.
     pub fn open(&self) -> Result<Raster, Failure> {
+        let raster = self.open_without_remarks()?;
+        for remark in raster.remarks() {
+            eprintln!("note: {remark}");
+        }
+        Ok(raster)
+    }
+
+    /// Opens the terrain, showing on a terminal that it takes a while. The caller shows its remarks.
+    ///
+    /// # Errors
+    /// What is wrong with the file, and what to do next.
+    pub(in crate::cli) fn open_without_remarks(&self) -> Result<Raster, Failure> {
         let waiting = ProgressBar::new_spinner().with_message(format!("reading {}", self.name()));
         waiting.enable_steady_tick(Duration::from_millis(200));
         let opened = Raster::open(&self.file, &self.reading.options());

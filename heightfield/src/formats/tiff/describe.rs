@@ -1,0 +1,91 @@
+//! What is wanted of a file, and what it and its neighbours say of the samples.
+
+use std::sync::Arc;
+
+use tiff_reader::{Ifd, TiffFile};
+
+use super::layout::Wanted;
+use super::metadata::Metadata;
+use super::{georef, images};
+use crate::beside::{find_appended, lay_out_by_world_file, remark_other_place};
+use crate::decoded::Decoded;
+use crate::input::{Data, FileBytes};
+use crate::{BadRaster, OpenOptions};
+
+/// Extensions of a TIFF's world files.
+const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
+
+/// Sets what the file and its neighbours say of the samples.
+pub(super) fn describe(
+    decoded: &mut Decoded,
+    image: &Ifd,
+    metadata: Metadata,
+    input: &FileBytes,
+    options: &OpenOptions,
+) -> Result<(), BadRaster> {
+    decoded.no_data = metadata.no_data;
+    decoded.scale = metadata.scale.unwrap_or(1.0);
+    decoded.offset = metadata.offset.unwrap_or(0.0);
+    decoded.remarks.extend(metadata.remarks);
+    // What keys spell out libgdal reads.
+    let file = match input.data() {
+        Data::File(_, path) if options.gdal => Some(path.as_path()),
+        _ => None,
+    };
+    georef::apply(image, decoded, metadata.metres_per_vertical_unit, file);
+    match decoded.place {
+        None => lay_out_by_world_file(input, &WORLD_FILES, decoded)?,
+        Some(_) if input.is_outline() => {}
+        Some(_) => remark_other_place(input, &WORLD_FILES, decoded),
+    }
+    if let Some(encoding) = options.encoding {
+        decoded.take_codes(encoding);
+    }
+    remark_orientation(image, decoded);
+    Ok(())
+}
+
+/// Columns and rows of the overviews in a file, and of those in one beside it on disk.
+pub(super) fn overview_sizes(
+    file: &Arc<TiffFile>,
+    input: &FileBytes,
+) -> Result<Vec<[u32; 2]>, BadRaster> {
+    let mut found = images::overviews(file);
+    if let (Data::File(..), false) = (input.data(), input.is_outline())
+        && let Some(beside) = find_appended(input, "ovr")?
+    {
+        // What is wrong with it is reported where it is used.
+        found
+            .extend(super::open(&beside).map_or(vec![], |file| images::overviews(&Arc::new(file))));
+    }
+    let size = |image: &images::Directory| [image.ifd().width(), image.ifd().height()];
+    Ok(found.iter().map(size).collect())
+}
+
+/// What the user wants of the file.
+pub(super) fn wanted(options: &OpenOptions) -> Result<Wanted, BadRaster> {
+    match (options.encoding, options.band) {
+        (Some(_), Some(band)) => Err(BadRaster::NoSuchPart {
+            asked: format!("band {band} with --encoding"),
+            there: "three bands together are one height".into(),
+        }),
+        (Some(_), None) => Ok(Wanted::Codes),
+        (None, band) if options.classes => Ok(Wanted::Classes(band)),
+        (None, band) => Ok(Wanted::Heights(band)),
+    }
+}
+
+/// Remarks on the tag that says where the first row and column lie: GDAL does not use it, either.
+fn remark_orientation(image: &Ifd, decoded: &mut Decoded) {
+    const ORIENTATION: u16 = 274;
+    let first = match image.tag(ORIENTATION).and_then(|tag| tag.value.as_u32()) {
+        None | Some(0 | 1) => return,
+        Some(2) => "the first row at the top, the first column at the right",
+        Some(3) => "the first row at the bottom, the first column at the right",
+        Some(4) => "the first row at the bottom, the first column at the left",
+        Some(_) => "rows and columns exchanged",
+    };
+    decoded.remarks.push(format!(
+        "its Orientation tag has {first}: it is not used, as in GDAL, and the first row is taken to be the northern one unless the file's place says otherwise"
+    ));
+}

@@ -1,0 +1,161 @@
+//! Files that overlap: whether they have the same heights where both have some.
+
+use std::collections::BTreeMap;
+
+use super::super::BadRaster;
+use super::super::blocks::Part;
+use super::reader::Mosaic;
+use super::source::Source;
+use crate::remote::is_url;
+
+/// No more pairs of neighbours are compared, evenly spread; those on the same samples all are.
+const MOST_PAIRS: usize = 8;
+/// While pairs are looked for, so many comparisons are made at most.
+const MOST_LOOKS: usize = 1 << 22;
+/// All samples of a smaller overlap are compared, of a larger one so many each way.
+const FEW_SAMPLES: u64 = 4096;
+const PLACES: u32 = 5;
+/// Heights that differ by less are the same, in the file's unit and as a share of the height.
+const SAME: f64 = 1e-3;
+const SAME_SHARE: f64 = 1e-5;
+
+/// Two files with other heights at the same places.
+struct Disagreement {
+    /// Their numbers.
+    files: [usize; 2],
+    /// Returns true if both have all their samples at the same places.
+    is_on_same_samples: bool,
+    /// Places with heights in both, and how many of them differ.
+    compared: u32,
+    different: u32,
+    /// The largest difference.
+    most: f64,
+}
+
+impl Mosaic {
+    /// Remarks on files that overlap and have other heights there.
+    ///
+    /// # Errors
+    /// [`BadRaster::SamePlace`] where both lie on the same samples.
+    pub(super) fn remark_differences(&self) -> Result<Vec<String>, BadRaster> {
+        const MOST_NAMED: usize = 3;
+        let found = self.disagreements()?;
+        let path = |number: usize| &self.sources[number].path;
+        if let Some(same) = found.iter().find(|it| it.is_on_same_samples) {
+            return Err(BadRaster::SamePlace {
+                files: same.files.map(|number| path(number).clone()),
+                difference: same.most,
+            });
+        }
+        let named = found.iter().take(MOST_NAMED);
+        Ok(named
+        .map(|it| {
+            let [one, other] = it.files.map(|number| {
+                let name = path(number).file_name().unwrap_or_default();
+                name.to_string_lossy().into_owned()
+            });
+            format!(
+                "{one} and {other} overlap and differ there by up to {} ({} of {} places compared): {other} is taken",
+                it.most, it.different, it.compared
+            )
+        })
+        .collect())
+    }
+
+    /// Compares files on disk that overlap.
+    ///
+    /// # Errors
+    /// Files that cannot be read at present.
+    fn disagreements(&self) -> Result<Vec<Disagreement>, BadRaster> {
+        let mut found = Vec::new();
+        for pair in chosen_pairs(&self.sources) {
+            found.extend(self.compared(pair)?.filter(|it| it.different > 0));
+        }
+        Ok(found)
+    }
+
+    /// Compares two files; `None` where one cannot be read.
+    fn compared(&self, files: [usize; 2]) -> Result<Option<Disagreement>, BadRaster> {
+        let sources = files.map(|number| &self.sources[number]);
+        let mut opened = Vec::new();
+        for (number, source) in files.into_iter().zip(sources) {
+            let Some(file) = self.opened(number, source)? else {
+                return Ok(None);
+            };
+            opened.push(file);
+        }
+        let mut seen = Disagreement {
+            files,
+            is_on_same_samples: sources[0].covers == sources[1].covers,
+            compared: 0,
+            different: 0,
+            most: 0.0,
+        };
+        let Some(overlap) = sources[0].overlap(0, &sources[1].covers) else {
+            return Ok(None);
+        };
+        for (column, row) in places(&overlap) {
+            let height = |index: usize| {
+                let place = sources[index].place([column, row]);
+                opened[index].height(0, place)
+            };
+            let Some((one, other)) = height(0).zip(height(1)) else {
+                continue;
+            };
+            let (apart, size) = ((one - other).abs(), one.abs().max(other.abs()));
+            seen.compared += 1;
+            seen.different += u32::from(apart > SAME.max(SAME_SHARE * size));
+            seen.most = seen.most.max(apart);
+        }
+        Ok(Some(seen))
+    }
+}
+
+/// Places of an overlap: all, or a few evenly spread.
+fn places(overlap: &Part) -> Vec<(u32, u32)> {
+    let is_small = u64::from(overlap.columns) * u64::from(overlap.rows) <= FEW_SAMPLES;
+    let along = |first: u32, count: u32| -> Vec<u32> {
+        let chosen = if is_small { count } else { count.min(PLACES) };
+        let steps = u64::from(chosen.max(2) - 1);
+        let at = |index: u32| (u64::from(index) * u64::from(count - 1) / steps) as u32;
+        (0..chosen).map(|index| first + at(index)).collect()
+    };
+    let columns = along(overlap.column, overlap.columns);
+    let rows = along(overlap.row, overlap.rows);
+    let each = rows
+        .iter()
+        .flat_map(|row| columns.iter().map(|column| (*column, *row)));
+    each.collect()
+}
+
+/// Pairs of files that overlap: all on the same samples with the one before, and some others.
+fn chosen_pairs(sources: &[Source]) -> Vec<[usize; 2]> {
+    let is_here = |number: &usize| !sources[*number].path.to_str().is_some_and(is_url);
+    let mut same: BTreeMap<[u32; 4], usize> = BTreeMap::new();
+    let mut chosen = Vec::new();
+    let mut order: Vec<usize> = (0..sources.len()).filter(is_here).collect();
+    for &number in &order {
+        let covers = &sources[number].covers;
+        let key = [covers.column, covers.row, covers.columns, covers.rows];
+        chosen.extend(same.insert(key, number).map(|before| [before, number]));
+    }
+    order.sort_by_key(|number| sources[*number].covers.column);
+    let mut others = Vec::new();
+    let mut looks = 0;
+    for (at, &number) in order.iter().enumerate() {
+        let covers = &sources[number].covers;
+        for &other in &order[at + 1..] {
+            let theirs = &sources[other].covers;
+            looks += 1;
+            if theirs.column >= covers.column + covers.columns || looks > MOST_LOOKS {
+                break;
+            }
+            if covers != theirs && sources[number].overlap(0, theirs).is_some() {
+                others.push([number.min(other), number.max(other)]);
+            }
+        }
+    }
+    let step = others.len().div_ceil(MOST_PAIRS).max(1);
+    chosen.extend(others.into_iter().step_by(step));
+    chosen
+}

@@ -1,0 +1,123 @@
+//! Numbers in text files and tags, as programs of many kinds write them.
+
+/// Reads a number: also with a decimal comma, with Fortran's exponent (`5.0D+02`), and what
+/// Microsoft's C library prints for NaN and infinity (`-1.#IND`, `1.#QNAN`, `1.#INF`).
+pub(super) fn number(word: &str) -> Option<f64> {
+    let word = word.trim();
+    let parsed = |word: &str| word.parse::<f64>().ok();
+    parsed(word)
+        .or_else(|| not_a_number(word))
+        .or_else(|| {
+            let one_comma = word.matches(',').count() == 1 && !word.contains('.');
+            parsed(&word.replace(',', ".")).filter(|_| one_comma)
+        })
+        .or_else(|| {
+            let is_decimal = word.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+            parsed(&word.replace(['d', 'D'], "e")).filter(|_| is_decimal)
+        })
+}
+
+/// NaN and infinity in the words of C libraries.
+fn not_a_number(word: &str) -> Option<f64> {
+    let lower = word.to_ascii_lowercase();
+    let size = lower.trim_start_matches(['+', '-']);
+    let begins = |words: &[&str]| words.iter().any(|word| size.starts_with(word));
+    if begins(&["1.#qnan", "1.#snan", "1.#ind", "nan("]) {
+        return Some(f64::NAN);
+    }
+    let infinity = match lower.starts_with('-') {
+        true => f64::NEG_INFINITY,
+        false => f64::INFINITY,
+    };
+    begins(&["1.#inf"]).then_some(infinity)
+}
+
+/// The beginning of a text from a file, for a remark.
+pub(super) fn beginning(text: &str) -> String {
+    const MOST: usize = 40;
+    let shown = |c: char| if c.is_control() { '?' } else { c };
+    let mut beginning: String = text.chars().take(MOST).map(shown).collect();
+    if text.chars().nth(MOST).is_some() {
+        beginning.push('…');
+    }
+    beginning
+}
+
+/// A no-data value as a file writes it, and what is said about it where it is no plain number.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct NoDataText {
+    /// The value, if the text has one.
+    pub(super) value: Option<f64>,
+    /// What the user should know.
+    pub(super) remark: Option<String>,
+}
+
+/// Reads a no-data value. Of a list with one value for each of `bands` that of `band` (the first
+/// being 0) counts, of another list the first one.
+pub(super) fn no_data(text: &str, band: usize, bands: usize) -> NoDataText {
+    if let Some(value) = number(text) {
+        return NoDataText {
+            value: Some(value),
+            remark: None,
+        };
+    }
+    let words: Vec<&str> = text
+        .split(|c: char| c.is_whitespace() || ";[](){}".contains(c))
+        .map(|word| word.trim_matches(','))
+        .filter(|word| !word.is_empty())
+        .collect();
+    let own = if words.len() == bands { band } else { 0 };
+    let value = words.get(own).and_then(|word| number(word));
+    let text = beginning(text);
+    let remark = match value {
+        Some(value) => format!("its no-data value is the text '{text}': {value} is taken"),
+        None => format!(
+            "its no-data value is the text '{text}', which is no number: it is not used (state it: --no-data VALUE)"
+        ),
+    };
+    NoDataText {
+        value,
+        remark: Some(remark),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_in_every_common_spelling() {
+        for (word, value) in [
+            ("-9999", -9999.0),
+            ("-9999,0", -9999.0),
+            ("5.0000D+02", 500.0),
+            ("-3.4e38", -3.4e38),
+            ("1.#INF", f64::INFINITY),
+            ("-1.#INF00", f64::NEG_INFINITY),
+            ("inf", f64::INFINITY),
+        ] {
+            assert_eq!(number(word), Some(value), "{word}");
+        }
+        let nan = ["nan", "-nan", "NaN", "-nan(ind)", "1.#QNAN", "-1.#IND00"];
+        for word in nan {
+            assert!(number(word).is_some_and(f64::is_nan), "{word}");
+        }
+        for word in ["", "None", "null", "D5", "1,000,000", "1.0,5", "deed"] {
+            assert_eq!(number(word), None, "{word}");
+        }
+    }
+
+    #[test]
+    fn list_of_no_data_values_has_one_for_each_band() {
+        let value = |text, band, bands| no_data(text, band, bands).value;
+        assert_eq!(value("-9999 -9999", 0, 1), Some(-9999.0));
+        assert_eq!(value("-9999 -32768 0", 1, 3), Some(-32768.0));
+        assert_eq!(value("-9999, -32768", 1, 3), Some(-9999.0));
+        assert_eq!(value("[-9999.0]", 0, 1), Some(-9999.0));
+        assert_eq!(value("-9999 (void)", 0, 1), Some(-9999.0));
+        assert_eq!(value("None", 0, 1), None);
+        assert_eq!(no_data("-9999,0", 0, 1).remark, None);
+        let remark = no_data("None", 0, 1).remark.expect("a remark");
+        assert!(remark.contains("'None'") && remark.contains("--no-data"));
+    }
+}
