@@ -251,6 +251,14 @@ impl Raster {
         }
     }
 
+    /// Blocks that the file has; none where all samples are in memory.
+    pub fn blocks(&self) -> u64 {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(blocks) => blocks.count(),
+        }
+    }
+
     /// Whether a block of the file is being read in the background, or is going to be
     /// ([`Raster::stop_waiting`]). Coarse samples that are made of the file do not count.
     pub fn is_reading(&self) -> bool {
