@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::options::Encoding;
 use crate::remote::{is_lost, is_missing, is_on_its_way, is_outage, without_key};
+use crate::shown::shown;
 
 /// A file that could not be opened as a height field: what is wrong with which file.
 #[derive(Debug, thiserror::Error)]
-#[error("{fault} ({})", without_key(path))]
+#[error("{}", shown(&format!("{fault} ({})", without_key(path))))]
 pub struct Error {
     path: PathBuf,
     fault: BadRaster,

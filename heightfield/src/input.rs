@@ -1,47 +1,17 @@
 //! The bytes to decode: a file, here or at a URL.
 
-use std::fs::{File, FileType, Metadata};
-use std::io::{BufRead, BufReader, Error, ErrorKind, Read, Seek, SeekFrom};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::BadRaster;
 use crate::disk_cache::FileStamp;
+use crate::regular_file;
 use crate::remote::{Elsewhere, RemoteFile, RemoteReader, file_name, is_url};
 
 /// Deflate packs at most this many bytes into one.
 pub(super) const DEFLATE_RATIO: u64 = 1040;
-
-/// Refuses what is no file, by the name of its kind.
-fn check_regular(metadata: &Metadata) -> Result<(), BadRaster> {
-    if metadata.is_file() {
-        return Ok(());
-    }
-    Err(BadRaster::Unreadable(match metadata.is_dir() {
-        true => Error::new(ErrorKind::IsADirectory, "it is a folder"),
-        false => Error::other(format!(
-            "it is {}, not a regular file",
-            kind(metadata.file_type())
-        )),
-    }))
-}
-
-#[cfg(unix)]
-fn kind(of: FileType) -> &'static str {
-    use std::os::unix::fs::FileTypeExt;
-    match of {
-        of if of.is_fifo() => "a pipe (FIFO)",
-        of if of.is_socket() => "a socket",
-        of if of.is_char_device() => "a character device",
-        of if of.is_block_device() => "a block device",
-        _ => "something else",
-    }
-}
-
-#[cfg(not(unix))]
-fn kind(_: FileType) -> &'static str {
-    "something else"
-}
 
 /// A buffered reader that a decoder may move about in.
 pub(super) trait ReadSeek: BufRead + Seek {}
@@ -89,11 +59,8 @@ impl FileBytes {
     }
 
     fn on_disk(path: &Path) -> Result<Self, BadRaster> {
-        // Before it is opened: to open a pipe waits for a writer, and may start a device.
-        check_regular(&std::fs::metadata(path).map_err(BadRaster::Unreadable)?)?;
-        let file = File::open(path).map_err(BadRaster::Unreadable)?;
+        let file = regular_file::open(path).map_err(BadRaster::Unreadable)?;
         let metadata = file.metadata().map_err(BadRaster::Unreadable)?;
-        check_regular(&metadata)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let data = Data::File(file, path.to_owned());
         Ok(Self::new(&name, metadata.len(), data))
@@ -277,7 +244,7 @@ pub(super) fn read_exact_at(file: &File, into: &mut [u8], at: u64) -> std::io::R
 pub(super) fn read_exact_at(file: &File, mut into: &mut [u8], mut at: u64) -> std::io::Result<()> {
     while !into.is_empty() {
         match std::os::windows::fs::FileExt::seek_read(file, into, at)? {
-            0 => return Err(ErrorKind::UnexpectedEof.into()),
+            0 => return Err(std::io::ErrorKind::UnexpectedEof.into()),
             count => {
                 into = &mut into[count..];
                 at += count as u64;

@@ -55,8 +55,10 @@ mod place;
 mod placed;
 mod plain;
 mod read;
+pub mod regular_file;
 mod remote;
 mod samples;
+pub mod shown;
 mod storage;
 mod tangents;
 mod thinned;
@@ -250,6 +252,14 @@ impl Raster {
         match &self.source.storage {
             Storage::Held { .. } => 0,
             Storage::Blocks(blocks) => blocks.blocks_read(),
+        }
+    }
+
+    /// Blocks that the file has; none where all samples are in memory.
+    pub fn blocks(&self) -> u64 {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(blocks) => blocks.count(),
         }
     }
 

@@ -10,6 +10,7 @@ use std::fs::{File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use heightfield::regular_file;
 use same_file::is_same_file;
 use tempfile::TempPath;
 
@@ -301,11 +302,7 @@ fn is_partial(beginning: &str, name: &OsStr) -> bool {
 
 /// Whether no process is writing a partial file.
 fn is_nobodys(path: &Path) -> bool {
-    // To open a pipe waits for a writer.
-    if !path.metadata().is_ok_and(|there| there.is_file()) {
-        return false;
-    }
-    let file = File::open(path);
+    let file = regular_file::open(path);
     file.is_ok_and(|file| !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 

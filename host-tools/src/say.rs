@@ -16,7 +16,7 @@ macro_rules! print {
     ($($what:tt)*) => {{
         use std::io::Write as _;
         // Whoever closed it does not want to know.
-        let _ = write!(std::io::stdout().lock(), $($what)*);
+        let _ = std::io::stdout().lock().write_all(heightfield::shown::shown_lines(&format!($($what)*)).as_bytes());
     }};
 }
 
@@ -24,7 +24,7 @@ macro_rules! print {
 macro_rules! println {
     ($($what:tt)*) => {{
         use std::io::Write as _;
-        let _ = writeln!(std::io::stdout().lock(), $($what)*);
+        let _ = writeln!(std::io::stdout().lock(), "{}", heightfield::shown::shown_lines(&format!($($what)*)));
     }};
 }
 
@@ -32,6 +32,6 @@ macro_rules! println {
 macro_rules! eprintln {
     ($($what:tt)*) => {{
         use std::io::Write as _;
-        let _ = writeln!(std::io::stderr().lock(), $($what)*);
+        let _ = writeln!(std::io::stderr().lock(), "{}", heightfield::shown::shown_lines(&format!($($what)*)));
     }};
 }

@@ -1,36 +1,94 @@
 //! Licences, bans, sources and advisories of the dependencies, by cargo-deny.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::run::{cargo, on_path, root, run, say, target_dir};
+use crate::run::{cargo, on_path, root, run, run_quietly, say, target_dir};
 
-/// Holds the dependencies to deny.toml. Advisories are held too where their
-/// database can be reached.
-pub(crate) fn check() -> Result<()> {
-    let program = ready()?;
-    let deny = |words: &[&str]| with(&program, words);
-    run(&mut deny(&["check", "bans", "licenses", "sources"]))?;
-    let mut fetch = deny(&["fetch", "db"]);
-    if run(fetch.stderr(Stdio::null()).stdout(Stdio::null())).is_err() {
-        say("advisories skipped: their database cannot be reached from here");
-        return Ok(());
-    }
-    run(&mut deny(&["check", "--disable-fetch", "advisories"]))
+/// The workspaces, each with a lock file.
+const WORKSPACES: [&str; 4] = [
+    "Cargo.toml",
+    "fuzz/Cargo.toml",
+    "python/Cargo.toml",
+    "view/Cargo.toml",
+];
+
+/// Whether dependencies were held against the database of advisories.
+#[must_use]
+pub(crate) enum Advisories {
+    /// No advisory is about them.
+    Checked,
+    /// Why they were not.
+    NotChecked(String),
 }
 
-/// Holds another workspace to the same, by its manifest; its advisories are not looked at.
-pub(crate) fn check_workspace(manifest: &str) -> Result<()> {
-    let words = [
-        "--manifest-path",
-        manifest,
-        "--config",
-        "deny.toml",
-        "check",
-    ];
-    run(with(&ready()?, &words).args(["bans", "licenses", "sources"]))
+impl Advisories {
+    /// Says so where they were not checked.
+    pub(crate) fn say(self) {
+        if let Some(line) = self.not_checked() {
+            say(line);
+        }
+    }
+
+    /// The line of a summary, where they were not checked.
+    pub(crate) fn not_checked(self) -> Option<String> {
+        match self {
+            Self::Checked => None,
+            Self::NotChecked(why) => Some(format!("advisories NOT CHECKED: {why}")),
+        }
+    }
+}
+
+/// Holds the dependencies of all workspaces to deny.toml.
+pub(crate) fn check_all() -> Result<()> {
+    let mut advisories = Advisories::Checked;
+    for workspace in WORKSPACES {
+        advisories = check(workspace)?;
+    }
+    advisories.say();
+    Ok(())
+}
+
+/// Holds the dependencies of a workspace, named by its manifest, to deny.toml.
+pub(crate) fn check(manifest: &str) -> Result<Advisories> {
+    let program = ready()?;
+    say(format!("the dependencies of {manifest}"));
+    let deny = |words: &[&str]| {
+        let of = ["--manifest-path", manifest];
+        let config = ["--config", "deny.toml"];
+        let (command, rest) = words.split_at(1);
+        with(&program, &[&of, command, &config, rest].concat())
+    };
+    run(&mut deny(&["check", "bans", "licenses", "sources"]))?;
+    // This renews the database; one that was fetched before does as well.
+    match run_quietly(&mut deny(&["fetch", "db"])) {
+        Err(why) if !has_database() => Ok(Advisories::NotChecked(format!(
+            "their database cannot be fetched: {}",
+            last_line(&format!("{why:#}"))
+        ))),
+        _ => {
+            run(&mut deny(&["check", "--disable-fetch", "advisories"]))?;
+            Ok(Advisories::Checked)
+        }
+    }
+}
+
+/// Returns true if cargo-deny has a database of advisories on this machine.
+fn has_database() -> bool {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
+    let databases = home.and_then(|home| home.join("advisory-dbs").read_dir().ok());
+    // A fetch that failed leaves an empty folder, or a lock.
+    let mut entries = databases.into_iter().flatten().flatten();
+    entries.any(|entry| entry.path().join("crates").is_dir())
+}
+
+/// Why a program failed: its last line.
+fn last_line(text: &str) -> &str {
+    let mut lines = text.lines().rev().map(str::trim);
+    lines.find(|line| !line.is_empty()).unwrap_or_default()
 }
 
 fn with(program: &Path, words: &[&str]) -> Command {
@@ -75,4 +133,26 @@ fn ready() -> Result<PathBuf> {
     }
     run(&mut install).context("type: cargo install cargo-deny --locked")?;
     Ok(own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_lock_file_of_the_project_is_checked() {
+        let lock = |manifest: &&str| root().join(manifest).with_extension("lock").is_file();
+        assert!(WORKSPACES.iter().all(lock));
+        let folders = root().read_dir().expect("a folder").flatten();
+        let locked = folders.filter(|entry| entry.path().join("Cargo.lock").is_file());
+        assert_eq!(locked.count() + 1, WORKSPACES.len());
+    }
+
+    #[test]
+    fn missing_database_is_named_with_the_reason() {
+        let why = last_line("`cargo-deny fetch db` failed\n  no route\n\n  to host\n");
+        let line = Advisories::NotChecked(why.to_owned()).not_checked();
+        assert_eq!(line.as_deref(), Some("advisories NOT CHECKED: to host"));
+        assert_eq!(Advisories::Checked.not_checked(), None);
+    }
 }

@@ -1,14 +1,15 @@
-//! `cargo xtask fuzz TARGET MINUTES`: libFuzzer on the tick, on packed tiles or on the wire.
+//! `cargo xtask fuzz TARGET MINUTES`: libFuzzer on the tick, packed tiles, the wire, terrain files, and
+//! the other files that are read.
 
 use anyhow::{Context, Result, bail};
 
 use crate::nightly;
-use crate::run::{on_path, output, root, run, target_dir, timed};
+use crate::run::{cargo, on_path, output, root, run, target_dir, timed};
 
 /// The programs in `fuzz/fuzz_targets`.
-const TARGETS: [&str; 3] = ["tick", "tile", "wire"];
+const TARGETS: [&str; 5] = ["terrain", "text", "tick", "tile", "wire"];
 
-/// Bytes of an input at most: some hundred ticks, or messages.
+/// Bytes of an input at most: some hundred ticks or messages, a file with its headers.
 const LONGEST: u32 = 4096;
 /// Seconds after which an input counts as one that hangs.
 const PATIENCE_S: u32 = 20;
@@ -41,6 +42,13 @@ pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
                 .env("CARGO_TARGET_DIR", target_dir()),
         )
     })
+}
+
+/// Compiles the targets, without a sanitizer and so by any compiler: what they call is still there.
+pub(crate) fn check() -> Result<()> {
+    let mut check = cargo();
+    check.args(["check", "--locked", "--manifest-path", "fuzz/Cargo.toml"]);
+    run(&mut check)
 }
 
 fn seconds(minutes: &str) -> Result<u64> {
@@ -83,6 +91,9 @@ mod tests {
         assert_eq!(seconds("0.5").unwrap(), 30);
         assert!(seconds("0").is_err() && seconds("soon").is_err());
         let message = fuzz("tock", "1").unwrap_err().to_string();
-        assert!(message.contains("tick, tile, wire"), "{message}");
+        assert!(
+            message.contains("terrain, text, tick, tile, wire"),
+            "{message}"
+        );
     }
 }

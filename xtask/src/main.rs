@@ -66,10 +66,12 @@ cargo xtask COMMAND
   campaign --link [--seconds N] [--seed S] [--segment K]
                          faults of the link, killed and hostile hosts and devices, an hour of
                          device time unless told otherwise; writes docs/link-campaign.md
-  fuzz TARGET MINUTES    libFuzzer on `tick`, `tile` or `wire`; installs cargo-fuzz and a nightly
-                         compiler where they are missing
+  fuzz TARGET MINUTES    libFuzzer on `terrain` (files of every format), `text` (recordings,
+                         calibrations, tables, commands), `tick`, `tile` or `wire`; installs
+                         cargo-fuzz and a nightly compiler where they are missing
   miri                   core's tests under Miri, where it can run
-  deny                   licences, bans, sources and advisories of dependencies
+  deny                   licences, bans, sources and advisories of the dependencies of all
+                         workspaces: the viewer's, Python's and the fuzz targets', too
   image BOARD            build an image and print where its ELF is
   flash BOARD            run an image on a real board with probe-rs
 
@@ -158,7 +160,7 @@ fn command() -> Result<ExitCode> {
                 "lint" => lint::lint()?,
                 "miri" => miri::miri()?,
                 "setup" => setup()?,
-                "deny" => deny::check()?,
+                "deny" => deny::check_all()?,
                 "help" => print!("{HELP}"),
                 _ => bail!("there is no command {plain}:\n\n{HELP}"),
             }

@@ -49,7 +49,7 @@ pub(crate) fn test() -> Result<()> {
         return Ok(());
     };
     timed("linting the Python package's crate", lint)?;
-    deny::check_workspace("python/Cargo.toml")?;
+    deny::check("python/Cargo.toml")?.say();
     install(&python, &[&format!("{}[test]", wheel.display())])?;
     // The version stays the same while one works on it.
     let again = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];

@@ -8,6 +8,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 
 use crate::board::{BOARDS, Board};
+use crate::deny::Advisories;
 use crate::run::{cargo, say, shown, timed};
 use crate::setup::{emulator, gdal, qemu, toolchain};
 use crate::{counts, deny, image, page, panics, python, size};
@@ -51,7 +52,7 @@ pub(crate) fn test(request: &Request) -> Result<()> {
     let boards: &[Board] = if request.quick { &BOARDS[..1] } else { &BOARDS };
     let images = images(boards)?;
     let counts = counts::image()?;
-    let mut failures = vec![];
+    let (mut failures, mut notes) = (vec![], vec![]);
     let mut step = |repeat: &str, result: Result<()>| {
         if let Err(why) = result {
             say(format!("error: {why:#}"));
@@ -62,8 +63,8 @@ pub(crate) fn test(request: &Request) -> Result<()> {
         step("cargo xtask size", check_sizes(&images));
         step("cargo xtask panics", check_panics(&images));
         if !request.quick {
-            let name = "checking licences, bans and sources of dependencies";
-            step("cargo xtask deny", timed(name, deny::check));
+            let checked = timed("checking the dependencies", dependencies);
+            step("cargo xtask deny", checked.map(|not| notes.extend(not)));
         }
     }
     let mut command = cargo();
@@ -96,6 +97,7 @@ pub(crate) fn test(request: &Request) -> Result<()> {
             }
         }
     }
+    notes.iter().for_each(say);
     if failures.is_empty() {
         return Ok(());
     }
@@ -104,6 +106,13 @@ pub(crate) fn test(request: &Request) -> Result<()> {
         failures.len(),
         failures.join("\n  ")
     )
+}
+
+/// Checks the dependencies of the workspaces that are tested here. Returns what was not checked, for
+/// the end.
+fn dependencies() -> Result<Option<String>> {
+    let _of_all = deny::check("Cargo.toml")?;
+    deny::check("fuzz/Cargo.toml").map(Advisories::not_checked)
 }
 
 /// Runs `cargo test`. Returns the targets that failed, as cargo selects them: `-p PACKAGE --lib`.

@@ -45,8 +45,9 @@ pub(crate) fn build() -> Result<PathBuf> {
 pub(crate) fn test() -> Result<()> {
     timed("linting the viewer", lint)?;
     timed("checking the viewer's dependencies", || {
-        deny::check_workspace("view/Cargo.toml")
-    })?;
+        deny::check("view/Cargo.toml")
+    })?
+    .say();
     // Before the tests: they start it.
     build()?;
     let mut tests = tests()?;

@@ -5,6 +5,8 @@
 //! eight times the one before: so a tile of any level lies in 25 pieces at most, and all
 //! three images together hold a sixtieth of the samples.
 
+use std::time::{Duration, Instant};
+
 use fixedbitset::FixedBitSet;
 use lru::LruCache;
 
@@ -19,6 +21,8 @@ const PIECE: u32 = 64;
 const SAMPLES: usize = (PIECE * PIECE) as usize;
 /// Pieces in memory, at most: 17 MB.
 const MOST_PIECES: usize = 512;
+/// Between two times at which all that is known is kept: pieces grow block by block.
+const BETWEEN_KEEPING: Duration = Duration::from_secs(5);
 /// Bytes that they take at most.
 pub(super) const MOST_BYTES: usize = MOST_PIECES * SAMPLES * (size_of::<f64>() + 1);
 
@@ -93,6 +97,8 @@ pub(super) struct Coarse {
     pieces: LruCache<Key, Held>,
     /// Pieces that gave way to others, and know more than the disk.
     outgoing: Vec<(Key, Piece)>,
+    /// When all that is known was kept.
+    kept: Instant,
 }
 
 impl Coarse {
@@ -103,6 +109,7 @@ impl Coarse {
             images: vec![],
             pieces: LruCache::unbounded(),
             outgoing: vec![],
+            kept: Instant::now(),
         }
     }
 
@@ -193,14 +200,19 @@ impl Coarse {
         }
     }
 
-    /// The pieces that gave way to others, and know more than the disk.
-    pub(super) fn take_outgoing(&mut self) -> Vec<(Key, Piece)> {
-        std::mem::take(&mut self.outgoing)
+    /// The pieces to keep now: those that gave way to others, and from time to time copies of all
+    /// that know more than the disk, so that little is lost with a program that is killed.
+    pub(super) fn take_due(&mut self) -> Vec<(Key, Piece)> {
+        match self.kept.elapsed() >= BETWEEN_KEEPING {
+            true => self.take_new(),
+            false => std::mem::take(&mut self.outgoing),
+        }
     }
 
-    /// The same, and copies of those that stay.
+    /// All pieces that know more than the disk.
     pub(super) fn take_new(&mut self) -> Vec<(Key, Piece)> {
-        let mut taken = self.take_outgoing();
+        self.kept = Instant::now();
+        let mut taken = std::mem::take(&mut self.outgoing);
         for (key, held) in &mut self.pieces {
             if std::mem::take(&mut held.is_new) {
                 taken.push((*key, held.piece.clone()));

@@ -204,6 +204,12 @@ impl Shared {
         self.read.load(Ordering::Relaxed)
     }
 
+    /// Blocks of the full image.
+    pub(super) fn count(&self) -> u64 {
+        let counts = self.images.first().map_or([0; 2], BlockImage::counts);
+        counts.map(u64::from).iter().product()
+    }
+
     /// Whether a block of the file is being read in the background, or is going to be.
     pub(super) fn is_reading(&self) -> bool {
         !self.fine.is_idle()

@@ -3,7 +3,6 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
-use std::time::{Duration, Instant};
 
 use super::super::guard::guarded;
 use super::background::{Job, Queue};
@@ -20,9 +19,6 @@ const AHEAD: usize = 16;
 
 /// Blocks that are read ahead of the hand at once, at most.
 const MOST_PREFETCHED: usize = 16;
-
-/// Between two times at which all that is known is kept: pieces grow block by block.
-const BETWEEN_KEEPING: Duration = Duration::from_secs(5);
 
 /// What came of reading a part of an image.
 pub(super) struct Read {
@@ -135,9 +131,9 @@ impl Shared {
         let mut coarse = self.coarse();
         coarse.leave(part, read.block.as_deref(), read.is_lacking);
         if self.waits() {
-            let outgoing = coarse.take_outgoing();
+            let due = coarse.take_due();
             drop(coarse);
-            self.keep(outgoing);
+            self.keep(due);
         }
     }
 
@@ -187,7 +183,6 @@ impl Shared {
 
     /// Does what a queue holds until that ends.
     pub(super) fn work(&self, queue: &Queue) {
-        let mut kept = Instant::now();
         loop {
             while let Some(job) = queue.next() {
                 match job {
@@ -201,15 +196,8 @@ impl Shared {
                     }
                 }
                 queue.done(&job);
-                let outgoing = self.coarse().take_outgoing();
-                self.keep(outgoing);
-            }
-            // Nothing else to do: then what is known is kept for another time. At the end it
-            // is kept anyway.
-            if kept.elapsed() >= BETWEEN_KEEPING {
-                let new = self.coarse().take_new();
-                self.keep(new);
-                kept = Instant::now();
+                let due = self.coarse().take_due();
+                self.keep(due);
             }
             if !queue.wait() {
                 return;

@@ -8,11 +8,13 @@
 //!
 //! A record appears when it is complete (it is renamed to its name), so that programs that
 //! use the folder at once only ever see whole ones. Whatever is wrong with the folder is a
-//! line in the log and no error: without it everything is worked out again.
+//! line in the log and no error: without it everything is worked out again. A folder in which
+//! others may write is not used (`private`).
 //!
 //! `unnamed` has files for one program's own use, which are no records.
 
 mod name;
+mod private;
 mod record;
 mod room;
 mod stamp;
@@ -21,11 +23,10 @@ mod tests;
 mod unnamed;
 
 use std::fmt;
-use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use etcetera::{BaseStrategy, choose_base_strategy};
@@ -34,6 +35,8 @@ pub(crate) use name::Name;
 use room::Room;
 pub(crate) use stamp::FileStamp;
 pub(crate) use unnamed::Unnamed;
+
+use crate::regular_file;
 
 /// Records of another form are in another folder.
 const FORM: &str = "v1";
@@ -47,12 +50,15 @@ const USED_AGAIN: Duration = Duration::from_secs(3600);
 pub struct DiskCache(Option<Arc<Folder>>);
 
 struct Folder {
+    /// Of the records, in the folder that the user names.
     path: PathBuf,
     most_bytes: u64,
     /// Bytes that files without a name may take.
     unnamed: AtomicU64,
     /// How much it holds; `None` once it could not be written.
     room: Mutex<Option<Room>>,
+    /// Whether it was said that it is not used.
+    warned: OnceLock<()>,
 }
 
 impl DiskCache {
@@ -79,6 +85,7 @@ impl DiskCache {
             most_bytes,
             unnamed: AtomicU64::new(0),
             room,
+            warned: OnceLock::new(),
         })))
     }
 
@@ -99,7 +106,7 @@ impl DiskCache {
     pub(crate) fn get(&self, name: &Name) -> Option<Vec<u8>> {
         let folder = self.0.as_ref()?;
         let path = folder.path.join(name.path());
-        match read(&path, name) {
+        match folder.check().and_then(|()| read(&path, name)) {
             Ok(bytes) => Some(bytes),
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => {
@@ -128,11 +135,41 @@ impl DiskCache {
 }
 
 impl Folder {
+    /// Checks that it is the user's own, and warns once where it is not.
+    ///
+    /// # Errors
+    /// There is none yet, or it is not used.
+    fn check(&self) -> io::Result<()> {
+        let above = self.path.parent().map_or(Ok(()), private::check);
+        let checked = above.and_then(|()| private::check(&self.path));
+        if let Err(error) = &checked
+            && error.kind() == io::ErrorKind::Other
+            && self.warned.set(()).is_ok()
+        {
+            tracing::warn!("nothing is kept on disk: {error}");
+        }
+        checked
+    }
+
+    /// Makes it, and checks that it is the user's own.
+    ///
+    /// # Errors
+    /// It cannot be made, or is not used.
+    fn make(&self) -> io::Result<()> {
+        match self.check() {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            checked => return checked,
+        }
+        private::make(&self.path)?;
+        self.check()
+    }
+
     fn write(&self, room: &mut Room, name: &Name, bytes: &[u8]) -> io::Result<()> {
+        self.make()?;
         room.look(&self.path);
         let path = self.path.join(name.path());
         let parent = path.parent().unwrap_or(&self.path);
-        make_private(parent)?;
+        private::make(parent)?;
         let record = record::made(name, bytes);
         let mut file = tempfile::Builder::new()
             .prefix(room::UNFINISHED)
@@ -144,25 +181,11 @@ impl Folder {
     }
 }
 
-/// Makes a folder, and those above it, that nobody else may look into: what comes from a
-/// server may have been opened with a key.
-fn make_private(folder: &Path) -> io::Result<()> {
-    let mut builder = fs::DirBuilder::new();
-    builder.recursive(true);
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-    builder.create(folder)
-}
-
 fn read(path: &Path, name: &Name) -> io::Result<Vec<u8>> {
-    // To open a pipe waits for a writer.
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("it is no record"));
-    }
-    let file = File::open(path)?;
+    let file = regular_file::open(path)?;
     let metadata = file.metadata()?;
     let most = (LARGEST_RECORD + record::HEAD) as u64;
-    if !metadata.is_file() || metadata.len() > most {
+    if metadata.len() > most {
         return Err(io::Error::other("it is no record"));
     }
     let mut bytes = Vec::new();

@@ -1,5 +1,6 @@
 //! A folder of records: whole or absent, within its bound, and never in the way.
 
+use std::fs;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -161,6 +162,51 @@ fn a_folder_that_is_off_or_cannot_be_made_keeps_nothing_and_says_nothing() {
     let cache = DiskCache::at(folder.path(), 1 << 30);
     cache.put(&name(1), &vec![0; LARGEST_RECORD + 1]);
     assert_eq!(cache.get(&name(1)), None);
+}
+
+#[cfg(unix)]
+#[test]
+fn folder_that_others_may_write_is_neither_read_nor_written() {
+    use std::os::unix::fs::PermissionsExt;
+    let (folder, cache) = cache(1 << 20);
+    cache.put(&name(1), &bytes(1));
+    let own = folder.path().join(FORM);
+    for open in [folder.path(), &own] {
+        for (mode, is_used) in [(0o757, false), (0o770, false), (0o755, true)] {
+            fs::set_permissions(open, fs::Permissions::from_mode(mode)).expect("set");
+            assert_eq!(cache.get(&name(1)).is_some(), is_used, "{mode:o}");
+            cache.put(&name(2), &bytes(2));
+            assert_eq!(path(&folder, 2).exists(), is_used, "{mode:o}");
+            assert_eq!(cache.file_without_name(1).is_ok(), is_used, "{mode:o}");
+            let _ = fs::remove_file(path(&folder, 2));
+        }
+    }
+    // Only root may give a folder away.
+    if std::os::unix::fs::chown(&own, Some(65_534), None).is_ok() {
+        assert_eq!(cache.get(&name(1)), None, "it is another user's");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn folder_that_is_a_link_is_not_used_and_nothing_there_is_deleted() {
+    use std::os::unix::fs::symlink;
+    let elsewhere = tempfile::tempdir().expect("a folder");
+    let foreign = elsewhere.path().join(name(1).path());
+    fs::create_dir_all(foreign.parent().expect("it has one")).expect("made");
+    fs::write(&foreign, vec![1; 1 << 19]).expect("written");
+    let (folder, linked) = (tempfile::tempdir().expect("a folder"), elsewhere.path());
+    symlink(linked, folder.path().join(FORM)).expect("linked");
+    symlink(linked, folder.path().join("link")).expect("linked");
+    for named in [folder.path().to_owned(), folder.path().join("link")] {
+        let cache = DiskCache::at(&named, 64 << 10);
+        cache.put(&name(2), &bytes(2));
+        assert_eq!(cache.get(&name(2)), None);
+        let why = cache.file_without_name(1).err().expect("refused");
+        assert!(why.to_string().contains("is a link"), "{why}");
+        assert!(foreign.exists(), "{}", named.display());
+        assert_eq!(fs::read_dir(linked).expect("listed").count(), 1);
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::io::{Error, ErrorKind, Result};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::{DiskCache, Folder, make_private};
+use super::{DiskCache, Folder};
 
 /// All of them take no more than one of so many parts of what is free.
 const PARTS: u64 = 2;
@@ -33,7 +33,7 @@ impl DiskCache {
         let Some(folder) = &self.0 else {
             return Err(Error::other("nothing may be kept on disk (--cache-mb 0)"));
         };
-        make_private(&folder.path)?;
+        folder.make()?;
         // Where the system does not tell, the writing decides.
         let free = fs4::available_space(&folder.path).unwrap_or(u64::MAX);
         let file = tempfile::tempfile_in(&folder.path)?;

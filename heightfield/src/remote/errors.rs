@@ -5,7 +5,9 @@ use std::io::{Error, ErrorKind};
 use object_store::Error as StoreError;
 
 use super::OUTAGE;
+use super::redirects::RedirectError;
 use super::url::{in_text, is_url};
+use crate::shown::shown;
 
 /// No answer of a server is shown at more length than this, characters.
 const SHOWN: usize = 300;
@@ -72,6 +74,9 @@ pub(super) fn at_opening(error: &StoreError) -> Error {
 
 /// What a server's answer means.
 pub(super) fn told(error: &StoreError) -> Error {
+    if let Some(why) = redirect_error(error) {
+        return Error::new(ErrorKind::Unsupported, why.to_string());
+    }
     let kind = match error {
         StoreError::NotFound { .. } => {
             return Error::new(ErrorKind::NotFound, "there is no such file");
@@ -109,6 +114,13 @@ pub(super) fn told(error: &StoreError) -> Error {
         _ => OUTAGE,
     };
     Error::new(kind, in_short(&with_cause(error)))
+}
+
+/// The redirect that was not followed, where that is what went wrong.
+fn redirect_error(error: &StoreError) -> Option<&RedirectError> {
+    let first: &dyn std::error::Error = error;
+    let mut causes = std::iter::successors(Some(first), |cause| cause.source());
+    causes.find_map(|cause| cause.downcast_ref())
 }
 
 fn forbidden(error: &StoreError) -> Error {
@@ -167,8 +179,7 @@ fn in_short(text: &str) -> String {
         false => word.to_owned(),
     };
     let words: Vec<String> = text.split_whitespace().map(word).collect();
-    let line: String = words.join(" ").chars().take(SHOWN).collect();
-    line.chars().filter(|c| !c.is_control()).collect()
+    shown(&words.join(" ")).chars().take(SHOWN).collect()
 }
 
 #[cfg(test)]
@@ -180,7 +191,10 @@ mod tests {
         let said =
             "GET https://h/a.tif?sig=secret:\n\t500 \u{1b}[2J".to_owned() + &" x".repeat(900);
         let told = in_short(&said);
-        assert!(told.starts_with("GET https://h/a.tif 500 [2J x"), "{told}");
+        assert!(
+            told.starts_with("GET https://h/a.tif 500 \\u{1b}[2J x"),
+            "{told}"
+        );
         assert!(told.len() <= SHOWN);
         let page = "Server returned status code: 400 Bad Request: <html>?sig=secret";
         assert_eq!(

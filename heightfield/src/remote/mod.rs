@@ -15,13 +15,11 @@
 //! A file that was changed at its server is not read on: what was fetched of it and what
 //! would come do not belong together.
 //!
-//! `object_store` makes the requests; it is named in `store`, `servers`, `capped` and `errors` only.
+//! `object_store` makes the requests; it is named in `store`, `servers`, `requests` and `errors` only.
 //! Without the feature `remote` there is no such file (`absent`).
 
 #[cfg(not(feature = "remote"))]
 mod absent;
-#[cfg(feature = "remote")]
-mod capped;
 #[cfg(feature = "remote")]
 mod elsewhere;
 #[cfg(feature = "remote")]
@@ -35,6 +33,10 @@ mod line;
 #[cfg(feature = "remote")]
 mod pages;
 mod reader;
+#[cfg(feature = "remote")]
+mod redirects;
+#[cfg(feature = "remote")]
+mod requests;
 #[cfg(feature = "remote")]
 mod servers;
 #[cfg(feature = "remote")]

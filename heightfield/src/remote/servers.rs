@@ -13,8 +13,8 @@ use object_store::http::HttpBuilder;
 use object_store::path::Path;
 use object_store::{ObjectStore, RetryConfig};
 
-use super::capped::Capped;
 use super::errors::wrong;
+use super::requests::Connector;
 use super::url::shown;
 
 /// A request is given up after so long, and when nothing comes for so long.
@@ -87,7 +87,7 @@ fn made(url: &str) -> Result<Server> {
                 $builder
                     .with_url(url)
                     .with_retry(retry)
-                    .with_http_connector(Capped::default())
+                    .with_http_connector(Connector)
                     .with_config($key(Timeout), REQUEST)
                     .with_config($key(ReadTimeout), SILENCE)
                     .with_config($key(ConnectTimeout), CONNECT)

@@ -11,6 +11,10 @@ use object::read::elf::{FileHeader, ProgramHeader, Sym};
 
 use super::boards::Board;
 use super::memories::Memories;
+use heightfield::regular_file;
+
+/// No ELF of a board is larger, also with all that a debugger wants.
+const MAX_BYTES: u64 = 256 << 20;
 
 /// An image that fits its chip.
 #[derive(Debug)]
@@ -111,7 +115,7 @@ impl Image {
         let (Some(chip), Some(memories)) = (board.chip, board.memories) else {
             return Err(ImageError::Emulated(board.name));
         };
-        let elf = std::fs::read(path).map_err(|source| ImageError::Unreadable {
+        let elf = regular_file::read(path, MAX_BYTES).map_err(|source| ImageError::Unreadable {
             path: path.to_owned(),
             source,
         })?;

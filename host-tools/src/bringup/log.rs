@@ -14,6 +14,10 @@ use serde::{Deserialize, Serialize};
 use super::step::Step;
 use super::utc::utc;
 use crate::output::{Output, OutputError};
+use heightfield::regular_file;
+
+/// No log is larger: a step has some hundred bytes.
+const MAX_BYTES: u64 = 1 << 20;
 
 /// Which board, and which record in it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -142,7 +146,7 @@ impl Log {
     /// # Errors
     /// [`LogError::Unreadable`], [`LogError::NoLog`].
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let text = match std::fs::read_to_string(path) {
+        let text = match regular_file::read_text(path, MAX_BYTES) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
             Err(source) => {

@@ -10,6 +10,10 @@ use hapterra_core::phantom::{BadCalibration, BadRecord, Calibration, JointLimits
 use serde::Deserialize;
 
 use crate::output::{Output, OutputError};
+use heightfield::regular_file;
+
+/// No calibration is larger.
+const MAX_BYTES: u64 = 1 << 20;
 
 /// Version of the file's format.
 const FORMAT: u32 = 1;
@@ -120,7 +124,7 @@ struct Limits {
 /// # Errors
 /// [`BadFile`] says what is wrong with which file.
 pub fn read(path: &Path) -> Result<Calibration, BadFile> {
-    let record = std::fs::read(path)
+    let record = regular_file::read(path, MAX_BYTES)
         .map_err(Fault::Unreadable)
         .and_then(|bytes| {
             if bytes.starts_with(BINARY) {

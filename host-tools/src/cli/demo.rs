@@ -15,6 +15,7 @@ use super::options::rendering::Rendering;
 use super::options::steering::{self, Commands, ViewControl};
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::session_summary::{self, SessionSummary};
+use super::terminal::waiting::shown_reading;
 use super::terminal::{interrupt, left_behind, progress, voice};
 use super::viewing::{Shown, ToBeShown, Viewing};
 use crate::events::{Event as Told, Watcher};
@@ -112,7 +113,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let law = args.rendering.law()?;
     let law = args.rendering.materials.law(materials.as_ref(), law);
     args.rendering.needs_the_devices_rule()?;
-    let placed = PlacedTerrain::in_view(&terrain, view.home_mm, law)?;
+    let placed = shown_reading(&name, &raster, || {
+        PlacedTerrain::in_view(&terrain, view.home_mm, law)
+    })?;
     let placed = placed.repeated(args.rounds);
     show(args, (&placed, &view), &name, &outputs)
 }

@@ -16,6 +16,7 @@ use super::options::terrain_file::TerrainFile;
 use super::report::put;
 use crate::place::place_in_words;
 use crate::terrain::{Distortion, FeltCells, FeltGrid};
+use heightfield::shown::shown_json;
 use heightfield::without_key;
 use heightfield::{CellSize, CellUnit, Certainty, ReferenceSystem, SamplesAre};
 use link::LinkFigures;
@@ -68,7 +69,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     if args.json {
         let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
-        put(&format!("{json}\n"))
+        put(&(shown_json(&json) + "\n"))
     } else {
         put(&report.text())
     }

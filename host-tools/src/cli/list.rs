@@ -6,7 +6,8 @@ use super::failure::{Failure, Hint};
 use super::session_summary;
 use crate::board::update::plugged;
 use crate::board::{BOARDS, probes};
-use crate::link::{Dialogue, LinkError, Tcp, Transport, Usb, shown, tcp_address};
+use crate::link::{Dialogue, LinkError, Tcp, Transport, Usb, tcp_address};
+use heightfield::shown::shown;
 
 /// Arguments of `hapterra list`.
 #[derive(Debug, clap::Args)]

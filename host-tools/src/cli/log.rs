@@ -16,7 +16,7 @@ use tracing_subscriber::fmt::MakeWriter;
 
 use super::sparing::Sparing;
 use super::terminal::voice;
-use crate::link::shown;
+use heightfield::shown::shown;
 
 /// Where the lines come from that a device can cause.
 const BY_DEVICE: &str = "hapterra::link";

@@ -42,6 +42,7 @@ use std::process::ExitCode;
 use clap::{ArgAction, Parser, Subcommand};
 
 pub use failure::Failure;
+use terminal::voice;
 
 /// Touch terrain of any size through a Phantom.
 #[derive(Debug, Parser)]
@@ -107,8 +108,12 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
     let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
         Err(error) => {
-            // A reader who goes away has seen enough of it.
-            let _ = error.print();
+            match error.use_stderr() {
+                // It repeats what was typed, which need not be of the user's making.
+                true => voice::put(std::io::stderr(), &error.render().to_string()),
+                // A reader who goes away has seen enough of the help.
+                false => _ = error.print(),
+            }
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
@@ -134,7 +139,7 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
         Command::Bench(args) => bench::run(&args),
     };
     log.end();
-    terminal::voice::finish();
+    voice::finish();
     // A process that is not this crate's own program does not do so at its end.
     let _ = std::io::stdout().flush();
     match outcome {

@@ -165,13 +165,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         InReach::of(&asked, arm).map_err(|failure| failure.about(device.speaker.name()))
     })?;
     let placed = of_each(devices.iter().zip(&laid), |(device, laid)| {
-        Placed::new(device, laid, law).map_err(|failure| failure.about(device.speaker.name()))
+        Placed::new(device, (&name, laid), law)
+            .map_err(|failure| failure.about(device.speaker.name()))
     })?;
-    let title = args.terrain.name();
     // The coarse levels are read before anything is armed. A viewer shows one device.
     let mut shown = viewer
         .zip(placed.first())
-        .map(|(program, of)| ToBeShown::new(program, of.terrain, &of.view, &title));
+        .map(|(program, of)| ToBeShown::new(program, of.terrain, &of.view, &name));
     raster.check_came()?;
     materials
         .as_ref()

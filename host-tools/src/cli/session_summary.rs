@@ -6,12 +6,13 @@ use hapterra_core::wire::hello::DeviceHello;
 
 use super::failure::{Failure, OrHint};
 use super::options::placing;
-use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT, Tally, shown};
+use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT, Tally};
 use crate::picture::{GroundFacts, SessionPicture, Surface};
 use crate::place::{View, coordinates_in_words};
 use crate::replay::Record;
 use crate::telemetry::Figures;
 use crate::terrain::Terrain;
+use heightfield::shown::shown;
 
 /// Figures of a session and of its link.
 #[derive(Clone, Debug)]

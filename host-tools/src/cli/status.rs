@@ -11,7 +11,8 @@ use super::options::device::Device;
 use super::report::put;
 use super::session_summary;
 use super::terminal::voice::{say, show};
-use crate::link::{EMULATED, shown};
+use crate::link::EMULATED;
+use heightfield::shown::shown;
 
 /// Arguments of `hapterra status`.
 #[derive(Debug, clap::Args)]

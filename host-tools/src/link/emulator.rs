@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::device_text::shown_lines;
 use super::tcp::Tcp;
+use heightfield::regular_file;
+use heightfield::shown::shown_lines;
 
 /// Environment variable that names the image when no option does.
 pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_ELF";
@@ -94,7 +95,7 @@ impl Emulator {
     /// [`EmulatorError`] says which part is missing or what QEMU said.
     pub fn start(qemu: &Path, image: &Path) -> Result<(Self, Lines), EmulatorError> {
         let path = image.to_owned();
-        std::fs::File::open(image).map_err(|source| EmulatorError::Image { path, source })?;
+        regular_file::open(image).map_err(|source| EmulatorError::Image { path, source })?;
         let path = qemu.to_owned();
         let lines = [listen()?, listen()?];
         let mut emulator = match command(qemu, image, &lines).spawn() {

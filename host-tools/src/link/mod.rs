@@ -26,7 +26,6 @@ mod bulk;
 mod client;
 mod conversation;
 mod device_address;
-mod device_text;
 mod dialogue;
 mod emulator;
 mod error;
@@ -49,7 +48,6 @@ pub use client::{Arming, Client, Event};
 pub use conversation::State;
 pub use device_address::DeviceAddress;
 pub(crate) use device_address::tcp_address;
-pub use device_text::{shown, shown_lines};
 pub use dialogue::Dialogue;
 pub use emulator::{
     EMULATED, Emulator, EmulatorError, IMAGE_VARIABLE, INSTRUCTIONS_PER_COUNT, Lines, QEMU,

@@ -14,17 +14,19 @@
 //! what the default does not state is as the options say.
 
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use toml::Spanned;
 
+use heightfield::regular_file;
+use heightfield::shown::shown;
+
 /// Most classes that a table names: with the default, as many materials as a device has room
 /// for.
 pub const MOST_CLASSES: usize = 15;
 /// A longer file is no table, bytes.
-const LARGEST: u64 = 1 << 20;
+const MAX_BYTES: u64 = 1 << 20;
 
 /// What a table says of one material; nothing where it says nothing.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -126,17 +128,7 @@ impl TableFile {
             file: file.to_owned(),
             why,
         };
-        let opened = std::fs::File::open(file).map_err(unreadable)?;
-        let mut text = String::new();
-        // A file of another kind is not read whole before it is refused.
-        let mut bounded = opened.take(LARGEST + 1);
-        bounded.read_to_string(&mut text).map_err(unreadable)?;
-        if text.len() as u64 > LARGEST {
-            return Err(BadTable::NoTable {
-                file: file.to_owned(),
-                why: format!("a table of 16 materials has no more than {LARGEST} bytes"),
-            });
-        }
+        let text = regular_file::read_text(file, MAX_BYTES).map_err(unreadable)?;
         Self::read(file, &text)
     }
 
@@ -182,15 +174,14 @@ impl TableFile {
         let default = written.default.map_or_else(Default::default, |look| {
             (line_of(look.span().start), look.into_inner())
         });
-        let has_control = |look: &Look| {
+        let is_unprintable = |look: &Look| {
             let name = look.name.as_deref().unwrap_or_default();
-            name.chars().any(char::is_control)
+            shown(name) != name
         };
         let of_classes = classes.iter().map(|(_, line, look)| (*line, look));
         let mut all = std::iter::once((default.0, &default.1)).chain(of_classes);
-        if let Some((line, _)) = all.find(|(_, look)| has_control(look)) {
-            let why =
-                "its name has a control character, and names are printed as they are; leave it out";
+        if let Some((line, _)) = all.find(|(_, look)| is_unprintable(look)) {
+            let why = "its name has a character that does not print; leave it out";
             return Err(bad(line, why.to_owned()));
         }
         Ok(Self { default, classes })
@@ -246,11 +237,11 @@ mod tests {
             ("classes = 3\n", ["line 1", "classes"]),
             (
                 "[class.1]\n[class.2]\nname = \"\\u001b[2J\"\n",
-                ["line 2", "control character"],
+                ["line 2", "does not print"],
             ),
             (
                 "[default]\nname = \"a\\nb\"\n",
-                ["line 1", "control character"],
+                ["line 1", "does not print"],
             ),
         ] {
             let why = read(text).expect_err(text);

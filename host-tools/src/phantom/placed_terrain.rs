@@ -8,6 +8,8 @@ use crate::terrain::Terrain;
 
 /// Force of the hand's slide, N; it presses with half as much again.
 const PUSH_N: f64 = 1.0;
+/// Places of the plan are so far apart, mm: a hand follows nothing finer.
+const PLANNED_APART_MM: f64 = 0.5;
 /// Rest after the tour, s.
 const REST_S: f64 = 0.25;
 
@@ -60,7 +62,7 @@ impl<'t> PlacedTerrain<'t> {
         home_mm: Option<[f64; 3]>,
     ) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
-        let surface = |east: f64, north: f64| terrain.height_mm(east, north);
+        let surface = |east: f64, north: f64| terrain.planned_mm(east, north, PLANNED_APART_MM);
         let tour = TourPlan {
             surface: &surface,
             size_mm: terrain.size_mm(),

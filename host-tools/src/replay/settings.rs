@@ -10,11 +10,11 @@ use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
 use super::marks::Mark;
-use crate::link::shown;
 use crate::materials::{Looks, Materials};
 use crate::place::Laid;
 use crate::terrain::{BadScale, FeltCells, FeltGrid, Scale, Terrain};
 use heightfield::ReferenceSystem;
+use heightfield::shown::shown;
 
 /// What the first line of the settings begins with; its value is [`FORMAT`].
 pub const KEY: &str = "hapterra-recording";

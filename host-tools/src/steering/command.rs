@@ -5,6 +5,7 @@ use hapterra_core::force::{Pattern, Shading, Texture};
 use super::marks::text_of;
 use super::{Steer, Wanted};
 use crate::place::{SurfaceChange, ViewChange};
+use heightfield::shown::shown;
 
 /// What is understood, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (hand mm), pan-m EAST NORTH (ground m), zoom TIMES, \
@@ -41,7 +42,7 @@ const SHOWN: usize = 60;
 /// [`NoCommand`] says what is understood.
 pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
     let refused = |why| NoCommand {
-        line: shown(line),
+        line: beginning(line),
         why,
     };
     let (at_s, rest) = timed(line).map_err(refused)?;
@@ -68,9 +69,9 @@ pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
 }
 
 /// The beginning of a line as a message may show it.
-fn shown(line: &str) -> String {
-    let visible = |c: char| if c.is_control() { '\u{FFFD}' } else { c };
-    line.trim().chars().take(SHOWN).map(visible).collect()
+fn beginning(line: &str) -> String {
+    let beginning: String = line.trim().chars().take(SHOWN).collect();
+    shown(&beginning)
 }
 
 /// Takes `at SECONDS` from the beginning of a line.

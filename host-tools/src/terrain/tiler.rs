@@ -352,6 +352,18 @@ impl<'r> Terrain<'r> {
         self.ground_mm(level, [east_mm, north_mm])
     }
 
+    /// Height of the surface where a hand plans its path, by places so far apart, mm: of a raster in
+    /// memory [`Self::height_mm`], of one that stays in its file as [`Self::seen_mm`], with a ball's
+    /// centre over flat ground. A plan goes all over the terrain, and must not read all of it.
+    #[must_use]
+    pub fn planned_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
+        if self.raster().is_known_whole() {
+            return self.height_mm(east_mm, north_mm);
+        }
+        let ground = self.seen_mm(east_mm, north_mm, apart_mm)?;
+        Some(ground + self.tip_cells() * self.scale.cell_mm())
+    }
+
     /// The bilinear ground at a place.
     fn ground_mm(&self, level: u8, [east_mm, north_mm]: [f64; 2]) -> Option<f64> {
         let coarser = level - self.level;

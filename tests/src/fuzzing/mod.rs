@@ -3,6 +3,8 @@
 
 mod bytes;
 mod materials;
+pub mod terrain;
+pub mod text;
 pub mod tick;
 pub mod tile;
 pub mod wire;

@@ -1,12 +1,13 @@
 //! A server of a folder's files, in ranges, and what goes wrong on the way to it.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Request, State};
-use axum::http::header::{CONTENT_RANGE, ETAG, RANGE};
+use axum::http::header::{CONTENT_RANGE, ETAG, LOCATION, RANGE};
 use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
@@ -49,6 +50,8 @@ pub enum Fault {
     NoRanges,
     /// There is no such file, which a page of 64 MB says.
     LongError,
+    /// Another URL has the file ([`Server::redirect`]).
+    Redirect,
 }
 
 struct Shared {
@@ -72,6 +75,10 @@ struct Faults {
     /// The version of all files.
     version: u32,
     requests: Vec<String>,
+    /// Names of the headers of all requests.
+    headers: BTreeSet<String>,
+    /// Where answers redirect to.
+    redirect: String,
     bytes: usize,
     /// Requests that wait for their answers, now and at most.
     at_once: [usize; 2],
@@ -109,6 +116,18 @@ impl Server {
     /// The next `count` answers are faulty.
     pub fn fail(&self, fault: Fault, count: usize) {
         self.fail_at("", fault, count);
+    }
+
+    /// All answers redirect to a URL.
+    pub fn redirect(&self, to: &str) {
+        self.shared.state().redirect = to.to_owned();
+        self.fail(Fault::Redirect, usize::MAX);
+    }
+
+    /// Names of the headers of all requests so far, in small letters.
+    #[must_use]
+    pub fn headers(&self) -> BTreeSet<String> {
+        self.shared.state().headers.clone()
     }
 
     /// The next `count` answers about files whose names end so are faulty.
@@ -171,6 +190,8 @@ impl Shared {
         let mut state = self.state();
         let line = format!("{} {}", request.method(), request.uri());
         state.requests.push(line);
+        let names = request.headers().keys().map(ToString::to_string);
+        state.headers.extend(names);
         let [now, most] = &mut state.at_once;
         *now += 1;
         *most = (*most).max(*now);
@@ -201,6 +222,10 @@ async fn between(State(shared): State<Arc<Shared>>, mut request: Request, next: 
         Fault::Error500 => return StatusCode::INTERNAL_SERVER_ERROR.into_response(),
         Fault::Forbidden => return StatusCode::FORBIDDEN.into_response(),
         Fault::Page => return "<!doctype html><title>Hills</title>".into_response(),
+        Fault::Redirect => {
+            let to = shared.state().redirect.clone();
+            return (StatusCode::FOUND, [(LOCATION, to)]).into_response();
+        }
         Fault::LongError => {
             let page = Body::new(Page(shared.clone(), 64));
             return (StatusCode::NOT_FOUND, page).into_response();

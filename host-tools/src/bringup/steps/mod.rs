@@ -21,7 +21,7 @@ use super::board::Board;
 use super::finding::Finding;
 use super::halt::Halt;
 use super::step::Step;
-use crate::link::shown;
+use heightfield::shown::shown;
 
 /// Goes through one step. Returns what the log keeps of it.
 ///

@@ -9,7 +9,8 @@ use crate::board::BOARDS;
 use crate::bringup::{Identity, Log, Step};
 use crate::cli::failure::Failure;
 use crate::cli::options::device::EMULATED_PATIENCE;
-use crate::link::{Dialogue, Transport, shown};
+use crate::link::{Dialogue, Transport};
+use heightfield::shown::shown;
 
 /// Asks the device who it is, and refuses a real board whose log is not complete. The
 /// device keeps what it holds.

@@ -4,7 +4,7 @@ use super::Args;
 use crate::board::{Image, flash};
 use crate::cli::failure::Failure;
 use crate::cli::terminal::progress;
-use crate::link::shown;
+use heightfield::shown::shown;
 
 pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     let bar = progress::bar(Some(0), "{bar:30} {bytes} of {total_bytes}");

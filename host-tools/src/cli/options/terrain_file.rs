@@ -2,14 +2,14 @@
 //! reads one.
 
 use std::path::PathBuf;
-use std::time::Duration;
 
 use clap::ValueHint;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use indicatif::ProgressBar;
 
 use crate::cli::failure::Failure;
+use crate::cli::terminal::waiting::shown_meanwhile;
 use heightfield::disk_cache::DiskCache;
+use heightfield::shown::shown;
 use heightfield::{
     CellUnit, Certainty, Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType,
     files_read_with, metres_in,
@@ -106,21 +106,18 @@ impl TerrainFile {
     pub fn open(&self) -> Result<Raster, Failure> {
         let raster = self.open_without_remarks()?;
         for remark in raster.remarks() {
-            eprintln!("note: {remark}");
+            eprintln!("note: {}", shown(remark));
         }
         Ok(raster)
     }
 
-    /// Opens the terrain, showing on a terminal that it takes a while. The caller shows its remarks.
+    /// Opens the terrain, and shows that it takes a while. The caller shows its remarks.
     ///
     /// # Errors
     /// What is wrong with the file, and what to do next.
     pub(in crate::cli) fn open_without_remarks(&self) -> Result<Raster, Failure> {
-        let waiting = ProgressBar::new_spinner().with_message(format!("reading {}", self.name()));
-        waiting.enable_steady_tick(Duration::from_millis(200));
-        let opened = Raster::open(&self.file, &self.reading.options());
-        waiting.finish_and_clear();
-        let raster = opened?;
+        let line = || format!("reading {}", self.name());
+        let raster = shown_meanwhile(line, || Raster::open(&self.file, &self.reading.options()))?;
         tracing::info!(format = raster.format(), "read {}", self.name());
         if let Some(line) = assumed_unit(&raster) {
             eprintln!("note: {line}");
@@ -133,16 +130,13 @@ impl TerrainFile {
         files_read_with(&self.file)
     }
 
-    /// The file's name without folders.
+    /// The file's name without folders, as it is shown: on a page and in a picture, too.
     pub fn name(&self) -> String {
         if let Some(url) = self.file.to_str().filter(|file| is_url(file)) {
-            return file_name(url).to_owned();
+            return shown(file_name(url));
         }
-        self.file
-            .file_name()
-            .unwrap_or(self.file.as_os_str())
-            .to_string_lossy()
-            .into_owned()
+        let name = self.file.file_name().unwrap_or(self.file.as_os_str());
+        shown(&name.to_string_lossy())
     }
 }
 

@@ -7,6 +7,7 @@ use hapterra_core::scene::Scene;
 use super::devices::OneDevice;
 use crate::cli::failure::Failure;
 use crate::cli::options::placing::Asked;
+use crate::cli::terminal::waiting::shown_reading;
 use crate::phantom::PlacedTerrain;
 use crate::place::View;
 use crate::terrain::Terrain;
@@ -41,18 +42,20 @@ pub(super) struct Placed<'t> {
 }
 
 impl<'t> Placed<'t> {
-    /// With the tour of a virtual arm, where the device has one.
+    /// With the tour of a virtual arm, where the device has one; `name` is the terrain's.
     ///
     /// # Errors
     /// No place that a virtual arm could tour.
     pub(super) fn new(
         device: &OneDevice,
-        laid: &'t InReach<'t>,
+        (name, laid): (&str, &'t InReach<'t>),
         law: ForceLaw,
     ) -> Result<Self, Failure> {
         let (view, terrain) = (laid.view, &laid.terrain);
         let tour = match device.is_scripted() {
-            true => Some(PlacedTerrain::in_view(terrain, view.home_mm, law)?),
+            true => Some(shown_reading(name, terrain.raster(), || {
+                PlacedTerrain::in_view(terrain, view.home_mm, law)
+            })?),
             false => None,
         };
         Ok(Self {

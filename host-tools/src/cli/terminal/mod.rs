@@ -12,3 +12,4 @@ pub(super) mod questions;
 pub(super) mod raw_keys;
 pub(super) mod speaker;
 pub(super) mod voice;
+pub(super) mod waiting;

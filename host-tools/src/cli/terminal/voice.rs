@@ -15,6 +15,7 @@ use std::thread::Builder;
 use indicatif::ProgressBar;
 
 use super::raw_keys;
+use heightfield::shown::shown_lines;
 
 /// Lines that wait to be written; beyond them, lines are left out.
 const WAITING: usize = 512;
@@ -92,7 +93,7 @@ fn write(said: Said, bottom: &mut Option<ProgressBar>) {
         Said::Err(line) => above(bottom, || put(io::stderr(), &line)),
         Said::Status(Some(line)) => {
             let bar = bottom.get_or_insert_with(ProgressBar::new_spinner);
-            bar.set_message(line);
+            bar.set_message(shown_lines(&line));
             bar.tick();
         }
         Said::Status(None) => {
@@ -113,10 +114,12 @@ fn above(bottom: &Option<ProgressBar>, put: impl FnOnce()) {
     }
 }
 
-/// Writes, where that can be written. In raw mode a terminal does not go back to the first
-/// column by itself.
+/// Writes, where that can be written, what a terminal may show. In raw mode a terminal does not go
+/// back to the first column by itself.
 pub(in crate::cli) fn put(mut to: impl Write, text: &str) {
-    let of_raw = raw_keys::is_raw().then(|| text.replace('\n', "\r\n"));
-    let text = of_raw.as_deref().unwrap_or(text);
+    let mut text = shown_lines(text);
+    if raw_keys::is_raw() {
+        text = text.replace('\n', "\r\n");
+    }
     let _ = to.write_all(text.as_bytes()).and_then(|()| to.flush());
 }

@@ -1,7 +1,7 @@
 //! All columns of a recording at once, for programs that work with whole recordings.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read as _};
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord};
@@ -11,6 +11,7 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::{COLUMNS, Settings, Trajectory, TrajectoryError, TrajectoryFault, is_parquet};
+use heightfield::regular_file;
 
 /// Names of columns of numbers with a fraction end in a unit.
 const UNITS: [&str; 3] = ["_s", "_mm", "_n"];
@@ -59,10 +60,15 @@ impl RecordedColumns {
 }
 
 fn read(path: &Path) -> Result<(Columns, bool), TrajectoryFault> {
-    let mut file = File::open(path).map_err(TrajectoryFault::Unreadable)?;
+    let mut file = regular_file::open(path).map_err(TrajectoryFault::Unreadable)?;
     match is_parquet(&mut file)? {
         true => Ok((of_parquet(file)?, false)),
-        false => of_csv(&std::fs::read(path).map_err(TrajectoryFault::Unreadable)?),
+        false => {
+            let mut content = Vec::new();
+            let read = file.read_to_end(&mut content);
+            read.map_err(TrajectoryFault::Unreadable)?;
+            of_csv(&content)
+        }
     }
 }
 

@@ -10,10 +10,12 @@ use parquet::file::reader::SerializedFileReader;
 use parquet::record::Field;
 use parquet::record::reader::RowIter;
 
+use super::bounded::Bounded;
 use super::fault::{TrajectoryError, TrajectoryFault};
 use super::{Trajectory, is_parquet};
 use crate::replay::recording::{CONTACT, NUMBERS};
 use crate::replay::{Record, Settings};
+use heightfield::regular_file;
 
 /// Columns of a recording by name: time and HIP, then what a trajectory does not have.
 const NAMES: [&str; NUMBERS.len() + 1] = {
@@ -50,7 +52,7 @@ pub struct FeltRows {
 
 enum Form {
     Csv {
-        reader: Box<csv::Reader<File>>,
+        reader: Box<csv::Reader<Bounded<File>>>,
         /// Where each of [`NAMES`] stands.
         columns: [Option<usize>; NAMES.len()],
         record: StringRecord,
@@ -172,7 +174,7 @@ fn record(values: &Values) -> Record {
 }
 
 fn form(path: &Path) -> Result<Form, TrajectoryFault> {
-    let mut file = File::open(path).map_err(TrajectoryFault::Unreadable)?;
+    let mut file = regular_file::open(path).map_err(TrajectoryFault::Unreadable)?;
     if is_parquet(&mut file)? {
         let reader = SerializedFileReader::new(file).map_err(unreadable)?;
         return Ok(Form::Parquet(Box::new(RowIter::from_file_into(Box::new(
@@ -183,7 +185,7 @@ fn form(path: &Path) -> Result<Form, TrajectoryFault> {
         .flexible(true)
         .comment(Some(b'#'))
         .trim(Trim::All)
-        .from_reader(file);
+        .from_reader(Bounded::new(file));
     let header = reader.headers().map_err(unreadable)?.clone();
     let columns = NAMES.map(|name| header.iter().position(|column| column == name));
     Ok(Form::Csv {

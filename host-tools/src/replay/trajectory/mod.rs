@@ -85,6 +85,7 @@ impl Trajectory {
     }
 
     fn opened(path: &Path) -> Result<Self, TrajectoryFault> {
+        // It may be a pipe whose other end makes the path.
         let mut file = File::open(path).map_err(TrajectoryFault::Unreadable)?;
         let (form, text) = match is_parquet(&mut file)? {
             true => {

@@ -1,0 +1,139 @@
+//! Redirects of servers, and which of them are followed: none leaves https, and none takes a
+//! request with a key to another host.
+
+use reqwest::Url;
+use reqwest::header::{HeaderMap, HeaderName};
+
+/// Headers that open nothing; any other may be a key.
+const WITHOUT_KEY: [&str; 9] = [
+    "accept",
+    "content-length",
+    "host",
+    "if-match",
+    "if-modified-since",
+    "if-none-match",
+    "if-unmodified-since",
+    "range",
+    "user-agent",
+];
+
+/// Why a redirect is not followed.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum RedirectError {
+    #[error(
+        "its server redirects from https to http at {0}, where others on the line could change it: name its URL there if that is meant"
+    )]
+    LeavesHttps(String),
+    #[error(
+        "its server redirects to {0}, and the key of the request is for another host: name its URL there if that is meant"
+    )]
+    TakesKeyAlong(String),
+    #[error("its server redirects to what is no URL of a web server")]
+    NoUrl,
+    #[error("its server redirects again and again")]
+    TooMany,
+}
+
+/// Returns true if a request opens more than anybody could: by a header, a password, or what
+/// follows the path of its URL.
+pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
+    let may_be_key = |name: &HeaderName| !WITHOUT_KEY.contains(&name.as_str());
+    let in_url = url.query().is_some() || url.password().is_some() || !url.username().is_empty();
+    in_url || headers.keys().any(may_be_key)
+}
+
+/// Where a redirect leads to.
+///
+/// # Errors
+/// Why it is not followed.
+pub(super) fn followed(from: &Url, location: &str, has_key: bool) -> Result<Url, RedirectError> {
+    let to = from.join(location).map_err(|_| RedirectError::NoUrl)?;
+    let host = match (to.scheme(), to.host_str()) {
+        ("http" | "https", Some(host)) => host.to_owned(),
+        _ => return Err(RedirectError::NoUrl),
+    };
+    if from.scheme() == "https" && to.scheme() == "http" {
+        return Err(RedirectError::LeavesHttps(host));
+    }
+    if has_key && !is_same_host(from, &to) {
+        return Err(RedirectError::TakesKeyAlong(host));
+    }
+    Ok(to)
+}
+
+/// Returns true if both are at one server, also where it goes on from http to https.
+fn is_same_host(from: &Url, to: &Url) -> bool {
+    let port = |url: &Url| url.port_or_known_default();
+    let goes_on_encrypted = (port(from), port(to)) == (Some(80), Some(443));
+    from.host_str() == to.host_str() && (port(from) == port(to) || goes_on_encrypted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn url(text: &str) -> Url {
+        text.parse().expect("a URL")
+    }
+
+    #[test]
+    fn redirect_is_followed_where_it_gives_nothing_away() {
+        for (from, location, has_key, to) in [
+            ("https://h/a", "/b", true, "https://h/b"),
+            ("https://h/a", "c/d?e", true, "https://h/c/d?e"),
+            ("https://h/a", "https://h:443/b", true, "https://h/b"),
+            ("http://h/a", "https://h/a", true, "https://h/a"),
+            ("https://h/a", "https://other/b", false, "https://other/b"),
+            ("http://h/a", "//other/b", false, "http://other/b"),
+        ] {
+            let followed = followed(&url(from), location, has_key);
+            assert_eq!(followed, Ok(url(to)), "{from} {location}");
+        }
+    }
+
+    #[test]
+    fn redirect_from_https_or_with_a_key_to_another_host_is_refused() {
+        use RedirectError::{LeavesHttps, NoUrl, TakesKeyAlong};
+        let other = || "other".to_owned();
+        for (from, location, has_key, why) in [
+            ("https://h/a", "http://h/a", false, LeavesHttps("h".into())),
+            ("https://h/a", "http://other/a", true, LeavesHttps(other())),
+            ("https://h/a", "//other/a", true, TakesKeyAlong(other())),
+            (
+                "https://h/a",
+                "https://h:444/",
+                true,
+                TakesKeyAlong("h".into()),
+            ),
+            (
+                "http://h:81/a",
+                "https://h/",
+                true,
+                TakesKeyAlong("h".into()),
+            ),
+            ("http://h/a", "https://other/", true, TakesKeyAlong(other())),
+            ("https://h/a", "file:///etc/passwd", false, NoUrl),
+            ("https://h/a", "http://", false, NoUrl),
+        ] {
+            let refused = followed(&url(from), location, has_key);
+            assert_eq!(refused, Err(why), "{from} {location}");
+        }
+    }
+
+    #[test]
+    fn key_is_any_header_or_part_of_the_url_that_may_open_something() {
+        let with = |name: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert("range", "bytes=0-1".parse().expect("a value"));
+            headers.insert(name, "x".parse().expect("a value"));
+            headers
+        };
+        assert!(!has_key(&url("https://h/a.tif"), &with("user-agent")));
+        for name in ["authorization", "x-amz-security-token", "cookie", "api-key"] {
+            assert!(has_key(&url("https://h/a.tif"), &with(name)), "{name}");
+        }
+        for keyed in ["https://h/a?sig=x", "https://me@h/a", "https://me:p@h/a"] {
+            assert!(has_key(&url(keyed), &HeaderMap::new()), "{keyed}");
+        }
+    }
+}

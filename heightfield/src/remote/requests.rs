@@ -1,0 +1,154 @@
+//! How requests are made: redirects are followed by the rules of `redirects`, and answers that are
+//! no files are cut, because the library would keep an endless error page until memory ends.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::time::Duration;
+
+use futures_util::StreamExt;
+use object_store::client::{
+    ClientConfigKey as Key, HttpClient, HttpConnector, HttpError, HttpErrorKind, HttpRequest,
+    HttpResponse, HttpResponseBody, HttpService,
+};
+use object_store::{ClientOptions, Error};
+use reqwest::header::LOCATION;
+use reqwest::redirect::Policy;
+use reqwest::tls::Certificate;
+use reqwest::{Client, NoProxy, Proxy, Url};
+
+use super::redirects::{self, RedirectError};
+
+/// Bytes that are read of an answer that is no file; some hundred of them are shown.
+const MAX_ERROR_BYTES: usize = 1 << 16;
+/// Redirects that are followed one after the other, at most.
+const MAX_REDIRECTS: usize = 10;
+
+/// Makes clients for servers.
+#[derive(Debug, Default)]
+pub(super) struct Connector;
+
+impl HttpConnector for Connector {
+    fn connect(&self, options: &ClientOptions) -> object_store::Result<HttpClient> {
+        let client = client(options).map_err(|error| Error::Generic {
+            store: "HTTP client",
+            source: Box::new(error),
+        })?;
+        Ok(HttpClient::new(Requests(HttpClient::new(client))))
+    }
+}
+
+/// A client that follows no redirects by itself: it would send keys and a `Referer` along.
+fn client(options: &ClientOptions) -> reqwest::Result<Client> {
+    let value = |key: Key| options.get_config_value(&key);
+    let is_on = |key: Key| value(key).is_some_and(|text| text.parse() == Ok(true));
+    // All are stated in whole seconds (`servers`), or are the library's own second.
+    let seconds = |key: Key| {
+        let text = value(key)?;
+        let digits = text.split(|c: char| !c.is_ascii_digit()).next()?;
+        digits.parse().ok().map(Duration::from_secs)
+    };
+    let mut builder = Client::builder()
+        .user_agent(concat!(
+            env!("CARGO_PKG_NAME"),
+            "/",
+            env!("CARGO_PKG_VERSION")
+        ))
+        .redirect(Policy::none())
+        .referer(false)
+        .http1_only()
+        .https_only(!is_on(Key::AllowHttp))
+        .tls_danger_accept_invalid_certs(is_on(Key::AllowInvalidCertificates));
+    if let Some(headers) = options.get_default_headers() {
+        builder = builder.default_headers(headers.clone());
+    }
+    if let Some(timeout) = seconds(Key::Timeout) {
+        builder = builder.timeout(timeout);
+    }
+    if let Some(timeout) = seconds(Key::ReadTimeout) {
+        builder = builder.read_timeout(timeout);
+    }
+    if let Some(timeout) = seconds(Key::ConnectTimeout) {
+        builder = builder.connect_timeout(timeout);
+    }
+    if let Some(proxy) = value(Key::ProxyUrl) {
+        let excluded = value(Key::ProxyExcludes).and_then(|hosts| NoProxy::from_string(&hosts));
+        builder = builder.proxy(Proxy::all(proxy)?.no_proxy(excluded));
+        if let Some(certificate) = value(Key::ProxyCaCertificate) {
+            let certificate = Certificate::from_pem(certificate.as_bytes())?;
+            builder = builder.tls_certs_merge([certificate]);
+        }
+    }
+    builder.build()
+}
+
+/// Makes requests as the module says.
+#[derive(Debug)]
+struct Requests(HttpClient);
+
+impl HttpService for Requests {
+    fn call<'s, 'f>(
+        &'s self,
+        request: HttpRequest,
+    ) -> Pin<Box<dyn Future<Output = Result<HttpResponse, HttpError>> + Send + 'f>>
+    where
+        's: 'f,
+        Self: 'f,
+    {
+        Box::pin(async move {
+            let response = self.followed(request).await?;
+            Ok(match response.status().is_success() {
+                true => response,
+                false => cut(response).await,
+            })
+        })
+    }
+}
+
+impl Requests {
+    /// The answer at the end of all redirects.
+    async fn followed(&self, mut request: HttpRequest) -> Result<HttpResponse, HttpError> {
+        for _ in 0..=MAX_REDIRECTS {
+            let response = self.0.execute(request.clone()).await?;
+            let location = response.headers().get(LOCATION);
+            let (true, Some(location)) = (response.status().is_redirection(), location) else {
+                return Ok(response);
+            };
+            // What is sent goes nowhere else.
+            if !request.method().is_safe() {
+                return Ok(response);
+            }
+            let location = String::from_utf8_lossy(location.as_bytes());
+            let to = next(&request, &location).map_err(refused)?;
+            let uri = to.as_str().parse();
+            *request.uri_mut() = uri.map_err(|_| refused(RedirectError::NoUrl))?;
+        }
+        Err(refused(RedirectError::TooMany))
+    }
+}
+
+/// Where a request goes on to.
+fn next(request: &HttpRequest, location: &str) -> Result<Url, RedirectError> {
+    let from = Url::parse(&request.uri().to_string()).map_err(|_| RedirectError::NoUrl)?;
+    let has_key = redirects::has_key(&from, request.headers());
+    redirects::followed(&from, location, has_key)
+}
+
+fn refused(why: RedirectError) -> HttpError {
+    // Of this kind no request is made again.
+    HttpError::new(HttpErrorKind::Unknown, why)
+}
+
+/// The same answer, and [`MAX_ERROR_BYTES`] of it at most. An answer that breaks off is the
+/// part that came.
+async fn cut(response: HttpResponse) -> HttpResponse {
+    let (parts, body) = response.into_parts();
+    let mut stream = body.bytes_stream();
+    let mut bytes = Vec::new();
+    while bytes.len() < MAX_ERROR_BYTES
+        && let Some(Ok(part)) = stream.next().await
+    {
+        let room = MAX_ERROR_BYTES - bytes.len();
+        bytes.extend_from_slice(part.get(..room).unwrap_or(&part));
+    }
+    HttpResponse::from_parts(parts, HttpResponseBody::from(bytes))
+}

@@ -1,0 +1,103 @@
+//! What may take long shows that it goes on: on a terminal a line at the bottom, else a line every
+//! few seconds.
+
+use std::io::{IsTerminal, stderr};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use indicatif::ProgressBar;
+
+use heightfield::Raster;
+
+/// Before the first line where there is no terminal, and between two of them.
+const FIRST: Duration = Duration::from_secs(1);
+const BETWEEN: Duration = Duration::from_secs(3);
+/// Between two changes of the line on a terminal.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Does `work`, and shows meanwhile what `line` says of it. For what is done before a device is
+/// served.
+pub(in crate::cli) fn shown_meanwhile<T>(
+    line: impl Fn() -> String + Sync,
+    work: impl FnOnce() -> T,
+) -> T {
+    std::thread::scope(|scope| {
+        // It is closed also where the work panics.
+        let (_working, ended) = channel::<()>();
+        let line = &line;
+        scope.spawn(move || {
+            let goes_on = |time| ended.recv_timeout(time) == Err(RecvTimeoutError::Timeout);
+            match stderr().is_terminal() {
+                true => at_bottom(line, goes_on),
+                false => in_lines(line, goes_on, |line| eprintln!("{line}")),
+            }
+        });
+        work()
+    })
+}
+
+/// The same of work that reads an open terrain.
+pub(in crate::cli) fn shown_reading<T>(name: &str, raster: &Raster, work: impl FnOnce() -> T) -> T {
+    let line = || match raster.blocks() {
+        0 => format!("reading {name}"),
+        all => format!("reading {name}: {} of {all} blocks", raster.blocks_read()),
+    };
+    shown_meanwhile(line, work)
+}
+
+fn at_bottom(line: impl Fn() -> String, goes_on: impl Fn(Duration) -> bool) {
+    let bar = ProgressBar::new_spinner();
+    while goes_on(LOOK) {
+        bar.set_message(line());
+        bar.tick();
+    }
+    bar.finish_and_clear();
+}
+
+/// `goes_on` waits for so long, and tells whether the work goes on.
+fn in_lines(
+    line: impl Fn() -> String,
+    goes_on: impl Fn(Duration) -> bool,
+    mut say: impl FnMut(String),
+) {
+    let mut time = FIRST;
+    let mut all = Duration::ZERO;
+    while goes_on(time) {
+        all += time;
+        say(format!("{} ({} s)", line(), all.as_secs()));
+        time = BETWEEN;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[test]
+    fn lines_are_said_from_the_first_second_until_the_work_ends() {
+        let (blocks, waits) = (Cell::new(0), Cell::new(0));
+        let goes_on = |time| {
+            assert_eq!(time, if waits.get() == 0 { FIRST } else { BETWEEN });
+            waits.set(waits.get() + 1);
+            blocks.set(blocks.get() + 10);
+            waits.get() < 4
+        };
+        let mut said = vec![];
+        in_lines(
+            || format!("{} of 40", blocks.get()),
+            goes_on,
+            |line| said.push(line),
+        );
+        assert_eq!(said, ["10 of 40 (1 s)", "20 of 40 (4 s)", "30 of 40 (7 s)"]);
+        in_lines(String::new, |_| false, |line| panic!("{line}"));
+    }
+
+    #[test]
+    fn work_that_ends_ends_the_waiting() {
+        assert_eq!(shown_meanwhile(String::new, || 7), 7);
+        let panics = || shown_meanwhile(String::new, || panic!("of the work"));
+        assert!(std::panic::catch_unwind(panics).is_err());
+    }
+}

@@ -1,0 +1,59 @@
+//! Arbitrary bytes as the other files that the command reads: recordings, calibrations, tables of
+//! materials, logs of a first power-up, commands.
+
+use std::fs;
+use std::path::Path;
+
+use hapterra::bringup::Log;
+use hapterra::calibrate;
+use hapterra::materials::table::TableFile;
+use hapterra::replay::{FeltRows, RecordedColumns, Trajectory};
+use hapterra::steering::command;
+
+/// Number of kinds.
+pub const KINDS: u8 = 5;
+
+/// Rows of a recording that are read, at most.
+const MAX_ROWS: usize = 10_000;
+
+/// The first byte chooses the kind of file, the others are its content.
+pub fn run(data: &[u8]) {
+    let (kind, content) = data.split_first().unwrap_or((&0, data));
+    if kind % KINDS == 4 {
+        let lines = String::from_utf8_lossy(content);
+        lines.lines().for_each(read_command);
+        return;
+    }
+    let file = tempfile::NamedTempFile::new().expect("a file");
+    fs::write(file.path(), content).expect("written");
+    let path = file.path();
+    match kind % KINDS {
+        0 => read_recording(path),
+        1 => check(calibrate::file::read(path)),
+        2 => check(TableFile::open(path)),
+        _ => check(Log::read(path)),
+    }
+}
+
+/// What is read, or why not, can be said.
+fn check<T: std::fmt::Debug, E: std::error::Error>(read: Result<T, E>) {
+    let told = read.map_or_else(|error| error.to_string(), |read| format!("{read:?}"));
+    assert!(!told.is_empty());
+}
+
+fn read_command(line: &str) {
+    check(command::parse(line));
+}
+
+/// As `replay`, the viewer and Python read it.
+fn read_recording(path: &Path) {
+    if let Ok(rows) = Trajectory::open(path) {
+        rows.take(MAX_ROWS).for_each(check);
+    }
+    if let Ok(rows) = FeltRows::open(path) {
+        rows.take(MAX_ROWS).for_each(check);
+    }
+    if let Err(error) = RecordedColumns::read(path) {
+        assert!(!error.to_string().is_empty());
+    }
+}
