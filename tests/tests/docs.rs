@@ -25,10 +25,10 @@ fn pages_in(folder: &Path) -> Vec<(PathBuf, String)> {
     pages.collect()
 }
 
-/// Returns the pages of the book, the README and the change log.
-fn pages() -> Vec<(PathBuf, String)> {
+/// Returns the pages of the book and those of the root folder that are named.
+fn pages_and(root: &[&str]) -> Vec<(PathBuf, String)> {
     let mut pages = pages_in(&repository().join("docs"));
-    pages.extend(["README.md", "CHANGELOG.md"].map(|page| {
+    pages.extend(root.iter().map(|page| {
         let path = repository().join(page);
         let text = std::fs::read_to_string(&path).expect("readable");
         (path, text)
@@ -39,7 +39,7 @@ fn pages() -> Vec<(PathBuf, String)> {
 #[test]
 fn figures_on_the_pages_are_those_of_the_tables() {
     let mut stale = Vec::new();
-    for (page, text) in pages() {
+    for (page, text) in pages_and(&["README.md", "CHANGELOG.md"]) {
         let (figures, wrong) = check(&text, repository());
         println!("{}: {figures} figures from tables", page.display());
         stale.extend(wrong.iter().map(|why| format!("{}: {why}", page.display())));
@@ -55,20 +55,29 @@ fn prose(text: &str) -> String {
 /// Returns the anchor that a heading gets: letters and digits in lower case, hyphens for spaces.
 fn anchor(heading: &str) -> String {
     let heading = heading.trim_start_matches('#').trim().to_lowercase();
-    let kept = heading.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    let kept = heading
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
 /// Returns a sentence for each link of a page to a file or a heading that does not exist.
 fn dead_links(page: &Path, text: &str) -> Vec<String> {
     let text = prose(text);
-    let links = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    let links = text
+        .split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next());
     let is_local = |link: &&str| !link.contains("://") && !link.starts_with("mailto:");
     let mut dead = Vec::new();
     for link in links.filter(is_local) {
         let (file, wanted) = link.split_once('#').unwrap_or((link, ""));
         let folder = page.parent().expect("a folder");
-        let target = if file.is_empty() { page.to_owned() } else { folder.join(file) };
+        let target = if file.is_empty() {
+            page.to_owned()
+        } else {
+            folder.join(file)
+        };
         if !target.exists() {
             dead.push(format!("{}: {link}: no such file", page.display()));
         } else if !wanted.is_empty() {
@@ -86,7 +95,7 @@ fn dead_links(page: &Path, text: &str) -> Vec<String> {
 
 #[test]
 fn links_of_the_pages_lead_somewhere() {
-    let pages = pages();
+    let pages = pages_and(&["README.md"]);
     let dead: Vec<_> = pages
         .iter()
         .flat_map(|(page, text)| dead_links(page, text))
@@ -121,7 +130,7 @@ fn lines_of_the_book_are_short() {
     assert!(long.is_empty(), "{}", long.join("\n"));
 }
 
-/// What the check says about a page beside this table.
+/// Checks a page beside this table.
 fn told(page: &str) -> (usize, Vec<String>) {
     const TABLE: &str = "state,median,share\nsliding,1218,0.04567\n\"chain, free\",1144,2.04e-6\n\
                          twice,1,1\ntwice,2,2\nempty,,1\n";

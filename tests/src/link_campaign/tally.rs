@@ -91,7 +91,8 @@ impl Tally {
         let runs = self.rows.table(heading, &Kind::ALL, |row| {
             format!("{} | {} | {}", row.runs, row.agreed, row.killed)
         });
-        let mut reports = "\n| fault | runs | reported to the user |\n| --- | ---: | --- |\n".to_owned();
+        let mut reports =
+            "\n| fault | runs | reported to the user |\n| --- | ---: | --- |\n".to_owned();
         for kind in Kind::ALL {
             let told = self.rows.get(kind).into_iter().flat_map(|row| &row.told);
             reports.extend(told.map(|(words, runs)| format!("| {kind:?} | {runs} | {words} |\n")));
