@@ -171,7 +171,7 @@ fn cells_of_a_table_are_compared() {
     assert_eq!(told(&table(right)), (3, vec![]));
     let (count, wrong) = told(&table("| sliding | 1,217 | 0.05 |\n| free | 1144 | 2e-6 |"));
     assert_eq!((count, wrong.len()), (4, 1), "{wrong:?}");
-    assert!(wrong[0].contains("the page says 1217"), "{wrong:?}");
+    assert!(wrong[0].contains("the page says 1,217"), "{wrong:?}");
     let (_, wrong) = told(&table("| sliding | 1,218 | 0.05 |"));
     assert!(wrong[0].contains("2 rows are named, 1 shown"), "{wrong:?}");
     let (_, wrong) = told(&table("| sliding | 1,218 |\n| free | 1144 | |"));
