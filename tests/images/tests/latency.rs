@@ -1,5 +1,5 @@
 //! What the haptic interrupt takes in the boards' own images, by the model of cycles
-//! (docs/cycles.md), and what the page, the build and the images make of it.
+//! (docs/reference/cycles.md), and what the page, the build and the images make of it.
 
 #[path = "../../../firmware/build/tick_rate.rs"]
 #[allow(dead_code)] // Only the table.
@@ -182,7 +182,11 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
     }
     let [g474, h743] = in_time_khz;
     let rates = format!("in time **up to {g474} kHz on a G474 and up to {h743} kHz on an H743**");
-    for page in ["docs/cycles.md", "docs/hardware.md", "docs/underlay.md"] {
+    for page in [
+        "docs/reference/cycles.md",
+        "docs/reference/hardware.md",
+        "docs/explanation/tiles-and-levels.md",
+    ] {
         let text = std::fs::read_to_string(repository().join(page)).expect("the page");
         assert!(text.contains(&rates), "{page}: {rates}");
     }
