@@ -28,7 +28,7 @@ struct Row {
 
 impl Row {
     fn read(board: &str) -> Self {
-        let page = repository().join("docs/hardware.md");
+        let page = repository().join("docs/reference/hardware.md");
         let page = std::fs::read_to_string(page).expect("the page");
         let begin = format!("| `{board}`, interrupt | ");
         let row = page.lines().find(|line| line.starts_with(&begin));
@@ -182,7 +182,11 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
     }
     let [g474, h743] = in_time_khz;
     let rates = format!("in time **up to {g474} kHz on a G474 and up to {h743} kHz on an H743**");
-    for page in ["docs/cycles.md", "docs/hardware.md", "docs/underlay.md"] {
+    for page in [
+        "docs/reference/cycles.md",
+        "docs/reference/hardware.md",
+        "docs/explanation/tiles-and-levels.md",
+    ] {
         let text = std::fs::read_to_string(repository().join(page)).expect("the page");
         assert!(text.contains(&rates), "{page}: {rates}");
     }
