@@ -32,6 +32,11 @@ pub mod timeouts;
 pub mod usb;
 pub mod walk;
 
+/// The program of the Rust tutorial, run.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/tutorials/kernel-in-rust.md")]
+struct KernelTutorial;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
