@@ -32,14 +32,14 @@ pub mod timeouts;
 pub mod usb;
 pub mod walk;
 
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
 /// The program of the Rust tutorial, run.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/tutorials/kernel-in-rust.md")]
 struct KernelTutorial;
-
-use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::sync::OnceLock;
 
 /// The repository's root folder.
 pub fn repository() -> &'static Path {
