@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use hapterra::raster::Raster;
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid};
+use heightfield::Raster;
 
 /// Most samples along a side; a larger field is cut to its middle.
 pub const LARGEST_SIDE: u32 = 4097;

@@ -7,12 +7,12 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueHint};
 use hapterra::cli::Failure;
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_bench::compare::{Effort, Row, compare};
 use hapterra_bench::effects::Measured;
 use hapterra_bench::grid::Grid;
 use hapterra_bench::streaming::{self, Plan};
 use hapterra_bench::{continuity, effects, report, solver, state};
+use heightfield::{OpenOptions, Raster};
 use indicatif::ProgressBar;
 
 /// Measure the contact beside other ways to render a height field: time for a

@@ -3,9 +3,7 @@
 //!
 //! Read top to bottom, the modules follow the data:
 //!
-//! - [`raster`]: files of every supported format become one [`raster::Raster`];
-//! - `remote`: files at URLs, of which what is touched is fetched;
-//! - [`disk_cache`]: what was worked out before, in a folder that may be deleted;
+//! - [`heightfield`], a crate of its own: terrain files become one [`heightfield::Raster`];
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
 //! - [`materials`]: classes of ground over a terrain, and what they feel like;
@@ -41,7 +39,6 @@ pub mod board;
 pub mod bringup;
 pub mod calibrate;
 pub mod cli;
-pub mod disk_cache;
 pub mod events;
 pub mod link;
 pub mod materials;
@@ -50,8 +47,6 @@ pub mod phantom;
 pub mod picture;
 pub mod place;
 pub mod published;
-pub mod raster;
-mod remote;
 pub mod replay;
 pub mod serving;
 pub mod stability;

@@ -9,7 +9,7 @@ use hapterra::cli::Failure;
 use hapterra::cli::options::exaggeration::Exaggeration;
 use hapterra::cli::options::terrain_file::{ReadingOptions, assumed_unit};
 use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, View, ViewOptions};
-use hapterra::raster::{BadRaster, Error, Raster};
+use heightfield::{BadRaster, Error, Raster};
 use hapterra::terrain::{FeltCells, INTERPOLATED_STEP, Terrain as Laid};
 use hapterra_core::phantom::Calibration;
 use hapterra_touch::{Block, Heights, Terrain as Touched, Unread};

@@ -2,12 +2,12 @@
 //! docs/tip.csv`. Radii from half a cell to 8 cells, over a city of walls or made ground, against the
 //! tiles that a link of 1,000 kB/s carries in a second (docs/streaming.md).
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::message::Heights;
 use hapterra_tests::shared;
+use heightfield::{OpenOptions, Raster};
 
 /// Tiles that the link carries in a second.
 const LINK: f64 = 463.0;

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use hapterra::raster::{Error, OpenOptions, Raster, gdal};
+use heightfield::{Error, OpenOptions, Raster, gdal};
 
 /// A reader of terrain files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Files of real ground that several tests slide over.
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
+use heightfield::{OpenOptions, Raster};
 
 use crate::shared;
 

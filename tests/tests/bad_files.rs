@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use hapterra::raster::{BadRaster, OpenOptions, Raster};
 use hapterra_tests::timeouts::end_of;
 use hapterra_tests::{hapterra_binary, shared};
+use heightfield::{BadRaster, OpenOptions, Raster};
 
 /// Address space a child may use. The program itself takes some 100 MB of it.
 const MEMORY_KIB: u64 = 1 << 20;

@@ -6,7 +6,6 @@ use std::time::Duration;
 use hapterra::link::{Arming, Event, Native, Patience, Session};
 use hapterra::phantom::PlacedTerrain;
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
-use hapterra::raster::Raster;
 use hapterra::replay::Record;
 use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Figures;
@@ -15,6 +14,7 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_firmware::native::StoppedClock;
+use heightfield::Raster;
 
 /// Runs a device until a tick; every sample it reported.
 fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec<Sample> {

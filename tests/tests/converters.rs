@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_tests::hapterra_binary;
+use heightfield::{OpenOptions, Raster};
 
 fn has_gdal() -> bool {
     let runs = Command::new("gdal_translate").arg("--version").output();

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use hapterra::disk_cache::DiskCache;
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::timeouts::{set_age, set_just_changed};
+use heightfield::disk_cache::DiskCache;
+use heightfield::{OpenOptions, Raster};
 
 /// A level whose samples lie in many blocks.
 const LEVEL: u8 = 6;

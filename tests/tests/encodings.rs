@@ -4,8 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hapterra::raster::{BadRaster, OpenOptions, Raster};
 use hapterra_tests::readers::Reader;
+use heightfield::{BadRaster, OpenOptions, Raster};
 
 const HOLE: (u32, u32) = (3, 4);
 

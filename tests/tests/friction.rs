@@ -1,6 +1,5 @@
 //! Friction as a user meets it: real ground, an arm's encoders, the command.
 
-use hapterra::raster::Raster;
 use hapterra::replay::on_native;
 use hapterra::terrain::Terrain;
 use hapterra_core::contact::{Contact, ContactSettings, ContactState, Friction};
@@ -12,6 +11,7 @@ use hapterra_tests::chance::Chance;
 use hapterra_tests::field::{point, position};
 use hapterra_tests::invariants::surface::distance;
 use hapterra_tests::real_ground::{self, terrain};
+use heightfield::Raster;
 
 fn law(friction: Friction) -> ForceLaw {
     ForceLaw {

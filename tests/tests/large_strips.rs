@@ -1,14 +1,14 @@
 //! TIFFs whose samples are all in one strip, larger than the memory of a terrain, or in millions of
 //! tiles.
 
-use std::fs::OpenOptions;
+use std::fs;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
-use hapterra::disk_cache::DiskCache;
-use hapterra::raster::{self, Raster};
 use hapterra_tests::bounded::{self, zstd_bomb};
 use hapterra_tests::tiffs::{DATA, Directory, Values, floats_in_a_strip, placed, tiff};
+use heightfield::disk_cache::DiskCache;
+use heightfield::{OpenOptions, Raster};
 
 /// Samples each way: 4.1 GB of single floats.
 const SIDE: u32 = 32_000;
@@ -30,7 +30,10 @@ fn file() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("strip.tif");
     std::fs::write(&path, tiff(&[], &[image])).expect("written");
-    let mut file = OpenOptions::new().write(true).open(&path).expect("there");
+    let mut file = fs::OpenOptions::new()
+        .write(true)
+        .open(&path)
+        .expect("there");
     for row in (0..SIDE).step_by(EVERY as usize) {
         let at = u64::from(FIRST) + u64::from(row) * u64::from(SIDE) * 4;
         let heights = (0..3000).flat_map(|column| height(column, row).to_le_bytes());
@@ -87,7 +90,10 @@ fn masked(compression: u32, mask: &[u8]) -> (tempfile::TempDir, PathBuf) {
     let images = [image(0, 1, 1, tiles), image(4, compression, 4, strip)];
     std::fs::write(&path, tiff(&data, &images)).expect("written");
     // All tiles are the same one; the file is as long as if they were not.
-    let file = OpenOptions::new().write(true).open(&path).expect("there");
+    let file = fs::OpenOptions::new()
+        .write(true)
+        .open(&path)
+        .expect("there");
     let length = file.metadata().expect("told").len();
     file.set_len(length.max(u64::from(MASKED * MASKED)))
         .expect("a sparse file");
@@ -95,11 +101,11 @@ fn masked(compression: u32, mask: &[u8]) -> (tempfile::TempDir, PathBuf) {
 }
 
 /// Options with which all stays in the file, and what may be unpacked is in a folder.
-fn in_file(disk: DiskCache) -> raster::OpenOptions {
-    raster::OpenOptions {
+fn in_file(disk: DiskCache) -> OpenOptions {
+    OpenOptions {
         most_in_memory_bytes: 0,
         disk_cache: disk,
-        ..raster::OpenOptions::default()
+        ..OpenOptions::default()
     }
 }
 
@@ -229,9 +235,9 @@ fn of_an_overview_that_ends_early_the_rows_that_are_there_are_felt() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("cut.tif");
     std::fs::write(&path, bytes).expect("written");
-    let options = raster::OpenOptions {
+    let options = OpenOptions {
         most_in_memory_bytes: 0,
-        ..raster::OpenOptions::default()
+        ..OpenOptions::default()
     };
     let raster = Raster::open(&path, &options).expect("all of the full image is there");
     assert_eq!([raster.height(0, 0), raster.height(3999, 3999)], [7.0; 2]);
@@ -247,7 +253,7 @@ fn a_strip_of_4_gb_is_felt_in_the_memory_of_a_terrain() {
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
     assert!(!told.contains("whole"), "{told}");
-    let raster = Raster::open(&path, &raster::OpenOptions::default()).expect("opens");
+    let raster = Raster::open(&path, &OpenOptions::default()).expect("opens");
     for row in [0, EVERY, EVERY + 1, 17 * EVERY, 31_904, SIDE - 1] {
         for column in [0, 1, 2999, 3000, SIDE - 1] {
             let found = raster.height(column, SIDE - 1 - row);
@@ -264,7 +270,10 @@ fn a_file_of_nothing_is_looked_through_and_it_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("nothing.tif");
     std::fs::write(&path, tiff(&[], &[image])).expect("written");
-    let file = OpenOptions::new().write(true).open(&path).expect("there");
+    let file = fs::OpenOptions::new()
+        .write(true)
+        .open(&path)
+        .expect("there");
     file.set_len(u64::from(FIRST) + u64::from(WIDE * WIDE) * 4)
         .expect("a sparse file");
     let output = bounded::info(&path, &["--no-data", "0"]);
@@ -306,7 +315,10 @@ fn four_million_tiles_are_felt_in_the_memory_of_a_terrain() {
     let info = |images: &[Directory]| {
         std::fs::write(&path, tiff(&data, images)).expect("written");
         // All tiles are the same one; the file is as long as if they were not.
-        let file = OpenOptions::new().write(true).open(&path).expect("there");
+        let file = fs::OpenOptions::new()
+            .write(true)
+            .open(&path)
+            .expect("there");
         file.set_len(u64::from(ACROSS * TILE).pow(2))
             .expect("a sparse file");
         let output = bounded::info_without_gdal(&path, &[]);

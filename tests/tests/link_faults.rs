@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use hapterra::link::{Arming, Event, LinkError, Native, Patience, Session, Transport};
 use hapterra::phantom::PlacedTerrain;
-use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
@@ -26,6 +25,7 @@ use hapterra_firmware::native::StoppedClock;
 use hapterra_tests::faulty::{Fault, Faulty, Shared};
 use hapterra_tests::timeouts::HANG;
 use hapterra_tests::walk::wander;
+use heightfield::Raster;
 
 /// A device in memory answers at once: what has not come in a moment is lost.
 const AT_ONCE: Patience = Patience {

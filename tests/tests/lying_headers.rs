@@ -5,9 +5,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_tests::bounded::{self, zstd_bomb};
 use hapterra_tests::tiffs::{DATA, Directory, Values, placed, tiff};
+use heightfield::{OpenOptions, Raster};
 
 /// Samples of the full image and of a tile each way, and bytes of a tile of single floats.
 const SIDE: u32 = 256;

@@ -7,7 +7,6 @@ use std::process::Command;
 use hapterra::link::{Emulator, Patience};
 use hapterra::materials::table::TableFile;
 use hapterra::materials::{ClassMaterial, Looks, Materials};
-use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
@@ -16,6 +15,7 @@ use hapterra_core::force::{ForceLaw, Material, Pattern, Shading, Texture};
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::walk::wander;
+use heightfield::Raster;
 
 const UTM_32: &str = r#"PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#;
 const LONLAT: &str = r#"GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]]"#;

@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use hapterra::raster::{OpenOptions, Raster, files_read_with};
 use hapterra_tests::hapterra_binary;
+use heightfield::{OpenOptions, Raster, files_read_with};
 
 fn has_gdal() -> bool {
     let runs = Command::new("gdalbuildvrt").arg("--version").output();

@@ -6,7 +6,6 @@ use std::process::Command;
 use std::time::Duration;
 
 use hapterra::link::{Emulator, Patience};
-use hapterra::raster::Raster;
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
@@ -17,6 +16,7 @@ use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::timeouts::pass;
 use hapterra_tests::walk::wander;
+use heightfield::Raster;
 
 /// What has to be the same: all but the work and the time it took, which
 /// depend on when a tile came.

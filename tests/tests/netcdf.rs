@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use hapterra::raster::{BadRaster, OpenOptions, Raster};
 use hapterra_tests::bounded::{self, zstd_bomb};
+use heightfield::{BadRaster, OpenOptions, Raster};
 
 const SIZE: (u32, u32) = (90, 70);
 const HOLE: (u32, u32) = (3, 4);

@@ -7,10 +7,10 @@ use std::path::Path;
 use std::process::Command;
 
 use hapterra::place::{Coordinates, Target};
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid};
 use hapterra_tests::readers::Reader;
 use hapterra_tests::{hapterra_binary, info};
+use heightfield::{OpenOptions, Raster};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/odd_places");
 /// Metres in a degree of latitude, for what a shift may be off.

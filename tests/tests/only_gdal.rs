@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hapterra::raster::{BadRaster, OpenOptions, Raster, gdal};
+use heightfield::{BadRaster, OpenOptions, Raster, gdal};
 
 /// Whether there is a libgdal; says so where not.
 fn has_gdal() -> bool {
@@ -18,7 +18,7 @@ fn file(name: &str) -> PathBuf {
         .join(name)
 }
 
-fn open(name: &str, band: Option<u32>) -> Result<Raster, hapterra::raster::Error> {
+fn open(name: &str, band: Option<u32>) -> Result<Raster, heightfield::Error> {
     let options = OpenOptions {
         band,
         ..OpenOptions::default()

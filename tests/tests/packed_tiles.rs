@@ -4,13 +4,13 @@
 
 use std::path::Path;
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::{POSTS, TILE_CELLS, Tile, TileKey};
 use hapterra_core::wire::message::{Heights, TileMessage};
 use hapterra_firmware::link::fill_tile;
 use hapterra_tests::shared;
+use heightfield::{OpenOptions, Raster};
 
 /// Bytes of a tile's samples as floats.
 const FLOATS: usize = 4 * POSTS * POSTS;

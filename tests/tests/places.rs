@@ -4,9 +4,9 @@
 //! `data/places_by_gdal.csv` was made once by `data/places_by_gdal.py`, which names
 //! its command.
 
-use hapterra::raster::{Bounds, OpenOptions, Raster};
 use hapterra_tests::readers::Reader;
 use hapterra_tests::{info, shared};
+use heightfield::{Bounds, OpenOptions, Raster};
 
 const TABLE: &str = include_str!("../data/places_by_gdal.csv");
 /// Metres or degrees: the table has bounds in full, degrees to 9 digits.

@@ -5,11 +5,11 @@
 
 use std::path::{Path, PathBuf};
 
-use hapterra::raster::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::readers::Reader;
 use hapterra_tests::shared;
+use heightfield::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster};
 
 const COLUMNS: usize = 512;
 const ROWS: usize = 400;
@@ -129,7 +129,7 @@ fn raw_samples_decode_with_a_stated_layout() {
     let Some(folder) = shared("dem/variants") else {
         return;
     };
-    use hapterra::raster::{Endian, RawLayout, SampleType};
+    use heightfield::{Endian, RawLayout, SampleType};
     let open_raw = |sample, columns, name: &str, no_data| {
         let options = OpenOptions {
             raw: Some(RawLayout {

@@ -1,7 +1,6 @@
 //! What a replay feels, against a dense search in `f64` that shares no code
 //! with the loop.
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::{Replayer, Rule, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
@@ -11,6 +10,7 @@ use hapterra_core::scene::Sample;
 use hapterra_tests::oracle::Oracle;
 use hapterra_tests::shared;
 use hapterra_tests::walk::wander;
+use heightfield::{OpenOptions, Raster};
 
 /// Distance of the proxy from the surface, cells: a few roundings of a height
 /// that is stored relative to its tile.

@@ -32,6 +32,7 @@ fn safety_table_names_tests_that_exist() {
     let mut source = String::new();
     for folder in [
         "core/src",
+        "heightfield/src",
         "firmware/src",
         "host-tools/src",
         "host-tools/tests",

@@ -1,7 +1,6 @@
 //! Random walks judged a second time: by a list of all places a proxy may rest
 //! (`hapterra_tests::minima`), and by looking densely at the HIP paths.
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid};
 use hapterra_core::contact::ContactState;
 use hapterra_tests::chance::Chance;
@@ -15,6 +14,7 @@ use hapterra_tests::scene::run::{Execution, Scene};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 use hapterra_tests::shared;
+use heightfield::{OpenOptions, Raster};
 
 /// What the second opinion found in a scene.
 #[derive(Debug, Default)]

@@ -4,9 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_tests::tiffs::{DATA, floats_in_a_strip, placed, tiff};
 use hapterra_tests::{bounded, hapterra_binary};
+use heightfield::{OpenOptions, Raster};
 use serde_json::{Value, json};
 
 /// Samples of a tile each way, and the side of a cell, metres.

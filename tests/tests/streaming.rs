@@ -1,11 +1,11 @@
 //! A terrain far larger than the device: it holds its window, the host holds
 //! the raster once.
 
-use hapterra::raster::Raster;
 use hapterra::replay::on_native;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
+use heightfield::Raster;
 
 const SIDE: u32 = 4096;
 

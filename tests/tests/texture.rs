@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::process::Command;
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::on_native;
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
@@ -14,6 +13,7 @@ use hapterra_tests::field::position;
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::invariants::seen::Seen;
 use hapterra_tests::invariants::texture::TextureJudge;
+use heightfield::{OpenOptions, Raster};
 
 /// HIPs of a way, and from one to the next, mm.
 const STEPS: u32 = 4_000;

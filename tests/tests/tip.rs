@@ -3,7 +3,6 @@
 
 use std::process::Command;
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::{Replayer, on_native};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 use hapterra_core::Vec3;
@@ -12,6 +11,7 @@ use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
 use hapterra_tests::walk::wander;
 use hapterra_tests::{hapterra_binary, shared};
+use heightfield::{OpenOptions, Raster};
 
 /// Distance of a place from the bilinear surface of samples, all in cells: over fine lines of
 /// each patch that is near enough, along each of which the nearest point is known.

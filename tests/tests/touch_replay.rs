@@ -1,7 +1,6 @@
 //! Forces of the library for arrays against `replay` on a file of the same heights: the same bits.
 
 use hapterra::materials::{ClassMaterial, Looks, Materials};
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::{on_native_at, state_name};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 use hapterra_core::rate::TickRate;
@@ -11,6 +10,7 @@ use hapterra_touch::{
     Contact, Damping, ForceLaw, Friction, Material, Pattern, RowOrder, Shading, State, Surface,
     Texture,
 };
+use heightfield::{OpenOptions, Raster};
 
 const COLUMNS: u32 = 130;
 const ROWS: u32 = 97;

@@ -10,7 +10,6 @@ use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script,
 use hapterra::place::{
     Bounds, Coordinates, Laid, Reach, Sizing, SurfaceChange, Target, View, ViewChange, ViewOptions,
 };
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::steering::{Steer, Steering};
 use hapterra::terrain::FeltCells;
 use hapterra_core::Vec3;
@@ -20,6 +19,7 @@ use hapterra_core::guard::{Limits, MAX_SLEW_N_PER_S, Mode};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Sample;
 use hapterra_firmware::native::StoppedClock;
+use heightfield::{OpenOptions, Raster};
 
 /// Samples along a side.
 const SIZE: u32 = 4097;

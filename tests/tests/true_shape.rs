@@ -3,11 +3,11 @@
 
 use std::path::PathBuf;
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::replay::on_native;
 use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
+use heightfield::{OpenOptions, Raster};
 
 /// Samples along a side, and degrees between them.
 const SIDE: u32 = 80;

@@ -9,7 +9,6 @@ use hapterra::link::{
 };
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::place::Reach;
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
@@ -22,6 +21,7 @@ use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::shared;
 use hapterra_tests::slow_line::{InMemory, OnBoard, SlowLine, Stepped};
 use hapterra_tests::timeouts::HANG;
+use heightfield::{OpenOptions, Raster};
 
 /// Millimetres of the hand a cell: 2,000 cells a second are 200 mm/s.
 const CELL_MM: f64 = 0.1;

@@ -6,7 +6,6 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Bulk, BulkEndpoints, Event, Patience, Session, is_hapterra};
-use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Source;
@@ -21,6 +20,7 @@ use hapterra_tests::usb::host::{
     fetch_packet, send_packet, string,
 };
 use hapterra_tests::usb::{Answer, Port};
+use heightfield::Raster;
 use nusb::descriptors::{ConfigurationDescriptor, DeviceDescriptor};
 
 /// The link's endpoint, in both directions.

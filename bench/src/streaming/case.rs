@@ -4,8 +4,8 @@
 use std::path::Path;
 use std::time::Instant;
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
+use heightfield::{OpenOptions, Raster};
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Pace, SentTile, board};

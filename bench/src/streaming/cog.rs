@@ -171,8 +171,8 @@ fn directory(image: &Image, list: u32, is_overview: bool, stored: &Stored, next:
 mod tests {
     use super::*;
     use crate::streaming::relief::PERIOD;
-    use hapterra::raster::{OpenOptions, Raster};
     use hapterra::terrain::{FeltCells, FeltGrid};
+    use heightfield::{OpenOptions, Raster};
 
     #[test]
     fn every_place_of_a_terrain_has_the_relief_of_the_square_that_repeats() {

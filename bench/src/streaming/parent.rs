@@ -4,7 +4,7 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{ChildStdin, Command, Stdio};
 
-use hapterra::raster::Raster;
+use heightfield::Raster;
 
 use super::case::{Case, terrain};
 use super::meter::{QUESTION, Traffic};

@@ -166,8 +166,8 @@ fn in_the_square([columns, rows]: [u32; 2], long: u32) -> [u32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hapterra::raster::Raster;
     use hapterra::terrain::Scale;
+    use heightfield::Raster;
 
     fn ways(columns: u32, rows: u32, is_made: bool) -> Result<Ways, NotMeasured> {
         let raster = Raster::from_fn(columns, rows, |x, y| x as f32 + 2.0 * y as f32);

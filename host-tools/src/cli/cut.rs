@@ -123,7 +123,7 @@ fn write_npy(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::{OpenOptions, Raster};
+    use heightfield::{OpenOptions, Raster};
 
     #[test]
     fn every_second_sample_is_written_and_read_again() {

@@ -25,13 +25,13 @@ use crate::materials::Materials;
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::{Laid, View};
-use crate::raster::{Raster, files_read_with};
-use crate::remote::without_key;
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{LoopColumns, Mark, Record, Recording, Rule, Settings};
 use crate::stability::limits;
 use crate::synth::{Kind, Synth};
 use crate::telemetry::{FeltViews, SampleLog};
+use heightfield::without_key;
+use heightfield::{Raster, files_read_with};
 
 /// Samples along the side of the terrain that the demo makes itself.
 const OWN_SIZE: u32 = 1024;

@@ -15,9 +15,9 @@ use super::options::placing::off_in_words;
 use super::options::terrain_file::TerrainFile;
 use super::report::put;
 use crate::place::place_in_words;
-use crate::raster::{CellSize, CellUnit, Certainty, ReferenceSystem};
-use crate::remote::without_key;
 use crate::terrain::{Distortion, FeltCells, FeltGrid};
+use heightfield::without_key;
+use heightfield::{CellSize, CellUnit, Certainty, ReferenceSystem};
 use link::LinkFigures;
 use place::{Rectangle, Vertical, from, told};
 

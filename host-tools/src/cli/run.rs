@@ -8,7 +8,7 @@
 //!                      watch ◀───┘
 //! ```
 //!
-//! There is one [`Raster`](crate::raster::Raster), with one reader and one bounded cache, and it
+//! There is one [`Raster`](heightfield::Raster), with one reader and one bounded cache, and it
 //! is lent to all devices. Everything else is a device's own: its calibration, the view of the
 //! terrain in its reach, its session and thread, its arming, its recording. The terrain is laid for all
 //! devices before any is armed, because from then on nobody waits for what is elsewhere.

@@ -207,8 +207,8 @@ pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
     use crate::terrain::{FeltCells, FeltGrid};
+    use heightfield::Raster;
 
     /// A cell of level 3 is eight cells of the file, and as much higher.
     #[test]

@@ -10,10 +10,10 @@ use super::options::terrain_file::TerrainFile;
 use super::terminal::interrupt;
 use super::viewing;
 use crate::output::keep_apart;
-use crate::raster::{Raster, files_read_with};
 use crate::replay::{FeltRows, ReplayError, Settings, terrain_of};
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
+use heightfield::{Raster, files_read_with};
 
 /// Rows between two looks at whether the viewer still reads.
 const LOOK_EVERY: u64 = 10_000;

@@ -7,8 +7,8 @@ use hapterra_core::wire::session::{InSession, SampleCount, SessionEnd};
 use hapterra_core::wire::version::VersionCheck;
 
 use super::*;
-use crate::raster::Raster;
 use crate::terrain::Scale;
+use heightfield::Raster;
 
 /// How a device introduces itself.
 pub(crate) fn hello() -> DeviceHello {

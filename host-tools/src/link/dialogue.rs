@@ -373,7 +373,6 @@ impl Drop for Exchange<'_> {
 mod tests {
     use super::*;
     use crate::link::{Meddler, Native};
-    use crate::raster::Raster;
     use crate::terrain::{Scale, Terrain};
     use crate::timeouts;
     use hapterra_core::force::ForceLaw;
@@ -383,6 +382,7 @@ mod tests {
     use hapterra_core::wire::session::SessionEnd;
     use hapterra_core::wire::version::VersionCheck;
     use hapterra_firmware::native::StoppedClock;
+    use heightfield::Raster;
     use std::cell::Cell;
     use std::io;
     use std::rc::Rc;

@@ -1,6 +1,6 @@
 //! Why classes cannot be laid over a terrain.
 
-use crate::raster::{Raster, Sides, System};
+use heightfield::{Raster, Sides, System};
 
 /// Why classes cannot be laid over a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

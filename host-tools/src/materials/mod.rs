@@ -19,10 +19,10 @@ use hapterra_core::wire::materials::{MOST_TILE_BYTES, TileMaterials};
 use serde::{Deserialize, Serialize};
 use twox_hash::XxHash64;
 
-use crate::raster::{Raster, ReferenceSystem};
-use crate::remote::{is_url, without_key};
 use crate::terrain::{FeltGrid, fingerprint};
 pub use ground::BadGround;
+use heightfield::{Raster, ReferenceSystem};
+use heightfield::{is_url, without_key};
 use pixels::Pixels;
 
 /// Samples of a tile.

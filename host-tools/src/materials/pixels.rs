@@ -1,7 +1,7 @@
 //! The pixel of a raster of classes in which a place of a terrain lies.
 
 use super::ground::{BadGround, place_of};
-use crate::raster::{Georeference, LonLat, Raster};
+use heightfield::{Georeference, LonLat, Raster};
 
 /// Places along each side of a raster that are tried to find whether two overlap.
 const TRIED: u32 = 33;

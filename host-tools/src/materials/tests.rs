@@ -6,8 +6,8 @@ use hapterra_core::scene::Source;
 use hapterra_core::terrain::{Tile, TileKey};
 
 use super::*;
-use crate::raster::{GroundTransform, OpenOptions};
 use crate::terrain::{FeltCells, Scale, Terrain};
+use heightfield::{GroundTransform, OpenOptions};
 
 /// A raster whose south-west sample is at `origin`, in steps of so much, in the system of a code.
 fn raster(

@@ -1,7 +1,7 @@
 use super::*;
 use crate::place::{Heights, Reach, Sizing, Target, ViewOptions};
-use crate::raster::Raster;
 use hapterra_core::phantom::Calibration;
+use heightfield::Raster;
 
 /// 2049 × 2049 samples, 10 m apart, that rise by 1 m each to the east.
 fn raster() -> Raster {

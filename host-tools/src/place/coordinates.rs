@@ -6,6 +6,6 @@ pub enum Coordinates {
     /// x and y of the file's own reference system, or columns and rows where it has none.
     Own,
     /// Longitude and latitude, degrees: of WGS 84, or what else
-    /// [`crate::raster::Georeference::lonlat`] says of the file.
+    /// [`heightfield::Georeference::lonlat`] says of the file.
     LonLat,
 }

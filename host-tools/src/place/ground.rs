@@ -5,8 +5,8 @@ use super::error::PlaceError;
 use super::words::{
     asked_in_words, bounds_in_words, box_in_words, own_box_in_words, system_in_words,
 };
-use crate::raster::{Georeference, Sides, System, around};
 use crate::terrain::FeltGrid;
+use heightfield::{Georeference, Sides, System, around};
 
 /// Points along each side of a box of longitude and latitude: its sides are bent on a map.
 const ALONG: u32 = 24;

@@ -3,8 +3,8 @@
 use super::coordinates::Coordinates;
 use super::error::PlaceError;
 use super::ground;
-use crate::raster::{Georeference, Raster, Sides, around};
 use crate::terrain::{FeltCells, FeltGrid};
+use heightfield::{Georeference, Raster, Sides, around};
 
 /// Which part of a terrain is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

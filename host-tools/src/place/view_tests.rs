@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::place::{Coordinates, ReachBox};
-use crate::raster::{CellSize, CellUnit, Certainty, Globe, GroundTransform, Raster};
 use crate::terrain::FeltCells;
 use hapterra_core::Vec3;
 use hapterra_core::phantom::{Calibration, Pose};
+use heightfield::{CellSize, CellUnit, Certainty, Globe, GroundTransform, Raster};
 
 const LONLAT: Coordinates = Coordinates::LonLat;
 const OWN: Coordinates = Coordinates::Own;

@@ -1,7 +1,7 @@
 //! Places and bounds as they are said to the user.
 
 use super::coordinates::Coordinates;
-use crate::raster::{Georeference, LonLat, Sides, System, around};
+use heightfield::{Georeference, LonLat, Sides, System, around};
 
 /// What a terrain covers, in its own coordinates and, where they are known, in longitude
 /// and latitude.

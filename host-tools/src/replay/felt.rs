@@ -197,9 +197,9 @@ fn nonce() -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
     use crate::replay::on_native;
     use crate::terrain::Scale;
+    use heightfield::Raster;
 
     /// A device takes a view that has the next number, and a tile that has the epoch of the
     /// view: one that comes again is another one, also when the numbers begin again.

@@ -13,8 +13,8 @@ use super::marks::Mark;
 use crate::link::shown;
 use crate::materials::{Looks, Materials};
 use crate::place::Laid;
-use crate::raster::ReferenceSystem;
 use crate::terrain::{BadScale, FeltCells, FeltGrid, Scale, Terrain};
+use heightfield::ReferenceSystem;
 
 /// What the first line of the settings begins with; its value is [`FORMAT`].
 pub const KEY: &str = "hapterra-recording";
@@ -507,7 +507,7 @@ mod tests {
 
     use super::*;
     use crate::place::View;
-    use crate::raster::Raster;
+    use heightfield::Raster;
 
     fn raster(height: f32) -> Raster {
         Raster::from_fn(9, 7, |x, y| height + (x * y) as f32).expect("raster")

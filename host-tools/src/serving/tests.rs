@@ -13,8 +13,8 @@ use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SessionEnd};
 
 use super::{End, Onlooker, Served, Service};
 use crate::link::{Arming, Ask, Dialogue, Event, LinkError, Native, Patience, Tally, Transport};
-use crate::raster::Raster;
 use crate::terrain::{Scale, Terrain};
+use heightfield::Raster;
 
 const fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)

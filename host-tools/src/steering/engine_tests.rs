@@ -3,10 +3,10 @@
 use super::*;
 use crate::link::hello;
 use crate::place::{Reach, Sizing, View as PlacedView, ViewOptions};
-use crate::raster::Raster;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::terrain::TileIndex;
+use heightfield::Raster;
 
 const ZOOM: Steer = Steer::Change(ViewChange::Zoom(2.0));
 

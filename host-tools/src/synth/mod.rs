@@ -12,7 +12,7 @@ pub use room::NoRoom;
 pub use rows::{Grid, Interrupted};
 pub use write::{WriteError, WriteFault, write};
 
-use crate::raster::{BadRaster, Raster};
+use heightfield::{BadRaster, Raster};
 
 /// What a terrain looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

@@ -79,11 +79,11 @@ mod tests {
     use super::*;
     use crate::link::hello;
     use crate::place::{Reach, ViewOptions};
-    use crate::raster::Raster;
     use hapterra_core::force::ForceLaw;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::phantom::Calibration;
     use hapterra_core::scene::{Source, View};
+    use heightfield::Raster;
 
     fn with(look: impl for<'t> FnOnce(FeltViews<'t>, Terrain<'t>, Laid)) {
         let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");

@@ -4,7 +4,7 @@
 //! not: those of degrees get narrower towards the poles, and a map's scale changes.
 
 use super::felt_grid::FeltGrid;
-use crate::raster::{CellSize, Sides};
+use heightfield::{CellSize, Sides};
 
 /// Places looked at along each side of a rectangle, its ends among them: the size of cells
 /// changes smoothly.
@@ -89,9 +89,9 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
     use crate::terrain::FeltCells;
     use crate::terrain::felt_grid::tests::cell;
+    use heightfield::Raster;
 
     fn grid_off(lean: f64, (east, north): (f64, f64), cells: FeltCells) -> f64 {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0)

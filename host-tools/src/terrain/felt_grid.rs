@@ -8,7 +8,7 @@ use std::hash::{Hash, Hasher};
 
 use super::{BadScale, Scale};
 use crate::materials::Materials;
-use crate::raster::{CellSize, Raster, Sides, around, bilinear};
+use heightfield::{CellSize, Raster, Sides, around, bilinear};
 
 /// Cells whose sides differ by less than this share count as square, and keep
 /// their exact samples.
@@ -461,7 +461,7 @@ fn is_square(cell: &CellSize) -> bool {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::raster::{CellUnit, Certainty, Globe};
+    use heightfield::{CellUnit, Certainty, Globe};
 
     /// A cell in metres, whose columns lean over its rows by an angle of that cosine.
     pub(in crate::terrain) fn cell(east: f64, north: f64, lean: f64) -> CellSize {

@@ -6,7 +6,7 @@ use hapterra_core::scene::Scene;
 use twox_hash::XxHash64;
 
 use super::{FeltGrid, Scale};
-use crate::raster::Raster;
+use heightfield::Raster;
 
 /// Hash of all heights from south-west to north-east, after the numbers of columns and
 /// rows: two files with the same content are the same terrain, and a file that was

@@ -16,7 +16,7 @@ use hapterra_touch::tip::{self, Ball, CENTRE_STEP, Nodes, Samples, TipError};
 use super::steps::{BinaryUnit, steps};
 use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
 use crate::materials::MaterialBuffer;
-use crate::raster::Raster;
+use heightfield::Raster;
 
 /// Heights that the file does not hold but are interpolated are rounded to multiples of this, cells.
 /// Single precision is as coarse 64 cells above a tile's base, and the floats of what is not
@@ -459,7 +459,7 @@ impl<'r> Terrain<'r> {
     ///
     /// # Errors
     /// Why something did not come.
-    pub fn check_came(&self) -> Result<(), crate::raster::Error> {
+    pub fn check_came(&self) -> Result<(), heightfield::Error> {
         self.raster().check_came()?;
         let of_classes = self.grid.materials().map(|materials| materials.classes());
         of_classes.map_or(Ok(()), Raster::check_came)

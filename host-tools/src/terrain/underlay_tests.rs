@@ -5,9 +5,9 @@ use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 
 use super::*;
-use crate::raster::Raster;
 use crate::terrain::Scale;
 use crate::terrain::tiler::tests::sent;
+use heightfield::Raster;
 
 /// 2000 × 1500 cells of a millimetre, with a hole.
 fn hills() -> Raster {

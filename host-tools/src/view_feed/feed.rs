@@ -299,9 +299,9 @@ impl<'t> ViewFeed<'t> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
     use crate::terrain::Scale;
     use crate::view_feed::pipe::Pipe;
+    use heightfield::Raster;
     use std::sync::mpsc::sync_channel;
 
     fn picture<'p, 't>(terrain: &'p Terrain<'t>) -> Picture<'p, 't> {

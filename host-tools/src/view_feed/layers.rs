@@ -172,8 +172,8 @@ pub(super) fn tile(terrain: &Terrain<'_>, index: TileIndex, slot: u32) -> Tile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
     use crate::terrain::Scale;
+    use heightfield::Raster;
 
     #[test]
     fn layers_are_bounded_nested_and_end_fine() {

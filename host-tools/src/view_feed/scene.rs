@@ -5,8 +5,8 @@ use hapterra_view_stream::{Coordinates, Hello, Layer, Message, Scene, TickCost, 
 
 use super::layers;
 use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT};
-use crate::raster::System;
 use crate::terrain::Terrain;
+use heightfield::System;
 
 /// What a viewer is to show.
 pub struct Picture<'p, 't> {
@@ -139,8 +139,8 @@ fn coordinates(terrain: &Terrain<'_>, level_0_mm: f64) -> Option<Coordinates> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
     use crate::terrain::Scale;
+    use heightfield::Raster;
 
     #[test]
     fn a_terrain_that_no_arm_felt_is_told_around_its_middle() {

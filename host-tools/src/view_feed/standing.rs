@@ -55,8 +55,8 @@ impl<'t> Standing<'t> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::{CellSize, CellUnit, Raster};
     use crate::terrain::{FeltCells, FeltGrid};
+    use heightfield::{CellSize, CellUnit, Raster};
 
     #[test]
     fn the_same_ground_stands_where_the_beginning_has_it() {

@@ -83,11 +83,11 @@ impl Surroundings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
     use crate::terrain::Scale;
     use crate::timeouts::HANG;
     use crate::view_feed::pipe::Pipe;
     use hapterra_view_stream::read;
+    use heightfield::Raster;
     use std::sync::mpsc::sync_channel;
 
     /// More than anything here takes.

@@ -1,8 +1,8 @@
 //! An arm that presses on a plane, on every board that there is an image of.
 
-use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::scene::{Scene, Source};
+use heightfield::Raster;
 
 use crate::device::{Device, Plane, machines};
 use crate::machine::{Machine, Stop};

@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use hapterra::link::{Ask, Bulk, BulkEndpoints, Event, Patience, Session, Transport};
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
-use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Mode, Report};
@@ -15,6 +14,7 @@ use hapterra_core::scene::{Sample, Scene, Source};
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::status::Status;
 use hapterra_tests::usb::host::{Found, ScriptedPipes, enumerate};
+use heightfield::Raster;
 
 use nusb::descriptors::ConfigurationDescriptor;
 

@@ -5,7 +5,6 @@
 #[allow(dead_code)] // Only the table.
 mod tick_rate;
 
-use hapterra::raster::Raster;
 use hapterra::stability::limits;
 use hapterra_core::contact::work_per_tick;
 use hapterra_core::rate::TickRate;
@@ -14,6 +13,7 @@ use hapterra_image_tests::chip::Chip;
 use hapterra_image_tests::device::{Device, Plane, machines, on_each_board};
 use hapterra_tests::cycles::{Cycles, H743_DATA_LINES};
 use hapterra_tests::repository;
+use heightfield::Raster;
 
 const HOME_MM: [f64; 3] = [100.0, 100.0, 75.0];
 

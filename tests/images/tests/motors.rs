@@ -1,7 +1,6 @@
 //! How warm a board takes its motors to be after a start: what it kept in its RAM goes on
 //! after a reset, and everything else is hot.
 
-use hapterra::raster::Raster;
 use hapterra::terrain::Terrain;
 use hapterra_core::Vec3;
 use hapterra_core::guard::Sense;
@@ -15,6 +14,7 @@ use hapterra_firmware::store::Stored;
 use hapterra_image_tests::device::{Device, Plane, on_each_board};
 use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_image_tests::supply::Reset;
+use heightfield::Raster;
 
 /// What a board's RAM holds whose motors were never used.
 fn cold() -> Copies {

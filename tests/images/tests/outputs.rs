@@ -1,13 +1,13 @@
 //! What leaves the boards' own images for the amplifiers, and what the amplifiers say
 //! back.
 
-use hapterra::raster::Raster;
 use hapterra_core::guard::{Blockers, Fault};
 use hapterra_core::wire::request::Request;
 use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::chip::Commands;
 use hapterra_image_tests::device::{Device, Plane, machines, on_each_board};
 use hapterra_image_tests::machine::{Machine, Stop};
+use heightfield::Raster;
 
 const HOME_MM: [f64; 3] = [100.0, 100.0, 30.0];
 

@@ -2,12 +2,12 @@
 //! amplifiers' inputs, in the boards' own images.
 
 use hapterra::phantom::{PhantomModel, Placement};
-use hapterra::raster::Raster;
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::ForceLaw;
 use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::device::{Device, Plane, on_each_board};
 use hapterra_image_tests::machine::Stop;
+use heightfield::Raster;
 
 fn plane() -> Plane {
     Plane {

@@ -1,11 +1,11 @@
 //! What the ground of a segment feels like: ice, or effects and materials drawn at random.
 
 use hapterra::materials::{ClassMaterial, Looks, Materials};
-use hapterra::raster::Raster;
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{
     Controller, Damping, ForceLaw, Material, MaterialTable, Pattern, Shading, Texture,
 };
+use heightfield::Raster;
 
 use crate::chance::Chance;
 

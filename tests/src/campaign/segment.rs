@@ -3,7 +3,6 @@
 
 use hapterra::materials::Materials;
 use hapterra::phantom::PhantomModel;
-use hapterra::raster::Raster;
 use hapterra::synth::{Kind as Look, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 use hapterra_core::Vec3;
@@ -15,6 +14,7 @@ use hapterra_core::scene::{Point, Scene, Source};
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::{ResetCause, Status};
+use heightfield::Raster;
 
 use super::arm::{Arm, Mood};
 use super::board::{self, Board};

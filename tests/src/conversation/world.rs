@@ -4,7 +4,6 @@
 use std::time::Duration;
 
 use hapterra::link::{Arming, Ask, Client, Event, LinkError, Patience, State};
-use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Mode, Sense};
@@ -15,6 +14,7 @@ use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
+use heightfield::Raster;
 
 use super::errands::{Errand, Errands};
 use super::forged;

@@ -33,9 +33,9 @@ pub mod tally;
 pub mod tap;
 pub mod wire;
 
-use hapterra::raster::Raster;
 use hapterra::synth::{Kind as Look, Synth};
 use hapterra::terrain::{Scale, Terrain};
+use heightfield::Raster;
 
 use crate::campaign::Violation;
 use crate::chance::Chance;

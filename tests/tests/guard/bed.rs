@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Patience, Session};
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
-use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::guard::{Drive, Report, Sense, WORKING_SHARE};
@@ -17,6 +16,7 @@ use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::native::StoppedClock;
 use hapterra_firmware::store::Stored;
 use hapterra_tests::faulty::Shared;
+use heightfield::Raster;
 
 /// The plane that is felt lies here, mm; the hand starts above its middle.
 pub(crate) const PLANE_MM: f64 = 20.0;

@@ -1,10 +1,10 @@
 //! The host goes, with a word or without.
 
 use hapterra::phantom::{HandModel, Touch};
-use hapterra::raster::Raster;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::{Drive, Limits, Mode, Sense};
+use heightfield::Raster;
 
 use crate::bed::{Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, on_plane, plane, press};
 

@@ -1,9 +1,9 @@
 //! What a server or the line to it may do wrong: it is told, and nothing wrong is felt.
 
-use hapterra::raster::{BadRaster, OpenOptions, Raster};
 use hapterra_tests::timeouts::wait_for;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::{Fault, Server};
+use heightfield::{BadRaster, OpenOptions, Raster};
 
 const SIZE: [u32; 2] = [2500, 2100];
 

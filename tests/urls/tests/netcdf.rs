@@ -3,9 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_tests::timeouts::wait_until;
 use hapterra_url_tests::http::{Fault, Server};
+use heightfield::{OpenOptions, Raster};
 
 fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/netcdf")

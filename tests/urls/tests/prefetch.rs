@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use hapterra::link::{Client, Patience};
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::Vec3;
 use hapterra_core::force::ForceLaw;
@@ -13,6 +12,7 @@ use hapterra_core::terrain::TileKey;
 use hapterra_tests::timeouts::{pass, wait_until};
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::Server;
+use heightfield::{OpenOptions, Raster};
 
 /// Requests for what two tiles beside each other need, and for what lies around a HIP: runs of
 /// pages that the layout of the file puts there.

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::shared;
 use hapterra_tests::tiffs::{DATA, floats_in_a_strip, placed, tiff};
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::{Fault, Server};
+use heightfield::{OpenOptions, Raster};
 
 fn height(column: u32, row: u32) -> f32 {
     (column * 7 % 1000) as f32 + 0.25 * (row % 400) as f32

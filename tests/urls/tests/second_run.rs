@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use hapterra::disk_cache::DiskCache;
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_tests::timeouts::wait_until;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::Server;
+use heightfield::disk_cache::DiskCache;
+use heightfield::{OpenOptions, Raster};
 
 /// Pages of what [`Bed::look`] looks at.
 const PAGES: usize = 50;

@@ -6,7 +6,6 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Event, Native, Patience, Session, Transport};
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::Vec3;
 use hapterra_core::force::ForceLaw;
@@ -16,6 +15,7 @@ use hapterra_core::terrain::TileKey;
 use hapterra_tests::timeouts::{pass, wait_for, wait_until};
 use hapterra_url_tests::cog::{cog, in_tiles};
 use hapterra_url_tests::http::{Fault, Server};
+use heightfield::{OpenOptions, Raster};
 
 fn height(column: u32, row: u32) -> f32 {
     (column % 100) as f32 + 0.5 * (row % 64) as f32

@@ -1,8 +1,8 @@
 //! A STAC at a URL: its items name files beside it, and each is fetched when it is touched.
 
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::{Fault, Server};
+use heightfield::{OpenOptions, Raster};
 
 /// Samples of a tile each way, and the side of a cell, metres.
 const SIDE: u32 = 300;

@@ -9,8 +9,8 @@ use std::path::Path;
 use heightfield_gdal::Error as GdalError;
 
 use crate::cli::failure::Hint;
-use crate::raster::{BadRaster, Encoding, Error, gdal};
-use crate::remote::is_url;
+use heightfield::is_url;
+use heightfield::{BadRaster, Error, gdal};
 
 impl Hint for Error {
     fn hint(&self) -> String {
@@ -75,10 +75,7 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             "leave --ground-cell-m out: it is for files that do not state a cell size"
         }
         BadRaster::EncodedPicture(encoding) => {
-            let name = match encoding {
-                Encoding::TerrainRgb => "terrain-rgb",
-                Encoding::Terrarium => "terrarium",
-            };
+            let name = encoding.name();
             return format!(
                 "if its colours are heights, say so: --encoding {name} (with --ground-cell-m for its scale)"
             );

@@ -7,7 +7,7 @@ use clap::builder::TypedValueParser;
 use heightfield_gdal::Error;
 
 use crate::cli::report::put;
-use crate::raster::{gdal, own_formats};
+use heightfield::{gdal, own_formats};
 
 /// The list is printed in place of what the command does, as `--help` is: no file is wanted for it.
 #[derive(Clone, Copy, Debug)]

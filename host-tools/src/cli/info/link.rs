@@ -139,8 +139,8 @@ fn frame_bytes(key: TileKey, heights: Heights<'_>) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
     use crate::terrain::FeltCells;
+    use heightfield::Raster;
 
     #[test]
     fn a_hip_along_an_axis_needs_two_tiles_every_32_cells() {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::raster::{Bounds, CellUnit, Certainty, LonLat, Raster, ReferenceSystem, System};
+use heightfield::{Bounds, CellUnit, Certainty, LonLat, Raster, ReferenceSystem, System};
 
 /// Where something comes from, as the JSON says it.
 pub(super) const fn from(certainty: Certainty) -> &'static str {

@@ -13,8 +13,8 @@ use crate::cli::failure::{Failure, Hint, OrHint};
 use crate::materials::table::{Look, TableFile, TextureName};
 use crate::materials::{ClassMaterial, Looks, Materials};
 use crate::place::STIFFEST_N_PER_MM;
-use crate::raster::{Raster, files_read_with};
 use crate::replay::settings::MaterialSettings;
+use heightfield::{Raster, files_read_with};
 
 /// What the ground is made of.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -109,7 +109,7 @@ impl Rendering {
 
 /// What went wrong with a file of classes: hints for heights work out numbers between those of the
 /// file, and of classes there are none.
-fn of_classes(error: crate::raster::Error) -> Failure {
+fn of_classes(error: heightfield::Error) -> Failure {
     let hint = error.hint().replace("-r bilinear", "-r near");
     let hint = hint.replace("-r average", "-r mode");
     let hint = hint.replace(" -ot Float32", "");

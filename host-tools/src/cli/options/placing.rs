@@ -9,8 +9,8 @@ use crate::place::{
     Coordinates, FELT_MM, Reach, Sizing, Target, View, ViewOptions, coordinates_in_words,
     place_in_words,
 };
-use crate::raster::{Georeference, Raster};
 use crate::terrain::{Distortion, FeltGrid, Terrain};
+use heightfield::{Georeference, Raster};
 
 /// Relief in the hand below which an exaggeration is suggested, mm.
 const FLAT_MM: f64 = 4.0;

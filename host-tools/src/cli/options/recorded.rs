@@ -153,10 +153,10 @@ mod tests {
 
     use super::super::texture::{SurfacePattern, SurfaceTexture};
     use super::*;
-    use crate::raster::Raster;
     use crate::replay::Rule;
     use crate::replay::settings::Device;
     use crate::terrain::{FeltCells, Scale, Terrain};
+    use heightfield::Raster;
 
     fn recorded() -> Settings {
         let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");

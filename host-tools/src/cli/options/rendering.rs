@@ -8,9 +8,9 @@ use super::materials::SurfaceMaterials;
 use super::texture::SurfaceTexture;
 use crate::cli::failure::{Failure, OrHint};
 use crate::place::{Heights, suited_height};
-use crate::raster::Raster;
 use crate::replay::Rule;
 use crate::terrain::{FeltCells, FeltGrid, MAX_TIP_CELLS, Scale, Terrain};
+use heightfield::Raster;
 
 /// Radius of the ball by which a hand feels the ground unless another is stated, mm: with a friction
 /// of 0.4 no ground that was tried holds it (docs/tip.md).

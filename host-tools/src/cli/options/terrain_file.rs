@@ -5,15 +5,16 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::ValueHint;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use indicatif::ProgressBar;
 
 use crate::cli::failure::Failure;
-use crate::disk_cache::DiskCache;
-use crate::raster::{
+use heightfield::disk_cache::DiskCache;
+use heightfield::{
     CellUnit, Certainty, Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType,
     files_read_with, metres_in,
 };
-use crate::remote::{file_name, is_url};
+use heightfield::{file_name, is_url};
 
 /// Where `--help` lists these options.
 const INPUT: &str = "Input";
@@ -40,11 +41,11 @@ pub struct ReadingOptions {
     pub raw_size: Option<(u32, u32)>,
 
     /// Type of a raw sample
-    #[arg(long, value_enum, default_value = "i16", requires = "raw_size", help_heading = INPUT)]
+    #[arg(long, value_parser = one_of(SampleType::ALL, SampleType::name), default_value = "i16", requires = "raw_size", help_heading = INPUT)]
     pub raw_type: SampleType,
 
     /// Byte order of a raw sample
-    #[arg(long, value_enum, default_value = "little", requires = "raw_size", help_heading = INPUT)]
+    #[arg(long, value_parser = one_of(Endian::ALL, Endian::name), default_value = "little", requires = "raw_size", help_heading = INPUT)]
     pub raw_endian: Endian,
 
     /// Stored value that means no data (replaces what the file says)
@@ -73,11 +74,11 @@ pub struct ReadingOptions {
     pub vertical_unit: Option<f64>,
 
     /// How the colours of a PNG encode heights
-    #[arg(long, value_enum, conflicts_with = "png_channel", help_heading = INPUT)]
+    #[arg(long, value_parser = one_of(Encoding::ALL, Encoding::name), conflicts_with = "png_channel", help_heading = INPUT)]
     pub encoding: Option<Encoding>,
 
     /// Channel of a PNG that holds the height
-    #[arg(long, value_enum, value_name = "CHANNEL", help_heading = INPUT)]
+    #[arg(long, value_parser = one_of(PngChannel::ALL, PngChannel::name), value_name = "CHANNEL", help_heading = INPUT)]
     pub png_channel: Option<PngChannel>,
 
     /// A terrain whose samples take more megabytes than this stays in its file and is read
@@ -202,6 +203,18 @@ pub fn assumed_unit(raster: &Raster) -> Option<String> {
         }
         CellUnit::Degree => Some(format!("{assumed} (--vertical-unit ft, if they are feet)")),
     }
+}
+
+/// Parses one of some values by its name.
+fn one_of<T: Copy + Send + Sync + 'static>(
+    all: &'static [T],
+    name: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    let names = PossibleValuesParser::new(all.iter().map(|value| name(*value)));
+    names.try_map(move |text| {
+        let named = all.iter().find(|value| name(**value) == text);
+        named.copied().ok_or("not one of the names")
+    })
 }
 
 /// A unit of height in metres.

@@ -27,12 +27,12 @@ use crate::materials::Materials;
 use crate::output::{Output, folder_of};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::Laid;
-use crate::remote::without_key;
 use crate::replay::settings::Device;
 use crate::replay::{Column, LoopColumns, Recording, Rule, Settings};
 use crate::serving::{Service, told_of_last_end};
 use crate::stability::limits;
 use crate::steering::CommandQueue;
+use heightfield::without_key;
 
 /// Between two tries to find a device that is gone.
 const RETRY: Duration = Duration::from_millis(500);

@@ -8,10 +8,10 @@ use ::parquet::record::RowAccessor;
 use hapterra_core::force::ForceLaw;
 
 use super::*;
-use crate::raster::Raster;
 use crate::replay::settings::{Device, KEY};
 use crate::replay::{Row, Trajectory};
 use crate::terrain::Terrain;
+use heightfield::Raster;
 
 /// More than one group of a Parquet file.
 const ROWS: u32 = 61_003;

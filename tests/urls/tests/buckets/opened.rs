@@ -4,9 +4,9 @@ use std::path::Path;
 use std::process::Command;
 
 use hapterra::cli::failure::Failure;
-use hapterra::raster::{OpenOptions, Raster};
 use hapterra_url_tests::bucket::Seen;
 use hapterra_url_tests::cog::cog;
+use heightfield::{OpenOptions, Raster};
 
 /// Names the file that the second process opens.
 const VARIABLE: &str = "HAPTERRA_TEST_BUCKET";

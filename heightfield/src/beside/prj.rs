@@ -1,0 +1,32 @@
+//! The reference system in a `.prj` file, as Esri's programs write it.
+
+use super::text;
+use crate::BadRaster;
+use crate::crs::ReferenceSystem;
+use crate::decoded::Decoded;
+use crate::input::FileBytes;
+
+/// Sets the reference system from a `.prj` beside the file, where there is one; it is
+/// to be called before the samples are laid out.
+///
+/// # Errors
+/// Where it is elsewhere and cannot be read at present.
+pub(crate) fn reference_system(input: &FileBytes, decoded: &mut Decoded) -> Result<(), BadRaster> {
+    let (wkt, name) = match text(input, "prj") {
+        Ok(Some(found)) => found,
+        Err(error) if error.is_of_the_line() => return Err(error),
+        // A neighbour that cannot be read costs the place, not the heights.
+        Ok(None) | Err(_) => return Ok(()),
+    };
+    let (system, vertical) = ReferenceSystem::from_wkt(&wkt);
+    if system.is_none() {
+        decoded.remarks.push(format!(
+            "{name} beside it names no reference system that is known here: it is not used"
+        ));
+    }
+    decoded.system = system;
+    if vertical.is_some() && decoded.metres_per_vertical_unit.is_none() {
+        decoded.set_vertical(vertical, None);
+    }
+    Ok(())
+}

@@ -1,0 +1,70 @@
+//! World files: six numbers in a text beside a picture, which say where its samples lie.
+
+use super::text;
+use crate::BadRaster;
+use crate::decoded::Decoded;
+use crate::ground_map::GroundMap;
+use crate::input::FileBytes;
+
+/// Lays the samples out by the world file beside a file, and the `.prj` that may lie
+/// there too. `own` are the extensions of the format's world files; `.wld` serves all.
+///
+/// The numbers are, a line each: x per column, y per column, x per row, y per row, x
+/// and y of the centre of the first sample.
+pub(crate) fn lay_out_by_world_file(
+    input: &FileBytes,
+    own: &[&'static str],
+    decoded: &mut Decoded,
+) -> Result<(), BadRaster> {
+    let extensions = || own.iter().copied().chain(["wld"]);
+    super::look_for(input, extensions());
+    for extension in extensions() {
+        let Some((text, name)) = text(input, extension)? else {
+            continue;
+        };
+        let map = read(&text).ok_or_else(|| {
+            BadRaster::damaged(format!(
+                "{name} beside it is no world file: six numbers are wanted, the steps not zero"
+            ))
+        })?;
+        super::reference_system(input, decoded)?;
+        decoded.lay_out(map, None);
+        decoded.format += &format!(", placed by {name}");
+        return Ok(());
+    }
+    Ok(())
+}
+
+fn read(text: &str) -> Option<GroundMap> {
+    let numbers: Vec<f64> = text
+        .split_whitespace()
+        .map(|word| word.replace(',', ".").parse().ok())
+        .collect::<Option<_>>()?;
+    match numbers.as_slice() {
+        &[column_x, column_y, row_x, row_y, x, y] => {
+            GroundMap::from_centre([x, column_x, row_x], [y, column_y, row_y])
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn six_numbers_place_the_centre_of_the_first_sample() {
+        let map = read("10\r\n0\r\n0\r\n-20,0\r\n505\r\n190\r\n").expect("a world file");
+        assert_eq!(map.at(0.5, 0.5), (505.0, 190.0));
+        assert_eq!(map.at(0.0, 0.0), (500.0, 200.0));
+        for text in [
+            "",
+            "1 2 3 4 5",
+            "1 0 0 -1 5 5 7",
+            "0 0 0 0 5 5",
+            "a 0 0 -1 5 5",
+        ] {
+            assert!(read(text).is_none(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,450 @@
+//! A field without overviews: its coarse levels, made on the way and kept on disk.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::ThreadId;
+use std::time::Duration;
+
+use super::coarse::STEPS;
+use super::*;
+use crate::Raster;
+use crate::decoded::Decoded;
+use crate::storage::Storage;
+use crate::timeouts::{pass, wait_for, wait_until};
+
+const SIZE: [u32; 2] = [2101, 1250];
+const BLOCK: [u32; 2] = [64, 48];
+/// Blocks that the file does not store, that cannot be read, and that have not come yet.
+const SPARSE: [u32; 2] = [3, 2];
+const BAD: [u32; 2] = [5, 4];
+const LATE: [u32; 2] = [7, 6];
+const NO_DATA: f64 = -5.0;
+
+fn value(column: u32, row: u32) -> f64 {
+    match (column * 31 + row * 17) % 11 {
+        0 => NO_DATA,
+        1 => f64::NAN,
+        _ => f64::from(column) + f64::from(row) * 1e-3,
+    }
+}
+
+/// What is known of the reader from outside.
+#[derive(Clone)]
+struct Seen {
+    reads: Arc<AtomicU64>,
+    threads: Arc<Mutex<Vec<ThreadId>>>,
+    is_damaged: Arc<AtomicBool>,
+    is_late: Arc<AtomicBool>,
+    stamp: Arc<Mutex<Option<String>>>,
+}
+
+impl Seen {
+    fn new(stamp: &str) -> Self {
+        Self {
+            reads: Arc::default(),
+            threads: Arc::default(),
+            is_damaged: Arc::default(),
+            is_late: Arc::default(),
+            stamp: Arc::new(Mutex::new(Some(stamp.into()))),
+        }
+    }
+
+    fn reads(&self) -> u64 {
+        self.reads.swap(0, Ordering::Relaxed)
+    }
+}
+
+struct Full {
+    images: Vec<BlockImage>,
+    seen: Seen,
+}
+
+impl BlockReader for Full {
+    fn format(&self) -> &'static str {
+        "test"
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        SampleType::F64
+    }
+
+    fn is_stored(&self, _: usize, part: &Part) -> bool {
+        [part.column / BLOCK[0], part.row / BLOCK[1]] != SPARSE
+    }
+
+    fn read(&self, _: usize, part: &Part) -> Result<Block, BadRaster> {
+        let at = [part.column / BLOCK[0], part.row / BLOCK[1]];
+        self.seen.reads.fetch_add(1, Ordering::Relaxed);
+        self.seen
+            .threads
+            .lock()
+            .expect("alone")
+            .push(thread::current().id());
+        if at == BAD && self.seen.is_damaged.load(Ordering::Relaxed) {
+            return Err(BadRaster::Damaged("test".into()));
+        }
+        if at == LATE && self.seen.is_late.load(Ordering::Relaxed) {
+            return Err(BadRaster::NotYet);
+        }
+        let rows = part.row..part.row + part.rows;
+        let samples: Vec<f64> = rows
+            .flat_map(|row| (part.column..part.column + part.columns).map(move |c| value(c, row)))
+            .collect();
+        Ok(Block {
+            samples: samples.into(),
+            holes: None,
+            is_lacking: false,
+        })
+    }
+
+    fn stamp(&self, _: usize, _: &Part) -> Option<String> {
+        self.seen.stamp.lock().expect("alone").clone()
+    }
+
+    fn looks(&self) -> Option<Looks> {
+        // One place is enough to know that there is a height.
+        let parts = vec![Part::whole(2, 2)];
+        Some(Looks { image: 0, parts })
+    }
+
+    fn index(&self) -> u64 {
+        7
+    }
+}
+
+fn raster(seen: &Seen, disk: &DiskCache, [south_up, east_first]: [bool; 2]) -> Raster {
+    let full = BlockImage {
+        columns: SIZE[0],
+        rows: SIZE[1],
+        block: BLOCK,
+        every: None,
+        first: [0; 2],
+    };
+    let reader = Full {
+        images: vec![full],
+        seen: seen.clone(),
+    };
+    let mut decoded = Decoded::new("test".into(), (SIZE[0], SIZE[1]), Storage::from(reader));
+    (decoded.south_up, decoded.east_first) = (south_up, east_first);
+    decoded.storage.set_disk_cache(disk);
+    let raster = Raster::checked(decoded, Some(NO_DATA)).expect("a field");
+    seen.reads();
+    raster
+}
+
+const USUAL: [bool; 2] = [false, false];
+
+/// The height that a sample of the full image has, by the field's own formula.
+fn height(column: u32, row: u32, [south_up, east_first]: [bool; 2]) -> f64 {
+    let column = if east_first {
+        SIZE[0] - 1 - column
+    } else {
+        column
+    };
+    let row = if south_up { row } else { SIZE[1] - 1 - row };
+    let is_in = |block: [u32; 2]| [column / BLOCK[0], row / BLOCK[1]] == block;
+    match value(column, row) {
+        NO_DATA => f64::NAN,
+        _ if is_in(SPARSE) => f64::NAN,
+        value => value,
+    }
+}
+
+/// Holds all samples of a level against the field.
+fn check(raster: &Raster, level: u8, order: [bool; 2]) {
+    let count = SIZE.map(|count| ((count - 1) >> level) + 1);
+    let mut heights = vec![0.0; count[0] as usize];
+    for row in 0..count[1] {
+        raster.copy_row(level, row, 0, &mut heights);
+        for (column, found) in (0..).zip(&heights) {
+            let expected = height(column << level, row << level, order);
+            let is_same = found.to_bits() == expected.to_bits();
+            assert!(
+                is_same || found.is_nan() && expected.is_nan(),
+                "{level}: {column} {row}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn coarse_levels_have_the_files_own_samples_whatever_its_order() {
+    for order in [[true, false], [false, false], [true, true], [false, true]] {
+        let seen = Seen::new("");
+        for level in [2, 3, 5, 6, 8, 9, 10] {
+            // Of each level anew, and then all after each other.
+            check(&raster(&seen, &DiskCache::off(), order), level, order);
+        }
+        let all = raster(&seen, &DiskCache::off(), order);
+        for level in [9, 6, 3, 4, 5, 7, 8, 10, 2] {
+            check(&all, level, order);
+        }
+    }
+}
+
+#[test]
+fn a_second_look_reads_no_block_and_a_finer_one_serves_the_coarser() {
+    let seen = Seen::new("");
+    let raster = raster(&seen, &DiskCache::off(), USUAL);
+    check(&raster, 8, USUAL);
+    let first = seen.reads();
+    // Every 256th sample is in another block.
+    assert!((1..=9 * 5).contains(&first), "{first}");
+    check(&raster, 8, USUAL);
+    assert_eq!(seen.reads(), 0);
+    // What is felt leaves its coarse samples behind, too.
+    check(&raster, 0, USUAL);
+    assert_eq!(
+        seen.reads(),
+        33 * 27 - 1 - first,
+        "all but those in memory, and the one that is not stored"
+    );
+    for level in 3..=10 {
+        check(&raster, level, USUAL);
+    }
+    assert_eq!(seen.reads(), 0);
+    assert_eq!(raster.blocks_read(), 1 + 33 * 27 - 1);
+}
+
+#[test]
+fn between_coarse_samples_a_surface_is_linear() {
+    let seen = Seen::new("");
+    let raster = raster(&seen, &DiskCache::off(), [true, false]);
+    // No holes among them.
+    let [a, b] = [560, 568].map(|column| height(column, 808, [true, false]));
+    assert!(a > 0.0 && b > 0.0);
+    assert_eq!(raster.surface(3, [562.0, 808.0]), 0.75 * a + 0.25 * b);
+}
+
+/// The level's row at which a tile would look, with what comes of it.
+fn look(raster: &Raster, level: u8) -> Option<Vec<f64>> {
+    let before = raster.not_yet();
+    let mut heights = vec![0.0; 9 * 7];
+    for (row, heights) in (0..).zip(heights.chunks_exact_mut(9)) {
+        raster.copy_row(level, row, 0, heights);
+    }
+    (raster.not_yet() == before).then_some(heights)
+}
+
+fn comes(raster: &Raster, level: u8) -> Vec<f64> {
+    wait_for("the level", || look(raster, level))
+}
+
+fn same(one: &[f64], other: &[f64]) {
+    let bits = |heights: &[f64]| {
+        let each = heights
+            .iter()
+            .map(|h| if h.is_nan() { 0 } else { h.to_bits() });
+        each.collect::<Vec<_>>()
+    };
+    assert_eq!(bits(one), bits(other));
+}
+
+#[test]
+fn whoever_is_served_waits_for_no_coarse_level_and_gets_it_later() {
+    let seen = Seen::new("");
+    let waited = look(&raster(&seen, &DiskCache::off(), USUAL), 8).expect("here");
+    let raster = raster(&seen, &DiskCache::off(), USUAL);
+    seen.threads.lock().expect("alone").clear();
+    raster.stop_waiting();
+    assert_eq!(
+        look(&raster, 8),
+        None,
+        "nothing is known yet, and nobody waits"
+    );
+    same(&comes(&raster, 8), &waited);
+    let this = thread::current().id();
+    let threads = seen.threads.lock().expect("alone").clone();
+    assert!(!threads.is_empty() && !threads.contains(&this));
+}
+
+#[test]
+fn whoever_is_served_reads_no_fine_block() {
+    let seen = Seen::new("");
+    let raster = raster(&seen, &DiskCache::off(), USUAL);
+    let there = |column| (raster.height(column, 1000) > 0.0, raster.not_yet());
+    assert!(there(300).0, "whoever may wait does");
+    raster.stop_waiting();
+    seen.threads.lock().expect("alone").clear();
+    let before = raster.not_yet();
+    let mut columns = 1000..1010;
+    let far = columns.find(|column| height(*column, 1000, USUAL) > 0.0);
+    let far = far.expect("no hole");
+    assert_eq!(there(far), (false, before + 1));
+    assert!(there(300).0, "it is in memory");
+    wait_until("the block", || there(far).0);
+    let threads = seen.threads.lock().expect("alone").clone();
+    assert!(threads.len() == 1 && threads[0] != thread::current().id());
+}
+
+#[test]
+fn what_has_not_come_is_no_hole_and_what_cannot_be_read_is_none_for_long() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let disk = DiskCache::at(folder.path(), 1 << 26);
+    let seen = Seen::new("one");
+    seen.is_late.store(true, Ordering::Relaxed);
+    seen.is_damaged.store(true, Ordering::Relaxed);
+    {
+        let raster = raster(&seen, &disk, [true, false]);
+        raster.stop_waiting();
+        // Level 3 there: the late block has columns 448 to 511, rows 288 to 335.
+        let late = |raster: &Raster| {
+            let (mut heights, before) = ([0.0; 8], raster.not_yet());
+            raster.copy_row(3, 37, 56, &mut heights);
+            (raster.not_yet() == before).then_some(heights)
+        };
+        for _ in 0..20 {
+            assert_eq!(late(&raster), None);
+            pass(Duration::from_millis(5));
+        }
+        seen.is_late.store(false, Ordering::Relaxed);
+        let heights = wait_for("the late block", || late(&raster));
+        let expected: Vec<f64> = (56..64)
+            .map(|c| height(c * 8, 37 * 8, [true, false]))
+            .collect();
+        same(&heights, &expected);
+        // The damaged one has columns 320 to 383, rows 192 to 239.
+        let mut bad = [0.0; 8];
+        wait_until("the damaged block", || {
+            let before = raster.not_yet();
+            raster.copy_row(3, 25, 40, &mut bad);
+            raster.not_yet() == before
+        });
+        assert!(bad.iter().all(|height| height.is_nan()), "{bad:?}");
+    }
+    // It was damaged in that run only.
+    seen.is_damaged.store(false, Ordering::Relaxed);
+    check(&raster(&seen, &disk, [true, false]), 3, [true, false]);
+}
+
+#[test]
+fn another_run_on_the_same_file_reads_nothing_and_on_another_all() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let disk = DiskCache::at(folder.path(), 1 << 26);
+    let seen = Seen::new("one");
+    for (stamp, off, again) in [
+        (Some("one"), false, false),
+        (Some("one"), false, true),
+        (Some("two"), false, false),
+        (Some("one"), true, false),
+        (None, false, false),
+        (None, false, false),
+        (Some("two"), false, true),
+    ] {
+        *seen.stamp.lock().expect("alone") = stamp.map(Into::into);
+        let disk = if off { DiskCache::off() } else { disk.clone() };
+        let raster = raster(&seen, &disk, USUAL);
+        for level in [8, 5, 9] {
+            check(&raster, level, USUAL);
+        }
+        assert_eq!(seen.reads() == 0, again, "{stamp:?}");
+    }
+    // In another order other samples are coarse ones.
+    *seen.stamp.lock().expect("alone") = Some("one".into());
+    check(&raster(&seen, &disk, [true, true]), 8, [true, true]);
+}
+
+#[test]
+fn what_was_read_of_a_file_that_changed_meanwhile_is_not_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let disk = DiskCache::at(folder.path(), 1 << 26);
+    let seen = Seen::new("one");
+    let before = raster(&seen, &disk, USUAL);
+    check(&before, 8, USUAL);
+    // Its reader finds that it is not what it was.
+    *seen.stamp.lock().expect("alone") = None;
+    drop(before);
+    *seen.stamp.lock().expect("alone") = Some("one".into());
+    check(&raster(&seen, &disk, USUAL), 8, USUAL);
+    assert!(seen.reads() > 0);
+}
+
+#[test]
+fn the_memory_of_coarse_samples_is_bounded_and_what_gives_way_is_kept_on_disk() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let disk = DiskCache::at(folder.path(), 1 << 30);
+    let seen = Seen::new("one");
+    let size = [1 << 14, 1 << 14];
+    let full = BlockImage {
+        columns: size[0],
+        rows: size[1],
+        block: [512, 16],
+        every: None,
+        first: [0; 2],
+    };
+    let reader = || Full {
+        images: vec![full],
+        seen: seen.clone(),
+    };
+    let blocks = || {
+        let mut blocks = Blocks::new(Box::new(reader()));
+        blocks.set_disk_cache(&disk);
+        blocks.set_order(true, false);
+        blocks
+    };
+    let first = blocks();
+    let image = first.image_of(3);
+    assert_eq!((image, first.images.len()), (1, 1 + STEPS.len()));
+    let step = STEPS[0];
+    let places = || {
+        (0..size[0]).step_by(512).flat_map(|column| {
+            (0..size[1])
+                .step_by(512)
+                .map(move |row| [column / step, row / step])
+        })
+    };
+    for [column, row] in places() {
+        first.stored(image, column, row);
+    }
+    let reads = seen.reads();
+    assert_eq!(reads, 32 * 32);
+    assert!(first.coarse().pieces() <= 512 && first.coarse().pieces() > 400);
+    drop(first);
+    let again = blocks();
+    for [column, row] in places() {
+        let found = again.stored(image, column, row);
+        let expected = value(column * step, row * step);
+        let is_same = found.is_some_and(|found| found.to_bits() == expected.to_bits());
+        assert!(is_same || expected.is_nan());
+    }
+    assert_eq!(seen.reads(), 0);
+}
+
+#[test]
+fn what_lies_ahead_is_read_in_the_background_and_too_much_is_not() {
+    for order in [[true, false], [false, true]] {
+        let seen = Seen::new("");
+        let raster = raster(&seen, &DiskCache::off(), order);
+        seen.threads.lock().expect("alone").clear();
+        raster.prefetch(0, [1000, 1100], [600, 650]);
+        raster.stop_waiting();
+        assert_eq!(seen.reads(), 0, "who may wait reads nothing ahead");
+        raster.prefetch(0, [0, 2100], [0, 1249]);
+        raster.prefetch(0, [1000, 1100], [600, 650]);
+        let there = |raster: &Raster| {
+            let mut heights = [0.0; 101];
+            let is_all = |row: u32, heights: &mut [f64; 101]| {
+                raster.copy_row(0, row, 1000, heights);
+                (1000..).zip(&*heights).all(|(column, found)| {
+                    let expected = height(column, row, order);
+                    found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan()
+                })
+            };
+            [600, 625, 650].iter().all(|row| is_all(*row, &mut heights))
+        };
+        let Storage::Blocks(blocks) = &raster.source.storage else {
+            panic!("it stays in its file");
+        };
+        let keys = [12, 13].map(|row| [15, 16, 17].map(|column| [column, row]));
+        let has = |at: &[u32; 2]| blocks.kept().cache.has(&Key { image: 0, at: *at });
+        wait_until("the blocks", || keys.as_flattened().iter().all(has));
+        assert!(there(&raster));
+        assert_eq!(seen.reads(), 6);
+        let this = thread::current().id();
+        assert!(!seen.threads.lock().expect("alone").contains(&this));
+    }
+}

@@ -1,0 +1,94 @@
+//! What is known of blocks without reading: those in memory, those that are not here yet, and
+//! what went wrong.
+
+use std::cell::Cell;
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::super::BadRaster;
+use super::Block;
+use super::cache::{Cache, Key};
+
+/// A block that was not here yet is looked for again after so long.
+const AGAIN: Duration = Duration::from_millis(20);
+/// Blocks that are known to be on their way, at most.
+const MOST_AWAITED: usize = 1024;
+
+thread_local! {
+    /// How often this thread asked for something that is not here yet.
+    static NOT_YET: Cell<u64> = const { Cell::new(0) };
+}
+
+/// How often this thread asked for something, of any file, that is not here yet. What another
+/// thread misses says nothing of what this one has read: of two devices on one terrain, one
+/// over what has come is not held up by one over what has not
+/// (`what_one_thread_misses_is_not_counted_for_another`).
+pub(crate) fn not_yet() -> u64 {
+    NOT_YET.get()
+}
+
+/// Counts something that is not here yet.
+pub(super) fn count_not_yet() {
+    NOT_YET.set(NOT_YET.get().wrapping_add(1));
+}
+
+/// What is known of the blocks of a file.
+pub(super) struct Kept {
+    pub(super) cache: Cache,
+    /// Blocks that could not be read.
+    pub(super) unread: u32,
+    /// Blocks that are not here yet, and when they were looked for.
+    awaited: HashMap<Key, Instant>,
+    /// What the line said last.
+    pub(super) outage: Option<BadRaster>,
+}
+
+impl Kept {
+    /// Nothing yet, and blocks of so many bytes at most.
+    pub(super) fn new(most_bytes: usize) -> Self {
+        Self {
+            cache: Cache::new(most_bytes),
+            unread: 0,
+            awaited: HashMap::new(),
+            outage: None,
+        }
+    }
+
+    /// The same of a file of which so many blocks were warned of before.
+    pub(super) fn after(self, unread: u32) -> Self {
+        Self { unread, ..self }
+    }
+
+    /// What is known of a block: it is in memory, or it is not here yet, and was looked for a
+    /// moment ago, which is counted.
+    pub(super) fn known(&mut self, key: &Key) -> Option<Option<Arc<Block>>> {
+        if let Some(block) = self.cache.get(key) {
+            return Some(block);
+        }
+        let looked = self.awaited.get(key);
+        looked.filter(|looked| looked.elapsed() < AGAIN)?;
+        count_not_yet();
+        Some(None)
+    }
+
+    /// Keeps a block that was read; `None` where there is no sample.
+    pub(super) fn put(&mut self, key: Key, block: Option<Arc<Block>>) {
+        self.awaited.remove(&key);
+        self.cache.put(key, block);
+    }
+
+    /// Remembers a block that is not here yet.
+    pub(super) fn wait_for(&mut self, key: Key) {
+        if self.awaited.len() >= MOST_AWAITED {
+            self.awaited.clear();
+        }
+        self.awaited.insert(key, Instant::now());
+    }
+
+    /// Counts a block that could not be read, and says how many there are.
+    pub(super) fn count_unread(&mut self) -> u32 {
+        self.unread = self.unread.saturating_add(1);
+        self.unread
+    }
+}

@@ -1,0 +1,193 @@
+//! What is known of a file without reading all of it.
+
+use std::hash::Hasher;
+
+use twox_hash::XxHash64;
+
+use super::super::HeightSummary;
+use super::{BlockImage, Part, Shared};
+use crate::remote::without_key;
+
+/// Of an image with at most so many samples all are looked at.
+const FEW_SAMPLES: u64 = 1 << 20;
+/// Of a larger one so many blocks that hold samples, spread evenly.
+const LOOKS: usize = 32;
+/// Of more blocks that hold samples not all are listed, but so many, spread evenly: a list of
+/// them all would take more memory than a terrain.
+const MOST_LISTED: usize = 1 << 20;
+
+/// Heights looked at when the file was opened.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Survey {
+    /// Of the heights that were looked at.
+    pub(crate) summary: HeightSummary,
+    /// Hash of the file's index and of the heights that were looked at: the same file has
+    /// the same, and one that was changed most likely another. `None` where all samples
+    /// are in memory.
+    pub(crate) print: Option<u64>,
+}
+
+impl Survey {
+    /// Of a raster that is in memory: nothing but its samples is needed to know it again.
+    pub(crate) const fn of_all(summary: HeightSummary) -> Self {
+        Self {
+            summary,
+            print: None,
+        }
+    }
+}
+
+/// What of a raster is looked at when it is opened.
+#[derive(Debug)]
+pub(crate) struct Looks {
+    /// The image to look at.
+    pub(crate) image: usize,
+    /// Parts of it, of which a few are looked at.
+    pub(crate) parts: Vec<Part>,
+}
+
+/// What was looked at so far.
+struct Seen {
+    hasher: XxHash64,
+    summary: HeightSummary,
+}
+
+impl Seen {
+    /// Counts a height; NaN is a hole.
+    fn add(&mut self, height: f64) {
+        let bits = if height.is_nan() { f64::NAN } else { height };
+        self.hasher.write(&bits.to_le_bytes());
+        self.summary.add(height);
+    }
+}
+
+impl Shared {
+    /// Looks at what the reader chooses, or at the coarsest image, all of it where it is
+    /// small. `height` makes a height of a stored sample. The summary's range is empty where
+    /// there is no height in the whole file.
+    pub(crate) fn survey(&self, height: impl Fn(Option<f64>) -> f64) -> Survey {
+        let mut seen = Seen {
+            hasher: XxHash64::with_seed(0),
+            summary: HeightSummary::EMPTY,
+        };
+        seen.hasher.write_u64(self.reader.index());
+        let chosen = self.reader.looks();
+        let (is_chosen, Looks { image, parts }) = match chosen {
+            Some(looks) => (true, looks),
+            None => (false, self.coarsest()),
+        };
+        let look_once = |part: &Part, seen: &mut Seen| {
+            self.look_once(image, part, |stored| seen.add(height(stored)));
+        };
+        let look = |part: &Part, seen: &mut Seen| match is_chosen {
+            true => look_once(part, seen),
+            false => self.look_at_block(image, part, |stored| seen.add(height(stored))),
+        };
+        let is_small = !is_chosen && self.samples(image) <= FEW_SAMPLES;
+        let looks = match is_small || parts.len() <= LOOKS {
+            true => parts.len(),
+            false => LOOKS,
+        };
+        let chosen = (0..looks).map(|index| parts[index * (parts.len() - 1) / (looks - 1).max(1)]);
+        let chosen: Vec<Part> = chosen.collect();
+        self.reader.want(image, &chosen);
+        for part in &chosen {
+            look(part, &mut seen);
+        }
+        if looks < parts.len() && seen.summary.has_none() {
+            self.tell_of_search(looks, parts.len());
+            // Most of it may hold nothing: then the first height anywhere will do.
+            for part in &parts {
+                look_once(part, &mut seen);
+                if !seen.summary.has_none() {
+                    break;
+                }
+            }
+        }
+        Survey {
+            summary: seen.summary,
+            print: Some(seen.hasher.finish()),
+        }
+    }
+
+    /// Says why it may take long to open the file.
+    fn tell_of_search(&self, looks: usize, parts: usize) {
+        let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
+        tracing::warn!(
+            "{looks} places of {name} have no height: all {parts} are looked at until one has, which may take a while"
+        );
+    }
+
+    /// The samples of a block, which is kept.
+    fn look_at_block(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
+        for row in part.row..part.row + part.rows {
+            for column in part.column..part.column + part.columns {
+                add(self.stored(image, column, row));
+            }
+        }
+    }
+
+    /// The samples of a part that is no block: neither is it kept, nor is read what lies
+    /// around it.
+    fn look_once(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
+        let block = self.read(image, part).ok().and_then(|read| read.block);
+        for index in 0..part.columns as usize * part.rows as usize {
+            add(block.as_ref().and_then(|block| block.stored(index)));
+        }
+    }
+
+    fn coarsest(&self) -> Looks {
+        let image = self.reader.images().len().saturating_sub(1);
+        let images = self.reader.images();
+        let parts = images.get(image).map(|of| {
+            let is_stored = |part: &Part| self.reader.is_stored(image, part);
+            stored_parts(of, is_stored)
+        });
+        Looks {
+            image,
+            parts: parts.unwrap_or_default(),
+        }
+    }
+
+    fn samples(&self, image: usize) -> u64 {
+        let of = self.images.get(image);
+        of.map_or(0, |of| u64::from(of.columns) * u64::from(of.rows))
+    }
+}
+
+/// The blocks of an image that hold samples, or some of them where there are very many.
+pub(crate) fn stored_parts(of: &BlockImage, is_stored: impl Fn(&Part) -> bool) -> Vec<Part> {
+    let [across, down] = of.counts();
+    let every = || (0..down).flat_map(|row| (0..across).map(move |column| [column, row]));
+    let stored = || every().map(|at| of.part(at)).filter(&is_stored);
+    let step = match u64::from(across) * u64::from(down) > MOST_LISTED as u64 {
+        true => stored().count().div_ceil(MOST_LISTED).max(1),
+        false => 1,
+    };
+    stored().step_by(step).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_very_many_blocks_those_that_are_listed_are_stored() {
+        let of = BlockImage {
+            columns: 2048,
+            rows: 2048,
+            block: [1, 1],
+            every: None,
+            first: [0; 2],
+        };
+        let one = stored_parts(&of, |part| (part.column, part.row) == (1999, 7));
+        assert_eq!(one.len(), 1);
+        assert_eq!((one[0].column, one[0].row), (1999, 7));
+        let all = stored_parts(&of, |_| true);
+        assert_eq!(all.len(), MOST_LISTED);
+        assert!(all.last().is_some_and(|part| part.row == 2047));
+        let third = stored_parts(&of, |part| part.row.is_multiple_of(3));
+        assert!((MOST_LISTED / 2..=MOST_LISTED).contains(&third.len()));
+        assert!(third.iter().all(|part| part.row % 3 == 0));
+    }
+}

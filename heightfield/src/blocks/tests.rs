@@ -1,0 +1,343 @@
+//! A field that is known everywhere, read in blocks.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::cache::MOST_BYTES;
+use super::*;
+use crate::decoded::Decoded;
+use crate::storage::Storage;
+use crate::{OpenOptions, Raster};
+
+const SIZE: [u32; 2] = [1000, 700];
+const BLOCK: [u32; 2] = [64, 48];
+
+/// Full image, and an overview of every fourth sample each way; a block of the full one is
+/// not stored and one cannot be read.
+struct Field {
+    images: Vec<BlockImage>,
+    /// Samples that were read.
+    read: Arc<AtomicU64>,
+    /// A plane, so that samples between samples are known.
+    fault: bool,
+}
+
+fn plane(column: f64, row: f64) -> f64 {
+    3.0 * column - 2.0 * row
+}
+
+fn image(size: [u32; 2]) -> BlockImage {
+    BlockImage {
+        columns: size[0],
+        rows: size[1],
+        block: BLOCK,
+        every: None,
+        first: [0; 2],
+    }
+}
+
+impl Field {
+    fn new() -> (Self, Arc<AtomicU64>) {
+        let read = Arc::new(AtomicU64::new(0));
+        let field = Self {
+            images: vec![image(SIZE), image(SIZE.map(|count| count / 4))],
+            read: read.clone(),
+            fault: true,
+        };
+        (field, read)
+    }
+}
+
+impl BlockReader for Field {
+    fn format(&self) -> &'static str {
+        "test"
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        SampleType::F64
+    }
+
+    fn is_stored(&self, image: usize, part: &Part) -> bool {
+        !(self.fault && image == 0 && (part.column, part.row) == (64, 0))
+    }
+
+    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        if self.fault && image == 0 && (part.column, part.row) == (0, 48) {
+            return Err(BadRaster::Damaged("test".into()));
+        }
+        if self.fault && image == 0 && (part.column, part.row) == (64, 48) {
+            panic!("a decoder's");
+        }
+        let count = u64::from(part.columns) * u64::from(part.rows);
+        self.read.fetch_add(count, Ordering::Relaxed);
+        let times = if image == 0 { 1.0 } else { 4.0 };
+        let at = |index: u32| f64::from(index) * times + 0.5 * (times - 1.0);
+        let samples: Vec<f64> = (part.row..part.row + part.rows)
+            .flat_map(|row| (part.column..part.column + part.columns).map(move |c| (c, row)))
+            .map(|(column, row)| plane(at(column), at(row)))
+            .collect();
+        Ok(Block {
+            samples: samples.into(),
+            holes: None,
+            is_lacking: false,
+        })
+    }
+
+    fn index(&self) -> u64 {
+        7
+    }
+}
+
+fn raster(field: Field, south_up: bool, east_first: bool) -> Raster {
+    let size = (field.images[0].columns, field.images[0].rows);
+    let mut decoded = Decoded::new("test".into(), size, Storage::from(field));
+    decoded.south_up = south_up;
+    decoded.east_first = east_first;
+    Raster::checked(decoded, None).expect("a field")
+}
+
+#[test]
+fn a_touched_place_reads_its_block_once_and_nothing_else() {
+    let (field, read) = Field::new();
+    let raster = raster(field, true, false);
+    let survey = read.swap(0, Ordering::Relaxed);
+    assert_eq!(survey, 250 * 175, "the overview, all of it");
+    assert_eq!(raster.summary().looked_at, survey);
+    assert!(!raster.is_known_whole());
+    for _ in 0..2 {
+        assert_eq!(raster.height(300, 200), plane(300.0, 200.0));
+        assert_eq!(raster.height(301, 210), plane(301.0, 210.0));
+    }
+    assert_eq!(read.load(Ordering::Relaxed), 64 * 48);
+    // The last blocks are cut.
+    assert_eq!(raster.height(999, 699), plane(999.0, 699.0));
+    assert!(raster.height(1000, 699).is_nan());
+    assert!(raster.height(999, 700).is_nan());
+}
+
+#[test]
+fn what_is_not_stored_damaged_or_panics_is_a_hole_and_the_rest_is_felt() {
+    let (field, _) = Field::new();
+    let raster = raster(field, true, false);
+    for (column, row, is_hole) in [
+        (64, 0, true),
+        (127, 47, true),
+        (0, 48, true),
+        (63, 95, true),
+        (64, 48, true),
+        (63, 47, false),
+        (128, 48, false),
+        (128, 0, false),
+        (0, 96, false),
+    ] {
+        assert_eq!(
+            raster.height(column, row).is_nan(),
+            is_hole,
+            "{column} {row}"
+        );
+    }
+}
+
+#[test]
+fn coarse_levels_come_from_the_overview_in_their_place_whatever_the_files_order() {
+    for (south_up, east_first) in [(true, false), (false, false), (true, true), (false, true)] {
+        let (mut field, read) = Field::new();
+        field.fault = false;
+        let raster = raster(field, south_up, east_first);
+        read.store(0, Ordering::Relaxed);
+        let height = |column: u32, row: u32| {
+            let (column, row) = (f64::from(column), f64::from(row));
+            let column = if east_first { 999.0 - column } else { column };
+            let row = if south_up { row } else { 699.0 - row };
+            plane(column, row)
+        };
+        for level in [2, 3, 5] {
+            let mut heights = [0.0; 5];
+            raster.copy_row(level, 3, 2, &mut heights);
+            for (index, found) in (2..).zip(heights) {
+                let expected = height(index << level, 3 << level);
+                assert!(
+                    (found - expected).abs() < 1e-9,
+                    "{level}: {found} {expected}"
+                );
+            }
+        }
+        assert!(
+            read.load(Ordering::Relaxed) < 250 * 175,
+            "no full image was read"
+        );
+        // One step is finer than the overview.
+        assert_eq!(raster.surface(1, [400.0, 200.0]), height(400, 200));
+        let before = read.load(Ordering::Relaxed);
+        assert!(before >= 64 * 48);
+        // Where the overview's outermost samples end its surface is level.
+        let corner = raster.surface(2, [0.0, 0.0]);
+        assert!((corner - height(0, 0)).abs() <= 3.0 * 1.5 + 2.0 * 1.5);
+    }
+}
+
+#[test]
+fn the_memory_that_blocks_take_is_bounded() {
+    let mut field = Field::new().0;
+    let read = field.read.clone();
+    field.images = vec![image([20_000, 20_000])];
+    let blocks = Blocks::new(Box::new(field));
+    for block in 0..20_000 / 64 {
+        assert!(blocks.stored(0, block * 64, 4800).is_some());
+        for row in 1..20 {
+            blocks.stored(0, block * 64, 4800 + row * 480);
+        }
+    }
+    let kept = blocks.kept.lock().expect("alone");
+    assert!(8 * read.load(Ordering::Relaxed) > 2 * MOST_BYTES as u64);
+    assert!(kept.cache.bytes() <= MOST_BYTES, "{}", kept.cache.bytes());
+    assert!(kept.cache.bytes() > MOST_BYTES / 2);
+    drop(kept);
+    // The one touched last is still there.
+    let before = read.load(Ordering::Relaxed);
+    blocks.stored(0, (20_000 / 64 - 1) * 64, 4800 + 19 * 480);
+    assert_eq!(read.load(Ordering::Relaxed), before);
+}
+
+/// Reads of the same field by several threads at once, each over its own terrain, as several
+/// devices do.
+#[test]
+fn a_block_that_one_thread_read_is_not_read_again_for_another() {
+    let (mut field, read) = Field::new();
+    field.fault = false;
+    let raster = raster(field, true, false);
+    read.store(0, Ordering::Relaxed);
+    let walk = || {
+        for row in (0..SIZE[1]).step_by(7) {
+            for column in (0..SIZE[0]).step_by(5) {
+                let expected = plane(f64::from(column), f64::from(row));
+                assert_eq!(raster.height(column, row), expected);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(walk);
+        }
+    });
+    let samples = u64::from(SIZE[0]) * u64::from(SIZE[1]);
+    assert_eq!(read.load(Ordering::Relaxed), samples, "each block once");
+    let Storage::Blocks(blocks) = &raster.source.storage else {
+        panic!("it is read in blocks");
+    };
+    // The overview was read when the raster was opened.
+    let overview = samples / 16;
+    let held = blocks.share().0 as u64;
+    assert!(held >= 8 * (samples + overview), "{held}");
+    assert!(held < 9 * (samples + overview), "{held}: kept once");
+}
+
+/// A field of one block a row of them, of which the second is read as slowly as the test
+/// wants.
+struct Slow {
+    images: Vec<BlockImage>,
+    begun: Arc<std::sync::Barrier>,
+    go_on: Arc<std::sync::Barrier>,
+    elsewhere: bool,
+}
+
+impl BlockReader for Slow {
+    fn format(&self) -> &'static str {
+        "test"
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        SampleType::F64
+    }
+
+    fn is_stored(&self, _: usize, _: &Part) -> bool {
+        true
+    }
+
+    fn read(&self, _: usize, part: &Part) -> Result<Block, BadRaster> {
+        if part.column == BLOCK[0] {
+            if self.elsewhere {
+                return Err(BadRaster::NotYet);
+            }
+            self.begun.wait();
+            self.go_on.wait();
+        }
+        let count = (part.columns * part.rows) as usize;
+        Ok(Block {
+            samples: vec![1.0; count].into(),
+            holes: None,
+            is_lacking: false,
+        })
+    }
+
+    fn index(&self) -> u64 {
+        7
+    }
+}
+
+fn slow(elsewhere: bool) -> Slow {
+    let barrier = || Arc::new(std::sync::Barrier::new(2));
+    Slow {
+        images: vec![image([BLOCK[0] * 2, BLOCK[1]])],
+        begun: barrier(),
+        go_on: barrier(),
+        elsewhere,
+    }
+}
+
+#[test]
+fn whoever_touches_what_is_in_memory_does_not_wait_for_a_block_that_is_being_read() {
+    let field = slow(false);
+    let (begun, go_on) = (field.begun.clone(), field.go_on.clone());
+    let blocks = Blocks::new(Box::new(field));
+    assert_eq!(blocks.stored(0, 0, 0), Some(1.0));
+    std::thread::scope(|scope| {
+        scope.spawn(|| assert_eq!(blocks.stored(0, BLOCK[0], 0), Some(1.0)));
+        begun.wait();
+        // The other thread reads until it is told to go on.
+        let is_free = blocks.kept.try_lock().is_ok();
+        let sample = is_free.then(|| blocks.stored(0, 1, 1));
+        go_on.wait();
+        assert_eq!(sample, Some(Some(1.0)));
+    });
+}
+
+#[test]
+fn what_one_thread_misses_is_not_counted_for_another() {
+    let blocks = Blocks::new(Box::new(slow(true)));
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| {
+            let before = not_yet();
+            // The second time it is known without a look.
+            for times in 1..=2 {
+                assert_eq!(blocks.stored(0, BLOCK[0], 0), None);
+                assert_eq!(not_yet(), before + times);
+            }
+        });
+        let before = not_yet();
+        other.join().expect("it counts");
+        assert_eq!(blocks.stored(0, 0, 0), Some(1.0));
+        assert_eq!(not_yet(), before);
+    });
+}
+
+#[test]
+fn a_field_without_a_height_anywhere_is_refused() {
+    let (mut field, _) = Field::new();
+    field.fault = false;
+    let size = (SIZE[0], SIZE[1]);
+    let mut decoded = Decoded::new("test".into(), size, Storage::from(field));
+    decoded.scale = f64::MAX;
+    // Every height but zero is larger than any height.
+    let fault = Raster::checked(decoded, Some(0.0)).expect_err("no height");
+    assert!(matches!(fault, BadRaster::AllNoData { .. }), "{fault}");
+    assert_eq!(OpenOptions::default().most_in_memory_bytes, 128 << 20);
+}

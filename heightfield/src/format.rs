@@ -1,0 +1,120 @@
+//! What every terrain format tells about itself.
+
+use super::input::FileBytes;
+use super::{BadRaster, Decoded, OpenOptions};
+
+/// A format that can be read. Each file or folder of `formats` declares one.
+pub(super) struct Format {
+    /// Name in messages.
+    pub(super) name: &'static str,
+    /// Whether a file that begins with these bytes (its first kibibyte, or all of a
+    /// shorter one) is of this format.
+    pub(super) begins: fn(head: &[u8]) -> bool,
+    /// Extensions in lower case. Inside an archive, a file with one of them is a terrain.
+    pub(super) extensions: &'static [(&'static str, Claim)],
+    /// What a file has several of, so that the user may choose.
+    pub(super) parts: Parts,
+    /// Reads the heights of a file.
+    pub(super) decode: fn(&FileBytes, &OpenOptions) -> Result<Decoded, BadRaster>,
+}
+
+/// What a file of a format has several of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Parts {
+    /// Nothing: one field a file.
+    One,
+    /// Numbered bands.
+    Bands,
+    /// Variables with names.
+    Variables,
+}
+
+/// What an extension says about a file whose beginning says nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Claim {
+    /// The file is of this format.
+    Decides,
+    /// The file should be of this format, and is damaged.
+    Promises,
+    /// Nothing: other formats use the extension, too.
+    Suggests,
+}
+
+impl Format {
+    /// Checks that the user chooses by what the format has.
+    ///
+    /// # Errors
+    /// [`BadRaster::NoSuchPart`].
+    pub(super) fn check_choice(&self, options: &OpenOptions) -> Result<(), BadRaster> {
+        if options.encoding.is_some() && self.name != "PNG" {
+            return Err(BadRaster::NoSuchPart {
+                asked: "picture with heights in its colours".into(),
+                there: format!("the file is {}", self.name),
+            });
+        }
+        self.parts.check_choice(self.name, options)
+    }
+
+    /// What an extension says, if it is one of this format's.
+    pub(super) fn claim(&self, extension: &str) -> Option<Claim> {
+        let own = self.extensions.iter().find(|(own, _)| *own == extension);
+        own.map(|(_, claim)| *claim)
+    }
+}
+
+impl Parts {
+    /// Checks that the user chooses by what the format of a name has.
+    ///
+    /// # Errors
+    /// [`BadRaster::NoSuchPart`].
+    pub(super) fn check_choice(self, name: &str, options: &OpenOptions) -> Result<(), BadRaster> {
+        let refused = |asked: String, there: String| Err(BadRaster::NoSuchPart { asked, there });
+        let has = match self {
+            Self::One => "one field of heights",
+            Self::Bands => "bands, chosen by number",
+            Self::Variables => "variables, chosen by name",
+        };
+        match (&options.variable, options.band) {
+            (Some(variable), _) if self != Self::Variables => {
+                refused(format!("variable {variable}"), format!("{name} has {has}"))
+            }
+            (_, Some(band)) if self == Self::Variables || (band > 1 && self == Self::One) => {
+                refused(format!("band {band}"), format!("{name} has {has}"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether a file begins with one of some signatures.
+pub(super) fn starts_with_any(head: &[u8], signatures: &[&[u8]]) -> bool {
+    signatures
+        .iter()
+        .any(|signature| head.starts_with(signature))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::formats::FORMATS;
+    use super::*;
+    use crate::Encoding;
+
+    #[test]
+    fn a_choice_that_a_format_does_not_have_is_refused() {
+        let accepting = |options: &OpenOptions| {
+            let formats = FORMATS.iter();
+            let formats = formats.filter(|format| format.check_choice(options).is_ok());
+            formats.map(|format| format.name).collect::<Vec<_>>()
+        };
+        let mut options = OpenOptions::default();
+        assert_eq!(accepting(&options).len(), FORMATS.len());
+        options.band = Some(2);
+        assert_eq!(accepting(&options), ["TIFF", "raster with a .hdr"]);
+        options.band = None;
+        options.variable = Some("z".into());
+        assert_eq!(accepting(&options), ["NetCDF"]);
+        options.variable = None;
+        options.encoding = Some(Encoding::Terrarium);
+        assert_eq!(accepting(&options), ["PNG"]);
+    }
+}

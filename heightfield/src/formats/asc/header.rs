@@ -1,0 +1,139 @@
+//! The header: keys in any order and case, each followed by its number.
+
+use std::collections::HashMap;
+use std::io::Read;
+
+use super::tokens::Tokens;
+use crate::BadRaster;
+
+/// What Esri takes for no data where the header does not say.
+const DEFAULT_NO_DATA: f64 = -9999.0;
+
+/// The header's numbers, unchecked, each under the first of its key's spellings.
+#[derive(Debug, Default)]
+pub(super) struct Header(HashMap<&'static str, f64>);
+
+/// A key in lower case as its first spelling; `None` where there is no such key.
+fn known(key: &str) -> Option<&'static str> {
+    Some(match key {
+        "ncols" => "ncols",
+        "nrows" => "nrows",
+        "cellsize" => "cellsize",
+        "dx" | "xdim" => "dx",
+        "dy" | "ydim" => "dy",
+        "xllcorner" => "xllcorner",
+        "yllcorner" => "yllcorner",
+        "xllcenter" | "xllcentre" => "xllcenter",
+        "yllcenter" | "yllcentre" => "yllcenter",
+        "nodata_value" | "nodata" => "nodata",
+        _ => return None,
+    })
+}
+
+/// Whether a file begins with a header's key.
+pub(super) fn looks_like_header(head: &[u8]) -> bool {
+    let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
+    let text = String::from_utf8_lossy(head);
+    let mut words = text.split_ascii_whitespace();
+    words
+        .next()
+        .is_some_and(|word| known(&word.to_lowercase()).is_some())
+        && words.next().is_some_and(|word| number(word).is_some())
+}
+
+/// A number as these files write them: also with a decimal comma.
+pub(super) fn number(word: &str) -> Option<f64> {
+    word.parse().ok().or_else(|| {
+        let one_comma = word.matches(',').count() == 1 && !word.contains('.');
+        word.replace(',', ".").parse().ok().filter(|_| one_comma)
+    })
+}
+
+impl Header {
+    /// Reads keys and numbers up to the first sample.
+    pub(super) fn read<R: Read>(tokens: &mut Tokens<R>) -> Result<Self, BadRaster> {
+        let mut header = Self::default();
+        while let Some(word) = tokens.next()? {
+            let key = word.trim_start_matches('\u{feff}').to_lowercase();
+            let is_key =
+                key.starts_with(|c: char| c.is_ascii_alphabetic()) && number(&key).is_none();
+            if !is_key {
+                tokens.put_back();
+                break;
+            }
+            let known = known(&key)
+                .ok_or_else(|| BadRaster::damaged(format!("unknown header key '{key}'")))?;
+            let value = tokens.next()?.ok_or_else(|| {
+                BadRaster::Truncated(format!("it ends after the header key '{key}'"))
+            })?;
+            let value = number(value).ok_or_else(|| {
+                BadRaster::damaged(format!("header: {key} is '{value}', not a number"))
+            })?;
+            header.0.insert(known, value);
+        }
+        Ok(header)
+    }
+
+    fn get(&self, key: &str) -> Option<f64> {
+        self.0.get(key).copied()
+    }
+
+    /// Columns and rows, as far as numbers of samples go.
+    pub(super) fn size(&self) -> Result<(u32, u32), BadRaster> {
+        Ok((self.count("ncols")?, self.count("nrows")?))
+    }
+
+    /// Size of a cell, west to east and south to north.
+    pub(super) fn cell(&self) -> Result<(f64, f64), BadRaster> {
+        let east = self.side("dx")?;
+        let north = self.side("dy")?;
+        Ok((east, north))
+    }
+
+    /// The south-west corner of the field of `east × north` cells: stated as such, or
+    /// as the centre of the cell there.
+    pub(super) fn south_west(&self, (east, north): (f64, f64)) -> Option<(f64, f64)> {
+        let side = |corner, centre, step: f64| {
+            let by_centre = || self.get(centre).map(|at| at - step / 2.0);
+            self.get(corner).or_else(by_centre)
+        };
+        let west = side("xllcorner", "xllcenter", east)?;
+        Some((west, side("yllcorner", "yllcenter", north)?))
+    }
+
+    /// The value that means no data.
+    pub(super) fn no_data(&self) -> f64 {
+        self.get("nodata").unwrap_or(DEFAULT_NO_DATA)
+    }
+
+    fn count(&self, key: &str) -> Result<u32, BadRaster> {
+        match self.get(key).ok_or_else(|| missing(key))? {
+            value if value.fract() != 0.0 || value < 1.0 => Err(wrong(key, value)),
+            value if value > f64::from(i32::MAX) => {
+                Err(BadRaster::AbsurdSize(format!("{key} is {value}")))
+            }
+            value => Ok(value as u32),
+        }
+    }
+
+    /// A cell's side, under its own key or that of both sides.
+    fn side(&self, key: &str) -> Result<f64, BadRaster> {
+        let both = "cellsize";
+        match self
+            .get(key)
+            .or(self.get(both))
+            .ok_or_else(|| missing(both))?
+        {
+            value if value.is_finite() && value > 0.0 => Ok(value),
+            value => Err(wrong(both, value)),
+        }
+    }
+}
+
+fn missing(key: &str) -> BadRaster {
+    BadRaster::damaged(format!("the header has no {key}"))
+}
+
+fn wrong(key: &str, value: f64) -> BadRaster {
+    BadRaster::damaged(format!("header: {key} is {value}"))
+}

@@ -1,0 +1,55 @@
+//! Esri ASCII grids: a header of keys, then numbers in any layout of white space.
+
+mod header;
+mod tokens;
+mod values;
+
+#[cfg(test)]
+mod tests;
+
+use crate::decoded::Decoded;
+use crate::format::{Claim, Format, Parts};
+use crate::ground_map::GroundMap;
+use crate::input::FileBytes;
+use crate::{BadRaster, CellSize, SampleType, beside};
+use header::{Header, looks_like_header};
+pub(super) use tokens::Tokens;
+
+/// Esri ASCII grids.
+pub(super) const FORMAT: Format = Format {
+    name: "Esri ASCII",
+    begins: looks_like_header,
+    extensions: &[("asc", Claim::Decides), ("txt", Claim::Suggests)],
+    parts: Parts::One,
+    decode: |input, _| decode(input),
+};
+
+/// Reads a grid. Every sample takes at least a digit and a separator, so the
+/// file's length bounds what is allocated whatever its header says.
+fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
+    let mut tokens = Tokens::new(input.reader()?);
+    let header = Header::read(&mut tokens)?;
+    let (columns, rows) = header.size()?;
+    let samples = match input.is_outline() {
+        // What the numbers need is not known before they are read; heights need no more.
+        true => SampleType::F32.none(),
+        false => values::read(&mut tokens, &header, columns, rows, input.len())?,
+    };
+    let format = format!("Esri ASCII grid, {}", samples.type_name());
+    let mut decoded = Decoded::new(format, (columns, rows), samples);
+    decoded.no_data = Some(header.no_data());
+    let (east, north) = header.cell()?;
+    beside::reference_system(input, &mut decoded)?;
+    match header.south_west((east, north)) {
+        Some(corner) => {
+            let map = GroundMap::from_south_west(corner, (east, north), rows);
+            let map = map.ok_or_else(|| BadRaster::damaged("its header places it nowhere"))?;
+            decoded.lay_out(map, None);
+        }
+        None => {
+            let extent = (east * f64::from(columns), north * f64::from(rows));
+            decoded.cell = Some(CellSize::guessed((east, north), None, extent));
+        }
+    }
+    Ok(decoded)
+}

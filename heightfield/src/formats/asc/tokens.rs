@@ -1,0 +1,69 @@
+//! Words separated by white space, from a file of any length and line ends.
+
+use std::io::{BufReader, Bytes, Read};
+
+use crate::BadRaster;
+
+/// No number or key is longer; what is, is not text.
+const LONGEST_WORD: usize = 128;
+
+/// Hands out one word at a time.
+pub(in crate::formats) struct Tokens<R> {
+    bytes: Bytes<BufReader<R>>,
+    word: Vec<u8>,
+    /// The current word is handed out once more.
+    again: bool,
+}
+
+impl<R: Read> Tokens<R> {
+    pub(in crate::formats) fn new(reader: R) -> Self {
+        Self {
+            // Its own buffer makes a byte cheap, whatever the reader is.
+            bytes: BufReader::with_capacity(1 << 16, reader).bytes(),
+            word: Vec::new(),
+            again: false,
+        }
+    }
+
+    /// The next word, or `None` at the end of the file.
+    pub(in crate::formats) fn next(&mut self) -> Result<Option<&str>, BadRaster> {
+        if !std::mem::take(&mut self.again) {
+            self.read_word()?;
+        }
+        if self.word.is_empty() {
+            return Ok(None);
+        }
+        match std::str::from_utf8(&self.word) {
+            Ok(word) => Ok(Some(word)),
+            Err(_) => Err(BadRaster::damaged("it is not text")),
+        }
+    }
+
+    /// The word handed out last is handed out again.
+    pub(in crate::formats) fn put_back(&mut self) {
+        self.again = true;
+    }
+
+    fn read_word(&mut self) -> Result<(), BadRaster> {
+        self.word.clear();
+        for byte in self.bytes.by_ref() {
+            let byte = byte.map_err(BadRaster::Unreadable)?;
+            if !is_space(byte) {
+                self.word.push(byte);
+            } else if !self.word.is_empty() {
+                break;
+            }
+            if self.word.len() > LONGEST_WORD {
+                return Err(BadRaster::damaged(format!(
+                    "it has a word of more than {LONGEST_WORD} bytes: not a grid of numbers"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// White space, and what editors of other times put at the ends of files.
+fn is_space(byte: u8) -> bool {
+    byte.is_ascii_whitespace() || matches!(byte, 0x0b | 0x1a | 0x00)
+}

@@ -1,0 +1,302 @@
+//! Headers as GDAL, Esri's programs and ENVI write them, and what is refused.
+
+use std::fs;
+use std::path::Path;
+
+use tempfile::TempDir;
+
+use crate::{BadRaster, CellUnit, Error, OpenOptions, Raster, ReferenceSystem};
+
+/// A file and its header in a folder of their own.
+struct Pair {
+    folder: TempDir,
+    data: &'static str,
+}
+
+impl Pair {
+    fn new(data: &'static str, bytes: &[u8], header: &'static str, text: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join(data), bytes).expect("written");
+        fs::write(folder.path().join(header), text).expect("written");
+        Self { folder, data }
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        Path::new(self.folder.path()).join(name)
+    }
+
+    fn open(&self, band: Option<u32>) -> Result<Raster, Error> {
+        let options = OpenOptions {
+            band,
+            ..OpenOptions::default()
+        };
+        Raster::open(self.path(self.data), &options)
+    }
+}
+
+/// Heights from the north-western sample on.
+fn heights(raster: &Raster) -> Vec<f64> {
+    let rows = (0..raster.rows()).rev();
+    rows.flat_map(|row| (0..raster.columns()).map(move |column| (column, row)))
+        .map(|(column, row)| raster.height(column, row))
+        .collect()
+}
+
+const FLT: &str = "ncols 3\nnrows 2\nxllcorner 500000\nyllcorner 4100000\ncellsize 30\n\
+                   NODATA_value -9999\nbyteorder LSBFIRST\n";
+
+fn floats(values: [f32; 6], big: bool) -> Vec<u8> {
+    let bytes = values.map(|value| {
+        if big {
+            value.to_be_bytes()
+        } else {
+            value.to_le_bytes()
+        }
+    });
+    bytes.concat()
+}
+
+#[test]
+fn a_float_grid_with_its_place_and_holes() {
+    let stored = [1.5, -2.0, 3.0, -9999.0, 5.25, 6.0];
+    for (big, header) in [(false, FLT.to_owned()), (true, FLT.replace("LSB", "MSB"))] {
+        let pair = Pair::new("dem.flt", &floats(stored, big), "dem.hdr", &header);
+        let wkt = epsg_utils::epsg_to_wkt2(32611).expect("known");
+        fs::write(pair.path("dem.prj"), wkt).expect("written");
+        let raster = pair.open(None).expect("a grid");
+        let found = heights(&raster);
+        assert_eq!(found[..3], [1.5, -2.0, 3.0]);
+        assert!(found[3].is_nan() && raster.summary().holes == 1);
+        let bounds = raster.bounds().expect("placed");
+        let sides = [bounds.west, bounds.south, bounds.east, bounds.north];
+        assert_eq!(sides, [500_000.0, 4_100_000.0, 500_090.0, 4_100_060.0]);
+        assert_eq!(
+            raster.reference_system().and_then(ReferenceSystem::code),
+            Some(32611)
+        );
+    }
+}
+
+#[test]
+fn bands_by_line_by_pixel_and_after_each_other() {
+    // Band 1 is 1 to 6, band 2 is -1 to -6.
+    let by_line: [i16; 12] = [1, 2, 3, -1, -2, -3, 4, 5, 6, -4, -5, -6];
+    let by_pixel: [i16; 12] = [1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6];
+    let sequential: [i16; 12] = [1, 2, 3, 4, 5, 6, -1, -2, -3, -4, -5, -6];
+    for (name, layout, samples) in [
+        ("dem.bil", "BIL", by_line),
+        ("dem.bip", "BIP", by_pixel),
+        ("dem.bsq", "BSQ", sequential),
+    ] {
+        let esri = format!(
+            "BYTEORDER M\nLAYOUT {layout}\nNROWS 2\nNCOLS 3\nNBANDS 2\nNBITS 16\n\
+             PIXELTYPE SIGNEDINT\nULXMAP 10.5\nULYMAP 50\nXDIM 0.25\nYDIM 0.25\nNODATA 5\n"
+        );
+        let envi = format!(
+            "ENVI\ndescription = {{\n two lines,\n of text}}\nsamples = 3\nlines = 2\nbands = 2\n\
+             header offset = 0\ndata type = 2\ninterleave = {}\nbyte order = 1\n\
+             data ignore value = 5\nmap info = {{Geographic Lat/Lon, 1, 1, 10.375, 50.125, 0.25, \
+             0.25, WGS-84, units=Degrees}}\n",
+            layout.to_lowercase()
+        );
+        let bytes = samples.map(i16::to_be_bytes).concat();
+        for header in [esri, envi] {
+            let pair = Pair::new(name, &bytes, "dem.hdr", &header);
+            let raster = pair.open(None).expect("a grid");
+            let first = heights(&raster);
+            assert_eq!(first[..4], [1.0, 2.0, 3.0, 4.0], "{header}");
+            assert!(first[4].is_nan(), "{header}");
+            assert!(raster.remarks()[0].contains("2 bands"));
+            let second = heights(&pair.open(Some(2)).expect("its second band"));
+            assert_eq!(second, [-1.0, -2.0, -3.0, -4.0, -5.0, -6.0], "{header}");
+            assert_eq!(raster.cell().map(|cell| cell.unit), Some(CellUnit::Degree));
+            assert_eq!(
+                raster.bounds().map(|bounds| (bounds.west, bounds.north)),
+                Some((10.375, 50.125))
+            );
+            let error = pair.open(Some(3)).expect_err("two bands");
+            assert!(
+                matches!(error.fault(), BadRaster::NoSuchPart { .. }),
+                "{error}"
+            );
+            assert!(error.to_string().contains("bands 1 to 2"), "{error}");
+        }
+    }
+}
+
+/// ENVI's data may have any extension, or none, and a header's name appended to it.
+#[test]
+fn envi_data_has_any_name() {
+    let header = "ENVI\nsamples = 2\nlines = 2\nbands = 1\nheader offset = 3\ndata type = 12\n\
+                  interleave = bsq\nbyte order = 0\nmap info = {UTM, 1, 1, 400000, 5000000, 10, 10, \
+                  32, North, WGS-84, units=Meters}\n";
+    let bytes = [&[0; 3][..], &[1, 0, 2, 0, 3, 0, 0, 1]].concat();
+    for (data, beside) in [
+        ("dem.dat", "dem.hdr"),
+        ("dem", "dem.hdr"),
+        ("dem.img", "dem.img.hdr"),
+        ("dem.raw", "dem.hdr"),
+    ] {
+        let raster = Pair::new(data, &bytes, beside, header)
+            .open(None)
+            .expect(data);
+        assert_eq!(heights(&raster), [1.0, 2.0, 3.0, 256.0], "{data}");
+        let system = raster.reference_system().expect("by zone and datum");
+        assert_eq!(system.code(), Some(32632));
+        assert_eq!(raster.bounds().map(|bounds| bounds.west), Some(400_000.0));
+    }
+}
+
+/// A folder may have a database or a picture of the name that a header has.
+#[test]
+fn a_file_of_another_kind_has_no_samples_by_a_header_beside_it() {
+    let header = "ENVI\nsamples = 2\nlines = 2\nbands = 1\ndata type = 1\n";
+    for (data, bytes) in [
+        ("f.gpkg", &b"SQLite format 3\0 and more"[..]),
+        ("f.img", b"EHFA_HEADER_TAG\0 and more"),
+        ("f.jpg", b"\xff\xd8\xff\xe0\0\x10JFIF"),
+    ] {
+        let opened = Pair::new(data, bytes, "f.hdr", header).open(None);
+        assert!(opened.is_err(), "{data}");
+        let named_so = Pair::new("f.bil", bytes, "f.hdr", header).open(None);
+        assert!(named_so.is_ok(), "by its name it is samples");
+    }
+}
+
+/// GTOPO30's `.DEM` is such an image, though USGS' models have the same extension.
+#[test]
+fn a_header_beside_wins_over_the_extension() {
+    let header = "BYTEORDER      M\nLAYOUT       BIL\nNROWS         2\nNCOLS         2\n\
+                  NBANDS        1\nNBITS         16\nBANDROWBYTES         4\n\
+                  TOTALROWBYTES        4\nBANDGAPBYTES         0\nNODATA        -9999\n\
+                  ULXMAP        20.00416666666667\nULYMAP        39.99583333333333\n\
+                  XDIM          0.00833333333333\nYDIM          0.00833333333333\n";
+    let bytes = [12_i16, -9999, -3, 400].map(i16::to_be_bytes).concat();
+    let raster = Pair::new("E020N40.DEM", &bytes, "E020N40.HDR", header).open(None);
+    let found = heights(&raster.expect("a grid"));
+    assert_eq!([found[0], found[2], found[3]], [12.0, -3.0, 400.0]);
+    assert!(
+        found[1].is_nan(),
+        "a negative no-data value means signed samples"
+    );
+}
+
+/// Rows of each band after another, each with its own padding.
+#[test]
+fn rows_of_bands_may_be_padded() {
+    let header = "NROWS 2\nNCOLS 2\nNBANDS 2\nNBITS 8\nLAYOUT BIL\nBANDROWBYTES 3\n";
+    let bytes = [1, 2, 0, 5, 6, 0, 3, 4, 0, 7, 8, 0];
+    for (band, wanted) in [(1, [1.0, 2.0, 3.0, 4.0]), (2, [5.0, 6.0, 7.0, 8.0])] {
+        let pair = Pair::new("a.bil", &bytes, "a.hdr", header);
+        let raster = pair.open(Some(band)).expect("a grid");
+        assert_eq!(heights(&raster), wanted, "band {band}");
+    }
+}
+
+#[test]
+fn rows_may_be_padded() {
+    let header = "NROWS 2\nNCOLS 2\nNBITS 8\nTOTALROWBYTES 5\nSKIPBYTES 1\n";
+    let bytes = [9, 1, 2, 0, 0, 0, 3, 4, 0, 0, 0];
+    let found = heights(
+        &Pair::new("a.bil", &bytes, "a.hdr", header)
+            .open(None)
+            .expect("a grid"),
+    );
+    assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
+}
+
+#[test]
+fn integers_of_64_bits_and_gains() {
+    let header = "ENVI\nsamples = 2\nlines = 2\nbands = 1\ndata type = 14\nbyte order = 0\n\
+                  data gain values = {0.5}\ndata offset values = {100}\n";
+    let bytes = [2_i64, -4, 1 << 40, 0].map(i64::to_le_bytes).concat();
+    let found = heights(
+        &Pair::new("a.dat", &bytes, "a.hdr", header)
+            .open(None)
+            .expect("a grid"),
+    );
+    assert_eq!(found, [101.0, 98.0, (1_u64 << 39) as f64 + 100.0, 100.0]);
+}
+
+fn told(data: &'static str, bytes: &[u8], header: &str) -> (String, Error) {
+    let error = Pair::new(data, bytes, "a.hdr", header)
+        .open(None)
+        .expect_err("refused");
+    (error.to_string(), error)
+}
+
+#[test]
+fn what_is_wrong_is_named_and_no_room_is_made_for_it() {
+    let whole = floats([1.0; 6], false);
+    let (text, _) = told("a.flt", &whole[..23], FLT);
+    assert!(
+        text.contains("truncated") && text.contains("a.hdr"),
+        "{text}"
+    );
+    for absurd in [
+        "ncols 4000000000\nnrows 4000000000\n",
+        "ncols 1e300\nnrows 2\n",
+        "ncols 3\nnrows 2\nskipbytes 8e15\n",
+        "ncols 3\nnrows 4000000000\ntotalrowbytes 0\n",
+    ] {
+        let (text, _) = told("a.flt", &whole, absurd);
+        assert!(
+            text.contains("truncated")
+                || text.contains("absurd")
+                || text.contains("is 1e300")
+                || text.contains("is 1000"),
+            "{text}"
+        );
+    }
+    for (header, word) in [
+        ("ncols x\nnrows 2\n", "ncols is 'x'"),
+        ("ncols 0\nnrows 2\n", "no columns"),
+        ("ncols 3\nnrows 2\nlayout up\n", "layout up"),
+        ("ncols 3\nnrows 2\nnbits 12\n", "12 bits"),
+        (
+            "ncols 3\nnrows 2\ncellsize 0\nxllcorner 1\nyllcorner 1\n",
+            "no size",
+        ),
+        ("ENVI\nsamples = 3\nlines = 2\n", "data type"),
+        ("ENVI\nsamples = 3\nlines = 2\ndata type = 6\n", "complex"),
+        ("ENVI\nsamples = 3\ndata type = 4\n", "no lines"),
+        (
+            "ENVI\nsamples = 3\nlines = 2.5\ndata type = 4\n",
+            "lines is 2.5",
+        ),
+        (
+            "ENVI\nsamples = 3\nlines = 2\ndata type = 4\nfile compression = 1\n",
+            "compressed",
+        ),
+        (
+            "ENVI\nsamples = 3\nlines = 2\ndata type = 4\nmap info = {UTM, 1, 1}\n",
+            "map info",
+        ),
+        (
+            "ENVI\nsamples = 3\nlines = 2\ndata type = 4\nbands = 4000000000\ninterleave = bip\n",
+            "truncated",
+        ),
+    ] {
+        let (text, _) = told("a.flt", &whole, header);
+        assert!(text.contains(word), "{header}: {text}");
+    }
+}
+
+#[test]
+fn a_missing_header_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("dem.flt");
+    fs::write(&path, [0; 24]).expect("written");
+    let error = Raster::open(&path, &OpenOptions::default()).expect_err("no header");
+    assert!(
+        matches!(error.fault(), BadRaster::HeaderMissing(name) if name == "dem.hdr"),
+        "{error}"
+    );
+    // A picture's own header format has the same extension.
+    fs::write(folder.path().join("dem.hdr"), "#?RADIANCE\n").expect("written");
+    let error = Raster::open(&path, &OpenOptions::default()).expect_err("another header");
+    assert!(
+        matches!(error.fault(), BadRaster::HeaderMissing(_)),
+        "{error}"
+    );
+}

@@ -1,0 +1,43 @@
+//! Which of several variables or arrays in a file holds the heights.
+
+use crate::BadRaster;
+
+/// The place in `names` of the `asked` one; without that of the first of the names that
+/// heights `usual`ly have (words, the likeliest first), or of the only name. `kind` is
+/// what the file calls its parts, for messages.
+///
+/// # Errors
+/// When there are none, several with other names, or not the one that is asked for.
+pub(super) fn choose(
+    kind: &'static str,
+    names: &[&str],
+    usual: &str,
+    asked: Option<&str>,
+) -> Result<usize, BadRaster> {
+    if let Some(asked) = asked {
+        let exact = names.iter().position(|name| *name == asked);
+        let there = match names {
+            [] => format!("it has no two-dimensional {kind} of numbers"),
+            names => format!("its two-dimensional {kind}s are {}", names.join(", ")),
+        };
+        return exact.ok_or_else(|| BadRaster::NoSuchPart {
+            asked: format!("{kind} {asked}"),
+            there,
+        });
+    }
+    let place = |wanted: &str| {
+        let mut names = names.iter();
+        names.position(|name| name.eq_ignore_ascii_case(wanted))
+    };
+    match (usual.split_whitespace().find_map(place), names) {
+        (Some(place), _) => Ok(place),
+        (None, [_]) => Ok(0),
+        (None, []) => Err(BadRaster::NotAHeightField(format!(
+            "it has no two-dimensional {kind} of numbers"
+        ))),
+        (None, several) => Err(BadRaster::SeveralHeights {
+            kind,
+            names: several.iter().map(|name| (*name).to_owned()).collect(),
+        }),
+    }
+}

@@ -1,0 +1,41 @@
+//! Raw samples with a stated layout.
+
+use crate::decoded::Decoded;
+use crate::input::FileBytes;
+use crate::plain::Plain;
+use crate::read::Stored;
+use crate::{BadRaster, OpenOptions, RawLayout};
+
+/// Extensions of files that are nothing but samples.
+pub(crate) const EXTENSIONS: [&str; 4] = ["raw", "bin", "r16", "r32"];
+
+/// Reads `columns × rows` samples, north row first; the file must hold exactly
+/// those.
+pub(crate) fn decode(
+    input: &FileBytes,
+    layout: RawLayout,
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    let (columns, rows) = (layout.columns, layout.rows);
+    let (samples, bytes) = (u64::from(columns) * u64::from(rows), layout.sample.bytes());
+    let promised = samples
+        .checked_mul(bytes)
+        .ok_or_else(|| BadRaster::AbsurdSize(format!("{columns} × {rows}")))?;
+    let what = format!(
+        "{columns} × {rows} samples of {bytes} bytes are {promised} bytes, the file has {}",
+        input.len()
+    );
+    if input.len() < promised {
+        return Err(BadRaster::Truncated(what));
+    }
+    if input.len() > promised {
+        return Err(BadRaster::damaged(format!(
+            "the stated size is not its size: {what}"
+        )));
+    }
+    let stored = Stored::Held(layout.sample);
+    let plain = Plain::packed((columns, rows), stored, layout.endian, 0);
+    let format = format!("raw {}", layout.sample.none().type_name());
+    let storage = plain.storage(input, options)?;
+    Ok(Decoded::new(format, (columns, rows), storage))
+}

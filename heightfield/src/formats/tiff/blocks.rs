@@ -1,0 +1,529 @@
+//! A TIFF that stays on disk: full image, overviews and masks, read in blocks of whole
+//! strips or tiles, or of parts of large ones that are plain samples.
+
+use std::hash::Hasher;
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+use tiff_reader::{TagValue, TiffFile};
+use twox_hash::XxHash64;
+
+use super::images::Directory;
+use super::layout::Layout;
+use super::masks::Mask;
+use super::samples::{holes, read};
+use super::uncompressed::rows;
+use super::{budget, images};
+use crate::blocks::{
+    Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, stored_parts,
+};
+use crate::disk_cache::{DiskCache, FileStamp};
+use crate::guard::guarded;
+use crate::input::FileBytes;
+use crate::remote::RemoteFile;
+use crate::samples::{HoleMask, SampleValue, with_samples};
+use crate::unread::Unread;
+use crate::{BadRaster, SampleType};
+
+/// Small strips and tiles are read several at once, samples each way.
+const USUAL_BLOCK: u32 = 256;
+/// Of longer rows of plain samples parts are read.
+const LONGEST_ROW: u32 = 32_768;
+
+/// Whether single blocks of an image can be read: its rows can, or a strip or tile is not too
+/// large.
+fn suit(layout: &Layout) -> bool {
+    layout.is_read_by_rows() || is_small(layout, chunks(layout))
+}
+
+/// Whether a block of so many columns and rows is not too large to be decoded.
+fn is_small(layout: &Layout, block: [u32; 2]) -> bool {
+    let [columns, rows] = block.map(u64::from);
+    let samples = columns.saturating_mul(rows);
+    samples.saturating_mul(layout.texel_bytes().max(8)) <= LARGEST_BLOCK_BYTES
+}
+
+/// Columns and rows of a block. Of plain samples it is a square, or of a file elsewhere a wide one,
+/// because what lies together comes together; with all of its bands it is not too large.
+fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
+    if !layout.is_read_by_rows() {
+        return chunks(layout);
+    }
+    let usual = if is_elsewhere {
+        LONGEST_ROW
+    } else {
+        USUAL_BLOCK
+    };
+    let texels = (LARGEST_BLOCK_BYTES / layout.texel_bytes()).min(u32::MAX.into()) as u32;
+    let columns = layout.chunk.0.min(usual).min(texels).max(1);
+    let rows = USUAL_BLOCK * USUAL_BLOCK / columns;
+    [columns, rows.min(texels / columns).max(1)]
+}
+
+/// As few whole strips or tiles as make a usual block.
+fn chunks(layout: &Layout) -> [u32; 2] {
+    let (columns, rows) = layout.chunk;
+    let several = |chunk: u32| chunk.saturating_mul(USUAL_BLOCK.div_ceil(chunk));
+    // A strip is as wide as the image: of wide ones few are read at once.
+    let usual = USUAL_BLOCK * USUAL_BLOCK / columns.clamp(1, USUAL_BLOCK * USUAL_BLOCK);
+    let down = match columns > USUAL_BLOCK {
+        true => rows.saturating_mul(usual.max(1).div_ceil(rows)),
+        false => several(rows),
+    };
+    [several(columns), down]
+}
+
+/// Where the bytes of a part lie in the file.
+fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
+    let mut ranges = vec![];
+    let bands = layout.bands_read();
+    let chunks = bands.flat_map(|band| layout.chunks_of(band, part));
+    for chunk in chunks.filter(|chunk| chunk.bytes > 0) {
+        match layout.is_plain {
+            true => ranges.extend(rows(layout, &chunk, part).map(|range| {
+                let at = |offset: u64| chunk.place.saturating_add(offset);
+                at(range.start)..at(range.end)
+            })),
+            false => ranges.push(chunk.place..chunk.place.saturating_add(chunk.bytes)),
+        }
+    }
+    ranges
+}
+
+/// A TIFF on disk.
+pub(super) struct TiffBlocks {
+    /// The main file and the one of overviews beside it, where they are elsewhere.
+    remote: Vec<Option<Arc<RemoteFile>>>,
+    unread: Unread,
+    /// The main file and the mask's, each with its state when it was opened; `None` where one
+    /// was changed meanwhile.
+    inputs: Option<Vec<(FileBytes, FileStamp)>>,
+    /// [`BlockReader::index`], once it was asked for.
+    index: OnceLock<u64>,
+    /// The full image and its overviews.
+    images: Vec<Image>,
+    /// The same as the rest of the program knows them.
+    blocks: Vec<BlockImage>,
+}
+
+/// A file, and the same as it is elsewhere.
+pub(super) type Opened = (Arc<TiffFile>, Option<Arc<RemoteFile>>);
+
+/// The main file, and one of overviews beside it.
+const MAIN: usize = 0;
+
+/// What is known of a file before its blocks are read.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'k> {
+    /// Its name in warnings.
+    pub(super) name: &'k str,
+    /// The band that the user chose, the first being 1.
+    pub(super) asked: Option<u32>,
+    /// Its numbers are classes.
+    pub(super) classes: bool,
+    /// The file of a mask beside it.
+    pub(super) mask: Option<&'k Arc<TiffFile>>,
+    /// Where large strips and tiles may be unpacked, or why they may not.
+    pub(super) disk: Result<&'k DiskCache, &'k str>,
+}
+
+/// An image with its masks.
+pub(super) struct Image {
+    /// Number of the file that it is in.
+    file: usize,
+    pub(super) layout: Layout,
+    pub(super) masks: Vec<Mask>,
+}
+
+impl Image {
+    /// An image of the main file.
+    pub(super) fn of(directory: &Directory, known: &Known<'_>) -> Result<Self, BadRaster> {
+        Ok(Self {
+            file: MAIN,
+            layout: Layout::read(directory, known.asked, known.classes)?,
+            masks: Mask::all(directory, known.mask),
+        })
+    }
+
+    /// Whether parts of it can be read, and nothing has to be unpacked for that.
+    pub(super) fn has_parts(&self) -> bool {
+        suit(&self.layout)
+    }
+
+    /// Makes it an image of which blocks are read.
+    ///
+    /// # Errors
+    /// Why that cannot be.
+    pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
+        let chunks = self.layout.chunks_name();
+        if !suit(&self.layout) {
+            let unpacked = match disk {
+                Ok(disk) => (self.layout.unpack_into(disk)).map_err(|error| error.to_string()),
+                Err(why) => Err(why.to_owned()),
+            };
+            unpacked.map_err(|why| {
+                format!("its {chunks} are too large to be read in parts, and {why}")
+            })?;
+        }
+        let mut masks = self.masks.iter_mut();
+        let left = masks.try_for_each(|mask| mask.leave_in_file(disk));
+        left.map_err(|why| {
+            self.layout.unpacked = None;
+            format!("the strips or tiles of its mask are too large to be read in parts, and {why}")
+        })
+    }
+
+    /// Bytes that it takes unpacked on disk at most.
+    pub(super) fn unpacked_bytes(&self) -> u64 {
+        let own = self.layout.unpacked.as_ref();
+        let masks = self.masks.iter().map(Mask::unpacked_bytes);
+        own.map_or(0, |unpacked| unpacked.most_bytes()) + masks.sum::<u64>()
+    }
+}
+
+impl TiffBlocks {
+    /// The full image of a file, [left in it](Image::leave_in_file), and the overviews in the file
+    /// and in one beside it that are of the same kind.
+    pub(super) fn new(
+        (file, remote): Opened,
+        full: Image,
+        overviews: Option<Opened>,
+        known: &Known<'_>,
+        inputs: &[&FileBytes],
+    ) -> Result<Self, BadRaster> {
+        let (also, also_remote) = overviews.unzip();
+        let files: Vec<_> = [file].into_iter().chain(also).collect();
+        let remote: Vec<_> = [remote].into_iter().chain(also_remote).collect();
+        let mut found = vec![full];
+        for (index, file) in files.iter().enumerate() {
+            for directory in images::overviews(file) {
+                // An overview that cannot be used is no reason not to feel the field.
+                let Ok(image) = Image::of(&directory, known) else {
+                    continue;
+                };
+                let mut image = Image {
+                    file: index,
+                    ..image
+                };
+                let bytes = file.source().len();
+                let suits = budget::check(&image.layout, bytes, true).is_ok()
+                    && image.is_overview_of(&found[MAIN])
+                    && image.leave_in_file(known.disk).is_ok();
+                if suits {
+                    found.push(image);
+                }
+            }
+        }
+        found.sort_by_key(|image| std::cmp::Reverse(image.layout.columns));
+        found.dedup_by_key(|image| image.layout.columns);
+        let is_elsewhere = remote.iter().any(Option::is_some);
+        let blocks = found.iter().map(|image| BlockImage {
+            columns: image.layout.columns,
+            rows: image.layout.rows,
+            block: block(&image.layout, is_elsewhere),
+            every: None,
+            first: [0; 2],
+        });
+        Ok(Self {
+            blocks: blocks.collect(),
+            remote,
+            unread: Unread::of(known.name),
+            inputs: stamped(inputs)?,
+            index: OnceLock::new(),
+            images: found,
+        })
+    }
+
+    /// A part of an image.
+    fn block(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let Image { layout, masks, .. } = &self.images[image];
+        Ok(Block {
+            samples: read(layout, layout.band, part)?,
+            holes: holes(layout, masks, part)?,
+            is_lacking: false,
+        })
+    }
+
+    /// A part of an image of which something cannot be read: strips and tiles that cannot are
+    /// holes, with a warning, and the others are not.
+    fn by_chunks(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let mut all = self.nothing_of(part);
+        let stored = self.images[image].layout.chunks_in(part);
+        for chunk in stored.filter(|chunk| chunk.bytes > 0) {
+            let inside = chunk.covers.within(part);
+            let read = || self.block(image, &inside);
+            if let Some(block) = self.try_read(image, &chunk.covers, read)? {
+                copy(&block, &inside, &mut all, part);
+            }
+        }
+        Ok(all)
+    }
+
+    /// The same of samples that are read by rows, of which any row may be read without the others. What masks
+    /// them is decoded once.
+    fn by_rows(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let Image { layout, masks, .. } = &self.images[image];
+        let mut all = self.nothing_of(part);
+        let masked = || holes(layout, masks, part);
+        let masked = match guarded(super::FORMAT.name, masked) {
+            Ok(masked) => masked,
+            Err(fault) if fault.is_of_the_line() => return Err(fault),
+            Err(fault) => {
+                self.unread.warn(image, part, &fault);
+                return Ok(all);
+            }
+        };
+        for row in part.row..part.row + part.rows {
+            let row = Part {
+                row,
+                rows: 1,
+                ..*part
+            };
+            let read = || read(layout, layout.band, &row);
+            if let Some(samples) = self.try_read(image, &row, read)? {
+                let block = Block {
+                    samples,
+                    holes: None,
+                    is_lacking: false,
+                };
+                copy(&block, &row, &mut all, part);
+            }
+        }
+        if let (Some(holes), Some(masked)) = (&mut all.holes, masked) {
+            holes.union_with(&masked);
+        }
+        Ok(all)
+    }
+
+    /// What can be read of a piece; `None`, with a warning the first time, where it cannot.
+    fn try_read<T>(
+        &self,
+        image: usize,
+        piece: &Part,
+        read: impl FnOnce() -> Result<T, BadRaster>,
+    ) -> Result<Option<T>, BadRaster> {
+        let first = [piece.column, piece.row];
+        if self.unread.has(image, first) {
+            return Ok(None);
+        }
+        match guarded(super::FORMAT.name, read) {
+            Ok(read) => Ok(Some(read)),
+            Err(fault) if fault.is_of_the_line() => Err(fault),
+            Err(fault) => {
+                self.unread.warn(image, piece, &fault);
+                Ok(None)
+            }
+        }
+    }
+
+    /// A part in which everything is a hole as yet.
+    fn nothing_of(&self, part: &Part) -> Block {
+        let count = part.columns as usize * part.rows as usize;
+        let mut samples = self.images[MAIN].layout.sample().held().none();
+        with_samples!(&mut samples, values => values.resize(count, SampleValue::nearest(0.0)));
+        let mut holes = HoleMask::with_capacity(count);
+        holes.insert_range(..);
+        Block {
+            samples,
+            holes: Some(holes),
+            is_lacking: true,
+        }
+    }
+}
+
+/// Copies a piece of a part to its place there. What is no hole of the piece is none of the part.
+fn copy(block: &Block, piece: &Part, to: &mut Block, part: &Part) {
+    let (columns, width) = (piece.columns as usize, part.columns as usize);
+    for index in 0..columns * piece.rows as usize {
+        let Some(value) = block.stored(index) else {
+            continue;
+        };
+        let row = (piece.row - part.row) as usize + index / columns;
+        let at = row * width + (piece.column - part.column) as usize + index % columns;
+        with_samples!(&mut to.samples, values => values[at] = SampleValue::nearest(value));
+        if let Some(holes) = &mut to.holes {
+            holes.remove(at);
+        }
+    }
+}
+
+/// Files that were opened, to be asked for their state again.
+fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>, BadRaster> {
+    let mut all = vec![];
+    for input in inputs {
+        // The decoder has opened the file at the path by itself.
+        let stamp = input.stamp().filter(|_| input.is_at_its_path());
+        match (input.again()?, stamp) {
+            (Some(own), Some(stamp)) => all.push((own, stamp)),
+            _ => return Ok(None),
+        }
+    }
+    Ok(Some(all))
+}
+
+impl Image {
+    /// Whether it shows all of another image in fewer samples of the same type and index.
+    fn is_overview_of(&self, full: &Self) -> bool {
+        let (ours, theirs) = (&self.layout, &full.layout);
+        let times = [
+            f64::from(theirs.columns) / f64::from(ours.columns),
+            f64::from(theirs.rows) / f64::from(ours.rows),
+        ];
+        // Half an odd number of samples is rounded up or down.
+        let one = 1.0 / f64::from(ours.columns.min(ours.rows).max(1));
+        ours.stored == theirs.stored
+            && ours.bands == theirs.bands
+            && times[0] > 1.0
+            && (times[0] / times[1] - 1.0).abs() <= 1.5 * one
+            && ours.of_band().is_some()
+            && self.has_place_of(full, times)
+    }
+
+    fn tag(&self, number: u16) -> Option<&TagValue> {
+        self.layout
+            .directory
+            .ifd()
+            .tag(number)
+            .map(|tag| &tag.value)
+    }
+
+    /// Whether it lies where another image lies, as far as it says so: most overviews do not.
+    fn has_place_of(&self, full: &Self, times: [f64; 2]) -> bool {
+        const PIXEL_SCALE: u16 = 33550;
+        const TIE_POINTS: u16 = 33922;
+        const TRANSFORM: u16 = 34264;
+        const GEO_KEYS: u16 = 34735;
+        // Sizes are those of cells; half a cell of the overview is no other place.
+        const OF_A_CELL: f64 = 0.5;
+        let keys = |image: &Self| Some(image.tag(GEO_KEYS)?.as_u16_slice()?.to_vec());
+        if keys(self).is_some_and(|own| keys(full) != Some(own)) {
+            return false;
+        }
+        let numbers = |image: &Self, number: u16| image.tag(number).and_then(TagValue::as_f64_vec);
+        let (Some(cell), Some(tie)) = (numbers(self, PIXEL_SCALE), numbers(self, TIE_POINTS))
+        else {
+            // A transform says what scale and tie points say.
+            return self.tag(TRANSFORM).is_none() || full.tag(TRANSFORM).is_some();
+        };
+        let (Some(full_cell), Some(full_tie)) =
+            (numbers(full, PIXEL_SCALE), numbers(full, TIE_POINTS))
+        else {
+            return false;
+        };
+        if (&cell, &tie) == (&full_cell, &full_tie) {
+            // Copied with the other tags of the full image: nothing is said of the overview.
+            return true;
+        }
+        (0..2).all(|axis| {
+            let at = |numbers: &[f64], index: usize| numbers.get(index).copied();
+            let (Some(own), Some(of_full)) = (at(&cell, axis), at(&full_cell, axis)) else {
+                return false;
+            };
+            let same_size = (own / of_full / times[axis] - 1.0).abs() <= 0.1;
+            let corner = |tie: &[f64], cell: f64| {
+                let along = if axis == 0 { cell } else { -cell };
+                Some(at(tie, axis + 3)? - at(tie, axis)? * along)
+            };
+            let corners = corner(&tie, own).zip(corner(&full_tie, of_full));
+            same_size && corners.is_some_and(|(a, b)| (a - b).abs() <= OF_A_CELL * own.abs())
+        })
+    }
+}
+
+impl BlockReader for TiffBlocks {
+    fn format(&self) -> &'static str {
+        super::FORMAT.name
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.blocks
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.images[MAIN].layout.sample().held()
+    }
+
+    fn is_stored(&self, image: usize, part: &Part) -> bool {
+        let mut chunks = self.images[image].layout.chunks_in(part);
+        chunks.any(|chunk| chunk.bytes > 0)
+    }
+
+    fn want(&self, image: usize, parts: &[Part]) {
+        let Image { file, layout, .. } = &self.images[image];
+        if let Some(remote) = &self.remote[*file] {
+            remote.want(parts.iter().flat_map(|part| ranges(layout, part)));
+        }
+    }
+
+    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        // The decoder asks for one chunk after the other.
+        self.want(image, std::slice::from_ref(part));
+        match self.block(image, part) {
+            Err(fault) if !fault.is_of_the_line() => {
+                match self.images[image].layout.is_read_by_rows() {
+                    true => self.by_rows(image, part),
+                    false => self.by_chunks(image, part),
+                }
+            }
+            block => block,
+        }
+    }
+
+    fn stamp(&self, image: usize, _: &Part) -> Option<String> {
+        let mut text = format!("{:x} band {}", self.index(), self.images[image].layout.band);
+        for (input, stamp) in self.inputs.as_ref()? {
+            let is_same = input.stamp().as_ref() == Some(stamp);
+            text += " ";
+            text += stamp.settled().filter(|_| is_same)?;
+        }
+        Some(text)
+    }
+
+    fn kept_bytes(&self) -> usize {
+        let pages = match self.remote.iter().any(Option::is_some) {
+            true => RemoteFile::kept_bytes(),
+            false => 0,
+        };
+        let lists = self.images.iter().map(|image| image.layout.index_bytes());
+        pages + lists.sum::<usize>()
+    }
+
+    fn looks(&self) -> Option<Looks> {
+        let image = self.images.len() - 1;
+        let layout = &self.images[image].layout;
+        // The same file is looked at in the same places whether it is here or elsewhere, and in
+        // whole strips or tiles where these are small, as in versions that decoded them.
+        let decoded = chunks(layout);
+        let looked_at = BlockImage {
+            block: match is_small(layout, decoded) {
+                true => decoded,
+                false => block(layout, true),
+            },
+            ..self.blocks[image]
+        };
+        let is_stored = |part: &Part| self.is_stored(image, part);
+        layout.is_plain.then(|| Looks {
+            image,
+            parts: stored_parts(&looked_at, is_stored),
+        })
+    }
+
+    fn index(&self) -> u64 {
+        *self.index.get_or_init(|| self.hash_of_index())
+    }
+}
+
+impl TiffBlocks {
+    fn hash_of_index(&self) -> u64 {
+        let mut hasher = XxHash64::with_seed(0);
+        for image in &self.images {
+            hasher.write_u32(image.layout.columns);
+            hasher.write_u32(image.layout.rows);
+            let bytes = image.layout.of_band().into_iter().flatten();
+            for number in image.layout.places().chain(bytes.map(|(_, bytes)| bytes)) {
+                hasher.write_u64(number);
+            }
+        }
+        hasher.finish()
+    }
+}

@@ -1,0 +1,226 @@
+//! Where the image lies: reference system, map to the ground, units.
+
+use geotiff_core::geokeys::{
+    GEODETIC_CRS_TYPE, GEOG_ANGULAR_UNITS, GEOG_CITATION, GT_CITATION, GT_MODEL_TYPE,
+    GT_RASTER_TYPE, GeoKeyDirectory, PROJ_CITATION, PROJ_LINEAR_UNITS, PROJECTED_CRS_TYPE,
+    VERTICAL_CS_TYPE, VERTICAL_UNITS,
+};
+use tiff_reader::Ifd;
+
+use super::user_defined;
+use crate::Certainty;
+use crate::crs::{self, ReferenceSystem};
+use crate::decoded::Decoded;
+use crate::ground_map::GroundMap;
+use crate::placed::GroundUnit;
+
+const MODEL_PIXEL_SCALE: u16 = 33550;
+const MODEL_TIEPOINT: u16 = 33922;
+const MODEL_TRANSFORMATION: u16 = 34264;
+const GEO_KEY_DIRECTORY: u16 = 34735;
+const GEO_DOUBLE_PARAMS: u16 = 34736;
+const GEO_ASCII_PARAMS: u16 = 34737;
+
+/// Sets reference system, place, cell size, units and orientation as far as the file
+/// states them. `stated` are the metres in a vertical unit by the file's own notes.
+pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>) {
+    let keys = GeoKeys::read(image);
+    let system = keys.code(VERTICAL_CS_TYPE).and_then(crs::vertical);
+    let stated = stated.or_else(|| keys.code(VERTICAL_UNITS).and_then(metres_of_code));
+    decoded.set_vertical(system, stated);
+    decoded.system = keys.system();
+    if let Some(map) = ground_map(image, &keys) {
+        decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
+        decoded.lay_out(map, keys.unit());
+        if !has_place(image) {
+            decoded.place = None;
+        }
+    }
+}
+
+/// A scale alone tells the cells' size, but not where they are.
+fn has_place(image: &Ifd) -> bool {
+    let placed = [MODEL_TRANSFORMATION, MODEL_TIEPOINT];
+    placed.iter().any(|tag| !numbers(image, *tag).is_empty())
+}
+
+/// The map from column and row to ground coordinates. A negative step of the scale
+/// stays one: such files are south-up.
+fn ground_map(image: &Ifd, keys: &GeoKeys) -> Option<GroundMap> {
+    let numbers = |tag| numbers(image, tag);
+    let (x, y) = match (
+        numbers(MODEL_TRANSFORMATION).as_slice(),
+        numbers(MODEL_PIXEL_SCALE).as_slice(),
+        numbers(MODEL_TIEPOINT).as_slice(),
+    ) {
+        (&[a, b, _, x, d, e, _, y, ..], _, _) => ([x, a, b], [y, d, e]),
+        (_, &[east, north, ..], &[column, row, _, x, y, ..]) => (
+            [x - column * east, east, 0.0],
+            [y + row * north, 0.0, -north],
+        ),
+        // A scale without a place.
+        (_, &[east, north, ..], _) => ([0.0, east, 0.0], [0.0, 0.0, -north]),
+        _ => return None,
+    };
+    match keys.are_points() {
+        true => GroundMap::from_centre(x, y),
+        false => GroundMap::new(x, y),
+    }
+}
+
+fn numbers(image: &Ifd, tag: u16) -> Vec<f64> {
+    let tag = image.tag(tag);
+    tag.and_then(|tag| tag.value.as_f64_vec())
+        .unwrap_or_default()
+}
+
+/// Values of [`GT_MODEL_TYPE`].
+const PROJECTED: u16 = 1;
+const GEOGRAPHIC: u16 = 2;
+/// The key of a linear unit's size in metres, where the unit has no code.
+const LINEAR_UNIT_SIZE: u16 = 3077;
+
+/// The GeoTIFF keys, if there are any.
+pub(super) struct GeoKeys(Option<GeoKeyDirectory>);
+
+impl GeoKeys {
+    fn read(image: &Ifd) -> Self {
+        let doubles = numbers(image, GEO_DOUBLE_PARAMS);
+        let texts = image.tag(GEO_ASCII_PARAMS);
+        let texts = texts.and_then(|tag| tag.value.as_str()).unwrap_or_default();
+        let directory = image.tag(GEO_KEY_DIRECTORY);
+        let directory = directory.and_then(|tag| tag.value.as_u16_slice());
+        Self(directory.and_then(|keys| GeoKeyDirectory::parse(keys, &doubles, texts)))
+    }
+
+    pub(super) fn code(&self, key: u16) -> Option<u16> {
+        self.0.as_ref()?.get_short(key)
+    }
+
+    pub(super) fn number(&self, key: u16) -> Option<f64> {
+        self.0.as_ref()?.get_double(key)?.first().copied()
+    }
+
+    /// All numbers of a key.
+    pub(super) fn numbers(&self, key: u16) -> &[f64] {
+        let numbers = self.0.as_ref().and_then(|keys| keys.get_double(key));
+        numbers.unwrap_or_default()
+    }
+
+    /// The first line of a text.
+    pub(super) fn text(&self, key: u16) -> Option<&str> {
+        let text = self.whole_text(key)?.split('|').next()?.trim();
+        (!text.is_empty()).then_some(text)
+    }
+
+    /// A text, its lines between bars.
+    pub(super) fn whole_text(&self, key: u16) -> Option<&str> {
+        let text = self.0.as_ref()?.get_ascii(key)?;
+        Some(text.trim_matches(['\0', ' ']))
+    }
+
+    /// Whether coordinates belong to the centres of samples, not to corners of cells.
+    fn are_points(&self) -> bool {
+        const PIXEL_IS_POINT: u16 = 2;
+        self.code(GT_RASTER_TYPE) == Some(PIXEL_IS_POINT)
+    }
+
+    /// The horizontal reference system: by its code, or by what it is called.
+    fn system(&self) -> Option<ReferenceSystem> {
+        let code = match self.is_projected()? {
+            true => self.known(PROJECTED_CRS_TYPE),
+            false => self.known(GEODETIC_CRS_TYPE),
+        };
+        let known = code.and_then(ReferenceSystem::from_code);
+        if let Some(system) = known.or_else(|| self.system_in_text()) {
+            return Some(system);
+        }
+        let is_projected = self.is_projected()?;
+        let own_name = self.text(match is_projected {
+            true => PROJ_CITATION,
+            false => GEOG_CITATION,
+        });
+        let unknown = code.map(|code| format!("EPSG:{code}, not known here"));
+        let name = unknown.as_deref().or(own_name).or(self.text(GT_CITATION));
+        Some(match is_projected {
+            true => user_defined::projected(self, name, self.known(GEODETIC_CRS_TYPE)),
+            false => user_defined::geographic(self, name),
+        })
+    }
+
+    /// Projections that no keys are made for are written as Esri's text into the citation.
+    fn system_in_text(&self) -> Option<ReferenceSystem> {
+        let texts = [PROJ_CITATION, GT_CITATION].map(|key| self.whole_text(key));
+        let mut texts = texts.into_iter().flatten();
+        let text = texts.find_map(|text| text.strip_prefix("ESRI PE String = "))?;
+        ReferenceSystem::from_wkt(text.trim_end_matches('|')).0
+    }
+
+    /// A code that is one of EPSG's.
+    fn known(&self, key: u16) -> Option<u16> {
+        const USER_DEFINED: u16 = 32767;
+        self.code(key).filter(|code| *code != USER_DEFINED)
+    }
+
+    /// Metres in the linear unit, where the file states it.
+    pub(super) fn stated_metres(&self) -> Option<f64> {
+        let named = self.code(PROJ_LINEAR_UNITS).and_then(metres_of_code);
+        let metres = named.or(self.number(LINEAR_UNIT_SIZE));
+        metres.filter(|metres| metres.is_finite() && *metres > 0.0)
+    }
+
+    /// Whether coordinates are lengths on a map, or angles.
+    fn is_projected(&self) -> Option<bool> {
+        match self.code(GT_MODEL_TYPE) {
+            Some(PROJECTED) => Some(true),
+            Some(GEOGRAPHIC) => Some(false),
+            _ if self.code(PROJECTED_CRS_TYPE).is_some() => Some(true),
+            // A map of a kind of its own, which stands on a geographic system.
+            _ if self.code(PROJ_LINEAR_UNITS).is_some() => Some(true),
+            _ if self.code(GEODETIC_CRS_TYPE).is_some() => Some(false),
+            _ => None,
+        }
+    }
+
+    /// The unit of the ground coordinates.
+    fn unit(&self) -> Option<GroundUnit> {
+        if !self.is_projected()? {
+            return Some(GroundUnit::angle(self.degrees()));
+        }
+        let code = self.known(PROJECTED_CRS_TYPE);
+        Some(
+            match (self.stated_metres(), code.and_then(crs::metres_per_unit)) {
+                (Some(metres), _) => GroundUnit::length(metres, Certainty::Stated),
+                (None, Some(metres)) => GroundUnit::length(metres, Certainty::FromCode),
+                (None, None) => GroundUnit::length(1.0, Certainty::Assumed),
+            },
+        )
+    }
+
+    /// Degrees in the angular unit.
+    pub(super) fn degrees(&self) -> f64 {
+        match self.code(GEOG_ANGULAR_UNITS) {
+            Some(9101) => 1.0_f64.to_degrees(),
+            Some(9103) => 1.0 / 60.0,
+            Some(9104) => 1.0 / 3600.0,
+            Some(9105 | 9106) => 0.9,
+            _ => 1.0,
+        }
+    }
+}
+
+/// Metres in a unit of length by its EPSG code.
+fn metres_of_code(code: u16) -> Option<f64> {
+    Some(match code {
+        9001 => 1.0,
+        9002 => 0.3048,
+        9003 => 1200.0 / 3937.0,
+        9005 => 0.304_797_265_4,
+        9014 => 1.8288,
+        9030 => 1852.0,
+        9036 => 1000.0,
+        1025 => 0.001,
+        1033 => 0.01,
+        _ => return None,
+    })
+}

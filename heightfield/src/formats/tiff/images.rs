@@ -1,0 +1,82 @@
+//! What each image of a file is.
+
+use std::sync::Arc;
+
+use tiff_reader::{Ifd, TiffFile};
+
+use crate::BadRaster;
+
+/// The tag that says what an image is, and two of its bits.
+const NEW_SUBFILE_TYPE: u16 = 254;
+const REDUCED: u32 = 1;
+const MASK: u32 = 4;
+
+/// An image of a file. Its lists of places may be long: nobody has a copy of them.
+#[derive(Clone)]
+pub(super) struct Directory {
+    file: Arc<TiffFile>,
+    number: usize,
+}
+
+impl Directory {
+    /// The file that it is in.
+    pub(super) fn file(&self) -> &TiffFile {
+        &self.file
+    }
+
+    /// What the file says of it.
+    pub(super) fn ifd(&self) -> &Ifd {
+        &self.file.ifds()[self.number]
+    }
+}
+
+/// The first image that is neither an overview nor a mask; else the last.
+pub(super) fn full(file: &Arc<TiffFile>) -> Result<Directory, BadRaster> {
+    let images = file.ifds();
+    let full = images.iter().position(|image| kind(image) == 0);
+    let number = full
+        .or(images.len().checked_sub(1))
+        .ok_or_else(|| BadRaster::damaged("TIFF: it has no image"))?;
+    Ok(Directory {
+        file: file.clone(),
+        number,
+    })
+}
+
+/// The masks of an image or overview: the one that GDAL keeps in the same file, and the one in a
+/// file `beside`; they are of its size. 0 is no data.
+pub(super) fn masks(image: &Directory, beside: Option<&Arc<TiffFile>>) -> Vec<Directory> {
+    let size = |image: &Ifd| (image.width(), image.height());
+    let wanted = size(image.ifd());
+    let mut inside = image.file().ifds().iter().skip(1);
+    let inside = inside.position(|other| kind(other) & MASK != 0 && size(other) == wanted);
+    let inside = inside.map(|number| Directory {
+        file: image.file.clone(),
+        number: number + 1,
+    });
+    let outside = beside.and_then(|file| {
+        let number = file.ifds().iter().position(|other| size(other) == wanted)?;
+        let file = file.clone();
+        Some(Directory { file, number })
+    });
+    inside.into_iter().chain(outside).collect()
+}
+
+/// The overviews in a file, the finest first.
+pub(super) fn overviews(file: &Arc<TiffFile>) -> Vec<Directory> {
+    let reduced = (0..file.ifds().len()).filter(|number| kind(&file.ifds()[*number]) == REDUCED);
+    let mut reduced: Vec<_> = reduced
+        .map(|number| Directory {
+            file: file.clone(),
+            number,
+        })
+        .collect();
+    reduced.sort_by_key(|image| std::cmp::Reverse((image.ifd().width(), image.ifd().height())));
+    reduced
+}
+
+/// Whether an image is reduced or a mask, as a set of bits.
+fn kind(image: &Ifd) -> u32 {
+    let bits = image.tag(NEW_SUBFILE_TYPE);
+    bits.and_then(|tag| tag.value.as_u32()).unwrap_or(0) & (REDUCED | MASK)
+}

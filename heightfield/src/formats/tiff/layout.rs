@@ -1,0 +1,444 @@
+//! How an image's samples are stored, and whether they can be heights.
+
+use std::io;
+use std::ops::Range;
+use std::sync::Arc;
+
+use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
+
+use super::fault::{fault, unsupported};
+use super::images::Directory;
+use super::index::Index;
+use super::unpack;
+use super::unpacked::Unpacked;
+use crate::blocks::Part;
+use crate::disk_cache::DiskCache;
+use crate::read::Stored;
+use crate::{BadRaster, SampleType};
+
+/// Larger chunks are not decoded as a whole where that can be helped, bytes.
+pub(super) const LARGEST_DECODED: u64 = 1 << 20;
+
+/// How an image's samples are stored.
+pub(super) struct Layout {
+    /// The image.
+    pub(super) directory: Directory,
+    pub(super) columns: u32,
+    pub(super) rows: u32,
+    /// Type of a sample.
+    pub(super) stored: (SampleFormat, u16),
+    pub(super) bands: u16,
+    /// The band that is the height, the first being 0.
+    pub(super) band: usize,
+    /// The band that says what is transparent, if one does.
+    pub(super) alpha: Option<usize>,
+    /// Name, and how many bytes one stored byte may hold.
+    pub(super) compression: (&'static str, u64),
+    /// Each band has its own chunks.
+    planar: bool,
+    tiled: bool,
+    /// Columns and rows of a strip or tile.
+    pub(super) chunk: (u32, u32),
+    /// Bytes are samples, in an order without surprises, and chunks are so large that they are
+    /// read row by row.
+    pub(super) is_plain: bool,
+    /// Chunks that are too large to be decoded where they are touched, once they are.
+    pub(super) unpacked: Option<Arc<Unpacked>>,
+}
+
+/// A strip or tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Chunk {
+    /// Where it lies in the file.
+    pub(super) place: u64,
+    /// Bytes stored for it; 0 for one that a sparse file leaves out.
+    pub(super) bytes: u64,
+    /// Its samples.
+    pub(super) covers: Part,
+}
+
+/// What the bits of a sample mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SampleFormat {
+    Unsigned,
+    Signed,
+    Float,
+}
+
+/// Name of a compression, and how many bytes one stored byte may hold.
+fn compression(code: u16) -> Result<(&'static str, u64), BadRaster> {
+    let refused = match code {
+        1 => return Ok(("uncompressed", 1)),
+        5 => return Ok(("lzw", 2048)),
+        8 => return Ok(("deflate", 1040)),
+        32773 => return Ok(("packbits", 64)),
+        32946 => return Ok(("olddeflate", 1040)),
+        // Zstandard repeats a block of 128 KiB with a few bytes.
+        50000 => return Ok(("zstd", 40_000)),
+        6 | 7 => "JPEG compression",
+        // LERC stores a flat block in some hundred bytes; blocks of a megapixel fit.
+        34887 => return Ok(("lerc", 40_000)),
+        34925 => "LZMA compression",
+        50001 => "WebP compression",
+        50002 | 52546 => "JPEG XL compression",
+        _ => return Err(unsupported(format!("compression {code}"))),
+    };
+    Err(unsupported(refused.into()))
+}
+
+impl Layout {
+    /// Reads and checks the layout of an image; `asked` is the band that the user chose,
+    /// the first being 1; a palette is taken for what it is where the numbers are
+    /// `classes`.
+    pub(super) fn read(
+        directory: &Directory,
+        asked: Option<u32>,
+        classes: bool,
+    ) -> Result<Self, BadRaster> {
+        let image = directory.ifd();
+        let bands = image.samples_per_pixel();
+        if !(classes && is_palette(image)) {
+            refuse_colour(image, bands, asked.is_some())?;
+        }
+        let band = chosen_band(asked, bands)?;
+        let layout = Self {
+            band,
+            alpha: alpha(image, bands).filter(|alpha| *alpha != band),
+            ..Self::of(directory, stored_type(image)?)?
+        };
+        // What the decoder refuses is refused here, too, where it does not come to decode.
+        image.raster_layout().map_err(fault)?;
+        Ok(layout)
+    }
+
+    /// The layout of a mask, of as few bits a sample as it has.
+    pub(super) fn of_mask(directory: &Directory) -> Result<Self, BadRaster> {
+        let image = directory.ifd();
+        let bits = image.bits_per_sample().map_err(fault)?;
+        let bits = bits.first().copied().unwrap_or(1);
+        let layout = Self::of(directory, (SampleFormat::Unsigned, bits))?;
+        image.raster_layout().map_err(fault)?;
+        match matches!(bits, 1 | 2 | 4 | 8) && image.predictor() == 1 && layout.bands == 1 {
+            true => Ok(layout),
+            false => Err(unsupported(format!("a mask of {bits} bits a sample"))),
+        }
+    }
+
+    /// Reads how the samples of the first band are laid out.
+    fn of(directory: &Directory, stored: (SampleFormat, u16)) -> Result<Self, BadRaster> {
+        let image = directory.ifd();
+        let (columns, rows) = (image.width(), image.height());
+        if columns == 0 || rows == 0 {
+            return Err(BadRaster::damaged(format!(
+                "TIFF: an image of {columns} × {rows}"
+            )));
+        }
+        let (tiled, chunk) = match (image.tile_width(), image.tile_height()) {
+            (Some(width), Some(height)) => (true, (width, height)),
+            _ => (false, (columns, image.rows_per_strip().min(rows))),
+        };
+        if chunk.0 == 0 || chunk.1 == 0 {
+            return Err(BadRaster::damaged("TIFF: strips or tiles without samples"));
+        }
+        if Index::of(image, tiled).is_none() {
+            let what = "TIFF: it does not say where its samples are";
+            return Err(BadRaster::damaged(what));
+        }
+        let layout = Self {
+            directory: directory.clone(),
+            columns,
+            rows,
+            stored,
+            bands: image.samples_per_pixel(),
+            band: 0,
+            alpha: None,
+            compression: compression(image.compression())?,
+            planar: image.planar_configuration() == 2,
+            tiled,
+            chunk,
+            is_plain: false,
+            unpacked: None,
+        };
+        Ok(Self {
+            is_plain: layout.chunk_size() > LARGEST_DECODED && has_plain_samples(image),
+            ..layout
+        })
+    }
+
+    /// Has strips or tiles unpacked into a file on disk when they are touched.
+    ///
+    /// # Errors
+    /// Why that cannot be.
+    pub(super) fn unpack_into(&mut self, disk: &DiskCache) -> io::Result<()> {
+        if !unpack::suits(self) {
+            let what = format!("what {} has packed comes as a whole", self.compression.0);
+            return Err(io::Error::other(what));
+        }
+        self.unpacked = Some(Arc::new(Unpacked::new(self, disk)?));
+        Ok(())
+    }
+
+    /// Whether rows are read without the others of their strip or tile.
+    pub(super) fn is_read_by_rows(&self) -> bool {
+        self.is_plain || self.unpacked.is_some()
+    }
+
+    /// Whether nothing has to be unpacked on disk for a part.
+    #[cfg(test)]
+    pub(super) fn is_at_hand(&self, part: &Part) -> bool {
+        self.unpacked.as_ref().is_none_or(|unpacked| {
+            let bands = self.bands_read();
+            let chunks = bands.flat_map(|band| self.chunks_of(band, part));
+            let mut stored = chunks.filter(|chunk| chunk.bytes > 0);
+            stored.all(|chunk| unpacked.has(&chunk))
+        })
+    }
+
+    /// Strips, or tiles.
+    pub(super) const fn chunks_name(&self) -> &'static str {
+        if self.tiled { "tiles" } else { "strips" }
+    }
+
+    /// Whether it has strips.
+    pub(super) const fn has_strips(&self) -> bool {
+        !self.tiled
+    }
+
+    /// Bytes of the samples of a chunk.
+    pub(super) fn chunk_size(&self) -> u64 {
+        self.row_bytes().saturating_mul(self.chunk.1.into())
+    }
+
+    /// Bytes of a row of a chunk.
+    pub(super) fn row_bytes(&self) -> u64 {
+        self.bytes_of(self.chunk.0)
+    }
+
+    /// Bytes of so many texels of a row, the last one filled up.
+    fn bytes_of(&self, columns: u32) -> u64 {
+        let bits = u64::from(self.stored.1) * u64::from(self.bands_together());
+        bits.saturating_mul(columns.into()).div_ceil(8)
+    }
+
+    /// The bytes of a row of a chunk, counted from its first one, that have some of its columns.
+    pub(super) fn row_range(&self, first: u32, columns: u32) -> Range<u64> {
+        let bits = u64::from(self.stored.1) * u64::from(self.bands_together());
+        bits.saturating_mul(first.into()) / 8..self.bytes_of(first.saturating_add(columns))
+    }
+
+    /// How a sample lies in the file, and in which type it is held.
+    pub(super) const fn sample(&self) -> Stored {
+        use SampleFormat::{Float, Signed, Unsigned};
+        match self.stored {
+            (Unsigned, 8) => Stored::Held(SampleType::U8),
+            (Signed, 8) => Stored::Held(SampleType::I8),
+            (Unsigned, 16) => Stored::Held(SampleType::U16),
+            (Signed, 16) => Stored::Held(SampleType::I16),
+            (Float, 16) => Stored::F16,
+            (Unsigned, 32) => Stored::Held(SampleType::U32),
+            (Signed, 32) => Stored::Held(SampleType::I32),
+            (Float, 32) => Stored::Held(SampleType::F32),
+            (Unsigned, _) => Stored::U64,
+            (Signed, _) => Stored::I64,
+            (Float, _) => Stored::Held(SampleType::F64),
+        }
+    }
+
+    /// Chunks from west to east.
+    pub(super) fn chunks_across(&self) -> u32 {
+        self.columns.div_ceil(self.chunk.0)
+    }
+
+    /// The chunks that have samples of a part of the band that is the height. Those that the
+    /// index has too few of are left out.
+    pub(super) fn chunks_in(&self, part: &Part) -> impl Iterator<Item = Chunk> {
+        self.chunks_of(self.band, part)
+    }
+
+    /// The same of another band.
+    pub(super) fn chunks_of(&self, band: usize, part: &Part) -> impl Iterator<Item = Chunk> {
+        let (width, height) = self.chunk;
+        let across = part.column / width..(part.column + part.columns).div_ceil(width);
+        let down = part.row / height..(part.row + part.rows).div_ceil(height);
+        let places = down.flat_map(move |row| across.clone().map(move |column| (column, row)));
+        let (first, index) = (self.first_of(band), self.index());
+        places.filter_map(move |(column, row)| {
+            let number = u64::from(row) * u64::from(self.chunks_across()) + u64::from(column);
+            let number = usize::try_from(number).ok()?.checked_add(first?)?;
+            let (place, bytes) = index.as_ref()?.at(number)?;
+            let (column, row) = (column * width, row * height);
+            let covers = Part {
+                column,
+                row,
+                columns: width.min(self.columns - column),
+                rows: height.min(self.rows - row),
+            };
+            Some(Chunk {
+                place,
+                bytes,
+                covers,
+            })
+        })
+    }
+
+    /// Bytes that all samples take in memory.
+    pub(super) fn bytes(&self) -> u64 {
+        let samples = u64::from(self.columns) * u64::from(self.rows);
+        samples.saturating_mul(self.sample().held().bytes())
+    }
+
+    /// Place and bytes of each chunk with samples of the band that is the height; `None` when the
+    /// index has too few. A chunk that a sparse file leaves out has 0 bytes.
+    pub(super) fn of_band(&self) -> Option<impl Iterator<Item = (u64, u64)>> {
+        let (index, first) = (self.index()?, self.first_of(self.band)?);
+        let end = first.checked_add(usize::try_from(self.chunks_of_band()).ok()?)?;
+        index.at(end.checked_sub(1)?)?;
+        Some((first..end).map_while(move |number| index.at(number)))
+    }
+
+    /// How many chunks a band has.
+    pub(super) fn chunks_of_band(&self) -> u64 {
+        u64::from(self.chunks_across()) * u64::from(self.rows.div_ceil(self.chunk.1))
+    }
+
+    /// Where all chunks lie, those of all bands.
+    pub(super) fn places(&self) -> impl Iterator<Item = u64> {
+        let index = self.index();
+        (0..).map_while(move |number| index.as_ref()?.place(number))
+    }
+
+    /// What its lists take in memory.
+    pub(super) fn index_bytes(&self) -> usize {
+        self.index().map_or(0, |index| index.held_bytes())
+    }
+
+    fn index(&self) -> Option<Index<'_>> {
+        Index::of(self.directory.ifd(), self.tiled)
+    }
+
+    /// Number of a band's first chunk among those of all bands.
+    fn first_of(&self, band: usize) -> Option<usize> {
+        let chunks = usize::try_from(self.chunks_of_band()).ok()?;
+        match self.planar {
+            true => chunks.checked_mul(band),
+            false => Some(0),
+        }
+    }
+
+    /// The bands of which chunks are read for heights: with them lies what is transparent.
+    pub(super) fn bands_read(&self) -> impl Iterator<Item = usize> + use<> {
+        let apart = self.alpha.filter(|_| self.planar);
+        std::iter::once(self.band).chain(apart)
+    }
+
+    /// Bytes of a texel that come before a band's sample.
+    pub(super) fn bytes_before(&self, band: usize) -> usize {
+        let band = if self.planar { 0 } else { band };
+        usize::from(self.stored.1 / 8) * band
+    }
+
+    /// Bytes of the samples that are stored together: one of each band, or of one
+    /// band only where each has its own chunks.
+    pub(super) fn texel_bytes(&self) -> u64 {
+        u64::from(self.stored.1 / 8) * u64::from(self.bands_together())
+    }
+
+    /// Bands that have their samples in the same chunks.
+    pub(super) const fn bands_together(&self) -> u16 {
+        if self.planar { 1 } else { self.bands }
+    }
+
+    /// The variant in words.
+    pub(super) fn described(&self, order: ByteOrder) -> String {
+        let sample = match self.stored.0 {
+            SampleFormat::Unsigned => "uint",
+            SampleFormat::Signed => "int",
+            SampleFormat::Float => "float",
+        };
+        let (bits, compression) = (self.stored.1, self.compression.0);
+        let chunks = match self.chunk {
+            (columns, rows) if self.tiled => format!("{columns} × {rows} tiles"),
+            _ => "strips".into(),
+        };
+        let order = match order {
+            ByteOrder::BigEndian => ", big-endian",
+            ByteOrder::LittleEndian => "",
+        };
+        format!("TIFF, {sample}{bits}, {compression}, {chunks}{order}")
+    }
+}
+
+/// Whether bytes are samples: neither packed, nor differences, nor with their bits turned.
+fn has_plain_samples(image: &Ifd) -> bool {
+    (image.compression(), image.predictor(), image.fill_order()) == (1, 1, 1)
+}
+
+/// The band that its tag calls alpha, associated or not.
+fn alpha(image: &Ifd, bands: u16) -> Option<usize> {
+    const EXTRA_SAMPLES: u16 = 338;
+    let extra = image.tag(EXTRA_SAMPLES)?.value.as_u16_slice()?;
+    let first = usize::from(bands).checked_sub(extra.len())?;
+    let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2))?;
+    // The first band is the height, whatever it is called.
+    Some(first + alpha).filter(|band| *band > 0)
+}
+
+/// The band that the user chose, or the first, which is 0.
+fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, BadRaster> {
+    let band = asked.unwrap_or(1).max(1);
+    if band > u32::from(bands) {
+        let there = match bands {
+            1 => "the file has one band".to_owned(),
+            bands => format!("the file has bands 1 to {bands}"),
+        };
+        let asked = format!("band {band}");
+        return Err(BadRaster::NoSuchPart { asked, there });
+    }
+    Ok(band as usize - 1)
+}
+
+fn is_palette(image: &Ifd) -> bool {
+    image.photometric_interpretation_enum() == Some(PhotometricInterpretation::Palette)
+}
+
+/// Colours are no heights, however many bands they have, unless the user has `chosen`
+/// one of them.
+fn refuse_colour(image: &Ifd, bands: u16, chosen: bool) -> Result<(), BadRaster> {
+    use PhotometricInterpretation as Meaning;
+    let what = match image.photometric_interpretation_enum() {
+        Some(Meaning::MinIsBlack | Meaning::MinIsWhite) => return Ok(()),
+        Some(Meaning::Rgb | Meaning::Separated) if chosen => return Ok(()),
+        Some(Meaning::Rgb) => {
+            let what = format!("a colour image of {bands} bands");
+            return Err(BadRaster::ColourBands { what, bands });
+        }
+        Some(Meaning::Palette) => "an image with a palette".into(),
+        Some(Meaning::YCbCr) => "a colour image (YCbCr)".into(),
+        Some(Meaning::Separated) => "a colour image (CMYK)".into(),
+        Some(Meaning::Mask) => "a transparency mask".into(),
+        _ => "an image of unknown interpretation".into(),
+    };
+    Err(BadRaster::NotAHeightField(what))
+}
+
+fn stored_type(image: &Ifd) -> Result<(SampleFormat, u16), BadRaster> {
+    let first = |values: Vec<u16>| values.first().copied().unwrap_or(1);
+    let bits = first(image.bits_per_sample().map_err(fault)?);
+    let format = match first(image.sample_format().map_err(fault)?) {
+        1 => SampleFormat::Unsigned,
+        2 => SampleFormat::Signed,
+        3 => SampleFormat::Float,
+        _ => {
+            let what = "samples that are no real numbers".into();
+            return Err(BadRaster::NotAHeightField(what));
+        }
+    };
+    match bits {
+        1 if format != SampleFormat::Float => {
+            Err(BadRaster::NotAHeightField("one bit a sample".into()))
+        }
+        8 if format == SampleFormat::Float => Err(unsupported("8 bits a sample".into())),
+        8 | 16 | 32 | 64 => Ok((format, bits)),
+        _ => Err(unsupported(format!("{bits} bits a sample"))),
+    }
+}

@@ -1,0 +1,168 @@
+//! The masks of an image: which of its samples have data.
+
+use std::sync::Arc;
+
+use tiff_reader::TiffFile;
+
+use super::images::{self, Directory};
+use super::layout::{Chunk, LARGEST_DECODED, Layout};
+use super::samples::Band;
+use super::uncompressed;
+use super::unpack::{self, Rows};
+use crate::BadRaster;
+use crate::blocks::{LARGEST_BLOCK_BYTES, Part};
+use crate::disk_cache::DiskCache;
+
+/// A mask. 0 is no data.
+pub(super) struct Mask {
+    directory: Directory,
+    /// Where it is laid out as masks are.
+    layout: Option<Layout>,
+}
+
+impl Mask {
+    /// The masks of an image or overview, in its file and in one beside it.
+    pub(super) fn all(image: &Directory, beside: Option<&Arc<TiffFile>>) -> Vec<Self> {
+        let masks = images::masks(image, beside).into_iter();
+        let masks = masks.map(|directory| Self {
+            layout: Layout::of_mask(&directory).ok(),
+            directory,
+        });
+        masks.collect()
+    }
+
+    /// Samples of a strip or tile.
+    fn chunk_samples(&self) -> u64 {
+        let mask = self.directory.ifd();
+        let columns = mask.tile_width().unwrap_or(mask.width());
+        let strip = mask.rows_per_strip().min(mask.height());
+        let rows = mask.tile_height().unwrap_or(strip);
+        u64::from(columns) * u64::from(rows)
+    }
+
+    /// Makes it a mask of which parts are read. `disk` is where it may be unpacked.
+    ///
+    /// # Errors
+    /// Why that cannot be.
+    pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
+        let samples = self.chunk_samples();
+        let is_large = samples > LARGEST_DECODED;
+        let unpacked = match (&mut self.layout, disk) {
+            (Some(layout), _) if layout.is_plain => return Ok(()),
+            (Some(layout), Ok(disk)) if is_large => {
+                layout.unpack_into(disk).map_err(|error| error.to_string())
+            }
+            (_, Err(why)) => Err(why.to_owned()),
+            _ => Err("its samples are packed in an unusual way".into()),
+        };
+        match unpacked {
+            // It is decoded with each block.
+            Err(_) if samples <= LARGEST_BLOCK_BYTES => Ok(()),
+            unpacked => unpacked,
+        }
+    }
+
+    /// Bytes that it takes unpacked on disk at most.
+    pub(super) fn unpacked_bytes(&self) -> u64 {
+        let unpacked = self.layout.as_ref().and_then(|mask| mask.unpacked.as_ref());
+        unpacked.map_or(0, |unpacked| unpacked.most_bytes())
+    }
+
+    /// Hands over each sample of a part that has no data, counted from the part's first.
+    pub(super) fn missing(&self, part: &Part, mut set: impl FnMut(usize)) -> Result<(), BadRaster> {
+        match &self.layout {
+            Some(mask) if mask.is_read_by_rows() => by_rows(mask, part, set),
+            Some(mask) if unpack::suits_whole(mask, part) => whole(mask, part, set),
+            _ => {
+                let band = Band::first_of(&self.directory);
+                let has_data = band.read(part, |value: u8| value != 0)?;
+                let missing = has_data.iter().enumerate().filter(|(_, has)| !**has);
+                missing.for_each(|(index, _)| set(index));
+                Ok(())
+            }
+        }
+    }
+}
+
+fn by_rows(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), BadRaster> {
+    let mut found = 0;
+    for row in part.row..part.row + part.rows {
+        let row = Part {
+            row,
+            rows: 1,
+            ..*part
+        };
+        for chunk in mask.chunks_in(&row) {
+            found += u64::from(chunk.covers.within(&row).columns);
+            for range in uncompressed::rows(mask, &chunk, &row) {
+                let bytes = uncompressed::bytes(mask, &chunk, range)?;
+                row_missing(mask, &chunk, &row, part, &bytes, &mut set);
+            }
+        }
+    }
+    all_there(found, part)
+}
+
+/// All of a mask whose strips are unpacked one after the other.
+fn whole(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), BadRaster> {
+    let mut found = 0;
+    for chunk in mask.chunks_in(part) {
+        let covers = chunk.covers;
+        found += u64::from(covers.columns) * u64::from(covers.rows);
+        let nothing = vec![0; mask.row_bytes() as usize];
+        let mut rows = match chunk.bytes {
+            0 => None,
+            _ => Some(Rows::of(mask, &chunk)?),
+        };
+        for row in covers.row..covers.row + covers.rows {
+            let row = Part {
+                row,
+                rows: 1,
+                ..*part
+            };
+            let bytes = match &mut rows {
+                Some(rows) => rows.next()?,
+                None => &nothing,
+            };
+            row_missing(mask, &chunk, &row, part, bytes, &mut set);
+        }
+    }
+    all_there(found, part)
+}
+
+fn all_there(found: u64, part: &Part) -> Result<(), BadRaster> {
+    match found == u64::from(part.columns) * u64::from(part.rows) {
+        true => Ok(()),
+        false => Err(BadRaster::damaged(
+            "TIFF: its mask's index has too few strips or tiles",
+        )),
+    }
+}
+
+/// The samples of a row of a part that have no data, by the bytes of a strip or tile that have them.
+fn row_missing(
+    mask: &Layout,
+    chunk: &Chunk,
+    row: &Part,
+    part: &Part,
+    bytes: &[u8],
+    set: &mut impl FnMut(usize),
+) {
+    let bits = usize::from(mask.stored.1);
+    let inside = chunk.covers.within(row);
+    // The first byte may begin with samples to the west.
+    let skipped = (inside.column - chunk.covers.column) as usize * bits % 8;
+    let to = (row.row - part.row) as usize * part.columns as usize;
+    let to = to + (inside.column - part.column) as usize;
+    for index in 0..inside.columns as usize {
+        let at = skipped + index * bits;
+        let value = (bytes[at / 8] << (at % 8)) >> (8 - bits);
+        if value == 0 {
+            set(to + index);
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "masks_tests.rs"]
+mod tests;

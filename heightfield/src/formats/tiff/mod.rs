@@ -1,0 +1,237 @@
+//! TIFF, GeoTIFF, BigTIFF and cloud-optimised GeoTIFF: the first band of the
+//! first full image, in memory or, where it is large, read in blocks when it is touched.
+//!
+//! `tiff-reader` decodes; it is named in this folder only.
+
+mod blocks;
+mod budget;
+mod fault;
+mod georef;
+mod images;
+mod index;
+mod layout;
+mod masks;
+mod metadata;
+mod remote_source;
+mod samples;
+mod uncompressed;
+mod unpack;
+mod unpacked;
+mod user_defined;
+
+use std::iter::once;
+use std::sync::Arc;
+
+use tiff_reader::source::{BytesSource, FileSource, SharedSource};
+use tiff_reader::{ParseBudgets, TiffError, TiffFile};
+
+use crate::beside::{find_appended, lay_out_by_world_file};
+use crate::blocks::Part;
+use crate::decoded::Decoded;
+use crate::format::{Claim, Format, Parts, starts_with_any};
+use crate::input::{Data, FileBytes};
+use crate::storage::Storage;
+use crate::{BadRaster, OpenOptions};
+use blocks::{Image, Known, TiffBlocks};
+use fault::fault;
+use layout::Layout;
+use metadata::Metadata;
+use remote_source::RemoteSource;
+
+/// TIFF and BigTIFF of either byte order.
+pub(super) const FORMAT: Format = Format {
+    name: "TIFF",
+    begins: |head| starts_with_any(head, &[b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]),
+    extensions: &[("tif", Claim::Promises), ("tiff", Claim::Promises)],
+    parts: Parts::Bands,
+    decode,
+};
+
+/// A file at a URL whose samples take no more than this is fetched as a whole.
+const FEW_BYTES: u64 = 1 << 20;
+
+/// The longest list of a directory, and all lists of all of them, bytes: a whole earth of cells of
+/// a second in tiles of 256 × 256 samples has an index of 100 MB.
+const LONGEST_LIST: usize = 72 << 20;
+const ALL_LISTS: usize = 128 << 20;
+
+/// Extensions of a TIFF's world files.
+const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
+
+/// Reads the heights, or lets them stay in the file: of several bands the chosen one or
+/// the first, of several images the first that is neither an overview nor a mask.
+fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    let file = Arc::new(open(input)?);
+    let full = images::full(&file)?;
+    let mask_file = find_appended(input, "msk")?;
+    let mask = mask_file.as_ref().map(open).transpose()?.map(Arc::new);
+    let known = Known {
+        name: input.name(),
+        asked: options.band,
+        classes: options.classes,
+        mask: mask.as_ref(),
+        disk: match input.remote() {
+            Some(_) => Err("it is at a URL"),
+            None => Ok(&options.disk_cache),
+        },
+    };
+    let image = Image::of(&full, &known)?;
+    let layout = &image.layout;
+    let (size, band, bands) = ((layout.columns, layout.rows), layout.band, layout.bands);
+    let has_alpha = layout.alpha.is_some();
+    let mut format = layout.described(file.byte_order());
+    if options.band.is_some() {
+        format += &format!(", band {} of {bands}", band + 1);
+    }
+    let files: Vec<_> = once(input).chain(&mask_file).collect();
+    let (storage, told) = stored(&files, options, &file, image, &known)?;
+    let mut decoded = Decoded::new(format, size, storage);
+    match told {
+        Some(Told::Unpacked(remark)) => decoded.remarks.push(remark),
+        Some(Told::Whole(why)) => decoded.why_whole = Some(why),
+        None => {}
+    }
+    if options.band.is_none() && bands > 1 + u16::from(has_alpha) {
+        decoded.remarks.push(format!(
+            "it has {bands} bands: the first is taken for the height (--band)"
+        ));
+    }
+    let metadata = Metadata::read(full.ifd(), band)?;
+    decoded.no_data = metadata.no_data;
+    decoded.scale = metadata.scale.unwrap_or(1.0);
+    decoded.offset = metadata.offset.unwrap_or(0.0);
+    georef::apply(full.ifd(), &mut decoded, metadata.metres_per_vertical_unit);
+    if decoded.place.is_none() {
+        lay_out_by_world_file(input, &WORLD_FILES, &mut decoded)?;
+    }
+    Ok(decoded)
+}
+
+/// What the user is told of where the samples are.
+enum Told {
+    /// What is unpacked on disk.
+    Unpacked(String),
+    /// Why all are in memory.
+    Whole(String),
+}
+
+/// The samples of the full image: left in the file where they are many and that can be, else all
+/// of them. `files` are the TIFF and the one of its mask, if it has one.
+fn stored(
+    files: &[&FileBytes],
+    options: &OpenOptions,
+    file: &Arc<TiffFile>,
+    mut image: Image,
+    known: &Known<'_>,
+) -> Result<(Storage, Option<Told>), BadRaster> {
+    let input = files[0];
+    let most = match input.remote() {
+        // What is not touched is not fetched, either.
+        Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
+        None => options.most_in_memory_bytes,
+    };
+    let mut told = None;
+    if image.layout.bytes() > most {
+        if let Err(fault) = budget::check(&image.layout, input.len(), true) {
+            if !image.has_parts() {
+                budget::check_memory(&image.layout)?;
+            }
+            return Err(fault);
+        }
+        match image.leave_in_file(known.disk) {
+            Ok(()) => {
+                if !input.is_outline() {
+                    unpacked::check_first(&image.layout)?;
+                }
+                told = unpacked_told(&image);
+                let overviews = match find_appended(input, "ovr")? {
+                    Some(beside) => Some((Arc::new(open(&beside)?), beside.remote())),
+                    None => None,
+                };
+                let file = (file.clone(), input.remote());
+                let blocks = TiffBlocks::new(file, image, overviews, known, files)?;
+                return Ok((blocks.into(), told));
+            }
+            Err(why) => told = Some(Told::Whole(why + at_once(&image.layout))),
+        }
+    }
+    let layout = &image.layout;
+    budget::check_memory(layout)?;
+    budget::check(layout, input.len(), false)?;
+    if input.is_outline() {
+        return Ok((layout.sample().held().none().into(), told));
+    }
+    let all = Part::whole(layout.columns, layout.rows);
+    if let Some(remote) = input.remote() {
+        remote.want(once(0..input.len()));
+    }
+    let mut storage = Storage::from(samples::read(layout, layout.band, &all)?);
+    storage.set_holes(samples::holes(layout, &image.masks, &all)?);
+    Ok((storage, told))
+}
+
+/// What is said of the memory that is taken while a file is read as a whole, where that is more
+/// than its samples take.
+fn at_once(layout: &Layout) -> &'static str {
+    let all = Part::whole(layout.columns, layout.rows);
+    match layout.is_plain || unpack::suits_whole(layout, &all) {
+        true => "",
+        false => "; while it is opened it takes more than that",
+    }
+}
+
+/// What is said of strips or tiles that are unpacked on disk, if some are.
+fn unpacked_told(image: &Image) -> Option<Told> {
+    let megabytes = image.unpacked_bytes().div_ceil(1_000_000);
+    let whose = match &image.layout.unpacked {
+        Some(_) => format!("its {}", image.layout.chunks_name()),
+        None => "the strips or tiles of its mask".into(),
+    };
+    (megabytes > 0).then(|| {
+        Told::Unpacked(format!(
+            "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache-dir), up to {megabytes} MB, until the program ends"
+        ))
+    })
+}
+
+/// Opens the file. No list in its directories may be longer than the file is.
+fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
+    let bytes = usize::try_from(input.len()).unwrap_or(usize::MAX);
+    let options = tiff_reader::OpenOptions {
+        // Blocks are kept where all formats keep theirs.
+        block_cache_bytes: 0,
+        parse_budgets: ParseBudgets {
+            max_ifds: 64,
+            max_tag_value_bytes: bytes.min(LONGEST_LIST),
+            max_metadata_value_bytes: ALL_LISTS,
+            ..ParseBudgets::default()
+        },
+        ..tiff_reader::OpenOptions::default()
+    };
+    let source: SharedSource = match input.data() {
+        Data::File(_, path) => Arc::new(FileSource::open(path).map_err(fault)?),
+        Data::Memory(bytes) => Arc::new(BytesSource::new(bytes.clone())),
+        Data::Remote(file, _) => Arc::new(RemoteSource(file.clone())),
+    };
+    TiffFile::from_source_with_options(source, options).map_err(|error| match &error {
+        TiffError::InvalidTagValue { reason, .. } if is_long(reason) => {
+            fault::unsupported(format!(
+                "an index of more than {} MB, as of very many small tiles,",
+                LONGEST_LIST >> 20
+            ))
+        }
+        _ => fault(error),
+    })
+}
+
+/// Whether a list is not read because it is too long, however long the file is.
+fn is_long(reason: &str) -> bool {
+    [LONGEST_LIST, ALL_LISTS]
+        .iter()
+        .any(|most| reason.ends_with(&format!("parse budget {most}")))
+}
+
+#[cfg(test)]
+mod made;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,132 @@
+//! The samples of a part of a band, and which of them are holes that no value marks:
+//! left out of a sparse file, masked, transparent.
+
+use half::f16;
+use tiff_reader::{Ifd, TiffFile, TiffSample};
+
+use super::fault::fault;
+use super::images::Directory;
+use super::layout::{Layout, SampleFormat};
+use super::masks::Mask;
+use super::{uncompressed, unpack};
+use crate::blocks::Part;
+use crate::samples::{HoleMask, SampleValue, with_samples};
+use crate::{BadRaster, Samples};
+
+/// Reads a part of a band, the first being 0.
+pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
+    use SampleFormat::{Float, Signed, Unsigned};
+    if layout.is_read_by_rows() {
+        return uncompressed::read(layout, band, part);
+    }
+    if unpack::suits_whole(layout, part) {
+        return unpack::read_whole(layout, band);
+    }
+    let band = Band {
+        band,
+        ..Band::first_of(&layout.directory)
+    };
+    Ok(match layout.stored {
+        (Unsigned, 8) => band.read(part, |value: u8| value)?.into(),
+        (Signed, 8) => band.read(part, |value: i8| value)?.into(),
+        (Unsigned, 16) => band.read(part, |value: u16| value)?.into(),
+        (Signed, 16) => band.read(part, |value: i16| value)?.into(),
+        (Float, 16) => band.read(part, f16::to_f32)?.into(),
+        (Unsigned, 32) => band.read(part, |value: u32| value)?.into(),
+        (Signed, 32) => band.read(part, |value: i32| value)?.into(),
+        (Float, 32) => band.read(part, |value: f32| value)?.into(),
+        (Unsigned, _) => band.read(part, |value: u64| value as f64)?.into(),
+        (Signed, _) => band.read(part, |value: i64| value as f64)?.into(),
+        (Float, _) => band.read(part, |value: f64| value)?.into(),
+    })
+}
+
+/// A band of an image.
+pub(super) struct Band<'f> {
+    file: &'f TiffFile,
+    image: &'f Ifd,
+    band: usize,
+}
+
+impl<'f> Band<'f> {
+    /// The first band of an image.
+    pub(super) fn first_of(directory: &'f Directory) -> Self {
+        Self {
+            file: directory.file(),
+            image: directory.ifd(),
+            band: 0,
+        }
+    }
+
+    /// Reads the samples of a part, each converted. They are held once: a row of chunks is
+    /// decoded, copied to its place and let go.
+    pub(super) fn read<T: TiffSample, U>(
+        &self,
+        part: &Part,
+        convert: impl Fn(T) -> U,
+    ) -> Result<Vec<U>, BadRaster> {
+        let height = self
+            .image
+            .tile_height()
+            .unwrap_or(self.image.rows_per_strip());
+        let [column, row, columns, rows] =
+            [part.column, part.row, part.columns, part.rows].map(|count| count as usize);
+        let samples = columns * rows;
+        let mut values = Vec::new();
+        values.try_reserve_exact(samples).map_err(|_| {
+            BadRaster::AbsurdSize(format!(
+                "{samples} samples are more than this machine can hold"
+            ))
+        })?;
+        let rows_at_once = height.clamp(1, part.rows.max(1)) as usize;
+        for first in (row..row + rows).step_by(rows_at_once) {
+            let count = rows_at_once.min(row + rows - first);
+            let window = self
+                .file
+                .read_band_window_from_ifd::<T>(
+                    self.image, self.band, first, column, count, columns,
+                )
+                .map_err(fault)?;
+            let (window, _) = window.into_raw_vec_and_offset();
+            values.extend(window.into_iter().map(&convert));
+        }
+        Ok(values)
+    }
+}
+
+/// The samples of a part in chunks that a sparse file leaves out, those that a mask calls no data,
+/// and those whose alpha is zero.
+pub(super) fn holes(
+    layout: &Layout,
+    masks: &[Mask],
+    part: &Part,
+) -> Result<Option<HoleMask>, BadRaster> {
+    let columns = part.columns as usize;
+    let mut holes = None;
+    let mut set = |index| {
+        let size = columns * part.rows as usize;
+        let holes = holes.get_or_insert_with(|| HoleMask::with_capacity(size));
+        holes.insert(index);
+    };
+    let (first, last) = (part.row, part.row + part.rows);
+    for left_out in layout.chunks_in(part).filter(|chunk| chunk.bytes == 0) {
+        let covers = left_out.covers;
+        let rows = covers.row.max(first)..(covers.row + covers.rows).min(last);
+        let west = covers.column.max(part.column) - part.column;
+        let east = (covers.column + covers.columns).min(part.column + part.columns) - part.column;
+        for row in rows {
+            let start = (row - first) as usize * columns;
+            (west..east).for_each(|column| set(start + column as usize));
+        }
+    }
+    for mask in masks {
+        mask.missing(part, &mut set)?;
+    }
+    if let Some(band) = layout.alpha {
+        with_samples!(read(layout, band, part)?, alpha => {
+            let clear = alpha.iter().enumerate().filter(|(_, alpha)| alpha.widen() == 0.0);
+            clear.for_each(|(index, _)| set(index));
+        });
+    }
+    Ok(holes)
+}

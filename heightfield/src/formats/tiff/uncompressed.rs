@@ -1,0 +1,93 @@
+//! Large strips and tiles without compression, or unpacked into a file: the rows that are wanted
+//! are read, and no more.
+//!
+//! The decoder reads a strip or tile as a whole, and some writers put all of an image into one.
+
+use std::ops::Range;
+
+use tiff_reader::ByteOrder;
+
+use super::fault::fault;
+use super::layout::{Chunk, Layout};
+use super::unpack;
+use crate::blocks::Part;
+use crate::samples::{Endian, with_samples};
+use crate::{BadRaster, Samples};
+
+/// Reads a part of a band, the first being 0, of a layout that [is read so](Layout::is_read_by_rows).
+pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
+    let stored = layout.sample();
+    let endian = match layout.directory.file().byte_order() {
+        _ if layout.unpacked.is_some() => unpack::ENDIAN,
+        ByteOrder::LittleEndian => Endian::Little,
+        ByteOrder::BigEndian => Endian::Big,
+    };
+    let apart = layout.texel_bytes() as usize;
+    let first = layout.bytes_before(band);
+    let count = u64::from(part.columns) * u64::from(part.rows);
+    let mut samples = stored.room(count)?;
+    for row in part.row..part.row + part.rows {
+        let row = Part {
+            row,
+            rows: 1,
+            ..*part
+        };
+        for chunk in layout.chunks_of(band, &row) {
+            for range in rows(layout, &chunk, &row) {
+                let bytes = bytes(layout, &chunk, range)?;
+                stored.append(&mut samples, &bytes[first..], apart, endian);
+            }
+        }
+    }
+    let has_all = with_samples!(&samples, values => values.len() as u64 == count);
+    match has_all {
+        true => Ok(samples),
+        false => Err(BadRaster::damaged(
+            "TIFF: its index has too few strips or tiles",
+        )),
+    }
+}
+
+/// Where the rows of a strip or tile that are in a part lie, counted from its first byte.
+pub(super) fn rows(
+    layout: &Layout,
+    chunk: &Chunk,
+    part: &Part,
+) -> impl Iterator<Item = Range<u64>> + use<> {
+    let (covers, inside) = (chunk.covers, chunk.covers.within(part));
+    let columns = layout.row_range(inside.column - covers.column, inside.columns);
+    let row_bytes = layout.row_bytes();
+    (inside.row..inside.row + inside.rows).map(move |row| {
+        // What is beyond all numbers is beyond the file.
+        let before = u64::from(row - covers.row).saturating_mul(row_bytes);
+        before.saturating_add(columns.start)..before.saturating_add(columns.end)
+    })
+}
+
+/// The bytes of a row; zeros where a sparse file leaves its strip or tile out.
+pub(super) fn bytes(
+    layout: &Layout,
+    chunk: &Chunk,
+    range: Range<u64>,
+) -> Result<Vec<u8>, BadRaster> {
+    let too_long = || BadRaster::AbsurdSize("TIFF: a row of more bytes than memory holds".into());
+    let count = usize::try_from(range.end - range.start).map_err(|_| too_long())?;
+    if chunk.bytes == 0 {
+        return Ok(vec![0; count]);
+    }
+    if let Some(unpacked) = &layout.unpacked {
+        return unpacked.read(layout, chunk, range);
+    }
+    if range.end > chunk.bytes {
+        return Err(BadRaster::damaged(
+            "TIFF: a strip or tile of fewer bytes than its samples take",
+        ));
+    }
+    let source = layout.directory.file().source();
+    let place = chunk.place.saturating_add(range.start);
+    source.read_exact_at(place, count).map_err(fault)
+}
+
+#[cfg(test)]
+#[path = "uncompressed_tests.rs"]
+mod tests;

@@ -1,0 +1,127 @@
+//! Large strips and tiles without compression, in all types, orders and arrangements.
+
+use super::super::made::{BANDS, KINDS, Made, ONE_STRIP, SIZE, check, open, value};
+use crate::BadRaster;
+
+#[test]
+fn all_types_of_either_order_are_what_was_written() {
+    for kind in KINDS {
+        for is_big_endian in [false, true] {
+            let made = Made {
+                kind,
+                is_big_endian,
+                ..ONE_STRIP
+            };
+            for most_in_memory_bytes in [0, 1 << 30] {
+                check(&made, &open(&made, most_in_memory_bytes).expect("a field"));
+            }
+        }
+    }
+}
+
+#[test]
+fn strips_and_tiles_of_several_bands_are_what_was_written() {
+    for chunk in [SIZE, [SIZE[0], 640], [1024, 640], [2048, 2048]] {
+        for (bands, is_planar) in [(1, false), (BANDS, false), (BANDS, true)] {
+            let made = Made {
+                chunk,
+                bands,
+                is_planar,
+                ..ONE_STRIP
+            };
+            for most_in_memory_bytes in [0, 1 << 30] {
+                check(&made, &open(&made, most_in_memory_bytes).expect("a field"));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tile_that_is_left_out_is_a_hole_and_no_other_is() {
+    let made = Made {
+        chunk: [1024, 640],
+        left_out: Some(1),
+        ..ONE_STRIP
+    };
+    for most_in_memory_bytes in [0, 1 << 30] {
+        let raster = open(&made, most_in_memory_bytes).expect("sparse");
+        let height = |[column, row]: [u32; 2]| raster.height(column, SIZE[1] - 1 - row);
+        for place in [[0, 0], [1023, 639], [1024, 640], [1200, 1102]] {
+            assert_eq!(height(place), value(place, 0) as f64);
+        }
+        assert!(height([1024, 0]).is_nan() && height([1200, 639]).is_nan());
+    }
+}
+
+#[test]
+fn rows_that_a_strip_does_not_have_are_holes_and_the_others_are_felt() {
+    const ROW: u32 = 4 * SIZE[0];
+    // The first strip ends 140 rows early, and the second is said to have as many more.
+    let made = Made {
+        chunk: [SIZE[0], 640],
+        other: Some((279, &[500 * ROW, (SIZE[1] - 500) * ROW])),
+        ..ONE_STRIP
+    };
+    let raster = open(&made, 0).expect("most of it is there");
+    let height = |row| raster.height(7, SIZE[1] - 1 - row);
+    for row in (0..500).chain(640..SIZE[1]) {
+        assert_eq!(height(row), value([7, row], 0) as f64, "{row}");
+    }
+    assert!((500..640).all(|row| height(row).is_nan()));
+    let made = Made {
+        other: Some((279, &[900 * ROW])),
+        ..ONE_STRIP
+    };
+    let fault = open(&made, 0).expect_err("fewer bytes than samples");
+    assert!(matches!(fault, BadRaster::AbsurdSize(_)), "{fault}");
+}
+
+#[test]
+fn bits_in_another_order_and_differences_are_left_to_the_decoder() {
+    // Of either the decoder knows what to do, or says that it does not.
+    let turned = Made {
+        kind: KINDS[0],
+        other: Some((266, &[2])),
+        ..ONE_STRIP
+    };
+    let raster = open(&turned, 0).expect("a field");
+    let expected = (value([5, 9], 0) as u8).reverse_bits();
+    assert_eq!(raster.height(5, SIZE[1] - 10), f64::from(expected));
+    let differences = Made {
+        kind: KINDS[2],
+        other: Some((317, &[2])),
+        ..ONE_STRIP
+    };
+    let raster = open(&differences, 0).expect("a field");
+    let sum: i64 = (0..=3).map(|column| value([column, 4], 0)).sum();
+    assert_eq!(raster.height(3, SIZE[1] - 5), sum as f64);
+}
+
+/// Decoded, they are refused; read as they lie, they were heights of other bands.
+#[test]
+fn bands_of_several_types_and_orders_that_nobody_knows_are_refused() {
+    for (tag, values, why) in [
+        (258, &[32, 16, 32][..], "mixed BitsPerSample"),
+        (339, &[3, 1, 3][..], "mixed SampleFormat"),
+        (284, &[3][..], "planar configuration"),
+    ] {
+        let made = Made {
+            bands: BANDS,
+            other: Some((tag, values)),
+            ..ONE_STRIP
+        };
+        let fault = open(&made, 0).expect_err(why);
+        let is_told = matches!(&fault, BadRaster::Unsupported { .. });
+        assert!(is_told && fault.to_string().contains(why), "{fault}");
+    }
+}
+
+#[test]
+fn a_strip_behind_the_end_is_told_before_anything_is_read() {
+    let made = Made {
+        other: Some((273, &[u32::MAX - 7])),
+        ..ONE_STRIP
+    };
+    let fault = open(&made, 0).expect_err("nothing is there");
+    assert!(matches!(fault, BadRaster::Truncated(_)), "{fault}");
+}

@@ -1,0 +1,124 @@
+//! Large strips and tiles that are packed: their rows come one after the other, in the memory of
+//! a row and of what the compression looks back to.
+//!
+//! The decoder unpacks a strip or tile as a whole and then copies it, and some writers put all of
+//! an image into one.
+
+mod codec;
+mod stored;
+
+use std::io::{ErrorKind, Read};
+
+use tiff_reader::filters::fix_endianness_and_predict;
+
+use super::fault::fault;
+use super::layout::{Chunk, LARGEST_DECODED, Layout};
+use crate::blocks::{LARGEST_BLOCK_BYTES, Part};
+use crate::samples::{Endian, SampleValue, with_samples};
+use crate::{BadRaster, Samples};
+use stored::StoredBytes;
+
+/// Byte order of unpacked rows: this machine's.
+pub(super) const ENDIAN: Endian = match cfg!(target_endian = "big") {
+    true => Endian::Big,
+    false => Endian::Little,
+};
+
+/// Whether the strips or tiles of a layout can be unpacked row by row. A row is held in memory.
+pub(super) fn suits(layout: &Layout) -> bool {
+    codec::is_known(layout.directory.ifd().compression())
+        && (1..=LARGEST_BLOCK_BYTES).contains(&layout.row_bytes())
+}
+
+/// The rows of a strip or tile.
+pub(super) struct Rows<'f> {
+    layout: &'f Layout,
+    chunk: Chunk,
+    unpacked: Box<dyn Read + 'f>,
+    /// How many came.
+    count: u32,
+    row: Vec<u8>,
+}
+
+impl<'f> Rows<'f> {
+    /// Nothing is unpacked yet. The layout [suits].
+    pub(super) fn of(layout: &'f Layout, chunk: &Chunk) -> Result<Self, BadRaster> {
+        let image = layout.directory.ifd();
+        let source = layout.directory.file().source();
+        let is_reversed = image.fill_order() == 2;
+        let stored = StoredBytes::new(source, chunk.place, chunk.bytes, is_reversed);
+        let unpacked = codec::unpacked(image.compression(), stored);
+        Ok(Self {
+            layout,
+            chunk: *chunk,
+            unpacked: unpacked.map_err(|error| cannot(layout, chunk, 0, &error))?,
+            count: 0,
+            row: vec![0; layout.row_bytes() as usize],
+        })
+    }
+
+    /// The bytes of the next row, its numbers in this machine's byte order.
+    pub(super) fn next(&mut self) -> Result<&[u8], BadRaster> {
+        let layout = self.layout;
+        let read = self.unpacked.read_exact(&mut self.row);
+        read.map_err(|error| cannot(layout, &self.chunk, self.count, &error))?;
+        self.count += 1;
+        // Bits are in the same order in every file.
+        if layout.stored.1 >= 8 {
+            let order = layout.directory.file().byte_order();
+            let predictor = layout.directory.ifd().predictor();
+            let (bits, bands) = (layout.stored.1, layout.bands_together());
+            fix_endianness_and_predict(&mut self.row, bits, bands, order, predictor)
+                .map_err(fault)?;
+        }
+        Ok(&self.row)
+    }
+}
+
+fn cannot(layout: &Layout, chunk: &Chunk, row: u32, error: &std::io::Error) -> BadRaster {
+    let why = match error.kind() {
+        ErrorKind::UnexpectedEof => "it ends too early".into(),
+        _ => error.to_string(),
+    };
+    BadRaster::Damaged(format!(
+        "TIFF: the {} data at byte {} cannot be unpacked from row {} on: {why}",
+        layout.compression.0,
+        chunk.place,
+        chunk.covers.row + row
+    ))
+}
+
+/// Whether all of a band is best read so: its strips are large.
+pub(super) fn suits_whole(layout: &Layout, part: &Part) -> bool {
+    let is_whole = *part == Part::whole(layout.columns, layout.rows);
+    is_whole && layout.has_strips() && layout.chunk_size() > LARGEST_DECODED && suits(layout)
+}
+
+/// Reads all of a band, the first being 0, of a layout that [suits](suits_whole): the samples are
+/// held once.
+pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, BadRaster> {
+    let all = Part::whole(layout.columns, layout.rows);
+    let stored = layout.sample();
+    let apart = layout.texel_bytes() as usize;
+    let first = layout.bytes_before(band);
+    let count = u64::from(layout.columns) * u64::from(layout.rows);
+    let mut samples = stored.room(count)?;
+    for chunk in layout.chunks_of(band, &all) {
+        let covers = chunk.covers;
+        if chunk.bytes == 0 {
+            let more = covers.columns as usize * covers.rows as usize;
+            with_samples!(&mut samples, values => {
+                values.resize(values.len() + more, SampleValue::nearest(0.0));
+            });
+            continue;
+        }
+        let mut rows = Rows::of(layout, &chunk)?;
+        for _ in 0..covers.rows {
+            stored.append(&mut samples, &rows.next()?[first..], apart, ENDIAN);
+        }
+    }
+    match samples.len() as u64 == count {
+        true => Ok(samples),
+        false => Err(BadRaster::damaged("TIFF: its index has too few strips")),
+    }
+}

@@ -1,0 +1,246 @@
+//! Strips and tiles that are too large to be unpacked each time: unpacked once, into a file
+//! without a name that goes with the program, and read there row by row.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::layout::{Chunk, Layout};
+use super::unpack::Rows;
+use crate::BadRaster;
+use crate::blocks::Part;
+use crate::disk_cache::{DiskCache, Unnamed};
+use crate::guard::guarded;
+use crate::input::read_exact_at;
+
+/// Bytes that are written at once.
+const AT_ONCE: usize = 1 << 20;
+
+/// Unpacked strips or tiles of an image.
+pub(super) struct Unpacked {
+    unnamed: Unnamed,
+    /// Places in it.
+    count: u64,
+    /// Bytes that one takes.
+    each: u64,
+    kept: Mutex<Kept>,
+    /// Is held by whoever unpacks something.
+    turn: Mutex<()>,
+}
+
+/// What is in the file.
+struct Kept {
+    /// The strip or tile at each place of the file.
+    slots: Vec<Option<Slot>>,
+    /// How often something was asked for.
+    asked: u64,
+}
+
+/// A strip or tile that was unpacked.
+struct Slot {
+    /// Where it lies in the TIFF, and how many rows of it are wanted.
+    is_of: (u64, u32),
+    /// How many bytes are here, and what is wrong with the others.
+    bytes: u64,
+    fault: Option<String>,
+    /// When it was asked for last.
+    used: u64,
+}
+
+impl Unpacked {
+    /// Nothing is unpacked yet. Two strips, or rows of tiles, are kept whatever their size, and as
+    /// many of what is transparent where that lies apart: a row of blocks may lie in two, and
+    /// nothing is to be unpacked again for each of its blocks. More of them are kept within the
+    /// bound of what is kept on disk.
+    ///
+    /// # Errors
+    /// Why there is no place for them.
+    pub(super) fn new(layout: &Layout, disk: &DiskCache) -> io::Result<Self> {
+        let each = layout.chunk_size();
+        let bands = layout.bands_read().count() as u64;
+        let most = layout.chunks_of_band().saturating_mul(bands).max(1);
+        let least = most.min(2 * u64::from(layout.chunks_across()) * bands);
+        let count = (disk.most_bytes() / each.max(1)).clamp(least, most);
+        let unnamed = disk.file_without_name(each.saturating_mul(count))?;
+        let slots = (0..count).map(|_| None).collect();
+        Ok(Self {
+            unnamed,
+            count,
+            each,
+            kept: Mutex::new(Kept { slots, asked: 0 }),
+            turn: Mutex::new(()),
+        })
+    }
+
+    /// Bytes that it takes on disk at most.
+    pub(super) const fn most_bytes(&self) -> u64 {
+        self.each.saturating_mul(self.count)
+    }
+
+    /// Bytes of a strip or tile, counted from its first one.
+    pub(super) fn read(
+        &self,
+        layout: &Layout,
+        chunk: &Chunk,
+        range: Range<u64>,
+    ) -> Result<Vec<u8>, BadRaster> {
+        if let Some(read) = self.read_kept(chunk, &range) {
+            return read;
+        }
+        let turn = self.turn.lock();
+        // The panics of decoders are caught.
+        let _turn = turn.unwrap_or_else(PoisonError::into_inner);
+        // It may have been unpacked by the one who had the turn before.
+        if let Some(read) = self.read_kept(chunk, &range) {
+            return read;
+        }
+        let index = self.kept().leave_oldest();
+        let slot = self.unpack(layout, chunk, self.each * index as u64);
+        self.kept().slots[index] = Some(slot);
+        let read = self.read_kept(chunk, &range);
+        read.unwrap_or_else(|| Err(BadRaster::damaged("TIFF: nothing was unpacked")))
+    }
+
+    /// Whether a strip or tile is unpacked already.
+    #[cfg(test)]
+    pub(super) fn has(&self, chunk: &Chunk) -> bool {
+        self.kept().find(chunk).is_some()
+    }
+
+    /// The same bytes of what is unpacked already.
+    fn read_kept(&self, chunk: &Chunk, range: &Range<u64>) -> Option<Result<Vec<u8>, BadRaster>> {
+        // Is held until the bytes are read: another may want the place for something else.
+        let mut kept = self.kept();
+        let index = kept.find(chunk)?;
+        kept.asked += 1;
+        let asked = kept.asked;
+        let slot = kept.slots[index].as_mut()?;
+        slot.used = asked;
+        if range.end > slot.bytes {
+            let why = slot.fault.as_deref().unwrap_or("TIFF: a row too many");
+            return Some(Err(BadRaster::damaged(why)));
+        }
+        let mut bytes = vec![0; (range.end - range.start) as usize];
+        let place = self.each * index as u64 + range.start;
+        let read = read_exact_at(&self.unnamed.file, &mut bytes, place);
+        let read = read.map_err(|error| BadRaster::from_io(error, "what was unpacked"));
+        Some(read.map(|()| bytes))
+    }
+
+    /// Writes the rows of a strip or tile to a place. What is wrong with it is known from then
+    /// on, and not tried again.
+    fn unpack(&self, layout: &Layout, chunk: &Chunk, place: u64) -> Slot {
+        let mut bytes = 0;
+        let done = guarded(super::FORMAT.name, || {
+            self.write(layout, chunk, place, &mut bytes)
+        });
+        Slot {
+            is_of: (chunk.place, chunk.covers.rows),
+            bytes,
+            fault: done.err().map(|fault| match fault {
+                BadRaster::Damaged(what) => what,
+                fault => fault.to_string(),
+            }),
+            used: 0,
+        }
+    }
+
+    fn write(
+        &self,
+        layout: &Layout,
+        chunk: &Chunk,
+        place: u64,
+        written: &mut u64,
+    ) -> Result<(), BadRaster> {
+        let no_room = |error: io::Error| {
+            let megabytes = self.each.div_ceil(1_000_000);
+            BadRaster::Damaged(format!(
+                "TIFF: {megabytes} MB could not be unpacked into the folder of --cache-dir: {error}"
+            ))
+        };
+        let file = &self.unnamed.file;
+        let mut to = BufWriter::with_capacity(AT_ONCE, Placed { file, place });
+        let mut rows = Rows::of(layout, chunk)?;
+        let mut came = 0;
+        let mut fault = None;
+        for _ in 0..chunk.covers.rows {
+            match rows.next() {
+                Ok(row) => to.write_all(row).map_err(no_room)?,
+                Err(error) => {
+                    fault = Some(error);
+                    break;
+                }
+            }
+            came += layout.row_bytes();
+        }
+        to.flush().map_err(no_room)?;
+        *written = came;
+        fault.map_or(Ok(()), Err)
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        // Nothing that panics runs while this is held.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Kept {
+    /// The place of a strip or tile.
+    fn find(&self, chunk: &Chunk) -> Option<usize> {
+        let is_of = (chunk.place, chunk.covers.rows);
+        let known = |slot: &Option<Slot>| slot.as_ref().is_some_and(|slot| slot.is_of == is_of);
+        self.slots.iter().position(known)
+    }
+
+    /// The place that is free, or was asked for longest ago: nothing is there from now on.
+    fn leave_oldest(&mut self) -> usize {
+        let used = |index: &usize| self.slots[*index].as_ref().map_or(0, |slot| slot.used);
+        let oldest = (0..self.slots.len()).min_by_key(used).unwrap_or(0);
+        self.slots[oldest] = None;
+        oldest
+    }
+}
+
+/// Writes from a place of a file on, wherever others read meanwhile.
+struct Placed<'f> {
+    file: &'f File,
+    place: u64,
+}
+
+impl Write for Placed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = write_at(self.file, bytes, self.place)?;
+        self.place += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(unix)]
+fn write_at(file: &File, bytes: &[u8], place: u64) -> io::Result<usize> {
+    std::os::unix::fs::FileExt::write_at(file, bytes, place)
+}
+
+#[cfg(windows)]
+fn write_at(file: &File, bytes: &[u8], place: u64) -> io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_write(file, bytes, place)
+}
+
+/// Checks that of an image in one strip or tile, which is to be unpacked, the first row is there.
+pub(super) fn check_first(layout: &Layout) -> Result<(), BadRaster> {
+    let all = Part::whole(layout.columns, layout.rows);
+    if layout.unpacked.is_some() && layout.chunks_of_band() == 1 {
+        for chunk in layout.chunks_in(&all) {
+            Rows::of(layout, &chunk)?.next()?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[path = "unpacked_tests.rs"]
+mod tests;

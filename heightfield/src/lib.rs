@@ -1,0 +1,530 @@
+//! Terrain files of every supported format become one [`Raster`].
+//!
+//! | format | read by | notes |
+//! |---|---|---|
+//! | GeoTIFF, TIFF, BigTIFF, COG | `tiff-reader` | first full image; a band by number |
+//! | SRTM `.hgt`, also zipped or gzipped | here | place from the name |
+//! | DTED 0 to 2 | here | |
+//! | Esri ASCII `.asc`, GRASS ASCII | here | |
+//! | `.flt`, `.bil`, `.bip`, `.bsq`, ENVI | here | by the `.hdr` beside them |
+//! | PNG | `png` | grey, grey + alpha, depth in the alpha of a colour picture, encoded in its colours |
+//! | raw samples | here | with a stated [`RawLayout`] |
+//! | NetCDF 3 and 4 `.nc`, `.grd` | `netcdf-reader` | |
+//! | USGS ASCII `.dem` | here | |
+//! | NumPy `.npy`, `.npz` | `npyz` | |
+//! | all others that GDAL knows | `heightfield-gdal` | where the machine has a libgdal |
+//!
+//! Each format is one file or folder of `formats`, and one line in its table. From a
+//! path to samples: `open` unpacks (`archive`), asks the table, and lets the format
+//! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that. A folder, a pattern
+//! of names, a GDAL VRT and a STAC are many files as one terrain (`mosaic`).
+//!
+//! **Places.** A format hands over its map from columns and rows to coordinates
+//! (`ground_map`) and its reference system (`crs`); what follows from these is worked out
+//! once for all (`placed`), as are places of samples for the rest of the program
+//! (`georeference`). World files and `.prj` files are read by `beside`.
+//!
+//! **Holes.** No-data as the format states it, NaN, masked samples and tiles
+//! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. An
+//! infinite sample is an error: it is neither a height nor a declared hole.
+
+#![forbid(unsafe_code)]
+
+mod archive;
+mod beside;
+pub mod bilinear;
+mod blocks;
+mod crs;
+mod decoded;
+pub mod disk_cache;
+mod error;
+mod format;
+mod formats;
+mod geometry;
+mod georeference;
+mod globe;
+mod ground_map;
+mod guard;
+mod input;
+mod mosaic;
+mod one_file;
+mod open;
+mod options;
+mod place;
+mod placed;
+mod plain;
+mod read;
+mod remote;
+mod samples;
+mod storage;
+mod tangents;
+mod thinned;
+mod unread;
+
+// What the tests of all crates wait with, of which each uses its part.
+#[cfg(test)]
+#[path = "../../tests/src/timeouts.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod timeouts;
+
+use std::path::{Path, PathBuf};
+
+pub use crs::{LonLat, ReferenceSystem};
+pub use decoded::{HeightSummary, LARGEST_HEIGHT};
+pub use error::{BadRaster, Error};
+pub use geometry::metres_in;
+pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
+pub use georeference::around;
+pub use georeference::{Georeference, GroundTransform, Sides, System};
+pub use globe::Globe;
+pub use ground_map::Bounds;
+pub use mosaic::files_read_with;
+pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
+pub use remote::{Elsewhere, file_name, is_url, without_key};
+pub use samples::{Endian, SampleType, Samples};
+
+use blocks::Survey;
+use decoded::Decoded;
+use place::Place;
+use samples::{SampleValue, with_samples};
+use storage::Storage;
+
+/// The libgdal of this machine, which reads what nothing here does; it is loaded the first time.
+///
+/// # Errors
+/// Why there is none that can be used.
+pub fn gdal() -> Result<heightfield_gdal::Library, heightfield_gdal::Error> {
+    formats::gdal::library()
+}
+
+/// Names of the formats that are read without GDAL.
+pub fn own_formats() -> impl Iterator<Item = &'static str> {
+    formats::FORMATS.iter().map(|format| format.name)
+}
+
+/// A height field held once, in the compact type of its file.
+///
+/// Column 0 is the westernmost, row 0 the **southernmost**, whatever the file's
+/// order. Heights are in the file's vertical unit.
+#[derive(Clone, Debug)]
+pub struct Raster {
+    source: Decoded,
+    survey: Survey,
+    elsewhere: Elsewhere,
+    /// Empty where it was made in memory.
+    path: PathBuf,
+}
+
+impl Raster {
+    /// Opens a terrain file: by its content, and where that says nothing by its
+    /// extension.
+    ///
+    /// # Errors
+    /// What is wrong with which file; never a panic, and never an allocation
+    /// that the file's own size does not justify.
+    pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
+        Self::opened(path.as_ref(), options, open::decode)
+    }
+
+    /// Opens files as one terrain, as those of a folder are.
+    ///
+    /// # Errors
+    /// As [`Raster::open`].
+    pub fn open_all(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Self, Error> {
+        let first = files.first().cloned().unwrap_or_default();
+        Self::opened(&first, options, |_, options| {
+            open::decode_all(&files, options)
+        })
+    }
+
+    /// Opens a terrain file with GDAL, also one that [`Raster::open`] reads by itself: both
+    /// are to say the same of it.
+    ///
+    /// # Errors
+    /// As [`Raster::open`]; [`BadRaster::UnknownFormat`] where there is no libgdal, too.
+    pub fn open_by_gdal(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
+        Self::opened(path.as_ref(), options, open::decode_by_gdal)
+    }
+
+    fn opened(
+        path: &Path,
+        options: &OpenOptions,
+        decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, BadRaster>,
+    ) -> Result<Self, Error> {
+        options.elsewhere.set_disk_cache(&options.disk_cache);
+        decode(path, options)
+            .and_then(|decoded| decoded.with_ground_cell(options.ground_cell_m))
+            .map(|decoded| decoded.with_vertical_unit(options.vertical_unit_m))
+            .and_then(|mut decoded| {
+                decoded.storage.set_path(path);
+                decoded.storage.set_disk_cache(&options.disk_cache);
+                decoded.tell_if_whole(options.most_in_memory_bytes);
+                Self::checked(decoded, options.no_data)
+            })
+            .inspect(|_| options.elsewhere.touch())
+            .map(|raster| Self {
+                path: path.to_owned(),
+                elsewhere: options.elsewhere.clone(),
+                ..raster
+            })
+            .map_err(|fault| Error::new(path, fault))
+    }
+
+    /// A field made in memory, `height(column, row)` with row 0 the
+    /// southernmost; NaN is a hole. Cells are 1 m, heights in metres.
+    ///
+    /// # Errors
+    /// When there are fewer than 2 × 2 samples, no heights, or infinite ones.
+    pub fn from_fn(
+        columns: u32,
+        rows: u32,
+        mut height: impl FnMut(u32, u32) -> f32,
+    ) -> Result<Self, BadRaster> {
+        let mut samples = Vec::with_capacity(columns as usize * rows as usize);
+        for row in 0..rows {
+            samples.extend((0..columns).map(|column| height(column, row)));
+        }
+        let mut decoded = Decoded::new(
+            "made in memory".into(),
+            (columns, rows),
+            Samples::from(samples),
+        );
+        decoded.south_up = true;
+        decoded.metres_per_vertical_unit = Some(1.0);
+        let metre = CellUnit::Length { metres: 1.0 };
+        decoded.cell = Some(CellSize::stated((1.0, 1.0), metre, None));
+        Self::checked(decoded, None)
+    }
+
+    /// The same samples in cells of another size.
+    #[must_use]
+    pub fn with_cell(mut self, cell: CellSize) -> Self {
+        self.source.cell = Some(cell).filter(CellSize::is_valid);
+        self
+    }
+
+    fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, BadRaster> {
+        let survey = source.check(no_data)?;
+        Ok(Self {
+            source,
+            survey,
+            elsewhere: Elsewhere::default(),
+            path: PathBuf::new(),
+        })
+    }
+
+    /// From now on nothing waits for what is fetched from elsewhere, nor for coarse levels that
+    /// are made of many blocks of the file: what is not here yet is a hole for the moment, and
+    /// [`Raster::not_yet`] counts it.
+    pub fn stop_waiting(&self) {
+        self.elsewhere.stop_waiting(true);
+        if let Storage::Blocks(blocks) = &self.source.storage {
+            blocks.stop_waiting();
+        }
+    }
+
+    /// Has what is not here yet of a level read, where that is not waited for any more
+    /// ([`Raster::stop_waiting`]): between two columns and between two rows of level 0, all of
+    /// them included. Waits for nothing, and asks for 16 blocks at most.
+    pub fn prefetch(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
+        let Storage::Blocks(blocks) = &self.source.storage else {
+            return;
+        };
+        let inside = |[first, last]: [u32; 2], count: u32, turned: bool| {
+            let (first, last) = (first.min(count - 1), last.min(count - 1));
+            let at = |index: u32| if turned { count - 1 - index } else { index };
+            let (one, other) = (at(first), at(last));
+            [one.min(other), one.max(other)]
+        };
+        let columns = inside(columns, self.columns(), self.source.east_first);
+        let rows = inside(rows, self.rows(), !self.source.south_up);
+        blocks.prefetch_full(level, columns, rows);
+    }
+
+    /// Blocks that were read from the file so far; none where all samples are in memory.
+    pub fn blocks_read(&self) -> u64 {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(blocks) => blocks.blocks_read(),
+        }
+    }
+
+    /// Whether a block of the file is being read in the background, or is going to be
+    /// ([`Raster::stop_waiting`]). Coarse samples that are made of the file do not count.
+    pub fn is_reading(&self) -> bool {
+        match &self.source.storage {
+            Storage::Held { .. } => false,
+            Storage::Blocks(blocks) => blocks.is_reading(),
+        }
+    }
+
+    /// How often this thread asked for heights that were not here yet. Where it grows while
+    /// the thread reads heights, some of their holes are none.
+    pub fn not_yet(&self) -> u64 {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(_) => blocks::not_yet(),
+        }
+    }
+
+    /// Whether all that was asked for so far has come: what is planned with holes that are
+    /// none is planned wrongly.
+    ///
+    /// # Errors
+    /// Why something did not come.
+    pub fn check_came(&self) -> Result<(), Error> {
+        let outage = match &self.source.storage {
+            Storage::Held { .. } => None,
+            Storage::Blocks(blocks) => blocks.take_outage(),
+        };
+        outage.map_or(Ok(()), |fault| Err(Error::new(&self.path, fault)))
+    }
+
+    /// Samples from west to east.
+    pub fn columns(&self) -> u32 {
+        self.source.columns
+    }
+
+    /// Samples from south to north.
+    pub fn rows(&self) -> u32 {
+        self.source.rows
+    }
+
+    /// The height at a sample in the file's vertical unit; NaN in a hole and
+    /// outside the field. Row 0 is the southernmost.
+    pub fn height(&self, column: u32, row: u32) -> f64 {
+        self.sample(column, row)
+    }
+
+    /// Copies heights of a row from `first_column` eastwards, one for each place in
+    /// `heights`: the same values as [`Raster::height`].
+    ///
+    /// Level *L* is the field with every 2ᴸ-th sample, or what an overview in the file has there
+    /// ([`Raster::surface`]); row and column count in it.
+    pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
+        heights.fill(f64::NAN);
+        let step = 1_u64.checked_shl(level.into()).unwrap_or(u64::MAX);
+        let row = u64::from(row).saturating_mul(step);
+        if row >= u64::from(self.rows()) {
+            return;
+        }
+        let columns = (u64::from(first_column)..).map(|column| column.saturating_mul(step));
+        let columns = columns.take_while(|column| *column < u64::from(self.columns()));
+        // Both fit: they are inside the field.
+        let each = columns.map(|column| column as u32).zip(heights);
+        let image = self.image_of(level);
+        for (column, height) in each {
+            *height = match image {
+                0 => self.sample(column, row as u32),
+                _ => self.surface_of(image, [f64::from(column), row as f64]),
+            };
+        }
+    }
+
+    /// The height between samples, linear along rows and columns, at a place in
+    /// columns and rows of level 0; NaN outside of the field, and where a corner that
+    /// counts has no height.
+    ///
+    /// A raster in memory has one image for all levels. One that stays in its file has the
+    /// heights of level *L* from the coarsest overview that is no coarser than it; of a file
+    /// without overviews, where *L* is at least 3, from every 8th, 64th or 512th sample.
+    pub fn surface(&self, level: u8, place: [f64; 2]) -> f64 {
+        self.surface_of(self.image_of(level), place)
+    }
+
+    /// The same of an image of the file.
+    fn surface_of(&self, image: usize, [column, row]: [f64; 2]) -> f64 {
+        let last = [self.columns(), self.rows()].map(|count| f64::from(count) - 1.0);
+        if !(0.0..=last[0]).contains(&column) || !(0.0..=last[1]).contains(&row) {
+            return f64::NAN;
+        }
+        match &self.source.storage {
+            Storage::Blocks(blocks) if image > 0 => {
+                let column = if self.source.east_first {
+                    last[0] - column
+                } else {
+                    column
+                };
+                let row = if self.source.south_up {
+                    row
+                } else {
+                    last[1] - row
+                };
+                let height = |stored| self.source.height_in_file(stored);
+                blocks.between(image, [column, row], height)
+            }
+            _ => bilinear::at([column, row], |column, row| self.sample(column, row)),
+        }
+    }
+
+    /// The image of the file that serves a level: 0 for the full one.
+    fn image_of(&self, level: u8) -> usize {
+        match &self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(blocks) => blocks.image_of(level),
+        }
+    }
+
+    /// The level of detail at which samples that lie `samples` apart are best read one by one:
+    /// 0 in memory, where all are at hand.
+    pub fn level_for(&self, samples: f64) -> u8 {
+        match self.source.storage {
+            Storage::Held { .. } => 0,
+            Storage::Blocks(_) => samples.max(1.0).log2() as u8,
+        }
+    }
+
+    /// The height at a sample of the full image.
+    fn sample(&self, column: u32, row: u32) -> f64 {
+        if column >= self.columns() || row >= self.rows() {
+            return f64::NAN;
+        }
+        let (column, row) = (self.file_column(column), self.file_row(row));
+        match &self.source.storage {
+            Storage::Held { samples, mask } => {
+                let index =
+                    (u64::from(row) * u64::from(self.columns()) + u64::from(column)) as usize;
+                match mask.as_ref().is_some_and(|mask| mask.contains(index)) {
+                    true => f64::NAN,
+                    false => with_samples!(samples, values => {
+                        self.source.height_of(values[index].widen())
+                    }),
+                }
+            }
+            Storage::Blocks(blocks) => self.source.height_in_file(blocks.stored(0, column, row)),
+        }
+    }
+
+    fn file_column(&self, column: u32) -> u32 {
+        match self.source.east_first {
+            true => self.columns() - 1 - column,
+            false => column,
+        }
+    }
+
+    fn file_row(&self, row: u32) -> u32 {
+        match self.source.south_up {
+            true => row,
+            false => self.rows() - 1 - row,
+        }
+    }
+
+    /// Range of the heights and number of holes: of all samples where they are in memory,
+    /// else of those that were looked at.
+    pub fn summary(&self) -> HeightSummary {
+        self.survey.summary
+    }
+
+    /// The samples as the file holds them, its own type and order; `None` where they stay in
+    /// the file.
+    pub fn samples(&self) -> Option<&Samples> {
+        self.source.storage.held()
+    }
+
+    /// Whether all samples were looked at: those in memory always are.
+    pub fn is_known_whole(&self) -> bool {
+        self.samples().is_some()
+    }
+
+    /// Bytes of memory that the samples take, at most.
+    pub fn memory_bytes(&self) -> usize {
+        match &self.source.storage {
+            Storage::Held { samples, .. } => samples.bytes(),
+            Storage::Blocks(blocks) => blocks.most_bytes(),
+        }
+    }
+
+    /// A hash of the file's index and of the heights that were looked at, where the samples
+    /// stay in the file.
+    pub fn print_in_file(&self) -> Option<u64> {
+        self.survey.print
+    }
+
+    /// Name of the format and variant, as `GeoTIFF, int16, deflate`.
+    pub fn format(&self) -> &str {
+        &self.source.format
+    }
+
+    /// The horizontal reference system, where the file states it.
+    pub fn reference_system(&self) -> Option<&ReferenceSystem> {
+        self.source.system.as_ref()
+    }
+
+    /// Where the reference system comes from.
+    pub fn reference_system_from(&self) -> Certainty {
+        self.source.system_from
+    }
+
+    /// Outer edges of the cells around all samples, in the units of the file's
+    /// coordinates, where the file knows its place.
+    pub fn bounds(&self) -> Option<Bounds> {
+        self.source.bounds()
+    }
+
+    /// The same in degrees of longitude and latitude, as [`Georeference::lonlat`] says,
+    /// where the reference system is known. Longitudes run on over 180° where the field does.
+    pub fn bounds_lonlat(&self) -> Option<Bounds> {
+        self.source.bounds_lonlat()
+    }
+
+    /// What the heights count from, where the file says so.
+    pub fn vertical_datum(&self) -> Option<&VerticalDatum> {
+        self.source.vertical_datum.as_ref()
+    }
+
+    /// Where the vertical unit comes from.
+    pub fn vertical_unit_from(&self) -> Certainty {
+        match self.source.metres_per_vertical_unit {
+            Some(_) => self.source.vertical_unit_from,
+            None => Certainty::Assumed,
+        }
+    }
+
+    /// Where the samples lie in the coordinates of the file's reference system.
+    pub fn georeference(&self) -> Georeference<'_> {
+        let source = &self.source;
+        let last = [source.columns, source.rows].map(|count| f64::from(count) - 1.0);
+        let ground = source.place.and_then(|place| place.map.of_centres());
+        let ground = ground.map(|map| {
+            let map = match source.east_first {
+                true => map.with_columns_from(last[0]),
+                false => map,
+            };
+            match source.south_up {
+                true => map,
+                false => map.with_rows_from(last[1]),
+            }
+        });
+        Georeference::new(ground, source.system.as_ref(), source.cell, last)
+    }
+
+    /// The same samples at a place: the south-west one at `origin`, and the steps to the
+    /// next column and row, in coordinates of the reference system with an EPSG code.
+    #[must_use]
+    pub fn with_ground(mut self, ground: GroundTransform, epsg: Option<u16>) -> Self {
+        self.source.place = ground_map::GroundMap::of_samples(&ground).map(Place::new);
+        self.source.system = epsg.and_then(ReferenceSystem::from_code);
+        self
+    }
+
+    /// Size of a cell, where the file knows it.
+    pub fn cell(&self) -> Option<CellSize> {
+        self.source.cell
+    }
+
+    /// Metres per vertical unit, where the file says so; most say nothing and
+    /// mean metres.
+    pub fn stated_metres_per_vertical_unit(&self) -> Option<f64> {
+        self.source.metres_per_vertical_unit
+    }
+
+    /// Metres per vertical unit; one where the file does not say.
+    pub fn metres_per_vertical_unit(&self) -> f64 {
+        self.stated_metres_per_vertical_unit().unwrap_or(1.0)
+    }
+
+    /// What the user should know about how the file was read, one sentence each.
+    pub fn remarks(&self) -> &[String] {
+        &self.source.remarks
+    }
+}

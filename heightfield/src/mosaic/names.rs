@@ -1,0 +1,127 @@
+//! Which files a folder or a pattern of names stands for.
+
+use std::path::{Path, PathBuf};
+
+use super::super::BadRaster;
+use super::super::format::Claim;
+use super::super::formats::claim_of;
+use crate::remote::is_url;
+
+/// No terrain has more files: the 30 m tiles of all the Earth's land are 26,450.
+const MOST_FILES: usize = 1 << 20;
+
+/// The terrain files that a folder, or a pattern of names that is no file itself, stands
+/// for, in the order of their names; `None` where a path is neither.
+///
+/// # Errors
+/// [`BadRaster::NoTiles`]; a folder that cannot be read.
+pub(crate) fn named(path: &Path) -> Result<Option<Vec<PathBuf>>, BadRaster> {
+    if path.to_str().is_some_and(is_url) {
+        return Ok(None);
+    }
+    let files = if path.is_dir() {
+        in_folder(path)?
+    } else if let Some(pattern) = pattern(path) {
+        matching(pattern)?
+    } else {
+        return Ok(None);
+    };
+    match files.len() {
+        0 => Err(BadRaster::NoTiles(match path.is_dir() {
+            true => "no file in this folder is known to hold a terrain and its place".into(),
+            false => "no terrain file matches this pattern".into(),
+        })),
+        count if count > MOST_FILES => Err(BadRaster::NoTiles(format!(
+            "more than {MOST_FILES} files are not read as one terrain"
+        ))),
+        _ => Ok(Some(files)),
+    }
+}
+
+/// A pattern: what is no file and has a sign of one.
+fn pattern(path: &Path) -> Option<&str> {
+    let text = path.to_str()?;
+    (text.contains(['*', '?', '[']) && !path.exists()).then_some(text)
+}
+
+/// Files of formats that know their place; folders inside are not looked into.
+fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, BadRaster> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(BadRaster::Unreadable)? {
+        let path = entry.map_err(BadRaster::Unreadable)?.path();
+        if is_tile(&path) && path.is_file() && files.len() <= MOST_FILES {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Files that match; a picture and an archive of any name count where they are asked for.
+fn matching(pattern: &str) -> Result<Vec<PathBuf>, BadRaster> {
+    let wrong = |error| BadRaster::NoTiles(format!("this pattern cannot be read: {error}"));
+    let found = glob::glob(pattern).map_err(wrong)?;
+    // What may not be looked into holds nothing that could be read.
+    let found = found.filter_map(Result::ok);
+    let asked = |path: &PathBuf| {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let others = ["png", "zip", "gz"];
+        is_tile(path) || others.iter().any(|other| extension == *other)
+    };
+    let tiles = found.filter(|path| asked(path) && path.is_file());
+    let mut files: Vec<_> = tiles.take(MOST_FILES + 1).collect();
+    files.sort();
+    Ok(files)
+}
+
+/// Whether a name is that of a file that holds a terrain and its place, perhaps packed. A
+/// picture seldom does, and lies beside tiles to show them.
+pub(super) fn is_tile(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let lower = name.to_lowercase();
+    let unpacked = lower.strip_suffix(".zip").or(lower.strip_suffix(".gz"));
+    let unpacked = unpacked.unwrap_or(&lower);
+    let is_hidden = lower.starts_with('.');
+    let is_placed = !unpacked.ends_with(".png");
+    let claims = claim_of(unpacked).is_some_and(|claim| claim != Claim::Suggests);
+    claims && is_placed && !is_hidden
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_says_whether_a_file_is_a_tile() {
+        for name in [
+            "a.tif",
+            "A.TIFF",
+            "N44W072.hgt",
+            "N44W072.hgt.zip",
+            "n44w072.HGT.gz",
+            "x.asc",
+            "w012n34.dt2",
+            "x.flt",
+            "x.nc",
+        ] {
+            assert!(is_tile(Path::new(name)), "{name}");
+        }
+        for name in [
+            "README.txt",
+            "a.tif.aux.xml",
+            "a.prj",
+            "a.tfw",
+            "a.hdr",
+            "a.tif.ovr",
+            "a.tif.msk",
+            "index.vrt",
+            "preview.png",
+            "tiles.zip",
+            ".a.tif",
+            "a.npy",
+            "tif",
+        ] {
+            assert!(!is_tile(Path::new(name)), "{name}");
+        }
+    }
+}

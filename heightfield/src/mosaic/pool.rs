@@ -1,0 +1,238 @@
+//! The files of a terrain that are open: few, and those touched last.
+
+use std::collections::{HashMap, HashSet};
+use std::io::{Error, ErrorKind};
+use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
+use std::thread::Builder;
+use std::time::Duration;
+
+use lru::LruCache;
+
+use super::super::guard::guarded;
+use super::super::storage::Storage;
+use super::super::{BadRaster, Decoded, OpenOptions};
+use super::source::{Opened, Source, Values};
+use super::tile_file;
+use crate::remote::{is_url, without_key};
+
+/// No more files are open at once: each may have a mask and overviews beside it.
+const MOST_OPEN: usize = 32;
+/// What open files keep in memory, bytes; the one touched last may take more alone.
+const MOST_BYTES: usize = 64 << 20;
+/// What blocks of one file take of that, bytes.
+const SHARE_BYTES: usize = 16 << 20;
+/// A file that has no blocks is held as a whole, and has to fit, bytes.
+const MOST_WHOLE_BYTES: u64 = 64 << 20;
+
+/// A file that is not open after so long is a hole.
+const OPEN_WITHIN: Duration = Duration::from_secs(20);
+
+/// Open files by their number among the terrain's.
+pub(super) struct Pool {
+    options: OpenOptions,
+    open: LruCache<usize, Arc<Opened>>,
+    /// Files that could not be read: each was warned of, and is not tried again.
+    failed: HashSet<usize>,
+    /// Blocks of files closed since that could not be read.
+    unread: HashMap<usize, u32>,
+}
+
+impl Pool {
+    pub(super) fn new(options: &OpenOptions) -> Self {
+        Self {
+            options: options_for_tiles(options),
+            open: LruCache::unbounded(),
+            failed: HashSet::new(),
+            unread: HashMap::new(),
+        }
+    }
+
+    /// Bytes that all open files take at most: one that was just decoded beside the others.
+    pub(super) const fn most_bytes() -> usize {
+        MOST_BYTES + MOST_WHOLE_BYTES as usize
+    }
+
+    /// An open file; `None`, with a warning the first time, where it cannot be read.
+    ///
+    /// # Errors
+    /// Where it is elsewhere, and cannot be read at present.
+    pub(super) fn get(
+        &mut self,
+        number: usize,
+        source: &Source,
+    ) -> Result<Option<Arc<Opened>>, BadRaster> {
+        if let Some(opened) = self.open.get(&number) {
+            return Ok(Some(opened.clone()));
+        }
+        if self.failed.contains(&number) {
+            return Ok(None);
+        }
+        match self.opened(number, source) {
+            Ok(opened) => {
+                let opened = Arc::new(opened);
+                self.open.push(number, opened.clone());
+                Ok(Some(opened))
+            }
+            Err(fault) if fault.is_of_the_line() => Err(BadRaster::in_tile(&source.path, fault)),
+            Err(fault) => {
+                self.failed.insert(number);
+                // That it holds nothing is no fault of a file among others.
+                if !matches!(fault, BadRaster::AllNoData { .. }) {
+                    let path = without_key(&source.path);
+                    tracing::warn!("{path} cannot be read and is a hole: {fault}");
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// A file that is open already.
+    pub(super) fn peek(&self, number: usize) -> Option<&Opened> {
+        self.open.peek(&number).map(|opened| &**opened)
+    }
+
+    fn opened(&mut self, number: usize, source: &Source) -> Result<Opened, BadRaster> {
+        let mut options = self.options.clone();
+        options.band = source.band.or(options.band);
+        let stamps = source.stamps();
+        let (path, by) = (source.path.clone(), options.clone());
+        let outline = in_time(source, OPEN_WITHIN, move || tile_file::outline(&path, &by))?;
+        let whole = whole_bytes(&outline)?;
+        self.make_room(usize::try_from(whole).unwrap_or(usize::MAX));
+        let (path, by) = (source.path.clone(), options.clone());
+        let decode = move || guarded("terrain", || tile_file::decode(&path, &by));
+        let mut decoded = in_time(source, OPEN_WITHIN, decode)?;
+        let found = (decoded.columns, decoded.rows);
+        if let Some((columns, rows)) = source.size.filter(|size| *size != found) {
+            return Err(BadRaster::damaged(format!(
+                "it had {columns} × {rows} samples and now has {} × {}",
+                found.0, found.1
+            )));
+        }
+        decoded.settle_no_data(match source.values {
+            Values::Heights => options.no_data,
+            Values::Stored { .. } => None,
+        });
+        if let Storage::Blocks(blocks) = &decoded.storage {
+            blocks.set_path(&source.path);
+            let unread = self.unread.get(&number).copied().unwrap_or_default();
+            blocks.set_share(SHARE_BYTES, unread);
+        }
+        Ok(Opened::new(decoded, source.values, stamps))
+    }
+
+    /// Closes files until those that stay, and `more` bytes, are within bounds. The last one
+    /// stays where it alone is too large.
+    pub(super) fn make_room(&mut self, more: usize) {
+        let bytes = |open: &LruCache<usize, Arc<Opened>>| {
+            open.iter()
+                .map(|(_, opened)| opened.share().0)
+                .sum::<usize>()
+        };
+        let fewest = usize::from(more == 0);
+        while self.open.len() > fewest
+            && (self.open.len() >= MOST_OPEN || bytes(&self.open).saturating_add(more) > MOST_BYTES)
+        {
+            let Some((number, closed)) = self.open.pop_lru() else {
+                return;
+            };
+            let unread = closed.share().1;
+            if unread > 0 {
+                self.unread.insert(number, unread);
+            }
+        }
+    }
+
+    /// Number of open files.
+    #[cfg(test)]
+    pub(super) fn len(&self) -> usize {
+        self.open.len()
+    }
+}
+
+/// How files among others are opened: those that can be are read in blocks.
+pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
+    OpenOptions {
+        most_in_memory_bytes: 0,
+        ..options.clone()
+    }
+}
+
+/// Opens a file in a thread of its own, which nobody waits for any more after a time: a disk of
+/// another computer may never answer. Requests to servers have times of their own.
+fn in_time<T: Send + 'static>(
+    source: &Source,
+    within: Duration,
+    open: impl FnOnce() -> Result<T, BadRaster> + Send + 'static,
+) -> Result<T, BadRaster> {
+    if source.path.to_str().is_some_and(is_url) {
+        return open();
+    }
+    let (send, opened) = sync_channel(1);
+    let thread = Builder::new().name("opening".into());
+    let spawned = thread.spawn(move || drop(send.send(open())));
+    spawned.map_err(BadRaster::Unreadable)?;
+    opened.recv_timeout(within).unwrap_or_else(|_| {
+        let why = format!("it was not open after {} s", within.as_secs());
+        Err(BadRaster::Unreadable(Error::new(ErrorKind::TimedOut, why)))
+    })
+}
+
+/// Bytes that a file takes that is held as a whole; none where it is read in blocks.
+///
+/// # Errors
+/// [`BadRaster::Unsupported`] where these are too many.
+pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, BadRaster> {
+    let Storage::Held { samples, .. } = &outline.storage else {
+        return Ok(0);
+    };
+    let (columns, rows) = (outline.columns, outline.rows);
+    let count = u64::from(columns) * u64::from(rows);
+    match count.saturating_mul(samples.sample_type().bytes()) {
+        bytes if bytes <= MOST_WHOLE_BYTES => Ok(bytes),
+        _ => Err(BadRaster::Unsupported {
+            format: "a terrain of many files",
+            feature: format!("a file of {columns} × {rows} samples that cannot be read in blocks"),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SampleType;
+    use crate::blocks::Part;
+    use crate::mosaic::source::Axis;
+
+    #[test]
+    fn file_that_never_opens_is_given_up() {
+        let axis = Axis {
+            start: 0.0,
+            step: 1.0,
+        };
+        let source = Source {
+            path: "never.tif".into(),
+            bytes: 1,
+            band: None,
+            covers: Part::whole(2, 2),
+            axes: [axis; 2],
+            size: None,
+            values: Values::Stored {
+                no_data: None,
+                covers: false,
+                scale: 1.0,
+                offset: 0.0,
+                sample: SampleType::F32,
+            },
+        };
+        let (ends, never) = sync_channel::<()>(0);
+        let open = move || {
+            let _ = never.recv();
+            Ok(())
+        };
+        let fault = in_time(&source, Duration::ZERO, open).expect_err("never");
+        assert!(fault.to_string().contains("not open after"), "{fault}");
+        drop(ends);
+    }
+}

@@ -1,0 +1,139 @@
+//! What the user may say about a file that the file does not say itself.
+
+use super::samples::{Endian, SampleType};
+use crate::disk_cache::DiskCache;
+use crate::remote::Elsewhere;
+
+/// How to open a file. The default believes the file.
+#[derive(Clone, Debug)]
+pub struct OpenOptions {
+    /// The file is raw samples of this layout, whatever its content looks like.
+    pub raw: Option<RawLayout>,
+    /// Which channel of a PNG holds the height. Without it: the grey of a grey
+    /// picture, the alpha of one with colours and an alpha that varies.
+    pub png_channel: Option<PngChannel>,
+    /// Stored sample value that means no data; replaces what the file says.
+    pub no_data: Option<f64>,
+    /// Which band holds the height, the first being 1. Without it: the first.
+    pub band: Option<u32>,
+    /// Which variable of a NetCDF file or array of an `.npz` holds the height. Without
+    /// it: the one that is named as heights are, or the only one.
+    pub variable: Option<String>,
+    /// Which asset of a STAC's items holds the heights. Without it: the one whose role or
+    /// name says so, or the only raster.
+    pub asset: Option<String>,
+    /// Side of a cell on the ground, metres, of a file that does not state it.
+    pub ground_cell_m: Option<f64>,
+    /// Metres in a unit of the heights; replaces what the file says.
+    pub vertical_unit_m: Option<f64>,
+    /// How a picture's colours encode heights, if they do.
+    pub encoding: Option<Encoding>,
+    /// The numbers are classes and no heights: those of a palette are taken as they are.
+    pub classes: bool,
+    /// What nothing here reads is given to GDAL, where there is a libgdal.
+    pub gdal: bool,
+    /// Samples that take more bytes than this stay in the file, where its format allows it,
+    /// and are read in blocks when they are touched.
+    pub most_in_memory_bytes: u64,
+    /// The files at URLs that are read with these options.
+    pub elsewhere: Elsewhere,
+    /// Where coarse samples are kept that are made of a terrain in its file. The default
+    /// keeps nothing.
+    pub disk_cache: DiskCache,
+}
+
+impl OpenOptions {
+    /// What [`OpenOptions::most_in_memory_bytes`] is unless somebody states it, in units of
+    /// 2²⁰ bytes.
+    pub const IN_MEMORY_MB: u32 = 128;
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self {
+            raw: None,
+            png_channel: None,
+            no_data: None,
+            band: None,
+            variable: None,
+            asset: None,
+            ground_cell_m: None,
+            vertical_unit_m: None,
+            encoding: None,
+            classes: false,
+            gdal: true,
+            most_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
+            elsewhere: Elsewhere::default(),
+            disk_cache: DiskCache::off(),
+        }
+    }
+}
+
+/// Layout of a raw file: rows from north to south, samples from west to east,
+/// nothing before, between or after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RawLayout {
+    /// Samples from west to east.
+    pub columns: u32,
+    /// Samples from north to south.
+    pub rows: u32,
+    /// Type of a sample.
+    pub sample: SampleType,
+    /// Byte order of a sample.
+    pub endian: Endian,
+}
+
+/// How the red, green and blue of a picture encode a height in metres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Mapbox Terrain-RGB: −10000 + 0.1 · (65536 R + 256 G + B)
+    TerrainRgb,
+    /// Terrarium: 256 R + G + B / 256 − 32768
+    Terrarium,
+}
+
+/// A channel of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PngChannel {
+    /// The grey of a grey picture
+    Grey,
+    /// Red
+    Red,
+    /// Green
+    Green,
+    /// Blue
+    Blue,
+    /// Alpha, where the paper's data holds the height
+    Alpha,
+}
+
+impl Encoding {
+    /// All of them.
+    pub const ALL: &[Self] = &[Self::TerrainRgb, Self::Terrarium];
+
+    /// Its name, as `terrain-rgb`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::TerrainRgb => "terrain-rgb",
+            Self::Terrarium => "terrarium",
+        }
+    }
+}
+
+impl PngChannel {
+    /// All of them.
+    pub const ALL: &[Self] = &[Self::Grey, Self::Red, Self::Green, Self::Blue, Self::Alpha];
+
+    /// Its name, as `grey`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Grey => "grey",
+            Self::Red => "red",
+            Self::Green => "green",
+            Self::Blue => "blue",
+            Self::Alpha => "alpha",
+        }
+    }
+}

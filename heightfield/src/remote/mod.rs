@@ -1,0 +1,86 @@
+//! Terrain files elsewhere: at URLs, of which only what is touched is fetched.
+//!
+//! ```text
+//! Elsewhere (files known by their URL) ─▶ RemoteFile (its pages) ─▶ store (requests)
+//! ```
+//!
+//! A file is cut into pages. Pages that are wanted are fetched in the background, several
+//! that follow each other with one request, and those touched last are kept. Whoever reads
+//! waits for them, until somebody is served who must not ([`Elsewhere::stop_waiting`]):
+//! then what is not here yet is [`std::io::ErrorKind::WouldBlock`], and comes later.
+//!
+//! Pages are kept on disk for another run (`kept`), where the server says by a tag or a time
+//! which state of the file they are of.
+//!
+//! A file that was changed at its server is not read on: what was fetched of it and what
+//! would come do not belong together.
+//!
+//! `object_store` makes the requests; it is named in `store`, `servers`, `capped` and `errors` only.
+//! Without the feature `remote` there is no such file (`absent`).
+
+#[cfg(not(feature = "remote"))]
+mod absent;
+#[cfg(feature = "remote")]
+mod capped;
+#[cfg(feature = "remote")]
+mod elsewhere;
+#[cfg(feature = "remote")]
+mod errors;
+#[cfg(feature = "remote")]
+mod file;
+#[cfg(feature = "remote")]
+mod kept;
+#[cfg(feature = "remote")]
+mod line;
+#[cfg(feature = "remote")]
+mod pages;
+mod reader;
+#[cfg(feature = "remote")]
+mod servers;
+#[cfg(feature = "remote")]
+mod store;
+mod url;
+
+use std::io::{Error, ErrorKind};
+
+#[cfg(not(feature = "remote"))]
+pub use absent::Elsewhere;
+#[cfg(not(feature = "remote"))]
+pub(crate) use absent::RemoteFile;
+#[cfg(feature = "remote")]
+pub use elsewhere::Elsewhere;
+#[cfg(feature = "remote")]
+pub(crate) use file::RemoteFile;
+pub(crate) use reader::RemoteReader;
+pub(crate) use url::{beside, escaped, neighbour};
+pub use url::{file_name, is_url, without_key};
+
+/// A failure of the line or the server: another try may go well.
+const OUTAGE: ErrorKind = ErrorKind::ConnectionAborted;
+
+/// A file that cannot be read on: it was changed, or may not be read any more.
+const LOST: ErrorKind = ErrorKind::StaleNetworkFileHandle;
+
+/// Whether an error says that nothing more comes of a file that was opened.
+pub(crate) fn is_lost(error: &Error) -> bool {
+    error.kind() == LOST
+}
+
+/// Whether an error is one of the line or the server.
+pub(crate) fn is_outage(error: &Error) -> bool {
+    error.kind() == OUTAGE
+}
+
+/// Whether an error says that what was asked for is on its way.
+pub(crate) fn is_on_its_way(error: &Error) -> bool {
+    error.kind() == ErrorKind::WouldBlock
+}
+
+/// Whether an error says that there is no such file. Who may not list a folder is told of
+/// a missing file that it is forbidden.
+pub(crate) fn is_missing(error: &Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::NotFound | ErrorKind::PermissionDenied
+    )
+}
