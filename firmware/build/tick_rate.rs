@@ -4,7 +4,7 @@
 const KILOHERTZ: std::ops::RangeInclusive<u32> = 1..=10;
 
 /// Ticks a second that a board is built for at most: its whole interrupt, by the bound of
-/// docs/hardware.md ("From encoder to output"), takes no longer than a period. A test of the images
+/// docs/reference/hardware.md ("From encoder to output"), takes no longer than a period. A test of the images
 /// compares both.
 pub(crate) const FASTEST_HZ: [(&str, u32); 3] = [
     ("nucleo-g474re", 4_000),
@@ -37,7 +37,7 @@ pub(crate) fn tick_hz(
         let all: Vec<_> = allowed().map(|hz| hz.to_string()).collect();
         format!(
             "HAPTERRA_TICK_HZ is {text:?}; {board} can tick {} times a second; at another rate \
-             its ticks may come late (docs/hardware.md, \"From encoder to output\")",
+             its ticks may come late (docs/reference/hardware.md, \"From encoder to output\")",
             all.join(", ")
         )
     })

@@ -69,6 +69,14 @@ def test_example_in_the_readme_draws_forces(tmp_path):
     assert (tmp_path / "forces.png").stat().st_size > 5000
 
 
+def test_examples_of_the_tutorial_run_in_their_order(tmp_path):
+    page = Path(__file__).parents[2] / "docs/tutorials/array-to-forces.md"
+    examples = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.S)
+    assert len(examples) == 4
+    subprocess.run([sys.executable, "-c", "\n".join(examples)], cwd=tmp_path, check=True)
+    assert (tmp_path / "forces.png").stat().st_size > 5000
+
+
 @pytest.mark.parametrize(
     "code, free_of",
     [

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Prints how far off shifts between datums are that know no grids, for
-`heightfield/src/crs/shift.rs` and `docs/placing.md`:
+`heightfield/src/crs/shift.rs` and `docs/how-to/place-and-scale.md`:
 
     python3 -m venv venv && venv/bin/pip install pyproj==3.7.2
     venv/bin/python tests/data/shift_errors.py ~/.cargo/registry/src/*/crs-definitions-0.6.0/src/defs.rs

@@ -37,6 +37,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+/// The program of the Rust tutorial, run.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/tutorials/kernel-in-rust.md")]
+struct KernelTutorial;
+
 /// The repository's root folder.
 pub fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -1,31 +1,38 @@
-//! Whether the tests that docs/safety.md, hardware.md and bringup.md name exist.
+//! Whether docs/safety-tests.csv names tests that exist, for each item of docs/safety.md.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use hapterra_tests::repository;
 
-/// What a page names in the last column of its tables that say what shows a thing.
-fn named(page: &str) -> Vec<&str> {
-    let is_row = |line: &&str| line.starts_with("| ");
-    let mut names = Vec::new();
-    for table in page.split("\n\n") {
-        let mut rows = table.lines().filter(is_row);
-        if rows
-            .next()
-            .is_some_and(|header| header.ends_with("| shown by |"))
-        {
-            let cells = rows.skip(1).filter_map(|row| row.rsplit(" | ").next());
-            names.extend(cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)));
-        }
-    }
-    names
+fn read(path: &str) -> String {
+    let path = repository().join(path);
+    std::fs::read_to_string(&path).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
+}
+
+/// The table's rows: an item's number, or another word, and a test.
+fn rows(table: &str) -> impl Iterator<Item = (&str, &str)> {
+    table
+        .lines()
+        .skip(1)
+        .map(|row| row.split_once(',').expect("two columns"))
+}
+
+/// Numbers of the page's items on what the machine does.
+fn items(page: &str) -> BTreeSet<&str> {
+    let numbered = page.lines().filter_map(|line| line.split_once(". **"));
+    let numbers = numbered.map(|(number, _)| number);
+    numbers
+        .filter(|number| number.parse::<u32>().is_ok())
+        .collect()
 }
 
 #[test]
-fn the_tests_that_the_pages_name_exist() {
+fn safety_table_names_tests_that_exist() {
     let mut source = String::new();
     for folder in [
         "core/src",
+        "heightfield/src",
         "firmware/src",
         "host-tools/src",
         "host-tools/tests",
@@ -33,16 +40,24 @@ fn the_tests_that_the_pages_name_exist() {
     ] {
         read_all(&repository().join(folder), &mut source);
     }
-    for (page, least) in [("safety", 60), ("hardware", 45), ("bringup", 12)] {
-        let path = repository().join(format!("docs/{page}.md"));
-        let text = std::fs::read_to_string(path).expect("the page");
-        let names = named(&text);
-        assert!(names.len() >= least, "{page}: {} names", names.len());
-        for name in names {
-            let found = source.contains(&format!("fn {name}()"));
-            assert!(found, "{page}: there is no test {name}");
-        }
+    let table = read("docs/safety-tests.csv");
+    assert!(rows(&table).count() > 300);
+    for (item, test) in rows(&table) {
+        let found = source.contains(&format!("fn {test}()"));
+        assert!(found, "item {item}: there is no test {test}");
     }
+}
+
+#[test]
+fn each_item_of_the_safety_page_has_a_test() {
+    let (page, table) = (read("docs/safety.md"), read("docs/safety-tests.csv"));
+    let items = items(&page);
+    assert!(items.len() > 40, "{items:?}");
+    let tested: BTreeSet<&str> = rows(&table)
+        .map(|(item, _)| item)
+        .filter(|item| item.parse::<u32>().is_ok())
+        .collect();
+    assert_eq!(items, tested);
 }
 
 fn read_all(folder: &Path, into: &mut String) {

@@ -53,7 +53,7 @@ fn source(files: &[&str]) -> String {
 #[test]
 fn the_wiring_tables_have_the_pins_that_the_images_take() {
     let page = |board: &str| {
-        let path = repository().join(format!("docs/boards/{board}.md"));
+        let path = repository().join(format!("docs/reference/boards/{board}.md"));
         std::fs::read_to_string(path).expect("the page")
     };
     let taken = |files: &[&str]| {

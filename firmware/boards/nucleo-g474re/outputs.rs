@@ -15,7 +15,7 @@ use crate::stm32::injected::Injected;
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-g474re";
 /// From the beginning of a tick until the motors have its current, at most, µs: 197 to the
-/// outputs (docs/hardware.md), 3 until they settle, and the amplifiers' own time.
+/// outputs (docs/reference/hardware.md), 3 until they settle, and the amplifiers' own time.
 pub(crate) const LATENCY_US: u16 = 197 + 3 + CURRENT_LOOP_US;
 
 /// Three converters, buffered, each behind an offset stage: the middle of the range is no

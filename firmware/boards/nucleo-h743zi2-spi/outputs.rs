@@ -16,7 +16,7 @@ use hapterra_firmware::amplifier::{Ad5754, CURRENT_LOOP_US, FrameBus};
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2-spi";
 /// From the beginning of a tick until the motors have its current, at most, µs: 125 to the
-/// outputs (docs/hardware.md), 15 until the converter has all frames, 10 until it settles, and the
+/// outputs (docs/reference/hardware.md), 15 until the converter has all frames, 10 until it settles, and the
 /// amplifiers' own time.
 pub(crate) const LATENCY_US: u16 = 125 + 15 + 10 + CURRENT_LOOP_US;
 /// The bus's 114 MHz make 7.1 MHz of it, of which half a clock is 70 ns. What the converter sends is valid 40 ns after the

@@ -20,7 +20,7 @@ use crate::stm32::clock::TICK_HZ;
 /// The image's name.
 pub(crate) const BOARD: &str = "nucleo-h743zi2";
 /// From the beginning of a tick until the motors have its current, at most, µs: 121 to the
-/// outputs (docs/hardware.md), two periods until an amplifier has read a duty cycle that waits
+/// outputs (docs/reference/hardware.md), two periods until an amplifier has read a duty cycle that waits
 /// for the next one, and the amplifiers' own time. The timers of the tick and of the duty cycles
 /// run at an arbitrary phase, so the wait is a whole period.
 pub(crate) const LATENCY_US: u16 = 121 + (2_000_000 / DUTY_HZ) as u16 + CURRENT_LOOP_US;

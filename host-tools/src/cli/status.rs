@@ -113,7 +113,7 @@ fn boot(boot: &BootReport) -> String {
     let crash = boot.crash.as_ref().map_or(String::new(), crashed);
     let brown_out = if boot.lacks_brown_out_reset() {
         format!(
-            "supply guard   the chip runs down to {} mV: set its brown-out level (docs/hardware.md, The supply)\n",
+            "supply guard   the chip runs down to {} mV: set its brown-out level (docs/reference/hardware.md, The supply)\n",
             boot.resets_below_mv
         )
     } else {

@@ -6,7 +6,7 @@
 //!
 //! [`Watcher`] belongs to a device and makes an [`Event`] of a change. It never waits: the queue and
 //! the buffers have bounds, and a line that finds no room is dropped and counted
-//! (`docs/events.md`).
+//! (`docs/how-to/events.md`).
 
 mod line;
 mod server;

@@ -12,7 +12,7 @@ const LARGEST_CELL_MM: f64 = 50.0;
 /// The longer side of a terrain as small as this in the hand tells nothing any more, mm.
 const SMALLEST_TERRAIN_MM: f64 = 5.0;
 /// Above this an arm most likely buzzes or kicks, N/mm: people hold 0.4 to 0.8 N/mm on a
-/// Premium 1.5 (`docs/hardware.md`).
+/// Premium 1.5 (`docs/reference/hardware.md`).
 pub const STIFFEST_N_PER_MM: f32 = 1.0;
 /// Less is not felt, N/mm.
 const SOFTEST_N_PER_MM: f32 = 0.005;

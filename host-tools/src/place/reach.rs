@@ -356,7 +356,7 @@ mod tests {
         }
     }
 
-    /// The figures of docs/placing.md.
+    /// The figures of docs/how-to/place-and-scale.md.
     #[test]
     fn the_encoders_tell_what_the_docs_say() {
         let counts = PRESETS.map(|record| Reach::of(&record).resolution_mm());

@@ -331,7 +331,7 @@ class Device:
 
     def events(self) -> Iterator[dict[str, Any]]:
         """Events as they come, but for samples: contact, place, material, limits, as
-        docs/events.md has them."""
+        docs/how-to/events.md has them."""
         return iter(self._events)
 
     def command(self, line: str) -> None:

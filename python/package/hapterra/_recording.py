@@ -24,7 +24,7 @@ class Recording:
     #: The file.
     path: str
     #: What is recorded of terrain, place, scale, surface and device; empty where nothing is.
-    #: Names are those of docs/recordings.md, with the unit at their end.
+    #: Names are those of docs/reference/recordings.md, with the unit at their end.
     settings: dict[str, Any]
     #: A row a tick, with all columns: ``t_s`` (s), ``x_mm``, ``y_mm``, ``z_mm`` (the HIP, mm: east,
     #: north, up), ``contact`` (0 or 1), ``proxy_x_mm``, ... (mm), ``force_x_n``, ... (N), and more.

@@ -115,7 +115,7 @@ fn the_boards_pages_say_what_the_tiles_take() {
     for machine in machines() {
         let board = machine.chip.board;
         let page = board.trim_end_matches("-spi");
-        let path = repository().join(format!("docs/boards/{page}.md"));
+        let path = repository().join(format!("docs/reference/boards/{page}.md"));
         let page = std::fs::read_to_string(path).expect("the page");
         let tiles = machine
             .image

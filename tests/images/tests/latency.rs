@@ -28,7 +28,7 @@ struct Row {
 
 impl Row {
     fn read(board: &str) -> Self {
-        let page = repository().join("docs/hardware.md");
+        let page = repository().join("docs/reference/hardware.md");
         let page = std::fs::read_to_string(page).expect("the page");
         let begin = format!("| `{board}`, interrupt | ");
         let row = page.lines().find(|line| line.starts_with(&begin));

@@ -34,7 +34,7 @@ fn table(page: &str, heading: &str) -> Pins {
 /// What the page of a board's image says.
 fn said(board: &str) -> Pins {
     let page = |name: &str| {
-        let path = repository().join(format!("docs/boards/{name}.md"));
+        let path = repository().join(format!("docs/reference/boards/{name}.md"));
         std::fs::read_to_string(path).expect("the page")
     };
     match board {

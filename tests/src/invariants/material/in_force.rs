@@ -1,4 +1,4 @@
-//! Which material is in force, by docs/materials.md: the wanted one, and the even way to it.
+//! Which material is in force, by docs/how-to/materials.md: the wanted one, and the even way to it.
 
 use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::Texture;
