@@ -65,16 +65,10 @@ cargo xtask COMMAND
                          arm time unless told otherwise; writes docs/reference/campaign.md
   campaign --link [--seconds N] [--seed S] [--segment K]
                          faults of the link, killed and hostile hosts and devices, an hour of
-<<<<<<< HEAD
-                         device time unless told otherwise; writes docs/link-campaign.md
+                         device time unless told otherwise; writes docs/reference/link-campaign.md
   fuzz TARGET MINUTES    libFuzzer on `terrain` (files of every format), `text` (recordings,
                          calibrations, tables, commands), `tick`, `tile` or `wire`; installs
                          cargo-fuzz and a nightly compiler where they are missing
-=======
-                         device time unless told otherwise; writes docs/reference/link-campaign.md
-  fuzz TARGET MINUTES    libFuzzer on `tick`, `tile` or `wire`; installs cargo-fuzz and a nightly
-                         compiler where they are missing
->>>>>>> book-explanation
   miri                   core's tests under Miri, where it can run
   deny                   licences, bans, sources and advisories of the dependencies of all
                          workspaces: the viewer's, Python's and the fuzz targets', too
