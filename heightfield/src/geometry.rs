@@ -167,7 +167,8 @@ pub fn metres_in(unit: &str) -> Option<f64> {
         "dm" | "decimetre" | "decimeter" | "decimetres" | "decimeters" => 0.1,
         "km" | "kilometre" | "kilometres" | "kilometer" | "kilometers" => 1000.0,
         "ft" | "foot" | "feet" | "internationalfoot" | "footinternational" => 0.3048,
-        "usft" | "ftus" | "ussurveyfoot" | "footus" | "surveyfoot" | "ussurveyfeet" => {
+        "usft" | "ftus" | "ussurveyfoot" | "footus" | "surveyfoot" | "ussurveyfeet" | "usfoot"
+        | "usfeet" | "sft" | "footussurvey" => {
             1200.0 / 3937.0
         }
         "fathom" | "fathoms" => 1.8288,

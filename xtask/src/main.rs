@@ -5,6 +5,7 @@
 
 mod board;
 mod campaign;
+mod census;
 mod counts;
 mod demo;
 mod deny;
@@ -51,6 +52,8 @@ cargo xtask COMMAND
                          emulated board only, no dependencies, page and Python; ARGS go to
                          `cargo test` and select programs, as `--test usb`
   lint                   formatting, clippy and documentation, warnings as errors
+  census                 words of the pages and lines of code by room; fails where a page is too
+                         long for its bounds
   setup                  only find or install what the commands need
   size [BOARD]           build the images and hold them to their flash and RAM budgets
   panics [BOARD]         build the images and prove that no interrupt can panic
@@ -158,6 +161,7 @@ fn command() -> Result<ExitCode> {
             }
             match plain {
                 "lint" => lint::lint()?,
+                "census" => census::census()?,
                 "miri" => miri::miri()?,
                 "setup" => setup()?,
                 "deny" => deny::check_all()?,

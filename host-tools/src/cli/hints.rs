@@ -90,6 +90,12 @@ impl Hint for PlaceError {
             Self::BoxOutside { .. } | Self::BoxOfHoles { .. } => {
                 "choose a box that overlaps it: west, south, east, north"
             }
+            Self::LatitudeFirst([latitude, longitude]) => {
+                return format!("swap them: --at-lonlat {longitude},{latitude}");
+            }
+            Self::WestInTheEast([west, south, east, north]) => {
+                return format!("swap them: --bbox-lonlat {east},{south},{west},{north}");
+            }
             Self::NoBox(_) => {
                 "say west before east and south before north; only a box of degrees may cross 180°"
             }

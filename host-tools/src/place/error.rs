@@ -35,6 +35,11 @@ pub enum PlaceError {
         /// What the terrain covers.
         bounds: String,
     },
+    /// A latitude and longitude in the place of a longitude and latitude.
+    #[error(
+        "{},{} is not in the terrain, {},{} is: longitude comes first", .0[0], .0[1], .0[1], .0[0]
+    )]
+    LatitudeFirst([f64; 2]),
     /// A place beyond the samples.
     #[error("{place} is outside of the terrain, which covers {bounds}")]
     Outside {
@@ -54,6 +59,11 @@ pub enum PlaceError {
     /// A box whose sides are in the wrong order.
     #[error("a box is west,south,east,north: {0} is not")]
     NoBox(String),
+    /// A box whose west lies east of its east, of a terrain that is not around the globe.
+    #[error(
+        "a box is west,south,east,north: {} is east of {}, and the terrain does not go around the globe", .0[0], .0[2]
+    )]
+    WestInTheEast([f64; 4]),
     /// A box beyond the samples.
     #[error("the box {place} is outside of the terrain, which covers {bounds}")]
     BoxOutside {

@@ -37,11 +37,22 @@ pub(super) fn place(
             _ => PlaceError::NoSystem { bounds },
         });
     }
-    file.of_lonlat(place).ok_or_else(|| PlaceError::NotOnMap {
-        lonlat: place,
-        system: system_in_words(file),
-        bounds: bounds_in_words(file),
-    })
+    file.of_lonlat(place)
+        .ok_or_else(|| match is_latitude_first(file, place) {
+            true => PlaceError::LatitudeFirst(place),
+            false => PlaceError::NotOnMap {
+                lonlat: place,
+                system: system_in_words(file),
+                bounds: bounds_in_words(file),
+            },
+        })
+}
+
+/// Returns true if the place lies in the field once its two numbers are swapped.
+fn is_latitude_first(file: &Georeference<'_>, [one, other]: [f64; 2]) -> bool {
+    let [west, south, east, north] = file.bounds();
+    let swapped = file.of_lonlat([other, one]);
+    swapped.is_some_and(|[x, y]| (west..=east).contains(&x) && (south..=north).contains(&y))
 }
 
 /// Points around a box, in the file's coordinates.
@@ -58,6 +69,13 @@ pub(super) fn outline(
     let [west, south, mut east, north] = asked;
     if let Some(turn) = turn.filter(|_| west > east) {
         east += turn;
+        if let System::Geographic { degrees } = file.system() {
+            let [first, _, last, _] = file.bounds();
+            // More than half of the globe, of a field that has less.
+            if east - west > 0.5 * turn && (last - first) * degrees < 180.0 {
+                return Err(PlaceError::WestInTheEast(asked));
+            }
+        }
     }
     if !(west < east && south < north) {
         return Err(PlaceError::NoBox(box_in_words(asked)));
@@ -169,6 +187,9 @@ pub(super) fn spot(
     let sample = file.transform().to_samples(ground);
     let inside = |axis: usize| (-ON_SAMPLE..=last[axis] + ON_SAMPLE).contains(&sample[axis]);
     if !(inside(0) && inside(1)) {
+        if coordinates == Coordinates::LonLat && is_latitude_first(&file, asked) {
+            return Err(PlaceError::LatitudeFirst(asked));
+        }
         let (place, bounds) = told();
         return Err(PlaceError::Outside { place, bounds });
     }

@@ -439,6 +439,10 @@ fn what_cannot_be_placed_is_refused_with_the_bounds() {
             ["latitude 95 is no place of the file's map", utm_bounds],
         ),
         (
+            refused(utm, at([34.2454, -118.2365], LONLAT, Sizing::Fit)),
+            ["longitude comes first", "-118.2365,34.2454 is"],
+        ),
+        (
             refused(no_code, at([-118.2, 34.2], LONLAT, Sizing::Fit)),
             ["states no reference system", "x 386000 to 386400"],
         ),
