@@ -1,6 +1,6 @@
 //! A stand-in for libgdal, for tests: a shared library with the functions that this crate calls.
 //!
-//! It opens any file as one band of 4096 × 4096 heights in blocks of 256 × 256, and makes trouble by
+//! It opens any file as one band of 2048 × 2048 heights in blocks of 256 × 256, and makes trouble by
 //! environment variables:
 //!
 //! - `STAND_IN_VERSION`: the number that it gives for its version;
@@ -15,7 +15,7 @@ use std::ptr;
 use std::time::Duration;
 
 /// Columns and rows.
-const SIDE: c_int = 4096;
+const SIDE: c_int = 2048;
 const BLOCK: c_int = 256;
 /// `GDT_Float32`.
 const FLOAT: c_int = 6;

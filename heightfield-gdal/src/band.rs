@@ -294,6 +294,7 @@ impl<'d> Band<'d> {
         // At most the band's size, which is a number of GDAL's.
         let [x, y, width, height] = [column, row, columns, rows].map(|count| count as c_int);
         let buffer = samples.as_mut_ptr().cast::<c_void>();
+        self.loaded.prepare_thread();
         let functions = &self.loaded.functions;
         // SAFETY: the buffer holds as many samples of that type as the window has, without gaps.
         let said = unsafe {

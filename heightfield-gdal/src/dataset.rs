@@ -44,6 +44,7 @@ pub struct Subdataset {
 
 impl Dataset {
     pub(crate) fn open(loaded: Arc<Loaded>, path: &Path, options: &[&str]) -> Result<Self, Error> {
+        loaded.prepare_thread();
         let path = path_to_c(path)?;
         let options: Result<Vec<_>, _> = options.iter().map(|option| to_c(option)).collect();
         let options = options?;
@@ -110,6 +111,7 @@ impl Dataset {
 
     /// The same file as a tree of arrays.
     pub(crate) fn open_arrays(loaded: Arc<Loaded>, path: &Path) -> Result<Self, Error> {
+        loaded.prepare_thread();
         let path = path_to_c(path)?;
         let none = ptr::null();
         // SAFETY: the path stays for the call.

@@ -8,6 +8,21 @@ use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
 /// `GDALMajorObjectH`.
 pub(crate) type Handle = *mut c_void;
 
+/// Stops HDF5 from printing its errors on this thread: GDAL says them, too, where they matter. It
+/// does nothing where libgdal has no HDF5, or keeps it to itself.
+///
+/// # Safety
+/// The library is GDAL's.
+pub(crate) unsafe fn silence_hdf5(library: &libloading::Library) {
+    type SetAuto = unsafe extern "C" fn(i64, *const c_void, *const c_void) -> c_int;
+    // SAFETY: the type is that of HDF5's headers from 1.10 on; 0 is the default stack of errors.
+    unsafe {
+        if let Ok(set) = library.get::<SetAuto>("H5Eset_auto2") {
+            set(0, std::ptr::null(), std::ptr::null());
+        }
+    }
+}
+
 /// A node of XML as `cpl_minixml.h` has it.
 #[repr(C)]
 pub(crate) struct XmlNode {

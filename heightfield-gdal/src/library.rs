@@ -1,5 +1,6 @@
 //! Finds libgdal, loads it once, and lists its drivers.
 
+use std::cell::Cell;
 use std::ffi::{OsString, c_char};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::beforehand;
 use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::functions::{Functions, Handle};
+use crate::functions::{Functions, Handle, silence_hdf5};
 use crate::in_time;
 use crate::settings::Settings;
 use crate::srs::SpatialReference;
@@ -75,7 +76,7 @@ pub(crate) struct Loaded {
     path: PathBuf,
     version: Version,
     // Last: the functions are its.
-    _library: libloading::Library,
+    library: libloading::Library,
 }
 
 impl Library {
@@ -122,7 +123,7 @@ impl Library {
                 functions,
                 path,
                 version,
-                _library: library,
+                library,
             }),
         })
     }
@@ -210,7 +211,20 @@ impl fmt::Debug for Library {
     }
 }
 
+thread_local! {
+    /// Whether HDF5 is silent on this thread.
+    static IS_SILENT: Cell<bool> = const { Cell::new(false) };
+}
+
 impl Loaded {
+    /// Prepares the present thread for calls that open or read.
+    pub(crate) fn prepare_thread(&self) {
+        if !IS_SILENT.replace(true) {
+            // SAFETY: the library is GDAL's.
+            unsafe { silence_hdf5(&self.library) };
+        }
+    }
+
     /// An error in the words that GDAL said last on this thread.
     pub(crate) fn refused(&self, otherwise: &str) -> Error {
         // SAFETY: the text stays until the next call on this thread, and is copied.

@@ -88,10 +88,6 @@ def main():
                         valid_range=np.array([-200, 400], "i2")),
     )
     classic_or_4(folder, "southern.nc", "f4", fill=-1, zlib=True, shuffle=True, chunksizes=CHUNKS, south=True)
-    classic_or_4(
-        folder, "unsigned.nc", "i1", fill=np.int8(-1), chunksizes=CHUNKS, zlib=True,
-        stored=lambda heights: heights.astype("u1").view("i1"), attributes={"_Unsigned": "true"},
-    )
     classic_or_4(folder, "depths.nc", "i4", fill=-1, chunksizes=CHUNKS, attributes=dict(positive="down"))
     classic_or_4(folder, "turned.nc", "f8", fill=-1, dims=("lon", "lat"), chunksizes=CHUNKS, zlib=True)
     classic_or_4(folder, "turned_contiguous.nc", "u2", fill=0, dims=("lon", "lat"))

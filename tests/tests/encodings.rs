@@ -38,7 +38,6 @@ fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &
     }
 }
 
-
 fn open_by(reader: Reader, name: &str, options: &OpenOptions) -> Raster {
     let raster = reader.open(&path(name), options);
     raster.unwrap_or_else(|error| panic!("{reader:?}: {error}"))

@@ -359,6 +359,24 @@ fn boxes_by_longitude_and_latitude_also_over_the_antimeridian() {
     );
 }
 
+/// A quarter of a degree between columns: no field around the globe.
+#[test]
+fn box_with_west_and_east_swapped_is_refused() {
+    let raster = Raster::from_fn(4, 4, |column, row| (column + row) as f32).expect("raster");
+    let ground = GroundTransform::new([-122.0, 46.0], [0.25, 0.0], [0.0, 0.25]);
+    let raster = raster
+        .with_cell(cell((0.25, 0.25), CellUnit::Degree, 46.0))
+        .with_ground(ground.expect("a plane"), Some(4326));
+    for coordinates in [OWN, LONLAT] {
+        for sides in [[-121.5, 46.1, -121.8, 46.4], [-121.5, 46.1, -122.0, 46.4]] {
+            let error = seen(&raster, &boxed(sides, coordinates)).expect_err("swapped");
+            assert_eq!(error, PlaceError::WestInTheEast(sides));
+        }
+        let right = boxed([-121.8, 46.1, -121.5, 46.4], coordinates);
+        assert!(seen(&raster, &right).is_ok());
+    }
+}
+
 /// Fields around the globe end somewhere, and nobody may be given half of a box unasked.
 #[test]
 fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {

@@ -13,6 +13,8 @@ mod netcdf;
 mod packed;
 mod stac;
 
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use heightfield_gdal::{Dataset, Error, Library, SampleType as Stored, Settings};
@@ -122,6 +124,11 @@ fn opened(
     if BY_HEADER.contains(&driver.as_str()) && headered::is_of_another_kind(head) {
         return Err(BadRaster::UnknownFormat);
     }
+    if driver == "GRASSASCIIGrid" && has_stars(path)? {
+        let why =
+            "it reads * as a height of 0: write a number for holes (r.out.ascii null_value=-9999)";
+        return Err(BadRaster::ByGdal(Error::Refused(why.into())));
+    }
     let dataset = match chosen(&dataset, options)? {
         Some(name) => library
             .open_part(&name, &open_options(options))
@@ -138,6 +145,19 @@ fn open_options(options: &OpenOptions) -> Vec<&str> {
 
 fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset, BadRaster> {
     library.open(path, &open_options(options)).map_err(fault)
+}
+
+/// Whether a text has a star, as GRASS writes where there is no height.
+fn has_stars(path: &Path) -> Result<bool, BadRaster> {
+    let mut reader = BufReader::new(File::open(path).map_err(BadRaster::Unreadable)?);
+    loop {
+        let chunk = reader.fill_buf().map_err(BadRaster::Unreadable)?;
+        if chunk.is_empty() || chunk.contains(&b'*') {
+            return Ok(!chunk.is_empty());
+        }
+        let read = chunk.len();
+        reader.consume(read);
+    }
 }
 
 /// The label of a planetary image, in a file of its own beside it.
