@@ -278,7 +278,9 @@ impl FileReport {
     /// How the file stores its samples.
     fn stored(&self) -> [(&'static str, String); 4] {
         let sides = |[columns, rows]: [u32; 2]| format!("{columns} × {rows}");
-        let no_data = self.no_data_value.map_or("none".into(), |value| value.to_string());
+        let no_data = self
+            .no_data_value
+            .map_or("none".into(), |value| value.to_string());
         let overviews: Vec<_> = self.overviews.iter().map(|size| sides(*size)).collect();
         [
             (
@@ -297,7 +299,10 @@ impl FileReport {
             ),
             (
                 "samples",
-                self.samples_are.map_or("area or point not stated".into(), |it| format!("{it} (stated)")),
+                self.samples_are
+                    .map_or("area or point not stated".into(), |it| {
+                        format!("{it} (stated)")
+                    }),
             ),
             (
                 "overviews",
