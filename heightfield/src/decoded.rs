@@ -55,7 +55,7 @@ pub(super) struct Decoded {
     pub(super) vertical_datum: Option<VerticalDatum>,
     /// Why all samples are in memory, where the format could have left them in the file.
     pub(super) why_whole: Option<String>,
-    /// How the file lays them out.
+    /// Their layout in the file.
     pub(super) file_layout: FileLayout,
     /// What the user should know.
     pub(super) remarks: Vec<String>,

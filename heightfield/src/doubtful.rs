@@ -54,7 +54,7 @@ impl Outermost {
         }
     }
 
-    /// What the user should know; `is_declared` where a no-data value is.
+    /// Returns remarks for the user; `is_declared` where a no-data value is.
     pub(super) fn remarks(&self, is_declared: bool) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.beyond > 0 {

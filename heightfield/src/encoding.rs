@@ -20,12 +20,12 @@ impl Encoding {
     }
 }
 
-/// 65536 R + 256 G + B.
+/// Returns 65536 R + 256 G + B.
 pub(super) const fn code([red, green, blue]: [u8; 3]) -> i32 {
     i32::from_be_bytes([0, red, green, blue])
 }
 
-/// The codes of three bands.
+/// Returns the codes of three bands.
 pub(super) fn codes([red, green, blue]: [Vec<u8>; 3]) -> Samples {
     let all = red.into_iter().zip(green).zip(blue);
     let codes: Vec<i32> = all
@@ -34,7 +34,7 @@ pub(super) fn codes([red, green, blue]: [Vec<u8>; 3]) -> Samples {
     codes.into()
 }
 
-/// A picture that has no codes.
+/// Returns the fault of a picture that has no codes.
 pub(super) fn no_codes(what: &str) -> BadRaster {
     BadRaster::NotAHeightField(format!(
         "{what}, and heights are encoded in pictures of red, green and blue of 8 bits"

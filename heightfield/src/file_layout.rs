@@ -1,6 +1,6 @@
-//! How a file lays its samples out, for those who check it.
+//! The layout of a file's samples, for those who check it.
 
-/// How a file lays its samples out, as far as its format tells.
+/// The layout of a file's samples, as far as its format tells.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileLayout {
     /// Bands, of which one holds the heights.
@@ -9,11 +9,11 @@ pub struct FileLayout {
     pub block: Option<[u32; 2]>,
     /// Columns and rows of its overviews, the finest first.
     pub overviews: Vec<[u32; 2]>,
-    /// What a sample stands for, where the file states it.
+    /// The meaning of a sample, where the file states it.
     pub samples_are: Option<SamplesAre>,
 }
 
-/// What a sample stands for.
+/// The meaning of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplesAre {
     /// The area of its cell.

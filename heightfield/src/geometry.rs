@@ -147,7 +147,7 @@ pub struct VerticalDatum {
     pub code: Option<u16>,
 }
 
-/// The remark on a unit of heights that [`metres_in`] does not know.
+/// Returns the remark on a unit of heights that [`metres_in`] does not know.
 pub(super) fn unknown_unit(name: &str) -> String {
     let name = beginning(name);
     format!("it states the unit of heights '{name}', which is not known here (--vertical-unit)")

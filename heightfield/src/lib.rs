@@ -459,7 +459,7 @@ impl Raster {
         &self.source.format
     }
 
-    /// How the file lays its samples out.
+    /// Returns the layout of the file's samples.
     pub fn file_layout(&self) -> &FileLayout {
         &self.source.file_layout
     }

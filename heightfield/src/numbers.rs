@@ -32,7 +32,7 @@ fn not_a_number(word: &str) -> Option<f64> {
     begins(&["1.#inf"]).then_some(infinity)
 }
 
-/// The beginning of a text from a file, for a remark.
+/// Returns the beginning of a text from a file, for a remark.
 pub(super) fn beginning(text: &str) -> String {
     const MOST: usize = 40;
     let shown = |c: char| if c.is_control() { '?' } else { c };
@@ -43,12 +43,12 @@ pub(super) fn beginning(text: &str) -> String {
     beginning
 }
 
-/// A no-data value as a file writes it, and what is said about it where it is no plain number.
+/// A no-data value as a file writes it, with a remark where it is no plain number.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct NoDataText {
     /// The value, if the text has one.
     pub(super) value: Option<f64>,
-    /// What the user should know.
+    /// A remark for the user.
     pub(super) remark: Option<String>,
 }
 

@@ -12,7 +12,7 @@ use crate::input::{Data, FileBytes};
 use crate::numbers::{no_data, number};
 use crate::xml;
 
-/// What lies beside a file for one of its bands.
+/// Notes on one band of a file.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Notes {
     /// The name of the file that they are in.
@@ -29,7 +29,7 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
-    /// The notes on a band, the first being 1, beside a file on disk: at a server they would be one
+    /// Reads the notes on a band, the first being 1, beside a file on disk: at a server they would be one
     /// more request for every file.
     pub(crate) fn read(input: &FileBytes, band: u32) -> Self {
         if !matches!(input.data(), Data::File(..)) {
@@ -86,7 +86,7 @@ impl Notes {
         }
     }
 
-    /// Adds them to what the file says itself.
+    /// Adds them to the file's own description.
     pub(crate) fn apply(self, decoded: &mut Decoded) {
         let name = self.name.as_str();
         let mut remarks = self.remarks;
@@ -191,7 +191,7 @@ impl Decoded {
     }
 }
 
-/// A reference system as text, or by its code as in `EPSG:32632`.
+/// Reads a reference system as text, or by its code as in `EPSG:32632`.
 fn reference_system(text: &str) -> (Option<ReferenceSystem>, Option<crate::crs::Vertical>) {
     let code = text
         .strip_prefix("EPSG:")
@@ -209,7 +209,7 @@ fn is_same(own: &ReferenceSystem, other: &ReferenceSystem) -> bool {
     }
 }
 
-/// Six numbers: x of the corner, x per column, x per row, and the same of y.
+/// Reads six numbers: x of the corner, x per column, x per row, and the same of y.
 fn ground_map(text: &str) -> Option<GroundMap> {
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
     match numbers?[..] {

@@ -1,4 +1,4 @@
-//! Which of several rasters at one place holds the heights: by their names, then by their types.
+//! The heights among several rasters at one place: by their names, then by their types.
 //!
 //! Providers ship a terrain with layers on the same samples: counts of scenes, masks, errors. A
 //! layer's name is that of the heights with another word (`_dem` and `_num`), or with one more
@@ -133,7 +133,7 @@ pub(super) fn split_by_name(files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>)
     })
 }
 
-/// Which of several rasters on the same samples holds the heights: the only one whose name says so
+/// Finds the heights among several rasters on the same samples: the only one whose name says so
 /// where the names differ, else the only one of numbers larger than a byte. `None` where that is
 /// not one.
 pub(super) fn heights_among(files: &[(&Path, SampleType)]) -> Option<usize> {
@@ -151,7 +151,7 @@ pub(super) fn heights_among(files: &[(&Path, SampleType)]) -> Option<usize> {
     only(&is_named).or_else(|| only(&is_wide))
 }
 
-/// The remark on layers that are left out.
+/// Returns the remark on layers that are left out.
 pub(super) fn left_out(layers: &[PathBuf]) -> Option<String> {
     const MOST_NAMED: usize = 4;
     let name = |path: &PathBuf| {

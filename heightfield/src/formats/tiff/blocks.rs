@@ -117,7 +117,7 @@ const MAIN: usize = 0;
 pub(super) struct Known<'k> {
     /// Its name in warnings.
     pub(super) name: &'k str,
-    /// What is wanted of it.
+    /// The kind of numbers to read from it.
     pub(super) wanted: Wanted,
     /// The file of a mask beside it.
     pub(super) mask: Option<&'k Arc<TiffFile>>,

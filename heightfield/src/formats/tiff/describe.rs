@@ -1,4 +1,4 @@
-//! What is wanted of a file, and what it and its neighbours say of the samples.
+//! The user's choice of numbers, and the descriptions of samples in a file and its neighbours.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::{BadRaster, OpenOptions};
 /// Extensions of a TIFF's world files.
 const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
 
-/// Sets what the file and its neighbours say of the samples.
+/// Takes the descriptions of the samples from the file and its neighbours.
 pub(super) fn describe(
     decoded: &mut Decoded,
     image: &Ifd,
@@ -62,7 +62,7 @@ pub(super) fn overview_sizes(
     Ok(found.iter().map(size).collect())
 }
 
-/// What the user wants of the file.
+/// Returns the user's choice of numbers.
 pub(super) fn wanted(options: &OpenOptions) -> Result<Wanted, BadRaster> {
     match (options.encoding, options.band) {
         (Some(_), Some(band)) => Err(BadRaster::NoSuchPart {

@@ -127,7 +127,7 @@ impl GeoKeys {
         Some(text.trim_matches(['\0', ' ']))
     }
 
-    /// What a sample stands for: coordinates belong to the centres of points, and to the corners
+    /// Returns the meaning of a sample: coordinates belong to the centres of points, and to the corners
     /// of areas.
     fn samples_are(&self) -> Option<SamplesAre> {
         match self.code(GT_RASTER_TYPE)? {

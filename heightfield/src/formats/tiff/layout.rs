@@ -63,7 +63,7 @@ pub(super) struct Chunk {
 /// Bands of a code.
 pub(super) const COLOURS: usize = 3;
 
-/// What is wanted of a file.
+/// The kind of numbers to read from a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wanted {
     /// Heights in a band, the first being 1; in the first one where the user chose none.

@@ -18,7 +18,7 @@ pub(super) struct Metadata {
     pub(super) scale: Option<f64>,
     pub(super) offset: Option<f64>,
     pub(super) metres_per_vertical_unit: Option<f64>,
-    /// What the user should know of them.
+    /// Remarks for the user.
     pub(super) remarks: Vec<String>,
 }
 

@@ -115,7 +115,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
 
 /// What the user is told of where the samples are.
 enum Told {
-    /// How they are read.
+    /// A remark on how they are read.
     Remark(String),
     /// Why all are in memory.
     Whole(String),
