@@ -334,6 +334,6 @@ fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, BadRaster> {
 fn fault(error: Error) -> BadRaster {
     match error {
         Error::NoSuchPart { asked, there } => BadRaster::NoSuchPart { asked, there },
-        error => BadRaster::Damaged(error.to_string()),
+        error => BadRaster::Unfamiliar(error.to_string()),
     }
 }

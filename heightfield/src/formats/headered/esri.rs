@@ -36,7 +36,7 @@ pub(super) fn read(text: &str, extension: &str) -> Result<Header, BadRaster> {
         None | Some("bil") => Interleave::Line,
         Some("bip") => Interleave::Pixel,
         Some("bsq") => Interleave::Sequential,
-        Some(other) => return Err(BadRaster::damaged(format!("layout {other} is not known"))),
+        Some(other) => return Err(BadRaster::Unfamiliar(format!("layout {other}"))),
     };
     let layout = Layout {
         columns,

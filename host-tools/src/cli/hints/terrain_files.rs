@@ -92,7 +92,7 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         BadRaster::NotANumber { value, .. } => {
             return format!("if that stands for no data, say so: --no-data {value}");
         }
-        BadRaster::DecoderFailed(_) => {
+        BadRaster::DecoderFailed(_) | BadRaster::Unfamiliar(_) => {
             return format!("get the file again; or {}", converted(path, ""));
         }
         BadRaster::Unreadable(_) => "check the path and that you may read the file",
