@@ -201,8 +201,13 @@ pub enum BadRaster {
     /// The file contradicts itself or its format.
     #[error("damaged file: {0}")]
     Damaged(String),
+    /// A decoder of somebody else's does not understand it.
+    #[error("not understood: {0}; the file is damaged, or of a kind that is not known here")]
+    Unfamiliar(String),
     /// A decoder of somebody else's panicked.
-    #[error("the {0} decoder failed on this file; it is most likely damaged")]
+    #[error(
+        "the {0} decoder failed on this file, which is damaged, or of a kind that is not known here"
+    )]
     DecoderFailed(&'static str),
 }
 
@@ -245,7 +250,7 @@ impl BadRaster {
                 Self::Truncated(format!("it ends while reading {during}"))
             }
             std::io::ErrorKind::InvalidData | std::io::ErrorKind::InvalidInput => {
-                Self::Damaged(format!("{during}: {error}"))
+                Self::Unfamiliar(format!("{during}: {error}"))
             }
             _ if is_outage(&error) || is_lost(&error) || is_on_its_way(&error) => {
                 Self::elsewhere(error)

@@ -123,7 +123,7 @@ fn by_extension(extension: &str) -> Result<&'static Format, BadRaster> {
         .filter_map(|format| Some((format, format.claim(extension)?)));
     match claims.next() {
         Some((format, Claim::Decides)) => Ok(format),
-        Some((format, Claim::Promises)) => Err(BadRaster::damaged(format!(
+        Some((format, Claim::Promises)) => Err(BadRaster::Unfamiliar(format!(
             "its name says {}, its content does not begin like one",
             format.name
         ))),

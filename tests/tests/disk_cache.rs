@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
+use hapterra::phantom::PlacedTerrain;
+use hapterra::terrain::{Scale, Terrain};
+use hapterra_core::force::ForceLaw;
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::timeouts::{set_age, set_just_changed};
 use heightfield::disk_cache::DiskCache;
@@ -307,6 +310,26 @@ fn of_many_files_those_that_are_touched_tell_whether_they_are_the_same() {
     assert_ne!(now, truth);
     let (found, again) = look(&srtm, &cache);
     assert!(found == now && again > 0 && again <= read, "{again}");
+}
+
+/// A tour goes all over the terrain: where to, is found by coarse samples, which are kept.
+#[test]
+fn another_tour_of_a_large_file_is_planned_without_reading_it() {
+    let bed = bed();
+    let plan = || {
+        let raster = open(&bed.file, &bed.cache);
+        let before = raster.blocks_read();
+        let scale = Scale::new(0.1, 0.1).expect("a scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
+        let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("in reach");
+        (placed.home_mm(), raster.blocks_read() - before)
+    };
+    let (home, read) = plan();
+    assert!(
+        (1..=open(&bed.file, &bed.cache).blocks()).contains(&read),
+        "{read}"
+    );
+    assert_eq!(plan(), (home, 0));
 }
 
 /// Blocks that a run at a coarse level reads, as it says with `-vv`.

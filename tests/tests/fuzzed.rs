@@ -17,7 +17,7 @@ use hapterra_core::wire::materials::{
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::request::Request;
 use hapterra_tests::chance::Chance;
-use hapterra_tests::fuzzing::{tick, tile, wire};
+use hapterra_tests::fuzzing::{terrain, text, tick, tile, wire};
 
 fn random(chance: &mut Chance, length: usize) -> Vec<u8> {
     (0..length).map(|_| chance.bits() as u8).collect()
@@ -239,5 +239,86 @@ fn no_bytes_break_a_tile() {
     let mut chance = Chance::new(13);
     for round in 0..4_000 {
         tile::run(&input(&mut chance, round, 5000, sensible_tile));
+    }
+}
+
+/// A small file of each kind, which opens.
+fn sensible_terrain(chance: &mut Chance) -> Vec<u8> {
+    let kind = chance.below(terrain::KINDS.len());
+    let samples: Vec<u8> = (0..6_i16).flat_map(i16::to_le_bytes).collect();
+    let world = b"10\n0\n0\n-10\n505\n5005\n".to_vec();
+    let header = b"nrows 2\nncols 3\nnbits 16\nbyteorder I\nlayout BIL\nnbands 1\n".to_vec();
+    let prj = b"PROJCS[\"a\",GEOGCS[\"b\",DATUM[\"c\",SPHEROID[\"d\",6378137,298.26]],UNIT[\"Degree\",0.01745]]]".to_vec();
+    let (beside, file) = match terrain::KINDS[kind] {
+        [name, other] if name.ends_with(".tif") => {
+            let other = if other.ends_with("tfw") { world } else { prj };
+            (other, small_tiff(&samples))
+        }
+        ["t.png", _] => (world, SMALL_PNG.to_vec()),
+        ["t.npy", _] => {
+            let head = "{'descr': '<i2', 'fortran_order': False, 'shape': (2, 3), }           \n";
+            let length = (head.len() as u16).to_le_bytes();
+            let begin = [&b"\x93NUMPY\x01\0"[..], &length, head.as_bytes()].concat();
+            (prj, [begin, samples].concat())
+        }
+        ["t.asc", _] => {
+            let text = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 10\nnodata_value -9\n1 2 3\n4 -9 6\n";
+            (prj, text.into())
+        }
+        ["t.flt" | "t.bil", _] => (header, samples),
+        ["t.raw", _] => (prj, [7; 70].to_vec()),
+        _ => (prj, vec![1; 2 * 1201 * 1201]),
+    };
+    terrain::of(kind, chance.below(32) as u8, &beside, &file)
+}
+
+/// Two rows of three samples of 16 bits.
+fn small_tiff(samples: &[u8]) -> Vec<u8> {
+    use hapterra_tests::tiffs::Values::{Longs, Shorts};
+    let image = vec![
+        (256, Shorts(vec![3])),
+        (257, Shorts(vec![2])),
+        (258, Shorts(vec![16])),
+        (259, Shorts(vec![1])),
+        (262, Shorts(vec![1])),
+        (273, Longs(vec![hapterra_tests::tiffs::DATA])),
+        (277, Shorts(vec![1])),
+        (278, Shorts(vec![2])),
+        (279, Longs(vec![12])),
+        (339, Shorts(vec![2])),
+    ];
+    hapterra_tests::tiffs::tiff(samples, &[image])
+}
+
+/// Two by two grey samples of 8 bits.
+const SMALL_PNG: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x02\0\0\0\x02\x08\0\0\0\0W\xddR\xf8\
+\0\0\0\x0eIDATx\x9cc`d`bf\x01\0\0\x14\0\x0b\0\0\0\0\0\0IEND\xaeB`\x82";
+
+#[test]
+fn no_bytes_break_the_readers_of_terrain() {
+    let mut chance = Chance::new(14);
+    for round in 0..2_000 {
+        terrain::run(&input(&mut chance, round, 400, sensible_terrain));
+    }
+}
+
+/// A file of each kind that the command reads besides terrain.
+fn sensible_text(chance: &mut Chance) -> Vec<u8> {
+    let text = [
+        "# hapterra-recording = 2\n# level = 0\nt_s,x_mm,y_mm,z_mm,contact\n0,1,2,3,0\n0.001,1,2,2.5,1\n",
+        "format = 1\nmodel = \"premium-1.5\"\n[limits]\nmax_force_n = 8.5\nmax_speed_mm_s = 1000\n",
+        "[default]\nstiffness_n_per_mm = 0.5\n[class.80]\nname = \"water\"\nstiffness_n_per_mm = 0.1\n",
+        "[board]\nname = \"nucleo-g474re\"\n[[step]]\nnumber = 1\n",
+        "at 2.5 zoom 2\npan 5 0\nmark a #1\non 2 texture grain 0.1 1\nat 3 stiffness 0.5 # soft\n",
+    ];
+    let kind = chance.below(text.len());
+    [&[kind as u8], text[kind].as_bytes()].concat()
+}
+
+#[test]
+fn no_bytes_break_the_readers_of_other_files() {
+    let mut chance = Chance::new(15);
+    for round in 0..10_000 {
+        text::run(&input(&mut chance, round, 400, sensible_text));
     }
 }

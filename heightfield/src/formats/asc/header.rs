@@ -60,8 +60,8 @@ impl Header {
                 tokens.put_back();
                 break;
             }
-            let known = known(&key)
-                .ok_or_else(|| BadRaster::damaged(format!("unknown header key '{key}'")))?;
+            let known =
+                known(&key).ok_or_else(|| BadRaster::Unfamiliar(format!("header key '{key}'")))?;
             let value = tokens.next()?.ok_or_else(|| {
                 BadRaster::Truncated(format!("it ends after the header key '{key}'"))
             })?;

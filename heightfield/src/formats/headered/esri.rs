@@ -38,7 +38,7 @@ pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, Ba
         None | Some("bil") => Interleave::Line,
         Some("bip") => Interleave::Pixel,
         Some("bsq") => Interleave::Sequential,
-        Some(other) => return Err(BadRaster::damaged(format!("layout {other} is not known"))),
+        Some(other) => return Err(BadRaster::Unfamiliar(format!("layout {other}"))),
     };
     let bands = keys.count("nbands")?.unwrap_or(1).max(1);
     let skip = keys.bytes("skipbytes")?.unwrap_or(0);

@@ -98,6 +98,7 @@ pub(crate) fn decode_by_header(
 fn in_header(fault: BadRaster, name: &str) -> BadRaster {
     match fault {
         BadRaster::Damaged(what) => BadRaster::Damaged(format!("{name} beside it: {what}")),
+        BadRaster::Unfamiliar(what) => BadRaster::Unfamiliar(format!("{name} beside it: {what}")),
         BadRaster::AbsurdSize(what) => BadRaster::AbsurdSize(format!("{name} beside it: {what}")),
         other => other,
     }

@@ -221,7 +221,7 @@ fn fault(error: DecodingError) -> BadRaster {
     match error {
         DecodingError::IoError(error) => BadRaster::from_io(error, "the picture"),
         DecodingError::LimitsExceeded => BadRaster::AbsurdSize("the picture's chunks".into()),
-        error => BadRaster::Damaged(format!("PNG: {error}")),
+        error => BadRaster::Unfamiliar(format!("PNG: {error}")),
     }
 }
 

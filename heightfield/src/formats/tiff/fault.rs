@@ -26,7 +26,7 @@ pub(super) fn fault(error: TiffError) -> BadRaster {
         E::InvalidImageLayout(ref what) if what.contains("not supported") => {
             unsupported(format!("this variant ({error})"))
         }
-        error => BadRaster::Damaged(format!("TIFF: {error}")),
+        error => BadRaster::Unfamiliar(format!("TIFF: {error}")),
     }
 }
 

@@ -111,7 +111,7 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             let (width, height) = (columns.min(&20_000), rows.min(&20_000));
             return cut(path, (*width, *height));
         }
-        BadRaster::DecoderFailed(_) => {
+        BadRaster::DecoderFailed(_) | BadRaster::Unfamiliar(_) => {
             return format!("get the file again; or {}", converted(path, ""));
         }
         BadRaster::Unreadable(_) => "check the path and that you may read the file",
