@@ -1,6 +1,6 @@
 //! The cost of a ball's tiles, as a table: `cargo run -p hapterra-tests --example tip >
 //! docs/tip.csv`. Radii from half a cell to 8 cells, over a city of walls or made ground, against the
-//! tiles that a link of 1,000 kB/s carries in a second (docs/streaming.md).
+//! tiles that a link of 1,000 kB/s carries in a second (docs/explanation/tiles-and-levels.md).
 
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{FeltCells, FeltGrid, Terrain, TileBuffer};

@@ -1,17 +1,45 @@
-//! Whether the figures on the pages are those of the committed tables. How a figure
-//! is marked: `hapterra_tests::figures`.
+//! The pages of the book: figures, links and lengths of lines. Marks of figures:
+//! `hapterra_tests::figures`.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 
 use hapterra_tests::figures::check;
 use hapterra_tests::repository;
 
+/// Longest line of a page, characters.
+const MAX_LINE: usize = 120;
+
+/// Returns every page in `folder` and its sub-folders, with its text.
+fn pages_in(folder: &Path) -> Vec<(PathBuf, String)> {
+    let entries = folder.read_dir().expect("a folder");
+    let paths = entries.map(|entry| entry.expect("readable").path());
+    let pages = paths.flat_map(|path| {
+        if path.is_dir() {
+            return pages_in(&path);
+        }
+        let is_page = path.extension().is_some_and(|kind| kind == "md");
+        let text = is_page.then(|| std::fs::read_to_string(&path).expect("readable"));
+        text.map(|text| (path, text)).into_iter().collect()
+    });
+    pages.collect()
+}
+
+/// Returns the pages of the book and those of the root folder that are named.
+fn pages_and(root: &[&str]) -> Vec<(PathBuf, String)> {
+    let mut pages = pages_in(&repository().join("docs"));
+    pages.extend(root.iter().map(|page| {
+        let path = repository().join(page);
+        let text = std::fs::read_to_string(&path).expect("readable");
+        (path, text)
+    }));
+    pages
+}
+
 #[test]
-fn the_figures_on_the_pages_are_those_of_the_tables() {
-    let docs = repository().join("docs").read_dir().expect("a folder");
-    let docs = docs.map(|entry| entry.expect("readable").path());
-    let pages = docs.chain(["README.md", "CHANGELOG.md"].map(|page| repository().join(page)));
+fn figures_on_the_pages_are_those_of_the_tables() {
     let mut stale = Vec::new();
-    for page in pages.filter(|page| page.extension().is_some_and(|kind| kind == "md")) {
-        let text = std::fs::read_to_string(&page).expect("readable");
+    for (page, text) in pages_and(&["README.md", "CHANGELOG.md"]) {
         let (figures, wrong) = check(&text, repository());
         println!("{}: {figures} figures from tables", page.display());
         stale.extend(wrong.iter().map(|why| format!("{}: {why}", page.display())));
@@ -19,7 +47,90 @@ fn the_figures_on_the_pages_are_those_of_the_tables() {
     assert!(stale.is_empty(), "{}", stale.join("\n"));
 }
 
-/// What the check says about a page beside this table.
+/// Returns the text without its blocks of code.
+fn prose(text: &str) -> String {
+    text.split("\n```").step_by(2).collect()
+}
+
+/// Returns the anchor that a heading gets: letters and digits in lower case, hyphens for spaces.
+fn anchor(heading: &str) -> String {
+    let heading = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = heading
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+/// Returns a sentence for each link of a page to a file or a heading that does not exist.
+fn dead_links(page: &Path, text: &str) -> Vec<String> {
+    let text = prose(text);
+    let links = text
+        .split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next());
+    let is_local = |link: &&str| !link.contains("://") && !link.starts_with("mailto:");
+    let mut dead = Vec::new();
+    for link in links.filter(is_local) {
+        let (file, wanted) = link.split_once('#').unwrap_or((link, ""));
+        let folder = page.parent().expect("a folder");
+        let target = if file.is_empty() {
+            page.to_owned()
+        } else {
+            folder.join(file)
+        };
+        if !target.exists() {
+            dead.push(format!("{}: {link}: no such file", page.display()));
+        } else if !wanted.is_empty() {
+            let target = std::fs::read_to_string(&target).unwrap_or_default();
+            let target = prose(&target);
+            let headings = target.lines().filter(|line| line.starts_with('#'));
+            let anchors: HashSet<String> = headings.map(anchor).collect();
+            if !anchors.contains(wanted) {
+                dead.push(format!("{}: {link}: no such heading", page.display()));
+            }
+        }
+    }
+    dead
+}
+
+#[test]
+fn links_of_the_pages_lead_somewhere() {
+    let pages = pages_and(&["README.md"]);
+    let dead: Vec<_> = pages
+        .iter()
+        .flat_map(|(page, text)| dead_links(page, text))
+        .collect();
+    assert!(dead.is_empty(), "{}", dead.join("\n"));
+}
+
+#[test]
+fn dead_links_are_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = folder.path().join("page.md");
+    let text = "# One: two, `three`\n[a](page.md#one-two-three) [b](#no) [c](no.md) [d](https://e)\n\
+                ```\n[f](gone.md)\n```\n";
+    std::fs::write(&page, text).expect("written");
+    let dead = dead_links(&page, text);
+    assert_eq!(dead.len(), 2, "{dead:?}");
+    assert!(dead[0].contains("#no: no such heading"), "{dead:?}");
+    assert!(dead[1].contains("no.md: no such file"), "{dead:?}");
+}
+
+#[test]
+fn lines_of_the_book_are_short() {
+    let mut long = Vec::new();
+    for (page, text) in pages_in(&repository().join("docs")) {
+        for (i, line) in text.lines().enumerate() {
+            let characters = line.chars().count();
+            if characters > MAX_LINE {
+                long.push(format!("{}:{}: {characters}", page.display(), i + 1));
+            }
+        }
+    }
+    assert!(long.is_empty(), "{}", long.join("\n"));
+}
+
+/// Checks a page beside this table.
 fn told(page: &str) -> (usize, Vec<String>) {
     const TABLE: &str = "state,median,share\nsliding,1218,0.04567\n\"chain, free\",1144,2.04e-6\n\
                          twice,1,1\ntwice,2,2\nempty,,1\n";
@@ -46,6 +157,25 @@ fn a_figure_of_the_table_is_right_to_the_digits_shown() {
         assert_eq!(told(&figure(place, shown)), (1, vec![]), "{place} {shown}");
     }
     assert_eq!(told("No figure of a table: 17."), (0, vec![]));
+}
+
+#[test]
+fn cells_of_a_table_are_compared() {
+    let table = |rows: &str| {
+        format!(
+            "<!-- table t.csv: -, median, share\nsliding\nchain, free\n-->\n\
+             | state | median | share |\n| --- | --- | --- |\n{rows}\nMore.\n"
+        )
+    };
+    let right = "| sliding | 1,218 | 0.05 |\n| free | 1144 | |";
+    assert_eq!(told(&table(right)), (3, vec![]));
+    let (count, wrong) = told(&table("| sliding | 1,217 | 0.05 |\n| free | 1144 | 2e-6 |"));
+    assert_eq!((count, wrong.len()), (4, 1), "{wrong:?}");
+    assert!(wrong[0].contains("the page says 1,217"), "{wrong:?}");
+    let (_, wrong) = told(&table("| sliding | 1,218 | 0.05 |"));
+    assert!(wrong[0].contains("2 rows are named, 1 shown"), "{wrong:?}");
+    let (_, wrong) = told(&table("| sliding | 1,218 |\n| free | 1144 | |"));
+    assert!(wrong[0].contains("number of columns"), "{wrong:?}");
 }
 
 #[test]

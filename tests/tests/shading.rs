@@ -16,7 +16,7 @@ const ROUND: f64 = 300.0;
 /// The same where many rounds are made.
 const LONG_STEP: f64 = 0.03;
 
-/// Most that a shaded round gives, mJ, at an even depth of 0.3 mm (`docs/effects.md`).
+/// Most that a shaded round gives, mJ, at an even depth of 0.3 mm (`docs/explanation/effects.md`).
 const MOST_EVEN_MJ: f64 = 0.06;
 /// The same at depths from 0.5 to 1.5 mm.
 const MOST_DEEP_MJ: f64 = 0.14;

@@ -8,13 +8,13 @@ use anyhow::Result;
 
 use crate::run::{cargo, output, root, run, timed};
 
-/// Runs the campaign with the user's words; without a segment the report goes to
-/// `docs/campaign.md`, or to `docs/link-campaign.md` with `--link`.
+/// Runs the campaign with the user's arguments. Without a segment it writes the report to
+/// `docs/reference/campaign.md`, or to `docs/reference/link-campaign.md` with `--link`.
 pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
     let words: Vec<_> = words.collect();
     let page = match words.iter().any(|word| word == "--link") {
-        true => "docs/link-campaign.md",
-        false => "docs/campaign.md",
+        true => "docs/reference/link-campaign.md",
+        false => "docs/reference/campaign.md",
     };
     let whole = !words.iter().any(|word| word == "--segment");
     timed("the campaign", || {

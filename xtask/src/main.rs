@@ -62,10 +62,10 @@ cargo xtask COMMAND
   soak --seed N --scene K [--rough]  one of them again
   campaign [--seconds N] [--seed S] [--segment K [--effects]]
                          the closed loop with everything going wrong at random, 10,000 s of
-                         arm time unless told otherwise; writes docs/campaign.md
+                         arm time unless told otherwise; writes docs/reference/campaign.md
   campaign --link [--seconds N] [--seed S] [--segment K]
                          faults of the link, killed and hostile hosts and devices, an hour of
-                         device time unless told otherwise; writes docs/link-campaign.md
+                         device time unless told otherwise; writes docs/reference/link-campaign.md
   fuzz TARGET MINUTES    libFuzzer on `tick`, `tile` or `wire`; installs cargo-fuzz and a nightly
                          compiler where they are missing
   miri                   core's tests under Miri, where it can run

@@ -106,7 +106,7 @@ mod tests {
     }
 
     /// No more than the exact closest point itself changes, which f64 shows; and
-    /// the bounds of docs/contact.md.
+    /// the bounds of docs/explanation/contact.md.
     #[test]
     fn the_force_is_as_continuous_as_the_surface() {
         let rows = measure();

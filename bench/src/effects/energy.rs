@@ -12,7 +12,7 @@ use super::row::{Error, Place};
 use super::vector::{Vector, dot, minus};
 use crate::grid::Grid;
 
-/// The stiffness up to which docs/stability.md states what a tap gives, N/mm.
+/// The stiffness up to which docs/explanation/stability.md states what a tap gives, N/mm.
 const STIFFNESS: f32 = 1.5;
 /// Most that a tap may give there, mJ: nothing, to within a hundredth.
 const MOST_MJ: f64 = 0.01;

@@ -14,7 +14,7 @@ use crate::path::{self, Dice};
 /// Cells a tick, 10 mm/s at 1 kHz, and depth.
 const STEP: f64 = 0.01;
 const DEPTH: f64 = 0.3;
-/// What docs/effects.md states for that speed, percent of the coefficient.
+/// What docs/explanation/effects.md states for that speed, percent of the coefficient.
 const MOST_ABOVE: f64 = 3.1;
 const MOST_BELOW: f64 = 5.0;
 /// Places where the tip is held, and ticks at each.

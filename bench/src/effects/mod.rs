@@ -3,7 +3,7 @@
 //! - [`Effect`]: the laws that are compared;
 //! - `time`: the whole tick from encoder counts to currents, all effects in turns;
 //! - `friction`, `shading`, `texture`, `damping`, `energy`, `together`: one judge each, in f64,
-//!   by the formulas of docs/effects.md. No judge calls what it judges;
+//!   by the formulas of docs/explanation/effects.md. No judge calls what it judges;
 //! - `felt`, `replay`, `arm`: what is judged, and where it comes from: points in lock-step, and an
 //!   arm that is armed.
 //!

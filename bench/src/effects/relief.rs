@@ -1,4 +1,4 @@
-//! The relief of a texture in f64, by the formulas of docs/effects.md.
+//! The relief of a texture in f64, by the formulas of docs/explanation/effects.md.
 
 use std::f64::consts::TAU;
 

@@ -49,7 +49,7 @@ pub struct Error {
     pub unit: &'static str,
     /// The errors.
     pub spread: Spread,
-    /// What the worst may be, where docs/effects.md promises something.
+    /// What the worst may be, where docs/explanation/effects.md promises something.
     pub bound: Option<f64>,
     /// How many were judged.
     pub judged: usize,

@@ -13,7 +13,7 @@ use crate::terrain::TileIndex;
 
 /// Units of work a tick may spend at 1 kHz, and at any rate at most.
 ///
-/// A unit takes at most 390 cycles of a NUCLEO-G474RE by the model of docs/cycles.md, and all else
+/// A unit takes at most 390 cycles of a NUCLEO-G474RE by the model of docs/reference/cycles.md, and all else
 /// of the costliest tick 23,000. With 300 units that is less than the 168,000 cycles of a
 /// millisecond, which a test of the images holds it to.
 pub const WORK_PER_TICK: u32 = 300;

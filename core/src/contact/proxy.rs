@@ -235,7 +235,7 @@ impl Contact {
     ///
     /// The HIP is in cells: x east, y north, z up, the origin at the south-west sample
     /// at height zero. How near the proxy is to the surface's closest point is in
-    /// `docs/contact.md`, and the soak judges it in every tick. The answer is finite
+    /// `docs/explanation/contact.md`, and the soak judges it in every tick. The answer is finite
     /// whatever the terrain.
     ///
     /// ```

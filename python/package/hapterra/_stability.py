@@ -26,7 +26,7 @@ def stability(
     **texture: Any,
 ) -> pandas.DataFrame:
     """Tries on a virtual arm, by ``hapterra stability``, how stiff a surface may be before the hand
-    feels the ticks; docs/stability.md describes the trials.
+    feels the ticks; docs/explanation/stability.md describes the trials.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 //! Cycles of single ticks on the boards' chips, at most, beside the kept table `bench/cycles.csv`
-//! (docs/cycles.md). `cargo xtask cycles` runs this over all counted scenes; after a change that is
+//! (docs/reference/cycles.md). `cargo xtask cycles` runs this over all counted scenes; after a change that is
 //! meant, `cargo xtask cycles --write`. Run as a test, it takes the scenes by which the emulated
 //! processor is compared.
 

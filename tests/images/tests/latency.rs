@@ -1,5 +1,5 @@
 //! What the haptic interrupt takes in the boards' own images, by the model of cycles
-//! (docs/cycles.md), and what the page, the build and the images make of it.
+//! (docs/reference/cycles.md), and what the page, the build and the images make of it.
 
 #[path = "../../../firmware/build/tick_rate.rs"]
 #[allow(dead_code)] // Only the table.

@@ -13,7 +13,7 @@ const HAPTIC: u8 = 0x10;
 /// Of the supply's interrupt, whose handler does not return.
 const SUPPLY: u8 = 0x00;
 /// The page with the table.
-const PAGE: &str = include_str!("../../../docs/priorities.md");
+const PAGE: &str = include_str!("../../../docs/explanation/priorities.md");
 
 /// Name of the handler in the vector table.
 fn handler(machine: &Machine, interrupt: usize) -> String {
@@ -78,7 +78,7 @@ fn the_haptic_interrupt_is_above_the_ceiling_and_the_page_says_so() {
         let rows = rows(&machine);
         assert!(
             PAGE.contains(&rows),
-            "docs/priorities.md has to say:\n{rows}"
+            "docs/explanation/priorities.md has to say:\n{rows}"
         );
     }
 }

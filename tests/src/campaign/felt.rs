@@ -15,10 +15,10 @@ use super::swing::{MOST_TURNS, Swing};
 /// ([`hapterra_firmware::amplifier::CURRENT_LOOP_US`]).
 const LATE: f32 = 0.11;
 /// What a contact may have given with the controller on, mJ: a hundredth of what a tap gives without
-/// (docs/effects.md).
+/// (docs/explanation/effects.md).
 const GIVEN_MJ: f32 = 0.05;
 /// What shaded ground may have given more, whose force is turned less and less until then
-/// (docs/effects.md): so much, and so large a part of the largest force times a cell and the depth,
+/// (docs/explanation/effects.md): so much, and so large a part of the largest force times a cell and the depth,
 /// and no more than the most; mJ.
 const SHADED_MJ: f32 = 0.2;
 const SHADED_PART: f32 = 0.2;

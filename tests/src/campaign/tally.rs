@@ -109,7 +109,7 @@ impl Tally {
     /// The table, in Markdown.
     #[must_use]
     pub fn table(&self) -> String {
-        let heading = "| went wrong | injected | ridden through | disarmed | latched | amplifiers on for at most, ticks |\n\
+        let heading = "| fault | injected | ridden through | disarmed | latched | amplifiers on, ticks |\n\
              | --- | ---: | ---: | ---: | --- | ---: |\n";
         self.rows.table(heading, &Kind::ALL, |row| {
             let latched = row.latched.values();

@@ -24,7 +24,7 @@ const HOTTEST_C: f64 = 112.0;
 /// A winding may be warmer than the device takes it to be by this, K: the arm's motors
 /// and the device's model are not the same formula.
 const COLDER_K: f64 = 1.0;
-/// What is created beyond this is forgotten, mJ (docs/effects.md).
+/// What is created beyond this is forgotten, mJ (docs/explanation/effects.md).
 const MOST_CREATED_MJ: f32 = 2.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;

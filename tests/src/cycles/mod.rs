@@ -1,5 +1,5 @@
 //! Cycles that an executed tick takes on the boards' chips, at most: a model of their cores and
-//! memories over the addresses that the emulated core has executed. `docs/cycles.md` has its
+//! memories over the addresses that the emulated core has executed. `docs/reference/cycles.md` has its
 //! sources and its margins.
 
 pub mod core;

@@ -9,7 +9,7 @@ use super::surface::{distance, patches_at};
 use crate::field::position;
 use crate::scene::terrain::Terrain;
 
-/// Error that is always allowed, cells (docs/contact.md).
+/// Error that is always allowed, cells (docs/explanation/contact.md).
 pub const ERROR: f64 = 2e-6;
 /// Stretches shorter than this, in cells, tell nothing about a fade.
 const SHORT: f64 = 1e-3;

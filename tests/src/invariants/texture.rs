@@ -1,4 +1,4 @@
-//! The force with texture, by the formulas of docs/effects.md, in f64 and whole numbers.
+//! The force with texture, by the formulas of docs/explanation/effects.md, in f64 and whole numbers.
 
 use glam::DVec3;
 use hapterra_core::force::{Pattern, Texture};

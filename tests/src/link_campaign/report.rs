@@ -1,4 +1,4 @@
-//! The report of a campaign of link faults: `docs/link-campaign.md`.
+//! The report of a campaign of link faults: `docs/reference/link-campaign.md`.
 
 use super::fault::Kind;
 use super::surface::OFF_SURFACE;
@@ -14,38 +14,43 @@ pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &Tally) -> Str
     format!(
         "# The campaign of link faults
 
-Written by `cargo xtask campaign --link --seconds {seconds} --seed {seed}`{commit}; the same source repeats it to the last figure.
+This page reports a randomised test of the link between host and device. It shows which faults were injected, and
+whether host and device agreed on the end of each session.
 
-The host's own client and the application of the boards compiled for the desktop, with a virtual Phantom Premium 1.5 in a
-wandering hand, talk over a line to which everything happens (`tests/src/link_campaign`). Time is the device's: {ticks} s of it
-passed, {armed} s with the amplifiers on. A run is one host from its hello to its end: {} runs, {} of which ended as host
-and device agreed. In each run one thing goes wrong, and it begins while the session opens, while the arm is armed, while
-terrain is felt, or while the host leaves. In one segment of four the device's clock stands still while it waits for a tile.
+Written by `cargo xtask campaign --link --seconds {seconds} --seed {seed}`{commit}.
+The same source repeats every figure.
 
-Held in every tick:
+The host's own client and the application of the boards, compiled for the desktop, exchange frames over a faulty line
+(`tests/src/link_campaign`). A wandering hand holds a virtual Phantom Premium 1.5. Time is the device's: {ticks} s passed,
+{armed} s with the amplifiers on. A run is one host from opening to closing: {} runs, {} of which ended with host and
+device in agreement. Each run has one fault. It begins while the session opens, while the arm is armed, during a
+contact, or while the host closes. In one segment of four the device's clock stops while it waits for a tile.
 
-- everything that the [closed-loop campaign](campaign.md) holds a device to: currents, force, its change in a tick, no force while
-  disarmed;
-- the proxy in contact lies on the bilinear surface of the terrain that the host serves, by an oracle in f64
-  (`tests/src/link_campaign/surface.rs`);
-- amplifiers go on only where a host that lives has asked for it;
-- on a line that works the user sees whether the amplifiers are on.
+## Checks in every tick
 
-Held at the end of each step of a run (`tests/src/link_campaign/play.rs`):
+- The checks of the [closed-loop campaign](campaign.md) on currents, force and its change in a tick hold.
+- The proxy in contact lies on the bilinear surface of the terrain that the host serves, by an oracle in f64.
+- The amplifiers go on only if a live host has asked for it.
+- On a working line, the user sees whether the amplifiers are on.
 
-- opening, arming and leaving end within their times, with what they are for or with an error that the user is told;
-- where host and device agree on the end the amplifiers are off;
-- where one host talked to one device, received, lost and dropped samples are together the samples that the device made,
-  by the numbers of their ticks;
-- a device does not ask for a tile again before its time-out, but for those that were under way at a hello;
-- a device whose host vanished lets the force out and disarms in the time that the host had told it.
+## Checks at the end of each step of a run
 
-| the largest seen | | bound |
+- Opening, arming and closing end within their time-outs, with their result or with an error that the user sees.
+- If host and device agree on the end, the amplifiers are off.
+- If one host used one device, its received, lost and dropped samples are together the samples that the device made.
+- The device does not request a tile again before its time-out, except for requests that were in flight at an opening.
+- A device whose host vanished ramps the force down and disarms within the time that the host had set.
+
+## Extremes
+
+| quantity | maximum | bound |
 | --- | ---: | ---: |
-| force told by the device | {:.4} N | 7.65 N |
+| force, as the device reports it | {:.4} N | 7.65 N |
 | change of the force in a tick | {:.4} N | 1 N |
 | current of a motor | {:.4} A | 5.5 A |
 | distance of a proxy in contact from the surface, of {} samples | {:.2e} cells | {OFF_SURFACE:.2e} cells |
+
+## Faults
 
 {}",
         tally.runs(),

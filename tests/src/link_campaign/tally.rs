@@ -86,15 +86,17 @@ impl Tally {
     /// The table, in Markdown.
     #[must_use]
     pub fn table(&self) -> String {
-        let heading = "| went wrong | runs | end agreed on | killed, no host after it | user told |\n\
-             | --- | ---: | ---: | ---: | --- |\n";
-        self.rows.table(heading, &Kind::ALL, |row| {
-            let told = row.told.iter();
-            let told: Vec<_> = told
-                .map(|(words, count)| format!("{count} {words}"))
-                .collect();
-            let (runs, agreed, killed) = (row.runs, row.agreed, row.killed);
-            format!("{runs} | {agreed} | {killed} | {}", told.join("; "))
-        })
+        let heading = "| fault | runs | end agreed | host killed |\n\
+             | --- | ---: | ---: | ---: |\n";
+        let runs = self.rows.table(heading, &Kind::ALL, |row| {
+            format!("{} | {} | {}", row.runs, row.agreed, row.killed)
+        });
+        let mut reports =
+            "\n| fault | runs | reported to the user |\n| --- | ---: | --- |\n".to_owned();
+        for kind in Kind::ALL {
+            let told = self.rows.get(kind).into_iter().flat_map(|row| &row.told);
+            reports.extend(told.map(|(words, runs)| format!("| {kind:?} | {runs} | {words} |\n")));
+        }
+        runs + &reports
     }
 }

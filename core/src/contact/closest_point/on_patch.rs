@@ -15,7 +15,7 @@
 //! gives z without cancellation, where evaluating a steep height at a rounded
 //! v would not.
 //!
-//! `docs/contact.md` has the error analysis.
+//! `docs/explanation/contact.md` has the error analysis.
 
 use super::on_convex_patch::{Convexity, Place};
 use super::on_ruling::Ruling;

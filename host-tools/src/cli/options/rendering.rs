@@ -13,7 +13,7 @@ use crate::terrain::{FeltCells, FeltGrid, MAX_TIP_CELLS, Scale, Terrain};
 use heightfield::Raster;
 
 /// Radius of the ball by which a hand feels the ground unless another is stated, mm: with a friction
-/// of 0.4 no ground that was tried holds it (docs/tip.md).
+/// of 0.4 no ground that was tried holds it (docs/explanation/tip.md).
 const HAND_MM: f64 = 7.0;
 
 /// How the terrain feels.

@@ -1,4 +1,4 @@
-//! The force of a material in force, by docs/effects.md, in f64.
+//! The force of a material in force, by docs/explanation/effects.md, in f64.
 
 use glam::DVec3;
 use hapterra_core::grid::GridPoint;

@@ -1,4 +1,5 @@
-//! What a loop feels of a scene with materials, judged by docs/how-to/materials.md and docs/effects.md.
+//! What a loop feels of a scene with materials, judged by docs/how-to/materials.md and
+//! docs/explanation/effects.md.
 //!
 //! The judge knows the class of each sample itself, and follows in f64 what may be in force. Where
 //! a proxy lies on the line half way between two samples either class is right: then it follows

@@ -1,4 +1,4 @@
-//! A proxy that slides over a plane, by docs/effects.md.
+//! A proxy that slides over a plane, by docs/explanation/effects.md.
 
 use glam::DVec3;
 use hapterra_core::contact::ContactState;
@@ -14,7 +14,7 @@ use crate::invariants::surface::{Patch, distance};
 use crate::scene::terrain::Kind;
 
 /// Ways of a proxy in a tick by which its friction is told, and distances from the HIP, cells:
-/// friction over half a cell a tick is less exact (docs/effects.md).
+/// friction over half a cell a tick is less exact (docs/explanation/effects.md).
 const SLIDES: std::ops::Range<f64> = 1e-4..0.5;
 const PRESSES: std::ops::Range<f64> = 1e-3..100.0;
 /// Part by which a proxy that trails by its speed may trail by more or less.
