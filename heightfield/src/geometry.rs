@@ -168,9 +168,7 @@ pub fn metres_in(unit: &str) -> Option<f64> {
         "km" | "kilometre" | "kilometres" | "kilometer" | "kilometers" => 1000.0,
         "ft" | "foot" | "feet" | "internationalfoot" | "footinternational" => 0.3048,
         "usft" | "ftus" | "ussurveyfoot" | "footus" | "surveyfoot" | "ussurveyfeet" | "usfoot"
-        | "usfeet" | "sft" | "footussurvey" => {
-            1200.0 / 3937.0
-        }
+        | "usfeet" | "sft" | "footussurvey" => 1200.0 / 3937.0,
         "fathom" | "fathoms" => 1.8288,
         _ => return None,
     })

@@ -9,13 +9,25 @@ use anyhow::{Context, Result, bail};
 use crate::run::root;
 
 /// Bounds of the pages: words in all, words of the longest sentence, characters of the longest line.
-const MAX_WORDS: usize = 40_000;
+const MAX_WORDS: usize = 36_000;
 const MAX_SENTENCE: usize = 40;
 const MAX_LINE: usize = 120;
 /// Folders that hold code, in the order of the data.
 const ROOMS: [&str; 14] = [
-    "core", "firmware", "heightfield", "heightfield-gdal", "touch", "host-tools", "c", "python", "page",
-    "view", "tests", "bench", "fuzz", "xtask",
+    "core",
+    "firmware",
+    "heightfield",
+    "heightfield-gdal",
+    "touch",
+    "host-tools",
+    "c",
+    "python",
+    "page",
+    "view",
+    "tests",
+    "bench",
+    "fuzz",
+    "xtask",
 ];
 /// Endings of files of code.
 const CODE: [&str; 5] = ["rs", "py", "js", "c", "h"];
@@ -47,16 +59,26 @@ pub(crate) fn census() -> Result<()> {
             ("characters in a line", page.longest_line, MAX_LINE),
         ];
         for (what, found, most) in bounds.into_iter().filter(|(_, found, most)| found > most) {
-            faults.push(format!("{}: {found} {what}, at most {most}", path.display()));
+            faults.push(format!(
+                "{}: {found} {what}, at most {most}",
+                path.display()
+            ));
         }
         all.words += page.words;
         all.sentences += page.sentences;
         all.words_in_sentences += page.words_in_sentences;
     }
     let mean = all.words_in_sentences as f64 / all.sentences.max(1) as f64;
-    println!("{:6} words on {} pages, {mean:.1} a sentence", all.words, pages.len());
+    println!(
+        "{:6} words on {} pages, {mean:.1} a sentence",
+        all.words,
+        pages.len()
+    );
     if all.words > MAX_WORDS {
-        faults.push(format!("{} words on all pages, at most {MAX_WORDS}", all.words));
+        faults.push(format!(
+            "{} words on all pages, at most {MAX_WORDS}",
+            all.words
+        ));
     }
     for (room, [lines, tests]) in code()? {
         println!("{lines:6} lines of code  {room}, {tests} of them in files of tests");
@@ -70,7 +92,10 @@ pub(crate) fn census() -> Result<()> {
 fn pages() -> Result<Vec<(PathBuf, Page)>> {
     let root = root();
     let mut found = vec![];
-    for path in files(&root.join("docs"))?.into_iter().chain([root.join("README.md")]) {
+    for path in files(&root.join("docs"))?
+        .into_iter()
+        .chain([root.join("README.md")])
+    {
         if path.extension().is_some_and(|kind| kind == "md") {
             let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
             let name = path.strip_prefix(root).unwrap_or(&path).to_owned();
@@ -81,17 +106,33 @@ fn pages() -> Result<Vec<(PathBuf, Page)>> {
 }
 
 fn page(text: &str) -> Page {
+    let is_word = |word: &&str| word.contains(char::is_alphanumeric);
+    let shown = without_comments(text);
     let mut page = Page {
-        words: text.split_whitespace().count(),
-        longest_line: text.lines().map(|line| line.chars().count()).max().unwrap_or(0),
+        words: shown.split_whitespace().filter(is_word).count(),
+        longest_line: text
+            .lines()
+            .map(|line| line.chars().count())
+            .max()
+            .unwrap_or(0),
         ..Page::default()
     };
-    for words in sentences(text) {
+    for words in sentences(&shown) {
         page.sentences += 1;
         page.words_in_sentences += words;
         page.longest_sentence = page.longest_sentence.max(words);
     }
     page
+}
+
+/// A page without its comments, which nobody sees.
+fn without_comments(text: &str) -> String {
+    let (mut shown, mut left) = (String::new(), text);
+    while let Some((before, comment)) = left.split_once("<!--") {
+        shown += before;
+        left = comment.split_once("-->").map_or("", |(_, after)| after);
+    }
+    shown + left
 }
 
 /// Words of each sentence of the prose: neither code, tables nor headings.
@@ -106,7 +147,8 @@ fn sentences(text: &str) -> Vec<usize> {
             is_code = !is_code;
         }
         let is_prose = !is_code && !line.starts_with(['|', '#', '<', '!', '`']) && !line.is_empty();
-        let begins = !is_prose || line.starts_with("- ") || line.starts_with(|c: char| c.is_ascii_digit());
+        let begins =
+            !is_prose || line.starts_with("- ") || line.starts_with(|c: char| c.is_ascii_digit());
         if begins {
             end(&mut words);
         }
@@ -148,7 +190,9 @@ fn code() -> Result<BTreeMap<&'static str, [usize; 2]>> {
 fn lines_of_code(text: &str, kind: &str) -> usize {
     let comment = if kind == "py" { "#" } else { "//" };
     let lines = text.lines().map(str::trim);
-    lines.filter(|line| !line.is_empty() && !line.starts_with(comment)).count()
+    lines
+        .filter(|line| !line.is_empty() && !line.starts_with(comment))
+        .count()
 }
 
 /// The files in a folder and below it, but for what is built.
@@ -178,13 +222,17 @@ mod tests {
     fn prose_is_counted_and_code_is_not() {
         let text = "# A title\n\nOne two\nthree. Four five:\n\n- six\n- seven eight\n\n```\nno words here\n```\n\n| a | table |\n";
         assert_eq!(sentences(text), [3, 2, 1, 2]);
-        let page = page(text);
+        let page = page(&format!("{text}<!-- no word -->"));
+        assert_eq!(page.words, 15);
         assert_eq!((page.longest_sentence, page.longest_line), (3, 17));
     }
 
     #[test]
     fn comments_and_empty_lines_are_no_code() {
-        assert_eq!(lines_of_code("//! Doc\n\nfn a() {\n    // why\n}\n", "rs"), 2);
+        assert_eq!(
+            lines_of_code("//! Doc\n\nfn a() {\n    // why\n}\n", "rs"),
+            2
+        );
         assert_eq!(lines_of_code("# why\nx = 1\n", "py"), 1);
     }
 }
