@@ -363,14 +363,6 @@ fn a_file_that_cannot_be_read_is_a_hole_with_one_warning() {
     let many = open(at);
     std::fs::remove_file(at.join("a.asc")).expect("removed");
     assert_eq!(many.height(2005, 1), 9.0);
-    // A source of a VRT that was never there.
-    let there = source("b.asc", "xOff=\"4\" yOff=\"0\" xSize=\"4\" ySize=\"3\"");
-    let gone = source("gone.asc", "xOff=\"0\" yOff=\"0\" xSize=\"4\" ySize=\"3\"");
-    let path = vrt(at, "gone.vrt", &format!("{gone}{there}"));
-    let many = open(&path);
-    assert!(many.height(0, 0).is_nan() && many.height(4, 0) == 9.0);
-    let warnings = told(&info(&path));
-    assert!(warnings.contains("gone.asc"), "{warnings}");
     // Its header is wanted.
     std::fs::write(at.join("c.asc"), "ncols x\n").expect("written");
     let why = refused(at);

@@ -129,7 +129,13 @@ fn opened(
             "it reads * as a height of 0: write a number for holes (r.out.ascii null_value=-9999)";
         return Err(BadRaster::ByGdal(Error::Refused(why.into())));
     }
-    let dataset = match chosen(&dataset, options)? {
+    let part = match chosen(&dataset, options) {
+        Err(fault @ (BadRaster::SeveralHeights { .. } | BadRaster::NoSuchPart { .. })) => {
+            return Err(stac::refused(path, options)?.unwrap_or(fault));
+        }
+        part => part?,
+    };
+    let dataset = match part {
         Some(name) => library
             .open_part(&name, &open_options(options))
             .map_err(fault)?,
@@ -176,7 +182,10 @@ fn no_raster(who: &str) -> BadRaster {
 /// The name of the raster to take, where the file holds several.
 fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, BadRaster> {
     // As `depth` of `NETCDF:"ocean.nc":depth`.
-    let short = |name: &str| name.rsplit([':', '/']).next().unwrap_or(name).to_owned();
+    let short = |name: &str| {
+        let last = name.rsplit([':', '/']).next().unwrap_or(name);
+        last.trim_start_matches("asset=").to_owned()
+    };
     let asked = options.variable.as_deref();
     let parts = dataset.subdatasets();
     let names: Vec<_> = parts.iter().map(|part| short(&part.name)).collect();

@@ -11,8 +11,8 @@ use serde_json::Value;
 
 use crate::{BadRaster, OpenOptions};
 
-/// A larger document is no list of items that can be opened.
-const MAX_BYTES: u64 = 16 << 20;
+/// A larger document is no list of items that can be opened. In memory it takes fifty times as much.
+const MAX_BYTES: u64 = 4 << 20;
 /// A file lies where its item says within this share of a cell.
 const TOLERANCE: f64 = 0.05;
 /// What files of heights are.
