@@ -242,17 +242,26 @@ fn no_bytes_break_a_tile() {
     }
 }
 
-/// A small file of each kind, which opens.
+/// A small file of any kind.
 fn sensible_terrain(chance: &mut Chance) -> Vec<u8> {
     let kind = chance.below(terrain::KINDS.len());
+    small_terrain(kind, chance.below(32) as u8)
+}
+
+/// A small file of a kind, which opens in the way 0.
+fn small_terrain(kind: usize, how: u8) -> Vec<u8> {
     let samples: Vec<u8> = (0..6_i16).flat_map(i16::to_le_bytes).collect();
     let world = b"10\n0\n0\n-10\n505\n5005\n".to_vec();
     let header = b"nrows 2\nncols 3\nnbits 16\nbyteorder I\nlayout BIL\nnbands 1\n".to_vec();
     let prj = b"PROJCS[\"a\",GEOGCS[\"b\",DATUM[\"c\",SPHEROID[\"d\",6378137,298.26]],UNIT[\"Degree\",0.01745]]]".to_vec();
     let (beside, file) = match terrain::KINDS[kind] {
         [name, other] if name.ends_with(".tif") => {
-            let other = if other.ends_with("tfw") { world } else { prj };
-            (other, small_tiff(&samples))
+            let beside = match other.rsplit('.').next() {
+                Some("tfw") => world,
+                Some("prj") => prj,
+                _ => vec![],
+            };
+            (beside, small_tiff(&samples))
         }
         ["t.png", _] => (world, SMALL_PNG.to_vec()),
         ["t.npy", _] => {
@@ -265,11 +274,12 @@ fn sensible_terrain(chance: &mut Chance) -> Vec<u8> {
             let text = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 10\nnodata_value -9\n1 2 3\n4 -9 6\n";
             (prj, text.into())
         }
-        ["t.flt" | "t.bil", _] => (header, samples),
+        ["t.flt", _] => (b"nrows 2\nncols 3\n".to_vec(), samples.repeat(2)),
+        ["t.bil", _] => (header, samples),
         ["t.raw", _] => (prj, [7; 70].to_vec()),
         _ => (prj, vec![1; 2 * 1201 * 1201]),
     };
-    terrain::of(kind, chance.below(32) as u8, &beside, &file)
+    terrain::of(kind, how, &beside, &file)
 }
 
 /// Two rows of three samples of 16 bits.
@@ -292,10 +302,13 @@ fn small_tiff(samples: &[u8]) -> Vec<u8> {
 
 /// Two by two grey samples of 8 bits.
 const SMALL_PNG: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x02\0\0\0\x02\x08\0\0\0\0W\xddR\xf8\
-\0\0\0\x0eIDATx\x9cc`d`bf\x01\0\0\x14\0\x0b\0\0\0\0\0\0IEND\xaeB`\x82";
+\0\0\0\x0eIDATx\x9cc`db`f\x01\0\0\x1d\0\x0b\r\xb5R\x06\0\0\0\0IEND\xaeB`\x82";
 
 #[test]
 fn no_bytes_break_the_readers_of_terrain() {
+    for (kind, [name, _]) in terrain::KINDS.iter().enumerate() {
+        assert!(terrain::run(&small_terrain(kind, 0)), "{name}");
+    }
     let mut chance = Chance::new(14);
     for round in 0..2_000 {
         terrain::run(&input(&mut chance, round, 400, sensible_terrain));
@@ -305,7 +318,7 @@ fn no_bytes_break_the_readers_of_terrain() {
 /// A file of each kind that the command reads besides terrain.
 fn sensible_text(chance: &mut Chance) -> Vec<u8> {
     let text = [
-        "# hapterra-recording = 2\n# level = 0\nt_s,x_mm,y_mm,z_mm,contact\n0,1,2,3,0\n0.001,1,2,2.5,1\n",
+        "# hapterra-recording = 1\n# level = 0\nt_s,x_mm,y_mm,z_mm,contact\n0,1,2,3,0\n0.001,1,2,2.5,1\n",
         "format = 1\nmodel = \"premium-1.5\"\n[limits]\nmax_force_n = 8.5\nmax_speed_mm_s = 1000\n",
         "[default]\nstiffness_n_per_mm = 0.5\n[class.80]\nname = \"water\"\nstiffness_n_per_mm = 0.1\n",
         "[board]\nname = \"nucleo-g474re\"\n[[step]]\nnumber = 1\n",

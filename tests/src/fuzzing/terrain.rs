@@ -22,8 +22,8 @@ pub const KINDS: [[&str; 2]; 10] = [
 ];
 
 /// The first byte chooses the kind, the second how it is opened, the next two how many bytes go to
-/// the file beside it; the file has the rest.
-pub fn run(data: &[u8]) {
+/// the file beside it; the file has the rest. Returns true if it is a terrain.
+pub fn run(data: &[u8]) -> bool {
     let folder = tempfile::tempdir().expect("a folder");
     let (kind, how, beside, file) = parts(data);
     let [name, neighbour] = KINDS[kind];
@@ -31,7 +31,7 @@ pub fn run(data: &[u8]) {
     if !beside.is_empty() {
         fs::write(folder.path().join(neighbour), beside).expect("written");
     }
-    open(&folder.path().join(name), how);
+    open(&folder.path().join(name), how)
 }
 
 /// An input of these parts.
@@ -49,8 +49,8 @@ fn parts(data: &[u8]) -> (usize, u8, &[u8], &[u8]) {
     (kind, how, beside, file)
 }
 
-/// Opens the file, and looks at heights of it.
-fn open(path: &Path, how: u8) {
+/// Opens the file, and looks at heights of it. Returns true if it is a terrain.
+fn open(path: &Path, how: u8) -> bool {
     let is_set = |bit: u8| how & (1 << bit) != 0;
     let raw = RawLayout {
         columns: 7,
@@ -78,7 +78,7 @@ fn open(path: &Path, how: u8) {
             assert!(!told.contains(char::is_control), "{told:?}");
             // A decoder of another's may panic; none of this project's may.
             assert!(!matches!(error.fault(), BadRaster::DecoderFailed(name) if !is_anothers(name)));
-            return;
+            return false;
         }
     };
     let last = [raster.columns(), raster.rows()].map(|count| f64::from(count) - 1.0);
@@ -88,6 +88,7 @@ fn open(path: &Path, how: u8) {
             assert!(!height.is_infinite(), "{height}");
         }
     }
+    true
 }
 
 /// Returns true if a format is decoded by a library.
