@@ -1,7 +1,10 @@
 //! A bound on the time that GDAL takes to open a file: some files lead a driver round in circles.
 
+use std::ffi::c_int;
+use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::thread::Builder;
 use std::time::Duration;
@@ -11,7 +14,26 @@ use crate::error::Error;
 use crate::library::Loaded;
 
 /// A VRT of 26,000 files opens within a second.
-const OPEN_WITHIN: Duration = Duration::from_secs(8);
+const OPEN_WITHIN: Duration = Duration::from_secs(6);
+
+/// Whether a call of GDAL has not returned.
+static IS_STUCK: AtomicBool = AtomicBool::new(false);
+
+unsafe extern "C" {
+    /// Ends the process without what libraries do at its end.
+    fn _exit(code: c_int) -> !;
+}
+
+/// Ends the process with an exit code if a call of GDAL has not returned: GDAL's own end would wait
+/// for it. Else does nothing.
+pub fn exit_if_stuck(code: u8) {
+    if IS_STUCK.load(Ordering::Acquire) {
+        // Nobody is left who could be told.
+        let _ = (std::io::stdout().flush(), std::io::stderr().flush());
+        // SAFETY: it does not return, and nothing of this process is used after it.
+        unsafe { _exit(code.into()) }
+    }
+}
 
 /// Opens a raster in a thread of its own, which is left behind where it does not come to an end.
 ///
@@ -32,7 +54,8 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
     };
     let thread = Builder::new().name("GDAL opens a file".into());
     thread.spawn(open).map_err(|_| slow())?;
-    opened
-        .recv_timeout(OPEN_WITHIN)
-        .unwrap_or_else(|_| Err(slow()))
+    opened.recv_timeout(OPEN_WITHIN).unwrap_or_else(|_| {
+        IS_STUCK.store(true, Ordering::Release);
+        Err(slow())
+    })
 }

@@ -42,6 +42,7 @@ pub use axes::Axis;
 pub use band::{Band, Mask, Sample, SampleType, Window};
 pub use dataset::{Dataset, Subdataset};
 pub use error::Error;
+pub use in_time::exit_if_stuck;
 pub use library::{Driver, Library, Version};
 pub use settings::Settings;
 pub use srs::{AxisUnit, SpatialReference};

@@ -142,11 +142,13 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
     voice::finish();
     // A process that is not this crate's own program does not do so at its end.
     let _ = std::io::stdout().flush();
-    match outcome {
+    let code = match outcome {
         Ok(()) => 0,
         Err(failure) => {
             failure.report();
             1
         }
-    }
+    };
+    heightfield_gdal::exit_if_stuck(code);
+    code
 }

@@ -57,7 +57,7 @@ pub struct ReadingOptions {
     pub band: Option<u32>,
 
     /// Which raster of several holds the height: a NetCDF variable, a file of an archive, a STAC asset
-    #[arg(long, value_name = "NAME", help_heading = INPUT)]
+    #[arg(long, alias = "asset", value_name = "NAME", help_heading = INPUT)]
     pub variable: Option<String>,
 
     /// Option of the GDAL driver that opens the file; may be repeated
