@@ -1,4 +1,4 @@
-//! The pages of the book: figures, links and lengths of lines. Marks of figures:
+//! The pages of the book: figures, links, tables and lengths of lines. Marks of figures:
 //! `hapterra_tests::figures`.
 
 use std::collections::HashSet;
@@ -128,6 +128,48 @@ fn lines_of_the_book_are_short() {
         }
     }
     assert!(long.is_empty(), "{}", long.join("\n"));
+}
+
+/// Returns the numbers of the lines at which a table begins without a line of dashes below. A blank
+/// line inside a table leaves such rows behind it.
+fn cut_tables(text: &str) -> Vec<usize> {
+    let lines: Vec<&str> = text.lines().map(str::trim_start).collect();
+    let mut cut = Vec::new();
+    let mut is_code = false;
+    let mut is_table = false;
+    for (i, line) in lines.iter().enumerate() {
+        if line.starts_with("```") {
+            is_code = !is_code;
+        }
+        let is_row = !is_code && line.starts_with('|');
+        let below = lines.get(i + 1).copied().unwrap_or_default();
+        if is_row && !is_table && !below.starts_with("| ---") {
+            cut.push(i + 1);
+        }
+        is_table = is_row;
+    }
+    cut
+}
+
+#[test]
+fn tables_of_the_pages_have_heads() {
+    let mut cut = Vec::new();
+    for (page, text) in pages_and(&["README.md", "CHANGELOG.md", "python/README.md"]) {
+        for line in cut_tables(&text) {
+            cut.push(format!("{}:{line}", page.display()));
+        }
+    }
+    assert!(cut.is_empty(), "{}", cut.join("\n"));
+}
+
+#[test]
+fn cut_tables_are_found() {
+    let whole = "Text.\n| a | b |\n| --- | ---: |\n| 1 | 2 |\n| 3 | 4 |\n";
+    assert!(cut_tables(whole).is_empty());
+    let blank = whole.replace("| 3", "\n| 3");
+    assert_eq!(cut_tables(&blank), vec![6]);
+    let code = format!("```text\n{blank}```\n");
+    assert!(cut_tables(&code).is_empty());
 }
 
 /// Checks a page beside this table.
