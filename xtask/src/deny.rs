@@ -56,10 +56,8 @@ pub(crate) fn check(manifest: &str) -> Result<Advisories> {
     let program = ready()?;
     say(format!("the dependencies of {manifest}"));
     let deny = |words: &[&str]| {
-        let of = ["--manifest-path", manifest];
-        let config = ["--config", "deny.toml"];
-        let (command, rest) = words.split_at(1);
-        with(&program, &[&of, command, &config, rest].concat())
+        let of = ["--manifest-path", manifest, "--config", "deny.toml"];
+        with(&program, &[&of, words].concat())
     };
     run(&mut deny(&["check", "bans", "licenses", "sources"]))?;
     // This renews the database; one that was fetched before does as well.
