@@ -67,7 +67,7 @@ pub(crate) fn check(manifest: &str) -> Result<Advisories> {
             last_line(&format!("{why:#}"))
         ))),
         _ => {
-            run(&mut deny(&["check", "--disable-fetch", "advisories"]))?;
+            run(&mut deny(&["--offline", "check", "advisories"]))?;
             Ok(Advisories::Checked)
         }
     }
