@@ -157,7 +157,10 @@ fn check_siblings(path: &Path) -> Result<(), Error> {
     for entry in entries.flatten() {
         let other = entry.path();
         let is_regular = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if !is_regular && stem(&other).starts_with(&own) {
+        let behind = stem(&other).strip_prefix(&own).map(str::to_owned);
+        let belongs =
+            behind.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '_', '-']));
+        if !is_regular && belongs {
             check_kind(&other)?;
         }
     }

@@ -4,7 +4,7 @@ use std::ffi::c_int;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::thread::Builder;
 use std::time::Duration;
@@ -16,8 +16,8 @@ use crate::library::Loaded;
 /// A VRT of 26,000 files opens within a second.
 const OPEN_WITHIN: Duration = Duration::from_secs(6);
 
-/// Whether a call of GDAL has not returned.
-static IS_STUCK: AtomicBool = AtomicBool::new(false);
+/// Calls of GDAL that were given up and have not returned.
+static STUCK: AtomicUsize = AtomicUsize::new(0);
 
 unsafe extern "C" {
     /// Ends the process without what libraries do at its end.
@@ -27,7 +27,7 @@ unsafe extern "C" {
 /// Ends the process with an exit code if a call of GDAL has not returned: GDAL's own end would wait
 /// for it. Else does nothing.
 pub fn exit_if_stuck(code: u8) {
-    if IS_STUCK.load(Ordering::Acquire) {
+    if STUCK.load(Ordering::Acquire) > 0 {
         // Nobody is left who could be told.
         let _ = (std::io::stdout().flush(), std::io::stderr().flush());
         // SAFETY: it does not return, and nothing of this process is used after it.
@@ -49,13 +49,16 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
     let options: Vec<String> = options.iter().map(|&option| option.to_owned()).collect();
     let open = move || {
         let options: Vec<&str> = options.iter().map(String::as_str).collect();
-        // Nobody may wait for it any more.
-        drop(send.send(Dataset::open(loaded, &own, &options)));
+        let opened = Dataset::open(loaded, &own, &options);
+        // Given up: then it has returned after all.
+        if send.send(opened).is_err() {
+            STUCK.fetch_sub(1, Ordering::AcqRel);
+        }
     };
     let thread = Builder::new().name("GDAL opens a file".into());
     thread.spawn(open).map_err(|_| slow())?;
     opened.recv_timeout(OPEN_WITHIN).unwrap_or_else(|_| {
-        IS_STUCK.store(true, Ordering::Release);
+        STUCK.fetch_add(1, Ordering::AcqRel);
         Err(slow())
     })
 }

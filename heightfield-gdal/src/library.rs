@@ -201,7 +201,15 @@ impl Library {
     /// # Errors
     /// As [`open`](Self::open), but nothing is looked at before.
     pub fn open_part(&self, name: &str, options: &[&str]) -> Result<Dataset, Error> {
-        in_time::open(&self.loaded, Path::new(name), options)
+        let dataset = in_time::open(&self.loaded, Path::new(name), options)?;
+        // One on disk is looked into; here, it may name pipes, devices and addresses.
+        match name.starts_with("/vsi") && dataset.driver() == "VRT" {
+            true => Err(Error::NotOpened {
+                path: name.into(),
+                why: "a VRT inside an archive may name any file: unpack the archive".into(),
+            }),
+            false => Ok(dataset),
+        }
     }
 }
 

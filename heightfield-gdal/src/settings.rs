@@ -1,6 +1,7 @@
 //! GDAL's own settings, all of them in one place.
 
 use std::ffi::c_void;
+use std::hash::{BuildHasher, Hasher, RandomState};
 
 use crate::error::Error;
 use crate::functions::Functions;
@@ -50,6 +51,9 @@ pub(crate) fn is_fetching_allowed() -> bool {
 impl Settings {
     /// Sets them, before drivers are registered.
     pub(crate) fn apply(self, functions: &Functions) -> Result<(), Error> {
+        // No address ends so: nobody knows the number.
+        let number = RandomState::new().build_hasher().finish();
+        let nothing = format!(".nothing-is-fetched-{number:016x}");
         let cache = format!("{}MB", (self.cache_bytes >> 20).max(1));
         let mut options = vec![
             ("GDAL_CACHEMAX", cache.as_str()),
@@ -60,8 +64,7 @@ impl Settings {
             ("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO"),
         ];
         if !self.may_fetch && !is_fetching_allowed() {
-            // No address ends so.
-            options.push((FETCHED, ".nothing-is-fetched"));
+            options.push((FETCHED, nothing.as_str()));
         }
         for (name, value) in options {
             let (name, value) = (to_c(name)?, to_c(value)?);

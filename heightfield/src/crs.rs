@@ -221,4 +221,33 @@ mod tests {
         // Two urban grids of Colombia, whose projection is of no other map.
         assert_eq!(unplaced, [6255.0, 6275.0]);
     }
+
+    /// A unit beside a code counts, in a text as in keys.
+    #[test]
+    fn unit_of_a_text_counts_beside_its_code() {
+        let text = |unit: &str| {
+            format!(r#"PROJCS["here",GEOGCS["NAD83"],{unit},AUTHORITY["EPSG","26945"]]"#)
+        };
+        let metres = text(r#"UNIT["metre",1]"#);
+        let feet = text(r#"UNIT["US survey foot",0.304800609601219]"#);
+        let [metres, feet] = [metres, feet].map(|text| {
+            let system = ReferenceSystem::from_wkt(&text).0.expect("a system");
+            assert_eq!(system.code(), Some(26945));
+            system
+        });
+        let place = (1_981_540.0, 566_554.0);
+        let same = (place.0 * 3937.0 / 1200.0, place.1 * 3937.0 / 1200.0);
+        let (a, b) = (metres.to_lonlat(place), feet.to_lonlat(same));
+        let (a, b) = (a.expect("in reach"), b.expect("in reach"));
+        assert!(
+            (a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9,
+            "{a:?} {b:?}"
+        );
+        let said = feet.other_unit().expect("said");
+        assert!(
+            said.contains("0.3048006") && metres.other_unit().is_none(),
+            "{said}"
+        );
+        assert!(!metres.has_unit_of(&feet));
+    }
 }

@@ -47,6 +47,8 @@ pub(super) struct Decoded {
     pub(super) place: Option<Place>,
     /// Size of a cell, where the file knows it.
     pub(super) cell: Option<CellSize>,
+    /// Its stored values are depths, which were turned into heights.
+    pub(super) are_depths: bool,
     /// Metres per vertical unit, where the file says so.
     pub(super) metres_per_vertical_unit: Option<f64>,
     /// Where that comes from.
@@ -93,6 +95,7 @@ impl Decoded {
             system_from: Certainty::Stated,
             place: None,
             cell: None,
+            are_depths: false,
             metres_per_vertical_unit: None,
             vertical_unit_from: Certainty::Stated,
             vertical_datum: None,
@@ -109,6 +112,14 @@ impl Decoded {
     pub(super) fn set_vertical(&mut self, system: Option<Vertical>, stated: Option<f64>) {
         self.metres_per_vertical_unit = stated.or(system.as_ref().map(|system| system.metres));
         if let Some(system) = system {
+            if let Some(stated) =
+                stated.filter(|stated| (stated / system.metres - 1.0).abs() > 1e-9)
+            {
+                self.remarks.push(format!(
+                    "unit of heights: the file states units of {stated} m, and {}, which counts in units of {} m; the former is taken (--vertical-unit)",
+                    system.name, system.metres
+                ));
+            }
             if stated.is_none() && system.code.is_some() {
                 self.vertical_unit_from = Certainty::FromCode;
             }
@@ -170,6 +181,10 @@ impl Decoded {
 
     /// Turns numbers that grow downwards into heights, and says so.
     pub(super) fn turn_depths_into_heights(&mut self, why: &str) {
+        // Several facts of a file may say that it has depths.
+        if std::mem::replace(&mut self.are_depths, true) {
+            return;
+        }
         self.scale = -self.scale;
         self.offset = -self.offset;
         self.remarks.push(format!(

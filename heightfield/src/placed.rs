@@ -95,10 +95,9 @@ impl Decoded {
     pub(super) fn lay_out(&mut self, map: GroundMap, unit: Option<GroundUnit>) {
         self.south_up = map.is_south_up();
         self.east_first = map.is_east_first();
-        let turned = turned(&map);
-        let new = turned
-            .into_iter()
-            .filter(|line| !self.remarks.contains(line));
+        let other_unit = self.system.as_ref().and_then(ReferenceSystem::other_unit);
+        let said = turned(&map).into_iter().chain(other_unit);
+        let new = said.filter(|line| !self.remarks.contains(line));
         self.remarks.extend(new.collect::<Vec<_>>());
         let unit = unit.or(self.system.as_ref().map(GroundUnit::of));
         let degrees = unit.map_or(1.0, |unit| unit.degrees);

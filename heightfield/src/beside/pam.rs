@@ -164,8 +164,8 @@ impl Decoded {
                     self.system = Some(system);
                 }
             }
-            if vertical.is_some() && self.metres_per_vertical_unit.is_none() {
-                self.set_vertical(vertical, None);
+            if vertical.is_some() && self.vertical_datum.is_none() {
+                self.set_vertical(vertical, self.metres_per_vertical_unit);
             }
         }
         let map = match place.map(ground_map) {
@@ -203,10 +203,11 @@ fn reference_system(text: &str) -> (Option<ReferenceSystem>, Option<crate::crs::
 }
 
 fn is_same(own: &ReferenceSystem, other: &ReferenceSystem) -> bool {
-    match (own.code(), other.code()) {
+    let is_same = match (own.code(), other.code()) {
         (Some(own), Some(other)) => own == other,
         _ => own == other || own.name() == other.name(),
-    }
+    };
+    is_same && own.has_unit_of(other)
 }
 
 /// Reads six numbers: x of the corner, x per column, x per row, and the same of y.

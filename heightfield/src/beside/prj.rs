@@ -25,8 +25,8 @@ pub(crate) fn reference_system(input: &FileBytes, decoded: &mut Decoded) -> Resu
         ));
     }
     decoded.system = system;
-    if vertical.is_some() && decoded.metres_per_vertical_unit.is_none() {
-        decoded.set_vertical(vertical, None);
+    if vertical.is_some() && decoded.vertical_datum.is_none() {
+        decoded.set_vertical(vertical, decoded.metres_per_vertical_unit);
     }
     Ok(())
 }

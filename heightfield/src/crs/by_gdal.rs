@@ -1,6 +1,7 @@
 //! Reference systems that nothing here knows, through libgdal's PROJ, where there is one.
 
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use heightfield_gdal::{AxisUnit, Library, Settings, SpatialReference};
 
@@ -25,8 +26,25 @@ pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
     described(&found).map(|system| system.with_code(code))
 }
 
+/// Texts that are remembered: tiles of one terrain have the same, and PROJ takes half a second to
+/// compare one with all of EPSG's systems.
+const MAX_REMEMBERED: usize = 16;
+static REMEMBERED: Mutex<Vec<(String, Option<ReferenceSystem>)>> = Mutex::new(Vec::new());
+
 /// The system of a text.
 pub(super) fn of_text(text: &str) -> Option<ReferenceSystem> {
+    let remembered = || REMEMBERED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, system)) = remembered().iter().find(|(known, _)| known == text) {
+        return system.clone();
+    }
+    let system = found_by_text(text);
+    let mut remembered = remembered();
+    remembered.truncate(MAX_REMEMBERED - 1);
+    remembered.insert(0, (text.to_owned(), system.clone()));
+    system
+}
+
+fn found_by_text(text: &str) -> Option<ReferenceSystem> {
     let found = library()?.reference_of_text(text).ok()?;
     let code = found.epsg.and_then(|code| u16::try_from(code).ok());
     let known = code.and_then(ReferenceSystem::from_code);

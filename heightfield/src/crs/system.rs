@@ -11,6 +11,9 @@ use crate::tangents::Tangents;
 /// outside of what the projection is for.
 const SENSIBLE: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
 
+/// Units that differ by less than this are one.
+const SAME_UNIT: f64 = 1e-9;
+
 /// How far from a place its scale is asked for, m: a projection's formulas end their
 /// rounds at 1e-10 rad, and its scale changes over kilometres.
 const STEP_M: f64 = 100.0;
@@ -61,6 +64,11 @@ impl ReferenceSystem {
 
     fn of_node(node: &Node, text: &str) -> Option<Self> {
         let by_code = node.epsg().and_then(Self::from_code);
+        // A unit that stands beside a code counts, as for GDAL.
+        let by_code = by_code.map(|system| match (node.is_projected(), node.unit()) {
+            (true, Some(metres)) => system.in_units_of(metres),
+            _ => system,
+        });
         by_code.or_else(|| by_gdal::of_text(text)).or_else(|| {
             let unit = node.unit_of_places().unwrap_or(Unit::Angle(1.0));
             Some(Self::new(node.name()?, unit, Datum::of(node.base(), None)))
@@ -99,11 +107,35 @@ impl ReferenceSystem {
 
     /// The same system, whose coordinates are in units of so many metres, whatever its own unit is.
     pub(crate) fn in_units_of(mut self, metres: f64) -> Self {
-        if let Unit::Length(own) = self.unit {
-            self.scale = metres / own.unwrap_or(metres);
+        if let Unit::Length(Some(own)) = self.unit
+            && (metres / own - 1.0).abs() > SAME_UNIT
+        {
+            self.scale *= metres / own;
             self.unit = Unit::Length(Some(metres));
         }
         self
+    }
+
+    /// The same system, whose coordinates are in units of so many degrees.
+    pub(crate) const fn in_degrees_of(mut self, degrees: f64) -> Self {
+        if let Unit::Angle(_) = self.unit {
+            self.unit = Unit::Angle(degrees);
+        }
+        self
+    }
+
+    /// What is said where coordinates are in another unit than the system's own.
+    pub(crate) fn other_unit(&self) -> Option<String> {
+        let Unit::Length(Some(metres)) = self.unit else {
+            return None;
+        };
+        let own = metres / self.scale;
+        (self.scale != 1.0).then(|| {
+            format!(
+                "{} counts in units of {own} m, and units of {metres} m are stated beside it: coordinates are taken to be in those that are stated",
+                self.name
+            )
+        })
     }
 
     /// Its datum, where it is known.
@@ -137,6 +169,15 @@ impl ReferenceSystem {
     /// The unit of its coordinates.
     pub(crate) const fn unit(&self) -> Unit {
         self.unit
+    }
+
+    /// Whether the coordinates of another system are in the same unit.
+    pub(crate) fn has_unit_of(&self, other: &Self) -> bool {
+        match (self.unit, other.unit) {
+            (Unit::Length(Some(own)), Unit::Length(Some(other)))
+            | (Unit::Angle(own), Unit::Angle(other)) => (own / other - 1.0).abs() < SAME_UNIT,
+            (own, other) => own == other,
+        }
     }
 
     /// What its longitudes and latitudes are.

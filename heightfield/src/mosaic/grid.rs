@@ -102,7 +102,10 @@ impl Grid {
         };
         let code = |decoded: &Decoded| decoded.system.as_ref().and_then(|system| system.code());
         let same = match (code(ours), code(theirs)) {
-            (Some(ours), Some(theirs)) => ours == theirs,
+            (Some(a), Some(b)) => {
+                let mut both = ours.system.iter().zip(&theirs.system);
+                a == b && both.all(|(ours, theirs)| ours.has_unit_of(theirs))
+            }
             _ => ours.system == theirs.system || same_places(ours, theirs),
         };
         if !same {

@@ -142,6 +142,7 @@ impl Index {
         let remarks = mosaic.remark_differences()?;
         let mut decoded = Decoded::new(format, size, mosaic);
         decoded.remarks = remarks;
+        decoded.remarks.extend(first.remarks.iter().cloned());
         decoded.file_layout = first.file_layout.clone();
         decoded.system = first.system.clone();
         decoded.system_from = first.system_from;

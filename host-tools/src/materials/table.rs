@@ -220,7 +220,7 @@ mod tests {
         file.as_file().set_len(1 << 40).expect("sparse");
         let why = TableFile::open(file.path()).expect_err("a terabyte");
         assert!(
-            why.to_string().contains("no more than 1048576 bytes"),
+            why.to_string().contains("larger than 1048576 bytes"),
             "{why}"
         );
     }

@@ -365,7 +365,7 @@ fn box_with_west_and_east_swapped_is_refused() {
     let raster = Raster::from_fn(4, 4, |column, row| (column + row) as f32).expect("raster");
     let ground = GroundTransform::new([-122.0, 46.0], [0.25, 0.0], [0.0, 0.25]);
     let raster = raster
-        .with_cell(cell((0.25, 0.25), CellUnit::Degree, 46.0))
+        .with_cell(cell((0.25, 0.25), CellUnit::Degree, 0.0))
         .with_ground(ground.expect("a plane"), Some(4326));
     for coordinates in [OWN, LONLAT] {
         for sides in [[-121.5, 46.1, -121.8, 46.4], [-121.5, 46.1, -122.0, 46.4]] {

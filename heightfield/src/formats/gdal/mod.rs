@@ -24,7 +24,7 @@ use crate::blocks::{BlockReader, Part};
 use crate::decoded::{Decoded, sides};
 use crate::encoding::no_codes;
 use crate::file_layout::FileLayout;
-use crate::geometry::metres_in;
+use crate::geometry::{metres_in, unknown_unit};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::{BadRaster, OpenOptions, ReferenceSystem};
@@ -274,7 +274,12 @@ fn decoded(
     let (system, vertical) = of_wkt.unwrap_or((None, None));
     let map = conventions.placed(map, system.as_ref());
     decoded.system = system;
-    decoded.set_vertical(vertical, unit.as_deref().and_then(metres_in));
+    let unit = unit.filter(|unit| !unit.is_empty());
+    let metres = unit.as_deref().map(metres_in);
+    decoded.set_vertical(vertical, metres.flatten());
+    if let (Some(unit), Some(None)) = (&unit, metres) {
+        decoded.remarks.push(unknown_unit(unit));
+    }
     conventions.describe(&mut decoded);
     if let Some([x, x_column, x_row, y, y_column, y_row]) = map
         && let Some(map) = GroundMap::new([x, x_column, x_row], [y, y_column, y_row])

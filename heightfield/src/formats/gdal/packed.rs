@@ -4,7 +4,7 @@ use std::io::{Read, copy, sink};
 use std::path::{Path, PathBuf};
 
 use flate2::read::MultiGzDecoder;
-use heightfield_gdal::Library;
+use heightfield_gdal::{Error, Library};
 
 use super::fault;
 use crate::format::Claim;
@@ -133,12 +133,14 @@ fn only(
     let mut rasters: Vec<String> = entries.iter().filter(is_likely).cloned().collect();
     if rasters.is_empty() {
         let tried = entries.iter().take(MAX_TRIED);
-        let opens = |name: &&String| {
-            library
-                .open_part(&full(name).display().to_string(), &[])
-                .is_ok()
-        };
-        rasters = tried.filter(opens).cloned().collect();
+        for name in tried {
+            match library.open_part(&full(name).display().to_string(), &[]) {
+                Ok(_) => rasters.push(name.clone()),
+                // Each of the others may take as long.
+                Err(error @ Error::Slow { .. }) => return Err(fault(error)),
+                Err(_) => {}
+            }
+        }
     }
     match rasters.len() {
         1 => Ok(rasters.remove(0)),

@@ -192,9 +192,20 @@ impl Item {
         let place = file.geo_transform();
         has_size
             && place.is_some_and(|found| {
-                let cell = stated[1].abs().max(stated[5].abs());
-                let is_near = |at: usize| (found[at] - stated[at]).abs() <= TOLERANCE * cell;
-                is_near(0) && is_near(3)
+                let cell = found[1].abs().max(found[5].abs());
+                let [columns, rows] = size.map(f64::from);
+                // The two far corners tell whether cells are as large as they are stated.
+                let corner = |of: [f64; 6], column: f64, row: f64| {
+                    [0, 3].map(|at| of[at] + of[at + 1] * column + of[at + 2] * row)
+                };
+                let is_near = |column: f64, row: f64| {
+                    let both = corner(found, column, row)
+                        .into_iter()
+                        .zip(corner(stated, column, row));
+                    both.into_iter()
+                        .all(|(a, b)| (a - b).abs() <= TOLERANCE * cell)
+                };
+                is_near(0.0, 0.0) && is_near(columns, 0.0) && is_near(0.0, rows)
             })
     }
 }

@@ -11,7 +11,7 @@ use tiff_reader::Ifd;
 
 use super::user_defined;
 use crate::Certainty;
-use crate::crs::{self, ReferenceSystem, Unit};
+use crate::crs::{self, ReferenceSystem};
 use crate::decoded::Decoded;
 use crate::file_layout::SamplesAre;
 use crate::ground_map::GroundMap;
@@ -32,14 +32,17 @@ const GEO_ASCII_PARAMS: u16 = 34737;
 pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>, file: Option<&Path>) {
     let keys = GeoKeys::read(image);
     let of_code = |key| keys.code(key);
-    let beside = || of_code(PROJECTED_CRS_TYPE).and_then(crs::vertical_beside);
+    let both = [PROJECTED_CRS_TYPE, GEODETIC_CRS_TYPE];
+    let beside = || {
+        let mut found = (both.iter()).filter_map(|key| crs::vertical_beside(of_code(*key)?));
+        found.next()
+    };
     let system = of_code(VERTICAL_CS_TYPE)
         .and_then(crs::vertical)
         .or_else(beside);
     let stated = stated.or_else(|| of_code(VERTICAL_UNITS).and_then(metres_of_code));
     decoded.set_vertical(system, stated);
     decoded.system = keys.system(file);
-    decoded.remarks.extend(keys.other_unit());
     decoded.file_layout.samples_are = keys.samples_are();
     if let Some(map) = ground_map(image, &keys) {
         decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
@@ -145,9 +148,12 @@ impl GeoKeys {
         };
         let known = code.and_then(ReferenceSystem::from_code);
         if let Some(system) = known.or_else(|| self.system_in_text()) {
-            return Some(match self.stated_metres() {
-                Some(metres) => system.in_units_of(metres),
-                None => system,
+            return Some(match (self.stated_metres(), self.stated_degrees()) {
+                (Some(metres), _) if self.is_projected() == Some(true) => {
+                    system.in_units_of(metres)
+                }
+                (_, Some(degrees)) => system.in_degrees_of(degrees),
+                _ => system,
             });
         }
         let is_projected = self.is_projected()?;
@@ -158,32 +164,6 @@ impl GeoKeys {
         let unknown = code.map(|code| format!("EPSG:{code}, not known here"));
         let name = unknown.as_deref().or(own_name).or(self.text(GT_CITATION));
         Some(user_defined::system(self, is_projected, name, file))
-    }
-
-    /// What is said where the code of the system has another unit than the keys: these count, as for
-    /// GDAL.
-    fn other_unit(&self) -> Option<String> {
-        let code = self.known(PROJECTED_CRS_TYPE)?;
-        let own = self.metres_of_system()?;
-        let stated = self
-            .stated_metres()
-            .filter(|_| self.is_projected() == Some(true))?;
-        ((stated / own - 1.0).abs() > 1e-9).then(|| {
-            format!(
-                "EPSG:{code} counts in units of {own} m, the file states units of {stated} m: its coordinates are taken to be in those that it states"
-            )
-        })
-    }
-
-    /// Metres in the unit of the projected system with the file's code.
-    fn metres_of_system(&self) -> Option<f64> {
-        let system = self
-            .known(PROJECTED_CRS_TYPE)
-            .and_then(ReferenceSystem::from_code)?;
-        match system.unit() {
-            Unit::Length(metres) => metres,
-            Unit::Angle(_) => None,
-        }
     }
 
     /// Projections that no keys are made for are written as Esri's text into the citation.
@@ -220,27 +200,31 @@ impl GeoKeys {
         }
     }
 
-    /// The unit of the ground coordinates.
+    /// The unit of the ground coordinates, where the keys state it: else the system's counts.
     fn unit(&self) -> Option<GroundUnit> {
-        if !self.is_projected()? {
-            return Some(GroundUnit::angle(self.degrees()));
+        match self.is_projected()? {
+            true => {
+                let metres = self.stated_metres();
+                metres.map(|metres| GroundUnit::length(metres, Certainty::Stated))
+            }
+            false => self.stated_degrees().map(GroundUnit::angle),
         }
-        Some(match (self.stated_metres(), self.metres_of_system()) {
-            (Some(metres), _) => GroundUnit::length(metres, Certainty::Stated),
-            (None, Some(metres)) => GroundUnit::length(metres, Certainty::FromCode),
-            (None, None) => GroundUnit::length(1.0, Certainty::Assumed),
-        })
     }
 
-    /// Degrees in the angular unit.
+    /// Degrees in the angular unit; one where nothing states it.
     pub(super) fn degrees(&self) -> f64 {
-        match self.code(GEOG_ANGULAR_UNITS) {
-            Some(9101) => 1.0_f64.to_degrees(),
-            Some(9103) => 1.0 / 60.0,
-            Some(9104) => 1.0 / 3600.0,
-            Some(9105 | 9106) => 0.9,
-            _ => 1.0,
-        }
+        self.stated_degrees().unwrap_or(1.0)
+    }
+
+    fn stated_degrees(&self) -> Option<f64> {
+        Some(match self.code(GEOG_ANGULAR_UNITS)? {
+            9101 => 1.0_f64.to_degrees(),
+            9102 | 9122 => 1.0,
+            9103 => 1.0 / 60.0,
+            9104 => 1.0 / 3600.0,
+            9105 | 9106 => 0.9,
+            _ => return None,
+        })
     }
 }
 
