@@ -105,6 +105,29 @@ silent! {
     GDALMDArrayRelease(*mut c_void) -> () = ();
     GDALDimensionGetType(*mut c_void) -> *const c_char = ptr::null();
     GDALReleaseDimensions(*mut *mut c_void, usize) -> () = ();
+    OSRNewSpatialReference(*const c_char) -> *mut c_void = ptr::null_mut();
+    OSRDestroySpatialReference(*mut c_void) -> () = ();
+    OSRImportFromWkt(*mut c_void, *mut *mut c_char) -> c_int = FAILED;
+    OSRImportFromEPSG(*mut c_void, c_int) -> c_int = FAILED;
+    OSRCloneGeogCS(*mut c_void) -> *mut c_void = ptr::null_mut();
+    OSRFindMatches(
+        *mut c_void, *const *const c_char, *mut c_int, *mut *mut c_int
+    ) -> *mut *mut c_void = ptr::null_mut();
+    OSRFreeSRSArray(*mut *mut c_void) -> () = ();
+    OSRExportToProj4(*mut c_void, *mut *mut c_char) -> c_int = FAILED;
+    OSRGetName(*mut c_void) -> *const c_char = ptr::null();
+    OSRGetAttrValue(*mut c_void, *const c_char, c_int) -> *const c_char = ptr::null();
+    OSRGetAuthorityName(*mut c_void, *const c_char) -> *const c_char = ptr::null();
+    OSRGetAuthorityCode(*mut c_void, *const c_char) -> *const c_char = ptr::null();
+    OSRIsGeographic(*mut c_void) -> c_int = 0;
+    OSRIsProjected(*mut c_void) -> c_int = 0;
+    OSRGetLinearUnits(*mut c_void, *mut *mut c_char) -> c_double = 1.0;
+    OSRGetAngularUnits(*mut c_void, *mut *mut c_char) -> c_double = 1.0;
+    OSRGetPrimeMeridian(*mut c_void, *mut *mut c_char) -> c_double = 0.0;
+    OSRGetSemiMajor(*mut c_void, *mut c_int) -> c_double = 0.0;
+    OSRGetInvFlattening(*mut c_void, *mut c_int) -> c_double = 0.0;
+    OSRGetTOWGS84(*mut c_void, *mut c_double, c_int) -> c_int = FAILED;
+    VSIFree(*mut c_void) -> () = ();
     GDALOpenEx(
         *const c_char, c_uint, *const *const c_char, *const *const c_char, *const *const c_char
     ) -> *mut c_void = handle();

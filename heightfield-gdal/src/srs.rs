@@ -22,6 +22,8 @@ pub struct SpatialReference {
     pub epsg: Option<u32>,
     /// EPSG's code of the geographic system that it stands on.
     pub base_epsg: Option<u32>,
+    /// Name of its projection's method, as `New_Zealand_Map_Grid`.
+    pub method: Option<String>,
     /// Name of its datum.
     pub datum: Option<String>,
     /// What its coordinates count.
@@ -134,7 +136,8 @@ impl<'l> Owned<'l> {
         Ok(SpatialReference {
             name: name.unwrap_or_default(),
             epsg: self.epsg(),
-            base_epsg: self.base().and_then(|base| base.epsg()),
+            base_epsg: (self.base().and_then(|base| base.epsg())).or_else(|| self.usual_base()),
+            method: self.attribute(c"PROJECTION"),
             datum: self.attribute(c"DATUM"),
             unit,
             proj: self.proj(),
@@ -177,16 +180,23 @@ impl<'l> Owned<'l> {
 
     /// EPSG's code, as it is stated, or that of the one system that it surely is.
     fn epsg(&self) -> Option<u32> {
-        self.stated().or_else(|| self.matching())
+        self.stated(ptr::null()).or_else(|| self.matching())
     }
 
-    fn stated(&self) -> Option<u32> {
+    /// The geographic system of the datum's code: in EPSG's oldest thousand, that less 2000.
+    fn usual_base(&self) -> Option<u32> {
+        let datum = self.stated(c"DATUM".as_ptr())?;
+        (6000..7000).contains(&datum).then(|| datum - 2000)
+    }
+
+    /// EPSG's code of a part, or of the system itself (null).
+    fn stated(&self, part: *const c_char) -> Option<u32> {
         let functions = &self.loaded.functions;
-        // SAFETY: null asks for the system itself; texts are copied.
+        // SAFETY: the part is null or a text that stays; texts are copied.
         let (authority, code) = unsafe {
             (
-                from_c((functions.OSRGetAuthorityName)(self.handle, ptr::null())),
-                from_c((functions.OSRGetAuthorityCode)(self.handle, ptr::null())),
+                from_c((functions.OSRGetAuthorityName)(self.handle, part)),
+                from_c((functions.OSRGetAuthorityCode)(self.handle, part)),
             )
         };
         authority.filter(|name| name == "EPSG")?;
@@ -211,7 +221,7 @@ impl<'l> Owned<'l> {
                 if *sureness.add(at) >= SURE {
                     let handle = *found.add(at);
                     let one = std::mem::ManuallyDrop::new(Owned { handle, ..*self });
-                    codes.extend(one.stated());
+                    codes.extend(one.stated(ptr::null()));
                 }
             }
         }

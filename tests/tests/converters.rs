@@ -236,7 +236,6 @@ fn what_is_no_height_field_becomes_one_by_the_hint() {
         ),
         ("-ot CFloat32", "complex.tif"),
         ("-ot CInt16", "integers.tif"),
-        ("-of ENVI -ot CFloat64", "envi.img"),
         ("-of EHdr -co NBITS=4 -a_nodata none", "four.bil"),
         ("-of PNG -co NBITS=4 -a_nodata none", "four.png"),
         (

@@ -253,7 +253,7 @@ fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
 fn a_projection_that_is_not_known_is_named_with_what_to_do() {
     for (file, name) in [
         ("new_zealand.tif", "New Zealand Map Grid"),
-        ("grinten.tif", "Van der Grinten"),
+        ("grinten.tif", "VanDerGrinten"),
     ] {
         let path = format!("{FOLDER}/{file}");
         let report = info(Path::new(&path));

@@ -10,7 +10,7 @@ use hapterra_core::terrain::{POSTS, TILE_CELLS, Tile, TileKey};
 use hapterra_core::wire::message::{Heights, TileMessage};
 use hapterra_firmware::link::fill_tile;
 use hapterra_tests::shared;
-use heightfield::{OpenOptions, Raster};
+use heightfield::{BadRaster, OpenOptions, Raster};
 
 /// Bytes of a tile's samples as floats.
 const FLOATS: usize = 4 * POSTS * POSTS;
@@ -24,7 +24,18 @@ fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
     let mut paths: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
     paths.sort();
     for path in paths {
-        let raster = Raster::open(&path, &OpenOptions::default()).expect("opens");
+        let raster = match Raster::open(&path, &OpenOptions::default()) {
+            Ok(raster) => raster,
+            // Archives of NumPy are not read, and some formats not without libgdal.
+            Err(error)
+                if path.extension().is_some_and(|end| end == "npz")
+                    || matches!(error.fault(), BadRaster::WantsGdal { .. }) =>
+            {
+                println!("skipped: {error}");
+                continue;
+            }
+            Err(error) => panic!("{error}"),
+        };
         let grid = FeltGrid::new(&raster, FeltCells::Square);
         let scale = grid.true_scale(1.0).expect("a scale");
         let mean = checked(&path, &grid, scale, 0);

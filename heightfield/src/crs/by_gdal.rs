@@ -67,9 +67,16 @@ fn described(found: &SpatialReference) -> Option<ReferenceSystem> {
     let shift = own.or_else(|| base.and_then(Shift::of_code));
     let datum = found.datum.clone().unwrap_or_default();
     let datum = Datum::new(datum, globe, found.meridian, shift);
-    let system = ReferenceSystem::new(&found.name, unit, Some(datum));
-    Some(match &found.proj {
-        Some(projection) => system.with_projection(projection),
-        None => system,
-    })
+    let named = |name: &str| ReferenceSystem::new(name, unit, Some(datum.clone()));
+    let system = match &found.proj {
+        Some(projection) => named(&found.name).with_projection(projection),
+        None => named(&found.name),
+    };
+    // "unknown" tells nobody why it cannot be placed; the method does.
+    match &found.method {
+        Some(method) if !system.has_lonlat() && found.name == "unknown" => {
+            Some(named(&method.replace('_', " ")))
+        }
+        _ => Some(system),
+    }
 }

@@ -33,7 +33,7 @@ fn a_mark_has_its_tick_its_time_and_the_hosts_clock() {
     let told = run(&folder, "felt.csv");
     let [began, ended] = ["commands", "felt.csv"].map(|name| changed_at_unix_s(&folder.path(name)));
     assert!(
-        told.contains("line 4 of the commands: `at 4 mark \u{FFFD}[31m`"),
+        told.contains(r"line 4 of the commands: `at 4 mark \u{1b}[31m`"),
         "{told}"
     );
     assert!(

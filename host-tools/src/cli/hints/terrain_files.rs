@@ -111,7 +111,17 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
             let (width, height) = (columns.min(&20_000), rows.min(&20_000));
             return cut(path, (*width, *height));
         }
-        BadRaster::DecoderFailed(_) | BadRaster::Unfamiliar(_) => {
+        BadRaster::DecoderFailed(_) => {
+            return format!("get the file again; or {}", converted(path, ""));
+        }
+        BadRaster::Unfamiliar(_) if is_known_to_gdal(path) => {
+            return format!(
+                "see whether GDAL reads it whole: gdalinfo -checksum {}; or {}",
+                names(path).0,
+                converted(path, "")
+            );
+        }
+        BadRaster::Unfamiliar(_) => {
             return format!("get the file again; or {}", converted(path, ""));
         }
         BadRaster::Unreadable(_) => "check the path and that you may read the file",
