@@ -319,7 +319,8 @@ fn another_tour_of_a_large_file_is_planned_without_reading_it() {
     let plan = || {
         let raster = open(&bed.file, &bed.cache);
         let before = raster.blocks_read();
-        let scale = Scale::new(0.1, 0.1).expect("a scale");
+        // Ten samples from one planned place to the next: coarse ones serve.
+        let scale = Scale::new(0.05, 0.05).expect("a scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
         let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("in reach");
         (placed.home_mm(), raster.blocks_read() - before)
@@ -332,7 +333,7 @@ fn another_tour_of_a_large_file_is_planned_without_reading_it() {
     // Only what lies under the home position is read again: fine, as it is felt.
     let (same, again) = plan();
     assert_eq!(same, home);
-    assert!(again <= 4 && again < read, "{again} of {read}");
+    assert!(again <= 1 && again < read, "{again} of {read}");
 }
 
 /// Blocks that a run at a coarse level reads, as it says with `-vv`.
