@@ -206,7 +206,7 @@ fn classic(
     let singles: Vec<u8> = (1..=12_u8)
         .flat_map(|value| f32::from(value).to_be_bytes())
         .collect();
-    let mut variables: Vec<(&str, Vec<u32>, Vec<Attribute<'_>>, u32, Vec<u8>)> = vec![
+    let mut variables: Vec<Variable<'_>> = vec![
         (y.0, vec![0], y.1, 6, doubles(&[50.0, 25.0, 0.0])),
         (x.0, vec![1], x.1, 6, doubles(&[0.0, 25.0, 50.0, 75.0])),
         ("crs", vec![], mapping.to_vec(), 4, vec![0; 4]),
@@ -238,6 +238,9 @@ fn classic(
     }
     file
 }
+
+/// Name, dimensions, attributes, type and data.
+type Variable<'a> = (&'a str, Vec<u32>, Vec<Attribute<'a>>, u32, Vec<u8>);
 
 /// The polar stereographic map of WGS 84, in metres.
 const POLAR: [Attribute<'_>; 1] = [(
