@@ -4,7 +4,7 @@
 use anyhow::{Context, Result, bail};
 
 use crate::nightly;
-use crate::run::{cargo, on_path, output, root, run, target_dir, timed};
+use crate::run::{on_path, output, root, run, target_dir, timed};
 
 /// The programs in `fuzz/fuzz_targets`.
 const TARGETS: [&str; 5] = ["terrain", "text", "tick", "tile", "wire"];
@@ -42,13 +42,6 @@ pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
                 .env("CARGO_TARGET_DIR", target_dir()),
         )
     })
-}
-
-/// Compiles the targets, without a sanitizer and so by any compiler: what they call is still there.
-pub(crate) fn check() -> Result<()> {
-    let mut check = cargo();
-    check.args(["check", "--locked", "--manifest-path", "fuzz/Cargo.toml"]);
-    run(&mut check)
 }
 
 fn seconds(minutes: &str) -> Result<u64> {

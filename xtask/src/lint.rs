@@ -5,7 +5,6 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::board::{BOARDS, EMULATED};
-use crate::fuzz;
 use crate::image::{COUNTS, package_words};
 use crate::run::{cargo, run, say, timed};
 use crate::setup::{emulator, toolchain};
@@ -49,7 +48,6 @@ pub(crate) fn lint() -> Result<()> {
         Ok(()) => timed("clippy for the browser's kernel", || run(&mut wasm()))?,
         Err(why) => say(format!("SKIPPED: clippy for the browser's kernel: {why:#}")),
     }
-    timed("checking the fuzz targets", fuzz::check)?;
     timed("documentation", || {
         let mut command = cargo();
         command

@@ -15,7 +15,7 @@
 //!   arming.
 //! - Transports are [`Tcp`], [`Usb`], and [`Native`], a device in this
 //!   program's memory; [`DeviceAddress`] is how a user names one.
-//! - [`shown`] is what of a device's own words a terminal may show.
+//! - [`heightfield::shown`] is what of a device's own words a terminal may show.
 //! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual
 //!   Phantom at its second line.
 
