@@ -118,10 +118,10 @@ impl Server {
         self.fail_at("", fault, count);
     }
 
-    /// All answers redirect to a URL.
+    /// All answers about a TIFF redirect to a URL.
     pub fn redirect(&self, to: &str) {
         self.shared.state().redirect = to.to_owned();
-        self.fail(Fault::Redirect, usize::MAX);
+        self.fail_at(".tif", Fault::Redirect, usize::MAX);
     }
 
     /// Names of the headers of all requests so far, in small letters.
