@@ -183,14 +183,20 @@ fn a_vrt_and_its_files_may_be_elsewhere() {
         )
     };
     write("there.vrt", vrt("west.tif", 1).as_bytes()).expect("written");
+    let raster = open(server.url("there.vrt"));
+    for (column, row) in [(0, 0), (799, 599), (800, 3), (1599, 300)] {
+        let expected = f64::from(height(column, 599 - row));
+        assert_eq!(raster.height(column, row), expected, "{column} {row}");
+    }
+    // From here to elsewhere is another matter.
     let here = folder.path().join("here.vrt");
     std::fs::write(&here, vrt(&server.url("west.tif"), 0)).expect("written");
-    for raster in [open(server.url("there.vrt")), open(here)] {
-        for (column, row) in [(0, 0), (799, 599), (800, 3), (1599, 300)] {
-            let expected = f64::from(height(column, 599 - row));
-            assert_eq!(raster.height(column, row), expected, "{column} {row}");
-        }
-    }
+    let refused = Raster::open(&here, &OpenOptions::default()).expect_err("an address");
+    let refused = refused.to_string();
+    assert!(
+        refused.contains(&server.url("")) && refused.contains("open its URL"),
+        "{refused}"
+    );
 }
 
 #[test]
