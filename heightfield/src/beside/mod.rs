@@ -39,11 +39,16 @@ pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     std::iter::once(path.to_owned()).chain(there).collect()
 }
 
-/// Names of the files beside the one at a URL that belong to it.
+/// Names of the files beside the one at a URL that belong to it. A TIFF of many that a VRT names is
+/// asked for three of them only.
 pub(super) fn names_at_url(input: &FileBytes, url: &str) -> Result<Vec<String>, BadRaster> {
-    look_for(input, NEIGHBOURS.into_iter());
+    let ends = match input.extension() {
+        "tif" | "tiff" => &["msk", "ovr", "aux.xml"][..],
+        _ => &NEIGHBOURS[..],
+    };
+    look_for(input, ends.iter().copied());
     let mut names = Vec::new();
-    for beside in NEIGHBOURS.iter().flat_map(|end| neighbour(url, end)) {
+    for beside in ends.iter().flat_map(|end| neighbour(url, end)) {
         let found = elsewhere(url, &[beside], input)?;
         names.extend(found.map(|found| found.name().to_owned()));
     }
