@@ -84,7 +84,10 @@ unsafe extern "C" fn open(
         if access.contains(['w', 'a', '+']) {
             return None;
         }
-        let file = mounted.open(&name)?;
+        let Some(file) = mounted.open(&name) else {
+            say_missing();
+            return None;
+        };
         Some(Box::into_raw(Box::new(OpenFile {
             mounted,
             file,
@@ -93,6 +96,20 @@ unsafe extern "C" fn open(
         })))
     })
     .cast()
+}
+
+/// Sets the number by which GDAL puts into words why a file was not opened.
+fn say_missing() {
+    // SAFETY: the pointer is to this thread's own number.
+    #[cfg(target_os = "linux")]
+    unsafe {
+        *libc::__errno_location() = libc::ENOENT;
+    }
+    // SAFETY: the same.
+    #[cfg(target_os = "macos")]
+    unsafe {
+        *libc::__error() = libc::ENOENT;
+    }
 }
 
 unsafe extern "C" fn stat(_: *mut c_void, name: *const c_char, stat: *mut Stat, _: c_int) -> c_int {

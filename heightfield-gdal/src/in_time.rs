@@ -70,8 +70,7 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
         let waited = files
             .as_ref()
             .map_or(Duration::ZERO, |files| files.waited());
-        let within = OPEN_WITHIN + waited.min(WAIT_WITHIN);
-        let left = within.saturating_sub(begun.elapsed());
+        let left = left(begun.elapsed(), waited);
         match opened.recv_timeout(left.max(LOOK)) {
             Ok(opened) => return opened,
             Err(RecvTimeoutError::Timeout) if !left.is_zero() => {}
@@ -80,4 +79,23 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
     }
     STUCK.fetch_add(1, Ordering::AcqRel);
     Err(slow())
+}
+
+/// The time that is left to open a file, of which some was waiting for its caller.
+fn left(elapsed: Duration, waited: Duration) -> Duration {
+    (OPEN_WITHIN + waited.min(WAIT_WITHIN)).saturating_sub(elapsed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waiting_for_a_server_is_not_counted_but_it_ends() {
+        let [zero, second] = [0, 1].map(Duration::from_secs);
+        assert_eq!(left(zero, zero), OPEN_WITHIN);
+        assert_eq!(left(OPEN_WITHIN, zero), zero);
+        assert_eq!(left(60 * second, 58 * second), OPEN_WITHIN - 2 * second);
+        assert_eq!(left(OPEN_WITHIN + WAIT_WITHIN, 2 * WAIT_WITHIN), zero);
+    }
 }

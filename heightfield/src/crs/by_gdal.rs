@@ -1,6 +1,5 @@
 //! Reference systems that nothing here knows, through libgdal's PROJ, where there is one.
 
-use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use heightfield_gdal::{AxisUnit, SpatialReference};
@@ -10,12 +9,6 @@ use super::shift::Shift;
 use super::system::{ReferenceSystem, Unit};
 use crate::gdal;
 use crate::globe::Globe;
-
-/// The system that the keys of a GeoTIFF spell out.
-pub(crate) fn of_file(path: &Path) -> Option<ReferenceSystem> {
-    let dataset = gdal().ok()?.open(path, &[]).ok()?;
-    ReferenceSystem::from_wkt(&dataset.wkt()?).0
-}
 
 /// The system with a code of EPSG's.
 pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {

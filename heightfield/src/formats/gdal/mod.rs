@@ -58,7 +58,7 @@ pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadR
         Some(format) => BadRaster::WantsGdal { format, why },
         None => BadRaster::UnknownFormat,
     })?;
-    let place = Arc::new(Place::of(&library, path, &head, options)?);
+    let place = Arc::new(Place::of(&library, path, &head, &options.elsewhere)?);
     let decoded = match packed::Packing::of(&head) {
         Some(packing) => of_archive(packing, &library, &place, &head, options),
         None => opened(&library, &place, &place.path, &head, options),
@@ -93,6 +93,14 @@ pub(crate) fn files_read_with(path: &Path) -> Vec<PathBuf> {
         }
         _ => Vec::new(),
     }
+}
+
+/// The reference system that GDAL finds in a file.
+pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
+    let library = gdal().ok()?;
+    let place = Place::of(&library, input.path()?, &[], input.elsewhere()).ok()?;
+    let dataset = library.open(&place.path, &[]).ok()?;
+    ReferenceSystem::from_wkt(&dataset.wkt()?).0
 }
 
 /// The first bytes; none of a folder.

@@ -7,8 +7,8 @@ use tempfile::TempDir;
 
 use super::at_url::{self, Served, fetched, is_fetched};
 use super::fault;
-use crate::remote::is_url;
-use crate::{BadRaster, OpenOptions};
+use crate::BadRaster;
+use crate::remote::{Elsewhere, is_url};
 
 /// A file here or at a URL.
 pub(super) struct Place {
@@ -27,7 +27,7 @@ impl Place {
         library: &Library,
         source: &Path,
         head: &[u8],
-        options: &OpenOptions,
+        elsewhere: &Elsewhere,
     ) -> Result<Self, BadRaster> {
         let here = Self {
             library: library.clone(),
@@ -40,14 +40,14 @@ impl Place {
             return Ok(here);
         };
         if is_fetched(head) {
-            let (folder, name) = fetched(url, &options.elsewhere)?;
+            let (folder, name) = fetched(url, elsewhere)?;
             return Ok(Self {
                 path: folder.path().join(name),
                 _fetched: Some(folder),
                 ..here
             });
         }
-        let (served, name) = Served::of(url, &options.elsewhere);
+        let (served, name) = Served::of(url, elsewhere);
         let mount = library.mount(Box::new(served.clone())).map_err(fault)?;
         Ok(Self {
             path: mount.path(&name).into(),
