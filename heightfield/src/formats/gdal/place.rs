@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use super::at_url::{self, Served, fetched, is_fetched};
 use super::fault;
 use crate::BadRaster;
-use crate::remote::{Elsewhere, is_url};
+use crate::remote::{Elsewhere, is_url, without_key};
 
 /// A file here or at a URL.
 pub(super) struct Place {
@@ -71,6 +71,10 @@ impl Place {
             (BadRaster::ByGdal(Error::Refused(words)), Some(folder)) => {
                 let words = words.replace(&format!("{folder}/"), "");
                 BadRaster::ByGdal(Error::Refused(words))
+            }
+            (BadRaster::ByGdal(Error::Slow { seconds, .. }), _) => {
+                let path = without_key(&self.source).into();
+                BadRaster::ByGdal(Error::Slow { path, seconds })
             }
             (refusal, _) => refusal,
         }
