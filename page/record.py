@@ -5,8 +5,8 @@
     pip install pillow
     python3 page/record.py target/page docs/touch.gif
 
-The page runs as it is. Only its clock is the script's, so that every frame is drawn however slow the
-machine is, and the same source makes the same picture. A scripted mouse moves the hand.
+The page runs as it is, and a scripted mouse moves the hand. Only the clock is replaced: a frame of 50 ms
+follows when the one before is drawn, so a slow machine drops none. It needs Linux or macOS.
 """
 
 import base64
@@ -34,7 +34,7 @@ WIDTH = 640
 COLOURS = 200
 # Colours of HIP, proxy and force in `style.css`, which few pixels have.
 ACCENTS = ["#48a8ff", "#ff8a2b", "#ffd84a"]
-# The page asks for its next frame; the script calls it at its own time.
+# Keeps the page's request for a frame until the script draws it.
 CLOCK = """
 globalThis.requestAnimationFrame = (draw) => { globalThis.nextFrame = draw; return 0; };
 globalThis.drawAt = (ms) => { const draw = globalThis.nextFrame; draw(ms); };
