@@ -22,11 +22,13 @@ pub mod info;
 pub mod list;
 mod log;
 mod met_device;
+mod old_options;
 pub mod options;
 pub mod replay;
 mod report;
 pub mod run;
 mod session_summary;
+mod settings;
 mod sparing;
 pub mod stability;
 pub mod status;
@@ -39,16 +41,17 @@ use std::ffi::OsString;
 use std::io::Write as _;
 use std::process::ExitCode;
 
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory as _, Parser, Subcommand};
 
 pub use failure::Failure;
+use settings::Completed;
 use terminal::voice;
 
 /// Touch terrain of any size through a Phantom.
 #[derive(Debug, Parser)]
 #[command(name = "hapterra", version, propagate_version = true)]
 pub struct Cli {
-    /// Say more: -v for progress, -vv for details, -vvv for everything
+    /// Say more: -v progress, -vv details, -vvv everything
     #[arg(short, long, action = ArgAction::Count, global = true)]
     pub verbose: u8,
 
@@ -98,6 +101,13 @@ pub fn main() -> ExitCode {
     ExitCode::from(command_line(&[own], words))
 }
 
+/// The first word that is a command's name.
+fn command_in(words: &[OsString]) -> Option<&str> {
+    let command = Cli::command();
+    let mut words = words.iter().skip(1).filter_map(|word| word.to_str());
+    words.find(|word| command.find_subcommand(word).is_some())
+}
+
 /// Runs the command with these arguments and returns its exit code, as [`main`] does. `program` is
 /// what starts it again, with the same arguments: a program and the words before the arguments.
 ///
@@ -105,12 +115,23 @@ pub fn main() -> ExitCode {
 pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let words = ["hapterra".into()].into_iter().chain(arguments.clone());
-    let cli = match Cli::try_parse_from(words) {
+    let Completed { words, line } = match settings::complete(words.collect()) {
+        Ok(completed) => completed,
+        Err(failure) => {
+            failure.report();
+            return 1;
+        }
+    };
+    let cli = match Cli::try_parse_from(&words) {
         Ok(cli) => cli,
         Err(error) => {
             match error.use_stderr() {
                 // It repeats what was typed, which need not be of the user's making.
-                true => voice::put(std::io::stderr(), &error.render().to_string()),
+                true => {
+                    let line = old_options::explained(command_in(&words), &error);
+                    let text = error.render().to_string() + &line.unwrap_or_default();
+                    voice::put(std::io::stderr(), &text);
+                }
                 // A reader who goes away has seen enough of the help.
                 false => _ = error.print(),
             }
@@ -120,6 +141,9 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
     let may_arm = matches!(cli.command, Command::Run(_) | Command::Bringup(_));
     if may_arm && let Some(code) = guardian::watch(program, &arguments) {
         return code;
+    }
+    if let Some(line) = line {
+        eprintln!("{line}");
     }
     let log = log::to_stderr(cli.verbose);
     let outcome = match cli.command {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::ValueHint;
 
 use super::failure::Failure;
-use super::options::terrain_file::parse_size;
+use super::options::input::parse_size;
 use super::terminal::{interrupt, left_behind, progress};
 use crate::synth::{Grid, Kind, Synth, write};
 

@@ -12,7 +12,7 @@
 //! and has not reported all devices as disarmed, the guardian connects to each of them and
 //! closes it until the board confirms. It puts the terminal back, and names the recording.
 //! If the guardian is killed, the worker ends as after Ctrl-C. Only if both are killed at
-//! once does the board have to disarm by itself, after `--silence-s`.
+//! once does the board have to disarm by itself, after `--silence`.
 //!
 //! Both are in the terminal's foreground, so Ctrl-C in a terminal reaches both. A signal
 //! that reaches the worker only asks for an end. The guardian counts: it passes each one
