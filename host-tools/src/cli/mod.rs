@@ -2,16 +2,17 @@
 //! and a `run`.
 //!
 //! - [`options`]: what several subcommands let their user say;
-//! - `terminal`: progress, Ctrl-C, and prompts while a command runs;
+//! - [`terminal`]: progress, Ctrl-C, and prompts while a command runs;
 //! - [`failure`] and `hints`: what an error looks like, and what to do about it;
 //! - `guardian`: the process that outlives one whose arm may be armed;
-//! - `report`: what a command exists to print;
+//! - [`report`]: what a command exists to print;
+//! - `moved`: what earlier versions had, and what to type now;
 //! - `log` and `sparing`: diagnostics, and lines that a device can cause kept to so many
 //!   a second.
 
-pub mod bench;
 pub mod bringup;
 pub mod calibrate;
+pub mod completions;
 pub mod cut;
 pub mod demo;
 pub mod failure;
@@ -21,17 +22,17 @@ mod hints;
 pub mod info;
 pub mod list;
 mod log;
+pub mod man;
 mod met_device;
+mod moved;
 pub mod options;
 pub mod replay;
-mod report;
+pub mod report;
 pub mod run;
 mod session_summary;
 mod sparing;
-pub mod stability;
 pub mod status;
-pub mod synth;
-mod terminal;
+pub mod terminal;
 pub mod view;
 pub mod viewing;
 
@@ -41,7 +42,7 @@ use std::process::ExitCode;
 
 use clap::{ArgAction, Parser, Subcommand};
 
-pub use failure::Failure;
+pub use failure::{Failure, OrHint};
 use terminal::voice;
 
 /// Touch terrain of any size through a Phantom.
@@ -62,8 +63,6 @@ pub struct Cli {
 pub enum Command {
     /// Show what a terrain file holds and how it would be streamed
     Info(info::Args),
-    /// Make a terrain file by formula
-    Synth(synth::Args),
     /// Write a terrain's heights for the page that touches it in a browser
     Cut(cut::Args),
     /// Serve a terrain to a device and watch what is felt
@@ -84,10 +83,10 @@ pub enum Command {
     Calibrate(calibrate::Args),
     /// Write an image to a board, through its debug probe or over USB
     Flash(flash::Args),
-    /// Try on a virtual arm how stiff a surface may be before the hand feels the ticks
-    Stability(stability::Args),
-    /// Measure run time against error, beside other ways to render a height field
-    Bench(bench::Args),
+    /// Print the completions of a shell
+    Completions(completions::Args),
+    /// Write the manual pages
+    Man(man::Args),
 }
 
 /// Runs the command with the arguments of this process: 0 on success, 1 on failure, 2 on wrong usage.
@@ -104,27 +103,16 @@ pub fn main() -> ExitCode {
 /// It listens to signals and starts the log of this process: one call a process.
 pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let words = ["hapterra".into()].into_iter().chain(arguments.clone());
-    let cli = match Cli::try_parse_from(words) {
+    let cli: Cli = match parse(arguments.clone()) {
         Ok(cli) => cli,
-        Err(error) => {
-            match error.use_stderr() {
-                // It repeats what was typed, which need not be of the user's making.
-                true => voice::put(std::io::stderr(), &error.render().to_string()),
-                // A reader who goes away has seen enough of the help.
-                false => _ = error.print(),
-            }
-            return u8::try_from(error.exit_code()).unwrap_or(2);
-        }
+        Err(code) => return code,
     };
     let may_arm = matches!(cli.command, Command::Run(_) | Command::Bringup(_));
     if may_arm && let Some(code) = guardian::watch(program, &arguments) {
         return code;
     }
-    let log = log::to_stderr(cli.verbose);
-    let outcome = match cli.command {
+    finish(cli.verbose, || match cli.command {
         Command::Info(args) => info::run(&args),
-        Command::Synth(args) => synth::run(&args),
         Command::Cut(args) => cut::run(&args),
         Command::Run(args) => run::run(&args.pinned()),
         Command::Demo(args) => demo::run(&args),
@@ -135,9 +123,38 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
         Command::Bringup(args) => bringup::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Flash(args) => flash::run(&args),
-        Command::Stability(args) => stability::run(&args),
-        Command::Bench(args) => bench::run(&args),
-    };
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
+    })
+}
+
+/// Parses the words behind a program's name. Where they are wrong, or ask for help, it prints that and
+/// returns the exit code.
+///
+/// # Errors
+/// The exit code.
+pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
+    let name = P::command().get_name().to_owned().into();
+    let words = [name].into_iter().chain(arguments);
+    P::try_parse_from(words).map_err(|error| {
+        match error.use_stderr() {
+            // It repeats what was typed, which need not be of the user's making.
+            true => {
+                let moved = moved::hint(&error).unwrap_or_default();
+                voice::put(std::io::stderr(), &format!("{}{moved}", error.render()));
+            }
+            // A reader who goes away has seen enough of the help.
+            false => _ = error.print(),
+        }
+        u8::try_from(error.exit_code()).unwrap_or(2)
+    })
+}
+
+/// Runs a command with the log of this process and returns its exit code. It listens to signals: one
+/// call a process.
+pub fn finish(verbose: u8, command: impl FnOnce() -> Result<(), Failure>) -> u8 {
+    let log = log::to_stderr(verbose);
+    let outcome = command();
     log.end();
     voice::finish();
     // A process that is not this crate's own program does not do so at its end.

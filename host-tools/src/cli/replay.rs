@@ -23,7 +23,7 @@ use crate::replay::{
     Mark, Pace, Record, ReplayError, Replayer, Rule, Settings, Summary, Ticks, Trajectory,
     on_native_at, replay_trajectory,
 };
-use crate::stability::limits;
+use crate::stability;
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
 
@@ -84,6 +84,14 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the terrain, the trajectory, the device or the output.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    run_by(args, None)
+}
+
+/// Replays the trajectory by a contact rule; without one by the recording's, else as devices do.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     let mut inputs = args.terrain.inputs();
     inputs.push(args.trajectory.clone());
     inputs.extend(args.rendering.materials.inputs());
@@ -96,7 +104,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .filter(|_| !args.ignore_settings)
         .cloned();
     let recorded_at = recorded.as_ref().map(rate_of).transpose()?;
-    let rendering = rendering(args, recorded.as_ref())?;
+    let rendering = rendering(args, rule, recorded.as_ref())?;
     let raster = args.terrain.open()?;
     let measured_at = recorded.as_ref().and_then(|it| it.felt.measured_at);
     let name = args.terrain.name();
@@ -227,9 +235,17 @@ impl<'t> Felt<'t> {
 }
 
 /// How it feels: as stated, else as recorded, else as usual.
-fn rendering(args: &Args, recorded: Option<&Settings>) -> Result<Rendering, Failure> {
+fn rendering(
+    args: &Args,
+    rule: Option<Rule>,
+    recorded: Option<&Settings>,
+) -> Result<Rendering, Failure> {
+    let stated = Rendering {
+        contact: rule,
+        ..args.rendering.clone()
+    };
     let Some(recorded) = recorded else {
-        return Ok(args.rendering.clone());
+        return Ok(stated);
     };
     let other_table = args.rendering.materials.material_table.is_some();
     if let (Some(option), Some(_), false) = (
@@ -242,7 +258,7 @@ fn rendering(args: &Args, recorded: Option<&Settings>) -> Result<Rendering, Fail
         ))
         .or_hint("leave it out, or name a table that states it with --material-table");
     }
-    let (rendering, told) = args.rendering.or_recorded(recorded);
+    let (rendering, told) = stated.or_recorded(recorded);
     if let (Some(line), false) = (told.first(), recorded.views.is_empty()) {
         let views = 1 + recorded.views.len();
         return Err(format!(
@@ -336,7 +352,7 @@ fn replay<'t>(
     interrupt::listen();
     let materials = felt.terrain.grid().materials();
     let table = materials.map(Materials::table);
-    limits::warn_of(&felt.law.0, table, replayer.device());
+    stability::warn_of(&felt.law.0, table, replayer.device());
     let device = Device::of(replayer.device());
     let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
     settings.views.clone_from(&felt.views);

@@ -96,8 +96,8 @@ pub struct Rendering {
     #[command(flatten)]
     pub materials: SurfaceMaterials,
 
-    /// Contact rule [default: swept]
-    #[arg(long, value_enum)]
+    /// Contact rule where it is not that of devices: `hapterra-lab replay` states it.
+    #[arg(skip)]
     pub contact: Option<Rule>,
 }
 
@@ -315,7 +315,7 @@ impl Rendering {
             Rule::Swept => Ok(()),
             Rule::Paper => {
                 Err("--contact paper: no device has the paper's contact rule".to_owned()).or_hint(
-                    "leave it out, or render a trajectory: hapterra replay --contact paper",
+                    "leave it out, or render a trajectory: hapterra-lab replay --contact paper",
                 )
             }
         }
