@@ -28,6 +28,7 @@ pub mod served;
 pub mod slow_line;
 pub mod soak;
 pub mod stand_in;
+mod terrain_file;
 pub mod tiffs;
 pub mod timeouts;
 pub mod usb;
@@ -36,6 +37,8 @@ pub mod walk;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
+
+pub use terrain_file::terrain_file;
 
 /// The program of the Rust tutorial, run.
 #[cfg(doctest)]

@@ -10,8 +10,10 @@ use std::time::Duration;
 
 use crate::hapterra_binary;
 use crate::link_campaign::wire::said_by_host;
+use crate::terrain_file;
 use crate::timeouts::{HANG, wait_until};
 use hapterra::link::{Dialogue, Native, Tcp, Transport};
+use hapterra::synth::Kind;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::session::SessionEnd;
@@ -167,11 +169,7 @@ fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
 pub fn terrain(folder: &Path) -> String {
     let file = folder.join("hills.tif");
     let path = file.to_str().expect("a plain path").to_owned();
-    let made = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "-o", &path, "--size", "64"])
-        .output()
-        .expect("it runs");
-    assert!(made.status.success());
+    terrain_file(&file, Kind::Fractal, 64, 1);
     path
 }
 

@@ -1,7 +1,6 @@
 //! The commands around a device as a newcomer meets them: with nothing plugged
 //! in, and with wrong words.
 
-use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use hapterra_tests::hapterra_binary;
@@ -46,30 +45,18 @@ fn list_says_what_it_looked_for() {
     }
 }
 
-/// Whoever asks what a command does is told, and where its program is to be had where that
-/// is missing.
 #[test]
-fn bench_tells_what_it_does_where_its_program_is_missing() {
-    let program = hapterra_binary();
-    let folder = program.parent().expect("a folder");
-    let folder = tempfile::tempdir_in(folder).expect("a folder");
-    let alone = folder.path().join("hapterra");
-    // A link, not a copy: a program that was just written may not be started while another
-    // test's child holds the file open ("Text file busy").
-    std::fs::hard_link(program, &alone).expect("linked");
-    let run = |words: &[&str]| {
-        let mut command = Command::new(&alone);
-        // Under cargo the program is built.
-        let output = command.args(words).env_remove("CARGO").output();
-        output.expect("it runs")
-    };
-    let help = run(&["bench", "--help"]);
-    assert!(help.status.success(), "{}", told(&help));
-    assert!(told(&help).contains("hapterra-bench"), "{}", told(&help));
-    let missing = run(&["bench", "hills.tif"]);
-    assert_eq!(missing.status.code(), Some(1));
-    for part in ["is not beside this program", "hint: install it"] {
-        assert!(told(&missing).contains(part), "{}", told(&missing));
+fn moved_subcommand_is_named_with_its_new_program() {
+    for (word, new) in [
+        ("bench", "contact"),
+        ("stability", "stability"),
+        ("synth", "synth"),
+    ] {
+        fails(
+            &[word, "--help"],
+            2,
+            &[&format!("hint: hapterra {word} is now hapterra-lab {new}")],
+        );
     }
 }
 
@@ -200,25 +187,4 @@ fn wrong_words_are_answered_with_what_to_do() {
         1,
         &["/no/such", "hint:"],
     );
-}
-
-#[test]
-fn a_terrain_that_no_disk_holds_is_refused_before_it_is_written() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("huge.tif");
-    let path = file.to_str().expect("a plain path");
-    fails(
-        &[
-            "synth",
-            "plane",
-            "-o",
-            path,
-            "--size",
-            "4000000000x4000000000",
-        ],
-        1,
-        &["GB are free", "hint:"],
-    );
-    assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 0);
-    assert!(!Path::new(path).exists());
 }

@@ -6,20 +6,16 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
-use hapterra_tests::hapterra_binary;
+use hapterra::synth::Kind;
 use hapterra_tests::timeouts::wait_for;
+use hapterra_tests::{hapterra_binary, terrain_file};
 
 /// Points that fill the recording's buffer more than once.
 const POINTS: usize = 4_000;
 
 fn terrain(folder: &Path) -> PathBuf {
     let path = folder.join("terrain.tif");
-    let made = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "--size", "64x64", "--output"])
-        .arg(&path)
-        .output()
-        .expect("started");
-    assert!(made.status.success(), "{}", said(&made));
+    terrain_file(&path, Kind::Fractal, 64, 1);
     path
 }
 

@@ -9,11 +9,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use hapterra::link::Native;
+use hapterra::synth::Kind;
 use hapterra_core::guard::Sense;
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::served::{Served, signal, terrain, told};
 use hapterra_tests::timeouts::end_of;
-use hapterra_tests::{greedy, hapterra_binary};
+use hapterra_tests::{greedy, hapterra_binary, terrain_file};
 
 /// Serves the terrain in a folder to these devices.
 fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
@@ -375,11 +376,8 @@ fn bytes_read(command: &Command) -> u64 {
 fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("large.tif");
+    terrain_file(&path, Kind::Fractal, 2048, 1);
     let path = path.to_str().expect("a plain path");
-    let made = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "-o", path, "--size", "2048"])
-        .status();
-    assert!(made.expect("it runs").success());
     let read_by = |devices: usize| {
         let mut command = Command::new(hapterra_binary());
         command.args(["run", path, "--in-memory-mb", "1", "--seconds", "8"]);

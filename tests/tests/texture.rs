@@ -10,9 +10,9 @@ use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::scene::Sample;
 use hapterra_tests::field::position;
-use hapterra_tests::hapterra_binary;
 use hapterra_tests::invariants::seen::Seen;
 use hapterra_tests::invariants::texture::TextureJudge;
+use hapterra_tests::{hapterra_binary, terrain_file};
 use heightfield::{OpenOptions, Raster};
 
 /// HIPs of a way, and from one to the next, mm.
@@ -140,18 +140,7 @@ fn a_recording_keeps_its_texture() {
         (run.status.success(), said)
     };
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("there");
-    let synth = [
-        "synth",
-        "fractal",
-        "--size",
-        "129",
-        "--seed",
-        "4",
-        "--output",
-        "hills.tif",
-    ];
-    let (made, said) = hapterra(&synth);
-    assert!(made, "{said}");
+    terrain_file(&folder.path().join("hills.tif"), Kind::Fractal, 129, 4);
     let demo = [
         "demo",
         "hills.tif",

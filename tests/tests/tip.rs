@@ -4,13 +4,14 @@
 use std::process::Command;
 
 use hapterra::replay::{Replayer, on_native};
+use hapterra::synth::Kind;
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
 use hapterra_tests::walk::wander;
-use hapterra_tests::{hapterra_binary, shared};
+use hapterra_tests::{hapterra_binary, shared, terrain_file};
 use heightfield::{OpenOptions, Raster};
 
 /// Distance of a place from the bilinear surface of samples, all in cells: over fine lines of
@@ -334,10 +335,7 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("there");
-    runs(
-        folder,
-        &["synth", "crater", "-o", "hills.tif", "--size", "512"],
-    );
+    terrain_file(&folder.join("hills.tif"), Kind::Crater, 512, 1);
     let native = [
         "--device",
         "native",
@@ -396,10 +394,7 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
 fn a_tip_of_too_many_cells_takes_a_coarser_level() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    runs(
-        folder,
-        &["synth", "fractal", "-o", "hills.tif", "--size", "256"],
-    );
+    terrain_file(&folder.join("hills.tif"), Kind::Fractal, 256, 1);
     std::fs::write(folder.join("in.csv"), "t_s,x_mm,y_mm,z_mm\n0,60,60,500\n").expect("written");
     runs(
         folder,
@@ -439,10 +434,7 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
 fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    runs(
-        folder,
-        &["synth", "crater", "-o", "hills.tif", "--size", "256"],
-    );
+    terrain_file(&folder.join("hills.tif"), Kind::Crater, 256, 1);
     std::fs::write(folder.join("in.csv"), "t_s,x_mm,y_mm,z_mm\n0,60,60,500\n").expect("written");
     let run = ["run", "hills.tif", "--device", "native", "--seconds", "1"];
     let demo = ["demo", "hills.tif", "--device", "native", "--seconds", "1"];

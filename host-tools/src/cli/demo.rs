@@ -30,7 +30,7 @@ use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::{Laid, View};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{LoopColumns, Mark, Record, Recording, Rule, Settings};
-use crate::stability::limits;
+use crate::stability;
 use crate::synth::{Kind, Synth};
 use crate::telemetry::{FeltViews, SampleLog};
 use heightfield::without_key;
@@ -352,7 +352,7 @@ impl<'t> Tour<'_, 't> {
         let line = format!("device         {}\n", session_summary::device(&device));
         voice::put(std::io::stdout(), &line);
         let materials = terrain.grid().materials();
-        limits::warn_of(&scene.law, materials.map(Materials::table), &device);
+        stability::warn_of(&scene.law, materials.map(Materials::table), &device);
         let tell = |line: String| voice::put(std::io::stderr(), &(line + "\n"));
         let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;

@@ -2,16 +2,17 @@
 //! and a `run`.
 //!
 //! - [`options`]: what several subcommands let their user say;
-//! - `terminal`: progress, Ctrl-C, and prompts while a command runs;
+//! - [`terminal`]: progress, Ctrl-C, and prompts while a command runs;
 //! - [`failure`] and `hints`: what an error looks like, and what to do about it;
 //! - `guardian`: the process that outlives one whose arm may be armed;
-//! - `report`: what a command exists to print;
+//! - [`report`]: what a command exists to print;
+//! - `moved`: what earlier versions had, and what to type now;
 //! - `log` and `sparing`: diagnostics, and lines that a device can cause kept to so many
 //!   a second.
 
-pub mod bench;
 pub mod bringup;
 pub mod calibrate;
+pub mod completions;
 pub mod cut;
 pub mod demo;
 pub mod failure;
@@ -21,19 +22,19 @@ mod hints;
 pub mod info;
 pub mod list;
 mod log;
+pub mod man;
 mod met_device;
+mod moved;
 mod old_options;
 pub mod options;
 pub mod replay;
-mod report;
+pub mod report;
 pub mod run;
 mod session_summary;
 mod settings;
 mod sparing;
-pub mod stability;
 pub mod status;
-pub mod synth;
-mod terminal;
+pub mod terminal;
 pub mod view;
 pub mod viewing;
 
@@ -41,9 +42,9 @@ use std::ffi::OsString;
 use std::io::Write as _;
 use std::process::ExitCode;
 
-use clap::{ArgAction, CommandFactory as _, Parser, Subcommand};
+use clap::{ArgAction, Parser, Subcommand};
 
-pub use failure::Failure;
+pub use failure::{Failure, OrHint};
 use settings::Completed;
 use terminal::voice;
 
@@ -65,8 +66,6 @@ pub struct Cli {
 pub enum Command {
     /// Show what a terrain file holds and how it would be streamed
     Info(info::Args),
-    /// Make a terrain file by formula
-    Synth(synth::Args),
     /// Write a terrain's heights for the page that touches it in a browser
     Cut(cut::Args),
     /// Serve a terrain to a device and watch what is felt
@@ -87,10 +86,10 @@ pub enum Command {
     Calibrate(calibrate::Args),
     /// Write an image to a board, through its debug probe or over USB
     Flash(flash::Args),
-    /// Try on a virtual arm how stiff a surface may be before the hand feels the ticks
-    Stability(stability::Args),
-    /// Measure run time against error, beside other ways to render a height field
-    Bench(bench::Args),
+    /// Print the completions of a shell
+    Completions(completions::Args),
+    /// Write the manual pages
+    Man(man::Args),
 }
 
 /// Runs the command with the arguments of this process: 0 on success, 1 on failure, 2 on wrong usage.
@@ -101,54 +100,22 @@ pub fn main() -> ExitCode {
     ExitCode::from(command_line(&[own], words))
 }
 
-/// The first word that is a command's name.
-fn command_in(words: &[OsString]) -> Option<&str> {
-    let command = Cli::command();
-    let mut words = words.iter().skip(1).filter_map(|word| word.to_str());
-    words.find(|word| command.find_subcommand(word).is_some())
-}
-
 /// Runs the command with these arguments and returns its exit code, as [`main`] does. `program` is
 /// what starts it again, with the same arguments: a program and the words before the arguments.
 ///
 /// It listens to signals and starts the log of this process: one call a process.
 pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let words = ["hapterra".into()].into_iter().chain(arguments.clone());
-    let Completed { words, line } = match settings::complete(words.collect()) {
-        Ok(completed) => completed,
-        Err(failure) => {
-            failure.report();
-            return 1;
-        }
-    };
-    let cli = match Cli::try_parse_from(&words) {
+    let cli: Cli = match parse(arguments.clone()) {
         Ok(cli) => cli,
-        Err(error) => {
-            match error.use_stderr() {
-                // It repeats what was typed, which need not be of the user's making.
-                true => {
-                    let line = old_options::explained(command_in(&words), &error);
-                    let text = error.render().to_string() + &line.unwrap_or_default();
-                    voice::put(std::io::stderr(), &text);
-                }
-                // A reader who goes away has seen enough of the help.
-                false => _ = error.print(),
-            }
-            return u8::try_from(error.exit_code()).unwrap_or(2);
-        }
+        Err(code) => return code,
     };
     let may_arm = matches!(cli.command, Command::Run(_) | Command::Bringup(_));
     if may_arm && let Some(code) = guardian::watch(program, &arguments) {
         return code;
     }
-    if let Some(line) = line {
-        eprintln!("{line}");
-    }
-    let log = log::to_stderr(cli.verbose);
-    let outcome = match cli.command {
+    finish(cli.verbose, || match cli.command {
         Command::Info(args) => info::run(&args),
-        Command::Synth(args) => synth::run(&args),
         Command::Cut(args) => cut::run(&args),
         Command::Run(args) => run::run(&args.pinned()),
         Command::Demo(args) => demo::run(&args),
@@ -159,9 +126,48 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
         Command::Bringup(args) => bringup::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Flash(args) => flash::run(&args),
-        Command::Stability(args) => stability::run(&args),
-        Command::Bench(args) => bench::run(&args),
-    };
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
+    })
+}
+
+/// Parses the words behind a program's name. Where they are wrong, or ask for help, it prints that and
+/// returns the exit code.
+///
+/// # Errors
+/// The exit code.
+pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
+    let command = P::command();
+    let name = command.get_name().to_owned().into();
+    let words = [name].into_iter().chain(arguments).collect();
+    let Completed { words, line } = settings::complete(&command, words).map_err(|failure| {
+        failure.report();
+        1
+    })?;
+    // Its guardian has printed it already.
+    if let Some(line) = line.filter(|_| !guardian::is_worker()) {
+        eprintln!("{line}");
+    }
+    P::try_parse_from(&words).map_err(|error| {
+        match error.use_stderr() {
+            // It repeats what was typed, which need not be of the user's making.
+            true => {
+                let option = || old_options::hint(&words, &error);
+                let moved = moved::hint(&error).or_else(option).unwrap_or_default();
+                voice::put(std::io::stderr(), &format!("{}{moved}", error.render()));
+            }
+            // A reader who goes away has seen enough of the help.
+            false => _ = error.print(),
+        }
+        u8::try_from(error.exit_code()).unwrap_or(2)
+    })
+}
+
+/// Runs a command with the log of this process and returns its exit code. It listens to signals: one
+/// call a process.
+pub fn finish(verbose: u8, command: impl FnOnce() -> Result<(), Failure>) -> u8 {
+    let log = log::to_stderr(verbose);
+    let outcome = command();
     log.end();
     voice::finish();
     // A process that is not this crate's own program does not do so at its end.

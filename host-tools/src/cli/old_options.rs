@@ -1,5 +1,7 @@
 //! Options of earlier versions, and what to type now.
 
+use std::ffi::OsString;
+
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 /// An option that is gone.
@@ -95,8 +97,8 @@ const OLD: &[Old] = &[
     old(&["calibrate"], "--skip-gravity", "--measure zero,ratios", ""),
 ];
 
-/// A line on what an unknown option is now.
-pub(super) fn explained(command: Option<&str>, error: &clap::Error) -> Option<String> {
+/// Returns a line on what to type now where an option that earlier versions had is the error.
+pub(super) fn hint(words: &[OsString], error: &clap::Error) -> Option<String> {
     if error.kind() != ErrorKind::UnknownArgument {
         return None;
     }
@@ -104,13 +106,14 @@ pub(super) fn explained(command: Option<&str>, error: &clap::Error) -> Option<St
         return None;
     };
     let name = argument.split('=').next()?;
-    let of_command = |old: &&Old| command.is_none_or(|it| old.commands.contains(&it));
-    let old = OLD.iter().filter(|old| old.name == name).find(of_command)?;
+    let is_typed = |command: &&str| words.iter().skip(1).any(|word| word == *command);
+    let of_command = |old: &&Old| old.name == name && old.commands.iter().any(|it| is_typed(&it));
+    let old = OLD.iter().find(of_command)?;
     let within = match old.within {
         "" => String::new(),
         key => format!(", with {key}"),
     };
-    Some(format!("{name} is now {}{within}\n", old.now))
+    Some(format!("\nhint: {name} is now {}{within}\n", old.now))
 }
 
 #[cfg(test)]
@@ -144,15 +147,16 @@ mod tests {
         for old in OLD {
             for command in old.commands {
                 let error = parse(command, &format!("{}=1", old.name)).expect_err(old.name);
-                let line = explained(Some(command), &error).expect(old.name);
+                let typed: Vec<_> = words(command).iter().map(OsString::from).collect();
+                let line = hint(&typed, &error).expect(old.name);
                 let now = format!("{} is now {}", old.name, old.now);
-                assert!(line.starts_with(&now), "{command}: {line}");
+                assert!(line.contains(&now), "{command}: {line}");
                 assert!(line.contains(old.within), "{line}");
                 assert_eq!(error.exit_code(), 2);
             }
         }
         let error = parse("run", "--nonsense").expect_err("unknown");
-        assert_eq!(explained(Some("run"), &error), None);
+        assert_eq!(hint(&["hapterra".into(), "run".into()], &error), None);
     }
 
     #[test]

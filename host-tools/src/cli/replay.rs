@@ -24,7 +24,7 @@ use crate::replay::{
     Mark, Pace, Record, ReplayError, Replayer, Rule, Settings, Summary, Ticks, Trajectory,
     on_native_at, replay_trajectory,
 };
-use crate::stability::limits;
+use crate::stability;
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
 
@@ -83,6 +83,14 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the terrain, the trajectory, the device or the output.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    run_by(args, None)
+}
+
+/// Replays the trajectory by a contact rule; without one by the recording's, else as devices do.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     let mut inputs = args.terrain.inputs();
     inputs.push(args.trajectory.clone());
     let of_surface = args.rendering.surface.inputs();
@@ -105,7 +113,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let name = args.terrain.name();
     let (options, reading) = (&rendering.surface, &args.terrain.reading);
     let surface = options.load()?;
-    let rule = recorded.as_ref().map_or(Rule::Swept, |it| it.force.rule);
+    let recorded_rule = recorded.as_ref().map(|it| it.force.rule);
+    let rule = rule.or(recorded_rule).unwrap_or(Rule::Swept);
     check_rule(rule, &surface.law)?;
     let materials = surface.materials(options, (&name, &raster), reading)?;
     let grid = rendering.grid((&raster, reading.cells()), measured_at);
@@ -353,7 +362,7 @@ fn replay<'t>(
     interrupt::listen();
     let materials = felt.terrain.grid().materials();
     let table = materials.map(Materials::table);
-    limits::warn_of(&felt.law.0, table, replayer.device());
+    stability::warn_of(&felt.law.0, table, replayer.device());
     let device = Device::of(replayer.device());
     let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
     settings.views.clone_from(&felt.views);

@@ -47,7 +47,7 @@ use placed::{InReach, Placed};
 use session::{Serving, recording};
 use together::serve_each;
 
-/// The stiffest surface that `hapterra stability` tries by itself.
+/// The stiffest surface that `hapterra-lab stability` tries by itself.
 const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
 
 /// What to do where the recording cannot be written.
@@ -220,7 +220,7 @@ fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
     Err(Failure::new(format!(
         "a stiffness of {n_per_mm} N/mm: no arm feels more than {STIFFEST_TRIED_N_PER_MM} N/mm"
     ))
-    .hint("people hold 0.4 to 0.8 N/mm: hapterra stability tries what an arm holds still"))
+    .hint("people hold 0.4 to 0.8 N/mm: hapterra-lab stability tries what an arm holds still"))
 }
 
 /// Makes something of each, or says what is wrong with the first for which that fails.

@@ -8,7 +8,8 @@ mod views;
 use std::path::Path;
 use std::process::Command;
 
-use hapterra_tests::hapterra_binary;
+use hapterra::synth::Kind;
+use hapterra_tests::{hapterra_binary, terrain_file};
 
 use folder::{Folder, rows, said};
 
@@ -70,9 +71,7 @@ fn a_recording_of_another_terrain_is_refused() {
     folder.write_trajectory("in.csv");
     folder.replays("in.csv", "felt.csv", &[]);
     let other = folder.text("other.tif");
-    folder.runs(&[
-        "synth", "fractal", "-o", &other, "--size", "256", "--seed", "7",
-    ]);
+    terrain_file(other.as_ref(), Kind::Fractal, 256, 7);
     let (felt, out) = (folder.text("felt.csv"), folder.text("out.csv"));
     let told = folder.fails(&["replay", &other, &felt, "-o", &out]);
     for part in [
@@ -331,7 +330,7 @@ fn no_command_writes_over_its_own_input() {
     folder.fails(&["replay", &hills, &input, "-o", &input]);
     // The picture of dem.png would be dem.png.
     let (png, here) = (folder.text("dem.png"), folder.text("."));
-    folder.runs(&["synth", "fractal", "-o", &png, "--size", "64"]);
+    terrain_file(png.as_ref(), Kind::Fractal, 64, 1);
     let picture = std::fs::read(&png).expect("there");
     let told = folder.fails(&["demo", &png, "--device", "native", "--out", &here]);
     assert!(told.contains("--out"), "{told}");
@@ -474,12 +473,11 @@ fn an_output_that_cannot_be_written_is_no_crash() {
     let [hills, input, out, file] =
         ["hills.tif", "in.csv", "none/out", "in.csv/out"].map(|name| folder.text(name));
     let native = ["--device", "native", "--seconds", "0.1"];
-    let of_files = |out: &str| -> [Vec<String>; 5] {
+    let of_files = |out: &str| -> [Vec<String>; 4] {
         let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
         [
             owned(&["replay", &hills, &input, "-o", out]),
             owned(&[&["run", &hills, "--record", out][..], &native].concat()),
-            owned(&["synth", "plane", "--size", "8", "-o", &format!("{out}.tif")]),
             owned(&[
                 "calibrate",
                 "--device",
@@ -520,14 +518,6 @@ fn an_output_that_cannot_be_written_is_no_crash() {
         &["status", "--device", "native"],
         &[&calibrate[..], &["--show"]].concat(),
         &["calibrate", "--show", &arm],
-        &[
-            "synth",
-            "plane",
-            "--size",
-            "8",
-            "-o",
-            &folder.text("plane.tif"),
-        ],
         &[&["run", &hills][..], &native].concat(),
         &[&["demo", &hills, "--out", &demo][..], &native].concat(),
         &["replay", &hills, &input, "-o", "-"],

@@ -20,7 +20,7 @@ use std::path::Path;
 use serde_json::json;
 
 use server::Server;
-use site::{Site, hapterra, one};
+use site::{Site, one, program};
 use timeouts::{HANG, wait_until};
 
 /// The rows of a CSV file's columns, as numbers of single precision.
@@ -54,7 +54,7 @@ fn check_saved(site: &mut Site, folder: &str, least: usize) -> Option<String> {
     });
     let line = site.text("command");
     let words: Vec<_> = line.split(' ').skip(1).collect();
-    hapterra(&saved, &words, &[])?;
+    program("HAPTERRA", &saved, &words, &[])?;
     let (felt, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
     let touching = felt.iter().filter(|force| **force != [0; 3]).count();
     println!("{} rows, {touching} with a force: {line}", felt.len());
@@ -128,10 +128,10 @@ fn dropped_files_of_one_terrain_have_the_same_heights() {
             "3000",
             "--size",
             "70x50",
-            "--output",
+            "--out",
             name,
         ];
-        if hapterra(&folder, &words, &[]).is_none() {
+        if program("HAPTERRA_LAB", &folder, &words, &[]).is_none() {
             return;
         }
         site.drop_file(name, &fs::read(folder.join(name)).expect("a file"));

@@ -58,6 +58,14 @@ pub(in crate::cli) fn counts_presses() -> bool {
     false
 }
 
+/// Returns true in a process that a guardian has started.
+pub(in crate::cli) fn is_worker() -> bool {
+    #[cfg(unix)]
+    return worker::has_guardian();
+    #[cfg(not(unix))]
+    false
+}
+
 /// Reports to the guardian, if there is one.
 pub(in crate::cli) fn report(news: &News) {
     #[cfg(unix)]

@@ -197,7 +197,10 @@ fn height_unit(text: &str) -> Result<f64, String> {
 }
 
 /// A size in samples, as `512x400`, or `512` for a square.
-pub(in crate::cli) fn parse_size(text: &str) -> Result<(u32, u32), String> {
+///
+/// # Errors
+/// What a size is.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let parts = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
     match (parts.0.trim().parse(), parts.1.trim().parse()) {
         (Ok(width), Ok(height)) if width > 0 && height > 0 => Ok((width, height)),

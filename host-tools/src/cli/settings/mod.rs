@@ -63,9 +63,9 @@ pub(super) struct Completed {
 /// # Errors
 /// A settings file or a recording that cannot be read; a setting that is no option, or has a value
 /// that is none.
-pub(super) fn complete(words: Vec<OsString>) -> Result<Completed, Failure> {
+pub(super) fn complete(command: &Command, words: Vec<OsString>) -> Result<Completed, Failure> {
     let as_typed = |words| Completed { words, line: None };
-    let command = relaxed();
+    let command = relaxed(command);
     // What the user has typed wrongly is explained when it is parsed in earnest.
     let Ok(matches) = command.clone().try_get_matches_from(&words) else {
         return Ok(as_typed(words));
@@ -77,7 +77,7 @@ pub(super) fn complete(words: Vec<OsString>) -> Result<Completed, Failure> {
         return Ok(as_typed(words));
     };
     let mut sources = Vec::from_iter(of_recording(name, of_command)?);
-    let from_file = of_file(&command, name, of_command)?;
+    let from_file = of_file(name, of_command)?;
     let line = from_file.as_ref().map(|(path, _)| format!("settings       {}", path.display()));
     sources.extend(from_file.map(|(_, settings)| settings));
     let mut given: BTreeSet<String> = options
@@ -101,8 +101,8 @@ pub(super) fn complete(words: Vec<OsString>) -> Result<Completed, Failure> {
 }
 
 /// The command line, without any option that has to be given.
-fn relaxed() -> Command {
-    let mut command = Cli::command();
+fn relaxed(command: &Command) -> Command {
+    let mut command = command.clone();
     for subcommand in command.get_subcommands_mut() {
         *subcommand = subcommand.clone().mut_args(|arg| arg.required(false));
     }
@@ -163,11 +163,7 @@ fn stated_in(matches: &ArgMatches) -> (Option<MapScale>, Option<FeltCells>) {
 }
 
 /// The settings file of a command, and what it says.
-fn of_file(
-    command: &Command,
-    name: &str,
-    matches: &ArgMatches,
-) -> Result<Option<(PathBuf, Vec<Setting>)>, Failure> {
+fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Setting>)>, Failure> {
     if !COMMANDS.contains(&name) {
         return Ok(None);
     }
@@ -178,7 +174,8 @@ fn of_file(
         None => return Ok(None),
     };
     if path.extension().is_some_and(|extension| extension == "toml") {
-        let settings = file::read(&path, |key| is_known(command, key))?;
+        let command = Cli::command();
+        let settings = file::read(&path, |key| is_known(&command, key))?;
         return Ok(Some((path, settings)));
     }
     let settings = settings_of(&path)?

@@ -13,7 +13,7 @@ use hapterra_core::guard::{Limits, WORKING_SHARE};
 
 use super::contact_loop::{CELL_MM, HOME, PLANE_MM, Step};
 use super::trial::Setting;
-use crate::phantom::{HeldPhantom, OutOfReach, Script};
+use hapterra::phantom::{HeldPhantom, OutOfReach, Script};
 
 /// The press, N.
 const PRESS_N: f64 = 1.0;

@@ -1,11 +1,9 @@
-//! `hapterra stability` as a command.
+//! `hapterra-lab stability` as a command.
 
 use std::process::{Command, Output};
 
-use hapterra_tests::hapterra_binary;
-
 fn stability(words: &[&str]) -> Output {
-    let mut command = Command::new(hapterra_binary());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hapterra-lab"));
     let output = command.arg("stability").args(words).output();
     output.expect("it runs")
 }

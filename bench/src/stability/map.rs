@@ -12,7 +12,7 @@ use super::entry::Entered;
 use super::grasp::Grasp;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
 use super::trial::{Press, Setting, Trial, Verdict};
-use crate::phantom::{OutOfReach, PhantomModel};
+use hapterra::phantom::{OutOfReach, PhantomModel};
 
 /// A rate, a damping, and the friction of the arm as a part of the model's.
 pub type Column = (TickRate, Damping, f64);

@@ -7,14 +7,14 @@ use hapterra_firmware::amplifier::CURRENT_LOOP_US;
 use super::bounds::AtTip;
 use super::entry::Entry;
 use super::grasp::Grasp;
-use super::limits::{
-    ENTERS_LATE_N_PER_MM, ENTERS_N_PER_MM, LEFT_LATE_WITH_TEXTURE, LEFT_WITH_TEXTURE, LONG_US,
-    SHORT_US, STILL_LATE_N_PER_MM, STILL_N_PER_MM,
-};
 use super::map::Plan;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
 use super::trial::{Press, Setting, Trial, Verdict};
-use crate::phantom::PhantomModel;
+use hapterra::phantom::PhantomModel;
+use hapterra::stability::{
+    ENTERS_LATE_N_PER_MM, ENTERS_N_PER_MM, LEFT_LATE_WITH_TEXTURE, LEFT_WITH_TEXTURE, LONG_US,
+    SHORT_US, STILL_LATE_N_PER_MM, STILL_N_PER_MM,
+};
 
 const UNDAMPED: Damping = Damping {
     ns_per_m: 0.0,

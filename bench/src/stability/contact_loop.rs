@@ -13,7 +13,7 @@ use hapterra_core::terrain::{FieldSize, Tile, TileDemand, TileKey, TileRequester
 use hapterra_core::tick::{Board, Command, Haptics};
 
 use super::surface_work::SurfaceWork;
-use crate::phantom::{Encoder, HeldPhantom, PhantomModel, Placement, kinematics};
+use hapterra::phantom::{Encoder, HeldPhantom, PhantomModel, Placement, kinematics};
 
 /// Tiles to a side of the loop's window, and cells of the plane, of 4 mm.
 const WINDOW: usize = 4;

@@ -1,6 +1,6 @@
 //! The energy that a surface gives to the arm: the work of what the motors really make.
 
-use crate::phantom::{Amplifier, HeldPhantom, MAX_SUBSTEP_S, PhantomModel};
+use hapterra::phantom::{Amplifier, HeldPhantom, MAX_SUBSTEP_S, PhantomModel};
 
 /// The surface's part of the motors' torques. It follows its part of the commands with the
 /// lag of the amplifiers' current loops, as the whole does.
@@ -52,8 +52,8 @@ impl SurfaceWork {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::phantom::{HandModel, Placement, Script};
     use crate::stability::contact_loop::HOME;
+    use hapterra::phantom::{HandModel, Placement, Script};
 
     #[test]
     fn an_arm_that_is_only_driven_gets_the_work_as_energy_of_motion() {
@@ -83,8 +83,8 @@ mod tests {
             given_mj += work.step(currents_a, currents_a, 0.3e-3, &mut arm);
         }
         let plant = arm.plant();
-        let energy_j = |of: &crate::phantom::Plant| {
-            crate::phantom::Dynamics::new(model).energy_j(of.q_rad(), of.rate_rad_s())
+        let energy_j = |of: &hapterra::phantom::Plant| {
+            hapterra::phantom::Dynamics::new(model).energy_j(of.q_rad(), of.rate_rad_s())
         };
         let moves_mj = 1e3 * energy_j(plant);
         assert!(moves_mj > 1.0, "{moves_mj} mJ");

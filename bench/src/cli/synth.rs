@@ -1,15 +1,14 @@
-//! `hapterra synth`: a terrain file made by formula.
+//! `hapterra-lab synth`: a terrain file made by formula.
 
 use std::path::PathBuf;
 
 use clap::ValueHint;
+use hapterra::cli::options::input::parse_size;
+use hapterra::cli::terminal::{interrupt, left_behind, progress};
+use hapterra::cli::{Failure, report};
+use hapterra::synth::{Grid, Kind, Synth, write};
 
-use super::failure::Failure;
-use super::options::input::parse_size;
-use super::terminal::{interrupt, left_behind, progress};
-use crate::synth::{Grid, Kind, Synth, write};
-
-/// Arguments of `hapterra synth`.
+/// Arguments of `hapterra-lab synth`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// What the terrain looks like
@@ -18,7 +17,7 @@ pub struct Args {
 
     /// File to write: .tif (GeoTIFF), .asc (Esri ASCII) or .png (16-bit, whole metres)
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub output: PathBuf,
+    pub out: PathBuf,
 
     /// Samples: WIDTHxHEIGHT, or one number for a square
     #[arg(long, value_name = "WxH", default_value = "1024", value_parser = parse_size)]
@@ -61,20 +60,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rows,
         cell_m: args.cell_m,
     };
-    left_behind::tell([args.output.as_path()]);
+    left_behind::tell([args.out.as_path()]);
     let progress = progress::bar(Some(rows.into()), "{bar:30} {pos}/{len} rows, {eta} left");
     interrupt::listen();
-    let written = write(&args.output, &synth, &grid, &mut || {
+    let written = write(&args.out, &synth, &grid, &mut || {
         progress.inc(1);
         !interrupt::requested()
     });
     progress.finish_and_clear();
     written?;
-    println!(
-        "wrote {}: {columns} × {rows} samples",
-        args.output.display()
-    );
-    Ok(())
+    report::put(&format!(
+        "wrote {}: {columns} × {rows} samples\n",
+        args.out.display()
+    ))
 }
 
 fn parse_length(text: &str) -> Result<f64, String> {

@@ -10,16 +10,15 @@
 //! - [`entry`]: presses while force comes in;
 //! - [`bounds`]: stiffness that theory says is passive;
 //! - [`map`]: many trials, and the table of them;
-//! - [`limits`]: what of it is said before a surface is felt;
 //! - [`picture`]: the table as a picture.
 //!
-//! Friction of the surface is left out: a hand that is held back hums less.
+//! Friction of the surface is left out: a hand that is held back hums less. What the trials found is
+//! what `hapterra run` warns by: [`hapterra::stability`].
 
 pub mod bounds;
 mod contact_loop;
 pub mod entry;
 pub mod grasp;
-pub mod limits;
 pub mod map;
 pub mod picture;
 mod surface_work;

@@ -1,23 +1,22 @@
-//! `hapterra stability`: how stiff a surface may be before the hand feels the ticks.
+//! `hapterra-lab stability`: how stiff a surface may be before it is unstable.
 
 use std::path::PathBuf;
 
 use clap::ValueHint;
+use hapterra::cli::options::surface::{SurfaceChoice, SurfaceOptions, choice};
+use hapterra::cli::terminal::{interrupt, left_behind, progress};
+use hapterra::cli::{Failure, OrHint as _, report};
+use hapterra::output::{Output, OutputError};
 use hapterra_core::force::{Controller, Damping};
 use hapterra_core::rate::TickRate;
 
-use super::failure::{Failure, OrHint as _};
-use super::options::surface::{SurfaceChoice, SurfaceOptions, choice};
-use super::report;
-use super::terminal::{interrupt, left_behind, progress};
-use crate::output::{Output, OutputError};
 use crate::stability::map::{Map, Plan};
 use crate::stability::picture;
 
-const OTHER_FILE: &str = "name another file with --output";
+const OTHER_FILE: &str = "name another file with --out";
 const OTHER_PICTURE: &str = "name another file with --picture";
 
-/// Arguments of `hapterra stability`.
+/// Arguments of `hapterra-lab stability`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Tick rates, Hz: whole kilohertz from 1000 to 10000
@@ -57,7 +56,7 @@ pub struct Args {
 
     /// File for every trial, as CSV
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub output: Option<PathBuf>,
+    pub out: Option<PathBuf>,
 
     /// File for a picture of it, as PNG
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
@@ -96,11 +95,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     plan.stiffness_n_per_mm.dedup();
     plan.arm_frictions.sort_by(f64::total_cmp);
     plan.arm_frictions.dedup();
-    if args.output.is_some() && args.output == args.picture {
+    if args.out.is_some() && args.out == args.picture {
         return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
     }
     left_behind::tell(
-        { args.output.iter() }
+        { args.out.iter() }
             .chain(&args.picture)
             .map(PathBuf::as_path),
     );
@@ -109,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         drop(Output::create(path).or_hint(OTHER_PICTURE)?);
     }
     let csv = args
-        .output
+        .out
         .as_deref()
         .map(Output::create)
         .transpose()

@@ -1,6 +1,6 @@
 //! How a hand holds the tip.
 
-use crate::phantom::HandModel;
+use hapterra::phantom::HandModel;
 
 /// A grasp, from the loosest to the tightest.
 ///

@@ -3,8 +3,8 @@
 use hapterra_core::rate::TickRate;
 
 use super::contact_loop::HOME;
-use crate::phantom::kinematics::jacobian;
-use crate::phantom::{PhantomModel, Placement};
+use hapterra::phantom::kinematics::jacobian;
+use hapterra::phantom::{PhantomModel, Placement};
 
 /// Properties of the arm at the tip, up and down, in the home pose.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,6 @@
-//! What the map says to who is about to feel a surface.
+//! Limits of stiffness that trials on the virtual arm found, and the warnings of a surface above them.
+//!
+//! `hapterra-lab stability` makes the trials; its tests hold these tables to them.
 
 use hapterra_core::force::{ForceLaw, MaterialTable, Texture};
 use hapterra_core::rate::TickRate;
@@ -6,10 +8,10 @@ use hapterra_core::wire::hello::DeviceHello;
 
 /// Stiffness up to which a press is still in a limp hand, N/mm: ticks a second, without and
 /// with the passivity controller.
-pub(super) type StillUpTo = [(u32, f32, f32); 4];
+pub type StillUpTo = [(u32, f32, f32); 4];
 
 /// At [`SHORT_US`]. Tried again in the tests.
-pub(super) const STILL_N_PER_MM: StillUpTo = [
+pub const STILL_N_PER_MM: StillUpTo = [
     (1_000, 2.0, 6.0),
     (2_000, 3.0, 8.0),
     (4_000, 4.0, 8.0),
@@ -17,7 +19,7 @@ pub(super) const STILL_N_PER_MM: StillUpTo = [
 ];
 
 /// At [`LONG_US`].
-pub(super) const STILL_LATE_N_PER_MM: StillUpTo = [
+pub const STILL_LATE_N_PER_MM: StillUpTo = [
     (1_000, 1.0, 3.0),
     (2_000, 1.0, 3.0),
     (4_000, 1.0, 3.0),
@@ -25,13 +27,13 @@ pub(super) const STILL_LATE_N_PER_MM: StillUpTo = [
 ];
 
 /// Stiffness up to which force comes in well on an arm with a tenth of the model's friction, with the
-/// controller, N/mm ([`Entered::is_good`](super::entry::Entered::is_good)), by ticks a second: in the
+/// controller, N/mm (`Entered::is_good` of the trials), by ticks a second: in the
 /// ramp, and while the clutch closes. Tried again in the tests.
-pub(super) const ENTERS_N_PER_MM: [(u32, f32); 4] =
+pub const ENTERS_N_PER_MM: [(u32, f32); 4] =
     [(1_000, 1.0), (2_000, 2.0), (4_000, 2.0), (10_000, 2.0)];
 
 /// The same at [`LONG_US`].
-pub(super) const ENTERS_LATE_N_PER_MM: [(u32, f32); 4] =
+pub const ENTERS_LATE_N_PER_MM: [(u32, f32); 4] =
     [(1_000, 1.0), (2_000, 1.0), (4_000, 1.0), (10_000, 0.5)];
 
 /// Latencies that were tried, µs: that of boards whose converters command the amplifiers, and that
@@ -42,9 +44,9 @@ pub const LONG_US: u16 = 1_240;
 
 /// What is left of that on a textured surface, whose steepest slopes rock a limp hand, too; and
 /// what is left at [`LONG_US`].
-pub(super) const LEFT_WITH_TEXTURE: f32 = 0.5;
+pub const LEFT_WITH_TEXTURE: f32 = 0.5;
 /// See [`LEFT_WITH_TEXTURE`].
-pub(super) const LEFT_LATE_WITH_TEXTURE: f32 = 1.0 / 3.0;
+pub const LEFT_LATE_WITH_TEXTURE: f32 = 1.0 / 3.0;
 
 /// Warns of a surface that is too stiff for a device's tick rate and latency.
 pub fn warn(law: &ForceLaw, device: &DeviceHello) {
@@ -122,13 +124,13 @@ fn warning(law: &ForceLaw, rate: TickRate, latency_us: u16) -> Option<String> {
             false => "may shake on a texture",
         };
         return Some(format!(
-            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand {shakes} above {still} N/mm at {hz} ticks a second{late}, {with} the passivity controller (hapterra stability)"
+            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand {shakes} above {still} N/mm at {hz} ticks a second{late}, {with} the passivity controller (hapterra-lab stability)"
         ));
     }
     let enters = enters_n_per_mm(rate, latency_us);
     (stiffness > enters).then(|| {
         format!(
-            "a stiffness of {stiffness} N/mm: on a virtual arm with a tenth of a Premium 1.5's friction the tip trembles above {enters} N/mm at {hz} ticks a second{late}, in the ramp or after the clutch (hapterra stability)"
+            "a stiffness of {stiffness} N/mm: on a virtual arm with a tenth of a Premium 1.5's friction the tip trembles above {enters} N/mm at {hz} ticks a second{late}, in the ramp or after the clutch (hapterra-lab stability)"
         )
     })
 }
@@ -145,12 +147,7 @@ fn enters_n_per_mm(rate: TickRate, latency_us: u16) -> f32 {
 
 /// Of the rates that were tried, the fastest that is no faster counts; of the latencies, the one
 /// that is not shorter.
-pub(super) fn still_n_per_mm(
-    rate: TickRate,
-    latency_us: u16,
-    is_controlled: bool,
-    texture: &Texture,
-) -> f32 {
+fn still_n_per_mm(rate: TickRate, latency_us: u16, is_controlled: bool, texture: &Texture) -> f32 {
     let (tried, left) = match latency_us > SHORT_US {
         true => (STILL_LATE_N_PER_MM, LEFT_LATE_WITH_TEXTURE),
         false => (STILL_N_PER_MM, LEFT_WITH_TEXTURE),

@@ -11,9 +11,9 @@ use super::grasp::Grasp;
 use super::map::{self, Column, Map};
 use super::tap::TAP_SPEEDS_M_S;
 use super::trial::{Trial, Verdict};
-use crate::picture::axes::{self, Area, Titles};
-use crate::picture::style::{self, INK, SERIES, SOFT_INK, px, stroke};
-use crate::picture::{Canvas, PictureError, line};
+use hapterra::picture::axes::{self, Area, Titles};
+use hapterra::picture::style::{self, INK, SERIES, SOFT_INK, px, stroke};
+use hapterra::picture::{Canvas, PictureError, line};
 
 const WIDTH_PX: i32 = 1600;
 const HEADER_PX: i32 = 110;

@@ -4,7 +4,7 @@
 use super::contact_loop::{HOME, PLANE_MM};
 use super::grasp::Grasp;
 use super::trial::Setting;
-use crate::phantom::{OutOfReach, Script};
+use hapterra::phantom::{OutOfReach, Script};
 
 /// Speeds of the tip where it touches the surface, m/s.
 pub const TAP_SPEEDS_M_S: [f64; 3] = [0.1, 0.2, 0.5];

@@ -9,7 +9,7 @@ use super::entry::{Entered, Entry};
 use super::grasp::Grasp;
 use super::map::Column;
 use super::tap::{TAP_SPEEDS_M_S, Taps};
-use crate::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
+use hapterra::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
 
 /// The press, N, and how long it is held; what is looked at is its last second.
 const PRESS_N: f64 = 1.0;
