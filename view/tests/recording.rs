@@ -91,9 +91,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let (first, last) = (bars[0], bars[bars.len() - 1]);
     assert!((0.39..0.51).contains(&(last / first)), "{bars:?}");
     let mut view = hapterra().expect("named");
-    view.arg("view")
-        .arg(&recording)
-        .arg(&terrain);
+    view.arg("view").arg(&recording).arg(&terrain);
     run(&mut view, &at("viewed.rrd"));
     let viewed = entities(&at("viewed.rrd"));
     check_views(&csv, &viewed, true);
