@@ -1,8 +1,16 @@
 use std::fs;
 
 use clap::Parser as _;
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{ForceLaw, Shading};
 
 use super::*;
+use crate::cli::options::exaggeration::Exaggeration;
+use crate::cli::options::surface::{SurfaceChoice, SurfaceOptions};
+use crate::replay::Rule;
+use crate::replay::settings::Device;
+use crate::terrain::{Scale, Terrain};
+use heightfield::Raster;
 
 /// The words of a command with a settings file.
 fn completed(text: &str, line: &str) -> Result<Vec<String>, String> {
@@ -128,4 +136,133 @@ fn no_settings_are_read_where_none_are_wanted() {
         words("hapterra run t.tif --settings no.toml"),
     );
     assert!(missing.is_err());
+}
+
+/// A recording of cells of 2 mm under a soft spring with friction, as a file in a folder.
+fn recording(folder: &Path) -> (PathBuf, Settings) {
+    let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
+    let scale = Scale::new(2.0, 6.0).expect("valid");
+    let terrain = Terrain::new(&raster, scale, 1).expect("terrain");
+    let law = ForceLaw {
+        stiffness_n_per_mm: 0.3,
+        max_force_n: 4.0,
+        friction: Friction::coulomb(0.25),
+        shading: Shading::Smooth,
+        ..ForceLaw::PREMIUM
+    };
+    let device = Device {
+        board: "native".into(),
+        firmware: String::new(),
+        tick_hz: 1000,
+    };
+    let settings = Settings::new("t.tif", &terrain, (law, Rule::Swept), None, device);
+    let path = folder.join("felt.csv");
+    let lines = settings.to_toml();
+    let lines: String = lines.lines().map(|line| format!("# {line}\n")).collect();
+    fs::write(&path, lines + "t_s,x_mm,y_mm,z_mm\n0,1,1,1\n").expect("written");
+    (path, settings)
+}
+
+/// A replay with the settings of a recording, and the lines on what differs.
+fn replayed(more: &str) -> (crate::cli::replay::Args, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, settings) = recording(folder.path());
+    let line = format!("hapterra replay t.tif {} -o x.csv {more}", path.display());
+    let words = line.split_whitespace().map(OsString::from).collect();
+    let completed = complete(&Cli::command(), words).map_err(|failure| failure.text());
+    let cli = Cli::try_parse_from(completed.expect(more).words).expect(more);
+    let crate::cli::Command::Replay(args) = cli.command else {
+        panic!("{more}");
+    };
+    let cells = args.terrain.reading.cells();
+    let lines = differences(&args.rendering, cells, (&path, &settings));
+    (args, lines)
+}
+
+#[test]
+fn options_of_a_recording_are_those_of_its_making() {
+    let (args, lines) = replayed("");
+    assert_eq!(lines, [""; 0]);
+    let rendering = &args.rendering;
+    assert_eq!(rendering.scale, Some(MapScale::CellMm(2.0)));
+    assert_eq!(rendering.exaggeration, Some(Exaggeration::MmPerUnit(6.0)));
+    assert_eq!((rendering.level, rendering.tip), (Some(1), Some(0.0)));
+    let (args, lines) = replayed("--ignore-settings");
+    assert_eq!(args.rendering.scale, None);
+    assert!(!lines.is_empty());
+}
+
+#[test]
+fn options_win_over_a_recording_and_are_named() {
+    // Half as large, and half as high.
+    let (args, lines) = replayed("--scale 1mm/cell --stiffness 0.5");
+    assert_eq!(
+        args.rendering.exaggeration,
+        Some(Exaggeration::MmPerUnit(3.0))
+    );
+    assert_eq!(
+        lines,
+        [
+            "--scale 1mm/cell, where the recording has 2mm/cell",
+            "--stiffness 0.5N/mm, where the recording has 0.3N/mm"
+        ]
+    );
+    // Other cells keep the factor.
+    let (args, lines) = replayed("--input cells=stored");
+    assert_eq!(args.rendering.exaggeration, Some(Exaggeration::Times(3.0)));
+    assert_eq!(lines.len(), 1, "{lines:?}");
+    let (_, lines) = replayed("--exaggeration 2 --surface sand --friction 0.7");
+    assert_eq!(
+        lines,
+        [
+            "--exaggeration 2, where the recording has 3",
+            "--surface sand, where the recording has its own",
+            "--friction 0.7, where the recording has 0.25"
+        ]
+    );
+}
+
+#[test]
+fn recorded_surface_has_all_bits_of_its_law() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, settings) = recording(folder.path());
+    let options = SurfaceOptions {
+        surface: Some(SurfaceChoice::File(path.clone())),
+        max_force: Some(4.0),
+        ..SurfaceOptions::default()
+    };
+    let law = options
+        .load()
+        .map(|surface| surface.law)
+        .map_err(|it| it.text());
+    assert_eq!(law, Ok(settings.law()));
+    // A friction of one's own brings its static part, and leaves shading as it is.
+    let rough = SurfaceOptions {
+        friction: Some(0.7),
+        ..options
+    };
+    let law = rough
+        .load()
+        .map(|surface| surface.law)
+        .map_err(|it| it.text());
+    let friction = Friction::coulomb(0.7);
+    assert_eq!(
+        law,
+        Ok(ForceLaw {
+            friction,
+            ..settings.law()
+        })
+    );
+    // So may `run` take it.
+    let line = format!("hapterra run t.tif --settings {}", path.display());
+    let words = line.split_whitespace().map(OsString::from).collect();
+    let completed = complete(&Cli::command(), words).map_err(|failure| failure.text());
+    let words = completed.expect("a recording").words;
+    for word in [
+        "--scale=2mm/cell",
+        "--exaggeration=6mm/unit",
+        "--max-force=4N",
+    ] {
+        assert!(words.contains(&word.into()), "{words:?}");
+    }
 }
