@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use hapterra::link::{Emulator, Patience};
-use hapterra::materials::table::TableFile;
+use hapterra::cli::options::surface::table::TableFile;
 use hapterra::materials::{ClassMaterial, Looks, Materials};
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};

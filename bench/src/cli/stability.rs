@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueHint;
-use hapterra::cli::options::texture::SurfaceTexture;
+use hapterra::cli::options::surface::{SurfaceChoice, SurfaceOptions, choice};
 use hapterra::cli::terminal::{interrupt, left_behind, progress};
 use hapterra::cli::{Failure, OrHint as _, report};
 use hapterra::output::{Output, OutputError};
@@ -31,9 +31,9 @@ pub struct Args {
     #[arg(long, value_name = "NS_PER_M,…", value_delimiter = ',', default_value = "0", value_parser = parse_damping)]
     pub damping: Vec<Damping>,
 
-    /// What the surface has for a micro-relief
-    #[command(flatten)]
-    pub texture: SurfaceTexture,
+    /// Surface whose micro-relief is tried: sand, rock, or a FILE.toml [default: none]
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, value_parser = choice())]
+    pub surface: Option<SurfaceChoice>,
 
     /// Whether the passivity controller acts
     #[arg(
@@ -77,11 +77,15 @@ pub enum Passivity {
 /// # Errors
 /// When it is interrupted, or a file cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let of_surface = SurfaceOptions {
+        surface: args.surface.clone(),
+        ..SurfaceOptions::default()
+    };
     let mut plan = Plan {
         rates: args.rate.clone(),
         stiffness_n_per_mm: args.stiffness.clone(),
         dampings: dampings(args),
-        texture: args.texture.relief()?,
+        texture: of_surface.load()?.law.texture,
         delay_s: 1e-6 * f64::from(args.delay_us),
         arm_frictions: args.arm_friction.clone(),
     };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueHint;
-use hapterra::cli::options::terrain_file::parse_size;
+use hapterra::cli::options::input::parse_size;
 use hapterra::cli::terminal::{interrupt, left_behind, progress};
 use hapterra::cli::{Failure, report};
 use hapterra::synth::{Grid, Kind, Synth, write};

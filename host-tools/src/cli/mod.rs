@@ -25,11 +25,13 @@ mod log;
 pub mod man;
 mod met_device;
 mod moved;
+mod old_options;
 pub mod options;
 pub mod replay;
 pub mod report;
 pub mod run;
 mod session_summary;
+mod settings;
 mod sparing;
 pub mod status;
 pub mod terminal;
@@ -43,13 +45,14 @@ use std::process::ExitCode;
 use clap::{ArgAction, Parser, Subcommand};
 
 pub use failure::{Failure, OrHint};
+use settings::Completed;
 use terminal::voice;
 
 /// Touch terrain of any size through a Phantom.
 #[derive(Debug, Parser)]
 #[command(name = "hapterra", version, propagate_version = true)]
 pub struct Cli {
-    /// Say more: -v for progress, -vv for details, -vvv for everything
+    /// Say more: -v progress, -vv details, -vvv everything
     #[arg(short, long, action = ArgAction::Count, global = true)]
     pub verbose: u8,
 
@@ -134,13 +137,23 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
 /// # Errors
 /// The exit code.
 pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
-    let name = P::command().get_name().to_owned().into();
-    let words = [name].into_iter().chain(arguments);
-    P::try_parse_from(words).map_err(|error| {
+    let command = P::command();
+    let name = command.get_name().to_owned().into();
+    let words = [name].into_iter().chain(arguments).collect();
+    let Completed { words, line } = settings::complete(&command, words).map_err(|failure| {
+        failure.report();
+        1
+    })?;
+    // Its guardian has printed it already.
+    if let Some(line) = line.filter(|_| !guardian::is_worker()) {
+        eprintln!("{line}");
+    }
+    P::try_parse_from(&words).map_err(|error| {
         match error.use_stderr() {
             // It repeats what was typed, which need not be of the user's making.
             true => {
-                let moved = moved::hint(&error).unwrap_or_default();
+                let option = || old_options::hint(&words, &error);
+                let moved = moved::hint(&error).or_else(option).unwrap_or_default();
                 voice::put(std::io::stderr(), &format!("{}{moved}", error.render()));
             }
             // A reader who goes away has seen enough of the help.

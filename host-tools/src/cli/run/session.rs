@@ -221,7 +221,7 @@ fn service<'s, 't: 's>(
             false => Arming::default(),
         },
         patience: Patience {
-            silence_s: args.silence_s,
+            silence_s: args.silence,
             ..Patience::REAL_TIME
         },
         connect: Box::new(move || connect(args, device, placed)),
