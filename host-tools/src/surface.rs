@@ -83,7 +83,10 @@ mod tests {
             assert!(material.stiffness_n_per_mm <= STIFFEST_N_PER_MM, "{name}");
             let texture = &material.texture;
             let shortest_mm = Texture::shortest_mm(TickRate::default());
-            assert!(texture.is_none() || texture.wavelength_mm >= shortest_mm, "{name}");
+            assert!(
+                texture.is_none() || texture.wavelength_mm >= shortest_mm,
+                "{name}"
+            );
         }
         let ice = NamedSurface::find("ice").map(|ice| ice.material);
         assert_eq!(ice, Some(Material::of(&ForceLaw::PREMIUM)));

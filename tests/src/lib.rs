@@ -106,3 +106,9 @@ pub fn info(path: &Path) -> serde_json::Value {
     assert!(output.status.success(), "{output:?}");
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
+
+/// A surface on which the passivity controller does not act, as a file for `--surface`.
+pub const UNCONTROLLED: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/data/surfaces/uncontrolled.toml"
+);

@@ -182,10 +182,10 @@ pub fn command(address: SocketAddr, folder: &Path) -> Command {
 pub fn command_over(terrain: &str, address: SocketAddr, folder: &Path) -> Command {
     let mut command = Command::new(hapterra_binary());
     command
-        .args(["run", terrain, "--cell-mm", "1"])
-        .args(["--height-mm-per-unit", "0.1"])
+        .args(["run", terrain, "--scale", "1mm/cell"])
+        .args(["--exaggeration", "0.1mm/unit"])
         .args(["--device", &format!("tcp:{address}")])
-        .arg("--record")
+        .arg("--out")
         .arg(folder.join("felt.csv"))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())

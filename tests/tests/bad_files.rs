@@ -259,11 +259,11 @@ fn pipes_and_devices_are_refused_unopened() {
     // So is every other file that a command reads.
     let hills = folder.path().join("hills.tif");
     terrain_file(&hills, Kind::Fractal, 16, 1);
-    let [hills, other] = [hills, pipe("pipe")].map(|path| path.display().to_string());
+    let [hills, other] = [hills, pipe("pipe.toml")].map(|path| path.display().to_string());
     let run = ["run", &hills, "--device", "native", "--materials", &hills];
     for (words, option) in [
         (&["calibrate", "--show"][..], None),
-        (&run, Some("--material-table")),
+        (&run, Some("--surface")),
         (
             &["flash", "--board", "nucleo-g474re", "--check"],
             Some("--image"),
@@ -318,17 +318,17 @@ fn texts_of_files_reach_the_terminal_without_control_characters() {
             &hills,
             "--device",
             "native",
-            "--seconds",
-            "0.1",
+            "--duration",
+            "0.1s",
             "--materials",
             &hills,
-            "--material-table",
+            "--surface",
             &table,
         ],
         &["replay", &hills, &csv, "-o", &format!("{named}.csv")],
         &["replay", &hills, &format!("{csv}{WICKED}"), "-o", "-"],
         &["calibrate", "--show", &csv],
-        &["info", &hills, "--no-data", WICKED],
+        &["info", &hills, "--input", &format!("no-data={WICKED}")],
     ] {
         let output = Command::new(hapterra_binary()).args(words).output();
         let output = output.expect("it runs");

@@ -70,7 +70,7 @@ fn run_says_how_a_terrain_is_felt_on_an_emulated_board() {
         &[
             "hapterra demo --device emulated",
             "tcp:HOST:PORT",
-            "--plant",
+            "+plant:HOST:PORT",
         ],
     );
 }
@@ -98,13 +98,13 @@ fn a_record_goes_to_a_file_and_comes_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("arm.toml");
     let file = file.to_str().expect("a plain path");
-    let base = ["calibrate", "--device", "native", "--no-walk"];
-    let write = [&base[..], &["--set", "ratio-2=10.5", "--output", file]].concat();
+    let base = ["calibrate", "--device", "native", "--measure", "none"];
+    let write = [&base[..], &["--set", "ratio-2=10.5", "--out", file]].concat();
     let output = hapterra(&write);
     assert!(output.status.success(), "{}", told(&output));
     let again = folder.path().join("again.toml");
     let again = again.to_str().expect("a plain path");
-    let read = [&base[..], &["--from", file, "--output", again]].concat();
+    let read = [&base[..], &["--from", file, "--out", again]].concat();
     let output = hapterra(&read);
     assert!(output.status.success(), "{}", told(&output));
     let bytes = |path: &str| std::fs::read(path).expect("written");
@@ -121,17 +121,18 @@ fn a_record_goes_to_a_file_and_comes_back() {
 fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
     let base = ["calibrate", "--device", "native", "--no-store", "--yes"];
     for model in ["premium-1.0", "premium-3.0", "omni"] {
-        for skip in ["--no-walk", "--skip-ratios"] {
-            let words = [&base[..], &["--model", model, skip]].concat();
-            fails(&words, 1, &["a guess", "--unmeasured-ratios"]);
+        for skip in ["none", "zero,gravity"] {
+            let words = [&base[..], &["--model", model, "--measure", skip]].concat();
+            fails(&words, 1, &["a guess", "guessed-ratios"]);
         }
     }
-    let agreed = ["--model", "premium-1.0", "--no-walk", "--unmeasured-ratios"];
-    let known = ["--model", "premium-1.5", "--no-walk"];
+    let agreed = ["--model", "premium-1.0", "--measure", "none,guessed-ratios"];
+    let known = ["--model", "premium-1.5", "--measure", "none"];
     let measured = [
         "--model",
         "premium-1.0",
-        "--no-walk",
+        "--measure",
+        "none",
         "--set",
         "ratio-1=7.2",
     ];
@@ -143,7 +144,14 @@ fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
 
 #[test]
 fn a_record_above_a_ceiling_is_refused_before_it_is_sent() {
-    let base = ["calibrate", "--device", "native", "--no-walk", "--set"];
+    let base = [
+        "calibrate",
+        "--device",
+        "native",
+        "--measure",
+        "none",
+        "--set",
+    ];
     for (setting, part) in [
         ("peak-a-1=20", "5.5 A"),
         ("max-force-n=20", "8.5 N"),
@@ -158,7 +166,7 @@ fn wrong_words_are_answered_with_what_to_do() {
     fails(
         &["status", "--device", "serial"],
         2,
-        &["usb, usb:SERIAL, tcp:HOST:PORT, native or emulated"],
+        &["usb, usb:SERIAL, tcp:HOST:PORT, native, emulated or emulated:ELF"],
     );
     fails(
         &["status", "--device", "tcp:127.0.0.1:1"],
@@ -166,7 +174,7 @@ fn wrong_words_are_answered_with_what_to_do() {
         &["127.0.0.1:1", "hint:"],
     );
     fails(
-        &["status", "--device", "emulated", "--image", "/no/such"],
+        &["status", "--device", "emulated:/no/such"],
         1,
         &["/no/such", "hint:"],
     );
@@ -177,8 +185,17 @@ fn wrong_words_are_answered_with_what_to_do() {
         1,
         &["hint:"],
     );
-    let calibrate =
-        |set: &'static str| ["calibrate", "--device", "native", "--no-walk", "--set", set];
+    let calibrate = |set: &'static str| {
+        [
+            "calibrate",
+            "--device",
+            "native",
+            "--measure",
+            "none",
+            "--set",
+            set,
+        ]
+    };
     fails(&calibrate("l1-mm=3"), 1, &["30 to 1000 mm", "hint:"]);
     fails(&calibrate("length=3"), 2, &["l1-mm"]);
     fails(&calibrate("l1-mm=long"), 2, &["no number"]);

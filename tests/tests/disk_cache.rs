@@ -335,8 +335,8 @@ fn another_tour_of_a_large_file_is_planned_without_reading_it() {
 /// Blocks that a run at a coarse level reads, as it says with `-vv`.
 fn blocks_of_run(file: &Path, cache: &Path, megabytes: &str) -> u64 {
     let output = Command::new(hapterra_binary())
-        .args(["-vv", "run", "--device", "native", "--seconds", "0.2"])
-        .args(["--in-memory-mb", "0", "--level", "4"])
+        .args(["-vv", "run", "--device", "native", "--duration", "0.2s"])
+        .args(["--input", "in-memory=0MB", "--level", "4"])
         .arg(file)
         .env("HAPTERRA_CACHE_DIR", cache)
         .env("HAPTERRA_CACHE_MB", megabytes)

@@ -155,9 +155,16 @@ fn a_run_tells_what_is_felt_and_examples_speak_and_sound_it() {
     let hills = hills_in(folder.path(), 256);
     let [record, commands] = ["felt.csv", "commands"].map(|name| folder.path().join(name));
     std::fs::write(&commands, "at 4 mark a \"b\"\nat 4.1 zoom 1.5\n").expect("written");
-    let words = ["run", text(&hills), "--device", "native", "--seconds", "6"];
-    let more = ["--record", text(&record), "--commands", text(&commands)];
-    let events = Telling::start(&[&words[..], &more, &["--event-samples", "10"]].concat()).end();
+    let words = [
+        "run",
+        text(&hills),
+        "--device",
+        "native",
+        "--duration",
+        "6s",
+    ];
+    let more = ["--out", text(&record), "--commands", text(&commands)];
+    let events = Telling::start(&[&words[..], &more, &["--events", "0,10"]].concat()).end();
     judge(&events, &record);
     if let Some(example) = example("speak_heights.py") {
         let heights = said(example, &events);
@@ -335,14 +342,7 @@ fn demo_tells_samples_marks_and_refusals() {
         "--out",
         text(&out),
     ];
-    let more = [
-        "--seconds",
-        "2.5",
-        "--event-samples",
-        "100",
-        "--commands",
-        "-",
-    ];
+    let more = ["--duration", "2.5s", "--commands", "-"];
     let mut demo = Telling::start(&[&words[..], &more].concat());
     demo.wait_for("sample");
     let mut stdin = demo.stdin.take().expect("piped");
@@ -380,7 +380,7 @@ fn run_ends_disarmed_when_its_input_ends() {
         text(&hills),
         "--device",
         "native",
-        "--record",
+        "--out",
         text(&record),
     ];
     let mut run = Telling::start(&[&words[..], &["--commands", "-", "--end-with-input"]].concat());

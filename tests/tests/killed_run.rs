@@ -26,7 +26,7 @@ fn said(run: &Output) -> String {
 fn replay(folder: &Path, terrain: &Path) -> Command {
     let mut command = Command::new(hapterra_binary());
     command.arg("replay").arg(terrain).arg("/dev/stdin");
-    command.arg("--output").arg(folder.join("out.csv"));
+    command.arg("--out").arg(folder.join("out.csv"));
     command.stdin(Stdio::piped()).stderr(Stdio::piped());
     command
 }
@@ -95,7 +95,7 @@ fn a_killed_commands_recording_is_named_at_the_next_start_and_kept() {
     let run = Command::new(hapterra_binary())
         .arg("run")
         .arg(&terrain)
-        .args(["--device", "native", "--seconds", "0.05", "--record"])
+        .args(["--device", "native", "--duration", "0.05s", "--out"])
         .arg(folder.join("out.csv"))
         .output()
         .expect("started");

@@ -20,8 +20,8 @@ use hapterra_tests::{greedy, hapterra_binary, terrain_file};
 fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
     let mut command = Command::new(hapterra_binary());
     command
-        .args(["run", &terrain(folder), "--cell-mm", "1"])
-        .args(["--height-mm-per-unit", "0.1"]);
+        .args(["run", &terrain(folder), "--scale", "1mm/cell"])
+        .args(["--exaggeration", "0.1mm/unit"]);
     for device in devices {
         command.args(["--device", device]);
     }
@@ -35,7 +35,7 @@ fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
 
 fn recorded(folder: &Path, name: &str) -> Vec<String> {
     let felt = folder.join(name);
-    vec!["--record".into(), felt.to_str().expect("plain").to_owned()]
+    vec!["--out".into(), felt.to_str().expect("plain").to_owned()]
 }
 
 fn texts(owned: &[String]) -> Vec<&str> {
@@ -380,9 +380,9 @@ fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
     let path = path.to_str().expect("a plain path");
     let read_by = |devices: usize| {
         let mut command = Command::new(hapterra_binary());
-        command.args(["run", path, "--in-memory-mb", "1", "--seconds", "8"]);
+        command.args(["run", path, "--input", "in-memory=1MB", "--duration", "8s"]);
         // What the first run keeps on disk of a file that is two seconds old is read by the second.
-        command.args(["--cache-mb", "0"]);
+        command.args(["--cache", "off"]);
         for _ in 0..devices {
             command.args(["--device", "native"]);
         }

@@ -31,7 +31,7 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     };
     let folder = folder("demo");
     let live = folder.join("live.rrd");
-    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"]);
+    demo.args(["demo", "--device", "native", "--duration", "4s", "--view"]);
     let said = Running::whole(demo.arg("--out").arg(&folder), &rrd(&live));
     assert!(!said.contains("not shown"), "{said}");
     let recording = folder.join("fractal.csv");
@@ -58,7 +58,7 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     let again = folder.join("again.rrd");
     let mut view = hapterra().expect("named");
     view.arg("view").arg(&recording).arg("--ignore-settings");
-    Running::whole(view.arg("--terrain").arg(&terrain), &rrd(&again));
+    Running::whole(view.arg(&terrain), &rrd(&again));
     check(&csv, &entities(&again));
     std::fs::remove_dir_all(folder).expect("it goes");
 }
@@ -77,7 +77,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let run = |command: &mut Command, into: &Path| Running::whole(command, &rrd(into));
     synth(&terrain, "512");
     let mut demo = hapterra().expect("named");
-    demo.args(["demo", "--device", "native", "--seconds", "6", "--view"]);
+    demo.args(["demo", "--device", "native", "--duration", "6s", "--view"]);
     demo.arg("--commands").arg(&commands);
     demo.arg("--out").arg(&folder).arg(&terrain);
     run(&mut demo, &at("live.rrd"));
@@ -91,10 +91,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let (first, last) = (bars[0], bars[bars.len() - 1]);
     assert!((0.39..0.51).contains(&(last / first)), "{bars:?}");
     let mut view = hapterra().expect("named");
-    view.arg("view")
-        .arg(&recording)
-        .arg("--terrain")
-        .arg(&terrain);
+    view.arg("view").arg(&recording).arg(&terrain);
     run(&mut view, &at("viewed.rrd"));
     let viewed = entities(&at("viewed.rrd"));
     check_views(&csv, &viewed, true);
@@ -109,7 +106,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     run(replay.arg("-o").arg(&felt), &at("replayed.rrd"));
     check_views(&csv, &entities(&at("replayed.rrd")), true);
     let mut view = hapterra().expect("named");
-    view.arg("view").arg(&felt).arg("--terrain").arg(&terrain);
+    view.arg("view").arg(&felt).arg(&terrain);
     run(&mut view, &at("parquet.rrd"));
     check_views(&csv, &entities(&at("parquet.rrd")), true);
     std::fs::remove_dir_all(folder).expect("it goes");
@@ -125,7 +122,7 @@ fn the_map_says_what_is_laid_in_front_of_the_arm() {
     let (terrain, shown) = (folder.join("hills.tif"), folder.join("shown.rrd"));
     synth(&terrain, "512");
     let mut demo = hapterra().expect("named");
-    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"])
+    demo.args(["demo", "--device", "native", "--duration", "4s", "--view"])
         .args(["--bbox", "501000,1500,503000,3000", "--out"])
         .arg(&folder)
         .arg(&terrain);

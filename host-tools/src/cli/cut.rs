@@ -123,6 +123,7 @@ fn write_npy(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::terrain::FeltCells;
     use heightfield::{OpenOptions, Raster};
 
     #[test]
@@ -135,7 +136,7 @@ mod tests {
             }
         };
         let raster = Raster::from_fn(7, 6, height).expect("raster");
-        let grid = FeltGrid::new(&raster, args.terrain.reading.cells());
+        let grid = FeltGrid::new(&raster, FeltCells::Square);
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(HEIGHTS);
         written(&path, |out| write_npy(out, &grid, 1, [4, 3])).expect("written");

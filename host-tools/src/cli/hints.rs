@@ -70,8 +70,7 @@ impl Hint for BadGround {
 
 impl Hint for PlacingError {
     fn hint(&self) -> String {
-        "choose another place with --at, a smaller --exaggeration or another --scale"
-            .into()
+        "choose another place with --at, a smaller --exaggeration or another --scale".into()
     }
 }
 

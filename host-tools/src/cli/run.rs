@@ -79,7 +79,7 @@ pub struct Args {
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub duration: Option<f64>,
 
-    /// Time after which the device disarms if it hears nothing from here, as 2s
+    /// Time after which the device disarms if it hears nothing from here, as 10s
     #[arg(long, value_name = "TIME", default_value_t = Patience::REAL_SILENCE_S, value_parser = silence)]
     pub silence: u16,
 
@@ -134,7 +134,7 @@ fn silence(text: &str) -> Result<u16, String> {
     let seconds = TIME.read_within(text, [least, most])?;
     match seconds.fract() == 0.0 {
         true => Ok(seconds as u16),
-        false => Err("whole seconds, as 2s".to_owned()),
+        false => Err("whole seconds, as 10s".to_owned()),
     }
 }
 

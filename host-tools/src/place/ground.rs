@@ -42,23 +42,20 @@ pub(super) fn place(
         Coordinates::Epsg(code) => lonlat_of(file, code, place)?,
         Coordinates::Own | Coordinates::LonLat => place,
     };
-    file.of_lonlat(lonlat)
-        .ok_or_else(|| match coordinates == Coordinates::LonLat && is_latitude_first(file, lonlat) {
+    file.of_lonlat(lonlat).ok_or_else(|| {
+        match coordinates == Coordinates::LonLat && is_latitude_first(file, lonlat) {
             true => PlaceError::LatitudeFirst(place),
             false => PlaceError::NotOnMap {
                 lonlat,
                 system: system_in_words(file),
                 bounds: bounds_in_words(file),
             },
-        })
+        }
+    })
 }
 
 /// Longitude and latitude, as the file counts them, of a place in another reference system.
-fn lonlat_of(
-    file: &Georeference<'_>,
-    code: u16,
-    place: [f64; 2],
-) -> Result<[f64; 2], PlaceError> {
+fn lonlat_of(file: &Georeference<'_>, code: u16, place: [f64; 2]) -> Result<[f64; 2], PlaceError> {
     let system = ReferenceSystem::from_code(code).ok_or(PlaceError::UnknownCode(code))?;
     let is_wgs84 = |kind| matches!(kind, LonLat::Wgs84 | LonLat::ShiftedToWgs84 { .. });
     let is_same = match (system.lonlat(), file.lonlat()) {

@@ -66,6 +66,18 @@ def options(**given: Any) -> list[str]:
     ]
 
 
+def reading_options(cache: Word | None = None, **reading: Any) -> list[str]:
+    """Options of the command on an input: ``no_data=-9999`` is ``--input=no-data=-9999``, and
+    ``gdal={"NAME": "VALUE"}`` is ``--input=gdal:NAME=VALUE``."""
+    gdal = {f"gdal:{name}": value for name, value in reading.pop("gdal", {}).items()}
+    named = {name.replace("_", "-"): value for name, value in reading.items()}
+    return options(cache=cache) + [
+        f"--input={name}={_text(value)}"
+        for name, value in {**named, **gdal}.items()
+        if value is not None
+    ]
+
+
 def _text(value: Any) -> str:
     if isinstance(value, (str, os.PathLike)):
         return os.fspath(value)

@@ -39,7 +39,7 @@ pub(crate) fn demo(
             false => &[],
         };
         let mut cut = Command::new(program("hapterra", features)?);
-        cut.arg("cut").arg(file).arg("--output").arg(&folder);
+        cut.arg("cut").arg(file).arg("--out").arg(&folder);
         run(cut.args(extra))?;
     }
     if !is_served {

@@ -48,7 +48,7 @@ fn check_saved(site: &mut Site, folder: &str, least: usize) -> Option<String> {
         .browser
         .call("Browser.setDownloadBehavior", allow, None);
     let _ = site.value("document.getElementById('save').click()");
-    let files = ["path.csv", "terrain.npy"].map(|name| saved.join(name));
+    let files = ["path.csv", "terrain.npy", "surface.toml"].map(|name| saved.join(name));
     wait_until("the saved files", || {
         files.iter().all(|file| file.is_file())
     });
@@ -96,7 +96,7 @@ fn saved_path_feels_the_same_in_replay_bit_for_bit() {
     assert!(line.ends_with("--tip 3mm"), "{line}");
     assert_eq!(site.value("document.getElementById('mixed').hidden"), false);
     // A ball of more than 8 cells, and a point; the surface stays.
-    for (tip_mm, word) in [(5.0, "--tip 5mm"), (0.0, "--texture-wavelength 2")] {
+    for (tip_mm, word) in [(5.0, "--tip 5mm"), (0.0, "--surface surface.toml")] {
         site.slide("tip", tip_mm);
         site.wait(&format!("hapterra.touch.tipMm === {tip_mm}"));
         stroke(&mut site);

@@ -29,7 +29,11 @@ impl FromStr for Measure {
                 "ratios" => measure.ratios = true,
                 "gravity" => measure.gravity = true,
                 "guessed-ratios" => measure.takes_guessed_ratios = true,
-                _ => return Err("all, none, or a list of zero, ratios, gravity and guessed-ratios".into()),
+                _ => {
+                    return Err(
+                        "all, none, or a list of zero, ratios, gravity and guessed-ratios".into(),
+                    );
+                }
             }
         }
         let Self {

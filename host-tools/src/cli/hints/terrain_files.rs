@@ -127,9 +127,7 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         BadRaster::Unreadable(_) => "check the path and that you may read the file",
         BadRaster::Elsewhere(error) => elsewhere(path, error),
         BadRaster::NotYet => "try again",
-        BadRaster::RawSizeMissing => {
-            "say how the samples lie: --input raw=WxH:i16:le"
-        }
+        BadRaster::RawSizeMissing => "say how the samples lie: --input raw=WxH:i16:le",
         BadRaster::AmbiguousChannels(_) => {
             "say which channel holds the height: --input channel=red|green|blue|alpha|grey"
         }

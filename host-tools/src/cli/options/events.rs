@@ -8,6 +8,7 @@ use crate::events::{Server, Watcher};
 
 /// Whether events are sent to other programs.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[command(next_help_heading = "While it is touched")]
 pub struct EventOptions {
     /// Send events as lines of JSON to programs at this port of 127.0.0.1; 0 takes a free one
     ///
@@ -75,7 +76,13 @@ mod tests {
     #[test]
     fn port_and_every_nth_sample() {
         let samples = None;
-        assert_eq!(events("4100"), Ok(Events { port: 4100, samples }));
+        assert_eq!(
+            events("4100"),
+            Ok(Events {
+                port: 4100,
+                samples
+            })
+        );
         let samples = NonZeroU32::new(10);
         assert_eq!(events("0,10"), Ok(Events { port: 0, samples }));
         for bad in ["", "70000", "-1", "1,0", "1,", "1,2,3", ",5"] {

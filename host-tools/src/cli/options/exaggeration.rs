@@ -48,7 +48,10 @@ impl FromStr for Exaggeration {
             Some(number) => (number.trim_end(), Self::MmPerUnit),
             None => (text, Self::Times),
         };
-        let number = number.parse().ok().filter(|number: &f64| number.is_finite());
+        let number = number
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite());
         number.map(make).ok_or_else(|| {
             "a number, as 2 or 0.5, auto, or millimetres a vertical unit, as 0.05mm/unit".into()
         })

@@ -157,7 +157,9 @@ pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Fai
 fn raw(text: &str) -> Result<InputValue, String> {
     let mut parts = text.split(':');
     let (columns, rows) = parse_size(parts.next().unwrap_or_default())?;
-    let sample = parts.next().map(|name| one_of(SampleType::ALL, SampleType::name, name));
+    let sample = parts
+        .next()
+        .map(|name| one_of(SampleType::ALL, SampleType::name, name));
     let endian = parts.next().map(|name| match name {
         "le" => Ok(Endian::Little),
         "be" => Ok(Endian::Big),
@@ -223,7 +225,12 @@ mod tests {
             let text = format!("{key}={value}");
             assert!(text.parse::<InputSetting>().is_ok(), "{text}");
         }
-        let all = ["raw=512x400:f32:be", "no-data=-9999", "cell=0.5km", "gdal:A=b=c"];
+        let all = [
+            "raw=512x400:f32:be",
+            "no-data=-9999",
+            "cell=0.5km",
+            "gdal:A=b=c",
+        ];
         let options = options(&all).expect("read");
         let raw = options.raw.expect("raw");
         assert_eq!((raw.columns, raw.rows), (512, 400));

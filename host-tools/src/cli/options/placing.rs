@@ -185,7 +185,9 @@ pub(in crate::cli) fn short(value: f64) -> String {
 /// The coordinates of a place by name.
 fn coordinates(text: &str) -> Result<Coordinates, String> {
     let code = || {
-        let prefix = text.get(..5).filter(|it| it.eq_ignore_ascii_case("EPSG:"))?;
+        let prefix = text
+            .get(..5)
+            .filter(|it| it.eq_ignore_ascii_case("EPSG:"))?;
         text[prefix.len()..].parse().ok().map(Coordinates::Epsg)
     };
     match text {
@@ -213,7 +215,15 @@ mod tests {
         assert_eq!(coordinates("file"), Ok(Coordinates::Own));
         assert_eq!(coordinates("lonlat"), Ok(Coordinates::LonLat));
         assert_eq!(coordinates("epsg:2056"), Ok(Coordinates::Epsg(2056)));
-        for bad in ["", "wgs84", "EPSG:", "EPSG:x", "EPSG:70000", "2056", "°°°°°1"] {
+        for bad in [
+            "",
+            "wgs84",
+            "EPSG:",
+            "EPSG:x",
+            "EPSG:70000",
+            "2056",
+            "°°°°°1",
+        ] {
             assert!(coordinates(bad).is_err(), "{bad}");
         }
     }

@@ -72,7 +72,10 @@ impl Units {
     pub fn read(&self, text: &str) -> Result<f64, String> {
         let (number, unit) = split(text);
         let size = self.size_of(unit);
-        let value = number.parse::<f64>().ok().filter(|number| number.is_finite());
+        let value = number
+            .parse::<f64>()
+            .ok()
+            .filter(|number| number.is_finite());
         match (value, size) {
             (Some(value), Some(1.0)) => Ok(value),
             (Some(value), Some(size)) => Ok(value * size),

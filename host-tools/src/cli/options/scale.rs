@@ -91,7 +91,16 @@ mod tests {
             assert_eq!(text.parse(), Ok(wanted));
             assert_eq!(wanted.to_string().parse(), Ok(wanted));
         }
-        for bad in ["", "5mm", "0", "-2m/mm", "nanmm/cell", "0mm/cell", "infm/mm", "1/5"] {
+        for bad in [
+            "",
+            "5mm",
+            "0",
+            "-2m/mm",
+            "nanmm/cell",
+            "0mm/cell",
+            "infm/mm",
+            "1/5",
+        ] {
             let why = bad.parse::<MapScale>().expect_err(bad);
             assert!(why.contains("size"), "{bad}: {why}");
         }

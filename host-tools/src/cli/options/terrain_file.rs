@@ -24,9 +24,11 @@ const LIMIT_VARIABLE: &str = "HAPTERRA_CACHE_MB";
 /// A terrain file, and what the user says about it that it does not say itself.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TerrainFile {
-    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, .flt, .bil, .npy, or raw samples; many as one: a folder
-    /// or a quoted pattern ('tiles/*.tif'); one of these at a URL (https, s3, gs, az), in builds with
-    /// them; or what GDAL reads, where it is installed: VRT, STAC, NetCDF, DTED, archives and more
+    /// Terrain: a file, a folder, a quoted pattern ('tiles/*.tif') or a URL
+    ///
+    /// GeoTIFF, .hgt, .asc, PNG, .flt, .bil, .npy or raw samples; many files as one; one of these at a
+    /// URL (https, s3, gs, az), in builds with URLs; what GDAL reads, if it is installed: VRT, STAC,
+    /// NetCDF, DTED, archives and more.
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
@@ -38,7 +40,7 @@ pub struct TerrainFile {
 /// What the user says about a terrain file that it does not say itself.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ReadingOptions {
-    /// What the file does not say itself, as no-data=-9999 or cell=30m (--help lists the keys)
+    /// What the file does not state, as no-data=-9999, band=2 or cell=30m
     ///
     /// May be repeated. raw=512x400:i16:le: raw samples, north row first, their type and byte order;
     /// no-data=VALUE: the stored value without a height; band=N: the band with the heights;
@@ -117,12 +119,16 @@ impl ReadingOptions {
         let folder = self.cache.clone().or_else(DiskCache::usual_folder);
         let folder = folder.filter(|folder| folder.as_os_str() != "off");
         let limit = std::env::var_os(LIMIT_VARIABLE).filter(|limit| !limit.is_empty());
-        let limit_mb = match limit.as_deref().map(|limit| limit.to_str().map(str::parse::<u32>)) {
+        let limit_mb = match limit
+            .as_deref()
+            .map(|limit| limit.to_str().map(str::parse::<u32>))
+        {
             None => DiskCache::MOST_MB,
             Some(Some(Ok(limit_mb))) => limit_mb,
             Some(_) => {
-                return Err(format!("{LIMIT_VARIABLE} is no number of megabytes"))
-                    .or_hint(format!("set {LIMIT_VARIABLE} to a whole number, or to nothing"));
+                return Err(format!("{LIMIT_VARIABLE} is no number of megabytes")).or_hint(
+                    format!("set {LIMIT_VARIABLE} to a whole number, or to nothing"),
+                );
             }
         };
         Ok(folder.map_or(DiskCache::off(), |folder| {
@@ -175,6 +181,8 @@ pub fn assumed_unit(raster: &Raster) -> Option<String> {
                 "{assumed}, but the ground is in units of {metres} m; if the heights are too, they are rendered {times:.2} times too steep: --input height-unit={unit} (or height-unit=m)"
             ))
         }
-        CellUnit::Degree => Some(format!("{assumed} (--input height-unit=ft, if they are feet)")),
+        CellUnit::Degree => Some(format!(
+            "{assumed} (--input height-unit=ft, if they are feet)"
+        )),
     }
 }

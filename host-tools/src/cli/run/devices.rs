@@ -118,9 +118,11 @@ fn check(args: &Args) -> Result<(), Failure> {
     apart(&addresses_of(args))?;
     plants_apart(args)?;
     if args.viewing.view {
-        return Err(Failure::new(format!("--view shows one device, and not {count}")).hint(
-            "leave --view out, record with -o, and look at each recording with `hapterra view`",
-        ));
+        return Err(
+            Failure::new(format!("--view shows one device, and not {count}")).hint(
+                "leave --view out, record with -o, and look at each recording with `hapterra view`",
+            ),
+        );
     }
     if args.commands.are_typed() && std::io::IsTerminal::is_terminal(&std::io::stdin()) {
         let error = "with several devices `--commands -` takes no lines from a terminal, whose Enter arms an arm";

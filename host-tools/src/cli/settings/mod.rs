@@ -31,6 +31,7 @@ const NOT_IN_FILE: [&str; 4] = ["settings", "help", "version", "verbose"];
 
 /// Which settings file is read.
 #[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Settings")]
 pub struct SettingsOption {
     /// Settings: a FILE.toml, a recording, or none [default: hapterra.toml, if it exists]
     ///
@@ -78,7 +79,9 @@ pub(super) fn complete(command: &Command, words: Vec<OsString>) -> Result<Comple
     };
     let mut sources = Vec::from_iter(of_recording(name, of_command)?);
     let from_file = of_file(name, of_command)?;
-    let line = from_file.as_ref().map(|(path, _)| format!("settings       {}", path.display()));
+    let line = from_file
+        .as_ref()
+        .map(|(path, _)| format!("settings       {}", path.display()));
     sources.extend(from_file.map(|(_, settings)| settings));
     let mut given: BTreeSet<String> = options
         .get_arguments()
@@ -88,13 +91,19 @@ pub(super) fn complete(command: &Command, words: Vec<OsString>) -> Result<Comple
     let mut keys = input_keys(of_command);
     let mut before = Vec::new();
     for settings in sources {
-        let names: Vec<_> = settings.iter().map(|setting| setting.name.clone()).collect();
+        let names: Vec<_> = settings
+            .iter()
+            .map(|setting| setting.name.clone())
+            .collect();
         for setting in settings {
             before.extend(words_of(&command, options, &given, &mut keys, &setting)?);
         }
         given.extend(names);
     }
-    let place = words.iter().position(|word| word == name).map_or(1, |at| at + 1);
+    let place = words
+        .iter()
+        .position(|word| word == name)
+        .map_or(1, |at| at + 1);
     let mut words = words;
     words.splice(place..place, before);
     Ok(Completed { words, line })
@@ -113,7 +122,10 @@ fn relaxed(command: &Command) -> Command {
 /// Returns true if the user or the environment gives an option.
 fn is_given(matches: &ArgMatches, option: &Arg) -> bool {
     let from = matches.value_source(option.get_id().as_str());
-    matches!(from, Some(ValueSource::CommandLine | ValueSource::EnvVariable))
+    matches!(
+        from,
+        Some(ValueSource::CommandLine | ValueSource::EnvVariable)
+    )
 }
 
 /// The keys of the user's `--input`: a setting adds others.
@@ -173,13 +185,21 @@ fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Sett
         None if Path::new(USUAL_FILE).exists() => USUAL_FILE.into(),
         None => return Ok(None),
     };
-    if path.extension().is_some_and(|extension| extension == "toml") {
+    if path
+        .extension()
+        .is_some_and(|extension| extension == "toml")
+    {
         let command = Cli::command();
         let settings = file::read(&path, |key| is_known(&command, key))?;
         return Ok(Some((path, settings)));
     }
     let settings = settings_of(&path)?
-        .ok_or_else(|| format!("{} is no recording with settings, and no .toml", path.display()))
+        .ok_or_else(|| {
+            format!(
+                "{} is no recording with settings, and no .toml",
+                path.display()
+            )
+        })
         .or_hint("name a recording or a FILE.toml with --settings")?;
     let settings = recorded::settings(&path, &settings, stated_in(matches));
     Ok(Some((path, settings)))
@@ -187,7 +207,9 @@ fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Sett
 
 /// Returns true if one of the commands has an option of a name.
 fn is_known(command: &Command, name: &str) -> bool {
-    let mut commands = COMMANDS.iter().filter_map(|known| command.find_subcommand(known));
+    let mut commands = COMMANDS
+        .iter()
+        .filter_map(|known| command.find_subcommand(known));
     !NOT_IN_FILE.contains(&name) && commands.any(|known| option(known, name).is_some())
 }
 
@@ -209,11 +231,15 @@ fn words_of(
     let Some(option) = option(of, name) else {
         return Ok(vec![]);
     };
-    let conflicts = of.get_arg_conflicts_with(option);
-    let conflicts = conflicts.iter().filter_map(|other| other.get_long());
+    let is_given = |other: &&Arg| other.get_long().is_some_and(|name| given.contains(name));
+    let is_against = |other: &Arg| {
+        let has = |one, other| of.get_arg_conflicts_with(one).contains(&other);
+        has(option, other) || has(other, option)
+    };
     let is_input = name == "input";
-    let is_out = |name: &str| given.contains(name);
-    if (!is_input && is_out(name)) || conflicts.into_iter().any(is_out) {
+    let is_out =
+        (!is_input && given.contains(name)) || of.get_arguments().filter(is_given).any(is_against);
+    if is_out {
         return Ok(vec![]);
     }
     let is_flag = matches!(option.get_action(), ArgAction::SetTrue);
@@ -251,8 +277,10 @@ fn check(command: &Command, name: &str, word: &OsStr, setting: &Setting) -> Resu
     let text = error.render().to_string();
     let what = text.lines().next().unwrap_or_default();
     let what = what.strip_prefix("error: ").unwrap_or(what);
-    Err(format!("{}: {what}", setting.place))
-        .or_hint(format!("hapterra {name} --help says what --{} takes", setting.name))
+    Err(format!("{}: {what}", setting.place)).or_hint(format!(
+        "hapterra {name} --help says what --{} takes",
+        setting.name
+    ))
 }
 
 #[cfg(test)]

@@ -83,7 +83,11 @@ pub(in crate::cli) fn differences(
 ) -> Vec<String> {
     let (felt, force, surface) = (&recorded.felt, &recorded.force, &rendering.surface);
     let number = |name: &str, value: Option<f32>, recorded: f32, say: &dyn Fn(f32) -> String| {
-        (name.to_owned(), say(value.unwrap_or(recorded)), say(recorded))
+        (
+            name.to_owned(),
+            say(value.unwrap_or(recorded)),
+            say(recorded),
+        )
     };
     let recorded_height = height(felt, rendering.scale, cells);
     let exaggeration = rendering.exaggeration.unwrap_or(recorded_height);
@@ -103,18 +107,48 @@ pub(in crate::cli) fn differences(
     };
     let own = "its own".to_owned();
     let lines = [
-        ("input".into(), in_words(cells).into(), in_words(felt.cells).into()),
+        (
+            "input".into(),
+            in_words(cells).into(),
+            in_words(felt.cells).into(),
+        ),
         ("scale".into(), stated_scale.to_string(), scale.to_string()),
-        ("exaggeration".into(), exaggeration.to_string(), recorded_height),
+        (
+            "exaggeration".into(),
+            exaggeration.to_string(),
+            recorded_height,
+        ),
         ("level".into(), level.to_string(), felt.level.to_string()),
         ("tip".into(), LENGTH.say(tip_mm), LENGTH.say(felt.tip_mm)),
-        ("surface".into(), surface_in_words(surface.surface.as_ref(), path), own),
-        number("stiffness", surface.stiffness, force.stiffness_n_per_mm, &|it| STIFFNESS.say(it)),
-        number("friction", surface.friction, force.friction.dynamic_mu, &|it| it.to_string()),
-        number("max-force", surface.max_force, force.max_force_n, &|it| FORCE.say(it)),
-        ("materials".into(), shown(&surface.materials), shown(&materials)),
+        (
+            "surface".into(),
+            surface_in_words(surface.surface.as_ref(), path),
+            own,
+        ),
+        number(
+            "stiffness",
+            surface.stiffness,
+            force.stiffness_n_per_mm,
+            &|it| STIFFNESS.say(it),
+        ),
+        number(
+            "friction",
+            surface.friction,
+            force.friction.dynamic_mu,
+            &|it| it.to_string(),
+        ),
+        number("max-force", surface.max_force, force.max_force_n, &|it| {
+            FORCE.say(it)
+        }),
+        (
+            "materials".into(),
+            shown(&surface.materials),
+            shown(&materials),
+        ),
     ];
-    let lines = lines.into_iter().filter(|(_, given, recorded)| given != recorded);
+    let lines = lines
+        .into_iter()
+        .filter(|(_, given, recorded)| given != recorded);
     let line = |(name, given, recorded): (String, String, String)| {
         format!("--{name} {given}, where the recording has {recorded}")
     };
@@ -132,7 +166,9 @@ fn in_words(cells: FeltCells) -> &'static str {
 fn surface_in_words(surface: Option<&SurfaceChoice>, recording: &Path) -> String {
     match surface {
         Some(SurfaceChoice::Named(named)) => named.name.to_owned(),
-        Some(SurfaceChoice::File(file)) if *file != surface_file(recording) => file.display().to_string(),
+        Some(SurfaceChoice::File(file)) if *file != surface_file(recording) => {
+            file.display().to_string()
+        }
         Some(SurfaceChoice::File(_)) | None => "its own".to_owned(),
     }
 }

@@ -166,8 +166,10 @@ impl SurfaceOptions {
             default.friction = rubbed(&default.friction, mu);
         }
         if default.stiffness_n_per_mm == 0.0 {
-            return Err("a default without stiffness: views make all materials as much stiffer as it")
-                .or_hint("state stiffness in [default]");
+            return Err(
+                "a default without stiffness: views make all materials as much stiffer as it",
+            )
+            .or_hint("state stiffness in [default]");
         }
         let classes = table.classes.iter().map(|(class, line, look)| {
             let what = format!("class {class}");
@@ -209,7 +211,9 @@ impl SurfaceOptions {
         Err(Failure::new(format!(
             "a stiffness of {stiffness} N/mm: a table may ask for {most} N/mm at most"
         ))
-        .hint(format!("if you trust the table, say --stiffness {stiffness}"))
+        .hint(format!(
+            "if you trust the table, say --stiffness {stiffness}"
+        ))
         .about(Some(&place)))
     }
 }
@@ -320,18 +324,24 @@ fn check(material: &Material) -> Result<(), String> {
     };
     if !damping.is_valid() {
         let (damping, most) = (material.damping_ns_per_m, Damping::MOST_NS_PER_M);
-        return Err(format!("a damping of {damping} N·s/m: damping from 0 to {most} N·s/m"));
+        return Err(format!(
+            "a damping of {damping} N·s/m: damping from 0 to {most} N·s/m"
+        ));
     }
     let stiffness = material.stiffness_n_per_mm;
     let is_valid = material.is_valid();
     is_valid.then_some(()).ok_or_else(|| {
-        format!("a stiffness of {stiffness} N/mm: stiffness finite and not below 0, usually 0.5 N/mm")
+        format!(
+            "a stiffness of {stiffness} N/mm: stiffness finite and not below 0, usually 0.5 N/mm"
+        )
     })
 }
 
 /// What is wrong, and what to do, as a failure.
 fn told(why: &str) -> Failure {
-    let (what, next_step) = why.split_once(": ").unwrap_or((why, "choose another number"));
+    let (what, next_step) = why
+        .split_once(": ")
+        .unwrap_or((why, "choose another number"));
     Failure::new(what.to_owned()).hint(next_step)
 }
 

@@ -333,7 +333,10 @@ mod tests {
         assert_eq!(table.shading, ShadingName::Smooth);
         assert_eq!(table.passivity, PassivityName::Off);
         let look = &table.default.1;
-        assert_eq!((look.stiffness, look.viscous_friction), (Some(0.6), Some(0.01)));
+        assert_eq!(
+            (look.stiffness, look.viscous_friction),
+            (Some(0.6), Some(0.01))
+        );
         assert_eq!(look.texture_amplitude, Some(0.2));
         let settings = "device = \"usb\"\n\n[surface.default]\nfriction = 0.4\n";
         let table = read(settings).expect("a table");

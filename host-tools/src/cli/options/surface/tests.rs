@@ -13,7 +13,6 @@ fn load(options: SurfaceOptions, text: &str) -> Result<Surface, String> {
     options.load().map_err(|failure| failure.text())
 }
 
-
 #[test]
 fn class_takes_from_the_default_and_the_options() {
     let options = SurfaceOptions {
@@ -116,11 +115,7 @@ fn options_that_no_surface_has_are_refused() {
 #[test]
 fn table_asks_for_no_more_stiffness_than_the_command_line() {
     for (text, told, allowed) in [
-        (
-            "[default]\nstiffness = 3",
-            "line 1: a stiffness of 3",
-            true,
-        ),
+        ("[default]\nstiffness = 3", "line 1: a stiffness of 3", true),
         ("[class.1]\nstiffness = 1.1", "a stiffness of 1.1", true),
         ("[class.1]\nstiffness = 1e30", "at most", false),
     ] {

@@ -15,11 +15,13 @@ const USUAL_MOST_MM: f32 = 0.2;
 /// # Errors
 /// Numbers without a texture, or such that no hand could feel or no tick could make.
 pub(super) fn texture(look: &Look, default: &Texture) -> Result<Texture, String> {
-    let pattern = look.texture.map_or(default.pattern, |texture| match texture {
-        TextureName::None => Pattern::None,
-        TextureName::Grain => Pattern::Grain,
-        TextureName::Grating => Pattern::Grating,
-    });
+    let pattern = look
+        .texture
+        .map_or(default.pattern, |texture| match texture {
+            TextureName::None => Pattern::None,
+            TextureName::Grain => Pattern::Grain,
+            TextureName::Grating => Pattern::Grating,
+        });
     if pattern == Pattern::None {
         return match first_number(look) {
             None => Ok(Texture::NONE),
@@ -130,7 +132,13 @@ mod tests {
         };
         let texture = super::texture(&higher, &default).expect("valid");
         let amplitude_mm = 0.15;
-        assert_eq!(texture, Texture { amplitude_mm, ..default });
+        assert_eq!(
+            texture,
+            Texture {
+                amplitude_mm,
+                ..default
+            }
+        );
         let other = Look {
             texture: Some(TextureName::Grain),
             ..Look::default()
