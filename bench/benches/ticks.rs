@@ -1,11 +1,11 @@
 //! `cargo bench`: a tick in each state, ours and the plain paper.
 
 use divan::{Bencher, counter::ItemsCount};
-use hapterra_bench::baseline::{Paper, Start};
-use hapterra_bench::grid::Grid;
-use hapterra_bench::haptics::Haptics;
-use hapterra_bench::path::{self, Flight, Path};
-use hapterra_bench::product::{self, Product, SIDE};
+use hapterra_lab::baseline::{Paper, Start};
+use hapterra_lab::grid::Grid;
+use hapterra_lab::haptics::Haptics;
+use hapterra_lab::path::{self, Flight, Path};
+use hapterra_lab::product::{self, Product, SIDE};
 
 const TICKS: usize = 4000;
 const PATHS: [&str; 6] = [

@@ -12,11 +12,14 @@
 //! - [`solver`]: one patch, and the square root, alone;
 //! - [`state`]: what a tick can be doing, for counting instructions;
 //! - [`streaming`]: terrain larger than memory and farther than the disk;
-//! - [`report`]: the table, the CSV file, the picture.
+//! - [`stability`]: how stiff a surface may be, by trials on a virtual arm;
+//! - [`report`]: the table, the CSV file, the picture;
+//! - [`cli`]: the command `hapterra-lab`.
 
 #![forbid(unsafe_code)]
 
 pub mod baseline;
+pub mod cli;
 mod clock;
 pub mod compare;
 pub mod continuity;
@@ -27,6 +30,7 @@ pub mod path;
 pub mod product;
 pub mod report;
 pub mod solver;
+pub mod stability;
 pub mod state;
 mod stats;
 pub mod streaming;

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use hapterra_bench::compare::Effort;
-use hapterra_bench::effects::{Effect, Error, errors, measure};
-use hapterra_bench::{report, state};
+use hapterra_lab::compare::Effort;
+use hapterra_lab::effects::{Effect, Error, errors, measure};
+use hapterra_lab::{report, state};
 
 /// A kept figure may be off by this share of itself, or of what it may be: four digits are kept, and
 /// machines round sines differently.
@@ -33,7 +33,7 @@ fn the_kept_errors_are_those_of_the_code_as_it_is() {
     assert_eq!(
         count,
         measured.len(),
-        "hapterra bench --effects --csv docs/effects.csv"
+        "hapterra-lab contact --effects -o docs/effects.csv"
     );
     let is_kept = |error: &Error| {
         let names = [&error.terrain, error.path, error.effect, error.what];
@@ -51,7 +51,7 @@ fn the_kept_errors_are_those_of_the_code_as_it_is() {
     let stale: Vec<_> = measured.iter().filter(|error| !is_kept(error)).collect();
     assert!(
         stale.is_empty(),
-        "hapterra bench --effects --csv docs/effects.csv: the table is older than {stale:#?}"
+        "hapterra-lab contact --effects -o docs/effects.csv: the table is older than {stale:#?}"
     );
 }
 

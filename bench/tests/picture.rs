@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use hapterra_bench::compare::{Error, Family, Label, Row};
-use hapterra_bench::report;
+use hapterra_lab::compare::{Error, Family, Label, Row};
+use hapterra_lab::report;
 
 /// Kept figures as they were measured; names live as long as the program.
 fn kept() -> Vec<Row> {

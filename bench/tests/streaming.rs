@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use hapterra_bench::report::{self, STREAMING_HEADER};
-use hapterra_bench::streaming::{LATENCIES_MS, RATES, Reading, Row, SIDES};
+use hapterra_lab::report::{self, STREAMING_HEADER};
+use hapterra_lab::streaming::{LATENCIES_MS, RATES, Reading, Row, SIDES};
 
 /// Bytes that the host may take for any terrain, 10⁶: the device in the same process is one of
 /// these megabytes.
@@ -23,8 +23,8 @@ fn kept() -> Vec<Row> {
 /// The program's exit, what it says on both outputs, and the table that it writes.
 fn streamed(name: &str, arguments: &[&str]) -> (bool, String, PathBuf) {
     let csv = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let output = Command::new(env!("CARGO_BIN_EXE_hapterra-bench"))
-        .args(["--streaming", "--quick", "--latencies", "0", "--csv"])
+    let output = Command::new(env!("CARGO_BIN_EXE_hapterra-lab"))
+        .args(["streaming", "--quick", "--latencies", "0", "--out"])
         .arg(&csv)
         .args(arguments)
         .output()
@@ -134,8 +134,8 @@ fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
 #[test]
 #[cfg(not(feature = "remote"))]
 fn latencies_without_a_server_are_refused_with_the_build_that_has_one() {
-    let output = Command::new(env!("CARGO_BIN_EXE_hapterra-bench"))
-        .args(["--streaming", "--latencies", "0,50"])
+    let output = Command::new(env!("CARGO_BIN_EXE_hapterra-lab"))
+        .args(["streaming", "--latencies", "0,50"])
         .output()
         .expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr);

@@ -73,7 +73,7 @@ impl Outermost {
         ];
         for (which, value, _) in suspects.iter().filter(|(_, _, is_suspect)| *is_suspect) {
             remarks.push(format!(
-                "its {which} stored value is {value}, which many files have where there is no data, and it does not declare that: if these are no heights, state it: --no-data {value}"
+                "its {which} stored value is {value}, which many files have where there is no data, and it does not declare that: if these are no heights, state it: --input no-data={value}"
             ));
         }
         remarks
@@ -103,9 +103,9 @@ mod tests {
     fn values_that_stand_for_no_data_elsewhere_are_named() {
         for value in LOW.into_iter().chain(HIGH) {
             let said = remarks(&[367.0, value, 400.0], false);
-            assert!(said.contains(&format!("--no-data {value}")), "{said}");
+            assert!(said.contains(&format!("--input no-data={value}")), "{said}");
         }
-        assert!(remarks(&[0.0, 367.0, 960.0], false).contains("--no-data 0"));
+        assert!(remarks(&[0.0, 367.0, 960.0], false).contains("--input no-data=0"));
         assert!(remarks(&[f64::INFINITY, f64::NEG_INFINITY, 1.0], false).starts_with("2 of"));
     }
 

@@ -150,7 +150,9 @@ pub struct VerticalDatum {
 /// Returns the remark on a unit of heights that [`metres_in`] does not know.
 pub(super) fn unknown_unit(name: &str) -> String {
     let name = beginning(name);
-    format!("it states the unit of heights '{name}', which is not known here (--vertical-unit)")
+    format!(
+        "it states the unit of heights '{name}', which is not known here (--input height-unit=…)"
+    )
 }
 
 /// Metres in a unit of length by the name files give it, as `ft` or `metre`.

@@ -72,7 +72,7 @@ pub(super) fn no_data(text: &str, band: usize, bands: usize) -> NoDataText {
     let remark = match value {
         Some(value) => format!("its no-data value is the text '{text}': {value} is taken"),
         None => format!(
-            "its no-data value is the text '{text}', which is no number: it is not used (state it: --no-data VALUE)"
+            "its no-data value is the text '{text}', which is no number: it is not used (state it: --input no-data=VALUE)"
         ),
     };
     NoDataText {
@@ -118,6 +118,6 @@ mod tests {
         assert_eq!(value("None", 0, 1), None);
         assert_eq!(no_data("-9999,0", 0, 1).remark, None);
         let remark = no_data("None", 0, 1).remark.expect("a remark");
-        assert!(remark.contains("'None'") && remark.contains("--no-data"));
+        assert!(remark.contains("'None'") && remark.contains("--input no-data"));
     }
 }

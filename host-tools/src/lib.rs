@@ -51,6 +51,7 @@ pub mod replay;
 pub mod serving;
 pub mod stability;
 pub mod steering;
+pub mod surface;
 pub mod synth;
 pub mod telemetry;
 pub mod terrain;

@@ -2,7 +2,7 @@
 
 import { Clock, TICK_HZ } from "./clock.js";
 import { load } from "./kernel.js";
-import { command, npy } from "./path.js";
+import { command, npy, surfaceFile } from "./path.js";
 import { Pointer } from "./pointer.js";
 import { read } from "./read/file.js";
 import { Sound } from "./sound.js";
@@ -118,6 +118,8 @@ async function main() {
     if (isMixed) kernel.again(touch.surface, touch.path);
     save("path.csv", touch.path.csv());
     save("terrain.npy", npy(touch.terrain));
+    const surface = surfaceFile(touch.surface);
+    if (surface) save("surface.toml", surface);
     element("saved").hidden = false;
     element("mixed").hidden = !isMixed;
     element("command").textContent = command(touch.terrain, touch.surface, touch.tipMm);

@@ -61,12 +61,18 @@ export function npy({ nx, ny, heights }) {
   return file;
 }
 
-/** What to type to feel the path again, beside the two files. */
-export function command(terrain, { friction, stiffness, texture, wavelength }, tipMm) {
+/** The texture of a surface as a file for the command; none where it has none. */
+export function surfaceFile({ texture, wavelength }) {
+  if (!(texture > 0)) return null;
+  return `[default]\ntexture = "grain"\ntexture_amplitude = ${texture}\ntexture_wavelength = ${wavelength}\n`;
+}
+
+/** What to type to feel the path again, beside the saved files. */
+export function command(terrain, { friction, stiffness, texture }, tipMm) {
   const words = ["hapterra replay terrain.npy path.csv -o felt.csv"];
-  words.push(`--cell-mm ${terrain.cellMm} --height-mm-per-unit 1`);
-  words.push(`--stiffness-n-per-mm ${stiffness} --friction ${friction}`);
-  if (texture > 0) words.push(`--texture grain --texture-amplitude ${texture} --texture-wavelength ${wavelength}`);
+  words.push(`--scale ${terrain.cellMm}mm/cell --exaggeration 1mm/unit`);
+  words.push(`--stiffness ${stiffness} --friction ${friction}`);
+  if (texture > 0) words.push("--surface surface.toml");
   if (tipMm > 0) words.push(`--tip ${tipMm}mm`);
   return words.join(" ");
 }

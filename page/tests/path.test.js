@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { MAX_ROWS, Path, command, npy } from "../js/path.js";
+import { MAX_ROWS, Path, command, npy, surfaceFile } from "../js/path.js";
 import { read } from "../js/read/file.js";
 
 test("path keeps every bit in CSV", () => {
@@ -34,7 +34,9 @@ test("saved terrain is read again with the same bits", async () => {
 test("command names the surface as it was felt", () => {
   const surface = { friction: 0.4, stiffness: 0.7, texture: 0.1, wavelength: 2 };
   const words = command({ cellMm: 0.25 }, surface, 0);
-  assert.match(words, /--cell-mm 0.25 .*--stiffness-n-per-mm 0.7 --friction 0.4 --texture grain --texture-amplitude 0.1 --texture-wavelength 2$/);
-  assert.doesNotMatch(command({ cellMm: 0.25 }, { ...surface, texture: 0 }, 0), /texture|tip/);
+  assert.match(words, /--scale 0.25mm\/cell .*--stiffness 0.7 --friction 0.4 --surface surface.toml$/);
+  assert.doesNotMatch(command({ cellMm: 0.25 }, { ...surface, texture: 0 }, 0), /surface|tip/);
+  assert.match(surfaceFile(surface), /texture_amplitude = 0.1\ntexture_wavelength = 2\n$/);
+  assert.equal(surfaceFile({ ...surface, texture: 0 }), null);
   assert.match(command({ cellMm: 0.25 }, surface, 2.5), / --tip 2.5mm$/);
 });

@@ -66,9 +66,10 @@ impl Opened {
     /// Opens a file, or several as one, by the command's options, and lays all of it.
     pub(crate) fn open(paths: Vec<PathBuf>, words: Vec<OsString>) -> PyResult<Arc<Self>> {
         let Words { reading, size } = parsed(words)?;
+        let options = reading.options().map_err(failed)?;
         let raster = match &paths[..] {
-            [path] => Raster::open(path, &reading.options()),
-            _ => Raster::open_all(paths, &reading.options()),
+            [path] => Raster::open(path, &options),
+            _ => Raster::open_all(paths, &options),
         };
         let raster = raster.map_err(unread)?;
         if let Some(note) = assumed_unit(&raster) {
@@ -180,13 +181,13 @@ impl Opened {
         let cells = [0, 1].map(|axis| mm[axis] / cell_mm + f64::from(self.first[axis]));
         let ground = terrain.grid().to_ground(cells);
         let file = terrain.raster().georeference();
-        match coordinates {
-            Coordinates::Own => Ok(ground),
-            Coordinates::LonLat => file.to_lonlat(ground).ok_or_else(|| {
-                let bounds = place::bounds_in_words(&file);
-                failed(PlaceError::NoSystem { bounds }.into())
-            }),
+        if coordinates == Coordinates::Own {
+            return Ok(ground);
         }
+        file.to_lonlat(ground).ok_or_else(|| {
+            let bounds = place::bounds_in_words(&file);
+            failed(PlaceError::NoSystem { bounds }.into())
+        })
     }
 
     /// What the file states about itself, in words.
@@ -272,13 +273,9 @@ impl Size {
     }
 
     fn heights(&self) -> place::Heights {
-        match (
-            self.height_mm_per_unit,
-            self.exaggeration.unwrap_or_default(),
-        ) {
-            (Some(height), _) => place::Heights::MmPerUnit(height),
-            (None, Exaggeration::Times(times)) => place::Heights::Exaggerated(times),
-            (None, Exaggeration::Auto) => place::Heights::Suited,
+        match self.height_mm_per_unit {
+            Some(height) => place::Heights::MmPerUnit(height),
+            None => self.exaggeration.unwrap_or_default().into(),
         }
     }
 }

@@ -78,7 +78,7 @@ def test_command_runs_once_in_a_process():
 def serving(folder):
     """Words of a command that serves until it is interrupted, and its recording."""
     np.save(folder / "flat.npy", np.zeros((50, 50)))
-    words = ["run", folder / "flat.npy", "--device", "native", "--record", folder / "felt.csv"]
+    words = ["run", folder / "flat.npy", "--device", "native", "--out", folder / "felt.csv"]
     return list(map(str, words))
 
 

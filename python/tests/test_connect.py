@@ -40,7 +40,7 @@ def test_native_device_from_arming_to_disarmed(tmp_path):
     record = tmp_path / "felt.csv"
     with connect("native", record=record) as device:
         assert not device.is_armed and not device.is_disarmed
-        device.load(hills(), Surface(friction=0.3, stiffness=0.4), seconds=60)
+        device.load(hills(), Surface(friction=0.3, stiffness=0.4), duration="60s")
         device.arm()
         assert device.is_armed and device.fault is None
         with pytest.raises(DeviceError, match="disarm"):
@@ -91,7 +91,7 @@ def test_array_is_loaded_as_it_lies(tmp_path):
     heights[0, 0] = np.nan
     path, scale = Terrain(heights, cell_mm=2, origin="lower")._write(tmp_path / "a.npy")
     assert np.array_equal(np.load(path), heights[::-1], equal_nan=True)
-    assert scale == {"cell_mm": 2, "height_mm_per_unit": 1}
+    assert scale == {"scale": "2.0mm/cell", "exaggeration": "1.0mm/unit"}
     opened = Terrain.open(path, cell_mm=2)
     again, _ = opened._write(tmp_path / "b.npy")
     assert np.array_equal(np.load(again), heights[::-1], equal_nan=True)

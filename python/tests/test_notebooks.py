@@ -4,6 +4,7 @@ After a change: ``jupyter execute --inplace notebooks/NAME.ipynb``, and look at 
 """
 
 import copy
+import os
 import pathlib
 
 import pytest
@@ -28,6 +29,8 @@ def outputs(notebook):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_notebook_prints_what_is_stored(name):
+    if name == "stiffness" and "HAPTERRA_LAB" not in os.environ:
+        pytest.skip("cargo xtask python --test names hapterra-lab")
     stored = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
     resources = {"metadata": {"path": str(FOLDER)}}
     ran = copy.deepcopy(stored)

@@ -44,9 +44,9 @@ def degrees(folder):
     "make, reading",
     [
         (lambda folder: written(folder / "hills.tif"), {}),
-        (lambda folder: written(folder / "hills.tif"), {"in_memory_mb": 0}),
+        (lambda folder: written(folder / "hills.tif"), {"in_memory": 0}),
         (degrees, {}),
-        (degrees, {"in_memory_mb": 0, "vertical_unit": "ft"}),
+        (degrees, {"in_memory": 0, "height_unit": "ft"}),
         (lambda folder: tiles(folder) and folder / "*.tif", {}),
     ],
     ids=["memory", "file", "degrees", "feet", "pattern"],
@@ -54,8 +54,8 @@ def degrees(folder):
 def test_opened_terrain_is_a_replay(tmp_path, surface, flags, make, reading):
     file = make(tmp_path)
     path = stroke(20_000)
-    words = [f"--{name.replace('_', '-')}={value}" for name, value in reading.items()]
-    felt = replayed(tmp_path, file, path, words=[f"--cell-mm={CELL_MM}", *flags, *words])
+    words = [f"--input={name.replace('_', '-')}={value}" for name, value in reading.items()]
+    felt = replayed(tmp_path, file, path, words=[f"--scale={CELL_MM}mm/cell", *flags, *words])
     terrain = Terrain.open(file, cell_mm=CELL_MM, **reading)
     touching = same(Contact(terrain, Surface(**surface)).run(path), felt)
     assert 2_000 < touching < 18_000, touching
@@ -99,7 +99,7 @@ def test_bad_words_have_the_text_of_the_command(tmp_path):
         (FileNotFoundError, "none.tif.*\nhint: check the path", tmp_path / "none.tif", {}),
         (ValueError, "there is no band 7.*\nhint: name one that is there", file, {"band": 7}),
         (ValueError, "unexpected argument '--bnd'", file, {"bnd": 1}),
-        (ValueError, "a unit of height is m, ft", file, {"vertical_unit": "furlong"}),
+        (ValueError, "m, ft, us-ft", file, {"height_unit": "furlong"}),
         (ValueError, "cannot be used with", file, {"cell_mm": 1, "scale": 2}),
         (ValueError, 'give ground a millimetre, as "100 m/mm"', file, {"scale": "100"}),
         (ValueError, "a cell of -1 mm", file, {"cell_mm": -1}),
@@ -131,7 +131,7 @@ def test_damaged_parts_are_holes_and_warnings(tmp_path):
     content[4064:8000] = bytes(8000 - 4064)
     file.write_bytes(content)
     with pytest.warns(UserWarning, match="cannot be read and are a hole"):
-        assert Terrain.open(file, in_memory_mb=0).height_mm(30, 230) is None
+        assert Terrain.open(file, in_memory=0).height_mm(30, 230) is None
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_damaged_parts_are_holes_and_warnings(tmp_path):
 )
 def test_parts_that_have_gone_meanwhile_are_warnings(tmp_path, touch):
     file = huge(tmp_path)
-    terrain = Terrain.open(file, raw_size=f"{SIDE}x{SIDE}", ground_cell_m=1)
+    terrain = Terrain.open(file, raw=f"{SIDE}x{SIDE}", cell="1m")
     os.truncate(file, 1000)
     with pytest.warns(UserWarning, match="cannot be read and are a hole"):
         touch(terrain, (1000.5, 1000.5))
@@ -170,7 +170,7 @@ def test_terrain_larger_than_memory_is_read_where_it_is_touched(tmp_path):
     file = huge(tmp_path)
     code = f"""
 import resource, hapterra
-terrain = hapterra.Terrain.open({str(file)!r}, raw_size="{SIDE}x{SIDE}", ground_cell_m=1)
+terrain = hapterra.Terrain.open({str(file)!r}, raw="{SIDE}x{SIDE}", cell="1m")
 contact = hapterra.Contact(terrain)
 contact.step((1000, 1000, 4))
 print(contact.step((1000, 1000, 2.5)).force_n, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)

@@ -30,7 +30,7 @@ def recorded(tmp_path):
     file = written(tmp_path / "hills.tif")
     path = tmp_path / "path.csv"
     np.savetxt(path, stroke(3_000), delimiter=",", header="x_mm,y_mm,z_mm", comments="", fmt="%.17g")
-    words = [f"--cell-mm={CELL_MM}", *FLAGS, file, path]
+    words = [f"--scale={CELL_MM}mm/cell", *FLAGS, file, path]
     for form in ("csv", "parquet"):
         run("replay", *words, "-o", tmp_path / f"felt.{form}")
     return tmp_path / "felt.csv", tmp_path / "felt.parquet"
@@ -85,7 +85,7 @@ def test_replay_is_on_the_terrain_that_was_recorded(recorded, tmp_path):
     other = written(tmp_path / "other.tif", (2 * hills()).astype("f4"))
     with pytest.raises(CommandError, match="is not the terrain of this recording"):
         recording.replay(other)
-    flat = recording.replay(other, ignore_settings=True, cell_mm=CELL_MM)
+    flat = recording.replay(other, ignore_settings=True, scale=f"{CELL_MM}mm/cell")
     assert flat.settings["terrain"]["file"] == str(other)
 
 

@@ -1,6 +1,7 @@
 """Runs against the command ``hapterra replay`` on the same heights: the same bits."""
 
 import csv
+import pathlib
 
 import numpy as np
 import pytest
@@ -28,11 +29,7 @@ ROUGH = dict(
     texture_wavelength=1.5,
     texture_seed=3,
 )
-FLAGS = (
-    "--stiffness-n-per-mm=0.4 --max-force-n=6 --friction=0.3 --static-friction=0.5"
-    " --viscous-friction=0.004 --damping-ns-per-m=2 --shading=smooth --texture=grain"
-    " --texture-amplitude=0.1 --texture-wavelength=1.5 --texture-seed=3"
-).split()
+FLAGS = [f"--surface={pathlib.Path(__file__).with_name('rough.toml')}", "--max-force=6"]
 
 
 def hills():
@@ -91,7 +88,7 @@ def same(steps, felt):
 @pytest.mark.parametrize("surface, flags", [({}, []), (ROUGH, FLAGS)], ids=["ice", "rough"])
 def test_run_is_a_replay(tmp_path, surface, flags):
     path = stroke(20_000)
-    felt = replayed(tmp_path, hills(), path, words=[f"--cell-mm={CELL_MM}", *flags])
+    felt = replayed(tmp_path, hills(), path, words=[f"--scale={CELL_MM}mm/cell", *flags])
     contact = Contact(Terrain(hills(), cell_mm=CELL_MM), Surface(**surface))
     touching = same(contact.run(path), felt)
     assert 2_000 < touching < 18_000, touching
@@ -100,7 +97,7 @@ def test_run_is_a_replay(tmp_path, surface, flags):
 @pytest.mark.parametrize("tip_mm", [1, 2, 8 * CELL_MM])
 def test_run_under_a_tip_is_a_replay(tmp_path, tip_mm):
     path = stroke(20_000) + [0, 0, tip_mm]
-    words = [f"--cell-mm={CELL_MM}", f"--tip={tip_mm}mm", *FLAGS]
+    words = [f"--scale={CELL_MM}mm/cell", f"--tip={tip_mm}mm", *FLAGS]
     felt = replayed(tmp_path, hills(), path, words=words)
     terrain = Terrain(hills(), cell_mm=CELL_MM).with_tip(tip_mm)
     touching = same(Contact(terrain, Surface(**ROUGH)).run(path), felt)
@@ -110,7 +107,7 @@ def test_run_under_a_tip_is_a_replay(tmp_path, tip_mm):
 def test_integers_at_a_scale_are_a_replay(tmp_path):
     heights = np.nan_to_num(hills() * 9).astype(">i2")
     path = stroke(20_000) * [0.42, 0.42, 0.2]
-    words = ["--cell-mm=0.3", "--height-mm-per-unit=0.017"]
+    words = ["--scale=0.3mm/cell", "--exaggeration=0.017mm/unit"]
     felt = replayed(tmp_path, heights, path, words=words)
     terrain = Terrain(np.asfortranarray(heights), cell_mm=0.3, height_mm_per_unit=0.017)
     assert same(Contact(terrain).run(path), felt) > 1_000
@@ -130,7 +127,7 @@ def test_times_are_those_of_a_replay(tmp_path, hz, begin_s):
     t, path = np.maximum.accumulate(t)[repeat], path[repeat]
     path = path[np.r_[True, (np.diff(t) > 0) | (np.diff(path, axis=0) == 0).all(1)]]
     t = t[np.r_[True, (np.diff(t) > 0) | (np.diff(repeat) == 0)]]
-    felt = replayed(tmp_path, hills(), path, t, [f"--cell-mm={CELL_MM}", *FLAGS])
+    felt = replayed(tmp_path, hills(), path, t, [f"--scale={CELL_MM}mm/cell", *FLAGS])
     steps = Contact(Terrain(hills(), cell_mm=CELL_MM), Surface(**ROUGH)).run(path, t)
     same(steps, felt)
     assert abs(len(steps) - 1000 * (t[-1] - t[0])) < 2
@@ -139,5 +136,5 @@ def test_times_are_those_of_a_replay(tmp_path, hz, begin_s):
 def test_one_time_for_all_rows_is_a_replay(tmp_path):
     path = stroke(3_000)
     t = np.full(3_000, 4.5)
-    felt = replayed(tmp_path, hills(), path, t, [f"--cell-mm={CELL_MM}"])
+    felt = replayed(tmp_path, hills(), path, t, [f"--scale={CELL_MM}mm/cell"])
     same(Contact(Terrain(hills(), cell_mm=CELL_MM)).run(path, t), felt)

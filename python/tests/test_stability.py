@@ -1,5 +1,6 @@
-"""The map of stability."""
+"""The map of stability, by the program that HAPTERRA_LAB names."""
 
+import os
 import sys
 
 import pytest
@@ -8,6 +9,12 @@ import hapterra
 from hapterra import CommandError, stability
 
 
+needs_lab = pytest.mark.skipif(
+    "HAPTERRA_LAB" not in os.environ, reason="cargo xtask python --test names hapterra-lab"
+)
+
+
+@needs_lab
 def test_trials_are_those_that_were_asked_for():
     trials = stability(rate=1000, stiffness=[0.5, 20], passivity="off", arm_friction=0.1)
     assert set(trials["stiffness_n_per_mm"]) == {0.5, 20}
@@ -18,11 +25,19 @@ def test_trials_are_those_that_were_asked_for():
     assert "1000 Hz" in trials.attrs["summary"] or "1 kHz" in trials.attrs["summary"]
 
 
+@needs_lab
 def test_bad_numbers_have_the_text_of_the_command():
     with pytest.raises(CommandError, match="expected 0.001 to 100 N/mm"):
         stability(stiffness=[0.5, -1])
     with pytest.raises(CommandError, match="unexpected argument '--stifness'"):
         stability(stifness=1)
+
+
+def test_missing_program_is_named_with_what_to_install(monkeypatch):
+    monkeypatch.delenv("HAPTERRA_LAB", raising=False)
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(CommandError, match="cargo install --path bench --bin hapterra-lab"):
+        stability()
 
 
 def test_without_pandas_the_error_says_what_to_install(monkeypatch):

@@ -84,7 +84,7 @@ def answered(ask):
 def test_heights_that_do_not_come_are_errors_and_no_holes(server, tmp_path):
     url = f"http://127.0.0.1:{server.server_port}/hills.tif"
     here = Terrain.open(tmp_path / "hills.tif", cell_mm=0.5)
-    there = Terrain.open(url, cell_mm=0.5, in_memory_mb=0, cache_mb=0)
+    there = Terrain.open(url, cell_mm=0.5, in_memory=0, cache="off")
     # The last two are in tiles that are not looked into at the start.
     places = [(300.3, 300.3), (140.1, 900.7), (700.2, 80.4)]
     assert there.height_mm(*places[0]) == here.height_mm(*places[0])

@@ -28,6 +28,7 @@ pub mod served;
 pub mod slow_line;
 pub mod soak;
 pub mod stand_in;
+mod terrain_file;
 pub mod tiffs;
 pub mod timeouts;
 pub mod usb;
@@ -36,6 +37,8 @@ pub mod walk;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
+
+pub use terrain_file::terrain_file;
 
 /// The program of the Rust tutorial, run.
 #[cfg(doctest)]
@@ -103,3 +106,9 @@ pub fn info(path: &Path) -> serde_json::Value {
     assert!(output.status.success(), "{output:?}");
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
+
+/// A surface on which the passivity controller does not act, as a file for `--surface`.
+pub const UNCONTROLLED: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/data/surfaces/uncontrolled.toml"
+);

@@ -10,8 +10,10 @@ use std::time::Duration;
 
 use crate::hapterra_binary;
 use crate::link_campaign::wire::said_by_host;
+use crate::terrain_file;
 use crate::timeouts::{HANG, wait_until};
 use hapterra::link::{Dialogue, Native, Tcp, Transport};
+use hapterra::synth::Kind;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::session::SessionEnd;
@@ -167,11 +169,7 @@ fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
 pub fn terrain(folder: &Path) -> String {
     let file = folder.join("hills.tif");
     let path = file.to_str().expect("a plain path").to_owned();
-    let made = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "-o", &path, "--size", "64"])
-        .output()
-        .expect("it runs");
-    assert!(made.status.success());
+    terrain_file(&file, Kind::Fractal, 64, 1);
     path
 }
 
@@ -184,10 +182,10 @@ pub fn command(address: SocketAddr, folder: &Path) -> Command {
 pub fn command_over(terrain: &str, address: SocketAddr, folder: &Path) -> Command {
     let mut command = Command::new(hapterra_binary());
     command
-        .args(["run", terrain, "--cell-mm", "1"])
-        .args(["--height-mm-per-unit", "0.1"])
+        .args(["run", terrain, "--scale", "1mm/cell"])
+        .args(["--exaggeration", "0.1mm/unit"])
         .args(["--device", &format!("tcp:{address}")])
-        .arg("--record")
+        .arg("--out")
         .arg(folder.join("felt.csv"))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())

@@ -4,8 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use hapterra::synth::Kind;
 use hapterra_tests::timeouts::end_of;
-use hapterra_tests::{hapterra_binary, shared};
+use hapterra_tests::{hapterra_binary, shared, terrain_file};
 use heightfield::{BadRaster, OpenOptions, Raster};
 
 /// Address space a child may use. The program itself takes some 100 MB of it.
@@ -257,16 +258,12 @@ fn pipes_and_devices_are_refused_unopened() {
     }
     // So is every other file that a command reads.
     let hills = folder.path().join("hills.tif");
-    let made = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "--size", "16", "-o"])
-        .arg(&hills)
-        .output();
-    assert!(made.expect("it runs").status.success());
-    let [hills, other] = [hills, pipe("pipe")].map(|path| path.display().to_string());
+    terrain_file(&hills, Kind::Fractal, 16, 1);
+    let [hills, other] = [hills, pipe("pipe.toml")].map(|path| path.display().to_string());
     let run = ["run", &hills, "--device", "native", "--materials", &hills];
     for (words, option) in [
         (&["calibrate", "--show"][..], None),
-        (&run, Some("--material-table")),
+        (&run, Some("--surface")),
         (
             &["flash", "--board", "nucleo-g474re", "--check"],
             Some("--image"),
@@ -285,14 +282,6 @@ fn pipes_and_devices_are_refused_unopened() {
         let told = String::from_utf8_lossy(&output.stderr);
         assert!(told.contains("a pipe (FIFO)"), "{words:?}: {told}");
     }
-    // One that is named like what a killed command left holds nothing up.
-    let _ = pipe("out.tif.a1B2c3.partial");
-    let made = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "--size", "16", "-o"])
-        .arg(folder.path().join("out.tif"))
-        .spawn();
-    let made = end_of(made.expect("the binary starts"));
-    assert!(made.status.success(), "{:?}", made.status);
 }
 
 /// Names in a file, the file's own name, and what is typed: on a terminal they control nothing.
@@ -329,25 +318,17 @@ fn texts_of_files_reach_the_terminal_without_control_characters() {
             &hills,
             "--device",
             "native",
-            "--seconds",
-            "0.1",
+            "--duration",
+            "0.1s",
             "--materials",
             &hills,
-            "--material-table",
+            "--surface",
             &table,
         ],
         &["replay", &hills, &csv, "-o", &format!("{named}.csv")],
         &["replay", &hills, &format!("{csv}{WICKED}"), "-o", "-"],
         &["calibrate", "--show", &csv],
-        &["info", &hills, "--no-data", WICKED],
-        &[
-            "synth",
-            "fractal",
-            "--size",
-            "8",
-            "-o",
-            &format!("{named}.tif"),
-        ],
+        &["info", &hills, "--input", &format!("no-data={WICKED}")],
     ] {
         let output = Command::new(hapterra_binary()).args(words).output();
         let output = output.expect("it runs");

@@ -143,7 +143,9 @@ fn what_gdal_reads_and_this_does_not_is_converted_by_the_hint() {
 /// Runs `demo` at a longitude and latitude where none is known, and the command in its
 /// hint; opens what that writes.
 fn brought_to_degrees(folder: &Path, name: &str, program: &str, code: &str) -> Raster {
-    let words = ["demo", "--device", "native", "--at-lonlat", "173,-41"];
+    let words = [
+        "demo", "--device", "native", "--at", "173,-41", "--crs", "lonlat",
+    ];
     let hint = hint_of(&words, &folder.join(name));
     let hint = hint.replace("IN OUT.tif", &format!("{name} brought.tif"));
     follow(folder, &hint.replace("EPSG:CODE", code), program);

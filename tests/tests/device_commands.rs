@@ -1,7 +1,6 @@
 //! The commands around a device as a newcomer meets them: with nothing plugged
 //! in, and with wrong words.
 
-use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use hapterra_tests::hapterra_binary;
@@ -46,30 +45,18 @@ fn list_says_what_it_looked_for() {
     }
 }
 
-/// Whoever asks what a command does is told, and where its program is to be had where that
-/// is missing.
 #[test]
-fn bench_tells_what_it_does_where_its_program_is_missing() {
-    let program = hapterra_binary();
-    let folder = program.parent().expect("a folder");
-    let folder = tempfile::tempdir_in(folder).expect("a folder");
-    let alone = folder.path().join("hapterra");
-    // A link, not a copy: a program that was just written may not be started while another
-    // test's child holds the file open ("Text file busy").
-    std::fs::hard_link(program, &alone).expect("linked");
-    let run = |words: &[&str]| {
-        let mut command = Command::new(&alone);
-        // Under cargo the program is built.
-        let output = command.args(words).env_remove("CARGO").output();
-        output.expect("it runs")
-    };
-    let help = run(&["bench", "--help"]);
-    assert!(help.status.success(), "{}", told(&help));
-    assert!(told(&help).contains("hapterra-bench"), "{}", told(&help));
-    let missing = run(&["bench", "hills.tif"]);
-    assert_eq!(missing.status.code(), Some(1));
-    for part in ["is not beside this program", "hint: install it"] {
-        assert!(told(&missing).contains(part), "{}", told(&missing));
+fn moved_subcommand_is_named_with_its_new_program() {
+    for (word, new) in [
+        ("bench", "contact"),
+        ("stability", "stability"),
+        ("synth", "synth"),
+    ] {
+        fails(
+            &[word, "--help"],
+            2,
+            &[&format!("hint: hapterra {word} is now hapterra-lab {new}")],
+        );
     }
 }
 
@@ -83,7 +70,7 @@ fn run_says_how_a_terrain_is_felt_on_an_emulated_board() {
         &[
             "hapterra demo --device emulated",
             "tcp:HOST:PORT",
-            "--plant",
+            "+plant:HOST:PORT",
         ],
     );
 }
@@ -111,13 +98,13 @@ fn a_record_goes_to_a_file_and_comes_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("arm.toml");
     let file = file.to_str().expect("a plain path");
-    let base = ["calibrate", "--device", "native", "--no-walk"];
-    let write = [&base[..], &["--set", "ratio-2=10.5", "--output", file]].concat();
+    let base = ["calibrate", "--device", "native", "--measure", "none"];
+    let write = [&base[..], &["--set", "ratio-2=10.5", "--out", file]].concat();
     let output = hapterra(&write);
     assert!(output.status.success(), "{}", told(&output));
     let again = folder.path().join("again.toml");
     let again = again.to_str().expect("a plain path");
-    let read = [&base[..], &["--from", file, "--output", again]].concat();
+    let read = [&base[..], &["--from", file, "--out", again]].concat();
     let output = hapterra(&read);
     assert!(output.status.success(), "{}", told(&output));
     let bytes = |path: &str| std::fs::read(path).expect("written");
@@ -134,17 +121,18 @@ fn a_record_goes_to_a_file_and_comes_back() {
 fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
     let base = ["calibrate", "--device", "native", "--no-store", "--yes"];
     for model in ["premium-1.0", "premium-3.0", "omni"] {
-        for skip in ["--no-walk", "--skip-ratios"] {
-            let words = [&base[..], &["--model", model, skip]].concat();
-            fails(&words, 1, &["a guess", "--unmeasured-ratios"]);
+        for skip in ["none", "zero,gravity"] {
+            let words = [&base[..], &["--model", model, "--measure", skip]].concat();
+            fails(&words, 1, &["a guess", "guessed-ratios"]);
         }
     }
-    let agreed = ["--model", "premium-1.0", "--no-walk", "--unmeasured-ratios"];
-    let known = ["--model", "premium-1.5", "--no-walk"];
+    let agreed = ["--model", "premium-1.0", "--measure", "none,guessed-ratios"];
+    let known = ["--model", "premium-1.5", "--measure", "none"];
     let measured = [
         "--model",
         "premium-1.0",
-        "--no-walk",
+        "--measure",
+        "none",
         "--set",
         "ratio-1=7.2",
     ];
@@ -156,7 +144,14 @@ fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
 
 #[test]
 fn a_record_above_a_ceiling_is_refused_before_it_is_sent() {
-    let base = ["calibrate", "--device", "native", "--no-walk", "--set"];
+    let base = [
+        "calibrate",
+        "--device",
+        "native",
+        "--measure",
+        "none",
+        "--set",
+    ];
     for (setting, part) in [
         ("peak-a-1=20", "5.5 A"),
         ("max-force-n=20", "8.5 N"),
@@ -171,7 +166,7 @@ fn wrong_words_are_answered_with_what_to_do() {
     fails(
         &["status", "--device", "serial"],
         2,
-        &["usb, usb:SERIAL, tcp:HOST:PORT, native or emulated"],
+        &["usb, usb:SERIAL, tcp:HOST:PORT, native, emulated or emulated:ELF"],
     );
     fails(
         &["status", "--device", "tcp:127.0.0.1:1"],
@@ -179,7 +174,7 @@ fn wrong_words_are_answered_with_what_to_do() {
         &["127.0.0.1:1", "hint:"],
     );
     fails(
-        &["status", "--device", "emulated", "--image", "/no/such"],
+        &["status", "--device", "emulated:/no/such"],
         1,
         &["/no/such", "hint:"],
     );
@@ -190,8 +185,17 @@ fn wrong_words_are_answered_with_what_to_do() {
         1,
         &["hint:"],
     );
-    let calibrate =
-        |set: &'static str| ["calibrate", "--device", "native", "--no-walk", "--set", set];
+    let calibrate = |set: &'static str| {
+        [
+            "calibrate",
+            "--device",
+            "native",
+            "--measure",
+            "none",
+            "--set",
+            set,
+        ]
+    };
     fails(&calibrate("l1-mm=3"), 1, &["30 to 1000 mm", "hint:"]);
     fails(&calibrate("length=3"), 2, &["l1-mm"]);
     fails(&calibrate("l1-mm=long"), 2, &["no number"]);
@@ -200,25 +204,4 @@ fn wrong_words_are_answered_with_what_to_do() {
         1,
         &["/no/such", "hint:"],
     );
-}
-
-#[test]
-fn a_terrain_that_no_disk_holds_is_refused_before_it_is_written() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("huge.tif");
-    let path = file.to_str().expect("a plain path");
-    fails(
-        &[
-            "synth",
-            "plane",
-            "-o",
-            path,
-            "--size",
-            "4000000000x4000000000",
-        ],
-        1,
-        &["GB are free", "hint:"],
-    );
-    assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 0);
-    assert!(!Path::new(path).exists());
 }

@@ -7,10 +7,11 @@ use std::process::Command;
 use std::time::Duration;
 
 use hapterra::phantom::PlacedTerrain;
+use hapterra::synth::Kind;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::ForceLaw;
-use hapterra_tests::hapterra_binary;
 use hapterra_tests::timeouts::{set_age, set_just_changed};
+use hapterra_tests::{hapterra_binary, terrain_file};
 use heightfield::disk_cache::DiskCache;
 use heightfield::{OpenOptions, Raster};
 
@@ -18,13 +19,8 @@ use heightfield::{OpenOptions, Raster};
 const LEVEL: u8 = 6;
 
 /// A TIFF without overviews of that seed, old enough to be known by its time.
-fn hills(path: &Path, seed: &str) {
-    let status = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "--size", "1500", "--seed", seed, "-o"])
-        .arg(path)
-        .output()
-        .expect("it runs");
-    assert!(status.status.success(), "{status:?}");
+fn hills(path: &Path, seed: u64) {
+    terrain_file(path, Kind::Fractal, 1500, seed);
     age(path, 1000);
 }
 
@@ -76,7 +72,7 @@ struct Bed {
 fn bed() -> Bed {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("hills.tif");
-    hills(&file, "1");
+    hills(&file, 1);
     let cache = DiskCache::at(&folder.path().join("cache"), 64 << 20);
     Bed {
         file,
@@ -124,7 +120,7 @@ fn a_file_that_is_another_now_has_its_own_heights() {
     // Of the same size, in the same place, with the same time.
     let modified = fs::metadata(&bed.file).and_then(|metadata| metadata.modified());
     let other = bed.folder.path().join("other.tif");
-    hills(&other, "2");
+    hills(&other, 2);
     let bytes = fs::read(&other).expect("there");
     assert_eq!(
         bytes.len() as u64,
@@ -142,7 +138,7 @@ fn a_file_that_is_another_now_has_its_own_heights() {
     }
     // Renamed over it.
     let third = bed.folder.path().join("third.tif");
-    hills(&third, "3");
+    hills(&third, 3);
     fs::rename(&third, &bed.file).expect("renamed");
     let (found, _) = look(&bed.file, &bed.cache);
     assert_eq!(found, truth(&bed.file));
@@ -164,7 +160,7 @@ fn a_file_that_is_another_now_has_its_own_heights() {
 fn what_is_changed_while_it_is_read_is_not_taken_for_what_it_was() {
     let bed = bed();
     let other = bed.folder.path().join("other.tif");
-    hills(&other, "2");
+    hills(&other, 2);
     let raster = open(&bed.file, &bed.cache);
     heights(&raster, 9);
     fs::write(&bed.file, fs::read(&other).expect("there")).expect("written");
@@ -339,8 +335,8 @@ fn another_tour_of_a_large_file_is_planned_without_reading_it() {
 /// Blocks that a run at a coarse level reads, as it says with `-vv`.
 fn blocks_of_run(file: &Path, cache: &Path, megabytes: &str) -> u64 {
     let output = Command::new(hapterra_binary())
-        .args(["-vv", "run", "--device", "native", "--seconds", "0.2"])
-        .args(["--in-memory-mb", "0", "--level", "4"])
+        .args(["-vv", "run", "--device", "native", "--duration", "0.2s"])
+        .args(["--input", "in-memory=0MB", "--level", "4"])
         .arg(file)
         .env("HAPTERRA_CACHE_DIR", cache)
         .env("HAPTERRA_CACHE_MB", megabytes)

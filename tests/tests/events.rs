@@ -9,10 +9,11 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{JoinHandle, spawn};
 
 use hapterra::replay::Trajectory;
+use hapterra::synth::Kind;
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::served::Served;
 use hapterra_tests::timeouts::next;
-use hapterra_tests::{hapterra_binary, repository};
+use hapterra_tests::{hapterra_binary, repository, terrain_file};
 use serde_json::Value;
 
 fn hapterra(words: &[&str]) -> Command {
@@ -77,10 +78,9 @@ fn near(told: &[f64], recorded: &[f64]) -> bool {
 }
 
 /// Hills in a folder.
-fn hills_in(folder: &Path, size: &str) -> PathBuf {
+fn hills_in(folder: &Path, size: u32) -> PathBuf {
     let hills = folder.join("hills.tif");
-    let made = hapterra(&["synth", "fractal", "-o", text(&hills), "--size", size]).status();
-    assert!(made.expect("started").success());
+    terrain_file(&hills, Kind::Fractal, size, 1);
     hills
 }
 
@@ -152,12 +152,19 @@ impl Telling {
 #[test]
 fn a_run_tells_what_is_felt_and_examples_speak_and_sound_it() {
     let folder = tempfile::tempdir().expect("a folder");
-    let hills = hills_in(folder.path(), "256");
+    let hills = hills_in(folder.path(), 256);
     let [record, commands] = ["felt.csv", "commands"].map(|name| folder.path().join(name));
     std::fs::write(&commands, "at 4 mark a \"b\"\nat 4.1 zoom 1.5\n").expect("written");
-    let words = ["run", text(&hills), "--device", "native", "--seconds", "6"];
-    let more = ["--record", text(&record), "--commands", text(&commands)];
-    let events = Telling::start(&[&words[..], &more, &["--event-samples", "10"]].concat()).end();
+    let words = [
+        "run",
+        text(&hills),
+        "--device",
+        "native",
+        "--duration",
+        "6s",
+    ];
+    let more = ["--out", text(&record), "--commands", text(&commands)];
+    let events = Telling::start(&[&words[..], &more, &["--events", "0,10"]].concat()).end();
     judge(&events, &record);
     if let Some(example) = example("speak_heights.py") {
         let heights = said(example, &events);
@@ -325,7 +332,7 @@ fn judge(events: &[Value], record: &Path) {
 #[test]
 fn demo_tells_samples_marks_and_refusals() {
     let folder = tempfile::tempdir().expect("a folder");
-    let hills = hills_in(folder.path(), "64");
+    let hills = hills_in(folder.path(), 64);
     let out = folder.path().join("out");
     let words = [
         "demo",
@@ -335,14 +342,7 @@ fn demo_tells_samples_marks_and_refusals() {
         "--out",
         text(&out),
     ];
-    let more = [
-        "--seconds",
-        "2.5",
-        "--event-samples",
-        "100",
-        "--commands",
-        "-",
-    ];
+    let more = ["--duration", "2.5s", "--commands", "-"];
     let mut demo = Telling::start(&[&words[..], &more].concat());
     demo.wait_for("sample");
     let mut stdin = demo.stdin.take().expect("piped");
@@ -373,14 +373,14 @@ fn demo_tells_samples_marks_and_refusals() {
 #[test]
 fn run_ends_disarmed_when_its_input_ends() {
     let folder = tempfile::tempdir().expect("a folder");
-    let hills = hills_in(folder.path(), "64");
+    let hills = hills_in(folder.path(), 64);
     let record = folder.path().join("felt.csv");
     let words = [
         "run",
         text(&hills),
         "--device",
         "native",
-        "--record",
+        "--out",
         text(&record),
     ];
     let mut run = Telling::start(&[&words[..], &["--commands", "-", "--end-with-input"]].concat());
@@ -415,7 +415,7 @@ fn run_ends_disarmed_when_its_input_ends() {
 #[test]
 fn enter_answers_the_question_of_its_number() {
     let folder = tempfile::tempdir().expect("a folder");
-    let hills = hills_in(folder.path(), "64");
+    let hills = hills_in(folder.path(), 64);
     let served = Served::start();
     let device = format!("tcp:{}", served.address);
     let words = ["run", text(&hills), "--device", &device, "--unchecked"];
@@ -437,7 +437,7 @@ fn enter_answers_the_question_of_its_number() {
 #[test]
 fn a_port_that_is_taken_is_an_error_before_anything_is_armed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let hills = hills_in(folder.path(), "64");
+    let hills = hills_in(folder.path(), 64);
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port().to_string();
     let words = ["run", text(&hills), "--device", "native", "--events", &port];

@@ -155,34 +155,32 @@ fn nothing_that_a_device_says_controls_the_terminal() {
 fn nothing_that_a_device_asks_for_floods_the_terminal() {
     let folder = tempfile::tempdir().expect("a folder");
     let device = format!("tcp:{}", started());
-    let run = |more: &[&str]| {
+    let with_plant = format!("{device}+plant:127.0.0.1:1");
+    let run = |device: &str, more: &[&str]| {
         Command::new(hapterra_binary())
             .arg("run")
             .arg(terrain(folder.path()))
-            .args(["--device", &device])
-            .args(["--seconds", "0.5", "--height-mm-per-unit", "1"])
+            .args(["--device", device])
+            .args(["--duration", "0.5s", "--exaggeration", "1mm/unit"])
             .args(more)
             .output()
             .expect("started")
     };
     // A board of this name was never brought up.
-    let refused = run(&[]);
+    let refused = run(&device, &[]);
     assert!(!refused.status.success(), "{refused:?}");
     let why = String::from_utf8_lossy(&refused.stderr);
     is_plain(&why);
     assert!(why.contains("was not brought up"), "{why}");
     // Nor is its arm a virtual one because somebody says so.
-    for more in [
-        &["--plant", "tcp:127.0.0.1:1"][..],
-        &["--plant", "tcp:127.0.0.1:1", "--unchecked"],
-    ] {
-        let refused = run(more);
+    for more in [&[][..], &["--unchecked"]] {
+        let refused = run(&with_plant, more);
         assert!(!refused.status.success(), "{refused:?}");
         let why = String::from_utf8_lossy(&refused.stderr);
         is_plain(&why);
         assert!(why.contains("is a real board"), "{why}");
     }
-    let said = said(&run(&["--unchecked"]));
+    let said = said(&run(&device, &["--unchecked"]));
     is_plain(&said);
     let lines = said.lines().count();
     // Some lines of its own, and one a second: it does not take minutes.

@@ -6,20 +6,16 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
-use hapterra_tests::hapterra_binary;
+use hapterra::synth::Kind;
 use hapterra_tests::timeouts::wait_for;
+use hapterra_tests::{hapterra_binary, terrain_file};
 
 /// Points that fill the recording's buffer more than once.
 const POINTS: usize = 4_000;
 
 fn terrain(folder: &Path) -> PathBuf {
     let path = folder.join("terrain.tif");
-    let made = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "--size", "64x64", "--output"])
-        .arg(&path)
-        .output()
-        .expect("started");
-    assert!(made.status.success(), "{}", said(&made));
+    terrain_file(&path, Kind::Fractal, 64, 1);
     path
 }
 
@@ -30,7 +26,7 @@ fn said(run: &Output) -> String {
 fn replay(folder: &Path, terrain: &Path) -> Command {
     let mut command = Command::new(hapterra_binary());
     command.arg("replay").arg(terrain).arg("/dev/stdin");
-    command.arg("--output").arg(folder.join("out.csv"));
+    command.arg("--out").arg(folder.join("out.csv"));
     command.stdin(Stdio::piped()).stderr(Stdio::piped());
     command
 }
@@ -99,7 +95,7 @@ fn a_killed_commands_recording_is_named_at_the_next_start_and_kept() {
     let run = Command::new(hapterra_binary())
         .arg("run")
         .arg(&terrain)
-        .args(["--device", "native", "--seconds", "0.05", "--record"])
+        .args(["--device", "native", "--duration", "0.05s", "--out"])
         .arg(folder.join("out.csv"))
         .output()
         .expect("started");

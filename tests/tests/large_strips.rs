@@ -179,28 +179,28 @@ fn a_packed_strip_is_felt_in_the_memory_of_a_terrain() {
     };
     let packed = zstd_bomb((WIDE * WIDE).div_ceil(128 * 1024) as usize);
     write(&packed);
-    let (code, told) = info(&["--cache-dir", cache]);
+    let (code, told) = info(&["--cache", cache]);
     assert_eq!(code, Some(0), "{told}");
     assert!(told.contains("unpacked on disk"), "{told}");
     // Without a place on disk it needs the memory, and there is too little.
-    let (code, told) = info(&["--cache-mb", "0"]);
+    let (code, told) = info(&["--cache", "off"]);
     assert_eq!(code, Some(1), "{told}");
     assert!(told.contains("more than memory can hold"), "{told}");
     // A strip that is cut: the rows before are felt.
     write(&packed[..packed.len() / 10 * 9]);
-    let (code, told) = info(&["--cache-dir", cache]);
+    let (code, told) = info(&["--cache", cache]);
     assert_eq!(code, Some(0), "{told}");
     assert!(told.contains("cannot be read and are a hole"), "{told}");
     // One of which nothing can be unpacked.
     let mut damaged = packed.clone();
     damaged[0] = 0;
     write(&damaged);
-    let (code, told) = info(&["--cache-dir", cache]);
+    let (code, told) = info(&["--cache", cache]);
     assert_eq!(code, Some(1), "{told}");
     let is_told = told.contains("packed.tif") && told.contains("cannot be unpacked from row 0 on");
     assert!(is_told && !told.contains("no surface"), "{told}");
     write(&packed[..3]);
-    let (code, told) = info(&["--cache-dir", cache]);
+    let (code, told) = info(&["--cache", cache]);
     assert_eq!(code, Some(1), "{told}");
     assert!(told.contains("absurd size"), "{told}");
 }
@@ -276,7 +276,7 @@ fn a_file_of_nothing_is_looked_through_and_it_says_so() {
         .expect("there");
     file.set_len(u64::from(FIRST) + u64::from(WIDE * WIDE) * 4)
         .expect("a sparse file");
-    let output = bounded::info(&path, &["--no-data", "0"]);
+    let output = bounded::info(&path, &["--input", "no-data=0"]);
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{told}");
     let search = told.find("32 places of").expect("it says that it searches");

@@ -87,7 +87,7 @@ fn open(path: &Path) -> Raster {
 
 /// It ends, within the memory, in an error that says what, where and what next, or without.
 fn ends_well(what: &str, path: &Path, more: &[&str]) -> (bool, String) {
-    let options = [&["--in-memory-mb", "0"], more].concat();
+    let options = [&["--input", "in-memory=0MB"], more].concat();
     let output = bounded::info(path, &options);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     println!("{what}: {:?} {told}", output.status.code());
@@ -428,7 +428,10 @@ fn plain_samples_whose_headers_lie_are_errors() {
     }
     let (_folder, path) = written("lie.raw", &[1; 4000]);
     for size in ["4294967295x4294967295", "2147483648x2147483648", "1001x2"] {
-        assert!(!ends_well(size, &path, &["--raw-size", size]).0, "{size}");
+        assert!(
+            !ends_well(size, &path, &["--input", &format!("raw={size}")]).0,
+            "{size}"
+        );
     }
     // As long as it says, and full of nothing: a terabyte that takes no memory.
     let (_folder, path) = written("N44W072.hgt", &[]);

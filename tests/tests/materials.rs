@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use hapterra::cli::options::surface::table::TableFile;
 use hapterra::link::{Emulator, Patience};
-use hapterra::materials::table::TableFile;
 use hapterra::materials::{ClassMaterial, Looks, Materials};
 use hapterra::replay::{Replayer, on_native};
 use hapterra::synth::{Kind, Synth};
@@ -105,13 +105,8 @@ impl Folder {
     }
 }
 
-const REPLAY: [&str; 4] = ["replay", "level.asc", "way.csv", "--output"];
-const MATERIALS: [&str; 4] = [
-    "--materials",
-    "classes.asc",
-    "--material-table",
-    "table.toml",
-];
+const REPLAY: [&str; 4] = ["replay", "level.asc", "way.csv", "--out"];
+const MATERIALS: [&str; 4] = ["--materials", "classes.asc", "--surface", "table.toml"];
 
 /// Place and upward force of each row of a recording in contact.
 fn felt(recording: &str) -> Vec<(f64, f64)> {
@@ -173,13 +168,7 @@ fn classes_in_another_system_and_resolution_are_felt_where_they_lie() {
 fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
     let folder = Folder::new();
     let replay = |more: &[&str], output: &str| {
-        folder.hapterra(
-            &[
-                &["replay", "level.asc", "a.csv", "--output", output][..],
-                more,
-            ]
-            .concat(),
-        )
+        folder.hapterra(&[&["replay", "level.asc", "a.csv", "--out", output][..], more].concat())
     };
     let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
     assert!(felt_it, "{said}");
@@ -194,18 +183,18 @@ fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
     let (again, said) = replay(&[], "b.csv");
     assert!(again && said.contains("rock"), "{said}");
     assert_eq!(felt(&folder.read("b.csv")), felt(&recorded));
-    let (again, said) = replay(&["--stiffness-n-per-mm", "1"], "c.csv");
+    let (again, said) = replay(&["--stiffness", "1"], "c.csv");
     assert!(again, "{said}");
     // Each material is twice as stiff as it was beside the 0.5 N/mm of the recording.
     for ((_, twice), (_, once)) in felt(&folder.read("c.csv")).iter().zip(felt(&recorded)) {
         assert!((twice - 2.0 * once).abs() < 1e-5, "{twice} {once}");
     }
     // What each material has its own of cannot be stated beside them.
-    for option in [["--friction", "0.4"], ["--texture", "grain"]] {
+    for option in [["--friction", "0.4"], ["--surface", "sand"]] {
         let (again, said) = replay(&option, "no.csv");
-        let named = said.contains(&format!("{}: each of the recorded materials", option[0]));
+        assert!(!again && said.contains("hint: "), "{said}");
         assert!(
-            !again && named && said.contains("--material-table"),
+            said.contains(option[0]) && said.contains("materials"),
             "{said}"
         );
     }
@@ -229,7 +218,14 @@ fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
 #[test]
 fn the_demo_and_run_feel_materials_too() {
     let folder = Folder::new();
-    let demo = ["demo", "level.asc", "--device", "native", "--seconds", "3"];
+    let demo = [
+        "demo",
+        "level.asc",
+        "--device",
+        "native",
+        "--duration",
+        "3s",
+    ];
     let (felt_it, said) = folder.hapterra(&[&demo[..], &MATERIALS].concat());
     assert!(felt_it && said.contains("materials      "), "{said}");
     assert!(folder.read("demo/level.csv").contains("# [materials]\n"));
@@ -238,9 +234,9 @@ fn the_demo_and_run_feel_materials_too() {
         "level.asc",
         "--device",
         "native",
-        "--seconds",
-        "3",
-        "--record",
+        "--duration",
+        "3s",
+        "--out",
         "r.csv",
     ];
     let (felt_it, said) = folder.hapterra(&[&run[..], &MATERIALS].concat());
@@ -252,7 +248,7 @@ fn the_demo_and_run_feel_materials_too() {
 fn no_view_makes_one_of_the_materials_stiffer_than_a_view_may_be() {
     // The default has 0.5 N/mm and rock 1.0.
     let folder = Folder::new();
-    let run = ["run", "level.asc", "--device", "native", "--seconds", "3"];
+    let run = ["run", "level.asc", "--device", "native", "--duration", "3s"];
     let said = |factor: &str| {
         folder.write("steps.txt", &format!("at 1 stiffness {factor}\n"));
         let (_, said) =
@@ -272,7 +268,7 @@ fn no_view_makes_one_of_the_materials_stiffer_than_a_view_may_be() {
 fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
     let folder = Folder::new();
     let fails = |materials: &str, table: &str, wanted: &[&str]| {
-        let options = ["x.csv", "--materials", materials, "--material-table", table];
+        let options = ["x.csv", "--materials", materials, "--surface", table];
         let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &options].concat());
         assert!(!felt_it && said.contains("hint: "), "{said}");
         for part in wanted {
@@ -300,7 +296,7 @@ fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
         &["wild.toml, line 2, class 10", "friction of 30"],
     );
     let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["x.csv"], &MATERIALS[..2]].concat());
-    assert!(!felt_it && said.contains("--material-table"), "{said}");
+    assert!(!felt_it && said.contains("--surface"), "{said}");
     // No output may be one of them.
     let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["table.toml"], &MATERIALS].concat());
     assert!(
@@ -322,7 +318,7 @@ fn the_table_for_worldcover_names_all_of_its_classes_and_can_be_felt() {
     assert!(table.classes.iter().all(|(_, _, look)| look.name.is_some()));
     let folder = Folder::new();
     let file = worldcover();
-    let options = ["w.csv", "--materials", "classes.asc", "--material-table"];
+    let options = ["w.csv", "--materials", "classes.asc", "--surface"];
     let replay = [&REPLAY[..], &options, &[file.to_str().expect("text")]].concat();
     let (felt_it, said) = folder.hapterra(&replay);
     assert!(felt_it, "{said}");

@@ -112,11 +112,13 @@ fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
     let Some((qemu, image)) = emulated_board() else {
         return;
     };
+    let device = format!("emulated:{}", image.display());
     let folder = tempfile::tempdir().expect("a folder");
     let demo = |out: &str, more: &[&std::ffi::OsStr]| {
         let out = folder.path().join(out);
         let run = Command::new(hapterra_binary())
-            .args(["demo", "--seconds", "5.5", "--out"])
+            .env("HAPTERRA_QEMU", &qemu)
+            .args(["demo", "--duration", "5.5s", "--out"])
             .arg(&out)
             .args(more)
             .output()
@@ -128,15 +130,7 @@ fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
         (std::fs::read(out.join("fractal.csv")).expect("there"), said)
     };
     let (native, _) = demo("native", &["--device".as_ref(), "native".as_ref()]);
-    let (emulated, said) = demo(
-        "emulated",
-        &[
-            "--image".as_ref(),
-            image.as_ref(),
-            "--qemu".as_ref(),
-            qemu.as_ref(),
-        ],
-    );
+    let (emulated, said) = demo("emulated", &["--device".as_ref(), device.as_ref()]);
     assert!(said.contains(", 0 late"), "{said}");
     assert!(said.contains("0 lost on the link, 0 dropped"), "{said}");
     let lines = |csv: &[u8]| csv.iter().filter(|b| **b == b'\n').count();
@@ -166,8 +160,8 @@ fn an_interrupted_demonstration_on_the_emulated_board_ends_in_an_orderly_manner(
     let mut demo = Command::new(hapterra_binary())
         .args(["demo", "--rounds", "50", "--out"])
         .arg(folder.path())
-        .args(["--image".as_ref(), image.as_os_str()])
-        .args(["--qemu".as_ref(), qemu.as_os_str()])
+        .arg(format!("--device=emulated:{}", image.display()))
+        .env("HAPTERRA_QEMU", &qemu)
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .process_group(0)

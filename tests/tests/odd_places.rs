@@ -232,15 +232,15 @@ fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
     };
     let (said, unit, from) = told("feet.tif", &[]);
     assert!(
-        said.contains("3.28 times too steep: --vertical-unit us-ft"),
+        said.contains("3.28 times too steep: --input height-unit=us-ft"),
         "{said}"
     );
     assert_eq!((unit, from.as_str()), (1.0, "assumed"));
-    let (said, unit, from) = told("feet.tif", &["--vertical-unit", "us-ft"]);
+    let (said, unit, from) = told("feet.tif", &["--input", "height-unit=us-ft"]);
     assert_eq!((said.as_str(), from.as_str()), ("", "option"));
     assert!((unit - 1200.0 / 3937.0).abs() < 1e-12, "{unit}");
     let (said, ..) = told("nad27.tif", &[]);
-    assert!(said.contains("--vertical-unit"), "{said}");
+    assert!(said.contains("--input height-unit="), "{said}");
     // Metres on the ground, or a unit that the file states, need no word.
     let (said, ..) = told("rotated.tif", &[]);
     assert_eq!(said, "");
@@ -259,12 +259,7 @@ fn a_projection_that_is_not_known_is_named_with_what_to_do() {
         assert!(report["bounds"].is_object(), "{report:#}");
         let output = Command::new(hapterra_binary())
             .args([
-                "demo",
-                "--device",
-                "native",
-                "--at-lonlat",
-                "174,-41",
-                &path,
+                "demo", "--device", "native", "--at", "174,-41", "--crs", "lonlat", &path,
             ])
             .output()
             .expect("it runs");

@@ -32,7 +32,7 @@ fn said(output: &Output) -> String {
 fn hapterra(command: &str, file: &Path, more: &[&str]) -> Output {
     Command::new(hapterra_binary())
         .args([command.as_ref(), file.as_os_str()])
-        .args(["--device", "native", "--seconds", "0.05"])
+        .args(["--device", "native", "--duration", "0.05s"])
         .args(more)
         .current_dir(file.parent().expect("a folder"))
         .output()
@@ -45,7 +45,6 @@ fn nothing_said_lays_all_of_it_into_the_reach_and_says_the_scale() {
     let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
     for command in ["run", "demo"] {
         let plain = said(&hapterra(command, &file, &[]));
-        let fitted = said(&hapterra(command, &file, &["--fit"]));
         let place = |text: &str| {
             let lines = text
                 .lines()
@@ -53,7 +52,6 @@ fn nothing_said_lays_all_of_it_into_the_reach_and_says_the_scale() {
             lines.map(str::to_owned).collect::<Vec<_>>()
         };
         assert_eq!(place(&plain).len(), 2, "{plain}");
-        assert_eq!(place(&plain), place(&fitted));
         let scale = &place(&plain)[1];
         let metres: f64 = scale
             .split_whitespace()
@@ -72,7 +70,7 @@ fn place_scale_and_level_are_taken_and_said() {
     let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
     for (more, parts) in [
         (
-            &["--at", "5100,7150", "--ground-m-per-mm", "4"][..],
+            &["--at", "5100,7150", "--scale", "4m/mm"][..],
             [
                 "place          x 5100, y 7150",
                 "4 ground metres a hand millimetre; at level 0 a felt cell is 10 m, 2.5 mm",
@@ -86,7 +84,7 @@ fn place_scale_and_level_are_taken_and_said() {
             ],
         ),
         (
-            &["--at=5100,7150", "--cell-mm", "2", "--level", "2"],
+            &["--at=5100,7150", "--scale", "2mm/cell", "--level", "2"],
             [
                 "x 5100, y 7150",
                 "5 ground metres a hand millimetre; at level 2 a felt cell is 40 m, 8 mm",
@@ -110,7 +108,7 @@ fn place_scale_and_level_are_taken_and_said() {
     let flat = said(&hapterra(
         "run",
         &file,
-        &["--at", "5100,7150", "--cell-mm", "0.5"],
+        &["--at", "5100,7150", "--scale", "0.5mm/cell"],
     ));
     assert!(flat.contains("mm in the hand; --exaggeration "), "{flat}");
 }
@@ -130,11 +128,11 @@ fn what_cannot_be_placed_is_an_error_that_says_the_bounds_and_what_to_do() {
             ["there is no data at x 5380, y 7280", bounds],
         ),
         (
-            &["--at-lonlat", "-118.2,34.2"],
+            &["--at", "-118.2,34.2", "--crs", "lonlat"],
             ["states no reference system", bounds],
         ),
         (
-            &["--bbox-lonlat", "-118.2,34.2,-118.1,34.3"],
+            &["--bbox", "-118.2,34.2,-118.1,34.3", "--crs", "lonlat"],
             ["states no reference system", "gdal_translate -a_srs"],
         ),
         (
@@ -154,17 +152,12 @@ fn what_cannot_be_placed_is_an_error_that_says_the_bounds_and_what_to_do() {
             ["is west,south,east,north", "west before east"],
         ),
         (
-            &["--ground-m-per-mm", "0"],
-            ["0 ground metres a hand millimetre", "above zero"],
-        ),
-        (&["--cell-mm", "0"], ["a cell of 0 mm", "hint: "]),
-        (
             &["--exaggeration", "0"],
             ["heights × 0", "1 is true to scale"],
         ),
         (
-            &["--height-mm-per-unit", "900"],
-            ["the relief is", "a smaller --height-mm-per-unit"],
+            &["--exaggeration", "900mm/unit"],
+            ["the relief is", "a smaller --exaggeration"],
         ),
         (
             &["--level", "9"],
@@ -187,21 +180,19 @@ fn options_that_contradict_each_other_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
     for more in [
-        &["--fit", "--at", "1,2"][..],
-        &["--fit", "--cell-mm", "1"],
-        &["--fit", "--ground-m-per-mm", "1"],
-        &["--at", "1,2", "--at-lonlat", "1,2"],
+        &["--at", "1,2", "--at", "1,2"][..],
         &["--bbox", "1,2,3,4", "--at", "1,2"],
-        &["--bbox", "1,2,3,4", "--bbox-lonlat", "1,2,3,4"],
-        &["--bbox", "1,2,3,4", "--cell-mm", "1"],
-        &["--bbox-lonlat", "1,2,3,4", "--ground-m-per-mm", "1"],
-        &["--ground-m-per-mm", "1", "--cell-mm", "1"],
-        &["--exaggeration", "2", "--height-mm-per-unit", "1"],
+        &["--bbox", "1,2,3,4", "--bbox", "1,2,3,4"],
+        &["--bbox", "1,2,3,4", "--scale", "1mm/cell"],
+        &["--bbox", "1,2,3,4", "--crs", "lonlat", "--scale", "1m/mm"],
+        &["--scale", "1m/mm", "--scale", "1mm/cell"],
+        &["--exaggeration", "2", "--exaggeration", "1mm/unit"],
+        &["--crs", "file", "--crs", "lonlat"],
     ] {
         let run = hapterra("run", &file, more);
         assert_eq!(run.status.code(), Some(2), "{more:?}: {}", said(&run));
         assert!(
-            said(&run).contains("cannot be used with"),
+            said(&run).contains("cannot be used"),
             "{more:?}: {}",
             said(&run)
         );
@@ -257,17 +248,20 @@ fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
         let off = percent - wanted(47.25, latitude);
         assert!(off.abs() < 0.2, "{percent} for {}", wanted(47.25, latitude));
         // At a scale at which the arm reaches 20 km to each side cells are as they are felt.
-        let near = ["--at", "15,47", "--ground-m-per-mm", "5"];
+        let near = ["--at", "15,47", "--scale", "5m/mm"];
         let near = said(&hapterra(command, &file, &near));
         assert!(near.contains("place ") && shape(&near).is_none(), "{near}");
         // What is stored is not square anywhere.
-        let stored = ["--cells", "stored", "--exaggeration", "9"];
+        let stored = ["--input", "cells=stored", "--exaggeration", "9"];
         let stored = said(&hapterra(command, &file, &stored));
         assert!(
             shape(&stored).is_some_and(|[percent, _]| percent > 20.0),
             "{stored}"
         );
-        for part in ["not in their true shape", "--cells square feels them"] {
+        for part in [
+            "not in their true shape",
+            "--input cells=square renders them",
+        ] {
             assert!(stored.contains(part), "{part} in {stored}");
         }
     }

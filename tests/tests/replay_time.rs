@@ -8,7 +8,10 @@ use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::{hapterra_binary, shared};
 
 const STIFFNESS: f64 = 0.5;
-const LAW: [&str; 2] = ["--cell-mm=1", "--stiffness-n-per-mm=0.5"];
+/// A surface with a damping of 5 N·s/m.
+const DAMPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/damped.toml");
+
+const LAW: [&str; 2] = ["--scale=1mm/cell", "--stiffness=0.5"];
 
 /// A row of what was felt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,7 +150,7 @@ fn pressed(felt: &[Felt]) -> usize {
 #[test]
 fn damping_is_the_same_however_often_a_path_has_rows() {
     let folder = Folder::new();
-    let damped = [&LAW[..], &["--damping-ns-per-m=5"]].concat();
+    let damped = [&LAW[..], &["--surface", DAMPED]].concat();
     for hz in [2, 10, 100, 250, 1_000, 1_600, 8_000, 100_000] {
         let rows = sampled(hz, 0.5, |t| [40.0, 20.0, 2.0 - 20.0 * t]);
         let (felt, said) = folder.felt(&path(&rows), &damped);
@@ -165,11 +168,12 @@ fn drag(t_s: f64) -> [f64; 3] {
     [10.0 + 50.0 * t_s, 20.0, z]
 }
 
-const VISCOUS: [&str; 4] = [
-    "--cell-mm=1",
-    "--stiffness-n-per-mm=0.5",
+const VISCOUS: [&str; 5] = [
+    "--scale=1mm/cell",
+    "--stiffness=0.5",
     "--friction=0.3",
-    "--viscous-friction=0.02",
+    "--surface",
+    concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/viscous.toml"),
 ];
 
 fn trails(felt: &[Felt]) {
@@ -255,7 +259,7 @@ fn times_that_contradict_a_recordings_rate_are_refused() {
 #[test]
 fn rows_without_times_are_ticks_and_that_is_said() {
     let folder = Folder::new();
-    let damped = [&LAW[..], &["--damping-ns-per-m=5"]].concat();
+    let damped = [&LAW[..], &["--surface", DAMPED]].concat();
     let timed = sampled(1_000, 0.5, |t| [40.0, 20.0, 2.0 - 20.0 * t]);
     let (expected, _) = folder.felt(&path(&timed), &damped);
     let places = timed
@@ -323,22 +327,18 @@ fn wrong_times_are_refused_and_odd_ones_remarked_on() {
 
 #[test]
 fn a_board_of_another_rate_than_a_recording_is_refused() {
-    let Some((qemu, image)) = emulated_board() else {
+    let Some((_, image)) = emulated_board() else {
         return;
     };
     let folder = Folder::new();
     let recording = folder.recording(4_000, &sampled(4_000, 0.1, drag), &VISCOUS);
-    let [qemu, image] = [("qemu", qemu), ("image", image)]
-        .map(|(name, path)| format!("--{name}={}", path.display()));
-    let said = folder.fails(&recording, &["--on=emulated", &qemu, &image]);
+    let device = format!("--device=emulated:{}", image.display());
+    let said = folder.fails(&recording, &[&device]);
     assert!(
         said.contains("the recording has 4000 ticks a second, and the device has 1000"),
         "{said}"
     );
-    let (felt, _) = folder.felt(
-        &recording,
-        &["--on=emulated", &qemu, &image, "--ignore-settings"],
-    );
+    let (felt, _) = folder.felt(&recording, &[&device, "--ignore-settings"]);
     assert_eq!(felt.len(), 101);
 }
 
@@ -376,7 +376,7 @@ fn reviewed_paths_and_recordings_are_felt_by_time() {
         0.0995,
     );
     assert!(adds.iter().all(|n| (n - 0.1003).abs() < 2e-4), "{adds:?}");
-    let law = ["--damping-ns-per-m=5", "--stiffness-n-per-mm=0.5"];
+    let law = ["--surface", DAMPED, "--stiffness=0.5"];
     let adds = damping(
         &felt("case3_flat33.tif", "case3_path_10ms.csv", &law),
         2.1,

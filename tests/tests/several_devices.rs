@@ -9,18 +9,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use hapterra::link::Native;
+use hapterra::synth::Kind;
 use hapterra_core::guard::Sense;
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::served::{Served, signal, terrain, told};
 use hapterra_tests::timeouts::end_of;
-use hapterra_tests::{greedy, hapterra_binary};
+use hapterra_tests::{greedy, hapterra_binary, terrain_file};
 
 /// Serves the terrain in a folder to these devices.
 fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
     let mut command = Command::new(hapterra_binary());
     command
-        .args(["run", &terrain(folder), "--cell-mm", "1"])
-        .args(["--height-mm-per-unit", "0.1"]);
+        .args(["run", &terrain(folder), "--scale", "1mm/cell"])
+        .args(["--exaggeration", "0.1mm/unit"]);
     for device in devices {
         command.args(["--device", device]);
     }
@@ -34,7 +35,7 @@ fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
 
 fn recorded(folder: &Path, name: &str) -> Vec<String> {
     let felt = folder.join(name);
-    vec!["--record".into(), felt.to_str().expect("plain").to_owned()]
+    vec!["--out".into(), felt.to_str().expect("plain").to_owned()]
 }
 
 fn texts(owned: &[String]) -> Vec<&str> {
@@ -375,16 +376,13 @@ fn bytes_read(command: &Command) -> u64 {
 fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("large.tif");
+    terrain_file(&path, Kind::Fractal, 2048, 1);
     let path = path.to_str().expect("a plain path");
-    let made = Command::new(hapterra_binary())
-        .args(["synth", "fractal", "-o", path, "--size", "2048"])
-        .status();
-    assert!(made.expect("it runs").success());
     let read_by = |devices: usize| {
         let mut command = Command::new(hapterra_binary());
-        command.args(["run", path, "--in-memory-mb", "1", "--seconds", "8"]);
+        command.args(["run", path, "--input", "in-memory=1MB", "--duration", "8s"]);
         // What the first run keeps on disk of a file that is two seconds old is read by the second.
-        command.args(["--cache-mb", "0"]);
+        command.args(["--cache", "off"]);
         for _ in 0..devices {
             command.args(["--device", "native"]);
         }

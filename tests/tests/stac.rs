@@ -199,12 +199,15 @@ fn assets_whose_names_differ_are_chosen_by_a_pattern() {
     let document = write(place.path(), "all.json", &collection(&items));
     let output = info(&document, &[]);
     let words = told(&output);
-    assert!(words.contains("--variable dem_0_0.5|dem_0_2"), "{words}");
+    assert!(
+        words.contains("--input variable=dem_0_0.5|dem_0_2"),
+        "{words}"
+    );
     assert_is_both(&built(
         place.path(),
-        &info(&document, &["--variable", "dem_*_2"]),
+        &info(&document, &["--input", "variable=dem_*_2"]),
     ));
-    let words = told(&info(&document, &["--variable", "dsm_*"]));
+    let words = told(&info(&document, &["--input", "variable=dsm_*"]));
     assert!(words.contains("no asset of that name"), "{words}");
 }
 

@@ -64,11 +64,11 @@ fn remarks_are_noted_where_a_terrain_is_touched() {
     let output = hapterra(folder.path(), &["cut", "x.asc", "-o", "out"]);
     let notes = String::from_utf8(output.stderr).expect("text");
     assert!(
-        notes.contains("note: ") && notes.contains("--no-data -32768"),
+        notes.contains("note: ") && notes.contains("--input no-data=-32768"),
         "{notes}"
     );
-    let stated = ["cut", "x.asc", "-o", "out", "--no-data", "-32768"];
+    let stated = ["cut", "x.asc", "-o", "out", "--input", "no-data=-32768"];
     let output = hapterra(folder.path(), &stated);
     let notes = String::from_utf8(output.stderr).expect("text");
-    assert!(!notes.contains("--no-data"), "{notes}");
+    assert!(!notes.contains("--input no-data"), "{notes}");
 }

@@ -10,9 +10,9 @@ use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
 use hapterra_core::scene::Sample;
 use hapterra_tests::field::position;
-use hapterra_tests::hapterra_binary;
 use hapterra_tests::invariants::seen::Seen;
 use hapterra_tests::invariants::texture::TextureJudge;
+use hapterra_tests::{hapterra_binary, terrain_file};
 use heightfield::{OpenOptions, Raster};
 
 /// HIPs of a way, and from one to the next, mm.
@@ -140,37 +140,16 @@ fn a_recording_keeps_its_texture() {
         (run.status.success(), said)
     };
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("there");
-    let synth = [
-        "synth",
-        "fractal",
-        "--size",
-        "129",
-        "--seed",
-        "4",
-        "--output",
-        "hills.tif",
-    ];
-    let (made, said) = hapterra(&synth);
-    assert!(made, "{said}");
+    terrain_file(&folder.path().join("hills.tif"), Kind::Fractal, 129, 4);
     let demo = [
         "demo",
         "hills.tif",
-        "--seconds",
-        "4",
-        "--texture",
-        "grating",
+        "--duration",
+        "4s",
+        "--surface",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/grating.toml"),
     ];
-    let numbers = [
-        "--texture-amplitude",
-        "0.15",
-        "--texture-wavelength",
-        "2.5",
-        "--texture-direction",
-        "-40",
-        "--texture-seed",
-        "6",
-    ];
-    let (felt, said) = hapterra(&[&demo[..], &numbers].concat());
+    let (felt, said) = hapterra(&demo);
     assert!(felt, "{said}");
     let recording = read("demo/hills.csv");
     assert!(
@@ -180,9 +159,9 @@ fn a_recording_keeps_its_texture() {
     for (more, output) in [
         (&[][..], "a.csv"),
         (&[], "b.csv"),
-        (&["--texture", "none"], "c.csv"),
+        (&["--surface", "ice"], "c.csv"),
     ] {
-        let replay = ["replay", "hills.tif", "demo/hills.csv", "--output", output];
+        let replay = ["replay", "hills.tif", "demo/hills.csv", "--out", output];
         let (replayed, said) = hapterra(&[&replay[..], more].concat());
         assert!(replayed, "{said}");
     }
@@ -195,15 +174,17 @@ fn a_recording_keeps_its_texture() {
         rows.map(str::to_owned).collect()
     };
     assert!(rows(&a).len() > 3_000 && rows(&a) != rows(&c));
+    let high = "[default]\ntexture = \"grain\"\ntexture_amplitude = 0.5\n";
+    std::fs::write(folder.path().join("high.toml"), high).expect("written");
     let (replayed, said) = hapterra(
         &[
-            &["replay", "hills.tif", "demo/hills.csv", "--output", "d.csv"][..],
-            &["--texture-amplitude", "0.5"],
+            &["replay", "hills.tif", "demo/hills.csv", "--out", "d.csv"][..],
+            &["--surface", "high.toml"],
         ]
         .concat(),
     );
     assert!(
-        !replayed && said.contains("hint: --texture-amplitude"),
+        !replayed && said.contains("hint: texture_amplitude"),
         "{said}"
     );
 }

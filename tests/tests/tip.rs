@@ -4,13 +4,14 @@
 use std::process::Command;
 
 use hapterra::replay::{Replayer, on_native};
+use hapterra::synth::Kind;
 use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::ForceLaw;
 use hapterra_core::scene::Sample;
 use hapterra_tests::walk::wander;
-use hapterra_tests::{hapterra_binary, shared};
+use hapterra_tests::{UNCONTROLLED, hapterra_binary, shared, terrain_file};
 use heightfield::{OpenOptions, Raster};
 
 /// Distance of a place from the bilinear surface of samples, all in cells: over fine lines of
@@ -334,23 +335,20 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("there");
-    runs(
-        folder,
-        &["synth", "crater", "-o", "hills.tif", "--size", "512"],
-    );
+    terrain_file(&folder.join("hills.tif"), Kind::Crater, 512, 1);
     let native = [
         "--device",
         "native",
-        "--seconds",
-        "5",
-        "--passivity",
-        "off",
+        "--duration",
+        "5s",
+        "--surface",
+        UNCONTROLLED,
         "--tip",
         "6mm",
     ];
     let said = runs(
         folder,
-        &[&["run", "hills.tif", "--record", "run.csv"][..], &native].concat(),
+        &[&["run", "hills.tif", "--out", "run.csv"][..], &native].concat(),
     );
     assert!(said.contains("felt by a ball of 6 mm"), "{said}");
     runs(
@@ -396,10 +394,7 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
 fn a_tip_of_too_many_cells_takes_a_coarser_level() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    runs(
-        folder,
-        &["synth", "fractal", "-o", "hills.tif", "--size", "256"],
-    );
+    terrain_file(&folder.join("hills.tif"), Kind::Fractal, 256, 1);
     std::fs::write(folder.join("in.csv"), "t_s,x_mm,y_mm,z_mm\n0,60,60,500\n").expect("written");
     runs(
         folder,
@@ -439,13 +434,17 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
 fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    runs(
-        folder,
-        &["synth", "crater", "-o", "hills.tif", "--size", "256"],
-    );
+    terrain_file(&folder.join("hills.tif"), Kind::Crater, 256, 1);
     std::fs::write(folder.join("in.csv"), "t_s,x_mm,y_mm,z_mm\n0,60,60,500\n").expect("written");
-    let run = ["run", "hills.tif", "--device", "native", "--seconds", "1"];
-    let demo = ["demo", "hills.tif", "--device", "native", "--seconds", "1"];
+    let run = ["run", "hills.tif", "--device", "native", "--duration", "1s"];
+    let demo = [
+        "demo",
+        "hills.tif",
+        "--device",
+        "native",
+        "--duration",
+        "1s",
+    ];
     let replay = ["replay", "hills.tif", "in.csv", "-o", "out.csv"];
     let line = "felt by a ball of 7 mm over level";
     for (words, more, is_ball) in [
@@ -472,9 +471,7 @@ struct Touched {
 impl Touched {
     fn in_demo(folder: &std::path::Path, file: &std::path::Path, friction: &str) -> Self {
         let file_text = file.to_string_lossy();
-        let words = [
-            "demo", &file_text, "--fit", "--device", "native", "--out", friction,
-        ];
+        let words = ["demo", &file_text, "--device", "native", "--out", friction];
         runs(folder, &[&words[..], &["--friction", friction]].concat());
         let name = file.file_stem().expect("a name").to_string_lossy();
         let recording = folder.join(friction).join(format!("{name}.csv"));

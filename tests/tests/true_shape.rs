@@ -90,7 +90,7 @@ fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
         let run = std::process::Command::new(hapterra_tests::hapterra_binary())
             .arg("replay")
             .args([&plane(60.0, slope), &path])
-            .args(["--cell-mm", "1", "-o"])
+            .args(["--scale", "1mm/cell", "-o"])
             .arg(&out)
             .output()
             .expect("started");

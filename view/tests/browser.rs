@@ -221,9 +221,8 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
     };
     let live = folder.join("live.rrd");
     // For as long as it takes a page to be seen on a busy machine: it is ended then.
-    demo.args(["demo", "--device", "emulated", "--rounds", "900", "--view"])
-        .arg("--image")
-        .arg(image)
+    demo.args(["demo", "--rounds", "900", "--view"])
+        .arg(format!("--device=emulated:{}", image.display()))
         .arg("--out")
         .arg(&folder);
     let mut demo = Running::shown(&mut demo, &format!("--rrd {}", live.display()));

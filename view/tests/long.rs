@@ -49,7 +49,7 @@ fn touching(into: &Path) -> Option<Command> {
     let mut demo = hapterra()?;
     demo.args(["demo", "--rounds", "300", "--view"]);
     match emulated() {
-        Some(image) => demo.args(["--device", "emulated", "--image"]).arg(image),
+        Some(image) => demo.arg(format!("--device=emulated:{}", image.display())),
         None => demo.args(["--device", "native"]),
     };
     demo.arg("--out").arg(into);

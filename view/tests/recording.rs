@@ -9,6 +9,15 @@ use common::framed::{check_frames, laid};
 use common::recorded::{Csv, check, check_views, entities, scalars};
 use common::{Running, folder, hapterra};
 
+/// Makes a terrain file by formula, with the program that `cargo xtask view --test` names.
+fn synth(file: &Path, size: &str) {
+    let program = std::env::var_os("HAPTERRA_LAB").expect("named beside HAPTERRA");
+    let mut synth = Command::new(program);
+    synth.args(["synth", "fractal", "--size", size, "--out"]);
+    let made = synth.arg(file).output().expect("it starts");
+    assert!(made.status.success(), "{made:?}");
+}
+
 /// Writes what is shown into a file, too.
 fn rrd(into: &Path) -> String {
     format!("--rrd {}", into.display())
@@ -22,7 +31,7 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     };
     let folder = folder("demo");
     let live = folder.join("live.rrd");
-    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"]);
+    demo.args(["demo", "--device", "native", "--duration", "4s", "--view"]);
     let said = Running::whole(demo.arg("--out").arg(&folder), &rrd(&live));
     assert!(!said.contains("not shown"), "{said}");
     let recording = folder.join("fractal.csv");
@@ -45,33 +54,30 @@ fn the_live_view_of_a_demo_and_of_its_recording_have_the_values_of_its_csv() {
     assert!(rates.iter().any(|(_, row)| row[0] > 0.0), "{rates:?}");
 
     let terrain = folder.join("hills.tif");
-    let mut synth = hapterra().expect("named");
-    synth.args(["synth", "fractal", "--size", "1024", "--seed", "1", "-o"]);
-    Running::whole(synth.arg(&terrain), "");
+    synth(&terrain, "1024");
     let again = folder.join("again.rrd");
     let mut view = hapterra().expect("named");
     view.arg("view").arg(&recording).arg("--ignore-settings");
-    Running::whole(view.arg("--terrain").arg(&terrain), &rrd(&again));
+    Running::whole(view.arg(&terrain), &rrd(&again));
     check(&csv, &entities(&again));
     std::fs::remove_dir_all(folder).expect("it goes");
 }
 
 #[test]
 fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
-    let Some(mut synth) = hapterra() else {
+    if hapterra().is_none() {
         println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
         return;
-    };
+    }
     let folder = folder("views");
     let at = |name: &str| folder.join(name);
     let (terrain, commands) = (at("hills.tif"), at("commands"));
     let lines = "at 3.5 zoom 2\nat 4.3 pan 4 3\nat 5.1 exaggerate 1.5\n";
     std::fs::write(&commands, lines).expect("written");
     let run = |command: &mut Command, into: &Path| Running::whole(command, &rrd(into));
-    let size = ["synth", "fractal", "--size", "512", "--seed", "1", "-o"];
-    Running::whole(synth.args(size).arg(&terrain), "");
+    synth(&terrain, "512");
     let mut demo = hapterra().expect("named");
-    demo.args(["demo", "--device", "native", "--seconds", "6", "--view"]);
+    demo.args(["demo", "--device", "native", "--duration", "6s", "--view"]);
     demo.arg("--commands").arg(&commands);
     demo.arg("--out").arg(&folder).arg(&terrain);
     run(&mut demo, &at("live.rrd"));
@@ -85,10 +91,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let (first, last) = (bars[0], bars[bars.len() - 1]);
     assert!((0.39..0.51).contains(&(last / first)), "{bars:?}");
     let mut view = hapterra().expect("named");
-    view.arg("view")
-        .arg(&recording)
-        .arg("--terrain")
-        .arg(&terrain);
+    view.arg("view").arg(&recording).arg(&terrain);
     run(&mut view, &at("viewed.rrd"));
     let viewed = entities(&at("viewed.rrd"));
     check_views(&csv, &viewed, true);
@@ -103,7 +106,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     run(replay.arg("-o").arg(&felt), &at("replayed.rrd"));
     check_views(&csv, &entities(&at("replayed.rrd")), true);
     let mut view = hapterra().expect("named");
-    view.arg("view").arg(&felt).arg("--terrain").arg(&terrain);
+    view.arg("view").arg(&felt).arg(&terrain);
     run(&mut view, &at("parquet.rrd"));
     check_views(&csv, &entities(&at("parquet.rrd")), true);
     std::fs::remove_dir_all(folder).expect("it goes");
@@ -111,16 +114,15 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
 
 #[test]
 fn the_map_says_what_is_laid_in_front_of_the_arm() {
-    let Some(mut synth) = hapterra() else {
+    if hapterra().is_none() {
         println!("SKIPPED: HAPTERRA names no program; cargo xtask view --test does");
         return;
-    };
+    }
     let folder = folder("laid");
     let (terrain, shown) = (folder.join("hills.tif"), folder.join("shown.rrd"));
-    let size = ["synth", "fractal", "--size", "512", "--seed", "1", "-o"];
-    Running::whole(synth.args(size).arg(&terrain), "");
+    synth(&terrain, "512");
     let mut demo = hapterra().expect("named");
-    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"])
+    demo.args(["demo", "--device", "native", "--duration", "4s", "--view"])
         .args(["--bbox", "501000,1500,503000,3000", "--out"])
         .arg(&folder)
         .arg(&terrain);

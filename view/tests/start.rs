@@ -91,7 +91,7 @@ fn page_of_a_demo_is_told_the_coarse_whole_first() {
         return;
     };
     let folder = folder("start");
-    demo.args(["demo", "--device", "native", "--seconds", "4", "--view"])
+    demo.args(["demo", "--device", "native", "--duration", "4s", "--view"])
         .args(std::env::var_os("TERRAIN").map(PathBuf::from))
         .arg("--out")
         .arg(&folder);

@@ -13,12 +13,7 @@ use crate::setup::{emulator, qemu, toolchain};
 /// with the kept table, or writes that anew. About five minutes on two cores.
 pub(crate) fn counts(write: bool) -> Result<()> {
     let wanted = if write { "write" } else { "all" };
-    replay(
-        "hapterra-bench",
-        "instructions_m4f",
-        &["--nocapture"],
-        wanted,
-    )
+    replay("hapterra-lab", "instructions_m4f", &["--nocapture"], wanted)
 }
 
 /// Works out the cycles of a tick on the boards' chips, prints them, and compares them with the

@@ -60,7 +60,11 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
     })?;
     let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
     let mut command = Command::new(target_dir().join("release").join(program));
-    command.args(request.words(emulation.as_ref()));
+    command.args(request.words(emulation.is_some()));
+    if let Some(Emulation { image, qemu }) = &emulation {
+        command.env("HAPTERRA_MPS2_ELF", image);
+        command.env("HAPTERRA_QEMU", qemu);
+    }
     if request.view {
         command.env("HAPTERRA_VIEW", view::build()?);
     }
@@ -124,23 +128,16 @@ impl Request {
     }
 
     /// The arguments of the `hapterra` command.
-    fn words(&self, emulation: Option<&Emulation>) -> Vec<OsString> {
+    fn words(&self, is_emulated: bool) -> Vec<OsString> {
         let mut words: Vec<OsString> = vec!["demo".into()];
         words.extend(self.file.clone());
         // Any file has to come out well without a question: relief that suits the hand.
-        let stated = ["--exaggeration", "--height-mm-per-unit"];
-        if stated.iter().all(|option| self.value(option).is_none()) {
+        if self.value("--exaggeration").is_none() {
             words.extend(["--exaggeration", "auto"].map(OsString::from));
         }
-        match emulation {
-            Some(Emulation { image, qemu }) => {
-                let pairs = ["--image".into(), image.into(), "--qemu".into(), qemu.into()];
-                words.extend(pairs);
-            }
-            None if self.device().is_none() => {
-                words.extend(["--device", "native"].map(OsString::from));
-            }
-            None => {}
+        if self.device().is_none() {
+            let device = if is_emulated { "emulated" } else { "native" };
+            words.extend(["--device", device].map(OsString::from));
         }
         if self.value("--out").is_none() {
             words.extend(["--out".into(), root().join("demo").into()]);
@@ -163,21 +160,17 @@ mod tests {
             extra: extra.iter().map(OsString::from).collect(),
             ..Request::default()
         };
-        let emulation = Emulation {
-            image: "ELF".into(),
-            qemu: "QEMU".into(),
-        };
-        let words = request.words(emulated.then_some(&emulation));
+        let words = request.words(emulated);
         let words: Vec<_> = words.iter().map(|w| w.to_string_lossy()).collect();
         words.join(" ")
     }
 
     #[test]
     fn the_emulated_board_is_used_where_it_can_be_had() {
-        let line = line(Some("a b.tif"), &["--out=x", "--seconds", "3"], true);
+        let line = line(Some("a b.tif"), &["--out=x", "--duration", "3s"], true);
         assert_eq!(
             line,
-            "demo a b.tif --exaggeration auto --image ELF --qemu QEMU --out=x --seconds 3"
+            "demo a b.tif --exaggeration auto --device emulated --out=x --duration 3s"
         );
     }
 
@@ -217,13 +210,13 @@ mod tests {
         };
         assert_eq!(request.device().as_deref(), Some("emulated"));
         assert_eq!(request.value("--out").as_deref(), Some("y"));
-        assert_eq!(request.value("--seconds"), None);
-        assert!(request.words(None).contains(&OsString::from("--view")));
+        assert_eq!(request.value("--duration"), None);
+        assert!(request.words(false).contains(&OsString::from("--view")));
     }
 
     #[test]
     fn relief_that_is_stated_is_not_overruled() {
-        for stated in ["--exaggeration=1", "--height-mm-per-unit=2"] {
+        for stated in ["--exaggeration=1", "--exaggeration=2mm/unit"] {
             let line = line(None, &[stated, "--out", "x"], false);
             assert!(!line.contains("auto"), "{line}");
         }

@@ -268,9 +268,9 @@ mod tests {
 
     #[test]
     fn what_follows_two_dashes_goes_to_the_run() {
-        let request = demo(&["a.tif", "--", "--seconds", "3", "--"]).unwrap();
+        let request = demo(&["a.tif", "--", "--rounds", "3", "--"]).unwrap();
         assert_eq!(request.file, Some("a.tif".into()));
-        assert_eq!(request.extra, ["--seconds", "3", "--"]);
+        assert_eq!(request.extra, ["--rounds", "3", "--"]);
         assert_eq!(demo(&["--", "b"]).unwrap().file, None);
         let touched = demo(&["--touch", "--out", "f", "a.tif"]).unwrap();
         assert_eq!((touched.touch, touched.out), (true, Some("f".into())));
@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn a_misplaced_option_is_explained() {
-        let message = demo(&["a.tif", "--seconds", "3"]).unwrap_err().to_string();
+        let message = demo(&["a.tif", "--rounds", "3"]).unwrap_err().to_string();
         assert!(message.contains("after `--`"), "{message}");
         assert!(demo(&["a.tif", "b.tif"]).is_err());
     }

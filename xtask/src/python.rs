@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
-use crate::run::{cargo, output, root, run, run_quietly, say, target_dir, timed};
+use crate::run::{cargo, output, program, root, run, run_quietly, say, target_dir, timed};
 use crate::{demo, deny};
 
 /// How the wheel is built that is handed out, and the one that is tested: most crates of the registry
@@ -57,6 +57,7 @@ pub(crate) fn test() -> Result<()> {
     let mut tests = Command::new(&python);
     tests
         .args(["-m", "pytest"])
+        .env("HAPTERRA_LAB", program("hapterra-lab", &[])?)
         .current_dir(root().join("python"));
     match demo::emulation() {
         Ok(board) => {

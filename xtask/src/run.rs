@@ -38,6 +38,16 @@ pub(crate) fn cargo() -> Command {
     command
 }
 
+/// Builds the program of the package of that name, and returns its path.
+pub(crate) fn program(name: &str, features: &[&str]) -> Result<PathBuf> {
+    let mut build = cargo();
+    build.args(["build", "--package", name, "--bin", name]);
+    build.args(features);
+    timed(&format!("building {name}"), || run(&mut build))?;
+    let program = format!("{name}{}", std::env::consts::EXE_SUFFIX);
+    Ok(target_dir().join("debug").join(program))
+}
+
 /// Runs `command` to its end; an unhappy end is an error naming the command.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let line = shown(command);

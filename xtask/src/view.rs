@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::board::EMULATED;
 use crate::demo::emulation;
 use crate::deny;
-use crate::run::{cargo, on_path, root, run, say, target_dir, timed};
+use crate::run::{cargo, on_path, program, root, run, say, target_dir, timed};
 use crate::setup::packages::{self, found_or_installed};
 
 /// Names the browser that the page is tested with.
@@ -77,14 +77,11 @@ pub(crate) fn pictures() -> Result<()> {
     timed("taking pictures of the live view", || run(&mut tests))
 }
 
-/// The viewer's tests, with `hapterra` beside them.
+/// The viewer's tests, with `hapterra` and `hapterra-lab` beside them.
 fn tests() -> Result<Command> {
-    timed("building the hapterra command", || {
-        run(cargo().args(["build", "--package", "hapterra", "--bin", "hapterra"]))
-    })?;
-    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
     let mut tests = viewers(&["test", "--release", "--locked"]);
-    tests.env("HAPTERRA", target_dir().join("debug").join(program));
+    tests.env("HAPTERRA", program("hapterra", &[])?);
+    tests.env("HAPTERRA_LAB", program("hapterra-lab", &[])?);
     Ok(tests)
 }
 

@@ -1,8 +1,8 @@
 //! The passivity controller: what a surface gives to a hand that taps on it, in a closed loop with a
 //! virtual arm.
 
+use crate::stability::grasp::Grasp;
 use hapterra::phantom::{HeldPhantom, PhantomModel, Placement, Script};
-use hapterra::stability::grasp::Grasp;
 use hapterra_core::force::ForceLaw;
 
 use super::arm::{Arm, NotMeasured};

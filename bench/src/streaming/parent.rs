@@ -43,7 +43,7 @@ pub fn measure(
     warn: &mut dyn FnMut(&str),
     done: &mut dyn FnMut(Row),
 ) -> Result<(), NotMeasured> {
-    let folder = tempfile::Builder::new().prefix("hapterra-bench-").tempdir();
+    let folder = tempfile::Builder::new().prefix("hapterra-lab-").tempdir();
     let failed = |error: std::io::Error| NotMeasured(format!("a folder for terrains: {error}"));
     let folder = folder.map_err(failed)?;
     for file in files {
@@ -197,7 +197,7 @@ fn run(
     let failed = |error: std::io::Error| NotMeasured(format!("a process of its own: {error}"));
     let program = std::env::current_exe().map_err(failed)?;
     let mut child = Command::new(program)
-        .args(["--streaming", "--streaming-case", &written(case)?])
+        .args(["streaming", "--case", &written(case)?])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()

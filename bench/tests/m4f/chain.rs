@@ -2,14 +2,14 @@
 //! currents.
 
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
-use hapterra_bench::grid::Grid;
-use hapterra_bench::path::Dice;
-use hapterra_bench::state::{TICKS, terrain};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::{Controller, Damping, ForceLaw, Material, Pattern, Shading, Texture};
 use hapterra_core::grid::Cell;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{CoarseTile, Underlay};
+use hapterra_lab::grid::Grid;
+use hapterra_lab::path::Dice;
+use hapterra_lab::state::{TICKS, terrain};
 use hapterra_tests::counting::{CountingBoard, Samples};
 use hapterra_tests::scene::materials::Materials;
 
@@ -338,7 +338,7 @@ impl<'g> Arm<'g> {
 
     fn scene(&self) -> Scene {
         let [x, y, z] = self.placement.home_mm;
-        let home = hapterra_bench::haptics::Hip::at([x, y, z]).grid;
+        let home = hapterra_lab::haptics::Hip::at([x, y, z]).grid;
         let arm = Scene {
             home,
             source: Source::Encoders,

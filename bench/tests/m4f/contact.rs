@@ -1,15 +1,15 @@
 //! The states of the contact alone: the same paths of the HIP as in the counts
 //! on the host, and the long sweeps.
 
-use hapterra_bench::grid::Grid;
-use hapterra_bench::haptics::Hip;
-use hapterra_bench::path;
-use hapterra_bench::state::{STATES, Step, TICKS, terrain};
 use hapterra_core::contact::Friction;
 use hapterra_core::force::ForceLaw;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{FieldSize, TileKey};
+use hapterra_lab::grid::Grid;
+use hapterra_lab::haptics::Hip;
+use hapterra_lab::path;
+use hapterra_lab::state::{STATES, Step, TICKS, terrain};
 use hapterra_tests::counting::{CountingBoard, Event, Replay, Samples, tiles};
 
 use super::table::{Row, Target, Tick};

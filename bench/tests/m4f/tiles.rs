@@ -1,11 +1,11 @@
 //! Filling a buffer with a tile, in each form in which tiles travel, and with bytes that
 //! are made to take long.
 
-use hapterra_bench::path::Dice;
-use hapterra_bench::state::terrain;
 use hapterra_core::terrain::POSTS;
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
 use hapterra_core::wire::message::Heights;
+use hapterra_lab::path::Dice;
+use hapterra_lab::state::terrain;
 use hapterra_tests::counting::CountingBoard;
 
 use super::contact::scene;

@@ -43,7 +43,8 @@ pub(crate) enum Unit {
 
 impl ReferenceSystem {
     /// The system with a code of EPSG's; `None` where the code is not known.
-    pub(crate) fn from_code(code: u16) -> Option<Self> {
+    #[must_use]
+    pub fn from_code(code: u16) -> Option<Self> {
         definition::of_code(code)
     }
 

@@ -24,7 +24,7 @@ pub(super) fn check(folder: &Path) -> Result<()> {
     let wrong = |why: &str| {
         let folder = folder.display();
         Err(Error::other(format!(
-            "{folder} {why}, or name another with --cache-dir"
+            "{folder} {why}, or name another with --cache"
         )))
     };
     if metadata.is_symlink() {

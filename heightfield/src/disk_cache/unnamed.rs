@@ -31,7 +31,7 @@ impl DiskCache {
     /// Why there is none: nothing may be kept, too little is free, the folder cannot be written.
     pub(crate) fn file_without_name(&self, bytes: u64) -> Result<Unnamed> {
         let Some(folder) = &self.0 else {
-            return Err(Error::other("nothing may be kept on disk (--cache-mb 0)"));
+            return Err(Error::other("nothing may be kept on disk (--cache off)"));
         };
         folder.make()?;
         // Where the system does not tell, the writing decides.
@@ -50,7 +50,7 @@ impl DiskCache {
             return Err(Error::new(
                 ErrorKind::StorageFull,
                 format!(
-                    "{needed} MB are too many for the {free} MB that are free on the disk of --cache-dir"
+                    "{needed} MB are too many for the {free} MB that are free on the disk of --cache"
                 ),
             ));
         }
@@ -84,11 +84,11 @@ mod tests {
         assert_eq!(names(), 0);
         let third = fs4::available_space(&within).expect("told") / 3;
         let refused = |bytes: u64| disk.file_without_name(bytes).err().map(|e| e.to_string());
-        assert!(refused(2 * third).is_some_and(|why| why.contains("--cache-dir")));
+        assert!(refused(2 * third).is_some_and(|why| why.contains("--cache")));
         assert_eq!(refused(third), None, "nothing is left of what was refused");
         let _one = disk.file_without_name(third).expect("a third");
         assert!(refused(third).is_some(), "two thirds are more than half");
         let off = DiskCache::off().file_without_name(1).err();
-        assert!(off.is_some_and(|error| error.to_string().contains("--cache-mb 0")));
+        assert!(off.is_some_and(|error| error.to_string().contains("--cache off")));
     }
 }

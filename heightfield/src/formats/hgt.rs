@@ -52,7 +52,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
         });
         decoded.remarks.push(
             "the name does not say where the tile is (as N44W072.hgt does): it is taken to be a \
-             degree high, its cells to be square (--ground-cell-m)"
+             degree high, its cells to be square (--input cell=30m)"
                 .into(),
         );
     }

@@ -175,7 +175,7 @@ impl Finding {
             Self::Fault(fault) => return fault.what_to_do().into(),
             Self::InvertedMotor { motor, right } => {
                 return format!(
-                    "exchange the motor's two wires, or type: hapterra calibrate --no-walk --set motor-sign-{motor}={right}"
+                    "exchange the motor's two wires, or type: hapterra calibrate --measure none --set motor-sign-{motor}={right}"
                 );
             }
             Self::WrongTorque { .. } => {
@@ -202,7 +202,7 @@ impl Finding {
             Self::Unclear { .. } => {
                 "hold the tip more loosely and as still as you can, and try again; if it stays so, a current may flow that nobody commands: measure the command at the amplifier again (--again-from outputs)"
             }
-            Self::Drifts { .. } | Self::MovesByItself { .. } => "measure the arm's weight again: hapterra calibrate --skip-ratios",
+            Self::Drifts { .. } | Self::MovesByItself { .. } => "measure the arm's weight again: hapterra calibrate --measure zero,gravity",
             Self::StopLeavesPower => "wire the stop's second contact into the supply of the power stages; the board alone is not to be relied on",
             Self::NoFloor => "report it with the log; do not go on to terrain",
         }

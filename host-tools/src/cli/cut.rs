@@ -9,14 +9,14 @@ use serde::Serialize;
 use super::failure::{Failure, OrHint};
 use super::options::terrain_file::TerrainFile;
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
-use crate::terrain::{FeltCells, FeltGrid};
+use crate::terrain::FeltGrid;
 
 /// The heights, beside what is said of them.
 const HEIGHTS: &str = "terrain.npy";
 const ABOUT: &str = "terrain.json";
 
 /// What to do where the folder cannot be written to.
-const HINT: &str = "name another folder with --output";
+const HINT: &str = "name another folder with -o";
 
 /// Arguments of `hapterra cut`.
 #[derive(Debug, clap::Args)]
@@ -26,10 +26,10 @@ pub struct Args {
     pub terrain: TerrainFile,
 
     /// Folder to write terrain.npy and terrain.json to
-    #[arg(short, long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
-    pub output: PathBuf,
+    #[arg(short, long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
 
-    /// Write the finest level that has at most so many samples
+    /// Largest number of samples; the finest level within it is written
     #[arg(long, value_name = "N", default_value_t = 4_000_000, value_parser = clap::value_parser!(u64).range(1024..))]
     pub most_samples: u64,
 }
@@ -50,15 +50,15 @@ struct About {
     unit_m: f64,
 }
 
-/// Writes the heights, square cells as they are felt, and what is known of them.
+/// Writes the heights, of the cells that are rendered, and what is known of them.
 ///
 /// # Errors
 /// When the terrain cannot be opened, or the folder not be written to.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let heights = args.output.join(HEIGHTS);
+    let heights = args.out.join(HEIGHTS);
     keep_apart(&[&heights], &args.terrain.inputs()).or_hint(HINT)?;
     let raster = args.terrain.open()?;
-    let grid = FeltGrid::new(&raster, FeltCells::Square);
+    let grid = FeltGrid::new(&raster, args.terrain.reading.cells());
     let of = [grid.columns(), grid.rows()];
     let size = |level: u8| of.map(|count| ((count - 1) >> level) + 1);
     let fits =
@@ -71,10 +71,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         cell_m: grid.side_m().map(|side| side * f64::from(level).exp2()),
         unit_m: raster.metres_per_vertical_unit(),
     };
-    let _folder = OutputFolder::create(&args.output).or_hint(HINT)?;
+    let _folder = OutputFolder::create(&args.out).or_hint(HINT)?;
     written(&heights, |out| write_npy(out, &grid, level, size(level))).or_hint(HINT)?;
     raster.check_came()?;
-    written(&args.output.join(ABOUT), |out| {
+    written(&args.out.join(ABOUT), |out| {
         Ok(serde_json::to_writer_pretty(out, &about)?)
     })
     .or_hint(HINT)?;
@@ -123,6 +123,7 @@ fn write_npy(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::terrain::FeltCells;
     use heightfield::{OpenOptions, Raster};
 
     #[test]

@@ -8,13 +8,15 @@ use clap::ValueHint;
 use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, OrHint};
-use super::options::emulated_board::{EmulatedBoard, RunsOn};
+use super::options::device::{EmulatedBoard, VirtualDevice};
 use super::options::events::{self, EventOptions};
 use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
 use super::options::steering::{self, Commands, ViewControl};
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
+use super::run::duration;
 use super::session_summary::{self, SessionSummary};
+use super::settings::SettingsOption;
 use super::terminal::waiting::shown_reading;
 use super::terminal::{interrupt, left_behind, progress, voice};
 use super::viewing::{Shown, ToBeShown, Viewing};
@@ -28,7 +30,7 @@ use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::{Laid, View};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{LoopColumns, Mark, Record, Recording, Rule, Settings};
-use crate::stability::limits;
+use crate::stability;
 use crate::synth::{Kind, Synth};
 use crate::telemetry::{FeltViews, SampleLog};
 use heightfield::without_key;
@@ -37,7 +39,7 @@ use heightfield::{Raster, files_read_with};
 /// Samples along the side of the terrain that the demo makes itself.
 const OWN_SIZE: u32 = 1024;
 /// What that terrain is called in a recording: how to make it as a file.
-const OWN_TERRAIN: &str = "hapterra synth fractal --size 1024 --seed 1";
+pub(super) const OWN_TERRAIN: &str = "hapterra synth fractal --size 1024 --seed 1";
 
 /// Arguments of `hapterra demo`.
 #[derive(Debug, clap::Args)]
@@ -51,31 +53,37 @@ pub struct Args {
     #[command(flatten)]
     pub reading: ReadingOptions,
 
-    /// Where the loop runs [default: emulated where an image of the board is named, else
-    /// native]
-    #[arg(long, value_enum)]
-    pub device: Option<RunsOn>,
+    /// Where the loop runs: native, emulated or emulated:ELF
+    ///
+    /// emulated: the Cortex-M4F board in QEMU, with the image ELF, else that of HAPTERRA_MPS2_ELF.
+    /// [default: emulated if that variable names an image, else native]
+    #[arg(long)]
+    pub device: Option<VirtualDevice>,
 
     /// Folder for the picture and the recording
-    #[arg(long, value_name = "DIR", default_value = "demo", value_hint = ValueHint::DirPath)]
+    #[arg(short, long, value_name = "DIR", default_value = "demo", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
 
-    /// End after this many seconds of the device's time
-    #[arg(long, value_name = "S")]
-    pub seconds: Option<f64>,
+    /// End after this time of the device, as 60s
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub duration: Option<f64>,
 
-    /// Make the tour so many times
-    #[arg(long, value_name = "TIMES", default_value_t = 1,
+    /// Number of tours
+    #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub rounds: u32,
 
-    /// Which part of it, and how large.
+    /// Which part of it.
     #[command(flatten)]
     pub placing: Placing,
 
-    /// How it feels.
+    /// How it is rendered.
     #[command(flatten)]
     pub rendering: Rendering,
+
+    /// Where settings are from.
+    #[command(flatten)]
+    pub settings: SettingsOption,
 
     /// How the view may be changed meanwhile.
     #[command(flatten)]
@@ -84,10 +92,6 @@ pub struct Args {
     /// Whether other programs are told what happens.
     #[command(flatten)]
     pub events: EventOptions,
-
-    /// The emulated board.
-    #[command(flatten)]
-    pub board: EmulatedBoard,
 
     /// Whether it is shown.
     #[command(flatten)]
@@ -102,17 +106,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let outputs = Outputs::new(&args.out, &name);
     outputs.keep_apart(args)?;
-    let of_ground = (&args.rendering, &args.reading);
-    let materials = (args.rendering.materials).over((&name, &raster), of_ground, None)?;
-    let mut asked = args.placing.of(&args.rendering, &raster)?;
+    let options = &args.rendering.surface;
+    let surface = options.load()?;
+    let law = surface.law;
+    let materials = surface.materials(options, (&name, &raster), &args.reading)?;
+    let cells = args.reading.cells();
+    let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
     asked.grid = asked.grid.with_materials(materials.as_ref());
     asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
     // The virtual Phantom is one.
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
     let terrain = view.terrain(asked.grid)?;
-    let law = args.rendering.law()?;
-    let law = args.rendering.materials.law(materials.as_ref(), law);
-    args.rendering.needs_the_devices_rule()?;
     let placed = shown_reading(&name, &raster, || {
         PlacedTerrain::in_view(&terrain, view.home_mm, law)
     })?;
@@ -128,9 +132,14 @@ fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
         };
         return Ok((input.open()?, input.name()));
     }
+    Ok((own_terrain()?, "fractal".into()))
+}
+
+/// The terrain that the demo makes itself: [`OWN_TERRAIN`].
+pub(super) fn own_terrain() -> Result<Raster, Failure> {
     let amplitude = Kind::Fractal.usual_amplitude_cells();
     let raster = Synth::new(Kind::Fractal, 1, amplitude).raster(OWN_SIZE, OWN_SIZE);
-    Ok((raster.map_err(Failure::new)?, "fractal".into()))
+    raster.map_err(Failure::new)
 }
 
 /// What to do where a file of the demo cannot be written.
@@ -158,7 +167,7 @@ impl Outputs {
     fn keep_apart(&self, args: &Args) -> Result<(), Failure> {
         let mut inputs = args.file.as_deref().map_or(vec![], files_read_with);
         inputs.extend(args.commands.file());
-        inputs.extend(args.rendering.materials.inputs());
+        inputs.extend(args.rendering.surface.inputs());
         keep_apart(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
     }
 }
@@ -188,7 +197,7 @@ fn show(
         voice::put(std::io::stderr(), &format!("{line}\n"));
     }
     let arm = placed.held_phantom();
-    let stop_s = args.seconds.unwrap_or(f64::MAX).min(placed.duration_s());
+    let stop_s = args.duration.unwrap_or(f64::MAX).min(placed.duration_s());
     interrupt::listen();
     let viewer = args.viewing.program()?;
     let shown = viewer.map(|program| ToBeShown::new(program, terrain, view, name));
@@ -201,14 +210,14 @@ fn show(
         events: server.as_ref().map(|server| args.events.watcher(server, 1)),
     };
     let (toured, shown) = match runs_on {
-        RunsOn::Native => {
+        VirtualDevice::Native => {
             let mut device = Native::new(HostClock::default(), Some(Box::new(arm)));
             if args.viewing.view || args.events.events.is_some() {
                 device = device.in_real_time();
             }
             tour.go(Box::new(device), Patience::EMULATED)?
         }
-        RunsOn::Emulated => tour_emulated(args, tour, arm)?,
+        VirtualDevice::Emulated(board) => tour_emulated(&board, tour, arm)?,
     };
     server.into_iter().for_each(events::end);
     // The terminal is as it was.
@@ -238,15 +247,15 @@ fn show(
 }
 
 /// Where the loop runs: as stated, else on the emulated board where there is one.
-fn device(args: &Args) -> RunsOn {
-    match args.device {
-        Some(device) => device,
-        None if args.board.is_named() => RunsOn::Emulated,
+fn device(args: &Args) -> VirtualDevice {
+    match &args.device {
+        Some(device) => device.clone(),
+        None if EmulatedBoard::has_image() => VirtualDevice::Emulated(EmulatedBoard::default()),
         None => {
             eprintln!(
-                "note: no image of the emulated board is named (--image ELF), so the same application runs in this program (--device native)"
+                "note: no image of the emulated board is named (--device emulated:ELF), so the same application runs in this program (--device native)"
             );
-            RunsOn::Native
+            VirtualDevice::Native
         }
     }
 }
@@ -293,11 +302,11 @@ fn draw(toured: &Toured<'_>, first: &View, name: &str, path: &Path) -> Result<()
 
 /// Tours on the board in an emulator, the arm in a thread of its own.
 fn tour_emulated<'t>(
-    args: &Args,
+    board: &EmulatedBoard,
     tour: Tour<'_, 't>,
     mut arm: HeldPhantom,
 ) -> Result<(Toured<'t>, Option<Shown<'t>>), Failure> {
-    let (emulator, mut lines) = args.board.start()?;
+    let (emulator, mut lines) = board.start()?;
     let report = "please report it with the file";
     move_arm_while(&mut lines.plant, &mut arm, || {
         match tour.go(Box::new(lines.link), Patience::EMULATED) {
@@ -343,7 +352,7 @@ impl<'t> Tour<'_, 't> {
         let line = format!("device         {}\n", session_summary::device(&device));
         voice::put(std::io::stdout(), &line);
         let materials = terrain.grid().materials();
-        limits::warn_of(&scene.law, materials.map(Materials::table), &device);
+        stability::warn_of(&scene.law, materials.map(Materials::table), &device);
         let tell = |line: String| voice::put(std::io::stderr(), &(line + "\n"));
         let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;

@@ -32,8 +32,11 @@ impl<E: Hint + Error + Send + Sync + 'static> From<E> for Failure {
 
 /// A result whose error becomes a [`Failure`] where the hint depends on the
 /// command, not on the error.
-pub(super) trait OrHint<T> {
+pub trait OrHint<T> {
     /// The value, or the failure with what to do next, in the imperative.
+    ///
+    /// # Errors
+    /// That of the result.
     fn or_hint(self, next_step: impl Into<String>) -> Result<T, Failure>;
 }
 

@@ -5,13 +5,13 @@
 mod terrain_files;
 
 use super::failure::Hint;
+use super::options::surface::table::BadTable;
 use crate::board::ImageError;
 use crate::board::update::{UpdateError, UpdateFailure};
 use crate::calibrate::file::BadFile;
 use crate::calibrate::{FitError, WalkError};
 use crate::link::{EmulatorError, LinkError};
 use crate::materials::BadGround;
-use crate::materials::table::BadTable;
 use crate::phantom::PlacingError;
 use crate::place::PlaceError;
 use crate::replay::ReplayError;
@@ -26,10 +26,10 @@ impl Hint for TerrainError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::NoSuchLevel { .. } => "choose a lower --level",
-            Self::Tip { .. } => "choose a smaller --tip, a larger --cell-mm, or a higher --level",
+            Self::Tip { .. } => "choose a smaller --tip, a larger --scale, or a higher --level",
             Self::TooLarge(_) => "cut a smaller part out of the file",
             Self::TooTall { .. } | Self::Scale(_) => {
-                "choose a smaller --exaggeration or --height-mm-per-unit, a larger --cell-mm, or name the file's no-data value with --no-data"
+                "choose a smaller --exaggeration, another --scale, or name the file's no-data value with --input no-data=VALUE"
             }
         };
         hint.into()
@@ -39,9 +39,9 @@ impl Hint for TerrainError {
 impl Hint for BadTable {
     fn hint(&self) -> String {
         match self {
-            Self::Unreadable { .. } => "name a table of materials with --material-table",
+            Self::Unreadable { .. } => "name a surface's file with --surface",
             Self::NoTable { .. } | Self::Class { .. } => {
-                "compare it with docs/worldcover.toml: what a class feels like stands under [class.NUMBER]"
+                "compare it with docs/worldcover.toml: a surface stands under [default], and a class of the ground under [class.NUMBER]"
             }
         }
         .into()
@@ -70,8 +70,7 @@ impl Hint for BadGround {
 
 impl Hint for PlacingError {
     fn hint(&self) -> String {
-        "choose another place with --at, or a smaller --exaggeration, --height-mm-per-unit or --cell-mm"
-            .into()
+        "choose another place with --at, a smaller --exaggeration or another --scale".into()
     }
 }
 
@@ -90,26 +89,31 @@ impl Hint for PlaceError {
             Self::BoxOutside { .. } | Self::BoxOfHoles { .. } => {
                 "choose a box that overlaps it: west, south, east, north"
             }
+            Self::UnknownCode(_) => {
+                "say the place with --crs file or --crs lonlat, or install GDAL, which knows more codes"
+            }
+            Self::OtherDatum { .. } => "say the place in the file's own coordinates: --crs file",
+            Self::NotInSystem { .. } => "choose a place inside: x, to the east, comes first",
             Self::LatitudeFirst([latitude, longitude]) => {
-                return format!("swap them: --at-lonlat {longitude},{latitude}");
+                return format!("swap them: --at {longitude},{latitude} --crs lonlat");
             }
             Self::WestInTheEast([west, south, east, north]) => {
-                return format!("swap them: --bbox-lonlat {east},{south},{west},{north}");
+                return format!("swap them: --bbox {east},{south},{west},{north} --crs lonlat");
             }
             Self::NoBox(_) => {
                 "say west before east and south before north; only a box of degrees may cross 180°"
             }
             Self::BoxInTwoParts { .. } => "name one of both parts, or --at a place",
             Self::BoxTooSmall { .. } => "choose a larger box",
-            Self::NoGroundSize => "state the scale with --cell-mm, hand millimetres a cell",
-            Self::GroundScale(_) => "choose another --ground-m-per-mm",
+            Self::NoGroundSize => "state the size of a cell, as --scale 1mm/cell",
+            Self::GroundScale(_) => "choose another --scale",
             Self::Exaggeration(_) => "choose another --exaggeration; 1 is true to scale",
-            Self::TooTall { .. } => "choose a smaller --height-mm-per-unit",
+            Self::TooTall { .. } => "choose a smaller --exaggeration",
             Self::FarAway(_) => {
-                "choose another place with --at, or a smaller --exaggeration, --height-mm-per-unit or --cell-mm"
+                "choose another place with --at, a smaller --exaggeration or another --scale"
             }
             Self::NoReach => "check the record: hapterra status, then hapterra calibrate",
-            Self::Scale(_) => "choose another --cell-mm or --height-mm-per-unit",
+            Self::Scale(_) => "choose another --scale or --exaggeration",
         };
         hint.into()
     }
@@ -144,9 +148,9 @@ impl Hint for ReplayError {
             Self::Trajectory(_) => {
                 "a trajectory is CSV: the header t_s,x_mm,y_mm,z_mm, then four numbers a line"
             }
-            Self::Output(_) => "name a file in a folder that you may write to with --output",
+            Self::Output(_) => "name a file in a folder that you may write to with -o",
             Self::View { .. } => {
-                "feel it on the terrain that it was recorded on; --ignore-settings takes its path alone"
+                "replay it on the terrain that it was recorded on; --ignore-settings takes its path alone"
             }
             Self::Interrupted => "nothing was written",
         };
@@ -190,10 +194,10 @@ impl Hint for EmulatorError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::NoImage | Self::Image { .. } => {
-                "`cargo xtask demo` builds the image and names it; or say --image ELF"
+                "`cargo xtask demo` builds the image and names it; or say --device emulated:ELF"
             }
             Self::Qemu { .. } => {
-                "install QEMU for ARM (`cargo xtask demo` does, or type: sudo apt-get install qemu-system-arm), or say --qemu PATH"
+                "install QEMU for ARM (`cargo xtask demo` does, or type: sudo apt-get install qemu-system-arm), or name it in HAPTERRA_QEMU"
             }
             Self::NotUp { .. } => {
                 "check that the image is the mps2-an386 one: `cargo xtask demo` builds it anew"
@@ -215,7 +219,7 @@ impl Hint for WalkError<LinkError> {
                 "measure again, along the ruler and in the direction asked for; check the link lengths with --set l1-mm=… and --set l2-mm=…"
             }
             Self::Fit(FitError::NoWeight { .. }) => {
-                "hold the arm in more different poses, or leave gravity out with --skip-gravity"
+                "hold the arm in more different poses, or leave gravity out with --measure zero,ratios"
             }
             Self::Stopped(_) | Self::Refused => {
                 "start again when you are ready: hapterra calibrate"
@@ -227,7 +231,7 @@ impl Hint for WalkError<LinkError> {
 
 impl Hint for BadFile {
     fn hint(&self) -> String {
-        "name a file that hapterra calibrate --output has written".into()
+        "name a file that hapterra calibrate -o has written".into()
     }
 }
 

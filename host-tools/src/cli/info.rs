@@ -15,7 +15,7 @@ use super::options::placing::off_in_words;
 use super::options::terrain_file::TerrainFile;
 use super::report::put;
 use crate::place::place_in_words;
-use crate::terrain::{Distortion, FeltCells, FeltGrid};
+use crate::terrain::{Distortion, FeltGrid};
 use heightfield::shown::shown_json;
 use heightfield::without_key;
 use heightfield::{CellSize, CellUnit, Certainty, ReferenceSystem, SamplesAre};
@@ -33,12 +33,9 @@ pub struct Args {
     #[arg(long, num_args = 0, default_missing_value = "", value_parser = formats::Printed)]
     pub formats: Option<formats::Printed>,
 
-    /// Which cells of the file are felt
-    #[arg(long, value_enum, default_value_t)]
-    pub cells: FeltCells,
-
-    /// Work out what the tiles take on a link of so many megabytes a second (1 where no
-    /// number is given), and how many cells a second the HIP may move along an axis
+    /// Show the tiles on a link of this many megabytes a second [1 without a number]
+    ///
+    /// Bytes of a tile, tiles a second, and the cells a second that the HIP may move along an axis.
     #[arg(long, value_name = "MB_PER_S", num_args = 0..=1, default_missing_value = "1", value_parser = rate)]
     pub link: Option<f64>,
 
@@ -61,7 +58,7 @@ fn rate(text: &str) -> Result<f64, String> {
 /// When the file cannot be opened as a height field.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let raster = args.terrain.open_without_remarks()?;
-    let grid = FeltGrid::new(&raster, args.cells);
+    let grid = FeltGrid::new(&raster, args.terrain.reading.cells());
     let link = args.link.map(|rate| LinkFigures::of(&grid, rate));
     let report = FileReport {
         link: link.transpose().map_err(Failure::new)?,
@@ -372,7 +369,7 @@ impl Cell {
         );
         let hint = match self.distorted {
             false => "",
-            true => " of the same area, not in their true shape (--cells square)",
+            true => " of the same area, not in their true shape (--input cells=square)",
         };
         match self.resampled || self.distorted {
             false => stored,

@@ -2,16 +2,18 @@
 //! and a `run`.
 //!
 //! - [`options`]: what several subcommands let their user say;
-//! - `terminal`: progress, Ctrl-C, and prompts while a command runs;
+//! - [`terminal`]: progress, Ctrl-C, and prompts while a command runs;
 //! - [`failure`] and `hints`: what an error looks like, and what to do about it;
 //! - `guardian`: the process that outlives one whose arm may be armed;
-//! - `report`: what a command exists to print;
+//! - [`report`]: what a command exists to print;
+//! - `settings`: settings files and recordings in place of options;
+//! - `moved` and `old_options`: what earlier versions had, and what to type now;
 //! - `log` and `sparing`: diagnostics, and lines that a device can cause kept to so many
 //!   a second.
 
-pub mod bench;
 pub mod bringup;
 pub mod calibrate;
+pub mod completions;
 pub mod cut;
 pub mod demo;
 pub mod failure;
@@ -21,17 +23,19 @@ mod hints;
 pub mod info;
 pub mod list;
 mod log;
+pub mod man;
 mod met_device;
+mod moved;
+mod old_options;
 pub mod options;
 pub mod replay;
-mod report;
+pub mod report;
 pub mod run;
 mod session_summary;
+mod settings;
 mod sparing;
-pub mod stability;
 pub mod status;
-pub mod synth;
-mod terminal;
+pub mod terminal;
 pub mod view;
 pub mod viewing;
 
@@ -41,14 +45,15 @@ use std::process::ExitCode;
 
 use clap::{ArgAction, Parser, Subcommand};
 
-pub use failure::Failure;
+pub use failure::{Failure, OrHint};
+use settings::Completed;
 use terminal::voice;
 
 /// Touch terrain of any size through a Phantom.
 #[derive(Debug, Parser)]
-#[command(name = "hapterra", version, propagate_version = true)]
+#[command(name = "hapterra", version)]
 pub struct Cli {
-    /// Say more: -v for progress, -vv for details, -vvv for everything
+    /// Say more: -v progress, -vv details, -vvv everything
     #[arg(short, long, action = ArgAction::Count, global = true)]
     pub verbose: u8,
 
@@ -62,21 +67,19 @@ pub struct Cli {
 pub enum Command {
     /// Show what a terrain file holds and how it would be streamed
     Info(info::Args),
-    /// Make a terrain file by formula
-    Synth(synth::Args),
     /// Write a terrain's heights for the page that touches it in a browser
     Cut(cut::Args),
-    /// Serve a terrain to a device and watch what is felt
+    /// Serve a terrain to a device and record what it renders
     Run(run::Args),
-    /// Show it all: a terrain, a board, a hand that tours it, and a picture
+    /// Show it all: a terrain, a board, a scripted hand on it, and a picture
     Demo(demo::Args),
-    /// Feel a trajectory tick by tick and write what was felt
+    /// Render the forces along a trajectory, tick by tick
     Replay(replay::Args),
-    /// Show a recording again in the viewer, to scrub and replay
+    /// Show a recording in the viewer, to scrub and replay
     View(view::Args),
     /// Show boards, debug probes and ports that can be seen from here
     List(list::Args),
-    /// Show how a device is: calibration, what keeps it from arming, faults, figures
+    /// Show a device: calibration, what keeps it from arming, faults, figures
     Status(status::Args),
     /// Bring a board and its arm up for the first time, step by step, with a log
     Bringup(bringup::Args),
@@ -84,10 +87,10 @@ pub enum Command {
     Calibrate(calibrate::Args),
     /// Write an image to a board, through its debug probe or over USB
     Flash(flash::Args),
-    /// Try on a virtual arm how stiff a surface may be before the hand feels the ticks
-    Stability(stability::Args),
-    /// Measure run time against error, beside other ways to render a height field
-    Bench(bench::Args),
+    /// Print the completions of a shell
+    Completions(completions::Args),
+    /// Write the manual pages
+    Man(man::Args),
 }
 
 /// Runs the command with the arguments of this process: 0 on success, 1 on failure, 2 on wrong usage.
@@ -104,27 +107,16 @@ pub fn main() -> ExitCode {
 /// It listens to signals and starts the log of this process: one call a process.
 pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let words = ["hapterra".into()].into_iter().chain(arguments.clone());
-    let cli = match Cli::try_parse_from(words) {
+    let cli: Cli = match parse(arguments.clone()) {
         Ok(cli) => cli,
-        Err(error) => {
-            match error.use_stderr() {
-                // It repeats what was typed, which need not be of the user's making.
-                true => voice::put(std::io::stderr(), &error.render().to_string()),
-                // A reader who goes away has seen enough of the help.
-                false => _ = error.print(),
-            }
-            return u8::try_from(error.exit_code()).unwrap_or(2);
-        }
+        Err(code) => return code,
     };
     let may_arm = matches!(cli.command, Command::Run(_) | Command::Bringup(_));
     if may_arm && let Some(code) = guardian::watch(program, &arguments) {
         return code;
     }
-    let log = log::to_stderr(cli.verbose);
-    let outcome = match cli.command {
+    finish(cli.verbose, || match cli.command {
         Command::Info(args) => info::run(&args),
-        Command::Synth(args) => synth::run(&args),
         Command::Cut(args) => cut::run(&args),
         Command::Run(args) => run::run(&args.pinned()),
         Command::Demo(args) => demo::run(&args),
@@ -135,9 +127,48 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
         Command::Bringup(args) => bringup::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Flash(args) => flash::run(&args),
-        Command::Stability(args) => stability::run(&args),
-        Command::Bench(args) => bench::run(&args),
-    };
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
+    })
+}
+
+/// Parses the words behind a program's name. Where they are wrong, or ask for help, it prints that and
+/// returns the exit code.
+///
+/// # Errors
+/// The exit code.
+pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
+    let command = P::command();
+    let name = command.get_name().to_owned().into();
+    let words = [name].into_iter().chain(arguments).collect();
+    let Completed { words, line } = settings::complete(&command, words).map_err(|failure| {
+        failure.report();
+        1
+    })?;
+    // Its guardian has printed it already.
+    if let Some(line) = line.filter(|_| !guardian::is_worker()) {
+        eprintln!("{line}");
+    }
+    P::try_parse_from(&words).map_err(|error| {
+        match error.use_stderr() {
+            // It repeats what was typed, which need not be of the user's making.
+            true => {
+                let option = || old_options::hint(&words, &error);
+                let moved = moved::hint(&error).or_else(option).unwrap_or_default();
+                voice::put(std::io::stderr(), &format!("{}{moved}", error.render()));
+            }
+            // A reader who goes away has seen enough of the help.
+            false => _ = error.print(),
+        }
+        u8::try_from(error.exit_code()).unwrap_or(2)
+    })
+}
+
+/// Runs a command with the log of this process and returns its exit code. It listens to signals: one
+/// call a process.
+pub fn finish(verbose: u8, command: impl FnOnce() -> Result<(), Failure>) -> u8 {
+    let log = log::to_stderr(verbose);
+    let outcome = command();
     log.end();
     voice::finish();
     // A process that is not this crate's own program does not do so at its end.
@@ -152,3 +183,6 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
     heightfield_gdal::exit_if_stuck(code);
     code
 }
+
+#[cfg(test)]
+mod help_tests;

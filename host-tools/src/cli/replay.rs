@@ -4,15 +4,16 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::ValueHint;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::{Damping, ForceLaw};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::Sample;
 
 use super::failure::{Failure, OrHint};
-use super::options::emulated_board::{EmulatedBoard, RunsOn};
+use super::options::device::{EmulatedBoard, VirtualDevice};
 use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
 use super::session_summary;
+use super::settings::{SettingsOption, differences};
 use super::terminal::{interrupt, left_behind, progress};
 use super::viewing::{self, Viewing};
 use crate::link::{Patience, Transport};
@@ -23,7 +24,7 @@ use crate::replay::{
     Mark, Pace, Record, ReplayError, Replayer, Rule, Settings, Summary, Ticks, Trajectory,
     on_native_at, replay_trajectory,
 };
-use crate::stability::limits;
+use crate::stability;
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
 
@@ -36,16 +37,13 @@ pub struct Args {
 
     /// Trajectory of the HIP: CSV with the header t_s,x_mm,y_mm,z_mm, or a recording
     ///
-    /// Millimetres as the hand feels them; x east, y north, z up, origin at
-    /// the south-west sample at height zero: at 1 mm a cell they count felt
-    /// cells, which are squares on the ground. Further columns are ignored.
-    /// It is felt at the device's ticks, a thousand a second, by t_s, seconds:
-    /// between two rows the HIP moves on a straight line at a constant speed,
-    /// and the output has a row for each tick. Rows a tick apart are felt row by
-    /// row; so are those of a file without t_s, header x_mm,y_mm,z_mm.
-    /// A recording, CSV or Parquet, is felt with the settings that it was
-    /// recorded with, tick rate included, on the terrain that it was recorded
-    /// on; options given here win.
+    /// Device millimetres; x east, y north, z up, origin at the south-west sample at height zero: at
+    /// 1mm/cell they count haptic cells, which are squares on the ground. Further columns are ignored.
+    /// It is replayed at the device's ticks, a thousand a second, by t_s, seconds: between two rows the
+    /// HIP moves on a straight line at a constant speed, and the output has a row for each tick. Rows a
+    /// tick apart are replayed row by row; so are those of a file without t_s, header x_mm,y_mm,z_mm.
+    /// A recording, CSV or Parquet, is replayed with the settings that it was recorded with, tick rate
+    /// and contact rule included, on the terrain that it was recorded on; options given here win.
     #[arg(value_hint = ValueHint::FilePath)]
     pub trajectory: PathBuf,
 
@@ -57,22 +55,23 @@ pub struct Args {
     #[arg(long)]
     pub rows_are_ticks: bool,
 
-    /// File to write what was felt to: CSV, or Parquet where its name ends in .parquet;
-    /// `-` for standard output
+    /// File for the recording: CSV, Parquet if its name ends in .parquet, - for standard output
     #[arg(short, long, value_hint = ValueHint::FilePath)]
-    pub output: PathBuf,
+    pub out: PathBuf,
 
-    /// Where the loop runs
-    #[arg(long, value_enum, default_value = "native")]
-    pub on: RunsOn,
+    /// Where the loop runs: native, emulated or emulated:ELF
+    ///
+    /// emulated: the Cortex-M4F board in QEMU, with the image ELF, else that of HAPTERRA_MPS2_ELF.
+    #[arg(long, default_value = "native")]
+    pub device: VirtualDevice,
 
-    /// How the terrain feels.
+    /// How the terrain is rendered.
     #[command(flatten)]
     pub rendering: Rendering,
 
-    /// The emulated board.
+    /// Where settings are from.
     #[command(flatten)]
-    pub board: EmulatedBoard,
+    pub settings: SettingsOption,
 
     /// Whether it is shown.
     #[command(flatten)]
@@ -84,11 +83,20 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the terrain, the trajectory, the device or the output.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    run_by(args, None)
+}
+
+/// Replays the trajectory by a contact rule; without one by the recording's, else as devices do.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     let mut inputs = args.terrain.inputs();
     inputs.push(args.trajectory.clone());
-    inputs.extend(args.rendering.materials.inputs());
-    keep_apart(&[&args.output], &inputs).or_hint("name another file with --output")?;
-    left_behind::tell([args.output.as_path()]);
+    let of_surface = args.rendering.surface.inputs();
+    inputs.extend(of_surface);
+    keep_apart(&[&args.out], &inputs).or_hint("name another file with -o")?;
+    left_behind::tell([args.out.as_path()]);
     let viewer = args.viewing.program()?;
     let trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
     let recorded = trajectory
@@ -96,14 +104,20 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .filter(|_| !args.ignore_settings)
         .cloned();
     let recorded_at = recorded.as_ref().map(rate_of).transpose()?;
-    let rendering = rendering(args, recorded.as_ref())?;
+    if let Some(recorded) = &recorded {
+        check_options(args, recorded)?;
+    }
+    let rendering = &args.rendering;
     let raster = args.terrain.open()?;
     let measured_at = recorded.as_ref().and_then(|it| it.felt.measured_at);
     let name = args.terrain.name();
-    let of_ground = (&rendering, &args.terrain.reading);
-    let of_recording = recorded.as_ref().and_then(|it| it.materials.as_ref());
-    let materials = (rendering.materials).over((&name, &raster), of_ground, of_recording)?;
-    let grid = rendering.grid(&raster, measured_at);
+    let (options, reading) = (&rendering.surface, &args.terrain.reading);
+    let surface = options.load()?;
+    let recorded_rule = recorded.as_ref().map(|it| it.force.rule);
+    let rule = rule.or(recorded_rule).unwrap_or(Rule::Swept);
+    check_rule(rule, &surface.law)?;
+    let materials = surface.materials(options, (&name, &raster), reading)?;
+    let grid = rendering.grid((&raster, reading.cells()), measured_at);
     let grid = grid.with_materials(materials.as_ref());
     let scale = rendering.scale(&grid)?;
     let terrain = rendering.terrain(grid, scale)?;
@@ -111,8 +125,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(recorded) = &recorded {
         recorded.check_terrain(&file, &terrain)?;
     }
-    let law = rendering.law()?;
-    let law = rendering.materials.law(materials.as_ref(), law);
     for line in [
         session_summary::materials(&terrain),
         session_summary::tip(&terrain),
@@ -124,7 +136,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (views, marks) = later.unwrap_or_default();
     let felt = Felt {
         terrain: &terrain,
-        law: (law, rendering.rule()),
+        law: (surface.law, rule),
         file,
         title: args.terrain.name(),
         home_mm,
@@ -134,9 +146,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         viewer,
     };
     let began = Instant::now();
-    let (summary, mut ticks) = match args.on {
-        RunsOn::Native => native(args, &felt, trajectory),
-        RunsOn::Emulated => emulated(args, &felt, trajectory),
+    let (summary, mut ticks) = match &args.device {
+        VirtualDevice::Native => native(args, &felt, trajectory),
+        VirtualDevice::Emulated(board) => emulated(args, board, &felt, trajectory),
     }?;
     let seconds = began.elapsed().as_secs_f64();
     for remark in ticks.remarks() {
@@ -165,7 +177,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         summary.rows,
         summary.in_contact,
         summary.rows as f64 / seconds.max(1e-9),
-        args.output.display(),
+        args.out.display(),
         ticks
             .pace()
             .map(|pace| format!("; {pace}"))
@@ -226,34 +238,47 @@ impl<'t> Felt<'t> {
     }
 }
 
-/// How it feels: as stated, else as recorded, else as usual.
-fn rendering(args: &Args, recorded: Option<&Settings>) -> Result<Rendering, Failure> {
-    let Some(recorded) = recorded else {
-        return Ok(args.rendering.clone());
-    };
-    let other_table = args.rendering.materials.material_table.is_some();
-    if let (Some(option), Some(_), false) = (
-        args.rendering.stated_of_ground(),
-        &recorded.materials,
-        other_table,
-    ) {
-        return Err(format!(
-            "{option}: each of the recorded materials has its own"
-        ))
-        .or_hint("leave it out, or name a table that states it with --material-table");
+/// Notes the options that differ from the recording.
+///
+/// # Errors
+/// Options for a recording of several placements, each of which has its own; a recording that could
+/// not be read twice.
+fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
+    if !args.trajectory.is_file() {
+        return Err("a recording that is no file: its settings are read before its path")
+            .or_hint("write it to a file first, or take the path alone with --ignore-settings");
     }
-    let (rendering, told) = args.rendering.or_recorded(recorded);
-    if let (Some(line), false) = (told.first(), recorded.views.is_empty()) {
+    let cells = args.terrain.reading.cells();
+    let lines = differences(&args.rendering, cells, (&args.trajectory, recorded));
+    if let (Some(line), false) = (lines.first(), recorded.views.is_empty()) {
         let views = 1 + recorded.views.len();
         return Err(format!(
             "{line}: a recording of {views} views is felt in its own"
         ))
         .or_hint("leave that option out, or take the path alone with --ignore-settings");
     }
-    for line in told {
+    for line in lines {
         eprintln!("note: {line}");
     }
-    Ok(rendering)
+    Ok(())
+}
+
+/// Checks that a law has no effects under the published rule, which has none.
+fn check_rule(rule: Rule, law: &ForceLaw) -> Result<(), Failure> {
+    let plain = ForceLaw {
+        stiffness_n_per_mm: law.stiffness_n_per_mm,
+        max_force_n: law.max_force_n,
+        damping: Damping {
+            ns_per_m: 0.0,
+            ..law.damping
+        },
+        ..ForceLaw::PREMIUM
+    };
+    match rule == Rule::Paper && *law != plain {
+        false => Ok(()),
+        true => Err("an effect with the published contact rule, which has none")
+            .or_hint("leave out what --surface and --friction add, or take the path alone with --ignore-settings"),
+    }
 }
 
 /// The tick rate of a recording.
@@ -281,15 +306,16 @@ fn native(
 
 fn emulated(
     args: &Args,
+    board: &EmulatedBoard,
     felt: &Felt<'_>,
     trajectory: Trajectory,
 ) -> Result<(Summary, Ticks), Failure> {
     let (law, rule) = felt.law;
     if rule == Rule::Paper {
-        return Err("--contact paper: no device has the paper's contact rule".to_owned())
-            .or_hint("leave --on emulated out: the host renders it");
+        return Err("no device has the published contact rule of this recording")
+            .or_hint("leave --device out: the host renders it");
     }
-    let (emulator, lines) = args.board.start()?;
+    let (emulator, lines) = board.start()?;
     // The other line stays open and silent: points take the arm's place.
     let _plant = lines.plant;
     let link: Box<dyn Transport> = Box::new(lines.link);
@@ -314,7 +340,7 @@ fn ticks(
         let why =
             format!("the recording has {recorded_hz} ticks a second, and the device has {tick_hz}");
         return Err(why).or_hint(
-            "feel it with --on native, or take its path alone, by its own times, with --ignore-settings",
+            "replay it with --device native, or take its path alone, by its own times, with --ignore-settings",
         );
     }
     let pace = match recorded {
@@ -336,12 +362,12 @@ fn replay<'t>(
     interrupt::listen();
     let materials = felt.terrain.grid().materials();
     let table = materials.map(Materials::table);
-    limits::warn_of(&felt.law.0, table, replayer.device());
+    stability::warn_of(&felt.law.0, table, replayer.device());
     let device = Device::of(replayer.device());
     let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
     settings.views.clone_from(&felt.views);
     settings.marks.clone_from(&felt.marks);
-    let output = Output::create_or_standard_output(&args.output).map_err(ReplayError::from)?;
+    let output = Output::create_or_standard_output(&args.out).map_err(ReplayError::from)?;
     let mut feed = felt.shown(replayer)?;
     let mut shown = 0;
     let mut show = |sample: &Sample, record: &Record, (view, terrain): (u32, &Terrain<'t>)| {

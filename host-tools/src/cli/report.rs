@@ -13,7 +13,7 @@ use heightfield::shown::shown_lines;
 ///
 /// # Errors
 /// Standard output cannot be written.
-pub(in crate::cli) fn put(report: &str) -> Result<(), Failure> {
+pub fn put(report: &str) -> Result<(), Failure> {
     let mut output = stdout().lock();
     let written = output.write_all(shown_lines(report).as_bytes());
     match written.and_then(|()| output.flush()) {

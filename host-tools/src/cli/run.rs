@@ -13,7 +13,7 @@
 //! terrain in its reach, its session and thread, its arming, its recording. The terrain is laid for all
 //! devices before any is armed, because from then on nobody waits for what is elsewhere.
 
-mod devices;
+pub mod devices;
 mod placed;
 mod session;
 mod together;
@@ -29,27 +29,29 @@ use hapterra_core::wire::session::SILENCE_S;
 use super::failure::{Failure, OrHint};
 use super::options::events::{self, EventOptions};
 use super::options::placing::Placing;
+use super::options::quantity::TIME;
 use super::options::rendering::Rendering;
 use super::options::steering::Commands;
 use super::options::terrain_file::TerrainFile;
+use super::settings::SettingsOption;
 use super::terminal::desk::{self, Seat};
 use super::terminal::speaker::Speaker;
 use super::terminal::voice::tell;
 use super::terminal::{interrupt, left_behind};
 use super::viewing::{ToBeShown, Viewing};
-use crate::link::{DeviceAddress, Patience};
+use crate::link::Patience;
 use crate::output::keep_apart;
 use crate::steering::keys::KEYS;
-use devices::OneDevice;
+use devices::{OneDevice, ServedDevice};
 use placed::{InReach, Placed};
 use session::{Serving, recording};
 use together::serve_each;
 
-/// The stiffest surface that `hapterra stability` tries by itself.
+/// The stiffest surface that `hapterra-lab stability` tries by itself.
 const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
 
 /// What to do where the recording cannot be written.
-const OTHER_FILE: &str = "name another file with --record";
+const OTHER_FILE: &str = "name another file with -o";
 
 /// Arguments of `hapterra run`.
 #[derive(Debug, clap::Args)]
@@ -58,46 +60,48 @@ pub struct Args {
     #[command(flatten)]
     pub terrain: TerrainFile,
 
-    /// Device: usb, usb:SERIAL (`hapterra list` shows it), tcp:HOST:PORT, or native (the
-    /// application in this program, with a virtual Phantom in a scripted hand); named several
-    /// times, several devices feel the terrain at once, each with its own arm
+    /// Device: usb, usb:SERIAL, tcp:HOST:PORT or native
+    ///
+    /// May be repeated. usb:SERIAL: `hapterra list` shows it. native: the application in this program, with a virtual
+    /// Phantom in a scripted hand. tcp:HOST:PORT+plant:HOST:PORT: an emulated board, whose virtual arm
+    /// in a scripted hand is moved over its second line. Several devices render the terrain at once,
+    /// each with its own arm.
     #[arg(long, default_value = "usb")]
-    pub device: Vec<DeviceAddress>,
+    pub device: Vec<ServedDevice>,
 
-    /// Where the emulated board's plant line is, for a virtual Phantom in a
-    /// scripted hand: tcp:HOST:PORT; with several devices, one for each that is not native, in
-    /// their order
-    #[arg(long, value_name = "tcp:HOST:PORT", value_parser = parse_plant)]
-    pub plant: Vec<String>,
+    /// File for the recording: CSV, or Parquet as FILE.parquet
+    ///
+    /// A row for each tick. With several devices OUT-1, OUT-2 and so on, in their order.
+    #[arg(short, long, value_name = "OUT", value_hint = ValueHint::FilePath)]
+    pub out: Option<PathBuf>,
 
-    /// Write what was felt to a file, tick by tick, as replay does: CSV, or Parquet where
-    /// its name ends in .parquet; with several devices OUT-1, OUT-2 and so on, in their order
-    #[arg(long, value_name = "OUT", value_hint = ValueHint::FilePath)]
-    pub record: Option<PathBuf>,
+    /// End after this time of the device, as 60s
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub duration: Option<f64>,
 
-    /// End after this many seconds of the device's time
-    #[arg(long, value_name = "S")]
-    pub seconds: Option<f64>,
+    /// Disarm after this time without a message from here, as 10s
+    ///
+    /// The device does so by itself; a number alone is in seconds.
+    #[arg(long, value_name = "TIME", default_value_t = Patience::REAL_SILENCE_S, value_parser = silence)]
+    pub silence: u16,
 
-    /// For how many seconds the device lets an armed arm be while it hears nothing from
-    /// here; then it lets the force out and disarms
-    #[arg(long, value_name = "S", default_value_t = Patience::REAL_SILENCE_S,
-          value_parser = clap::value_parser!(u16).range(i64::from(SILENCE_S.0)..=i64::from(SILENCE_S.1)))]
-    pub silence_s: u16,
-
-    /// Serve a real board although its log of `hapterra bringup` is not complete
+    /// Serve a real board without a complete log of hapterra bringup
     #[arg(long)]
     pub unchecked: bool,
 
-    /// Which part of the terrain, and how large.
+    /// Which part of the terrain.
     #[command(flatten)]
     pub placing: Placing,
 
-    /// How the terrain feels.
+    /// How the terrain is rendered.
     #[command(flatten)]
     pub rendering: Rendering,
 
-    /// How the view may be changed meanwhile.
+    /// Where settings are from.
+    #[command(flatten)]
+    pub settings: SettingsOption,
+
+    /// How the placement may be changed meanwhile.
     #[command(flatten)]
     pub commands: Commands,
 
@@ -116,15 +120,23 @@ impl Args {
     #[must_use]
     pub fn pinned(mut self) -> Self {
         let devices = self.device.into_iter();
-        self.device = devices.map(DeviceAddress::pinned).collect();
+        self.device = devices.map(ServedDevice::pinned).collect();
         self
     }
 }
 
-fn parse_plant(text: &str) -> Result<String, String> {
-    match text.parse()? {
-        DeviceAddress::Tcp(address) => Ok(address),
-        _ => Err("the plant's line is tcp:HOST:PORT".into()),
+/// A duration in seconds.
+pub(super) fn duration(text: &str) -> Result<f64, String> {
+    TIME.read_within(text, [0.0, 1e9])
+}
+
+/// A time without a message that a device waits before it disarms, whole seconds.
+fn silence(text: &str) -> Result<u16, String> {
+    let [least, most] = [SILENCE_S.0, SILENCE_S.1].map(f64::from);
+    let seconds = TIME.read_within(text, [least, most])?;
+    match seconds.fract() == 0.0 {
+        true => Ok(seconds as u16),
+        false => Err("whole seconds, as 10s".to_owned()),
     }
 }
 
@@ -140,22 +152,22 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let outputs: Vec<_> = devices.iter().filter_map(|d| d.record.clone()).collect();
     let mut inputs = args.terrain.inputs();
     inputs.extend(args.commands.file());
-    inputs.extend(args.rendering.materials.inputs());
+    inputs.extend(args.rendering.surface.inputs());
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
     left_behind::tell(outputs.iter().map(PathBuf::as_path));
     let events = args.events.listen()?;
     let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;
-    let of_ground = (&args.rendering, &args.terrain.reading);
     let name = args.terrain.name();
-    let materials = (args.rendering.materials).over((&name, &raster), of_ground, None)?;
-    let mut asked = args.placing.of(&args.rendering, &raster)?;
+    let (options, reading) = (&args.rendering.surface, &args.terrain.reading);
+    let surface = options.load()?;
+    let law = surface.law;
+    check_stiffness(law.stiffness_n_per_mm)?;
+    let materials = surface.materials(options, (&name, &raster), reading)?;
+    let cells = reading.cells();
+    let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
     asked.grid = asked.grid.with_materials(materials.as_ref());
     asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
-    let law = args.rendering.law()?;
-    check_stiffness(law.stiffness_n_per_mm)?;
-    let law = args.rendering.materials.law(materials.as_ref(), law);
-    args.rendering.needs_the_devices_rule()?;
     // What cannot be recorded is known before anything is armed.
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;
@@ -210,7 +222,7 @@ fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
     Err(Failure::new(format!(
         "a stiffness of {n_per_mm} N/mm: no arm feels more than {STIFFEST_TRIED_N_PER_MM} N/mm"
     ))
-    .hint("people hold 0.4 to 0.8 N/mm: hapterra stability tries what an arm holds still"))
+    .hint("people hold 0.4 to 0.8 N/mm: hapterra-lab stability tries what an arm holds still"))
 }
 
 /// Makes something of each, or says what is wrong with the first for which that fails.

@@ -17,10 +17,6 @@ use heightfield::shown::shown;
 /// Arguments of `hapterra status`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The device.
-    #[command(flatten)]
-    pub device: Device,
-
     /// Clear a latched fault, after showing it
     #[arg(long)]
     pub clear: bool,
@@ -28,6 +24,10 @@ pub struct Args {
     /// Disarm: force goes out within a tenth of a second
     #[arg(long)]
     pub disarm: bool,
+
+    /// The device.
+    #[command(flatten)]
+    pub device: Device,
 }
 
 /// Shows how the device is.

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueHint;
 
+use super::demo::{OWN_TERRAIN, own_terrain};
 use super::failure::{Failure, OrHint};
 use super::options::rendering::Rendering;
-use super::options::terrain_file::TerrainFile;
+use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::terminal::interrupt;
 use super::viewing;
 use crate::output::keep_apart;
@@ -25,13 +26,13 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub recording: PathBuf,
 
-    /// The terrain that was felt: a file, a folder, a quoted pattern, or a .vrt
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub terrain: PathBuf,
+    /// The terrain: a file, a folder or a quoted pattern [default: the one that the recording names]
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub terrain: Option<PathBuf>,
 
     /// What the terrain file does not say itself.
     #[command(flatten)]
-    pub reading: super::options::terrain_file::ReadingOptions,
+    pub reading: ReadingOptions,
 
     /// Show a recording's path on another terrain, too
     #[arg(long)]
@@ -41,7 +42,7 @@ pub struct Args {
     #[arg(long, value_name = "OUT.rrd", value_hint = ValueHint::FilePath)]
     pub rrd: Option<PathBuf>,
 
-    /// How the terrain was felt, where the recording does not say.
+    /// How the terrain was rendered, where the recording does not say.
     #[command(flatten)]
     pub rendering: Rendering,
 }
@@ -51,21 +52,25 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the recording or the terrain; no viewer.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let mut inputs = files_read_with(&args.terrain);
+    let rows = FeltRows::open(&args.recording).map_err(ReplayError::from)?;
+    let recorded = rows.settings().filter(|_| !args.ignore_settings).cloned();
+    let path = path_of(args, recorded.as_ref())?;
+    let mut inputs = files_read_with(&path);
     inputs.push(args.recording.clone());
     let outputs = Vec::from_iter(args.rrd.as_deref());
     keep_apart(&outputs, &inputs).or_hint("name another file with --rrd")?;
     let program = Program::find()?;
-    let rows = FeltRows::open(&args.recording).map_err(ReplayError::from)?;
-    let recorded = rows.settings().filter(|_| !args.ignore_settings).cloned();
     let file = TerrainFile {
-        file: args.terrain.clone(),
+        file: path.clone(),
         reading: args.reading.clone(),
     };
-    let raster = file.open()?;
+    let raster = match path.to_str() {
+        Some(OWN_TERRAIN) => own_terrain()?,
+        _ => file.open()?,
+    };
     let terrain = terrain(args, recorded.as_ref(), &raster)?;
     if let Some(recorded) = &recorded {
-        recorded.check_terrain(&args.terrain.display().to_string(), &terrain)?;
+        recorded.check_terrain(&path.display().to_string(), &terrain)?;
     }
     let picture = Picture {
         terrain: &terrain,
@@ -85,6 +90,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         eprintln!("{path}: its last row is cut in the middle, and left out");
     }
     Ok(())
+}
+
+/// The terrain's file: as named, else as the recording names it.
+fn path_of(args: &Args, recorded: Option<&Settings>) -> Result<PathBuf, Failure> {
+    let named = |it: &Settings| PathBuf::from(&it.terrain.file);
+    let path = args.terrain.clone().or_else(|| recorded.map(named));
+    path.ok_or_else(|| format!("{} does not name its terrain", args.recording.display()))
+        .or_hint("name it: hapterra view RECORDING TERRAIN")
 }
 
 /// Whether the recording was cut.
@@ -140,12 +153,9 @@ fn terrain<'r>(
     recorded: Option<&Settings>,
     raster: &'r Raster,
 ) -> Result<Terrain<'r>, Failure> {
-    let rendering = match recorded {
-        Some(recorded) => args.rendering.or_recorded(recorded).0,
-        None => args.rendering.clone(),
-    };
+    let (rendering, cells) = (&args.rendering, args.reading.cells());
     let measured_at = recorded.and_then(|it| it.felt.measured_at);
-    let grid = rendering.grid(raster, measured_at);
+    let grid = rendering.grid((raster, cells), measured_at);
     let scale = rendering.scale(&grid)?;
     rendering.terrain(grid, scale)
 }

@@ -18,11 +18,11 @@ use crate::view_feed::{Picture, Prepared, Program, ProgramError, VARIABLE, ViewF
 /// Between two looks at whether the viewer has ended.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether what is felt is shown.
+/// Whether it is shown.
 #[derive(Clone, Debug, Default, clap::Args)]
-#[command(next_help_heading = "Viewer")]
+#[command(next_help_heading = "While it is touched")]
 pub struct Viewing {
-    /// Show what is felt in a browser, live: terrain, hand and plots
+    /// Show terrain, hand and plots in a browser
     ///
     /// Needs the program hapterra-view beside this one or on the PATH. Its options go
     /// into HAPTERRA_VIEW_OPTIONS; `hapterra-view --help` lists them.

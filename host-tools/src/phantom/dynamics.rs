@@ -88,6 +88,16 @@ impl Dynamics {
             - press(spread - limits.q2_minus_q3_max_rad, speed);
         DVec3::new(one(0), one(1) + linkage, one(2) - linkage)
     }
+
+    /// Kinetic plus potential energy, J. The stops' springs are not included.
+    #[must_use]
+    pub fn energy_j(&self, q_rad: [f64; 3], rate_rad_s: [f64; 3]) -> f64 {
+        let pose = Pose::new(DVec3::from(q_rad));
+        let rate = DVec3::from(rate_rad_s);
+        let lumped = &self.model.lumped;
+        let lift = lumped.g2 * pose.s[1] - lumped.g3 * pose.c[2];
+        0.5 * rate.dot(self.mass(&pose) * rate) + self.model.gravity_m_s2 * lift
+    }
 }
 
 #[cfg(test)]
@@ -95,17 +105,6 @@ mod tests {
     use super::*;
 
     const Q: [f64; 3] = [0.3, 0.4, -0.2];
-
-    impl Dynamics {
-        /// Kinetic plus potential energy, J. The stops' springs are not included.
-        pub(crate) fn energy_j(&self, q_rad: [f64; 3], rate_rad_s: [f64; 3]) -> f64 {
-            let pose = Pose::new(DVec3::from(q_rad));
-            let rate = DVec3::from(rate_rad_s);
-            let lumped = &self.model.lumped;
-            let lift = lumped.g2 * pose.s[1] - lumped.g3 * pose.c[2];
-            0.5 * rate.dot(self.mass(&pose) * rate) + self.model.gravity_m_s2 * lift
-        }
-    }
 
     #[test]
     fn tip_inertia_near_home_is_a_few_tens_of_grams() {

@@ -1,5 +1,7 @@
 //! What the numbers of a place are.
 
+use heightfield::{Georeference, ReferenceSystem};
+
 /// What the numbers of a place are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
@@ -8,4 +10,18 @@ pub enum Coordinates {
     /// Longitude and latitude, degrees: of WGS 84, or what else
     /// [`heightfield::Georeference::lonlat`] says of the file.
     LonLat,
+    /// x and y, east before north, of the reference system with this code of EPSG's.
+    Epsg(u16),
+}
+
+impl Coordinates {
+    /// The same, as the file's own where these are in its reference system.
+    pub(super) fn of(self, file: &Georeference<'_>) -> Self {
+        match self {
+            Self::Epsg(code) if file.reference() == ReferenceSystem::from_code(code).as_ref() => {
+                Self::Own
+            }
+            other => other,
+        }
+    }
 }

@@ -35,6 +35,25 @@ pub enum PlaceError {
         /// What the terrain covers.
         bounds: String,
     },
+    /// A code without a reference system.
+    #[error("no reference system EPSG:{0} is known here")]
+    UnknownCode(u16),
+    /// A reference system without a transformation to that of the file.
+    #[error("EPSG:{code} and the file's reference system ({system}) have no datum in common")]
+    OtherDatum {
+        /// The code.
+        code: u16,
+        /// The file's reference system.
+        system: String,
+    },
+    /// A place that its reference system does not have.
+    #[error("{},{} is no place of EPSG:{code}", .place[0], .place[1])]
+    NotInSystem {
+        /// The code.
+        code: u16,
+        /// As asked for, x and y.
+        place: [f64; 2],
+    },
     /// A latitude and longitude in the place of a longitude and latitude.
     #[error(
         "{},{} is not in the terrain, {},{} is: longitude comes first", .0[0], .0[1], .0[1], .0[0]

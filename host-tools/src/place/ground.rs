@@ -6,9 +6,9 @@ use super::words::{
     asked_in_words, bounds_in_words, box_in_words, own_box_in_words, system_in_words,
 };
 use crate::terrain::FeltGrid;
-use heightfield::{Georeference, Sides, System, around};
+use heightfield::{Georeference, LonLat, ReferenceSystem, Sides, System, around};
 
-/// Points along each side of a box of longitude and latitude: its sides are bent on a map.
+/// Points along each side of a box in another system than the file's: its sides are bent on a map.
 const ALONG: u32 = 24;
 /// Neighbours on a side of a box that are farther apart than this share of it lie on two
 /// sides of a map's seam.
@@ -24,6 +24,7 @@ pub(super) fn place(
     place: [f64; 2],
     coordinates: Coordinates,
 ) -> Result<[f64; 2], PlaceError> {
+    let coordinates = coordinates.of(file);
     if coordinates == Coordinates::Own {
         return Ok(file.nearest_turn(place));
     }
@@ -37,15 +38,39 @@ pub(super) fn place(
             _ => PlaceError::NoSystem { bounds },
         });
     }
-    file.of_lonlat(place)
-        .ok_or_else(|| match is_latitude_first(file, place) {
+    let lonlat = match coordinates {
+        Coordinates::Epsg(code) => lonlat_of(file, code, place)?,
+        Coordinates::Own | Coordinates::LonLat => place,
+    };
+    file.of_lonlat(lonlat).ok_or_else(|| {
+        match coordinates == Coordinates::LonLat && is_latitude_first(file, lonlat) {
             true => PlaceError::LatitudeFirst(place),
             false => PlaceError::NotOnMap {
-                lonlat: place,
+                lonlat,
                 system: system_in_words(file),
                 bounds: bounds_in_words(file),
             },
-        })
+        }
+    })
+}
+
+/// Longitude and latitude, as the file counts them, of a place in another reference system.
+fn lonlat_of(file: &Georeference<'_>, code: u16, place: [f64; 2]) -> Result<[f64; 2], PlaceError> {
+    let system = ReferenceSystem::from_code(code).ok_or(PlaceError::UnknownCode(code))?;
+    let is_wgs84 = |kind| matches!(kind, LonLat::Wgs84 | LonLat::ShiftedToWgs84 { .. });
+    let is_same = match (system.lonlat(), file.lonlat()) {
+        (one, other) if is_wgs84(one) => is_wgs84(other) || other == LonLat::Unstated,
+        (one, other) => one == other,
+    };
+    if !is_same {
+        return Err(PlaceError::OtherDatum {
+            code,
+            system: system_in_words(file),
+        });
+    }
+    let lonlat = system.to_lonlat(place.into());
+    let (longitude, latitude) = lonlat.ok_or(PlaceError::NotInSystem { code, place })?;
+    Ok([longitude, latitude])
 }
 
 /// Returns true if the place lies in the field once its two numbers are swapped.
@@ -61,10 +86,11 @@ pub(super) fn outline(
     asked: Sides,
     coordinates: Coordinates,
 ) -> Result<Vec<[f64; 2]>, PlaceError> {
+    let coordinates = coordinates.of(file);
     let turn = match (coordinates, file.system()) {
         (Coordinates::LonLat, _) => Some(360.0),
         (Coordinates::Own, System::Geographic { degrees }) => Some(360.0 / degrees),
-        (Coordinates::Own, _) => None,
+        (Coordinates::Own | Coordinates::Epsg(_), _) => None,
     };
     let [west, south, mut east, north] = asked;
     if let Some(turn) = turn.filter(|_| west > east) {
@@ -93,10 +119,14 @@ pub(super) fn outline(
         let (from, to) = (corners[side], corners[(side + 1) % 4]);
         for step in 0..ALONG {
             let share = f64::from(step) / f64::from(ALONG);
-            let lonlat = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
-            let found = place(file, within_turn(lonlat), coordinates)?;
-            let east = lonlat[0] - middle[0];
-            points.push(in_turn_of(file, there, east, found));
+            let point = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+            points.push(match coordinates {
+                Coordinates::LonLat => {
+                    let found = place(file, within_turn(point), coordinates)?;
+                    in_turn_of(file, there, point[0] - middle[0], found)
+                }
+                _ => place(file, point, coordinates)?,
+            });
         }
     }
     match is_torn(&points) {

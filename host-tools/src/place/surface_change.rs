@@ -1,7 +1,9 @@
-//! Changes of a surface while it is felt, but for its stiffness.
+//! Changes of a surface while it is touched.
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, ForceLaw, Shading, Texture};
+
+use crate::surface::NamedSurface;
 
 /// What may be changed of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +23,8 @@ pub enum SurfaceChange {
     Shading(Shading),
     /// The micro-relief.
     Texture(Texture),
+    /// Another surface with its stiffness.
+    Named(&'static NamedSurface),
 }
 
 /// Why a surface cannot be changed as it is asked for. It stays as it is.
@@ -99,6 +103,7 @@ impl SurfaceChange {
                 law.shading = shading;
                 Ok(law)
             }
+            Self::Named(named) => Ok(named.material.law(&law)),
             Self::Texture(texture) => {
                 law.texture = texture;
                 let error = SurfaceError::Texture {
@@ -115,7 +120,7 @@ impl SurfaceChange {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hapterra_core::force::Pattern;
+    use hapterra_core::force::{Material, Pattern};
 
     fn texture(amplitude_mm: f32, wavelength_mm: f32) -> SurfaceChange {
         SurfaceChange::Texture(Texture {
@@ -155,6 +160,19 @@ mod tests {
             assert_eq!(law.stiffness_n_per_mm, stiffness_n_per_mm);
             assert_eq!(law.max_force_n, max_force_n);
         }
+    }
+
+    #[test]
+    fn named_surface_keeps_limit_and_shading() {
+        let sand = NamedSurface::find("sand").expect("named");
+        let before = ForceLaw {
+            max_force_n: 4.0,
+            shading: Shading::Smooth,
+            ..ForceLaw::PREMIUM
+        };
+        let law = SurfaceChange::Named(sand).of(&before, false).expect("sand");
+        assert_eq!(Material::of(&law), sand.material);
+        assert_eq!((law.max_force_n, law.shading), (4.0, Shading::Smooth));
     }
 
     #[test]

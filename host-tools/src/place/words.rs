@@ -79,8 +79,9 @@ pub(super) fn asked_in_words(
     [a, b]: [f64; 2],
     coordinates: Coordinates,
 ) -> String {
-    match coordinates {
+    match coordinates.of(file) {
         Coordinates::LonLat => format!("longitude {a}, latitude {b}"),
+        Coordinates::Epsg(code) => format!("x {a}, y {b} (EPSG:{code})"),
         Coordinates::Own => {
             let ([x, y], digits) = (names(file), Digits::of(file));
             let [a, b] = [a, b].map(|value| digits.say(value));

@@ -2,7 +2,7 @@
 //! in two variables, the bounded point over edges and vertices, averaged normals, the
 //! candidate patch by the lowest height of the whole segment.
 //!
-//! `hapterra replay --contact paper` renders it, and the speed tables compare with it
+//! `hapterra-lab replay --contact paper` renders it, and the speed tables compare with it
 //! ("× plain"). No device knows it. Two properties are the paper's own: the first candidate
 //! may not be the first patch hit, and a fast HIP passes through what is thin.
 

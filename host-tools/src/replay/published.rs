@@ -1,4 +1,4 @@
-//! The paper's rule over a terrain, for `replay --contact paper`.
+//! The paper's rule over a terrain, for `hapterra-lab replay --contact paper`.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::ContactState;

@@ -5,11 +5,12 @@ use hapterra_core::force::{Pattern, Shading, Texture};
 use super::marks::text_of;
 use super::{Steer, Wanted};
 use crate::place::{SurfaceChange, ViewChange};
+use crate::surface::NamedSurface;
 use heightfield::shown::shown;
 
 /// What is understood, for messages.
-pub const UNDERSTOOD: &str = "pan EAST NORTH (hand mm), pan-m EAST NORTH (ground m), zoom TIMES, \
-     exaggerate TIMES, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
+pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
+     exaggerate TIMES, surface ice|sand|rock, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
      shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
      clutch on, clutch off, mark TEXT, enter QUESTION; `at SECONDS` before any of them, and before that \
      `on NUMBER` for one device of several";
@@ -115,7 +116,7 @@ fn read(words: &[&str]) -> Result<Steer, &'static str> {
         ["exaggerate", times] => change(ViewChange::Exaggerate(factor(times)?)),
         ["stiffness", times] => change(ViewChange::Stiffness(factor(times)?)),
         [
-            "friction" | "viscous-friction" | "damping" | "shading" | "texture",
+            "surface" | "friction" | "viscous-friction" | "damping" | "shading" | "texture",
             ..,
         ] => change(ViewChange::Surface(surface(words)?)),
         ["reset"] => change(ViewChange::Reset),
@@ -129,10 +130,14 @@ fn read(words: &[&str]) -> Result<Steer, &'static str> {
     }
 }
 
-/// A change of the surface, but for its stiffness.
+/// A change of the surface.
 fn surface(words: &[&str]) -> Result<SurfaceChange, &'static str> {
     let number = |word| number(word).map(|number| number as f32);
     Ok(match words {
+        ["surface", name] => {
+            SurfaceChange::Named(NamedSurface::find(name).ok_or("it is ice, sand or rock")?)
+        }
+        ["surface", ..] => return Err("it is ice, sand or rock"),
         ["friction", mu] => SurfaceChange::Friction {
             dynamic_mu: number(mu)?,
             static_mu: number(mu)?,
@@ -232,6 +237,13 @@ mod tests {
                 }),
             ),
             (
+                "surface sand",
+                None,
+                of_surface(SurfaceChange::Named(
+                    NamedSurface::find("sand").expect("named"),
+                )),
+            ),
+            (
                 "friction 0.4",
                 None,
                 of_surface(SurfaceChange::Friction {
@@ -322,6 +334,8 @@ mod tests {
             ("zoom inf", "a number"),
             ("pan 5", "two numbers"),
             ("pan 5 nan", "a number"),
+            ("surface", "ice, sand or rock"),
+            ("surface mud", "ice, sand or rock"),
             ("friction", "one or two numbers"),
             ("friction a", "a number"),
             ("damping 1 2", "one number"),

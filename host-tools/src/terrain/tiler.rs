@@ -432,7 +432,7 @@ impl<'r> Terrain<'r> {
         );
         tracing::warn!(
             "sample {column}, {row} of level {}, from the south-west, differs from a neighbour by {cells:.3e} cells, at most {MAX_STEP_CELLS} can be rendered: \
-             its tile, and each that is as steep, is a hole; scale the heights down with --exaggeration or --height-mm-per-unit, or fill the sample",
+             its tile, and each that is as steep, is a hole; scale the heights down with --exaggeration, or fill the sample",
             self.level
         );
     }

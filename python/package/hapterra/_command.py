@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -38,6 +39,23 @@ def command() -> list[str]:
     return [named] if named else [sys.executable, "-m", "hapterra"]
 
 
+def lab() -> list[str]:
+    """The words that start ``hapterra-lab``: the environment variable HAPTERRA_LAB, else that of the PATH.
+
+    Raises
+    ------
+    CommandError
+        Where there is none.
+    """
+    named = os.environ.get("HAPTERRA_LAB") or shutil.which("hapterra-lab")
+    if not named:
+        raise CommandError(
+            "there is no program hapterra-lab on the PATH",
+            "in a clone: cargo install --path bench --bin hapterra-lab; or name it in HAPTERRA_LAB",
+        )
+    return [named]
+
+
 def options(**given: Any) -> list[str]:
     """Options of the command: ``friction=0.1`` is ``--friction=0.1``, ``[1, 2]`` is ``1,2``, True is a
     flag, and None or False is none."""
@@ -48,14 +66,26 @@ def options(**given: Any) -> list[str]:
     ]
 
 
+def reading_options(cache: Word | None = None, **reading: Any) -> list[str]:
+    """Options of the command on an input: ``no_data=-9999`` is ``--input=no-data=-9999``, and
+    ``gdal={"NAME": "VALUE"}`` is ``--input=gdal:NAME=VALUE``."""
+    gdal = {f"gdal:{name}": value for name, value in reading.pop("gdal", {}).items()}
+    named = {name.replace("_", "-"): value for name, value in reading.items()}
+    return options(cache=cache) + [
+        f"--input={name}={_text(value)}"
+        for name, value in {**named, **gdal}.items()
+        if value is not None
+    ]
+
+
 def _text(value: Any) -> str:
     if isinstance(value, (str, os.PathLike)):
         return os.fspath(value)
     return ",".join(map(_text, value)) if isinstance(value, Iterable) else str(value)
 
 
-def run(*words: Word) -> str:
-    """Runs the command to its end and returns what it prints.
+def run(*words: Word, program: list[str] | None = None) -> str:
+    """Runs the command, or another program, to its end and returns what it prints.
 
     Ctrl-C ends the command, too, and waits for it.
 
@@ -65,7 +95,7 @@ def run(*words: Word) -> str:
         With the command's own text and hint.
     """
     with subprocess.Popen(
-        [*command(), *(os.fspath(word) for word in words)],
+        [*(program or command()), *(os.fspath(word) for word in words)],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

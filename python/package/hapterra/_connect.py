@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import json
 import os
 import shutil
 import tempfile
@@ -25,16 +26,12 @@ _Path = Union[str, "os.PathLike[str]"]
 _Vector = tuple[float, float, float]
 #: For so long a command may take until it is done: the clutch opens and closes in a second.
 _DONE_S = 15.0
-#: The command's options by the parameters of ``Surface``.
-_OPTIONS = {
-    "stiffness": "stiffness_n_per_mm",
-    "max_force": "max_force_n",
-    "damping": "damping_ns_per_m",
-}
+#: Parameters of ``Surface`` that are options of the command; its file has the others.
+_OPTIONS = ("stiffness", "max_force")
 #: Commands that change no view, or the surface of ``params``, and what is there for them.
 _NOT_HERE = {
     **dict.fromkeys(
-        ("stiffness", "friction", "viscous-friction", "damping", "shading", "texture"),
+        ("surface", "stiffness", "friction", "viscous-friction", "damping", "shading", "texture"),
         "set it by device.params",
     ),
     "mark": "use device.mark()",
@@ -42,6 +39,19 @@ _NOT_HERE = {
     "at": "each command is done at once",
     "on": "there is one device",
 }
+
+
+def _written(surface: dict[str, Any], path: Path) -> Path:
+    """Writes a surface as a file of the command."""
+    scene = {"shading": surface["shading"]}
+    default = {name: it for name, it in surface.items() if name not in ("shading", *_OPTIONS)}
+    lines = [*_toml(scene), "[default]", *_toml(default)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def _toml(values: dict[str, Any]) -> list[str]:
+    return [f"{name} = {json.dumps(it)}" for name, it in values.items()]
 
 
 class Sample(NamedTuple):
@@ -108,7 +118,7 @@ def connect(
         must not read which surface it is.
     options
         Options of ``hapterra run`` (``hapterra demo`` for "emulated") with underscores:
-        ``silence_s=10``, ``image="board.elf"``, ``view=True``.
+        ``silence="10s"``, ``view=True``, ``settings="none"``.
     """
     return Device(device, record, sample_every, buffer, quiet, options)
 
@@ -129,13 +139,14 @@ class Device:
         options: dict[str, Any],
     ) -> None:
         kinds = ("usb", "native", "emulated")
-        if name not in kinds and not name.startswith(("usb:", "tcp:")):
-            known = '"usb", "usb:SERIAL", "tcp:HOST:PORT", "native" or "emulated"'
+        if name not in kinds and not name.startswith(("usb:", "tcp:", "emulated:")):
+            known = '"usb", "usb:SERIAL", "tcp:HOST:PORT", "native", "emulated" or "emulated:ELF"'
             raise ValueError(f"{name!r} is no device: give {known}")
-        if name == "emulated" and record is not None and Path(record).suffix == ".parquet":
+        if name.startswith("emulated") and record is not None and Path(record).suffix == ".parquet":
             raise ValueError("an emulated board records CSV: name a file that ends in .csv")
         self.name = name
         self._record = None if record is None else Path(record)
+        self._is_emulated = name.startswith("emulated")
         self._every, self._buffer, self._options = int(every), buffer, options
         self._quiet = quiet
         self._loaded: list[str] | None = None
@@ -155,7 +166,7 @@ class Device:
         self._abandon: Callable[[], object] | None = None
 
     def load(
-        self, terrain: Terrain | _Path, surface: Surface | None = None, **options: Any
+        self, terrain: Terrain | _Path, surface: Surface | _Path | None = None, **options: Any
     ) -> None:
         """Sets what is touched next.
 
@@ -163,11 +174,12 @@ class Device:
         ----------
         terrain : a Terrain, or whatever ``hapterra run`` opens: a file, a folder, a URL. A Terrain
             is written to a file of 8 bytes a sample; give the path of a large one.
-        surface : Surface, optional
-            Materials of a surface cannot be loaded: give ``materials=`` and ``material_table=``.
+        surface : Surface, or one of the command: "ice", "sand", "rock" or a file, optional
+            Materials of a surface cannot be loaded: give ``materials=``, a file, and the file of
+            its classes as the surface.
         options
-            Options of ``hapterra run`` with underscores: ``at=(x, y)``, ``ground_m_per_mm=5``,
-            ``exaggeration="auto"``, ``tip="2mm"``, ``seconds=60``. A Terrain has its scale
+            Options of ``hapterra run`` with underscores: ``at=(x, y)``, ``scale="5m/mm"``,
+            ``exaggeration="auto"``, ``tip="2mm"``, ``duration="60s"``. A Terrain has its scale
             itself.
         """
         if self._session is not None:
@@ -179,18 +191,23 @@ class Device:
             file, words = terrain._write(Path(self._folder) / "terrain.npy")
         else:
             file = os.fspath(terrain)
-        self._surface = (surface or Surface()).params()
+        of_params = surface if isinstance(surface, Surface) else Surface()
+        self._surface = of_params.params()
         if self._surface.pop("materials"):
             raise ValueError(
-                "materials of a surface cannot be loaded: give materials= and material_table=, files"
+                "materials of a surface cannot be loaded: give materials=, a file, and the file of"
+                " its classes as the surface"
             )
-        if surface is None:
-            self._surface["static_friction"] = options.get("friction", 0.0)
-        else:
-            words.update((_OPTIONS.get(name, name), it) for name, it in self._surface.items())
+        if isinstance(surface, Surface):
+            words.update((name, self._surface[name]) for name in _OPTIONS)
+            words["surface"] = _written(self._surface, Path(self._folder) / "surface.toml")
+        elif surface is not None:
+            words["surface"] = surface
+            self._surface = dict.fromkeys(self._surface)
         words.update(options)
-        names = {option: name for name, option in _OPTIONS.items()}
-        given = {names.get(name, name): it for name, it in options.items() if it is not None}
+        given = {name: it for name, it in options.items() if it is not None}
+        if "friction" in given:
+            self._surface["static_friction"] = given["friction"]
         self._surface.update(given)
         self._loaded = [file, *options_of(**words)]
 
@@ -240,12 +257,12 @@ class Device:
     def _begin(self) -> Session:
         out = Path(self._folder) / "demo"
         words = ["run", "--device", self.name]
-        if self.name == "emulated":
-            words = ["demo", "--device", "emulated", "--out", str(out)]
+        if self._is_emulated:
+            words = ["demo", "--device", self.name, "--out", str(out)]
         elif self._record is not None:
-            words += ["--record", str(self._record)]
+            words += ["--out", str(self._record)]
         assert self._loaded is not None
-        words += [*self._loaded, *options_of(**self._options), "--event-samples", str(self._every)]
+        words += [*self._loaded, *options_of(**self._options), "--events", f"0,{self._every}"]
         self._confirmed = False
         self._samples, self._events = Buffer(self._buffer), Buffer(self._buffer)
         take = functools.partial(_take, self._samples, self._events)

@@ -65,7 +65,7 @@ class Recording:
         output : path, optional
             A file for the new recording, .csv or .parquet; by default a temporary one.
         **changes
-            Options of the command by their names: ``friction=0.1``, ``shading="smooth"``,
+            Options of the command by their names: ``friction=0.1``, ``surface="sand"``,
             ``ignore_settings=True``, ... (``hapterra replay --help``). Without any, the forces are
             the recorded ones, bit for bit.
 
@@ -82,7 +82,7 @@ class Recording:
         if output is None:
             folder = tempfile.TemporaryDirectory(prefix="hapterra-")
             output = os.path.join(folder.name, "felt.parquet")
-        run("replay", *options(**changes, output=output), "--", terrain, self.path)
+        run("replay", *options(**changes, out=output), "--", terrain, self.path)
         recording = read_recording(output)
         recording._folder = folder
         return recording

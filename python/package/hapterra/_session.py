@@ -129,7 +129,7 @@ class Session:
         self.refused: list[str] = []
         self.marks: list[dict[str, Any]] = []
         self._disarmed = False
-        driven = ["--commands", "-", "--end-with-input", "--events", "0"]
+        driven = ["--commands", "-", "--end-with-input"]
         self._child = subprocess.Popen(
             [*command(), *words, *driven],
             stdin=subprocess.PIPE,

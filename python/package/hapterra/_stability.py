@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Union
 
-from ._command import options, run
+from ._command import lab, options, run
 
 if TYPE_CHECKING:
     import pandas
@@ -25,8 +25,9 @@ def stability(
     arm_friction: _Numbers | None = None,
     **texture: Any,
 ) -> pandas.DataFrame:
-    """Tries on a virtual arm, by ``hapterra stability``, how stiff a surface may be before the hand
-    feels the ticks; docs/explanation/stability.md describes the trials.
+    """Tries on a virtual arm, by ``hapterra-lab stability``, how stiff a surface may be before it is
+    unstable; docs/explanation/stability.md describes the trials. The program ``hapterra-lab`` is not
+    part of this package: in a clone, ``cargo install --path bench --bin hapterra-lab``.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ def stability(
     ImportError
         Without pandas.
     CommandError
-        For numbers out of bounds, with the command's text.
+        For numbers out of bounds, with the command's text, or without ``hapterra-lab``.
     """
     try:
         import pandas
@@ -72,7 +73,7 @@ def stability(
     )
     with tempfile.TemporaryDirectory(prefix="hapterra-") as folder:
         trials = os.path.join(folder, "trials.csv")
-        summary = run("stability", *asked, f"--output={trials}")
+        summary = run("stability", *asked, f"--out={trials}", program=lab())
         # "none" is the name of a texture.
         frame = pandas.read_csv(trials, keep_default_na=False, na_values=[""])
     frame.attrs["summary"] = summary

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._command import options
+from ._command import options, reading_options
 from ._grid import Grid, of_rasterio, of_xarray
 from ._place import Ground, Laid, Pair, Path, files, ground_m_per_mm, is_lonlat, pair, resized
 
@@ -122,8 +122,9 @@ class Terrain:
             Times true to scale. A unit of heights is a millimetre times this where the file does
             not know how large its cells are.
         **reading
-            The command's options on how a file is read, by their names: ``band=2``,
-            ``no_data=-9999``, ``vertical_unit="ft"``, ... (``hapterra info --help``)
+            What the file does not state, by the keys of the command's ``--input``: ``band=2``,
+            ``no_data=-9999``, ``height_unit="ft"``, ``gdal={"NAME": "VALUE"}``, ...
+            (``hapterra info --help``); and ``cache=``, a folder or "off".
 
         Raises
         ------
@@ -135,7 +136,7 @@ class Terrain:
         """
         how = {"cell_mm": cell_mm, "scale": scale, "exaggeration": exaggeration}
         paths = files(source)
-        native = _native.Terrain.open(paths, options(**reading, **_size(how)))
+        native = _native.Terrain.open(paths, [*reading_options(**reading), *options(**_size(how))])
         return cls._of_file(native, {"file": paths[0] if len(paths) == 1 else paths}, how)
 
     @classmethod
@@ -286,7 +287,7 @@ class Terrain:
         """Writes the heights as a file of the command. Returns it, and the options of its scale."""
         if self._has_materials:
             raise ValueError(
-                "materials of a Terrain cannot be loaded: give materials= and material_table=, files"
+                "materials of a Terrain cannot be loaded: give materials=, a file, and surface=, a file of its classes"
             )
         rows, columns = self.shape
         if rows * columns > _MOST_WRITTEN:
@@ -300,7 +301,10 @@ class Terrain:
             block = np.frombuffer(self._native.rows(south, step), "=f8").reshape(-1, columns)
             heights[rows - south - len(block) : rows - south] = block[::-1]
         heights.flush()
-        scale = {"cell_mm": self.cell_mm, "height_mm_per_unit": self.height_mm_per_unit}
+        scale = {
+            "scale": f"{self.cell_mm!r}mm/cell",
+            "exaggeration": f"{self.height_mm_per_unit!r}mm/unit",
+        }
         tip = {"tip": f"{self.tip_mm}mm"} if self.tip_mm else {}
         return os.fspath(path), {**scale, **tip}
 

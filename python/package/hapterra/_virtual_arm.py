@@ -33,7 +33,7 @@ class VirtualArm:
 
         target ─[ arm k, b ]─ hand mass ─[ grip k, b ]─ tip ─ links, motors, encoders
 
-    The arm is that of ``hapterra stability``: rigid links, joints with friction, motors with
+    The arm is that of ``hapterra-lab stability``: rigid links, joints with friction, motors with
     the lag of their amplifiers, encoder counts. Each tick reads the encoders, makes a
     step of the contact, and sets the motors to its force and the arm's weight, by the boards'
     own kinematics and without a delay. What a board adds is not there: its guard, arming and

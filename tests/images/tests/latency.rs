@@ -5,7 +5,7 @@
 #[allow(dead_code)] // Only the table.
 mod tick_rate;
 
-use hapterra::stability::limits;
+use hapterra::stability;
 use hapterra_core::contact::work_per_tick;
 use hapterra_core::rate::TickRate;
 use hapterra_firmware::amplifier::{CURRENT_LOOP_US, DUTY_HZ};
@@ -90,8 +90,8 @@ fn cycles_of_the_interrupt_are_at_most_what_the_page_says() {
             let states_us = said.us[0] as u16 + behind_us + CURRENT_LOOP_US;
             assert_eq!(latency_us, states_us, "{board}");
             let tried_us = match board {
-                "nucleo-h743zi2" => limits::LONG_US,
-                _ => limits::SHORT_US,
+                "nucleo-h743zi2" => stability::LONG_US,
+                _ => stability::SHORT_US,
             };
             assert!(latency_us <= tried_us, "{board}");
         },

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use hapterra::bringup::Log;
 use hapterra::calibrate;
-use hapterra::materials::table::TableFile;
+use hapterra::cli::options::surface::table::TableFile;
 use hapterra::replay::{FeltRows, RecordedColumns, Trajectory};
 use hapterra::steering::command;
 

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-use hapterra_tests::hapterra_binary;
+use hapterra::synth::Kind;
+use hapterra_tests::{hapterra_binary, terrain_file};
 
 pub(super) struct Folder(tempfile::TempDir);
 
@@ -17,8 +18,7 @@ impl Folder {
     /// With a terrain of hills, so many samples wide.
     pub(super) fn of(size: u32) -> Self {
         let folder = Self(tempfile::tempdir().expect("a folder"));
-        let (file, size) = (folder.text("hills.tif"), size.to_string());
-        folder.runs(&["synth", "fractal", "-o", &file, "--size", &size]);
+        terrain_file(&folder.path("hills.tif"), Kind::Fractal, size, 1);
         folder
     }
 

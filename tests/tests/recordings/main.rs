@@ -8,17 +8,18 @@ mod views;
 use std::path::Path;
 use std::process::Command;
 
-use hapterra_tests::hapterra_binary;
+use hapterra::synth::Kind;
+use hapterra_tests::{UNCONTROLLED, hapterra_binary, terrain_file};
 
 use folder::{Folder, rows, said};
 
 const SETTINGS: [&str; 6] = [
-    "--cell-mm=0.7",
-    "--height-mm-per-unit=0.1",
+    "--scale=0.7mm/cell",
+    "--exaggeration=0.1mm/unit",
     "--level=1",
-    "--stiffness-n-per-mm=0.3",
-    "--max-force-n=4",
-    "--contact=paper",
+    "--stiffness=0.3",
+    "--max-force=4",
+    "--friction=0.25",
 ];
 
 #[test]
@@ -36,7 +37,7 @@ fn a_recording_is_replayed_with_its_own_settings() {
         "hills.tif",
         "fingerprint",
         "\"square\"",
-        "paper",
+        "dynamic_mu = 0.25",
     ] {
         assert!(text.contains(part), "{part} in {text}");
     }
@@ -52,9 +53,9 @@ fn a_recording_is_replayed_with_its_own_settings() {
             .any(|(a, b)| a["force_z_n"] != b["force_z_n"])
     );
     // An option of one's own wins, and that is said.
-    let told = folder.replays("felt.csv", "stiff.csv", &["--stiffness-n-per-mm=0.6"]);
+    let told = folder.replays("felt.csv", "stiff.csv", &["--stiffness=0.6"]);
     assert!(
-        told.contains("--stiffness-n-per-mm 0.6, where the recording has 0.3"),
+        told.contains("--stiffness 0.6N/mm, where the recording has 0.3N/mm"),
         "{told}"
     );
     assert!(
@@ -70,9 +71,7 @@ fn a_recording_of_another_terrain_is_refused() {
     folder.write_trajectory("in.csv");
     folder.replays("in.csv", "felt.csv", &[]);
     let other = folder.text("other.tif");
-    folder.runs(&[
-        "synth", "fractal", "-o", &other, "--size", "256", "--seed", "7",
-    ]);
+    terrain_file(other.as_ref(), Kind::Fractal, 256, 7);
     let (felt, out) = (folder.text("felt.csv"), folder.text("out.csv"));
     let told = folder.fails(&["replay", &other, &felt, "-o", &out]);
     for part in [
@@ -152,12 +151,19 @@ fn what_run_recorded_is_felt_again_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, record) = (folder.text("hills.tif"), folder.text("run.csv"));
     let words = [
-        "run", &terrain, "--tip", "0", "--device", "native", "--record", &record,
+        "run", &terrain, "--tip", "0", "--device", "native", "--out", &record,
     ];
     folder.runs(
         &[
             &words[..],
-            &["--seconds", "6", "--cell-mm", "0.9", "--passivity", "off"],
+            &[
+                "--duration",
+                "6s",
+                "--scale",
+                "0.9mm/cell",
+                "--surface",
+                UNCONTROLLED,
+            ],
         ]
         .concat(),
     );
@@ -174,10 +180,10 @@ fn what_demo_recorded_is_felt_again_bit_by_bit() {
         &terrain,
         "--out",
         &out,
-        "--seconds",
-        "6",
-        "--passivity",
-        "off",
+        "--duration",
+        "6s",
+        "--surface",
+        UNCONTROLLED,
     ]);
     assert!(told.contains("--device native"), "{told}");
     is_reproduced(&folder, "hills.tif", "demo/hills.csv");
@@ -205,10 +211,10 @@ fn a_place_far_from_the_middle_is_felt_again_with_its_own_cells() {
         &terrain,
         "--out",
         &out,
-        "--seconds",
-        "4",
-        "--passivity",
-        "off",
+        "--duration",
+        "4s",
+        "--surface",
+        UNCONTROLLED,
     ];
     folder.runs(&[&words[..], &["--at", "13,56", "--exaggeration", "9"]].concat());
     let text = folder.read("demo/hills.csv");
@@ -322,29 +328,36 @@ fn no_command_writes_over_its_own_input() {
             &hills,
             "--device",
             "native",
-            "--seconds",
-            "1",
-            "--record",
+            "--duration",
+            "1s",
+            "--out",
             output,
         ]);
     }
     folder.fails(&["replay", &hills, &input, "-o", &input]);
     // The picture of dem.png would be dem.png.
     let (png, here) = (folder.text("dem.png"), folder.text("."));
-    folder.runs(&["synth", "fractal", "-o", &png, "--size", "64"]);
+    terrain_file(png.as_ref(), Kind::Fractal, 64, 1);
     let picture = std::fs::read(&png).expect("there");
     let told = folder.fails(&["demo", &png, "--device", "native", "--out", &here]);
     assert!(told.contains("--out"), "{told}");
     let arm = folder.text("arm.toml");
-    let native = ["calibrate", "--device", "native", "--no-walk", "--no-store"];
+    let native = [
+        "calibrate",
+        "--device",
+        "native",
+        "--measure",
+        "none",
+        "--no-store",
+    ];
     folder.runs(&[&native[..], &["-o", &arm]].concat());
     let record = std::fs::read(&arm).expect("there");
     folder.fails(&[&native[..], &["--from", &arm, "-o", &arm]].concat());
     // The commands of a run are an input, too.
     std::fs::write(folder.path("steer.txt"), "at 1 zoom 2\n").expect("written");
     let steer = folder.text("steer.txt");
-    let native = ["--device", "native", "--seconds", "1"];
-    let by_file = ["--commands", &steer, "--record", &steer];
+    let native = ["--device", "native", "--duration", "1s"];
+    let by_file = ["--commands", &steer, "--out", &steer];
     let told = folder.fails(&[&["run", &hills], &native[..], &by_file].concat());
     assert!(told.contains("it is the input"), "{told}");
     exists_as_before(&folder.path("steer.txt"), b"at 1 zoom 2\n");
@@ -372,11 +385,11 @@ fn no_command_writes_over_a_file_beside_its_input() {
     ] {
         let [terrain, output, input] = [terrain, beside, "in.csv"].map(|name| folder.text(name));
         std::fs::write(&output, text).expect("written");
-        let native = ["--device", "native", "--seconds", "1"];
+        let native = ["--device", "native", "--duration", "1s"];
         for words in [
             &["replay", &terrain, &input, "-o", &output][..],
-            &[&["run", &terrain, "--record", &output], &native[..]].concat(),
-            &["view", &input, "--terrain", &terrain, "--rrd", &output],
+            &[&["run", &terrain, "--out", &output], &native[..]].concat(),
+            &["view", &input, &terrain, "--rrd", &output],
         ] {
             let told = folder.fails(words);
             assert!(told.contains("it is the input"), "{beside}: {told}");
@@ -396,7 +409,14 @@ fn no_command_writes_over_a_file_beside_its_input() {
 fn a_calibration_file_is_text_and_show_prints_it() {
     let folder = Folder::new();
     let arm = folder.text("arm.toml");
-    let native = ["calibrate", "--device", "native", "--no-walk", "--no-store"];
+    let native = [
+        "calibrate",
+        "--device",
+        "native",
+        "--measure",
+        "none",
+        "--no-store",
+    ];
     let set = ["--set", "l1-mm=215", "-o", &arm];
     folder.runs(&[&native[..], &set].concat());
     let text = folder.read("arm.toml");
@@ -428,15 +448,22 @@ fn a_reader_who_goes_away_is_no_crash() {
         &["info", "--json", &hills],
         &["list"],
         &["status", "--device", "native"],
-        &["calibrate", "--device", "native", "--no-walk", "--no-store"],
-        &["run", &hills, "--device", "native", "--seconds", "0.3"],
+        &[
+            "calibrate",
+            "--device",
+            "native",
+            "--measure",
+            "none",
+            "--no-store",
+        ],
+        &["run", &hills, "--device", "native", "--duration", "0.3s"],
         &[
             "demo",
             &hills,
             "--device",
             "native",
-            "--seconds",
-            "0.3",
+            "--duration",
+            "0.3s",
             "--out",
             &demo,
         ],
@@ -473,18 +500,18 @@ fn an_output_that_cannot_be_written_is_no_crash() {
     folder.write_trajectory("in.csv");
     let [hills, input, out, file] =
         ["hills.tif", "in.csv", "none/out", "in.csv/out"].map(|name| folder.text(name));
-    let native = ["--device", "native", "--seconds", "0.1"];
-    let of_files = |out: &str| -> [Vec<String>; 5] {
+    let native = ["--device", "native", "--duration", "0.1s"];
+    let of_files = |out: &str| -> [Vec<String>; 4] {
         let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
         [
             owned(&["replay", &hills, &input, "-o", out]),
-            owned(&[&["run", &hills, "--record", out][..], &native].concat()),
-            owned(&["synth", "plane", "--size", "8", "-o", &format!("{out}.tif")]),
+            owned(&[&["run", &hills, "--out", out][..], &native].concat()),
             owned(&[
                 "calibrate",
                 "--device",
                 "native",
-                "--no-walk",
+                "--measure",
+                "none",
                 "--no-store",
                 "-o",
                 out,
@@ -512,7 +539,13 @@ fn an_output_that_cannot_be_written_is_no_crash() {
     };
     let [demo, arm] = ["demo", "arm.toml"].map(|name| folder.text(name));
     let calibrate = ["calibrate", "--device", "native"];
-    folder.runs(&[&calibrate[..], &["--no-walk", "--no-store", "-o", &arm]].concat());
+    folder.runs(
+        &[
+            &calibrate[..],
+            &["--measure", "none", "--no-store", "-o", &arm],
+        ]
+        .concat(),
+    );
     for words in [
         &["info", &hills][..],
         &["info", "--json", &hills],
@@ -520,14 +553,6 @@ fn an_output_that_cannot_be_written_is_no_crash() {
         &["status", "--device", "native"],
         &[&calibrate[..], &["--show"]].concat(),
         &["calibrate", "--show", &arm],
-        &[
-            "synth",
-            "plane",
-            "--size",
-            "8",
-            "-o",
-            &folder.text("plane.tif"),
-        ],
         &[&["run", &hills][..], &native].concat(),
         &[&["demo", &hills, "--out", &demo][..], &native].concat(),
         &["replay", &hills, &input, "-o", "-"],
@@ -564,9 +589,9 @@ fn odd_outputs_and_options_are_told() {
         String::from_utf8_lossy(&run.stdout),
         folder.read("felt.csv")
     );
-    let told = folder.fails(&["run", &hills, "--device", "native", "--record", "-"]);
+    let told = folder.fails(&["run", &hills, "--device", "native", "--out", "-"]);
     assert!(told.contains("standard output"), "{told}");
-    let told = folder.replays("in.csv", "stiff.csv", &["--stiffness-n-per-mm=1e9"]);
+    let told = folder.replays("in.csv", "stiff.csv", &["--stiffness=1e9"]);
     assert!(told.contains("1000000000 N/mm"), "{told}");
     // What shows a record writes none.
     let run = folder.run(&[
@@ -580,9 +605,7 @@ fn odd_outputs_and_options_are_told() {
     assert!(said(&run).contains("cannot be used with"), "{}", said(&run));
     // Nothing is left of a demo that fails.
     let demo = folder.text("demo");
-    let words = [
-        "demo", &hills, "--device", "emulated", "--image", "none.elf",
-    ];
+    let words = ["demo", &hills, "--device", "emulated:none.elf"];
     let told = folder.fails(&[&words[..], &["--out", &demo]].concat());
     assert!(
         told.contains("none.elf") && !folder.path("demo").exists(),
@@ -617,12 +640,12 @@ fn every_command_takes_one_exaggeration_and_feels_true_to_scale_without() {
                 &hills,
                 "--device",
                 "native",
-                "--seconds",
-                "0.1",
+                "--duration",
+                "0.1s",
                 "--out",
                 &demo,
             ],
-            &["run", &hills, "--device", "native", "--seconds", "0.1"],
+            &["run", &hills, "--device", "native", "--duration", "0.1s"],
         ];
         for words in commands {
             let run = folder.run(&[words, more].concat());
@@ -638,7 +661,7 @@ fn every_command_takes_one_exaggeration_and_feels_true_to_scale_without() {
     folder.replays("in.csv", "felt.csv", &["--exaggeration=3"]);
     assert!(folder.read("felt.csv").contains("# exaggeration = 3.0"));
     let input = folder.text("in.csv");
-    let both = ["--exaggeration=2", "--height-mm-per-unit=1"];
+    let both = ["--exaggeration=2", "--exaggeration=1mm/unit"];
     let out = folder.text("o.csv");
     let run = folder.run(&[&["replay", &hills, &input, "-o", &out][..], &both].concat());
     assert_eq!(run.status.code(), Some(2), "{}", said(&run));

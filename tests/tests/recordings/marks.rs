@@ -17,8 +17,8 @@ fn run(folder: &Folder, record: &str) -> String {
     folder.write("commands", COMMANDS);
     let [terrain, commands, record] =
         ["hills.tif", "commands", record].map(|name| folder.text(name));
-    let words = ["run", &terrain, "--device", "native", "--seconds", "5"];
-    let more = ["--commands", &commands, "--record", &record];
+    let words = ["run", &terrain, "--device", "native", "--duration", "5s"];
+    let more = ["--commands", &commands, "--out", &record];
     folder.runs(&[&words[..], &more].concat())
 }
 
@@ -89,7 +89,7 @@ fn a_demo_keeps_its_marks() {
     let folder = Folder::new();
     folder.write("commands", COMMANDS);
     let [terrain, out, commands] = ["hills.tif", "demo", "commands"].map(|n| folder.text(n));
-    let words = ["demo", &terrain, "--out", &out, "--seconds", "5"];
+    let words = ["demo", &terrain, "--out", &out, "--duration", "5s"];
     folder.runs(&[&words[..], &["--commands", &commands]].concat());
     let marks = marks_of(&folder, "demo/hills.csv");
     let texts: Vec<_> = marks.iter().map(|mark| mark.text.as_str()).collect();

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use hapterra::replay::settings::ViewSettings;
 use hapterra::replay::{Settings, Trajectory};
 use hapterra_core::contact::{LARGEST_PIECE, WORK_PER_TICK};
-use hapterra_tests::hapterra_binary;
+use hapterra_tests::{UNCONTROLLED, hapterra_binary};
 
 use super::folder::{Folder, rows, said};
 use super::write_degrees;
@@ -34,10 +34,10 @@ fn demo(folder: &Folder) -> String {
         &terrain,
         "--out",
         &out,
-        "--seconds",
-        "9.5",
-        "--passivity",
-        "off",
+        "--duration",
+        "9.5s",
+        "--surface",
+        UNCONTROLLED,
     ];
     let run = folder.run(&[&words[..], &["--commands", &commands]].concat());
     assert!(run.status.success(), "{}", said(&run));
@@ -147,7 +147,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
         assert!(!folder.path("again.csv").exists());
         said(&run)
     };
-    let told = refused("demo/hills.csv", &["--cell-mm", "3"]);
+    let told = refused("demo/hills.csv", &["--scale", "3mm/cell"]);
     assert!(
         told.contains("5 views") && told.contains("--ignore-settings"),
         "{told}"
@@ -177,8 +177,8 @@ fn a_parquet_recording_of_views_is_felt_again_too() {
     folder.write("commands", "at 3.5 zoom 2\nat 4.5 reset\n");
     let names = ["hills.tif", "felt.parquet", "commands"].map(|name| folder.text(name));
     let [terrain, record, commands] = &names;
-    let words = ["run", terrain, "--device", "native", "--record", record];
-    let more = ["--commands", commands, "--seconds", "6"];
+    let words = ["run", terrain, "--device", "native", "--out", record];
+    let more = ["--commands", commands, "--duration", "6s"];
     let run = folder.run(&[&words[..], &more].concat());
     assert!(run.status.success(), "{}", said(&run));
     assert!(said(&run).contains("view 2: "), "{}", said(&run));
@@ -197,8 +197,8 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     use std::io::Write;
     let folder = Folder::of(SIZE);
     let [terrain, record] = ["hills.tif", "felt.csv"].map(|name| folder.text(name));
-    let words = ["run", &terrain, "--device", "native", "--record", &record];
-    let more = ["--seconds", "4.5", "--commands"];
+    let words = ["run", &terrain, "--device", "native", "--out", &record];
+    let more = ["--duration", "4.5s", "--commands"];
     let mut command = Command::new(hapterra_binary());
     let command = command.args(words).args(more).arg("-");
     let child = command
@@ -252,10 +252,10 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
         terrain,
         "--out",
         out,
-        "--seconds",
-        "6.5",
-        "--passivity",
-        "off",
+        "--duration",
+        "6.5s",
+        "--surface",
+        UNCONTROLLED,
         "--commands",
         commands,
     ];
@@ -350,9 +350,9 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
     for pan in ["", "at 4.0 pan 2 1\n"] {
         folder.write("commands", pan);
         let words = [
-            "run", &terrain, "--tip", "0", "--device", "native", "--record", &record,
+            "run", &terrain, "--tip", "0", "--device", "native", "--out", &record,
         ];
-        let more = ["--seconds", "9", "--at", "13,56", "--exaggeration", "9"];
+        let more = ["--duration", "9s", "--at", "13,56", "--exaggeration", "9"];
         folder.runs(&[&words[..], &more, &["--commands", &commands]].concat());
         folder.runs(&["replay", &terrain, &record, "-o", &again]);
         let [live_text, again_text] = ["felt.csv", "again.csv"].map(|name| folder.read(name));

@@ -191,7 +191,7 @@ fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
     let armed = Armed::by(|address, folder| {
         let ground = ground.to_str().expect("a plain path");
         let mut command = command_over(ground, address, folder);
-        command.args(["--in-memory-mb", "0"]);
+        command.args(["--input", "in-memory=0MB"]);
         command.env("GDAL_LIBRARY", &library);
         command.env("STAND_IN_CRASH", &crash);
         command

@@ -36,7 +36,7 @@ fn a_signal_ends_it_with_a_goodbye_that_the_board_confirms() {
 fn the_end_of_the_time_is_a_goodbye_too() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = Served::start();
-    let child = start(&served, folder.path(), &["--seconds", "0.5"]);
+    let child = start(&served, folder.path(), &["--duration", "0.5s"]);
     let output = end_of(child);
     assert!(output.status.success(), "{}", told(&output));
     // Who looks does not hide it from who looks next.
@@ -83,7 +83,7 @@ fn the_second_signal_ends_it_at_once_with_the_same_word() {
 fn a_silence_that_no_device_keeps_to_is_refused() {
     for seconds in ["4", "3601", "soon"] {
         let output = Command::new(hapterra_binary())
-            .args(["run", "x.tif", "--silence-s", seconds])
+            .args(["run", "x.tif", "--silence", seconds])
             .output()
             .expect("it runs");
         assert_eq!(output.status.code(), Some(2), "{}", told(&output));
@@ -95,7 +95,7 @@ fn stiffness_that_no_arm_feels_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = Served::start();
     let output = command(served.address, folder.path())
-        .args(["--stiffness-n-per-mm", "1e30"])
+        .args(["--stiffness", "1e30"])
         .output()
         .expect("it runs");
     let told = told(&output);

@@ -90,7 +90,7 @@ fn a_disk_that_is_full_costs_its_lines_and_nothing_else() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = Served::start();
     let mut command = command(served.address, folder.path());
-    let command = command.args(["--seconds", "0.5"]).stdout(out).stderr(err);
+    let command = command.args(["--duration", "0.5s"]).stdout(out).stderr(err);
     let child = command.spawn().expect("it runs");
     let output = end_of(child);
     assert!(output.status.success(), "{}", output.status);

@@ -10,7 +10,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::run::{cargo, on_path, root, run, run_quietly, say, target_dir, timed};
+use crate::run::{cargo, on_path, program, root, run, run_quietly, say, target_dir, timed};
 use crate::setup::{packages, toolchain};
 use crate::view;
 use server::Server;
@@ -34,9 +34,12 @@ pub(crate) fn demo(
     let folder = out.unwrap_or_else(|| target_dir().join("page"));
     build(&folder)?;
     if let Some(file) = file {
-        let is_url = file.to_string_lossy().contains("://");
-        let mut cut = Command::new(command(is_url)?);
-        cut.arg("cut").arg(file).arg("--output").arg(&folder);
+        let features: &[&str] = match file.to_string_lossy().contains("://") {
+            true => &["--features", "remote"],
+            false => &[],
+        };
+        let mut cut = Command::new(program("hapterra", features)?);
+        cut.arg("cut").arg(file).arg("--out").arg(&folder);
         run(cut.args(extra))?;
     }
     if !is_served {
@@ -71,7 +74,8 @@ pub(crate) fn test() -> Result<()> {
     let mut tests = cargo();
     tests
         .args(["test", "--package", "xtask", "--test", "page"])
-        .env("HAPTERRA", command(false)?)
+        .env("HAPTERRA", program("hapterra", &[])?)
+        .env("HAPTERRA_LAB", program("hapterra-lab", &[])?)
         .env("HAPTERRA_PAGE", folder);
     match view::browser() {
         Ok(browser) => drop(tests.env(view::BROWSER, browser)),
@@ -82,18 +86,6 @@ pub(crate) fn test() -> Result<()> {
 
 fn node() -> Result<PathBuf> {
     on_path("node").context("there is no node on the PATH")
-}
-
-/// Builds the `hapterra` command and gives its path.
-fn command(is_remote: bool) -> Result<PathBuf> {
-    let mut build = cargo();
-    build.args(["build", "--package", "hapterra", "--bin", "hapterra"]);
-    if is_remote {
-        build.args(["--features", "remote"]);
-    }
-    timed("building the hapterra command", || run(&mut build))?;
-    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
-    Ok(target_dir().join("debug").join(program))
 }
 
 /// Writes the page without a terrain file.

@@ -20,7 +20,7 @@ use std::path::Path;
 use serde_json::json;
 
 use server::Server;
-use site::{Site, hapterra, one};
+use site::{Site, one, program};
 use timeouts::{HANG, wait_until};
 
 /// The rows of a CSV file's columns, as numbers of single precision.
@@ -48,13 +48,13 @@ fn check_saved(site: &mut Site, folder: &str, least: usize) -> Option<String> {
         .browser
         .call("Browser.setDownloadBehavior", allow, None);
     let _ = site.value("document.getElementById('save').click()");
-    let files = ["path.csv", "terrain.npy"].map(|name| saved.join(name));
+    let files = ["path.csv", "terrain.npy", "surface.toml"].map(|name| saved.join(name));
     wait_until("the saved files", || {
         files.iter().all(|file| file.is_file())
     });
     let line = site.text("command");
     let words: Vec<_> = line.split(' ').skip(1).collect();
-    hapterra(&saved, &words, &[])?;
+    program("HAPTERRA", &saved, &words, &[])?;
     let (felt, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
     let touching = felt.iter().filter(|force| **force != [0; 3]).count();
     println!("{} rows, {touching} with a force: {line}", felt.len());
@@ -96,7 +96,7 @@ fn saved_path_feels_the_same_in_replay_bit_for_bit() {
     assert!(line.ends_with("--tip 3mm"), "{line}");
     assert_eq!(site.value("document.getElementById('mixed').hidden"), false);
     // A ball of more than 8 cells, and a point; the surface stays.
-    for (tip_mm, word) in [(5.0, "--tip 5mm"), (0.0, "--texture-wavelength 2")] {
+    for (tip_mm, word) in [(5.0, "--tip 5mm"), (0.0, "--surface surface.toml")] {
         site.slide("tip", tip_mm);
         site.wait(&format!("hapterra.touch.tipMm === {tip_mm}"));
         stroke(&mut site);
@@ -128,10 +128,10 @@ fn dropped_files_of_one_terrain_have_the_same_heights() {
             "3000",
             "--size",
             "70x50",
-            "--output",
+            "--out",
             name,
         ];
-        if hapterra(&folder, &words, &[]).is_none() {
+        if program("HAPTERRA_LAB", &folder, &words, &[]).is_none() {
             return;
         }
         site.drop_file(name, &fs::read(folder.join(name)).expect("a file"));

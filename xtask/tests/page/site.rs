@@ -46,7 +46,7 @@ impl Site {
     /// Serves the page, with a terrain where there is one, and waits until it is touched.
     pub(crate) fn open(terrain: Option<&Path>) -> Option<Self> {
         let built = built("HAPTERRA_PAGE")?;
-        let Some(program) = browser::program() else {
+        let Some(browser) = browser::program() else {
             println!("SKIPPED: no Chromium here; HAPTERRA_BROWSER can name one");
             return None;
         };
@@ -55,13 +55,13 @@ impl Site {
         let copied = Command::new("cp").arg("-r").args([&built, &site]).status();
         assert!(copied.expect("cp").success());
         if let Some(terrain) = terrain {
-            let words = ["cut", "--most-samples", "5000", "--output"];
-            hapterra(folder.path(), &words, &[&site, terrain])?;
+            let words = ["cut", "--most-samples", "5000", "--out"];
+            program("HAPTERRA", folder.path(), &words, &[&site, terrain])?;
         }
         let server = Server::bind(&site).expect("a port");
         let address = server.address();
         std::thread::spawn(|| server.serve());
-        let mut browser = Browser::start(&program, folder.path());
+        let mut browser = Browser::start(&browser, folder.path());
         let page = browser.open_sized(&address, SIZE);
         let mut site = Self {
             browser,
@@ -149,11 +149,11 @@ impl Site {
     }
 }
 
-/// Runs the command in a folder; none where it was not built.
-pub(crate) fn hapterra(folder: &Path, words: &[&str], files: &[&Path]) -> Option<()> {
-    let mut command = Command::new(built("HAPTERRA")?);
+/// Runs the program that a variable names in a folder; none where it was not built.
+pub(crate) fn program(name: &str, folder: &Path, words: &[&str], files: &[&Path]) -> Option<()> {
+    let mut command = Command::new(built(name)?);
     command.current_dir(folder).args(words).args(files);
-    let done = command.output().expect("hapterra starts");
+    let done = command.output().expect("it starts");
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert!(done.status.success(), "{words:?}: {said}");
     Some(())

@@ -261,7 +261,7 @@ fn decoded(
     decoded.offset = offset.unwrap_or(0.0);
     if bands > 1 && options.band.is_none() && !has_codes {
         decoded.remarks.push(format!(
-            "it has {bands} bands: the first is taken for the height (--band)"
+            "it has {bands} bands: the first is taken for the height (--input band=N)"
         ));
     }
     if OF_FILES.contains(&driver.as_str()) && no_data.is_none() {
@@ -296,7 +296,7 @@ fn decoded(
 fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), BadRaster> {
     match options.band {
         Some(band) => Err(BadRaster::NoSuchPart {
-            asked: format!("band {band} with --encoding"),
+            asked: format!("band {band} with --input encoding=…"),
             there: "three bands together are one height".into(),
         }),
         None if stored == Stored::U8 && COLOURS.contains(&bands) => Ok(()),

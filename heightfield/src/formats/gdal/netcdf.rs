@@ -105,7 +105,7 @@ impl Conventions {
             .collect();
         if !felt.is_empty() {
             decoded.remarks.push(format!(
-                "its missing_value {} is felt as a height: GDAL knows one no-data value (--no-data)",
+                "its missing_value {} is felt as a height: GDAL knows one no-data value (--input no-data=VALUE)",
                 felt.join(", ")
             ));
         }

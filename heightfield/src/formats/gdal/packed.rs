@@ -58,7 +58,7 @@ impl Packing {
     /// What GDAL calls the raster in an archive, and the options that are left for it.
     ///
     /// # Errors
-    /// [`BadRaster::SeveralHeights`] where none of several is chosen by `--variable`.
+    /// [`BadRaster::SeveralHeights`] where none of several is chosen by `--input variable=NAME`.
     pub(super) fn entry(
         self,
         library: &Library,

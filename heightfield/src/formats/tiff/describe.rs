@@ -66,7 +66,7 @@ pub(super) fn overview_sizes(
 pub(super) fn wanted(options: &OpenOptions) -> Result<Wanted, BadRaster> {
     match (options.encoding, options.band) {
         (Some(_), Some(band)) => Err(BadRaster::NoSuchPart {
-            asked: format!("band {band} with --encoding"),
+            asked: format!("band {band} with --input encoding=…"),
             there: "three bands together are one height".into(),
         }),
         (Some(_), None) => Ok(Wanted::Codes),

@@ -105,7 +105,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
     }
     if options.band.is_none() && options.encoding.is_none() && bands > 1 + u16::from(has_alpha) {
         decoded.remarks.push(format!(
-            "it has {bands} bands: the first is taken for the height (--band)"
+            "it has {bands} bands: the first is taken for the height (--input band=N)"
         ));
     }
     decoded.file_layout = file_layout;
@@ -210,7 +210,7 @@ fn unpacked_told(image: &Image) -> Option<Told> {
     };
     (megabytes > 0).then(|| {
         Told::Remark(format!(
-            "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache-dir), up to {megabytes} MB, until the program ends"
+            "{whose} are too large to be unpacked each time they are touched: they are unpacked on disk (--cache), up to {megabytes} MB, until the program ends"
         ))
     })
 }

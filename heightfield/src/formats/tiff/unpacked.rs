@@ -156,7 +156,7 @@ impl Unpacked {
         let no_room = |error: io::Error| {
             let megabytes = self.each.div_ceil(1_000_000);
             BadRaster::Damaged(format!(
-                "TIFF: {megabytes} MB could not be unpacked into the folder of --cache-dir: {error}"
+                "TIFF: {megabytes} MB could not be unpacked into the folder of --cache: {error}"
             ))
         };
         let file = &self.unnamed.file;

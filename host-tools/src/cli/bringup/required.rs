@@ -46,9 +46,9 @@ pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(),
     if is_real(board) {
         let board = shown(board);
         return Err(Failure::new(format!(
-            "{board} is a real board: its arm is not the virtual one that --plant moves"
+            "{board} is a real board: its arm is not the virtual one that is moved over a plant line"
         ))
-        .hint("leave --plant out; it is for a board that QEMU emulates"));
+        .hint("leave +plant:HOST:PORT out; it is for a board that QEMU emulates"));
     }
     Ok(dialogue.end()?)
 }

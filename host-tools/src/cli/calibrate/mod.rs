@@ -1,5 +1,6 @@
 //! `hapterra calibrate`: the walk through a calibration, and records in files.
 
+mod measure;
 mod questions;
 mod set;
 
@@ -20,11 +21,12 @@ use super::terminal::voice::say;
 use crate::calibrate::{Attendant, Plan, VirtualUser, file, walk};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 use crate::output::keep_apart;
+use measure::Measure;
 use questions::UserAtTerminal;
 use set::Setting;
 
 /// What to do where the record cannot be written.
-const OTHER_FILE: &str = "name another file with --output";
+const OTHER_FILE: &str = "name another file with -o";
 /// How long a device in this program may take to answer.
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -42,7 +44,7 @@ pub struct Args {
     /// Print a record as the text of a file and do nothing else: the one in FILE, else
     /// what the device holds
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, num_args = 0..=1,
-          conflicts_with = "output")]
+          conflicts_with = "out")]
     pub show: Option<Option<PathBuf>>,
 
     /// Begin with the record in this file (TOML, or a binary one of an earlier version)
@@ -53,25 +55,16 @@ pub struct Args {
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<Setting>,
 
-    /// Do not measure anything: take the record as it is
-    #[arg(long)]
-    pub no_walk: bool,
+    /// Measure all, none, or some of zero,ratios,gravity
+    ///
+    /// The zero pose is the first step of all measuring. A preset's guessed ratios (Premium 1.0, 3.0,
+    /// Omni) have to be measured, or taken as they are with guessed-ratios in the list.
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub measure: Measure,
 
-    /// Do not measure the ratios
-    #[arg(long)]
-    pub skip_ratios: bool,
-
-    /// Take a preset's guessed ratios as they are (Premium 1.0, 3.0, Omni)
-    #[arg(long)]
-    pub unmeasured_ratios: bool,
-
-    /// Do not measure gravity
-    #[arg(long)]
-    pub skip_gravity: bool,
-
-    /// Write the record to this file, too, as TOML
+    /// File for the record, too, as TOML
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub output: Option<PathBuf>,
+    pub out: Option<PathBuf>,
 
     /// Do not store the record on the device
     #[arg(long)]
@@ -105,7 +98,7 @@ fn models() -> impl TypedValueParser<Value = Model> {
 /// refuses.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (outputs, inputs) = (
-        Vec::from_iter(args.output.as_deref()),
+        Vec::from_iter(args.out.as_deref()),
         Vec::from_iter(args.from.as_deref()),
     );
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
@@ -115,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Some(None) => return put(&file::to_toml(&args.device.look(held)?)),
         None => {}
     }
-    left_behind::tell(args.output.as_deref());
+    left_behind::tell(args.out.as_deref());
     if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
         let mut user = UserAtTerminal::new(args.yes);
         return args
@@ -128,7 +121,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let device = Native::new(HostClock::default(), None)
         .meddled_with(user.hands())
         .restless();
-    if !args.no_walk {
+    if args.measure.zero {
         say("a virtual user calibrates a virtual Phantom that differs from its preset");
     }
     let mut dialogue = Dialogue::open(Box::new(device), PATIENCE)?;
@@ -150,25 +143,26 @@ fn calibrate(
 ) -> Result<(), Failure> {
     let (begin, whence) = begin(args, dialogue)?;
     say(format!("begins with    {whence}"));
-    if (args.no_walk || args.skip_ratios) && !args.unmeasured_ratios && begin.has_guessed_ratios() {
+    let measure = args.measure;
+    if !measure.ratios && !measure.takes_guessed_ratios && begin.has_guessed_ratios() {
         return Err("the cable ratios of this model are a guess, and were never measured").or_hint(
-            "measure them: no --no-walk, no --skip-ratios; or agree with --unmeasured-ratios",
+            "measure them, too; or agree with guessed-ratios, as --measure zero,gravity,guessed-ratios",
         );
     }
     if dialogue.status()?.health.report.mode.drives() {
         return Err("the amplifiers are on").or_hint("disarm first: hapterra status --disarm");
     }
     let (mut record, mut zero) = (begin, None);
-    if !args.no_walk {
+    if measure.zero {
         let plan = Plan {
-            ratios: !args.skip_ratios,
-            gravity: !args.skip_gravity,
+            ratios: measure.ratios,
+            gravity: measure.gravity,
         };
         let mut counts = || Ok(dialogue.fresh_status()?.health.sense.counts);
         let review = walk(&begin, plan, attendant, &mut counts)?;
         (record, zero) = (review.after, Some(review.zero));
     }
-    if let Some(path) = &args.output {
+    if let Some(path) = &args.out {
         file::write(path, &record).or_hint(OTHER_FILE)?;
         say(format!("written        {}", path.display()));
     }
@@ -223,7 +217,7 @@ fn hand_over(
             (dialogue.store(calibration)?, "and stored there")
         }
     };
-    answer.or_hint("see hapterra status; the record can be kept in a file with --output FILE")?;
+    answer.or_hint("see hapterra status; the record can be kept in a file with -o FILE")?;
     say(format!("in force       on the device, {until}"));
     Ok(())
 }

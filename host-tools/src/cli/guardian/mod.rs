@@ -12,7 +12,7 @@
 //! and has not reported all devices as disarmed, the guardian connects to each of them and
 //! closes it until the board confirms. It puts the terminal back, and names the recording.
 //! If the guardian is killed, the worker ends as after Ctrl-C. Only if both are killed at
-//! once does the board have to disarm by itself, after `--silence-s`.
+//! once does the board have to disarm by itself, after `--silence`.
 //!
 //! Both are in the terminal's foreground, so Ctrl-C in a terminal reaches both. A signal
 //! that reaches the worker only asks for an end. The guardian counts: it passes each one
@@ -54,6 +54,14 @@ pub(in crate::cli) fn watch(program: &[OsString], arguments: &[OsString]) -> Opt
 pub(in crate::cli) fn counts_presses() -> bool {
     #[cfg(unix)]
     return worker::is_worker();
+    #[cfg(not(unix))]
+    false
+}
+
+/// Returns true in a process that a guardian has started.
+pub(in crate::cli) fn is_worker() -> bool {
+    #[cfg(unix)]
+    return worker::has_guardian();
     #[cfg(not(unix))]
     false
 }

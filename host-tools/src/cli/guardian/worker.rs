@@ -33,6 +33,10 @@ pub(super) fn begin() -> bool {
     true
 }
 
+pub(super) fn has_guardian() -> bool {
+    descriptors().is_some()
+}
+
 /// The numbers of the two descriptors, if this process is the child that they are for.
 fn descriptors() -> Option<[u32; 2]> {
     let variable = std::env::var(VARIABLE).ok()?;

@@ -22,7 +22,7 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
     let hint = match fault {
         BadRaster::UnknownFormat => {
             return format!(
-                "{}{}; or say how raw samples lie with --raw-size WxH",
+                "{}{}; or say how raw samples lie with --input raw=WxH:i16:le",
                 with_gdal(path),
                 converted(path, "")
             );
@@ -68,7 +68,7 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         }
         BadRaster::WhichAsset { names, .. } => {
             return format!(
-                "name the one with the heights, or a pattern in quotes for one of each item: --variable {}",
+                "name the one with the heights, or a pattern in quotes for one of each item: --input variable={}",
                 names.join("|")
             );
         }
@@ -83,28 +83,28 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         BadRaster::NoNumbers(_) => "take a file with heights",
         BadRaster::ColourBands { bands, .. } => {
             return format!(
-                "if one of its bands holds heights, name it: --band 1 to {bands}; if its colours encode heights: --encoding terrain-rgb or terrarium"
+                "if one of its bands holds heights, name it: --input band=1 to {bands}; if its colours encode heights: --input encoding=terrain-rgb or terrarium"
             );
         }
         BadRaster::SeveralHeights { names, .. } => {
             return format!(
-                "name the one with the heights: --variable {}",
+                "name the one with the heights: --input variable={}",
                 names.join("|")
             );
         }
         BadRaster::NoSuchPart { .. } => "name one that is there, or leave that option out",
         BadRaster::CellKnown(_) => {
-            "leave --ground-cell-m out: it is for files that do not state a cell size"
+            "leave --input cell=… out: it is for files that do not state a cell size"
         }
         BadRaster::EncodedPicture(encoding) => {
             let name = encoding.name();
             return format!(
-                "if its colours are heights, say so: --encoding {name} (with --ground-cell-m for its scale)"
+                "if its colours are heights, say so: --input encoding={name} (with --input cell=30m for its scale)"
             );
         }
         BadRaster::HeaderMissing(name) => {
             return format!(
-                "put {name} beside it; or say how the samples lie: --raw-size WxH --raw-type f32"
+                "put {name} beside it; or say how the samples lie: --input raw=WxH:f32"
             );
         }
         BadRaster::TooLarge { columns, rows, .. } => {
@@ -127,15 +127,13 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
         BadRaster::Unreadable(_) => "check the path and that you may read the file",
         BadRaster::Elsewhere(error) => elsewhere(path, error),
         BadRaster::NotYet => "try again",
-        BadRaster::RawSizeMissing => {
-            "say how the samples lie: --raw-size WxH --raw-type i16 --raw-endian little"
-        }
+        BadRaster::RawSizeMissing => "say how the samples lie: --input raw=WxH:i16:le",
         BadRaster::AmbiguousChannels(_) => {
-            "say which channel holds the height: --png-channel red|green|blue|alpha|grey"
+            "say which channel holds the height: --input channel=red|green|blue|alpha|grey"
         }
         BadRaster::TooSmall { .. } => "take a larger part of the terrain",
         BadRaster::AllNoData { .. } => {
-            "check that the file covers your area, or name another no-data value with --no-data"
+            "check that the file covers your area, or name another no-data value with --input no-data=VALUE"
         }
         // What is not an image of GDAL's has no checksum there.
         BadRaster::AbsurdSize(_) | BadRaster::Damaged(_) | BadRaster::Truncated(_)

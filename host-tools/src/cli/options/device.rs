@@ -1,13 +1,14 @@
 //! Which device a command talks to: on USB, behind a socket, in this program's
 //! memory, or a board that is emulated for the occasion.
 
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use super::emulated_board::EmulatedBoard;
 use crate::cli::failure::Failure;
 use crate::link::{
-    DeviceAddress, Dialogue, HostClock, LinkError, Native, Transport, move_arm_while,
+    DeviceAddress, Dialogue, Emulator, EmulatorError, HostClock, IMAGE_VARIABLE, Lines, LinkError,
+    Native, QEMU, QEMU_VARIABLE, Transport, move_arm_while,
 };
 use crate::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script};
 
@@ -22,34 +23,97 @@ pub enum DeviceChoice {
     /// A device that is there already.
     There(DeviceAddress),
     /// A board emulated by QEMU, with a virtual Phantom at rest.
-    Emulated,
+    Emulated(EmulatedBoard),
 }
 
 impl FromStr for DeviceChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "emulated" => Ok(Self::Emulated),
-            _ => text.parse().map(Self::There).map_err(|_| {
-                "a device is usb, usb:SERIAL, tcp:HOST:PORT, native or emulated".into()
-            }),
+        match (EmulatedBoard::named(text), text.parse()) {
+            (Some(board), _) => Ok(Self::Emulated(board)),
+            (None, Ok(address)) => Ok(Self::There(address)),
+            (None, Err(_)) => Err(
+                "a device is usb, usb:SERIAL, tcp:HOST:PORT, native, emulated or emulated:ELF"
+                    .into(),
+            ),
         }
     }
 }
 
-/// The device, and how to emulate it.
+/// Where the loop runs that moves no real arm: in this program, or on an emulated board.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum VirtualDevice {
+    /// In this program: the application compiled for this machine.
+    Native,
+    /// On the emulated Cortex-M4F board.
+    Emulated(EmulatedBoard),
+}
+
+impl FromStr for VirtualDevice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, EmulatedBoard::named(text)) {
+            ("native", _) => Ok(Self::Native),
+            (_, Some(board)) => Ok(Self::Emulated(board)),
+            _ => Err("native, emulated or emulated:ELF".into()),
+        }
+    }
+}
+
+/// A board that QEMU emulates, by its image; `HAPTERRA_QEMU` may name QEMU.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct EmulatedBoard {
+    /// The image; where none is named, that of `HAPTERRA_MPS2_ELF`.
+    image: Option<PathBuf>,
+}
+
+impl EmulatedBoard {
+    /// The board that a device's name means, if any.
+    fn named(text: &str) -> Option<Self> {
+        match text.strip_prefix("emulated")? {
+            "" => Some(Self::default()),
+            rest => {
+                let image = rest.strip_prefix(':').filter(|image| !image.is_empty())?;
+                let image = Some(image.into());
+                Some(Self { image })
+            }
+        }
+    }
+
+    /// Returns true if the environment names an image.
+    pub(in crate::cli) fn has_image() -> bool {
+        path_in(IMAGE_VARIABLE).is_some()
+    }
+
+    /// Starts the board and connects its two lines.
+    ///
+    /// # Errors
+    /// What is missing, and what to type.
+    pub(in crate::cli) fn start(&self) -> Result<(Emulator, Lines), Failure> {
+        let image = self.image.clone().or_else(|| path_in(IMAGE_VARIABLE));
+        let image = image.ok_or(EmulatorError::NoImage)?;
+        let qemu = path_in(QEMU_VARIABLE).unwrap_or_else(|| QEMU.into());
+        Ok(Emulator::start(&qemu, &image)?)
+    }
+}
+
+/// The path in an environment variable; none where the variable is empty.
+fn path_in(variable: &str) -> Option<PathBuf> {
+    let value = std::env::var_os(variable).filter(|value| !value.is_empty());
+    value.map(PathBuf::from)
+}
+
+/// The device that a command talks to.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Device {
-    /// Device: usb, usb:SERIAL (`hapterra list` shows it), tcp:HOST:PORT, native (the
-    /// application in this program), or
-    /// emulated (the Cortex-M4F board, in QEMU)
+    /// Device: usb, usb:SERIAL, tcp:HOST:PORT, native, emulated or emulated:ELF
+    ///
+    /// usb:SERIAL: `hapterra list` shows it; native: the application in this program; emulated: the
+    /// Cortex-M4F board in QEMU, with the image ELF, else that of HAPTERRA_MPS2_ELF.
     #[arg(long, default_value = "usb")]
     pub device: DeviceChoice,
-
-    /// The emulated board.
-    #[command(flatten)]
-    pub board: EmulatedBoard,
 }
 
 impl Device {
@@ -86,8 +150,8 @@ impl Device {
                 let native = || Native::new(HostClock::default(), Some(Box::new(arm))).restless();
                 converse(open(address.connect(native)?, PATIENCE)?, talk)
             }
-            DeviceChoice::Emulated => {
-                let (_emulator, mut lines) = self.board.start()?;
+            DeviceChoice::Emulated(board) => {
+                let (_emulator, mut lines) = board.start()?;
                 move_arm_while(&mut lines.plant, &mut arm, || {
                     converse(open(Box::new(lines.link), EMULATED_PATIENCE)?, talk)
                 })
@@ -135,7 +199,18 @@ mod tests {
 
     #[test]
     fn devices_by_name() {
-        assert_eq!("emulated".parse(), Ok(DeviceChoice::Emulated));
+        let emulated = |image: Option<&str>| {
+            let image = image.map(Into::into);
+            EmulatedBoard { image }
+        };
+        let usual = DeviceChoice::Emulated(emulated(None));
+        assert_eq!("emulated".parse(), Ok(usual));
+        let named = VirtualDevice::Emulated(emulated(Some("a:b/c.elf")));
+        assert_eq!("emulated:a:b/c.elf".parse(), Ok(named));
+        assert_eq!("native".parse(), Ok(VirtualDevice::Native));
+        for bad in ["usb", "emulated:", "emulatedx", ""] {
+            assert!(bad.parse::<VirtualDevice>().is_err(), "{bad}");
+        }
         assert_eq!(
             "usb".parse(),
             Ok(DeviceChoice::There(DeviceAddress::Usb(None)))
@@ -147,7 +222,6 @@ mod tests {
     fn the_device_in_memory_talks() {
         let device = Device {
             device: DeviceChoice::There(DeviceAddress::Native),
-            board: EmulatedBoard::default(),
         };
         let board = device.talk(|dialogue| Ok(dialogue.device().board.to_string()));
         assert_eq!(board.ok().as_deref(), Some("native"));

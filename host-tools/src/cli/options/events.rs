@@ -6,17 +6,35 @@ use crate::cli::failure::{Failure, OrHint};
 use crate::cli::terminal::voice::tell;
 use crate::events::{Server, Watcher};
 
-/// Whether other programs are told what happens.
+/// Whether events are sent to other programs.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[command(next_help_heading = "While it is touched")]
 pub struct EventOptions {
-    /// Tell what happens in lines of JSON on this port of 127.0.0.1, to any program of this
-    /// machine that connects; 0 takes a free one
-    #[arg(long, value_name = "PORT")]
-    pub events: Option<u16>,
+    /// Send events as lines of JSON at this port of 127.0.0.1
+    ///
+    /// 0 takes a free one. With PORT,N every N-th sample is sent, too, of the thousand that a device reports a second.
+    #[arg(long, value_name = "PORT[,N]", value_parser = events)]
+    pub events: Option<Events>,
+}
 
-    /// Tell every N-th sample, too, of the thousand that a device reports a second
-    #[arg(long, value_name = "N", requires = "events")]
-    pub event_samples: Option<NonZeroU32>,
+/// Where events are sent, and which samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Events {
+    /// The port of 127.0.0.1; 0 takes a free one.
+    port: u16,
+    /// Every N-th sample is sent, too.
+    samples: Option<NonZeroU32>,
+}
+
+fn events(text: &str) -> Result<Events, String> {
+    let (port, samples) = match text.split_once(',') {
+        None => (text, None),
+        Some((port, every)) => (port, Some(every.trim().parse::<NonZeroU32>())),
+    };
+    match (port.trim().parse(), samples.transpose()) {
+        (Ok(port), Ok(samples)) => Ok(Events { port, samples }),
+        _ => Err("a port from 0 to 65535, and with samples PORT,N, as 4100,10".into()),
+    }
 }
 
 impl EventOptions {
@@ -25,11 +43,11 @@ impl EventOptions {
     /// # Errors
     /// A port that is taken.
     pub(in crate::cli) fn listen(&self) -> Result<Option<Server>, Failure> {
-        let Some(port) = self.events else {
+        let Some(Events { port, .. }) = self.events else {
             return Ok(None);
         };
         let server = Server::listen(port)
-            .map_err(|why| format!("events cannot be told on port {port} of 127.0.0.1: {why}"))
+            .map_err(|why| format!("events cannot be sent on port {port} of 127.0.0.1: {why}"))
             .or_hint("name another port with --events, or 0 for any that is free")?;
         tell(format!("events         {}", server.address()));
         Ok(Some(server))
@@ -37,7 +55,7 @@ impl EventOptions {
 
     /// Watches a device, counted from 1.
     pub(in crate::cli) fn watcher(&self, server: &Server, device: usize) -> Watcher {
-        Watcher::new(server.sender(), device).with_samples(self.event_samples)
+        Watcher::new(server.sender(), device).with_samples(self.events.and_then(|it| it.samples))
     }
 }
 
@@ -48,5 +66,27 @@ pub(in crate::cli) fn end(server: Server) {
         tell(format!(
             "events         {dropped} lines were dropped: a reader was too slow"
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn port_and_every_nth_sample() {
+        let samples = None;
+        assert_eq!(
+            events("4100"),
+            Ok(Events {
+                port: 4100,
+                samples
+            })
+        );
+        let samples = NonZeroU32::new(10);
+        assert_eq!(events("0,10"), Ok(Events { port: 0, samples }));
+        for bad in ["", "70000", "-1", "1,0", "1,", "1,2,3", ",5"] {
+            assert!(events(bad).is_err(), "{bad}");
+        }
     }
 }

@@ -1,15 +1,23 @@
-//! How much higher than true to scale a terrain is felt.
+//! How high a terrain is rendered.
 
+use std::fmt;
 use std::str::FromStr;
 
-/// Times that heights are higher than true to scale.
+use crate::place::Heights;
+
+/// The unit of a height in the hand for each vertical unit of the file.
+const MM_PER_UNIT: &str = "mm/unit";
+
+/// How high a terrain is rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exaggeration {
-    /// So many times; below zero upside down. One where nothing is stated, for every
-    /// command.
+    /// This many times higher than true to scale; upside down below zero. One is every command's
+    /// default.
     Times(f64),
-    /// As many as make the relief large enough to be felt: [`crate::place::suited_height`].
+    /// As many times as make the relief large enough: [`crate::place::suited_height`].
     Auto,
+    /// Device millimetres a vertical unit of the file.
+    MmPerUnit(f64),
 }
 
 impl Default for Exaggeration {
@@ -18,14 +26,44 @@ impl Default for Exaggeration {
     }
 }
 
+impl From<Exaggeration> for Heights {
+    fn from(exaggeration: Exaggeration) -> Self {
+        match exaggeration {
+            Exaggeration::Times(times) => Self::Exaggerated(times),
+            Exaggeration::Auto => Self::Suited,
+            Exaggeration::MmPerUnit(height) => Self::MmPerUnit(height),
+        }
+    }
+}
+
 impl FromStr for Exaggeration {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match (text, text.parse::<f64>()) {
-            ("auto", _) => Ok(Self::Auto),
-            (_, Ok(times)) if times.is_finite() => Ok(Self::Times(times)),
-            _ => Err("a number, as 2 or 0.5, or auto".into()),
+        let text = text.trim();
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        let (number, make): (_, fn(f64) -> Self) = match text.strip_suffix(MM_PER_UNIT) {
+            Some(number) => (number.trim_end(), Self::MmPerUnit),
+            None => (text, Self::Times),
+        };
+        let number = number
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite());
+        number.map(make).ok_or_else(|| {
+            "a number, as 2 or 0.5, auto, or millimetres a vertical unit, as 0.05mm/unit".into()
+        })
+    }
+}
+
+impl fmt::Display for Exaggeration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Times(times) => write!(f, "{times}"),
+            Self::Auto => f.write_str("auto"),
+            Self::MmPerUnit(height) => write!(f, "{height}{MM_PER_UNIT}"),
         }
     }
 }
@@ -35,11 +73,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_and_auto() {
-        assert_eq!("auto".parse(), Ok(Exaggeration::Auto));
-        assert_eq!("2.5".parse(), Ok(Exaggeration::Times(2.5)));
-        assert_eq!("-1".parse(), Ok(Exaggeration::Times(-1.0)));
-        for bad in ["much", "inf", "nan", ""] {
+    fn numbers_heights_and_auto() {
+        for (text, wanted) in [
+            ("auto", Exaggeration::Auto),
+            ("2.5", Exaggeration::Times(2.5)),
+            ("-1", Exaggeration::Times(-1.0)),
+            ("0.0485mm/unit", Exaggeration::MmPerUnit(0.0485)),
+            ("-0.5 mm/unit", Exaggeration::MmPerUnit(-0.5)),
+        ] {
+            assert_eq!(text.parse(), Ok(wanted));
+            assert_eq!(wanted.to_string().parse(), Ok(wanted));
+        }
+        for bad in ["much", "inf", "nan", "", "2mm", "nanmm/unit", "mm/unit"] {
             assert!(bad.parse::<Exaggeration>().is_err(), "{bad}");
         }
     }

@@ -1,14 +1,14 @@
-//! Options that several subcommands share: which terrain file, how it feels,
-//! which device, how to start the emulated board.
+//! Options that several subcommands share: which terrain, where and how large, what it feels like, on
+//! which device.
 
 pub mod device;
-pub mod emulated_board;
 pub mod events;
 pub mod exaggeration;
-pub mod materials;
+pub mod input;
 pub mod placing;
-pub mod recorded;
+pub mod quantity;
 pub mod rendering;
+pub mod scale;
 pub mod steering;
+pub mod surface;
 pub mod terrain_file;
-pub mod texture;

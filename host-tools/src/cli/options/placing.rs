@@ -4,56 +4,40 @@
 use hapterra_core::phantom::Calibration;
 
 use super::rendering::Rendering;
+use super::scale::MapScale;
 use crate::cli::failure::Failure;
 use crate::place::{
-    Coordinates, FELT_MM, Reach, Sizing, Target, View, ViewOptions, coordinates_in_words,
-    place_in_words,
+    Coordinates, FELT_MM, Reach, Target, View, ViewOptions, coordinates_in_words, place_in_words,
 };
-use crate::terrain::{Distortion, FeltGrid, Terrain};
+use crate::terrain::{Distortion, FeltCells, FeltGrid, Terrain};
 use heightfield::{Georeference, Raster};
 
 /// Relief in the hand below which an exaggeration is suggested, mm.
 const FLAT_MM: f64 = 4.0;
 
-/// Which part of the terrain, and how large. Nothing said: all of it, laid into the arm's
-/// reach.
+/// Which part of the terrain. Without these options all of it is fitted to the workspace.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Place and scale")]
 pub struct Placing {
-    /// Lay the terrain, or the box, into the reach of the arm: what is done when nothing
-    /// else is said
-    #[arg(long, conflicts_with_all = ["at", "at_lonlat", "ground_m_per_mm", "cell_mm"])]
-    pub fit: bool,
-
-    /// Part of the terrain to lay into the reach: west, south, east and north in the file's
-    /// coordinates (columns and rows from the south-west sample where it has none)
-    #[arg(long, value_name = "W,S,E,N", allow_hyphen_values = true, value_parser = numbers::<4>,
-          conflicts_with_all = ["bbox_lonlat", "at", "at_lonlat", "ground_m_per_mm", "cell_mm"])]
-    pub bbox: Option<[f64; 4]>,
-
-    /// The same by longitude and latitude, degrees (WGS 84; of another body, its own)
-    #[arg(long, value_name = "W,S,E,N", allow_hyphen_values = true, value_parser = numbers::<4>,
-          conflicts_with_all = ["at", "at_lonlat", "ground_m_per_mm", "cell_mm"])]
-    pub bbox_lonlat: Option<[f64; 4]>,
-
-    /// Place under the arm's home position, in the file's coordinates; at 1 mm a felt cell
-    /// unless a scale is stated
+    /// Place under the arm's home position
+    ///
+    /// At 1mm/cell, unless --scale is given.
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = numbers::<2>,
-          conflicts_with = "at_lonlat")]
+          conflicts_with = "bbox")]
     pub at: Option<[f64; 2]>,
 
-    /// The same by longitude and latitude, degrees (WGS 84; of another body, its own)
-    #[arg(long, value_name = "LON,LAT", allow_hyphen_values = true, value_parser = numbers::<2>)]
-    pub at_lonlat: Option<[f64; 2]>,
+    /// Part of the terrain to fit to the arm's workspace
+    #[arg(long, value_name = "W,S,E,N", allow_hyphen_values = true, value_parser = numbers::<4>,
+          conflicts_with = "scale")]
+    pub bbox: Option<[f64; 4]>,
 
-    /// Scale: ground metres a hand millimetre
-    #[arg(
-        long,
-        value_name = "S",
-        allow_negative_numbers = true,
-        conflicts_with = "cell_mm"
-    )]
-    pub ground_m_per_mm: Option<f64>,
+    /// Coordinates of --at and --bbox: file, lonlat or EPSG:N
+    ///
+    /// [default: file] file: x and y of the file's reference system (columns and rows from the south-west sample where
+    /// it has none); lonlat: degrees of WGS 84, on another body its own; EPSG:N: x and y, east before
+    /// north, of that reference system.
+    #[arg(long, value_name = "CRS", value_parser = coordinates)]
+    pub crs: Option<Coordinates>,
 }
 
 /// A grid, and what is asked for of it.
@@ -70,13 +54,11 @@ impl Placing {
     /// No such place.
     pub(in crate::cli) fn of<'r>(
         &self,
-        rendering: &Rendering,
+        (rendering, cells): (&Rendering, FeltCells),
         raster: &'r Raster,
     ) -> Result<Asked<'r>, Failure> {
         let options = self.options(rendering);
-        let grid = options
-            .target
-            .grid(raster, rendering.cells.unwrap_or_default())?;
+        let grid = options.target.grid(raster, cells)?;
         // Whichever arm it will be: of one, all but the reach shows already.
         let tried = View::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options);
         tried
@@ -85,31 +67,16 @@ impl Placing {
     }
 
     fn options(&self, rendering: &Rendering) -> ViewOptions {
-        let (own, lonlat) = (Coordinates::Own, Coordinates::LonLat);
-        let target = match self {
-            Self { at: Some(at), .. } => Target::At(*at, own),
-            Self {
-                at_lonlat: Some(at),
-                ..
-            } => Target::At(*at, lonlat),
-            Self {
-                bbox: Some(sides), ..
-            } => Target::Box(*sides, own),
-            Self {
-                bbox_lonlat: Some(sides),
-                ..
-            } => Target::Box(*sides, lonlat),
-            _ => Target::Whole,
-        };
-        let sizing = match (self.ground_m_per_mm, rendering.cell_mm) {
-            (Some(scale), _) => Sizing::GroundMPerMm(scale),
-            (None, Some(cell_mm)) => Sizing::CellMm(cell_mm),
-            (None, None) => Sizing::Fit,
+        let coordinates = self.crs.unwrap_or(Coordinates::Own);
+        let target = match (self.at, self.bbox) {
+            (Some(at), _) => Target::At(at, coordinates),
+            (None, Some(sides)) => Target::Box(sides, coordinates),
+            (None, None) => Target::Whole,
         };
         ViewOptions {
             target,
-            sizing,
-            heights: rendering.heights(),
+            sizing: MapScale::sizing(rendering.scale),
+            heights: rendering.exaggeration.unwrap_or_default().into(),
             level: rendering.level,
         }
     }
@@ -139,7 +106,7 @@ pub(in crate::cli) fn told(view: &View, terrain: &Terrain<'_>) -> String {
     {
         let (off, place) = (off_in_words(&worst), place_in_words(&file, worst.ground));
         let remedy = match terrain.grid().is_distorted() {
-            true => "--cells square feels them in their true shape",
+            true => "--input cells=square renders them in their true shape",
             false => "pan there, or hold the clutch, and the cells are measured anew",
         };
         text += &format!("shape          {off} where the arm reaches, at {place}; {remedy}\n");
@@ -166,11 +133,11 @@ pub(in crate::cli) fn scale_in_words(view: &View) -> String {
     let (level, cell_mm) = (view.level, short(view.felt_cell_mm()));
     match (view.ground_m_per_mm(), view.felt_cell_m()) {
         (Some(scale), Some(cell_m)) => format!(
-            "{} ground metres a hand millimetre; at level {level} a felt cell is {} m, {cell_mm} mm in the hand",
+            "{} ground metres a device millimetre; at level {level} a haptic cell is {} m, {cell_mm} mm at the device",
             short(scale),
             short(cell_m)
         ),
-        _ => format!("at level {level} a felt cell is {cell_mm} mm in the hand"),
+        _ => format!("at level {level} a haptic cell is {cell_mm} mm at the device"),
     }
 }
 
@@ -217,6 +184,21 @@ pub(in crate::cli) fn short(value: f64) -> String {
     }
 }
 
+/// The coordinates of a place by name.
+fn coordinates(text: &str) -> Result<Coordinates, String> {
+    let code = || {
+        let prefix = text
+            .get(..5)
+            .filter(|it| it.eq_ignore_ascii_case("EPSG:"))?;
+        text[prefix.len()..].parse().ok().map(Coordinates::Epsg)
+    };
+    match text {
+        "file" => Ok(Coordinates::Own),
+        "lonlat" => Ok(Coordinates::LonLat),
+        _ => code().ok_or_else(|| "file, lonlat or EPSG:N, as EPSG:2056".into()),
+    }
+}
+
 /// So many finite numbers between commas.
 fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
     let parsed: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
@@ -229,6 +211,24 @@ fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn coordinates_by_name() {
+        assert_eq!(coordinates("file"), Ok(Coordinates::Own));
+        assert_eq!(coordinates("lonlat"), Ok(Coordinates::LonLat));
+        assert_eq!(coordinates("epsg:2056"), Ok(Coordinates::Epsg(2056)));
+        for bad in [
+            "",
+            "wgs84",
+            "EPSG:",
+            "EPSG:x",
+            "EPSG:70000",
+            "2056",
+            "°°°°°1",
+        ] {
+            assert!(coordinates(bad).is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn numbers_between_commas() {

@@ -21,19 +21,20 @@ use crate::steering::{CommandQueue, Made, Marks, Origin, Put, Steer, Steering, W
 use crate::telemetry::{FeltViews, SampleLog};
 use crate::terrain::Terrain;
 
-/// How the view may be changed while it is touched.
+/// How the placement and the surface may be changed while they are touched.
 #[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "While it is touched")]
 pub struct Commands {
-    /// Change the view by lines of this file while it is touched, or of standard input where
-    /// it is `-`: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `stiffness 0.5`, `friction 0.4`, `damping 2`,
-    /// `shading smooth`, `texture grain 0.1 1`, `clutch on`,
-    /// `clutch off`, `reset`, `mark TEXT`
+    /// File with commands, a line each, or - for standard input
+    ///
+    /// As `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `surface sand`, `stiffness 0.5`, `friction 0.4`,
+    /// `damping 2`, `shading smooth`, `texture grain 0.1 1`, `clutch on`, `clutch off`, `reset`,
+    /// `mark TEXT`.
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub commands: Option<Origin>,
 
-    /// End as after Ctrl-C when standard input ends, because the program that gives commands is
-    /// gone; with `--commands -`
-    #[arg(long, requires = "commands")]
+    /// End as after Ctrl-C when standard input ends; with --commands -
+    #[arg(long, hide_short_help = true)]
     pub end_with_input: bool,
 }
 

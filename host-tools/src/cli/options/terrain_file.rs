@@ -4,27 +4,31 @@
 use std::path::PathBuf;
 
 use clap::ValueHint;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use crate::cli::failure::Failure;
+use super::input::{self, InputSetting};
+use crate::cli::failure::{Failure, OrHint};
 use crate::cli::terminal::waiting::shown_meanwhile;
+use crate::terrain::FeltCells;
 use heightfield::disk_cache::DiskCache;
 use heightfield::shown::shown;
-use heightfield::{
-    CellUnit, Certainty, Encoding, Endian, OpenOptions, PngChannel, Raster, RawLayout, SampleType,
-    files_read_with, metres_in,
-};
+use heightfield::{CellUnit, Certainty, OpenOptions, Raster, files_read_with};
 use heightfield::{file_name, is_url};
 
 /// Where `--help` lists these options.
 const INPUT: &str = "Input";
+/// Environment variable with the folder of the disk cache.
+const FOLDER_VARIABLE: &str = "HAPTERRA_CACHE_DIR";
+/// Environment variable with the size of the disk cache, megabytes.
+const LIMIT_VARIABLE: &str = "HAPTERRA_CACHE_MB";
 
 /// A terrain file, and what the user says about it that it does not say itself.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TerrainFile {
-    /// Terrain file: GeoTIFF, .hgt, .asc, PNG, .flt, .bil, .npy, or raw samples; many as one: a folder
-    /// or a quoted pattern ('tiles/*.tif'); one of these at a URL (https, s3, gs, az), in builds with
-    /// them; or what GDAL reads, where it is installed: VRT, STAC, NetCDF, DTED, archives and more
+    /// Terrain: a file, a folder, a quoted pattern ('tiles/*.tif') or a URL
+    ///
+    /// GeoTIFF, .hgt, .asc, PNG, .flt, .bil, .npy or raw samples; many files as one; one of these at a
+    /// URL (https, s3, gs, az), in builds with URLs; what GDAL reads, if it is installed: VRT, STAC,
+    /// NetCDF, DTED, archives and more.
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
@@ -34,68 +38,29 @@ pub struct TerrainFile {
 }
 
 /// What the user says about a terrain file that it does not say itself.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 pub struct ReadingOptions {
-    /// The file is raw samples, north row first: WIDTHxHEIGHT
-    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = INPUT)]
-    pub raw_size: Option<(u32, u32)>,
+    /// What the file does not state, as no-data=-9999, band=2 or cell=30m
+    ///
+    /// May be repeated. raw=512x400:i16:le: raw samples, north row first, their type and byte order;
+    /// no-data=VALUE: the stored value without a height; band=N: the band with the heights;
+    /// variable=NAME: which raster of several (a NetCDF variable, a file of an archive, a STAC asset);
+    /// cell=30m: side of a cell on the ground, where the file states none; height-unit=m|ft|us-ft or
+    /// metres in a unit; encoding=terrarium|terrain-rgb: how colours are heights; channel=red|green|
+    /// blue|alpha|grey: of a PNG; cells=square|stored: which cells are rendered; in-memory=64MB: a
+    /// larger terrain stays in its file, if its format allows it; gdal:NAME=VALUE: option of the GDAL
+    /// driver.
+    #[arg(long, value_name = "KEY=VALUE", help_heading = INPUT)]
+    pub input: Vec<InputSetting>,
 
-    /// Type of a raw sample
-    #[arg(long, value_parser = one_of(SampleType::ALL, SampleType::name), default_value = "i16", requires = "raw_size", help_heading = INPUT)]
-    pub raw_type: SampleType,
-
-    /// Byte order of a raw sample
-    #[arg(long, value_parser = one_of(Endian::ALL, Endian::name), default_value = "little", requires = "raw_size", help_heading = INPUT)]
-    pub raw_endian: Endian,
-
-    /// Stored value that means no data (replaces what the file says)
-    #[arg(long, allow_negative_numbers = true, value_name = "VALUE", help_heading = INPUT)]
-    pub no_data: Option<f64>,
-
-    /// Band that holds the height, the first being 1
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = INPUT)]
-    pub band: Option<u32>,
-
-    /// Which raster of several holds the height: a NetCDF variable, a file of an archive, a STAC asset
-    #[arg(long, alias = "asset", value_name = "NAME", help_heading = INPUT)]
-    pub variable: Option<String>,
-
-    /// Option of the GDAL driver that opens the file; may be repeated
-    #[arg(long, value_name = "NAME=VALUE", value_parser = parse_open_option, help_heading = INPUT)]
-    pub open_option: Vec<String>,
-
-    /// Side of a cell on the ground in metres, for files that do not state it
-    #[arg(long, value_name = "M", value_parser = parse_side, help_heading = INPUT)]
-    pub ground_cell_m: Option<f64>,
-
-    /// Unit of the heights, for files that do not state it or state it wrongly: m, ft, us-ft,
-    /// or metres in a unit, as 0.01
-    #[arg(long, value_name = "UNIT", value_parser = parse_unit, help_heading = INPUT)]
-    pub vertical_unit: Option<f64>,
-
-    /// How the colours of a picture (PNG, TIFF, WebP by GDAL) encode heights
-    #[arg(long, value_parser = one_of(Encoding::ALL, Encoding::name), conflicts_with = "png_channel", help_heading = INPUT)]
-    pub encoding: Option<Encoding>,
-
-    /// Channel of a PNG that holds the height
-    #[arg(long, value_parser = one_of(PngChannel::ALL, PngChannel::name), value_name = "CHANNEL", help_heading = INPUT)]
-    pub png_channel: Option<PngChannel>,
-
-    /// A terrain whose samples take more megabytes than this stays in its file and is read
-    /// where it is touched, if its format allows it (all but .asc and PNG); many files always do
-    #[arg(long, value_name = "MB", default_value_t = OpenOptions::IN_MEMORY_MB, help_heading = INPUT)]
-    pub in_memory_mb: u32,
-
-    /// Folder for coarse samples and pages of URLs that were read before, and for large strips of a
-    /// TIFF that are unpacked while it is used; it may be deleted at any time. Without it: hapterra
-    /// in the user's folder for caches, as ~/.cache
-    #[arg(long, value_name = "DIR", env = "HAPTERRA_CACHE_DIR", value_hint = ValueHint::DirPath, hide_env_values = true, help_heading = INPUT)]
-    pub cache_dir: Option<PathBuf>,
-
-    /// Megabytes that this folder takes at most, besides what is unpacked; 0 keeps and unpacks nothing
-    /// there
-    #[arg(long, value_name = "MB", env = "HAPTERRA_CACHE_MB", default_value_t = DiskCache::MOST_MB, hide_env_values = true, help_heading = INPUT)]
-    pub cache_mb: u32,
+    /// Folder for what was read before from URLs and large files, or off
+    ///
+    /// [default: hapterra in the user's folder for caches, as ~/.cache] It may be deleted at any time.
+    /// HAPTERRA_CACHE_MB limits its size in megabytes, besides what is unpacked while it is used; 0 is
+    /// off.
+    #[arg(long, value_name = "DIR|off", env = FOLDER_VARIABLE, value_hint = ValueHint::DirPath,
+          hide_env_values = true, hide_short_help = true, help_heading = INPUT)]
+    pub cache: Option<PathBuf>,
 }
 
 impl TerrainFile {
@@ -116,8 +81,9 @@ impl TerrainFile {
     /// # Errors
     /// What is wrong with the file, and what to do next.
     pub(in crate::cli) fn open_without_remarks(&self) -> Result<Raster, Failure> {
+        let options = self.reading.options()?;
         let line = || format!("reading {}", self.name());
-        let raster = shown_meanwhile(line, || Raster::open(&self.file, &self.reading.options()))?;
+        let raster = shown_meanwhile(line, || Raster::open(&self.file, &options))?;
         tracing::info!(format = raster.format(), "read {}", self.name());
         if let Some(line) = assumed_unit(&raster) {
             eprintln!("note: {line}");
@@ -141,47 +107,56 @@ impl TerrainFile {
 }
 
 impl ReadingOptions {
-    /// Where there is no home folder nothing is kept.
-    fn disk_cache(&self) -> DiskCache {
-        let folder = self.cache_dir.clone().or_else(DiskCache::usual_folder);
-        folder.map_or(DiskCache::off(), |folder| {
-            DiskCache::at(&folder, u64::from(self.cache_mb) << 20)
+    /// The cells of the file that are rendered.
+    #[must_use]
+    pub fn cells(&self) -> FeltCells {
+        let mut stated = self.input.iter().filter_map(InputSetting::cells);
+        stated.next().unwrap_or_default()
+    }
+
+    /// Nothing is kept where there is no home folder, or none is wanted.
+    fn disk_cache(&self) -> Result<DiskCache, Failure> {
+        let folder = self.cache.clone().or_else(DiskCache::usual_folder);
+        let folder = folder.filter(|folder| folder.as_os_str() != "off");
+        let limit = std::env::var_os(LIMIT_VARIABLE).filter(|limit| !limit.is_empty());
+        let limit_mb = match limit
+            .as_deref()
+            .map(|limit| limit.to_str().map(str::parse::<u32>))
+        {
+            None => DiskCache::MOST_MB,
+            Some(Some(Ok(limit_mb))) => limit_mb,
+            Some(_) => {
+                return Err(format!("{LIMIT_VARIABLE} is no number of megabytes")).or_hint(
+                    format!("set {LIMIT_VARIABLE} to a whole number, or to nothing"),
+                );
+            }
+        };
+        Ok(folder.map_or(DiskCache::off(), |folder| {
+            DiskCache::at(&folder, u64::from(limit_mb) << 20)
+        }))
+    }
+
+    /// The options for a raster of classes over the terrain: it states all by itself, and shares the
+    /// limits of memory and disk.
+    pub(in crate::cli) fn of_classes(&self) -> Result<OpenOptions, Failure> {
+        let terrain = self.options()?;
+        Ok(OpenOptions {
+            classes: true,
+            most_in_memory_bytes: terrain.most_in_memory_bytes,
+            disk_cache: terrain.disk_cache,
+            ..OpenOptions::default()
         })
     }
 
-    /// How a raster of classes is opened that lies over the terrain: it says all by itself, and
-    /// shares the bounds of memory and disk.
-    pub(in crate::cli) fn of_classes(&self) -> OpenOptions {
-        OpenOptions {
-            classes: true,
-            most_in_memory_bytes: u64::from(self.in_memory_mb) << 20,
-            disk_cache: self.disk_cache(),
-            ..OpenOptions::default()
-        }
-    }
-
-    /// The same for the library.
-    #[must_use]
-    pub fn options(&self) -> OpenOptions {
-        OpenOptions {
-            raw: self.raw_size.map(|(columns, rows)| RawLayout {
-                columns,
-                rows,
-                sample: self.raw_type,
-                endian: self.raw_endian,
-            }),
-            png_channel: self.png_channel,
-            no_data: self.no_data,
-            band: self.band,
-            variable: self.variable.clone(),
-            open_options: self.open_option.clone(),
-            ground_cell_m: self.ground_cell_m,
-            vertical_unit_m: self.vertical_unit,
-            encoding: self.encoding,
-            most_in_memory_bytes: u64::from(self.in_memory_mb) << 20,
-            disk_cache: self.disk_cache(),
-            ..OpenOptions::default()
-        }
+    /// The options of the library.
+    ///
+    /// # Errors
+    /// Two settings that disagree.
+    pub fn options(&self) -> Result<OpenOptions, Failure> {
+        Ok(OpenOptions {
+            disk_cache: self.disk_cache()?,
+            ..input::open_options(&self.input)?
+        })
     }
 }
 
@@ -203,83 +178,11 @@ pub fn assumed_unit(raster: &Raster) -> Option<String> {
                 false => metres.to_string(),
             };
             Some(format!(
-                "{assumed}, but the ground is in units of {metres} m; if the heights are too, they are felt {times:.2} times too steep: --vertical-unit {unit} (or --vertical-unit m)"
+                "{assumed}, but the ground is in units of {metres} m; if the heights are too, they are rendered {times:.2} times too steep: --input height-unit={unit} (or height-unit=m)"
             ))
         }
-        CellUnit::Degree => Some(format!("{assumed} (--vertical-unit ft, if they are feet)")),
-    }
-}
-
-/// Parses one of some values by its name.
-fn one_of<T: Copy + Send + Sync + 'static>(
-    all: &'static [T],
-    name: fn(T) -> &'static str,
-) -> impl TypedValueParser<Value = T> {
-    let names = PossibleValuesParser::new(all.iter().map(|value| name(*value)));
-    names.try_map(move |text| {
-        let named = all.iter().find(|value| name(**value) == text);
-        named.copied().ok_or("not one of the names")
-    })
-}
-
-/// A unit of height in metres.
-fn parse_unit(text: &str) -> Result<f64, String> {
-    let text = text.trim();
-    let metres = metres_in(text).or_else(|| text.parse().ok());
-    metres
-        .filter(|metres| (1e-6..=1e6).contains(metres))
-        .ok_or_else(|| "a unit of height is m, ft, us-ft, or metres in a unit, as 0.01".into())
-}
-
-/// An option of a GDAL driver.
-fn parse_open_option(text: &str) -> Result<String, String> {
-    match text.split_once('=') {
-        Some((name, _)) if !name.is_empty() => Ok(text.to_owned()),
-        _ => Err("an open option is NAME=VALUE, as HONOUR_VALID_RANGE=NO".into()),
-    }
-}
-
-/// A length of the ground in metres.
-fn parse_side(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(side) if (1e-6..=1e7).contains(&side) => Ok(side),
-        _ => Err("a side is a length in metres from 0.000001 to 10000000, as 30".into()),
-    }
-}
-
-/// A size in samples, as `512x400`, or `512` for a square.
-pub(in crate::cli) fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let parts = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
-    match (parts.0.trim().parse(), parts.1.trim().parse()) {
-        (Ok(width), Ok(height)) if width > 0 && height > 0 => Ok((width, height)),
-        _ => Err("a size is WIDTHxHEIGHT in samples, as 512x400".into()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes() {
-        assert_eq!(parse_size("512x400"), Ok((512, 400)));
-        assert_eq!(parse_size("7"), Ok((7, 7)));
-        assert!(parse_size("0x4").is_err());
-        assert!(parse_size("4x").is_err());
-        for (unit, metres) in [
-            ("m", 1.0),
-            ("ft", 0.3048),
-            ("us-ft", 1200.0 / 3937.0),
-            ("0.01", 0.01),
-        ] {
-            assert_eq!(parse_unit(unit), Ok(metres));
-        }
-        for unit in ["", "furlong", "0", "-1", "nan", "inf"] {
-            assert!(parse_unit(unit).is_err(), "{unit}");
-        }
-        assert_eq!(parse_side("0.5"), Ok(0.5));
-        for side in ["0", "-3", "nan", "inf", "1e9", "x"] {
-            assert!(parse_side(side).is_err(), "{side}");
-        }
+        CellUnit::Degree => Some(format!(
+            "{assumed} (--input height-unit=ft, if they are feet)"
+        )),
     }
 }

@@ -2,6 +2,7 @@
 
 use std::net::ToSocketAddrs;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use hapterra_core::phantom::Calibration;
 
@@ -10,7 +11,42 @@ use crate::cli::failure::Failure;
 use crate::cli::met_device::calibration_of;
 use crate::cli::terminal::desk;
 use crate::cli::terminal::speaker::Speaker;
-use crate::link::DeviceAddress;
+use crate::link::{DeviceAddress, tcp_address};
+
+/// A device as the command line names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ServedDevice {
+    address: DeviceAddress,
+    /// The plant line of an emulated board, HOST:PORT.
+    plant: Option<String>,
+}
+
+impl ServedDevice {
+    /// The same, and the board that is the only one now for good.
+    pub(super) fn pinned(self) -> Self {
+        Self {
+            address: self.address.pinned(),
+            ..self
+        }
+    }
+}
+
+impl FromStr for ServedDevice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let Some((address, plant)) = text.split_once("+plant:") else {
+            let (address, plant) = (text.parse()?, None);
+            return Ok(Self { address, plant });
+        };
+        let address = address.parse()?;
+        if address == DeviceAddress::Native {
+            return Err("native moves its arm by itself: leave +plant:HOST:PORT out".into());
+        }
+        let plant = Some(tcp_address(plant)?);
+        Ok(Self { address, plant })
+    }
+}
 
 /// One of the devices, with what belongs to it alone.
 #[derive(Clone)]
@@ -49,47 +85,44 @@ impl OneDevice {
 /// # Errors
 /// One device that is named twice, and what several devices cannot be given.
 pub(super) fn of(args: &Args) -> Result<Vec<OneDevice>, Failure> {
-    let addresses = &args.device;
-    let are_several = addresses.len() > 1;
+    let are_several = args.device.len() > 1;
     if are_several {
         check(args)?;
     }
-    let mut plants = args.plant.iter().cloned();
-    let speakers = Speaker::of_each(addresses);
-    let numbered = addresses.iter().zip(speakers).zip(1..);
-    let devices = numbered.map(|((address, speaker), number)| OneDevice {
-        address: address.clone(),
-        // Of one device it is asked for, whatever the device is.
-        plant: match are_several && *address == DeviceAddress::Native {
-            true => None,
-            false => plants.next(),
-        },
-        record: match (&args.record, are_several) {
+    let speakers = Speaker::of_each(&addresses_of(args));
+    let numbered = args.device.iter().zip(speakers).zip(1..);
+    let devices = numbered.map(|((device, speaker), number)| OneDevice {
+        address: device.address.clone(),
+        plant: device.plant.clone(),
+        record: match (&args.out, are_several) {
             (Some(path), true) => Some(of_device(path, number)),
             (path, _) => path.clone(),
         },
         speaker,
     });
-    let devices = devices.collect();
-    match plants.next() {
-        None => Ok(devices),
-        Some(more) => Err(too_many_plants(&more)),
-    }
+    Ok(devices.collect())
+}
+
+fn addresses_of(args: &Args) -> Vec<DeviceAddress> {
+    let devices = args.device.iter();
+    devices.map(|device| device.address.clone()).collect()
 }
 
 /// What several devices cannot be given.
 fn check(args: &Args) -> Result<(), Failure> {
-    let (addresses, count) = (&args.device, args.device.len());
+    let count = args.device.len();
     if count > desk::MOST {
         let error = format!("{count} devices; at most {} can be served", desk::MOST);
         return Err(Failure::new(error).hint("serve the others by another `hapterra run`"));
     }
-    apart(addresses)?;
+    apart(&addresses_of(args))?;
     plants_apart(args)?;
     if args.viewing.view {
-        return Err(Failure::new(format!("--view shows one device, and not {count}")).hint(
-            "leave --view out, record with --record, and look at each recording with `hapterra view`",
-        ));
+        return Err(
+            Failure::new(format!("--view shows one device, and not {count}")).hint(
+                "leave --view out, record with -o, and look at each recording with `hapterra view`",
+            ),
+        );
     }
     if args.commands.are_typed() && std::io::IsTerminal::is_terminal(&std::io::stdin()) {
         let error = "with several devices `--commands -` takes no lines from a terminal, whose Enter arms an arm";
@@ -161,33 +194,28 @@ fn is_same_socket(first: &str, second: &str) -> bool {
 
 /// Checks that each device that is not native has a plant line of its own, or none has one.
 fn plants_apart(args: &Args) -> Result<(), Failure> {
-    let plants = &args.plant;
+    let plants: Vec<_> = { args.device.iter() }
+        .filter_map(|device| device.plant.as_ref())
+        .collect();
     for (index, plant) in plants.iter().enumerate() {
-        if plants
-            .iter()
-            .take(index)
-            .any(|other| is_same_socket(other, plant))
-        {
+        let mut before = plants.iter().take(index);
+        if before.any(|other| is_same_socket(other, plant)) {
             return Err(same_plant(plant));
         }
     }
-    let others = args.device.iter().filter(|d| **d != DeviceAddress::Native);
+    let is_other = |device: &&ServedDevice| device.address != DeviceAddress::Native;
+    let others = args.device.iter().filter(is_other);
     let (others, count) = (others.count(), plants.len());
     if count == 0 || count == others {
         return Ok(());
     }
-    let error = format!("--plant is given {count} times for {others} devices that are not native");
-    Err(Failure::new(error).hint("give --plant once for each of them, in their order, and serve real arms by another `hapterra run`"))
+    let error = format!("{count} of {others} devices that are not native have a plant line");
+    Err(Failure::new(error).hint("name it with each of them, as tcp:HOST:PORT+plant:HOST:PORT, and serve real arms by another `hapterra run`"))
 }
 
 fn same_plant(plant: &str) -> Failure {
     let error = format!("two devices have the plant line tcp:{plant}");
     Failure::new(error).hint("give each emulated board a plant line of its own")
-}
-
-fn too_many_plants(plant: &str) -> Failure {
-    let error = format!("there is no device for the plant line tcp:{plant}");
-    Failure::new(error).hint("name the board of each --plant with --device")
 }
 
 /// Where the recording of a device goes, as `felt-2.csv` for `felt.csv`.

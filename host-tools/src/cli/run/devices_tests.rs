@@ -30,7 +30,7 @@ fn refused(more: &str) -> String {
 #[test]
 fn one_device_has_the_files_name_and_its_lines_have_none() {
     for more in ["", "--device native", "--device usb"] {
-        let [only] = &devices(&format!("{more} --record felt.csv"))[..] else {
+        let [only] = &devices(&format!("{more} --out felt.csv"))[..] else {
             panic!("{more}");
         };
         assert_eq!(only.record.as_deref(), Some(Path::new("felt.csv")));
@@ -41,7 +41,7 @@ fn one_device_has_the_files_name_and_its_lines_have_none() {
 #[test]
 fn each_of_several_devices_has_its_number_its_name_and_its_recording() {
     let devices = devices(
-        "--device native --device usb:7 --device native --device tcp:h:1 --record out/felt.x.csv",
+        "--device native --device usb:7 --device native --device tcp:h:1 --out out/felt.x.csv",
     );
     let names: Vec<_> = devices.iter().map(|device| device.speaker.name()).collect();
     let expected = ["[1 native]", "[2 usb:7]", "[3 native]", "[4 tcp:h:1]"];
@@ -85,27 +85,25 @@ fn a_device_that_is_named_twice_is_refused_also_by_two_names() {
 }
 
 #[test]
-fn plants_belong_to_the_devices_that_are_not_native_in_their_order() {
-    let boards = "--device tcp:h:1 --device native --device tcp:h:2";
-    let of = |more: &str| -> Vec<_> {
-        let devices = devices(&format!("{boards} {more}"));
+fn plant_line_is_part_of_an_emulated_boards_name() {
+    let plants = |more: &str| -> Vec<_> {
+        let devices = devices(more);
         devices.into_iter().map(|device| device.plant).collect()
     };
-    assert_eq!(of(""), [None, None, None]);
-    let plants = of("--plant tcp:h:3 --plant tcp:h:4");
-    assert_eq!(plants, [Some("h:3".into()), None, Some("h:4".into())]);
-    for (plants, says) in [
-        ("--plant tcp:h:3", "--plant is given 1 times for 2 devices"),
-        ("--plant tcp:h:3 --plant tcp:h:3", "two devices have"),
+    assert_eq!(plants("--device tcp:h:1"), [None]);
+    let (one, other) = ("--device tcp:h:1+plant:h:3", "--device tcp:h:2");
+    let both = plants(&format!("{one} --device native {other}+plant:h:4"));
+    assert_eq!(both, [Some("h:3".into()), None, Some("h:4".into())]);
+    for (more, says) in [
+        (format!("{one} {other}"), "1 of 2 devices"),
+        (format!("{one} {other}+plant:h:3"), "two devices have"),
     ] {
-        let told = refused(&format!("{boards} {plants}"));
+        let told = refused(&more);
         assert!(told.contains(says) && told.contains("hint: "), "{told}");
     }
-    let told = refused("--device tcp:h:1 --plant tcp:h:3 --plant tcp:h:4");
-    assert!(
-        told.contains("no device for the plant line tcp:h:4"),
-        "{told}"
-    );
+    for bad in ["native+plant:h:3", "tcp:h:1+plant:h", "tcp:h:1+plant:"] {
+        assert!(bad.parse::<ServedDevice>().is_err(), "{bad}");
+    }
 }
 
 #[test]

@@ -30,7 +30,7 @@ use crate::place::Laid;
 use crate::replay::settings::Device;
 use crate::replay::{Column, LoopColumns, Recording, Rule, Settings};
 use crate::serving::{Service, told_of_last_end};
-use crate::stability::limits;
+use crate::stability;
 use crate::steering::CommandQueue;
 use heightfield::without_key;
 
@@ -108,7 +108,7 @@ impl<'t> Serving<'_, 't> {
         }
         let materials = placed.terrain.grid().materials();
         let table = materials.map(Materials::table);
-        limits::warn_of(&placed.scene.law, table, &hello);
+        stability::warn_of(&placed.scene.law, table, &hello);
         let recording = described(self.recording, args, placed, &hello);
         let laid = Laid {
             view: placed.view,
@@ -221,7 +221,7 @@ fn service<'s, 't: 's>(
             false => Arming::default(),
         },
         patience: Patience {
-            silence_s: args.silence_s,
+            silence_s: args.silence,
             ..Patience::REAL_TIME
         },
         connect: Box::new(move || connect(args, device, placed)),

@@ -77,7 +77,7 @@ impl<'t> Watch<'t> {
         };
         Self {
             log: SampleLog::new(placed.terrain, device),
-            stop_s: args.seconds.unwrap_or(f64::MAX).min(script_s),
+            stop_s: args.duration.unwrap_or(f64::MAX).min(script_s),
             ticked: placed.tour.as_ref().map(|_| Instant::now()),
             latest: None,
             recording,

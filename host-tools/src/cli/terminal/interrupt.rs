@@ -46,7 +46,7 @@ thread_local! {
 }
 
 /// Listens from now on.
-pub(in crate::cli) fn listen() {
+pub fn listen() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| match handle(on_signal) {
         Ok(()) => {
@@ -176,7 +176,7 @@ fn may_be_armed() -> MutexGuard<'static, BTreeSet<String>> {
 
 /// Whether an end was asked for.
 #[must_use]
-pub(in crate::cli) fn requested() -> bool {
+pub fn requested() -> bool {
     let requested = REQUESTED.load(Ordering::Relaxed);
     if requested && let Some(address) = SERVES.take() {
         guardian::report(&News::Leaving(address));

@@ -6,7 +6,7 @@ use crate::output::left_behind;
 
 /// Says on standard error what killed commands left of these files, and how to keep it.
 /// Nothing else in this program touches what is left.
-pub(in crate::cli) fn tell<'p>(files: impl IntoIterator<Item = &'p Path>) {
+pub fn tell<'p>(files: impl IntoIterator<Item = &'p Path>) {
     for line in files.into_iter().flat_map(lines) {
         eprintln!("{line}");
     }

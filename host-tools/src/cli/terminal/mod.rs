@@ -4,10 +4,10 @@
 
 pub(super) mod arming_prompts;
 pub(super) mod desk;
-pub(super) mod interrupt;
+pub mod interrupt;
 pub(super) mod keyboard;
-pub(super) mod left_behind;
-pub(super) mod progress;
+pub mod left_behind;
+pub mod progress;
 pub(super) mod questions;
 pub(super) mod raw_keys;
 pub(super) mod speaker;

@@ -4,7 +4,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 /// A bar over `length` steps, or a spinner where nobody knows how many there
 /// are, drawn as the template says.
-pub(in crate::cli) fn bar(length: Option<u64>, template: &str) -> ProgressBar {
+#[must_use]
+pub fn bar(length: Option<u64>, template: &str) -> ProgressBar {
     let bar = length.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
     match ProgressStyle::with_template(template) {
         Ok(style) => bar.with_style(style),

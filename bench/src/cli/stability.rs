@@ -1,0 +1,193 @@
+//! `hapterra-lab stability`: how stiff a surface may be before it is unstable.
+
+use std::path::PathBuf;
+
+use clap::ValueHint;
+use hapterra::cli::options::surface::{SurfaceChoice, SurfaceOptions, choice};
+use hapterra::cli::terminal::{interrupt, left_behind, progress};
+use hapterra::cli::{Failure, OrHint as _, report};
+use hapterra::output::{Output, OutputError};
+use hapterra_core::force::{Controller, Damping};
+use hapterra_core::rate::TickRate;
+
+use crate::stability::map::{Map, Plan};
+use crate::stability::picture;
+
+const OTHER_FILE: &str = "name another file with --out";
+const OTHER_PICTURE: &str = "name another file with --picture";
+
+/// Arguments of `hapterra-lab stability`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Tick rates, Hz: whole kilohertz from 1000 to 10000
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', default_value = "1000,2000,4000,10000", value_parser = parse_rate)]
+    pub rate: Vec<TickRate>,
+
+    /// Stiffnesses, N/mm
+    #[arg(long, value_name = "N_PER_MM,…", value_delimiter = ',', default_value = "0.1,0.2,0.5,1,1.5,2,2.5,3,4,6,8,12,20", value_parser = parse_stiffness)]
+    pub stiffness: Vec<f64>,
+
+    /// Dampings of the surface, N·s/m
+    #[arg(long, value_name = "NS_PER_M,…", value_delimiter = ',', default_value = "0", value_parser = parse_damping)]
+    pub damping: Vec<Damping>,
+
+    /// Surface whose micro-relief is tried: sand, rock, or a FILE.toml [default: none]
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, value_parser = choice())]
+    pub surface: Option<SurfaceChoice>,
+
+    /// Whether the passivity controller acts
+    #[arg(
+        long,
+        value_name = "off|on,…",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "off,on"
+    )]
+    pub passivity: Vec<Passivity>,
+
+    /// Microseconds from reading the encoders to the amplifiers; 200 is what a nucleo-g474re
+    /// may take, and 1130 is more than a nucleo-h743zi2 with duty cycles takes
+    #[arg(long, value_name = "US", default_value_t = 200, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub delay_us: u32,
+
+    /// Friction of the arm's joints, as parts of the model's
+    #[arg(long, value_name = "PART,…", value_delimiter = ',', default_value = "0.1,1", value_parser = parse_part)]
+    pub arm_friction: Vec<f64>,
+
+    /// File for every trial, as CSV
+    #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub out: Option<PathBuf>,
+
+    /// File for a picture of it, as PNG
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub picture: Option<PathBuf>,
+}
+
+/// Whether the passivity controller acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum Passivity {
+    /// It does not
+    Off,
+    /// It does
+    On,
+}
+
+/// Tries all of it and says the limits.
+///
+/// # Errors
+/// When it is interrupted, or a file cannot be written.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let of_surface = SurfaceOptions {
+        surface: args.surface.clone(),
+        ..SurfaceOptions::default()
+    };
+    let mut plan = Plan {
+        rates: args.rate.clone(),
+        stiffness_n_per_mm: args.stiffness.clone(),
+        dampings: dampings(args),
+        texture: of_surface.load()?.law.texture,
+        delay_s: 1e-6 * f64::from(args.delay_us),
+        arm_frictions: args.arm_friction.clone(),
+    };
+    plan.rates.sort_by_key(|rate| rate.hz());
+    plan.rates.dedup();
+    plan.stiffness_n_per_mm.sort_by(f64::total_cmp);
+    plan.stiffness_n_per_mm.dedup();
+    plan.arm_frictions.sort_by(f64::total_cmp);
+    plan.arm_frictions.dedup();
+    if args.out.is_some() && args.out == args.picture {
+        return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
+    }
+    left_behind::tell(
+        { args.out.iter() }
+            .chain(&args.picture)
+            .map(PathBuf::as_path),
+    );
+    // A place that cannot be written to is said before the trials.
+    if let Some(path) = &args.picture {
+        drop(Output::create(path).or_hint(OTHER_PICTURE)?);
+    }
+    let csv = args
+        .out
+        .as_deref()
+        .map(Output::create)
+        .transpose()
+        .or_hint(OTHER_FILE)?;
+    let progress = progress::bar(Some(0), "{bar:30} {pos}/{len} trials, {eta} left");
+    interrupt::listen();
+    let map = plan.map(&|of| {
+        progress.set_length(of as u64);
+        progress.inc(1);
+        !interrupt::requested()
+    });
+    progress.finish_and_clear();
+    let map = map.map_err(|error| Failure::new(error.to_string()))?;
+    let map = map.ok_or_else(|| Failure::new("interrupted: no limits are said"))?;
+    report::put(&map.summary())?;
+    if let Some(csv) = csv {
+        write(csv, &map).or_hint(OTHER_FILE)?;
+    }
+    if let Some(path) = &args.picture {
+        let drawn = picture::draw(&map).and_then(|canvas| canvas.save(path));
+        drawn.or_hint(OTHER_PICTURE)?;
+    }
+    Ok(())
+}
+
+/// Every damping with every controller that is asked for.
+fn dampings(args: &Args) -> Vec<Damping> {
+    let mut values = args.damping.clone();
+    values.sort_by(|a, b| a.ns_per_m.total_cmp(&b.ns_per_m));
+    values.dedup();
+    let mut controllers = args.passivity.clone();
+    controllers.sort();
+    controllers.dedup();
+    let with_each = |damping: Damping| {
+        let controllers = controllers.iter().map(|passivity| match passivity {
+            Passivity::Off => Controller::Off,
+            Passivity::On => Controller::On,
+        });
+        let dampings = controllers.map(move |controller| Damping {
+            controller,
+            ..damping
+        });
+        dampings.collect::<Vec<_>>()
+    };
+    values.into_iter().flat_map(with_each).collect()
+}
+
+fn write(mut csv: Output, map: &Map) -> Result<(), OutputError> {
+    let written = map.write_csv(&mut csv);
+    written.map_err(|source| OutputError {
+        path: csv.path().to_owned(),
+        source,
+    })?;
+    csv.finish()
+}
+
+fn parse_rate(text: &str) -> Result<TickRate, String> {
+    let rate = text.trim().parse().ok().and_then(TickRate::new);
+    rate.ok_or_else(|| "expected whole kilohertz from 1000 to 10000 Hz".to_owned())
+}
+
+fn parse_stiffness(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok();
+    let number = number.filter(|number| (0.001..=100.0).contains(number));
+    number.ok_or_else(|| "expected 0.001 to 100 N/mm".to_owned())
+}
+
+fn parse_part(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok();
+    let number = number.filter(|number| (0.0..=10.0).contains(number));
+    number.ok_or_else(|| "expected 0 to 10 times the model's friction".to_owned())
+}
+
+fn parse_damping(text: &str) -> Result<Damping, String> {
+    let number = text.trim().parse::<f32>().ok();
+    let damping = number.map(|ns_per_m| Damping {
+        ns_per_m,
+        ..Damping::NONE
+    });
+    let most = Damping::MOST_NS_PER_M;
+    { damping.filter(Damping::is_valid) }.ok_or_else(|| format!("expected 0 to {most} N·s/m"))
+}

@@ -1,0 +1,91 @@
+//! `hapterra-lab streaming`: what terrain larger than memory costs.
+
+use hapterra::cli::Failure;
+
+use super::files::{self, Files, spinner};
+use crate::report;
+use crate::streaming::{self, Plan};
+
+/// Arguments of `hapterra-lab streaming`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// What is measured, and written.
+    #[command(flatten)]
+    pub files: Files,
+
+    /// Sizes of the synthetic terrains as powers of ten, from 6 to 10
+    #[arg(long, value_name = "LIST", value_delimiter = ',',
+          default_values_t = [6, 7, 8, 9, 10], value_parser = clap::value_parser!(u32).range(6..=10))]
+    pub sizes: Vec<u32>,
+
+    /// Latencies of a web server, ms; 0 is a file on disk [default: 0,20,50,100,200, or 0 without
+    /// the feature remote]
+    #[arg(long, value_name = "LIST", value_delimiter = ',',
+          value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub latencies: Vec<u32>,
+
+    /// What a process of its own measures
+    #[arg(long, hide = true)]
+    pub case: Option<String>,
+}
+
+/// Measures, and prints a line for each row as soon as it is measured.
+///
+/// # Errors
+/// What cannot be measured or written.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(case) = &args.case {
+        return streaming::measure_case(case).map_err(Failure::new);
+    }
+    super::warn_without_optimisation();
+    let plan = plan(args)?;
+    let waiting = spinner();
+    let mut rows: Vec<streaming::Row> = vec![];
+    waiting.suspend(|| println!("{}", report::streaming_head()));
+    let measured = streaming::measure(
+        &plan,
+        &args.files.files,
+        &mut |what| waiting.set_message(what.to_owned()),
+        &mut |why| waiting.suspend(|| eprintln!("warning: not measured: {why}")),
+        &mut |row| {
+            waiting.suspend(|| println!("{}", report::streaming(&row)));
+            rows.push(row);
+        },
+    );
+    waiting.finish_and_clear();
+    let room = "free some room where temporary files are, or name another place in TMPDIR";
+    measured.map_err(|why| Failure::new(why).hint(room))?;
+    if rows.is_empty() {
+        let hint = "the warnings above say why; name other files, or leave --files-only out";
+        return Err(Failure::new("nothing was measured").hint(hint));
+    }
+    files::write(args.files.out.as_ref(), |file| {
+        report::write_streaming(file, &rows)
+    })?;
+    files::write(args.files.picture.as_ref(), |file| {
+        report::draw_streaming(&rows, file)
+    })
+}
+
+fn plan(args: &Args) -> Result<Plan, Failure> {
+    let has_server = cfg!(feature = "remote");
+    let latencies_ms = match (args.latencies.is_empty(), has_server) {
+        (false, _) => args.latencies.clone(),
+        (true, true) => streaming::LATENCIES_MS.to_vec(),
+        (true, false) => vec![0],
+    };
+    if !has_server && latencies_ms.iter().any(|latency| *latency > 0) {
+        let text = "this build has no web server, so latencies cannot be measured";
+        let hint = "cargo run --release -p hapterra-lab --features remote -- streaming";
+        return Err(Failure::new(text).hint(hint));
+    }
+    Ok(Plan {
+        exponents: match args.files.files_only {
+            true => vec![],
+            false => args.sizes.clone(),
+        },
+        latencies_ms,
+        halvings: if args.files.quick { 4 } else { 6 },
+        stands_while_reading: args.files.quick,
+    })
+}

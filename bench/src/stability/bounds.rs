@@ -1,0 +1,53 @@
+//! Stiffness that theory says is passive, whoever holds the arm.
+
+use hapterra_core::rate::TickRate;
+
+use super::contact_loop::HOME;
+use hapterra::phantom::kinematics::jacobian;
+use hapterra::phantom::{PhantomModel, Placement};
+
+/// Properties of the arm at the tip, up and down, in the home pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtTip {
+    /// Viscous friction, N·s/m.
+    pub damping_ns_per_m: f64,
+    /// Coulomb friction, N.
+    pub coulomb_n: f64,
+    /// The tip's displacement for one count of the encoder that moves it most, mm.
+    pub count_mm: f64,
+}
+
+impl AtTip {
+    /// Of a model.
+    #[must_use]
+    pub fn new(model: &PhantomModel) -> Self {
+        let Placement { home_mm } = HOME;
+        let joints = HOME.joints_at(model, home_mm).unwrap_or_default();
+        let up = jacobian(model, joints)[2];
+        // The joint that moves the tip up and down; the others hardly do in this pose.
+        let most = (0..3).max_by(|a, b| up[*a].abs().total_cmp(&up[*b].abs()));
+        let joint = most.unwrap_or_default();
+        let lever_m = up[joint].abs();
+        let drive = &model.drive[joint];
+        let count_rad = std::f64::consts::TAU / (drive.ratio * drive.counts_per_rev);
+        Self {
+            damping_ns_per_m: model.viscous_nms_per_rad[joint] / (lever_m * lever_m),
+            coulomb_n: model.coulomb_nm[joint] / lever_m,
+            count_mm: 1e3 * lever_m * count_rad,
+        }
+    }
+
+    /// Colgate and Schenkel 1997: a virtual wall is passive up to 2b/T, N/mm, where the arm's
+    /// own damping is all that there is.
+    #[must_use]
+    pub fn by_damping(&self, rate: TickRate) -> f64 {
+        1e-3 * 2.0 * self.damping_ns_per_m * f64::from(rate.hz())
+    }
+
+    /// Abbott and Okamura 2005: the friction takes up what an encoder's counts create up to
+    /// 2·fc/Δ, N/mm; with it the wall is passive up to the smaller of both bounds.
+    #[must_use]
+    pub fn by_friction(&self) -> f64 {
+        2.0 * self.coulomb_n / self.count_mm
+    }
+}

@@ -1,0 +1,235 @@
+//! A press while force comes in: in the ramp after arming, and while the clutch closes.
+//!
+//! The hand presses with 1 N from the first moment with force on, for ten seconds after it is in.
+//! Two figures judge it, both of the true tip and the true torques:
+//!
+//! - the *swing*: how far the tip goes back in while the surface becomes stiffer, which pushes it
+//!   out, and how far it moves from then on;
+//! - the *energy given*: the work of the surface, more than a spring does that becomes stiffer
+//!   by the same share.
+
+use hapterra_core::force::ForceLaw;
+use hapterra_core::guard::{Limits, WORKING_SHARE};
+
+use super::contact_loop::{CELL_MM, HOME, PLANE_MM, Step};
+use super::trial::Setting;
+use hapterra::phantom::{HeldPhantom, OutOfReach, Script};
+
+/// The press, N.
+const PRESS_N: f64 = 1.0;
+/// How fast the hand begins to press, mm/s.
+const BEGIN_MM_S: f64 = 60.0;
+/// The tip begins so far above the surface, mm.
+const ABOVE_MM: f64 = 0.2;
+/// How long force takes to come in: in the ramp, and while the clutch closes, s.
+const RAMP_S: f64 = 2.0;
+const CLOSING_S: f64 = 0.5;
+/// How long is looked at after that, s.
+const AFTER_S: f64 = 10.0;
+/// Swings are looked for from so long after the hand has begun to press with all of it on, s.
+const SETTLES_S: f64 = 0.25;
+/// The guard's clamp, N.
+const CLAMP_N: f64 = (WORKING_SHARE * ForceLaw::PREMIUM.max_force_n) as f64;
+/// And in so long a time each, s.
+const WINDOW_S: f64 = 0.25;
+
+/// Which way force comes in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// The ramp after arming.
+    Ramp,
+    /// The clutch closes.
+    Clutch,
+}
+
+/// What a press did while force came in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entered {
+    /// The largest swing from half of the force on, mm.
+    pub swing_mm: f64,
+    /// The most energy that had been given at any moment, mJ.
+    pub given_mj: f64,
+}
+
+impl Entered {
+    /// Most that the tip may swing, mm, and most energy that may be given, mJ.
+    pub const MOST_SWING_MM: f64 = 0.3;
+    /// See [`Self::MOST_SWING_MM`].
+    pub const MOST_GIVEN_MJ: f64 = 0.05;
+
+    /// Whether force came in well.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.swing_mm <= Self::MOST_SWING_MM && self.given_mj <= Self::MOST_GIVEN_MJ
+    }
+}
+
+impl Setting {
+    /// A press from the first moment on in which force comes in; none where the guard switched the
+    /// force off.
+    ///
+    /// # Errors
+    /// [`OutOfReach`] where the hand would have to leave the arm's reach.
+    pub fn enters(self, entry: Entry) -> Result<Option<Entered>, OutOfReach> {
+        let [east, north, _] = HOME.home_mm;
+        let wall_mm = PRESS_N / self.stiffness_n_per_mm;
+        let give_mm = 1e3 * PRESS_N * self.grasp.hand().give_m_per_n();
+        let pressed = PLANE_MM - wall_mm - give_mm;
+        let begin = Script::start([east, north, PLANE_MM + ABOVE_MM]);
+        let press = |script: Script, up_mm: f64| script.go([east, north, up_mm], BEGIN_MM_S);
+        let (arm, clutch_s, in_s) = match entry {
+            Entry::Ramp => {
+                let script = press(begin, pressed).wait(RAMP_S + AFTER_S);
+                let arm = self.arm(script)?.arming_for(HeldPhantom::RAMPS_S);
+                (arm, None, RAMP_S)
+            }
+            Entry::Clutch => {
+                let script = press(begin, pressed).wait(1.0);
+                let held_s = script.duration_s();
+                let script = press(script.wait(0.5), pressed - give_mm);
+                let arm = self.arm(script.wait(CLOSING_S + AFTER_S))?;
+                (arm, Some([held_s, held_s + 0.5]), CLOSING_S)
+            }
+        };
+        let rests_s = arm.script_s() - AFTER_S - in_s + SETTLES_S;
+        let mut judge = Judge::new(&self, entry, rests_s);
+        let mut is_tripped = false;
+        self.run_with_clutch(arm, clutch_s, &mut |t_s, step| {
+            judge.look(t_s, step);
+            is_tripped = step.sample.fault.is_some();
+            !is_tripped
+        });
+        Ok((!is_tripped).then_some(judge.seen))
+    }
+}
+
+/// Watches a press.
+struct Judge {
+    entry: Entry,
+    stiffness_n_per_mm: f64,
+    tick_s: f64,
+    /// Ticks since force began to come in, less those by which it acts late.
+    ticks: f64,
+    /// Share of the force, and where the surface is, mm.
+    share: f64,
+    plane_mm: f64,
+    has_begun: bool,
+    /// Energy given, mJ.
+    excess_mj: f64,
+    stored_mj: Option<f64>,
+    /// The hand has pressed for a while, s.
+    rests_s: f64,
+    block: Block,
+    seen: Entered,
+}
+
+impl Judge {
+    fn new(setting: &Setting, entry: Entry, rests_s: f64) -> Self {
+        Self {
+            entry,
+            stiffness_n_per_mm: setting.stiffness_n_per_mm,
+            tick_s: 1.0 / f64::from(setting.rate.hz()),
+            ticks: -setting.late_s() * f64::from(setting.rate.hz()),
+            share: 0.0,
+            plane_mm: PLANE_MM,
+            has_begun: false,
+            excess_mj: 0.0,
+            stored_mj: None,
+            rests_s,
+            block: Block::EMPTY,
+            seen: Entered {
+                swing_mm: 0.0,
+                given_mj: 0.0,
+            },
+        }
+    }
+
+    fn look(&mut self, t_s: f64, step: &Step) {
+        self.follow(step);
+        if !self.has_begun {
+            return;
+        }
+        let depth_mm = (self.plane_mm - step.tip_mm[2]).max(0.0);
+        let stretched_n = self.stiffness_n_per_mm * depth_mm;
+        // The guard clamps after the clutch's share, and before that of the ramp.
+        let most_n = match self.entry {
+            Entry::Ramp => CLAMP_N,
+            Entry::Clutch => f64::from(ForceLaw::PREMIUM.max_force_n).min(CLAMP_N / self.share),
+        };
+        let spring_n = stretched_n.min(most_n);
+        // Beyond the clamp the force stays as it is.
+        let stored_mj = spring_n * (stretched_n - 0.5 * spring_n) / self.stiffness_n_per_mm;
+        // What a stiffer spring holds more at the same depth is meant to be given.
+        let more_mj = self.stored_mj.map_or(0.0, |before| stored_mj - before);
+        self.stored_mj = Some(stored_mj);
+        self.excess_mj += step.given_mj + self.share * more_mj;
+        self.seen.given_mj = self.seen.given_mj.max(self.excess_mj);
+        if self.share > 0.5 && t_s > self.rests_s {
+            let swing_mm = self.block.swing_mm(step.tip_mm, self.share < 1.0);
+            self.seen.swing_mm = self.seen.swing_mm.max(swing_mm);
+            if f64::from(self.block.ticks) * self.tick_s >= WINDOW_S {
+                self.block = Block::EMPTY;
+            }
+        }
+    }
+
+    /// Moves share and surface on.
+    fn follow(&mut self, step: &Step) {
+        let sample = &step.sample;
+        let over_s = match self.entry {
+            Entry::Ramp => {
+                if sample.limits.contains(Limits::RAMPING) && !self.has_begun {
+                    // The first tick's force has the first step of the share.
+                    (self.has_begun, self.ticks) = (true, self.ticks + 1.0);
+                }
+                RAMP_S
+            }
+            Entry::Clutch => {
+                if sample.limits.contains(Limits::CLUTCH_OPEN) {
+                    // The surface goes with the tip.
+                    let hip_mm = f64::from(sample.hip.cell()[2]) + f64::from(sample.hip.frac().z);
+                    self.plane_mm = PLANE_MM + step.read_up_mm - CELL_MM * hip_mm;
+                    self.has_begun = true;
+                    return;
+                }
+                CLOSING_S
+            }
+        };
+        if self.has_begun {
+            self.share = (self.ticks * self.tick_s / over_s).clamp(0.0, 1.0);
+            self.ticks += 1.0;
+        }
+    }
+}
+
+/// The places of the tip in a quarter of a second.
+struct Block {
+    ticks: u32,
+    low_mm: [f64; 3],
+    high_mm: [f64; 3],
+    /// How far it went back in.
+    fell_mm: f64,
+}
+
+impl Block {
+    const EMPTY: Self = Self {
+        ticks: 0,
+        low_mm: [f64::INFINITY; 3],
+        high_mm: [f64::NEG_INFINITY; 3],
+        fell_mm: 0.0,
+    };
+
+    /// Takes a place; the swing so far, which for a surface that becomes stiffer is no motion
+    /// outwards.
+    fn swing_mm(&mut self, tip_mm: [f64; 3], becomes_stiffer: bool) -> f64 {
+        self.ticks += 1;
+        let bounds = self.low_mm.iter_mut().zip(&mut self.high_mm);
+        for ((low, high), at) in bounds.zip(tip_mm) {
+            (*low, *high) = (low.min(at), high.max(at));
+        }
+        self.fell_mm = self.fell_mm.max(self.high_mm[2] - tip_mm[2]);
+        let [east, north, up] = [0, 1, 2].map(|axis| self.high_mm[axis] - self.low_mm[axis]);
+        let up = if becomes_stiffer { self.fell_mm } else { up };
+        east.max(north).max(up)
+    }
+}

@@ -1,0 +1,55 @@
+//! How a hand holds the tip.
+
+use hapterra::phantom::HandModel;
+
+/// A grasp, from the loosest to the tightest.
+///
+/// Identification studies give 10 to 1,000 N/m and 0.5 to 5 N·s/m towards the target for
+/// fingers on a stylus, wrists more; limp and firm are a stated choice at the ends of that,
+/// and normal is [`HandModel::default`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grasp {
+    /// Two fingertips that hardly hold: what hums first.
+    Limp,
+    /// A relaxed precision grip.
+    Normal,
+    /// A fist around the stylus.
+    Firm,
+}
+
+impl Grasp {
+    /// All, from the loosest to the tightest.
+    pub const ALL: [Self; 3] = [Self::Limp, Self::Normal, Self::Firm];
+
+    /// Its name, in tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Limp => "limp",
+            Self::Normal => "normal",
+            Self::Firm => "firm",
+        }
+    }
+
+    /// What the hand is made of.
+    #[must_use]
+    pub fn hand(self) -> HandModel {
+        match self {
+            Self::Limp => HandModel {
+                mass_kg: 0.05,
+                arm_n_per_m: 30.0,
+                arm_ns_per_m: 0.5,
+                grip_n_per_m: 200.0,
+                grip_ns_per_m: 0.5,
+            },
+            Self::Normal => HandModel::default(),
+            Self::Firm => HandModel {
+                mass_kg: 0.3,
+                arm_n_per_m: 1000.0,
+                arm_ns_per_m: 20.0,
+                grip_n_per_m: 5000.0,
+                grip_ns_per_m: 20.0,
+            },
+        }
+    }
+}

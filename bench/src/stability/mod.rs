@@ -1,0 +1,29 @@
+//! How stiff a surface may be before the hand feels the ticks: the tick of the boards in a
+//! closed loop with a virtual Premium 1.5 and a person's hand, over stiffness, tick rate and
+//! grasp.
+//!
+//! - [`grasp`]: how the hand holds the tip;
+//! - `contact_loop`: the tick and the arm, step by step;
+//! - `surface_work`: the energy that the surface gives;
+//! - [`tap`]: taps at a stated speed;
+//! - [`trial`]: what a press and taps show: hum, and energy that the surface gave;
+//! - [`entry`]: presses while force comes in;
+//! - [`bounds`]: stiffness that theory says is passive;
+//! - [`map`]: many trials, and the table of them;
+//! - [`picture`]: the table as a picture.
+//!
+//! Friction of the surface is left out: a hand that is held back hums less. What the trials found is
+//! what `hapterra run` warns by: [`hapterra::stability`].
+
+pub mod bounds;
+mod contact_loop;
+pub mod entry;
+pub mod grasp;
+pub mod map;
+pub mod picture;
+mod surface_work;
+pub mod tap;
+pub mod trial;
+
+#[cfg(test)]
+mod tests;

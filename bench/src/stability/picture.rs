@@ -1,0 +1,138 @@
+//! The table as a picture: what the surface gives in a tap, by stiffness, a chart a rate; and
+//! how the press was.
+
+use plotters::coord::combinators::IntoLogRange;
+use plotters::drawing::IntoDrawingArea;
+use plotters::element::{Circle, Cross};
+use plotters::style::{Color, RGBColor};
+use plotters_backend::text_anchor::HPos;
+
+use super::grasp::Grasp;
+use super::map::{self, Column, Map};
+use super::tap::TAP_SPEEDS_M_S;
+use super::trial::{Trial, Verdict};
+use hapterra::picture::axes::{self, Area, Titles};
+use hapterra::picture::style::{self, INK, SERIES, SOFT_INK, px, stroke};
+use hapterra::picture::{Canvas, PictureError, line};
+
+const WIDTH_PX: i32 = 1600;
+const HEADER_PX: i32 = 110;
+const CHART_PX: i32 = 420;
+const MARGIN_PX: i32 = 30;
+/// What is drawn of given energy, mJ: what is smaller or larger lies on the edge.
+const GIVEN_MJ: std::ops::Range<f64> = 0.01..100.0;
+/// The speed of the taps that are drawn: the place in [`TAP_SPEEDS_M_S`].
+const DRAWN: usize = 1;
+const COLOURS: [RGBColor; 3] = [SERIES[1], SERIES[0], SERIES[2]];
+
+/// Draws it.
+///
+/// # Errors
+/// As `plotters`.
+pub fn draw(map: &Map) -> Result<Canvas, PictureError> {
+    // A row a rate, a column a damping; of a single damping, the rates in two columns.
+    let columns = map.columns();
+    let across = match columns.len() / map.rates().len() {
+        1 => 2,
+        dampings => dampings,
+    };
+    let rows = columns.len().div_ceil(across) as i32;
+    let across = across as i32;
+    let height = HEADER_PX + rows * CHART_PX + MARGIN_PX;
+    let mut canvas = Canvas::new(WIDTH_PX as u16, height as u16);
+    let sheet = canvas.pen().into_drawing_area();
+    let part = |x: i32, y: i32, width: i32, height: i32| {
+        sheet
+            .clone()
+            .shrink((px(x), px(y)), (px(width), px(height)))
+    };
+    header(&part(MARGIN_PX, 0, WIDTH_PX - 2 * MARGIN_PX, HEADER_PX))?;
+    let width = (WIDTH_PX - (across + 1) * MARGIN_PX) / across;
+    for (i, column) in (0..).zip(columns) {
+        let (left, top) = (
+            MARGIN_PX + (i % across) * (width + MARGIN_PX),
+            HEADER_PX + i / across * CHART_PX,
+        );
+        let area = part(left, top, width, CHART_PX - MARGIN_PX / 2);
+        chart(&area, map, column)?;
+    }
+    drop(sheet);
+    Ok(canvas)
+}
+
+fn header(area: &Area<'_>) -> Result<(), PictureError> {
+    let (title, text) = (style::bold(32, &INK), style::text(20, &SOFT_INK));
+    let name = "How stiff a surface may be: energy that it gives to a tapping hand";
+    axes::write(area, name, (0, px(34)), title, HPos::Left)?;
+    let lines = format!(
+        "taps at {} m/s; dot: a press with 1 N is still, ring: it hums, cross: unstable; grey: 2b/T (Colgate & Schenkel) and 2fc/Δ (Abbott & Okamura) of the arm alone",
+        TAP_SPEEDS_M_S[DRAWN]
+    );
+    axes::write(area, &lines, (0, px(68)), text, HPos::Left)?;
+    let mut left = 0;
+    for (grasp, colour) in Grasp::ALL.iter().zip(&COLOURS) {
+        let style = style::bold(20, colour);
+        let name = format!("{} grasp", grasp.name());
+        axes::write(area, &name, (left, px(94)), style.clone(), HPos::Left)?;
+        left += area.estimate_text_size(&name, &style)?.0 as i32 + px(24);
+    }
+    Ok(())
+}
+
+fn chart(
+    area: &Area<'_>,
+    map: &Map,
+    column @ (rate, damping, part): Column,
+) -> Result<(), PictureError> {
+    let all = map
+        .trials
+        .iter()
+        .map(|trial| trial.setting.stiffness_n_per_mm);
+    let (low, high) = all.fold((f64::INFINITY, 0.0_f64), |(low, high), stiffness| {
+        (low.min(stiffness), high.max(stiffness))
+    });
+    let range = 0.8 * low..1.25 * high;
+    let named = map::name(damping);
+    let x = format!(
+        "stiffness (N/mm) at {} Hz, {}, {part} of the arm's friction",
+        rate.hz(),
+        named.trim_end_matches(':')
+    );
+    let titles = Titles {
+        x: &x,
+        y: "given in a tap (mJ)",
+    };
+    let mut chart = axes::chart(
+        area,
+        range.clone().log_scale(),
+        GIVEN_MJ.log_scale(),
+        titles,
+    )?;
+    for bound in [map.at_tip.by_damping(rate), map.at_tip.by_friction()] {
+        if range.contains(&bound) {
+            let upright = vec![(bound, GIVEN_MJ.start), (bound, GIVEN_MJ.end)];
+            line::draw(&mut chart, &[upright], stroke(&SOFT_INK, 1.2))?;
+        }
+    }
+    for (grasp, colour) in Grasp::ALL.into_iter().zip(COLOURS) {
+        let points: Vec<_> = map.of(column, grasp).map(place).collect();
+        line::draw(&mut chart, &[points], stroke(&colour, 2.0))?;
+        for trial in map.of(column, grasp) {
+            let at = place(trial);
+            let (ring, dot) = (stroke(&colour, 2.0), colour.filled());
+            match trial.press.verdict(map.at_tip.count_mm) {
+                Verdict::Still => drop(chart.draw_series([Circle::new(at, px(4), dot)])?),
+                Verdict::Hum => drop(chart.draw_series([Circle::new(at, px(6), ring)])?),
+                Verdict::Unstable => drop(chart.draw_series([Cross::new(at, px(7), ring)])?),
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A trial in the chart; where the guard switched the force off, at the top.
+fn place(trial: &Trial) -> (f64, f64) {
+    let given_mj = trial.taps[DRAWN].map_or(GIVEN_MJ.end, |taps| taps.given_mj);
+    let given_mj = given_mj.clamp(GIVEN_MJ.start, GIVEN_MJ.end);
+    (trial.setting.stiffness_n_per_mm, given_mj)
+}

@@ -1,0 +1,102 @@
+//! The energy that a surface gives to the arm: the work of what the motors really make.
+
+use hapterra::phantom::{Amplifier, HeldPhantom, MAX_SUBSTEP_S, PhantomModel};
+
+/// The surface's part of the motors' torques. It follows its part of the commands with the
+/// lag of the amplifiers' current loops, as the whole does.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SurfaceWork {
+    of_surface: [Amplifier; 3],
+}
+
+impl SurfaceWork {
+    /// On an arm without currents.
+    pub(super) fn new(model: &PhantomModel) -> Self {
+        Self {
+            of_surface: model.drive.map(Amplifier::new),
+        }
+    }
+
+    /// Moves the arm for a time with these commands, of which the surface's part is
+    /// `of_surface_a`; gives the work of that part, mJ.
+    ///
+    /// The steps are those of the plant's own integration, with the torque in the middle of
+    /// each: so the sum is as exact as the motion.
+    pub(super) fn step(
+        &mut self,
+        currents_a: [f64; 3],
+        of_surface_a: [f64; 3],
+        for_s: f64,
+        arm: &mut HeldPhantom,
+    ) -> f64 {
+        for (amplifier, current_a) in self.of_surface.iter_mut().zip(of_surface_a) {
+            amplifier.command(current_a);
+        }
+        let steps = (for_s / MAX_SUBSTEP_S - 1e-9).ceil().max(1.0);
+        let step_s = for_s / steps;
+        let mut given_j = 0.0;
+        for _ in 0..steps as u32 {
+            let from_rad = arm.plant().q_rad();
+            arm.step(currents_a, step_s);
+            let to_rad = arm.plant().q_rad();
+            for (joint, amplifier) in self.of_surface.iter_mut().enumerate() {
+                amplifier.advance(0.5 * step_s);
+                given_j += amplifier.torque_nm() * (to_rad[joint] - from_rad[joint]);
+                amplifier.advance(0.5 * step_s);
+            }
+        }
+        1e3 * given_j
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stability::contact_loop::HOME;
+    use hapterra::phantom::{HandModel, Placement, Script};
+
+    #[test]
+    fn an_arm_that_is_only_driven_gets_the_work_as_energy_of_motion() {
+        // Without friction and weight, and with a hand that does not hold it.
+        let model = PhantomModel {
+            gravity_m_s2: 0.0,
+            coulomb_nm: [0.0; 3],
+            viscous_nms_per_rad: [0.0; 3],
+            ..PhantomModel::premium_1_5()
+        };
+        let hand = HandModel {
+            mass_kg: 1.0,
+            arm_n_per_m: 0.0,
+            arm_ns_per_m: 0.0,
+            grip_n_per_m: 0.0,
+            grip_ns_per_m: 0.0,
+        };
+        let Placement { home_mm } = HOME;
+        let script = Script::start(home_mm).wait(1.0);
+        let mut arm = HeldPhantom::new(model, hand, HOME, script).expect("in reach");
+        let mut work = SurfaceWork::new(&model);
+        // Of all three currents, changed before the current loops have settled.
+        let mut given_mj = 0.0;
+        for tick in 0..40 {
+            let current_a = if tick % 2 == 0 { 1.0 } else { -0.2 };
+            let currents_a = [0.5 * current_a, current_a, -current_a];
+            given_mj += work.step(currents_a, currents_a, 0.3e-3, &mut arm);
+        }
+        let plant = arm.plant();
+        let energy_j = |of: &hapterra::phantom::Plant| {
+            hapterra::phantom::Dynamics::new(model).energy_j(of.q_rad(), of.rate_rad_s())
+        };
+        let moves_mj = 1e3 * energy_j(plant);
+        assert!(moves_mj > 1.0, "{moves_mj} mJ");
+        assert!(
+            (given_mj / moves_mj - 1.0).abs() < 1e-3,
+            "{given_mj} and {moves_mj} mJ"
+        );
+        // Only what is the surface's counts.
+        let mut other = HeldPhantom::new(model, hand, HOME, Script::start(home_mm).wait(1.0));
+        let other = other.as_mut().expect("in reach");
+        let none = SurfaceWork::new(&model).step([1.0; 3], [0.0; 3], 5e-3, other);
+        assert_eq!(none, 0.0);
+        assert!(energy_j(other.plant()) > 1e-4);
+    }
+}

@@ -1,0 +1,400 @@
+//! What is known of a spring that is felt in ticks, beside what the trials say.
+
+use hapterra_core::force::{Controller, Damping, Pattern, Texture};
+use hapterra_core::rate::TickRate;
+use hapterra_firmware::amplifier::CURRENT_LOOP_US;
+
+use super::bounds::AtTip;
+use super::entry::Entry;
+use super::grasp::Grasp;
+use super::map::Plan;
+use super::tap::{TAP_SPEEDS_M_S, Taps};
+use super::trial::{Press, Setting, Trial, Verdict};
+use hapterra::phantom::PhantomModel;
+use hapterra::stability::{
+    ENTERS_LATE_N_PER_MM, ENTERS_N_PER_MM, LEFT_LATE_WITH_TEXTURE, LEFT_WITH_TEXTURE, LONG_US,
+    SHORT_US, STILL_LATE_N_PER_MM, STILL_N_PER_MM,
+};
+
+const UNDAMPED: Damping = Damping {
+    ns_per_m: 0.0,
+    controller: Controller::Off,
+};
+
+/// From the encoders to the amplifiers, at the latencies that were tried, s.
+const SHORT_S: f64 = 1e-6 * (SHORT_US - CURRENT_LOOP_US) as f64;
+const LONG_S: f64 = 1e-6 * (LONG_US - CURRENT_LOOP_US) as f64;
+
+const CONTROLLED: Damping = Damping {
+    controller: Controller::On,
+    ..UNDAMPED
+};
+
+fn tried(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp) -> Trial {
+    tried_damped(hz, stiffness_n_per_mm, grasp, 0.0, UNDAMPED)
+}
+
+fn tried_damped(
+    hz: u32,
+    stiffness_n_per_mm: f64,
+    grasp: Grasp,
+    delay_s: f64,
+    damping: Damping,
+) -> Trial {
+    tried_on(
+        Texture::NONE,
+        hz,
+        stiffness_n_per_mm,
+        grasp,
+        delay_s,
+        damping,
+    )
+}
+
+fn tried_on(
+    texture: Texture,
+    hz: u32,
+    stiffness_n_per_mm: f64,
+    grasp: Grasp,
+    delay_s: f64,
+    damping: Damping,
+) -> Trial {
+    let setting = Setting {
+        texture,
+        ..set(hz, stiffness_n_per_mm, grasp, delay_s, damping)
+    };
+    setting.tried().expect("in reach")
+}
+
+fn set(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp, delay_s: f64, damping: Damping) -> Setting {
+    Setting {
+        rate: TickRate::new(hz).expect("a rate"),
+        stiffness_n_per_mm,
+        damping,
+        texture: Texture::NONE,
+        grasp,
+        delay_s,
+        arm_friction: 1.0,
+    }
+}
+
+/// What taps at a speed showed.
+fn tapped(setting: Setting, speed_m_s: f64) -> Taps {
+    let taps = setting.taps(speed_m_s).expect("in reach");
+    taps.expect("it is held")
+}
+
+fn verdict(trial: &Trial) -> Verdict {
+    let arm = AtTip::new(&PhantomModel::premium_1_5());
+    trial.press.verdict(arm.count_mm)
+}
+
+#[test]
+fn the_arm_at_its_tip_is_what_its_data_say() {
+    let arm = AtTip::new(&PhantomModel::premium_1_5());
+    // The upper link of 209.55 mm lifts the tip, geared 11.2 to 1 to 4,096 counts a turn.
+    let (lever_m, counts) = (0.209_55, 11.2 * 4096.0);
+    let count_mm = 1e3 * lever_m * std::f64::consts::TAU / counts;
+    assert!((arm.count_mm - count_mm).abs() < 1e-9, "{arm:?}");
+    assert!((arm.coulomb_n - 0.01 / lever_m).abs() < 1e-9, "{arm:?}");
+    let damping = 0.0005 / (lever_m * lever_m);
+    assert!((arm.damping_ns_per_m - damping).abs() < 1e-9, "{arm:?}");
+    let bound = 2.0 * (0.01 / lever_m) / count_mm;
+    assert!((arm.by_friction() - bound).abs() < 1e-9);
+    let two_khz = TickRate::new(2000).expect("a rate");
+    assert!((arm.by_damping(two_khz) - 1e-3 * 2.0 * damping / 0.0005).abs() < 1e-9);
+}
+
+#[test]
+fn a_soft_surface_is_still_in_every_hand_and_a_stiff_one_shakes_a_limp_one_until_it_ticks_faster() {
+    for grasp in Grasp::ALL {
+        let soft = tried(1000, 0.5, grasp);
+        assert_eq!(verdict(&soft), Verdict::Still, "{soft:?}");
+        // It was touched: an arm that is not armed is still, too.
+        let is_felt = { soft.taps.iter() }.all(|taps| taps.is_some_and(|taps| taps.given_mj > 0.0));
+        assert!(is_felt, "{soft:?}");
+    }
+    let shaken = tried(1000, 6.0, Grasp::Limp);
+    assert_eq!(verdict(&shaken), Verdict::Unstable, "{shaken:?}");
+    let Press::Held { swings_hz, .. } = shaken.press else {
+        panic!("{shaken:?}")
+    };
+    assert!((2.0..200.0).contains(&swings_hz), "{swings_hz}");
+    let faster = tried(4000, 6.0, Grasp::Limp);
+    assert_eq!(verdict(&faster), Verdict::Still, "{faster:?}");
+}
+
+/// The lag of the arm's current loops, s.
+const LAG_S: f64 = 0.238e-3 / 2.18;
+
+#[test]
+fn a_tap_touches_the_surface_at_the_speed_that_it_is_called_by() {
+    for grasp in Grasp::ALL {
+        // A limp hand is held back by the arm's friction at rest, now more and now less.
+        let off = match grasp {
+            Grasp::Limp => 0.05,
+            Grasp::Normal | Grasp::Firm => 0.015,
+        };
+        for (hz, stiffness) in [(1000, 0.5), (1000, 2.0), (10_000, 1.0)] {
+            for speed_m_s in TAP_SPEEDS_M_S {
+                let setting = set(hz, stiffness, grasp, 80e-6, CONTROLLED);
+                let Taps { touched_m_s, .. } = tapped(setting, speed_m_s);
+                assert!(
+                    touched_m_s
+                        .iter()
+                        .all(|touched| (touched / speed_m_s - 1.0).abs() < off),
+                    "{}, {hz} Hz, {stiffness} N/mm, {speed_m_s} m/s: {touched_m_s:?} m/s",
+                    grasp.name()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_tap_gives_is_what_the_age_of_the_force_says() {
+    // The force of a tick is half a tick old on average, and as much older as it gets to the
+    // amplifiers late and the current loops lag. In proportion to that it is too little on the
+    // way in and too much on the way out.
+    let given = |hz: u32, delay_s| {
+        let age_s = 0.5 / f64::from(hz) + delay_s + LAG_S;
+        let given_mj = tapped(set(hz, 1.0, Grasp::Normal, delay_s, UNDAMPED), 0.2).given_mj;
+        assert!(given_mj > 0.05, "{given_mj} mJ");
+        given_mj / age_s
+    };
+    let once = given(1000, 0.0);
+    for (hz, delay_s) in [
+        (4000, 0.0),
+        (10_000, 0.0),
+        (1000, 0.5e-3),
+        (4000, 0.5e-3),
+        (2000, 0.2e-3),
+        (4000, 1e-3),
+    ] {
+        let share = given(hz, delay_s) / once;
+        assert!((share - 1.0).abs() < 0.15, "{hz} Hz, {delay_s} s: {share}");
+    }
+}
+
+#[test]
+fn with_the_controller_a_tap_gives_nothing_and_a_stiffer_surface_is_still() {
+    // The last two of these lines ask for more than 1,000 N/s.
+    for (hz, stiffness, delay_s, speeds) in [
+        (1000, 0.5, 80e-6, &TAP_SPEEDS_M_S[..]),
+        (4000, 1.0, 80e-6, &TAP_SPEEDS_M_S[..]),
+        (10_000, 0.5, 80e-6, &TAP_SPEEDS_M_S[..]),
+        (1000, 1.0, 1e-3, &TAP_SPEEDS_M_S[..]),
+        (1000, 4.0, 80e-6, &TAP_SPEEDS_M_S[1..]),
+        (4000, 3.0, 80e-6, &TAP_SPEEDS_M_S[2..]),
+    ] {
+        for grasp in Grasp::ALL {
+            for speed_m_s in speeds {
+                let setting = set(hz, stiffness, grasp, delay_s, CONTROLLED);
+                let given_mj = tapped(setting, *speed_m_s).given_mj;
+                assert!(
+                    given_mj < 1e-3,
+                    "{}, {hz} Hz, {stiffness} N/mm, {delay_s} s, {speed_m_s} m/s: {given_mj} mJ",
+                    grasp.name()
+                );
+            }
+        }
+    }
+    let stiff = tried_damped(1000, 6.0, Grasp::Limp, 80e-6, CONTROLLED);
+    assert_eq!(verdict(&stiff), Verdict::Still, "{stiff:?}");
+}
+
+#[test]
+fn what_is_said_before_a_surface_is_felt_is_what_the_trials_show() {
+    // The next stiffness of the command's own list is held still no more.
+    let next = |still: f32| match still {
+        1.0 => 1.5,
+        1.5 => 2.0,
+        2.0 => 2.5,
+        2.5 => 3.0,
+        3.0 => 4.0,
+        4.0 => 6.0,
+        6.0 => 8.0,
+        _ => 12.0,
+    };
+    let count_mm = AtTip::new(&PhantomModel::premium_1_5()).count_mm;
+    for (table, delay_s) in [(STILL_N_PER_MM, SHORT_S), (STILL_LATE_N_PER_MM, LONG_S)] {
+        for (hz, without, with) in table {
+            for (still, damping) in [(without, UNDAMPED), (with, CONTROLLED)] {
+                let at = |stiffness| {
+                    let press = set(hz, stiffness, Grasp::Limp, delay_s, damping).press();
+                    press.expect("in reach").verdict(count_mm)
+                };
+                let name = format!("{hz} Hz, {delay_s} s, {still} N/mm");
+                assert_eq!(at(still.into()), Verdict::Still, "{name}");
+                assert_ne!(at(next(still)), Verdict::Still, "above {name}");
+            }
+        }
+    }
+}
+
+/// The highest and steepest grain there is, on which a limp hand is rocked most of all that
+/// were tried.
+#[test]
+fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
+    let texture = Texture {
+        pattern: Pattern::Grain,
+        amplitude_mm: Texture::MOST_AMPLITUDE_MM,
+        wavelength_mm: Texture::MOST_AMPLITUDE_MM / Texture::STEEPEST,
+        ..Texture::NONE
+    };
+    assert!(texture.is_valid());
+    let at = |hz, stiffness, delay_s, damping| {
+        let trial = tried_on(texture, hz, stiffness, Grasp::Limp, delay_s, damping);
+        verdict(&trial)
+    };
+    for (table, left, delay_s) in [
+        (STILL_N_PER_MM, LEFT_WITH_TEXTURE, SHORT_S),
+        (STILL_LATE_N_PER_MM, LEFT_LATE_WITH_TEXTURE, LONG_S),
+    ] {
+        for (hz, without, with) in table {
+            for (still, damping) in [(without, UNDAMPED), (with, CONTROLLED)] {
+                let share = f64::from(left * still);
+                assert_eq!(
+                    at(hz, share, delay_s, damping),
+                    Verdict::Still,
+                    "{hz} Hz, {delay_s} s, {share} N/mm"
+                );
+            }
+        }
+    }
+    // What an even surface bears is too much here: a hand that slides sideways is rocked.
+    let (hz, without, _) = STILL_N_PER_MM[0];
+    let whole = at(hz, without.into(), SHORT_S, UNDAMPED);
+    assert_eq!(whole, Verdict::Unstable);
+}
+
+#[test]
+fn damping_takes_from_what_a_tap_gives() {
+    let damped = Damping {
+        ns_per_m: 2.0,
+        ..UNDAMPED
+    };
+    let given = |damping| tapped(set(1000, 1.0, Grasp::Normal, 80e-6, damping), 0.2).given_mj;
+    let (with, without) = (given(damped), given(UNDAMPED));
+    assert!(with < without, "{with} and {without} mJ");
+}
+
+#[test]
+fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
+    let plan = Plan {
+        rates: vec![TickRate::DEFAULT],
+        stiffness_n_per_mm: vec![0.5, 6.0],
+        dampings: vec![UNDAMPED],
+        texture: Texture::NONE,
+        delay_s: 80e-6,
+        arm_frictions: vec![1.0],
+    };
+    let map = plan.map(&|of| of == 6).expect("in reach").expect("whole");
+    let mut csv = Vec::new();
+    map.write_csv(&mut csv).expect("written");
+    let csv = String::from_utf8(csv).expect("text");
+    let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 1 + 6);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
+    let begins: Vec<_> = rows[1..].iter().map(|row| row[..5].join(",")).collect();
+    let wanted = Grasp::ALL.map(|grasp| {
+        ["0.5", "6"].map(|stiffness| format!("1000,0.0,false,{},{stiffness}", grasp.name()))
+    });
+    assert_eq!(begins, wanted.concat());
+    let limit = |grasp| map.up_to((TickRate::DEFAULT, UNDAMPED, 1.0), grasp, Verdict::Hum);
+    assert_eq!(
+        (limit(Grasp::Limp), limit(Grasp::Firm)),
+        (Some(0.5), Some(6.0))
+    );
+    let none = plan.map(&|_| false).expect("in reach");
+    assert!(none.is_none(), "interrupted");
+}
+
+/// Stiffnesses that are tried while force comes in, N/mm.
+const ENTERED_N_PER_MM: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 4.0];
+
+/// Holds every stiffness, in the ramp and while the clutch closes, to a table: ticks a second, and up
+/// to which stiffness force comes in well in the ramp, and through the clutch, N/mm.
+fn enters_up_to(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
+    for (hz, ramp, clutch) in table {
+        for stiffness in ENTERED_N_PER_MM {
+            for (entry, up_to) in [(Entry::Ramp, ramp), (Entry::Clutch, clutch)] {
+                let setting = Setting {
+                    arm_friction,
+                    ..set(hz, stiffness, Grasp::Limp, delay_s, CONTROLLED)
+                };
+                let entered = setting.enters(entry).expect("in reach").expect("no fault");
+                assert_eq!(
+                    entered.is_good(),
+                    stiffness <= up_to,
+                    "{hz} Hz, {delay_s} s, {stiffness} N/mm, {entry:?}: {entered:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn force_comes_in_without_swing_or_energy() {
+    let all = |hz| (hz, 4.0, 4.0);
+    enters_up_to(1.0, SHORT_S, [1000, 2000, 4000, 10_000].map(all));
+}
+
+#[test]
+fn force_comes_in_a_millisecond_late() {
+    let all = |hz| (hz, 4.0, 4.0);
+    enters_up_to(1.0, LONG_S, [1000, 2000, 4000, 10_000].map(all));
+}
+
+#[test]
+fn force_comes_in_on_a_tenth_of_the_friction() {
+    let little = [
+        (1000, 2.0, 1.0),
+        (2000, 2.0, 2.0),
+        (4000, 3.0, 2.0),
+        (10_000, 3.0, 2.0),
+    ];
+    enters_up_to(0.1, SHORT_S, little);
+    let late = [
+        (1000, 1.0, 1.0),
+        (2000, 1.0, 1.0),
+        (4000, 1.0, 1.0),
+        (10_000, 1.0, 0.5),
+    ];
+    enters_up_to(0.1, LONG_S, late);
+    for (table, said) in [(little, ENTERS_N_PER_MM), (late, ENTERS_LATE_N_PER_MM)] {
+        for ((hz, ramp, clutch), (of_hz, n_per_mm)) in table.into_iter().zip(said) {
+            assert_eq!((hz, ramp.min(clutch)), (of_hz, f64::from(n_per_mm)));
+        }
+    }
+}
+
+/// Beyond the limits in energy, no swing is above 0.3 mm on a board with converters.
+#[test]
+fn little_friction_makes_small_swings_only() {
+    for hz in [1000, 10_000] {
+        for entry in [Entry::Ramp, Entry::Clutch] {
+            let setting = Setting {
+                arm_friction: 0.1,
+                ..set(hz, 4.0, Grasp::Limp, SHORT_S, CONTROLLED)
+            };
+            let entered = setting.enters(entry).expect("in reach").expect("no fault");
+            assert!(entered.swing_mm < 0.16, "{hz} Hz, {entry:?}: {entered:?}");
+        }
+    }
+}
+
+#[test]
+fn without_the_controller_the_tip_swings() {
+    let setting = Setting {
+        arm_friction: 0.1,
+        ..set(1000, 3.0, Grasp::Limp, 0.1e-3, UNDAMPED)
+    };
+    for entry in [Entry::Ramp, Entry::Clutch] {
+        let entered = setting.enters(entry).expect("in reach").expect("no fault");
+        assert!(
+            entered.swing_mm > 3.0 && entered.given_mj > 100.0,
+            "{entered:?}"
+        );
+    }
+}

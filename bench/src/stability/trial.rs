@@ -1,0 +1,236 @@
+//! One stiffness in one hand at one tick rate: a press, and [taps](super::tap).
+
+use hapterra_core::force::{Damping, Texture};
+use hapterra_core::guard::Fault;
+use hapterra_core::rate::TickRate;
+
+use super::contact_loop::{self, Felt, HOME, PLANE_MM};
+use super::entry::{Entered, Entry};
+use super::grasp::Grasp;
+use super::map::Column;
+use super::tap::{TAP_SPEEDS_M_S, Taps};
+use hapterra::phantom::{HeldPhantom, OutOfReach, PhantomModel, Script, Touch};
+
+/// The press, N, and how long it is held; what is looked at is its last second.
+const PRESS_N: f64 = 1.0;
+const HELD_S: f64 = 2.5;
+const LOOKED_AT_S: f64 = 1.0;
+/// The tip swings by more than this, mm: no hand holds it.
+const UNSTABLE_MM: f64 = 1.0;
+
+/// What is tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// How often the loop ticks.
+    pub rate: TickRate,
+    /// The surface's stiffness, N/mm.
+    pub stiffness_n_per_mm: f64,
+    /// Its damping, and whether the passivity controller acts.
+    pub damping: Damping,
+    /// Its micro-relief.
+    pub texture: Texture,
+    /// Who holds the tip.
+    pub grasp: Grasp,
+    /// From reading the encoders to the amplifiers, s.
+    pub delay_s: f64,
+    /// Friction of the arm's joints, as a part of the model's.
+    pub arm_friction: f64,
+}
+
+/// What a press did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Press {
+    /// The tip swung by so much and so often in the last second: eastward, northward or up,
+    /// whichever is most.
+    Held {
+        /// From end to end, mm.
+        swing_mm: f64,
+        /// Swings a second.
+        swings_hz: f64,
+    },
+    /// The guard switched the force off.
+    Tripped(Fault),
+}
+
+/// What a trial showed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trial {
+    /// What was tried.
+    pub setting: Setting,
+    /// The press.
+    pub press: Press,
+    /// Taps at each of [`TAP_SPEEDS_M_S`]; none where the guard switched the force off.
+    pub taps: [Option<Taps>; 3],
+    /// A press from the beginning of the ramp on, and one from the closing of the clutch on;
+    /// none where the guard switched the force off.
+    pub entries: [Option<Entered>; 2],
+}
+
+/// What the hand feels of a press.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verdict {
+    /// The tip swings by no more than an encoder count.
+    Still,
+    /// It swings: a hum.
+    Hum,
+    /// It swings by more than a millimetre, or the guard has switched the force off.
+    Unstable,
+}
+
+impl Verdict {
+    /// Its name, in tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Still => "still",
+            Self::Hum => "hum",
+            Self::Unstable => "unstable",
+        }
+    }
+}
+
+impl Press {
+    /// What the hand feels, where an encoder count is so much of the tip's way, mm.
+    #[must_use]
+    pub fn verdict(&self, count_mm: f64) -> Verdict {
+        match *self {
+            Self::Held { swing_mm, .. } if swing_mm <= count_mm => Verdict::Still,
+            Self::Held { swing_mm, .. } if swing_mm <= UNSTABLE_MM => Verdict::Hum,
+            Self::Held { .. } | Self::Tripped(_) => Verdict::Unstable,
+        }
+    }
+}
+
+impl Setting {
+    /// From the beginning of a tick until its force acts: the delay, and the lag of the
+    /// amplifiers' current loops, s.
+    pub(super) fn late_s(self) -> f64 {
+        self.delay_s + PhantomModel::premium_1_5().drive[0].motor.current_lag_s
+    }
+
+    /// Rate, damping and the arm's friction.
+    pub(super) const fn column(self) -> Column {
+        (self.rate, self.damping, self.arm_friction)
+    }
+
+    /// Presses and taps.
+    ///
+    /// # Errors
+    /// [`OutOfReach`] where the hand would have to leave the arm's reach.
+    pub fn tried(self) -> Result<Trial, OutOfReach> {
+        let press = self.press()?;
+        let mut taps = [None; 3];
+        for (taps, speed_m_s) in taps.iter_mut().zip(TAP_SPEEDS_M_S) {
+            *taps = self.taps(speed_m_s)?;
+        }
+        Ok(Trial {
+            setting: self,
+            press,
+            taps,
+            entries: [self.enters(Entry::Ramp)?, self.enters(Entry::Clutch)?],
+        })
+    }
+
+    pub(super) fn press(self) -> Result<Press, OutOfReach> {
+        let (hand, wall) = (self.grasp.hand(), self.stiffness_n_per_mm);
+        let [east, north, _] = HOME.home_mm;
+        let above = Touch::start(&|_, _| Some(PLANE_MM), &hand, wall, [east, north], 10.0);
+        let arm = self.arm(above.press(PRESS_N, HELD_S).finish())?;
+        let from_s = arm.script_s() - LOOKED_AT_S;
+        let (mut places, mut fault) = (Vec::new(), None);
+        self.run(arm, &mut |t_s, step| {
+            fault = step.sample.fault;
+            if t_s >= from_s {
+                places.push(step.tip_mm);
+            }
+            fault.is_none()
+        });
+        Ok(match fault {
+            Some(fault) => Press::Tripped(fault),
+            None => swings(&places),
+        })
+    }
+
+    pub(super) fn arm(self, script: Script) -> Result<HeldPhantom, OutOfReach> {
+        let model = PhantomModel::premium_1_5().with_friction(self.arm_friction);
+        let arm = HeldPhantom::new(model, self.grasp.hand(), HOME, script)?;
+        Ok(arm.arming())
+    }
+
+    pub(super) fn run(
+        self,
+        arm: HeldPhantom,
+        look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
+    ) {
+        self.run_with_clutch(arm, None, look);
+    }
+
+    pub(super) fn run_with_clutch(
+        self,
+        arm: HeldPhantom,
+        clutch_s: Option<[f64; 2]>,
+        look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
+    ) {
+        let felt = Felt {
+            rate: self.rate,
+            stiffness_n_per_mm: self.stiffness_n_per_mm,
+            damping: self.damping,
+            texture: self.texture,
+            delay_s: self.delay_s,
+            clutch_s,
+        };
+        contact_loop::run(&felt, arm, look);
+    }
+}
+
+/// How far and how often places of a second go to and fro along the axis where they do most.
+fn swings(places_mm: &[[f64; 3]]) -> Press {
+    let along = |axis: usize| {
+        let coordinates = places_mm.iter().map(move |place| place[axis]);
+        let low = coordinates.clone().fold(f64::INFINITY, f64::min);
+        let high = coordinates.clone().fold(f64::NEG_INFINITY, f64::max);
+        let middle = 0.5 * (low + high);
+        // A swing goes through the middle twice.
+        let sides = coordinates.map(|coordinate| coordinate > middle);
+        let crossings = sides.clone().zip(sides.skip(1)).filter(|(a, b)| a != b);
+        (high - low, crossings.count())
+    };
+    let widest = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
+    let (swing_mm, crossings) = [along(0), along(1)].into_iter().fold(along(2), widest);
+    Press::Held {
+        swing_mm,
+        swings_hz: 0.5 * crossings as f64 / LOOKED_AT_S,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tip_swings_along_whichever_axis() {
+        for axis in 0..3 {
+            let places: Vec<_> = (0..1000)
+                .map(|tick| {
+                    let mut place = [1.0, 2.0, 3.0];
+                    // A swing of 20 ticks up to 0.5 mm, and less along another axis.
+                    place[axis] += if tick % 20 < 10 { 0.25 } else { -0.25 };
+                    place[(axis + 1) % 3] += if tick % 4 < 2 { 0.01 } else { -0.01 };
+                    place
+                })
+                .collect();
+            let Press::Held {
+                swing_mm,
+                swings_hz,
+            } = swings(&places)
+            else {
+                panic!("it is held")
+            };
+            assert!((swing_mm - 0.5).abs() < 1e-12, "axis {axis}: {swing_mm} mm");
+            assert!(
+                (swings_hz - 49.5).abs() < 1.0,
+                "axis {axis}: {swings_hz} Hz"
+            );
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! `--input`: what a terrain file does not say itself, one `KEY=VALUE` each.
+
+use std::str::FromStr;
+
+use super::quantity::{GROUND, MEMORY};
+use crate::cli::failure::{Failure, OrHint};
+use crate::terrain::FeltCells;
+use heightfield::{Encoding, Endian, OpenOptions, PngChannel, RawLayout, SampleType, metres_in};
+
+/// The keys, each with an example.
+const KEYS: [(&str, &str); 12] = [
+    ("raw", "512x400:i16:le"),
+    ("no-data", "-9999"),
+    ("band", "2"),
+    ("variable", "depth"),
+    ("cell", "30m"),
+    ("height-unit", "ft"),
+    ("encoding", "terrarium"),
+    ("channel", "alpha"),
+    ("cells", "stored"),
+    ("in-memory", "64MB"),
+    ("gdal:NAME", "VALUE"),
+    ("asset", "dem"),
+];
+
+/// Something about the input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputSetting {
+    key: String,
+    value: InputValue,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum InputValue {
+    /// The file is raw samples, north row first.
+    Raw(u32, u32, SampleType, Endian),
+    /// The stored value that means no data.
+    NoData(f64),
+    /// The band that holds the height, the first being 1.
+    Band(u32),
+    /// Which raster of several holds the height.
+    Variable(String),
+    /// Side of a cell on the ground, m.
+    CellM(f64),
+    /// Metres in a unit of height.
+    HeightUnitM(f64),
+    /// How colours encode heights.
+    Encoding(Encoding),
+    /// The channel of a PNG that holds the height.
+    Channel(PngChannel),
+    /// Which cells are rendered.
+    Cells(FeltCells),
+    /// Megabytes of samples that are kept in memory.
+    InMemoryMb(u32),
+    /// An option of the GDAL driver.
+    Gdal(String),
+}
+
+impl FromStr for InputSetting {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let unknown = || {
+            let keys: Vec<_> = KEYS.iter().map(|(key, it)| format!("{key}={it}")).collect();
+            format!("known are {}", keys.join(", "))
+        };
+        let (key, value) = text.split_once('=').ok_or_else(unknown)?;
+        let key = match key {
+            // A STAC's raster is an asset.
+            "asset" => "variable",
+            key => key,
+        };
+        let parsed = match key {
+            "raw" => raw(value),
+            "no-data" => number(value).map(InputValue::NoData),
+            "band" => match value.parse() {
+                Ok(band) if band > 0 => Ok(InputValue::Band(band)),
+                _ => Err("a band is a whole number from 1 on".into()),
+            },
+            "variable" => Ok(InputValue::Variable(value.to_owned())),
+            "cell" => GROUND
+                .read_within(value, [1e-6, 1e7])
+                .map(InputValue::CellM),
+            "height-unit" => height_unit(value).map(InputValue::HeightUnitM),
+            "encoding" => one_of(Encoding::ALL, Encoding::name, value).map(InputValue::Encoding),
+            "channel" => one_of(PngChannel::ALL, PngChannel::name, value).map(InputValue::Channel),
+            "cells" => <FeltCells as clap::ValueEnum>::from_str(value, false)
+                .map(InputValue::Cells)
+                .map_err(|_| "square or stored".to_owned()),
+            "in-memory" => MEMORY
+                .read_within(value, [0.0, f64::from(u32::MAX)])
+                .map(|mb| InputValue::InMemoryMb(mb as u32)),
+            _ => match key.strip_prefix("gdal:") {
+                Some(name) if !name.is_empty() => Ok(InputValue::Gdal(format!("{name}={value}"))),
+                _ => return Err(unknown()),
+            },
+        };
+        let value = parsed.map_err(|why| format!("{key}: {why}"))?;
+        let key = key.to_owned();
+        Ok(Self { key, value })
+    }
+}
+
+impl InputSetting {
+    /// The cells that are asked for, if this setting is about them.
+    pub(in crate::cli) const fn cells(&self) -> Option<FeltCells> {
+        match self.value {
+            InputValue::Cells(cells) => Some(cells),
+            _ => None,
+        }
+    }
+}
+
+/// Puts what is said about an input into the options of the library.
+pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Failure> {
+    let twice = settings.iter().enumerate().find(|(index, setting)| {
+        let mut before = settings.iter().take(*index);
+        before.any(|other| other.key == setting.key)
+    });
+    if let Some((_, InputSetting { key, .. })) = twice {
+        return Err(format!("--input {key}=… is given twice")).or_hint("give it once");
+    }
+    let mut options = OpenOptions {
+        most_in_memory_bytes: u64::from(OpenOptions::IN_MEMORY_MB) << 20,
+        ..OpenOptions::default()
+    };
+    for InputSetting { value, .. } in settings {
+        match value {
+            InputValue::Raw(columns, rows, sample, endian) => {
+                options.raw = Some(RawLayout {
+                    columns: *columns,
+                    rows: *rows,
+                    sample: *sample,
+                    endian: *endian,
+                });
+            }
+            InputValue::NoData(value) => options.no_data = Some(*value),
+            InputValue::Band(band) => options.band = Some(*band),
+            InputValue::Variable(name) => options.variable = Some(name.clone()),
+            InputValue::CellM(side) => options.ground_cell_m = Some(*side),
+            InputValue::HeightUnitM(metres) => options.vertical_unit_m = Some(*metres),
+            InputValue::Encoding(encoding) => options.encoding = Some(*encoding),
+            InputValue::Channel(channel) => options.png_channel = Some(*channel),
+            InputValue::Cells(_) => {}
+            InputValue::InMemoryMb(mb) => options.most_in_memory_bytes = u64::from(*mb) << 20,
+            InputValue::Gdal(option) => options.open_options.push(option.clone()),
+        }
+    }
+    if options.encoding.is_some() && options.png_channel.is_some() {
+        return Err("both encoding= and channel= say how colours are heights")
+            .or_hint("leave one of them out");
+    }
+    Ok(options)
+}
+
+/// As `512x400:i16:le`; type and byte order may be left out.
+fn raw(text: &str) -> Result<InputValue, String> {
+    let mut parts = text.split(':');
+    let (columns, rows) = parse_size(parts.next().unwrap_or_default())?;
+    let sample = parts
+        .next()
+        .map(|name| one_of(SampleType::ALL, SampleType::name, name));
+    let endian = parts.next().map(|name| match name {
+        "le" => Ok(Endian::Little),
+        "be" => Ok(Endian::Big),
+        _ => one_of(Endian::ALL, Endian::name, name),
+    });
+    if let Some(more) = parts.next() {
+        return Err(format!("`{more}` is too much: WIDTHxHEIGHT:TYPE:ORDER"));
+    }
+    Ok(InputValue::Raw(
+        columns,
+        rows,
+        sample.transpose()?.unwrap_or(SampleType::I16),
+        endian.transpose()?.unwrap_or(Endian::Little),
+    ))
+}
+
+/// One of some values by its name.
+fn one_of<T: Copy>(all: &[T], name: fn(T) -> &'static str, text: &str) -> Result<T, String> {
+    let named = all.iter().find(|value| name(**value) == text);
+    named.copied().ok_or_else(|| {
+        let names: Vec<_> = all.iter().map(|value| name(*value)).collect();
+        format!("`{text}` is none of {}", names.join(", "))
+    })
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| "a number is wanted".into())
+}
+
+/// A unit of height in metres.
+fn height_unit(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let metres = metres_in(text).or_else(|| text.parse().ok());
+    metres
+        .filter(|metres| (1e-6..=1e6).contains(metres))
+        .ok_or_else(|| "m, ft, us-ft, or metres in a unit, as 0.01".into())
+}
+
+/// A size in samples, as `512x400`, or `512` for a square.
+///
+/// # Errors
+/// What a size is.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let parts = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
+    match (parts.0.trim().parse(), parts.1.trim().parse()) {
+        (Ok(width), Ok(height)) if width > 0 && height > 0 => Ok((width, height)),
+        _ => Err("a size is WIDTHxHEIGHT in samples, as 512x400".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(settings: &[&str]) -> Result<OpenOptions, String> {
+        let settings: Result<Vec<_>, _> = settings.iter().map(|text| text.parse()).collect();
+        open_options(&settings?).map_err(|failure| failure.text())
+    }
+
+    #[test]
+    fn each_key_with_its_example_is_read() {
+        for (key, value) in KEYS {
+            let text = format!("{key}={value}");
+            assert!(text.parse::<InputSetting>().is_ok(), "{text}");
+        }
+        let all = [
+            "raw=512x400:f32:be",
+            "no-data=-9999",
+            "cell=0.5km",
+            "gdal:A=b=c",
+        ];
+        let options = options(&all).expect("read");
+        let raw = options.raw.expect("raw");
+        assert_eq!((raw.columns, raw.rows), (512, 400));
+        assert_eq!((raw.sample, raw.endian), (SampleType::F32, Endian::Big));
+        assert_eq!(options.no_data, Some(-9999.0));
+        assert_eq!(options.ground_cell_m, Some(500.0));
+        assert_eq!(options.open_options, ["A=b=c"]);
+    }
+
+    #[test]
+    fn what_is_not_understood_is_named_with_what_is() {
+        for (text, wanted) in [
+            ("bands=2", "band=2"),
+            ("stored", "cells=stored"),
+            ("gdal:=1", "gdal:NAME"),
+            ("band=0", "from 1 on"),
+            ("raw=0x4", "WIDTHxHEIGHT"),
+            ("raw=4x", "WIDTHxHEIGHT"),
+            ("raw=4x4:i17", "i16"),
+            ("raw=4x4:i16:middle", "little"),
+            ("raw=4x4:i16:le:more", "too much"),
+            ("cell=0", "from"),
+            ("cell=-3", "from"),
+            ("cell=1e9", "from"),
+            ("cell=3furlongs", "km"),
+            ("height-unit=furlong", "us-ft"),
+            ("height-unit=0", "us-ft"),
+            ("height-unit=nan", "us-ft"),
+            ("no-data=none", "number"),
+            ("in-memory=1TB", "MB, GB"),
+            ("cells=round", "square or stored"),
+            ("encoding=morse", "terrarium"),
+        ] {
+            let why = text.parse::<InputSetting>().expect_err(text);
+            assert!(why.contains(wanted), "{text}: {why}");
+        }
+    }
+
+    #[test]
+    fn sources_that_disagree_are_refused() {
+        let why = options(&["band=1", "band=2"]).expect_err("twice");
+        assert!(why.contains("band=… is given twice"), "{why}");
+        assert!(options(&["variable=a", "asset=b"]).is_err());
+        assert!(options(&["encoding=terrarium", "channel=red"]).is_err());
+        assert!(options(&["gdal:A=1", "gdal:B=2"]).is_ok());
+        assert!(options(&["gdal:A=1", "gdal:A=2"]).is_err());
+    }
+
+    #[test]
+    fn units_of_height() {
+        let feet = 1200.0 / 3937.0;
+        for (unit, metres) in [("m", 1.0), ("ft", 0.3048), ("us-ft", feet), ("0.01", 0.01)] {
+            assert_eq!(height_unit(unit), Ok(metres));
+        }
+    }
+}

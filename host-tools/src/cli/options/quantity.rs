@@ -1,0 +1,197 @@
+//! Quantities as they are typed: a number, and a unit where it is not the usual one.
+
+use std::fmt::Display;
+use std::str::FromStr;
+
+/// The units that a kind of quantity may carry.
+#[derive(Debug)]
+pub struct Units {
+    /// What the quantity is, for messages.
+    name: &'static str,
+    /// Each unit and its size in the first, which is that of a number alone.
+    units: &'static [(&'static str, f64)],
+}
+
+/// A force between tip and surface for each millimetre between HIP and proxy.
+pub const STIFFNESS: Units = Units {
+    name: "a stiffness",
+    units: &[("N/mm", 1.0), ("N/m", 1e-3)],
+};
+/// A force.
+pub const FORCE: Units = Units {
+    name: "a force",
+    units: &[("N", 1.0), ("mN", 1e-3)],
+};
+/// A length at the device.
+pub const LENGTH: Units = Units {
+    name: "a length at the device",
+    units: &[("mm", 1.0), ("cm", 10.0), ("um", 1e-3), ("µm", 1e-3)],
+};
+/// A length on the ground.
+pub const GROUND: Units = Units {
+    name: "a length on the ground",
+    units: &[
+        ("m", 1.0),
+        ("km", 1e3),
+        ("cm", 0.01),
+        ("mm", 1e-3),
+        ("ft", 0.3048),
+    ],
+};
+/// A time.
+pub const TIME: Units = Units {
+    name: "a time",
+    units: &[("s", 1.0), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0)],
+};
+/// A force for each unit of speed.
+pub const DAMPING: Units = Units {
+    name: "a damping",
+    units: &[("Ns/m", 1.0), ("N·s/m", 1.0), ("Ns/mm", 1e3)],
+};
+/// An angle.
+pub const ANGLE: Units = Units {
+    name: "an angle",
+    units: &[("deg", 1.0), ("°", 1.0)],
+};
+/// A size in memory.
+pub const MEMORY: Units = Units {
+    name: "a size",
+    units: &[("MB", 1.0), ("GB", 1024.0)],
+};
+/// Ground under a millimetre of the device.
+pub const GROUND_SCALE: Units = Units {
+    name: "a scale",
+    units: &[("m/mm", 1.0), ("km/mm", 1e3), ("cm/mm", 0.01)],
+};
+
+impl Units {
+    /// Reads a quantity in the first of the units.
+    ///
+    /// # Errors
+    /// No finite number, or another unit; the message names those that are known.
+    pub fn read(&self, text: &str) -> Result<f64, String> {
+        let (number, unit) = split(text);
+        let size = self.size_of(unit);
+        let value = number
+            .parse::<f64>()
+            .ok()
+            .filter(|number| number.is_finite());
+        match (value, size) {
+            (Some(value), Some(1.0)) => Ok(value),
+            (Some(value), Some(size)) => Ok(value * size),
+            _ => Err(self.expected(text)),
+        }
+    }
+
+    /// The same in single precision: a number in the first unit is rounded once.
+    ///
+    /// # Errors
+    /// As [`Units::read`].
+    pub fn read_single(&self, text: &str) -> Result<f32, String> {
+        let (number, unit) = split(text);
+        match (number.parse::<f32>(), self.size_of(unit)) {
+            (Ok(value), Some(1.0)) if value.is_finite() => Ok(value),
+            _ => self.read(text).map(|value| value as f32),
+        }
+    }
+
+    /// Reads a quantity within a range.
+    ///
+    /// # Errors
+    /// As [`Units::read`]; a quantity out of range.
+    pub fn read_within(&self, text: &str, range: [f64; 2]) -> Result<f64, String> {
+        let value = self.read(text)?;
+        let [least, most] = range;
+        let unit = self.usual();
+        (least..=most)
+            .contains(&value)
+            .then_some(value)
+            .ok_or_else(|| format!("{} from {least} to {most} {unit}", self.name))
+    }
+
+    /// A quantity as it is typed.
+    #[must_use]
+    pub fn say(&self, value: impl Display) -> String {
+        format!("{value}{}", self.usual())
+    }
+
+    fn usual(&self) -> &'static str {
+        self.units.first().map_or("", |(unit, _)| unit)
+    }
+
+    fn size_of(&self, unit: &str) -> Option<f64> {
+        if unit.is_empty() {
+            return Some(1.0);
+        }
+        let known = self.units.iter().find(|(known, _)| *known == unit);
+        known.map(|(_, size)| *size)
+    }
+
+    fn expected(&self, text: &str) -> String {
+        let units: Vec<_> = self.units.iter().map(|(unit, _)| *unit).collect();
+        let (name, units) = (self.name, units.join(", "));
+        let usual = self.usual();
+        match split(text) {
+            ("", _) => format!("{name} is a number in {usual}, or with its unit: {units}"),
+            (_, "") => format!("{name} is a finite number in {usual}"),
+            (_, unit) => format!("{name} is not in `{unit}`: its units are {units}"),
+        }
+    }
+}
+
+/// A number and what stands behind it.
+fn split(text: &str) -> (&str, &str) {
+    let text = text.trim();
+    let ends = (0..=text.len())
+        .rev()
+        .filter(|end| text.is_char_boundary(*end));
+    let mut numbers = ends.filter(|end| f64::from_str(&text[..*end]).is_ok());
+    match numbers.next() {
+        Some(end) => (&text[..end], text[end..].trim()),
+        None => ("", text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn number_alone_is_in_the_first_unit() {
+        assert_eq!(STIFFNESS.read("0.5"), Ok(0.5));
+        assert_eq!(STIFFNESS.read(" 0.5 N/mm "), Ok(0.5));
+        assert_eq!(STIFFNESS.read("500N/m"), Ok(0.5));
+        assert_eq!(LENGTH.read("2e-1cm"), Ok(2.0));
+        assert_eq!(TIME.read("2min"), Ok(120.0));
+        assert_eq!(DAMPING.read("2N·s/m"), Ok(2.0));
+        assert_eq!(GROUND_SCALE.read("5m/mm"), Ok(5.0));
+    }
+
+    #[test]
+    fn wrong_unit_names_the_right_ones() {
+        for (units, text, wanted) in [
+            (&STIFFNESS, "0.5N", "N/mm, N/m"),
+            (&LENGTH, "2m", "mm, cm"),
+            (&TIME, "soon", "s, ms, min, h"),
+            (&FORCE, "", "a number in N"),
+            (&FORCE, "nan", "finite"),
+            (&FORCE, "inf", "finite"),
+            (&FORCE, "1e999", "finite"),
+            (&ANGLE, "1 2deg", "deg"),
+        ] {
+            let why = units.read(text).expect_err(text);
+            assert!(why.contains(wanted), "{text}: {why}");
+        }
+        let why = TIME.read_within("0.5s", [1.0, 60.0]).expect_err("short");
+        assert_eq!(why, "a time from 1 to 60 s");
+    }
+
+    #[test]
+    fn what_is_written_is_read_bit_by_bit() {
+        for value in [0.1_f32, 0.3, 1.0 / 3.0, 8.5, f32::MIN_POSITIVE] {
+            assert_eq!(STIFFNESS.read_single(&STIFFNESS.say(value)), Ok(value));
+            let value = f64::from(value);
+            assert_eq!(LENGTH.read(&LENGTH.say(value)), Ok(value));
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! Options that say what a terrain feels like; shared by `replay`, `run`, `demo` and `view`.
+
+pub mod table;
+mod texture;
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueHint;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{Controller, Damping, ForceLaw, Material, Shading};
+
+use super::quantity::{FORCE, STIFFNESS};
+use super::terrain_file::ReadingOptions;
+use crate::cli::failure::{Failure, Hint, OrHint};
+use crate::materials::{ClassMaterial, Looks, Materials};
+use crate::place::STIFFEST_N_PER_MM;
+use crate::replay::{ReplayError, Settings, Trajectory};
+use crate::surface::{NAMED_SURFACES, NamedSurface};
+use heightfield::{Raster, files_read_with};
+use table::{Look, PassivityName, ShadingName, TableFile};
+
+/// What a terrain feels like.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Surface")]
+pub struct SurfaceOptions {
+    /// Surface: ice, sand, rock, or a file
+    ///
+    /// [default: ice] ice: 0.5 N/mm without friction. sand: 0.4 N/mm, friction 0.5, damping 2 Ns/m, grain of 0.1 mm
+    /// every 1.5 mm. rock: 0.8 N/mm, friction 0.4 and 0.6 at rest, grain of 0.05 mm every 0.8 mm.
+    /// FILE.toml: stiffness, friction, static_friction, viscous_friction, damping, texture ("grain" or
+    /// "grating") and its texture_amplitude, texture_wavelength, texture_direction and texture_seed
+    /// under [default], and under [class.N] for each class of --materials; shading = "smooth" and
+    /// passivity = "off" at its top. A recording: the surface that was recorded.
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, value_parser = choice())]
+    pub surface: Option<SurfaceChoice>,
+
+    /// Stiffness, as 0.5N/mm [default: the surface's]
+    #[arg(long, value_name = "N/MM", value_parser = |text: &str| STIFFNESS.read_single(text),
+          allow_negative_numbers = true)]
+    pub stiffness: Option<f32>,
+
+    /// Friction: tangential over normal force [default: the surface's]
+    #[arg(long, value_name = "MU", allow_negative_numbers = true)]
+    pub friction: Option<f32>,
+
+    /// Largest force, as 8N [default: 8.5]
+    #[arg(long, value_name = "N", value_parser = |text: &str| FORCE.read_single(text),
+          allow_negative_numbers = true)]
+    pub max_force: Option<f32>,
+
+    /// Raster of classes of the ground; --surface has them
+    ///
+    /// As land cover: in a grid and a reference system of its own.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub materials: Option<PathBuf>,
+}
+
+/// A surface by its name, or the file that has it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SurfaceChoice {
+    /// One that has a name.
+    Named(&'static NamedSurface),
+    /// A table, a settings file with one, or a recording.
+    File(PathBuf),
+}
+
+/// Reads a surface's name or file.
+pub fn choice() -> impl TypedValueParser<Value = SurfaceChoice> {
+    PathBufValueParser::new().try_map(|path| {
+        let named = path.to_str().and_then(NamedSurface::find);
+        let is_file = path.extension().is_some() || path.components().count() > 1;
+        match named {
+            Some(named) => Ok(SurfaceChoice::Named(named)),
+            None if is_file => Ok(SurfaceChoice::File(path)),
+            None => {
+                let names: Vec<_> = NAMED_SURFACES.iter().map(|known| known.name).collect();
+                let names = names.join(", ");
+                Err(format!("a surface is {names}, a FILE.toml, or a recording"))
+            }
+        }
+    })
+}
+
+/// A surface with all its numbers.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// The law of the scene: that of the default where the ground has classes.
+    pub law: ForceLaw,
+    /// The classes of the ground, where the surface has some.
+    looks: Option<Looks>,
+}
+
+impl SurfaceOptions {
+    /// The files that are read: no output may be one of them.
+    pub(in crate::cli) fn inputs(&self) -> Vec<PathBuf> {
+        let mut inputs = self.materials.as_deref().map_or(vec![], files_read_with);
+        if let Some(SurfaceChoice::File(file)) = &self.surface {
+            inputs.push(file.clone());
+        }
+        inputs
+    }
+
+    /// Reads the surface. `--stiffness` and `--friction` take the place of its own numbers.
+    ///
+    /// # Errors
+    /// A file that has no surface, and numbers that no surface has.
+    pub fn load(&self) -> Result<Surface, Failure> {
+        let mut surface = match &self.surface {
+            None => Surface::of(&ForceLaw::PREMIUM),
+            Some(SurfaceChoice::Named(named)) => {
+                Surface::of(&named.material.law(&ForceLaw::PREMIUM))
+            }
+            Some(SurfaceChoice::File(file)) if file.extension().is_some_and(|it| it == "toml") => {
+                self.of_table(file)?
+            }
+            Some(SurfaceChoice::File(file)) => self.of_recording(file)?,
+        };
+        let law = &mut surface.law;
+        if let Some(stiffness) = self.stiffness {
+            law.stiffness_n_per_mm = stiffness;
+        }
+        if let Some(mu) = self.friction {
+            law.friction = rubbed(&law.friction, mu);
+        }
+        if let Some(force) = self.max_force {
+            law.max_force_n = force;
+        }
+        check(&Material::of(law)).map_err(|why| told(&why))?;
+        let limit = law.max_force_n;
+        if !(limit.is_finite() && limit >= 0.0) {
+            return Err(format!("a largest force of {limit} N"))
+                .or_hint("--max-force finite and not below 0; 8.5 N without it");
+        }
+        Ok(surface)
+    }
+
+    /// The surface of a recording, with its classes as they were.
+    fn of_recording(&self, file: &Path) -> Result<Surface, Failure> {
+        let trajectory = Trajectory::open(file).map_err(ReplayError::from)?;
+        let Some(settings) = trajectory.settings() else {
+            return Err(format!("{} is no recording, and no .toml", file.display()))
+                .or_hint("name a recording, or a surface in a FILE.toml, with --surface");
+        };
+        let looks = settings.materials.as_ref().map(|it| it.looks.clone());
+        if self.friction.is_some() && looks.is_some() {
+            return Err("--friction: each of the recorded materials has its own")
+                .or_hint("leave it out, or name a table that states it with --surface");
+        }
+        let law = Settings::law(settings);
+        Ok(Surface { law, looks })
+    }
+
+    /// The surface of a table: the options over its default, and the classes over that.
+    fn of_table(&self, file: &Path) -> Result<Surface, Failure> {
+        let table = TableFile::open(file)?;
+        let (line, look) = &table.default;
+        let of_classes = table.classes.iter().map(|(_, line, look)| (*line, look));
+        for (line, look) in std::iter::once((*line, look)).chain(of_classes) {
+            self.check_stiffness(look, (file, line))?;
+        }
+        let usual = Material::of(&ForceLaw::PREMIUM);
+        let mut default = over(&usual, look, (file, *line, "the default"))?;
+        if let Some(stiffness) = self.stiffness {
+            default.stiffness_n_per_mm = stiffness;
+        }
+        if let Some(mu) = self.friction {
+            default.friction = rubbed(&default.friction, mu);
+        }
+        if default.stiffness_n_per_mm == 0.0 {
+            return Err(
+                "a default without stiffness: views make all materials as much stiffer as it",
+            )
+            .or_hint("state stiffness in [default]");
+        }
+        let classes = table.classes.iter().map(|(class, line, look)| {
+            let what = format!("class {class}");
+            Ok(ClassMaterial {
+                class: *class,
+                name: look.name.clone(),
+                material: over(&default, look, (file, *line, &what))?,
+            })
+        });
+        let class = classes.collect::<Result<_, Failure>>()?;
+        let scene = ForceLaw {
+            shading: match table.shading {
+                ShadingName::None => Shading::None,
+                ShadingName::Smooth => Shading::Smooth,
+            },
+            damping: Damping {
+                controller: match table.passivity {
+                    PassivityName::On => Controller::On,
+                    PassivityName::Off => Controller::Off,
+                },
+                ..Damping::NONE
+            },
+            ..ForceLaw::PREMIUM
+        };
+        Ok(Surface {
+            law: default.law(&scene),
+            looks: Some(Looks { default, class }),
+        })
+    }
+
+    /// Checks that a table, which may be a stranger's, asks for no more stiffness than keys may, or
+    /// than the command line does.
+    fn check_stiffness(&self, look: &Look, (file, line): (&Path, usize)) -> Result<(), Failure> {
+        let most = STIFFEST_N_PER_MM.max(self.stiffness.unwrap_or(0.0));
+        let Some(stiffness) = look.stiffness.filter(|asked| *asked > most) else {
+            return Ok(());
+        };
+        let place = format!("{}, line {line}:", file.display());
+        Err(Failure::new(format!(
+            "a stiffness of {stiffness} N/mm: a table may ask for {most} N/mm at most"
+        ))
+        .hint(format!(
+            "if you trust the table, say --stiffness {stiffness}"
+        ))
+        .about(Some(&place)))
+    }
+}
+
+impl Surface {
+    /// A surface that is the same everywhere.
+    const fn of(law: &ForceLaw) -> Self {
+        Self {
+            law: *law,
+            looks: None,
+        }
+    }
+
+    /// The materials of a terrain: its classes from the file of the options, as this surface has them.
+    ///
+    /// # Errors
+    /// What is wrong with the file of classes or its place; one of file and classes alone.
+    pub(in crate::cli) fn materials(
+        &self,
+        options: &SurfaceOptions,
+        terrain: (&str, &Raster),
+        reading: &ReadingOptions,
+    ) -> Result<Option<Materials>, Failure> {
+        let has_classes = |looks: &&Looks| !looks.class.is_empty();
+        let (file, looks) = match (&options.materials, &self.looks) {
+            (None, looks) if looks.as_ref().is_some_and(|it| has_classes(&it)) => {
+                return Err("a surface of several classes without a raster of them")
+                    .or_hint("name the raster with --materials");
+            }
+            (None, _) => return Ok(None),
+            (Some(_), None) => {
+                return Err("--materials without what its classes feel like")
+                    .or_hint("name a table with --surface FILE.toml; docs/worldcover.toml is one");
+            }
+            (Some(file), Some(looks)) => (file, looks.clone()),
+        };
+        let classes = Raster::open(file, &reading.of_classes()?).map_err(of_classes)?;
+        let name = file.display().to_string();
+        Ok(Some(Materials::over(terrain, (&name, classes), looks)?))
+    }
+}
+
+/// A friction with another coefficient, which also holds until the tip slides.
+fn rubbed(friction: &Friction, mu: f32) -> Friction {
+    Friction {
+        viscous_s: friction.viscous_s,
+        ..Friction::coulomb(mu)
+    }
+}
+
+/// What went wrong with a file of classes: hints for heights work out numbers between those of the
+/// file, and between classes there are none.
+fn of_classes(error: heightfield::Error) -> Failure {
+    let hint = error.hint().replace("-r bilinear", "-r near");
+    let hint = hint.replace("-r average", "-r mode");
+    let hint = hint.replace(" -ot Float32", "");
+    Failure::new(error).hint(hint)
+}
+
+/// A material with what a table states in place of its numbers. A friction brings its own static
+/// part.
+fn over(
+    material: &Material,
+    look: &Look,
+    (file, line, what): (&Path, usize, &str),
+) -> Result<Material, Failure> {
+    let before = &material.friction;
+    let friction = Friction {
+        dynamic_mu: look.friction.unwrap_or(before.dynamic_mu),
+        static_mu: look
+            .static_friction
+            .or(look.friction)
+            .unwrap_or(before.static_mu),
+        viscous_s: look.viscous_friction.unwrap_or(before.viscous_s),
+    };
+    let made = texture::texture(look, &material.texture).and_then(|texture| {
+        let material = Material {
+            stiffness_n_per_mm: look.stiffness.unwrap_or(material.stiffness_n_per_mm),
+            friction,
+            damping_ns_per_m: look.damping.unwrap_or(material.damping_ns_per_m),
+            texture,
+        };
+        check(&material).map(|()| material)
+    });
+    made.map_err(|why| {
+        let place = format!("{}, line {line}, {what}:", file.display());
+        told(&why).about(Some(&place))
+    })
+}
+
+/// Checks that a surface can have these numbers; the message says which it can.
+fn check(material: &Material) -> Result<(), String> {
+    let Friction {
+        static_mu,
+        dynamic_mu,
+        viscous_s,
+    } = material.friction;
+    if !material.friction.is_valid() {
+        return Err(format!(
+            "a friction of {dynamic_mu}, {static_mu} at rest, trailing by {viscous_s} s: friction from 0 to {}, static_friction not below it, viscous_friction from 0 to {} s",
+            Friction::MOST,
+            Friction::MOST_VISCOUS_S
+        ));
+    }
+    let damping = Damping {
+        ns_per_m: material.damping_ns_per_m,
+        ..Damping::NONE
+    };
+    if !damping.is_valid() {
+        let (damping, most) = (material.damping_ns_per_m, Damping::MOST_NS_PER_M);
+        return Err(format!(
+            "a damping of {damping} N·s/m: damping from 0 to {most} N·s/m"
+        ));
+    }
+    let stiffness = material.stiffness_n_per_mm;
+    let is_valid = material.is_valid();
+    is_valid.then_some(()).ok_or_else(|| {
+        format!(
+            "a stiffness of {stiffness} N/mm: stiffness finite and not below 0, usually 0.5 N/mm"
+        )
+    })
+}
+
+/// What is wrong, and what to do, as a failure.
+fn told(why: &str) -> Failure {
+    let (what, next_step) = why
+        .split_once(": ")
+        .unwrap_or((why, "choose another number"));
+    Failure::new(what.to_owned()).hint(next_step)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,401 @@
+//! A surface as a user writes it: TOML, the default and further classes of the ground.
+//!
+//! ```toml
+//! shading = "smooth"
+//!
+//! [default]
+//! stiffness = "0.6 N/mm"
+//!
+//! [class.10]
+//! name = "tree cover"
+//! friction = 0.6
+//! texture = "grain"
+//! ```
+//!
+//! A quantity is a number in its usual unit, or a text with the unit. A class takes from the default
+//! what it does not state.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Deserializer};
+use toml::Spanned;
+
+use super::super::quantity::{ANGLE, DAMPING, LENGTH, STIFFNESS, TIME, Units};
+
+use heightfield::regular_file;
+use heightfield::shown::shown;
+
+/// Most classes that a table names: with the default, as many materials as a device has room
+/// for.
+pub const MOST_CLASSES: usize = 15;
+/// A longer file is no table, bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// The keys of earlier versions and their names now.
+const RENAMED: [(&str, &str); 2] = [
+    ("stiffness_n_per_mm", "stiffness"),
+    ("damping_ns_per_m", "damping"),
+];
+
+/// What a table says of one material; nothing where it says nothing.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Look {
+    /// What it is called.
+    pub name: Option<String>,
+    /// Stiffness, N/mm.
+    #[serde(deserialize_with = "stiffness")]
+    pub stiffness: Option<f32>,
+    /// Coefficient of friction while the tip slides.
+    pub friction: Option<f32>,
+    /// The same until it begins to slide.
+    pub static_friction: Option<f32>,
+    /// Friction that grows with the speed: the time by which the tip trails, s.
+    #[serde(deserialize_with = "time")]
+    pub viscous_friction: Option<f32>,
+    /// Damping along the force, N·s/m.
+    #[serde(deserialize_with = "damping")]
+    pub damping: Option<f32>,
+    /// The micro-relief.
+    pub texture: Option<TextureName>,
+    /// Height of the micro-relief above and below the surface, mm.
+    #[serde(deserialize_with = "length")]
+    pub texture_amplitude: Option<f32>,
+    /// From ridge to ridge, mm.
+    #[serde(deserialize_with = "length")]
+    pub texture_wavelength: Option<f32>,
+    /// Direction in which the ridges of a grating follow each other, degrees from east to north.
+    #[serde(deserialize_with = "angle")]
+    pub texture_direction: Option<f32>,
+    /// Which of the textures that are alike.
+    pub texture_seed: Option<u32>,
+}
+
+/// A texture by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TextureName {
+    /// The surface is even.
+    None,
+    /// Heights at random.
+    Grain,
+    /// Ridges.
+    Grating,
+}
+
+/// Whether the force turns evenly over the edges between patches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShadingName {
+    /// It follows the normals of the patches.
+    #[default]
+    None,
+    /// It turns evenly.
+    Smooth,
+}
+
+/// Whether the passivity controller acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PassivityName {
+    /// Wherever a current may flow.
+    #[default]
+    On,
+    /// Never.
+    Off,
+}
+
+/// A number, or a text with a unit.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a number, or a text with a number and its unit")]
+enum Quantity {
+    Number(f32),
+    Text(String),
+}
+
+fn quantity<'de, D: Deserializer<'de>>(from: D, units: &Units) -> Result<Option<f32>, D::Error> {
+    match Quantity::deserialize(from)? {
+        Quantity::Number(number) => Ok(Some(number)),
+        Quantity::Text(text) => units
+            .read_single(&text)
+            .map(Some)
+            .map_err(serde::de::Error::custom),
+    }
+}
+
+fn stiffness<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &STIFFNESS)
+}
+
+fn time<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &TIME)
+}
+
+fn damping<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &DAMPING)
+}
+
+fn length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &LENGTH)
+}
+
+fn angle<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &ANGLE)
+}
+
+/// A table that was read: the default, and the classes in their order, each with its line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TableFile {
+    /// Which normals the force follows.
+    pub shading: ShadingName,
+    /// Whether the passivity controller acts.
+    pub passivity: PassivityName,
+    /// Where there is no class.
+    pub default: (usize, Look),
+    /// By class.
+    pub classes: Vec<(i64, usize, Look)>,
+}
+
+/// What is wrong with a table.
+#[derive(Debug, thiserror::Error)]
+pub enum BadTable {
+    /// It cannot be read.
+    #[error("{}: {why}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        why: std::io::Error,
+    },
+    /// It is no such TOML.
+    #[error("{}: {why}", file.display())]
+    NoTable {
+        /// The file.
+        file: PathBuf,
+        /// What was found, and in which line.
+        why: String,
+    },
+    /// One of its classes.
+    #[error("{}, line {line}: {why}", file.display())]
+    Class {
+        /// The file.
+        file: PathBuf,
+        /// The line, from 1 on.
+        line: usize,
+        /// What is wrong.
+        why: String,
+    },
+}
+
+/// The file as TOML has it.
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Written {
+    shading: ShadingName,
+    passivity: PassivityName,
+    default: Option<Spanned<Look>>,
+    class: BTreeMap<String, Spanned<Look>>,
+}
+
+/// A settings file, whose table `surface` is one.
+#[derive(Deserialize)]
+struct SettingsFile {
+    surface: Written,
+}
+
+impl Written {
+    /// Reads a surface, in a file of its own or in a settings file.
+    fn read(text: &str) -> Result<Self, toml::de::Error> {
+        let is_in_settings = toml::from_str::<toml::Table>(text)
+            .is_ok_and(|file| file.get("surface").is_some_and(toml::Value::is_table));
+        match is_in_settings {
+            true => toml::from_str(text).map(|SettingsFile { surface }| surface),
+            false => toml::from_str(text),
+        }
+    }
+}
+
+/// What is wrong with a text, and the present name of a key that has another one.
+fn explained(why: &toml::de::Error) -> String {
+    let text = why.to_string().trim_end().to_owned();
+    let is_unknown = |(old, _): &&(&str, &str)| text.contains(&format!("unknown field `{old}`"));
+    match RENAMED.iter().find(is_unknown) {
+        Some((old, new)) => format!("{text}\n`{old}` is now `{new}`"),
+        None => text,
+    }
+}
+
+impl TableFile {
+    /// Reads a table.
+    ///
+    /// # Errors
+    /// [`BadTable`], with the line.
+    pub fn open(file: &Path) -> Result<Self, BadTable> {
+        let unreadable = |why| BadTable::Unreadable {
+            file: file.to_owned(),
+            why,
+        };
+        let text = regular_file::read_text(file, MAX_BYTES).map_err(unreadable)?;
+        Self::read(file, &text)
+    }
+
+    /// Reads the text of a table; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`BadTable`], with the line.
+    pub fn read(file: &Path, text: &str) -> Result<Self, BadTable> {
+        let line_of = |at: usize| 1 + text.bytes().take(at).filter(|byte| *byte == b'\n').count();
+        let written = Written::read(text).map_err(|why| BadTable::NoTable {
+            file: file.to_owned(),
+            why: explained(&why),
+        })?;
+        let bad = |line: usize, why: String| BadTable::Class {
+            file: file.to_owned(),
+            line,
+            why,
+        };
+        let mut classes: Vec<(i64, usize, Look)> = Vec::new();
+        for (number, look) in written.class {
+            let line = line_of(look.span().start);
+            let class = number.parse::<i64>().map_err(|_| {
+                bad(
+                    line,
+                    format!("[class.{number}]: a class is a whole number, as [class.10]"),
+                )
+            })?;
+            if let Some((_, other, _)) = classes.iter().find(|(known, ..)| *known == class) {
+                return Err(bad(line, format!("class {class} is in line {other}, too")));
+            }
+            classes.push((class, line, look.into_inner()));
+        }
+        classes.sort_by_key(|(class, ..)| *class);
+        if let Some((class, line, _)) = classes.get(MOST_CLASSES) {
+            let count = classes.len();
+            return Err(bad(
+                *line,
+                format!(
+                    "class {class} is one too many: {count} classes, and at most {MOST_CLASSES} can be told apart; leave those out that may feel as the default"
+                ),
+            ));
+        }
+        let default = written.default.map_or_else(Default::default, |look| {
+            (line_of(look.span().start), look.into_inner())
+        });
+        let is_unprintable = |look: &Look| {
+            let name = look.name.as_deref().unwrap_or_default();
+            shown(name) != name
+        };
+        let of_classes = classes.iter().map(|(_, line, look)| (*line, look));
+        let mut all = std::iter::once((default.0, &default.1)).chain(of_classes);
+        if let Some((line, _)) = all.find(|(_, look)| is_unprintable(look)) {
+            let why = "its name has a character that does not print; leave it out";
+            return Err(bad(line, why.to_owned()));
+        }
+        Ok(Self {
+            shading: written.shading,
+            passivity: written.passivity,
+            default,
+            classes,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<TableFile, String> {
+        TableFile::read(Path::new("t.toml"), text).map_err(|bad| bad.to_string())
+    }
+
+    #[test]
+    fn a_table_comes_with_its_lines() {
+        let table = read(
+            "# what\n[default]\nstiffness = 0.6\n\n[class.10]\nname = \"trees\"\nfriction = 0.6\ntexture = \"grain\"\n[class.-3]\n",
+        );
+        let table = table.expect("a table");
+        assert_eq!(table.default.1.stiffness, Some(0.6));
+        let (classes, lines): (Vec<_>, Vec<_>) = table
+            .classes
+            .iter()
+            .map(|(class, line, _)| (*class, *line))
+            .unzip();
+        assert_eq!((classes, lines), (vec![-3, 10], vec![9, 5]));
+        assert_eq!(table.classes[1].2.texture, Some(TextureName::Grain));
+        assert_eq!(read("").expect("nothing is said"), TableFile::default());
+    }
+
+    #[test]
+    fn units_are_read_and_settings_files_have_a_surface() {
+        let text = "shading = \"smooth\"\npassivity = \"off\"\n[default]\nstiffness = \"600 N/m\"\nviscous_friction = \"10ms\"\ntexture = \"grain\"\ntexture_amplitude = \"0.02 cm\"\n";
+        let table = read(text).expect("a table");
+        assert_eq!(table.shading, ShadingName::Smooth);
+        assert_eq!(table.passivity, PassivityName::Off);
+        let look = &table.default.1;
+        assert_eq!(
+            (look.stiffness, look.viscous_friction),
+            (Some(0.6), Some(0.01))
+        );
+        assert_eq!(look.texture_amplitude, Some(0.2));
+        let settings = "device = \"usb\"\n\n[surface.default]\nfriction = 0.4\n";
+        let table = read(settings).expect("a table");
+        assert_eq!(table.default.1.friction, Some(0.4));
+        assert_eq!(table.default.0, 3);
+    }
+
+    #[test]
+    fn a_file_that_is_no_table_is_not_read_to_its_end() {
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        // All holes: it takes no room.
+        file.as_file().set_len(1 << 40).expect("sparse");
+        let why = TableFile::open(file.path()).expect_err("a terabyte");
+        assert!(
+            why.to_string().contains("larger than 1048576 bytes"),
+            "{why}"
+        );
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        for (text, wanted) in [
+            ("[default]\nfrictoin = 1\n", ["line 2", "frictoin"]),
+            ("[class.10]\n\n[class.trees]\n", ["line 3", "whole number"]),
+            ("[class.10]\n[class.010]\n", ["line 1", "class 10"]),
+            ("[class.10]\n[class.10]\n", ["line 2", "duplicate"]),
+            ("[class.1]\ntexture = \"wood\"\n", ["line 2", "wood"]),
+            ("[class.1]\nfriction = \"much\"\n", ["line 2", "f32"]),
+            ("[class.1]\ndamping = \"2 N\"\n", ["line 2", "Ns/m"]),
+            ("[class.1]\ndamping = true\n", ["line 2", "its unit"]),
+            (
+                "[default]\nstiffness_n_per_mm = 1\n",
+                ["line 2", "`stiffness_n_per_mm` is now `stiffness`"],
+            ),
+            (
+                "tip = \"2mm\"\n[surface.default]\nfrictoin = 1\n",
+                ["line 3", "frictoin"],
+            ),
+            ("classes = 3\n", ["line 1", "classes"]),
+            (
+                "[class.1]\n[class.2]\nname = \"\\u001b[2J\"\n",
+                ["line 2", "does not print"],
+            ),
+            (
+                "[default]\nname = \"a\\nb\"\n",
+                ["line 1", "does not print"],
+            ),
+        ] {
+            let why = read(text).expect_err(text);
+            assert!(
+                wanted.iter().all(|part| why.contains(part)),
+                "{text}: {why}"
+            );
+        }
+        let many: String = (0..16).map(|class| format!("[class.{class}]\n")).collect();
+        let why = read(&many).expect_err("16");
+        assert!(
+            why.contains("line 16") && why.contains("at most 15"),
+            "{why}"
+        );
+    }
+}

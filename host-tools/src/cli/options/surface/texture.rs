@@ -1,0 +1,182 @@
+//! The micro-relief of a surface, from what a table says of it.
+
+use hapterra_core::force::{Pattern, Texture};
+
+use super::table::{Look, TextureName};
+
+/// From ridge to ridge where nothing is stated, mm.
+const USUAL_WAVELENGTH_MM: f32 = 1.0;
+/// Amplitude where nothing is stated: part of the wavelength, and most of it, mm.
+const USUAL_PART: f32 = 0.1;
+const USUAL_MOST_MM: f32 = 0.2;
+
+/// The texture of a material over that of the default. A stated pattern brings its own numbers.
+///
+/// # Errors
+/// Numbers without a texture, or such that no hand could feel or no tick could make.
+pub(super) fn texture(look: &Look, default: &Texture) -> Result<Texture, String> {
+    let pattern = look
+        .texture
+        .map_or(default.pattern, |texture| match texture {
+            TextureName::None => Pattern::None,
+            TextureName::Grain => Pattern::Grain,
+            TextureName::Grating => Pattern::Grating,
+        });
+    if pattern == Pattern::None {
+        return match first_number(look) {
+            None => Ok(Texture::NONE),
+            Some(number) => Err(format!(
+                "{number} of no texture: add texture = \"grain\" or \"grating\", or leave it out"
+            )),
+        };
+    }
+    if pattern == Pattern::Grain && look.texture_direction.is_some() {
+        return Err(
+            "texture_direction of grain, which is alike in all directions: leave it out, or choose texture = \"grating\""
+                .to_owned(),
+        );
+    }
+    let inherited = look.texture.is_none().then_some(default);
+    let wavelength_mm = look.texture_wavelength;
+    let wavelength_mm = wavelength_mm.or(inherited.map(|it| it.wavelength_mm));
+    let wavelength_mm = wavelength_mm.unwrap_or(USUAL_WAVELENGTH_MM);
+    let amplitude_mm = look.texture_amplitude;
+    let amplitude_mm = amplitude_mm.or(inherited.map(|it| it.amplitude_mm));
+    let direction_deg = look.texture_direction;
+    let direction_deg = direction_deg.or(inherited.map(|it| it.direction_deg));
+    let seed = look.texture_seed.or(inherited.map(|it| it.seed));
+    checked(Texture {
+        pattern,
+        amplitude_mm: amplitude_mm.unwrap_or((USUAL_PART * wavelength_mm).min(USUAL_MOST_MM)),
+        wavelength_mm,
+        direction_deg: direction_deg.unwrap_or(0.0),
+        seed: seed.unwrap_or(0),
+    })
+}
+
+/// The name of the first number that is stated.
+fn first_number(look: &Look) -> Option<&'static str> {
+    let stated = [
+        (look.texture_amplitude.is_some(), "texture_amplitude"),
+        (look.texture_wavelength.is_some(), "texture_wavelength"),
+        (look.texture_direction.is_some(), "texture_direction"),
+        (look.texture_seed.is_some(), "texture_seed"),
+    ];
+    let mut stated = stated.into_iter().filter(|(is_stated, _)| *is_stated);
+    stated.next().map(|(_, name)| name)
+}
+
+/// A texture whose numbers can be felt and made.
+fn checked(texture: Texture) -> Result<Texture, String> {
+    let Texture {
+        amplitude_mm: amplitude,
+        wavelength_mm: wavelength,
+        direction_deg: direction,
+        ..
+    } = texture;
+    let (shortest, longest) = Texture::WAVELENGTHS_MM;
+    if !(shortest..=longest).contains(&wavelength) {
+        return Err(format!(
+            "a texture with a wavelength of {wavelength} mm: texture_wavelength from {shortest}, a few encoder counts, to {longest} mm"
+        ));
+    }
+    let most = (wavelength * Texture::STEEPEST).min(Texture::MOST_AMPLITUDE_MM);
+    if !(amplitude > 0.0 && amplitude <= most) {
+        return Err(format!(
+            "a texture of {amplitude} mm with a wavelength of {wavelength} mm: texture_amplitude above 0 and up to {most} mm, which is an eighth of the wavelength, and {} mm at most",
+            Texture::MOST_AMPLITUDE_MM
+        ));
+    }
+    texture.is_valid().then_some(texture).ok_or_else(|| {
+        format!(
+            "a grating in the direction {direction}°: texture_direction from -360 to 360 degrees"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(texture: Option<TextureName>, numbers: [Option<f32>; 3]) -> Result<Texture, String> {
+        let [texture_amplitude, texture_wavelength, texture_direction] = numbers;
+        let look = Look {
+            texture,
+            texture_amplitude,
+            texture_wavelength,
+            texture_direction,
+            ..Look::default()
+        };
+        super::texture(&look, &Texture::NONE)
+    }
+
+    #[test]
+    fn what_is_not_stated_is_as_usual() {
+        assert_eq!(asked(None, [None; 3]), Ok(Texture::NONE));
+        let grain = asked(Some(TextureName::Grain), [None; 3]).expect("valid");
+        assert_eq!((grain.amplitude_mm, grain.wavelength_mm), (0.1, 1.0));
+        for wavelength in [0.25, 0.3, 7.0, 100.0] {
+            let numbers = [None, Some(wavelength), Some(-30.0)];
+            let grating = asked(Some(TextureName::Grating), numbers).expect("valid");
+            assert!(grating.amplitude_mm <= 0.2 && grating.direction_deg == -30.0);
+        }
+    }
+
+    #[test]
+    fn a_class_takes_what_it_does_not_state_from_the_default() {
+        let numbers = [Some(0.1), Some(1.5), Some(20.0)];
+        let default = asked(Some(TextureName::Grating), numbers).expect("valid");
+        let higher = Look {
+            texture_amplitude: Some(0.15),
+            ..Look::default()
+        };
+        let texture = super::texture(&higher, &default).expect("valid");
+        let amplitude_mm = 0.15;
+        assert_eq!(
+            texture,
+            Texture {
+                amplitude_mm,
+                ..default
+            }
+        );
+        let other = Look {
+            texture: Some(TextureName::Grain),
+            ..Look::default()
+        };
+        let texture = super::texture(&other, &default).expect("valid");
+        assert_eq!((texture.wavelength_mm, texture.direction_deg), (1.0, 0.0));
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_what_to_do() {
+        let (grain, grating) = (Some(TextureName::Grain), Some(TextureName::Grating));
+        let bad = [
+            (None, [Some(0.1), None, None], "of no texture"),
+            (None, [None, Some(1.0), None], "of no texture"),
+            (
+                Some(TextureName::None),
+                [None, None, Some(1.0)],
+                "of no texture",
+            ),
+            (grain, [None, None, Some(10.0)], "of grain"),
+            (grain, [Some(-0.1), None, None], "of -0.1 mm"),
+            (grain, [Some(0.0), None, None], "of 0 mm"),
+            (grain, [Some(f32::NAN), None, None], "of NaN mm"),
+            (grain, [Some(0.13), None, None], "of 0.13 mm"),
+            (grain, [Some(2.5), Some(50.0), None], "of 2.5 mm"),
+            (grain, [None, Some(0.2), None], "wavelength of 0.2 mm"),
+            (grain, [None, Some(-1.0), None], "wavelength of -1 mm"),
+            (
+                grain,
+                [None, Some(f32::INFINITY), None],
+                "wavelength of inf mm",
+            ),
+            (grating, [None, None, Some(f32::NAN)], "direction NaN°"),
+            (grating, [None, None, Some(400.0)], "direction 400°"),
+        ];
+        for (pattern, numbers, wanted) in bad {
+            let why = asked(pattern, numbers).expect_err(wanted);
+            assert!(why.contains(wanted) && why.contains(": "), "{why}");
+        }
+    }
+}

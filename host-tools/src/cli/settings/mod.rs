@@ -1,0 +1,287 @@
+//! Settings that stand for options: those of a settings file and of a recording.
+//!
+//! Each becomes words of the command line, `--name=value`, in front of the user's own. An option that
+//! the user gives, or that the environment has, takes the place of all words for it. So a setting is
+//! read, checked and explained as the option is.
+
+mod file;
+mod recorded;
+
+use std::collections::BTreeSet;
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
+
+use clap::parser::ValueSource;
+use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, ValueHint};
+
+use super::Cli;
+use super::failure::{Failure, OrHint};
+use super::options::input::InputSetting;
+use super::options::scale::MapScale;
+use crate::replay::{ReplayError, Settings, Trajectory};
+use crate::terrain::FeltCells;
+pub(super) use recorded::differences;
+
+/// The settings file that is read if it exists.
+const USUAL_FILE: &str = "hapterra.toml";
+/// The commands that a settings file is for.
+const COMMANDS: [&str; 3] = ["run", "demo", "replay"];
+/// What no settings file can say.
+const NOT_IN_FILE: [&str; 4] = ["settings", "help", "version", "verbose"];
+
+/// Which settings file is read.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Settings")]
+pub struct SettingsOption {
+    /// FILE.toml, a recording, or none
+    ///
+    /// [default: hapterra.toml, if it exists] Its keys are the names of options, as device = "usb" and scale = "5m/mm"; [surface.default] may
+    /// have a surface in place. Options given on the command line win.
+    #[arg(long, value_name = "FILE|none", value_hint = ValueHint::FilePath)]
+    pub settings: Option<PathBuf>,
+}
+
+/// One setting.
+struct Setting {
+    /// The name of its option.
+    name: String,
+    /// Its values, as on the command line; none for a flag.
+    values: Vec<OsString>,
+    /// Where it is from, for messages.
+    place: String,
+}
+
+/// The words of a command with its settings.
+pub(super) struct Completed {
+    /// The words.
+    pub(super) words: Vec<OsString>,
+    /// A line on the settings file that was read.
+    pub(super) line: Option<String>,
+}
+
+/// Puts settings into the words of a command, the name of the program first.
+///
+/// # Errors
+/// A settings file or a recording that cannot be read; a setting that is no option, or has a value
+/// that is none.
+pub(super) fn complete(command: &Command, words: Vec<OsString>) -> Result<Completed, Failure> {
+    let as_typed = |words| Completed { words, line: None };
+    let command = relaxed(command);
+    // What the user has typed wrongly is explained when it is parsed in earnest.
+    let Ok(matches) = command.clone().try_get_matches_from(&words) else {
+        return Ok(as_typed(words));
+    };
+    let Some((name, of_command)) = matches.subcommand() else {
+        return Ok(as_typed(words));
+    };
+    let Some(options) = command.find_subcommand(name) else {
+        return Ok(as_typed(words));
+    };
+    let mut sources = Vec::from_iter(of_recording(name, of_command)?);
+    let from_file = of_file(name, of_command)?;
+    let line = from_file
+        .as_ref()
+        .map(|(path, _)| format!("settings       {}", path.display()));
+    sources.extend(from_file.map(|(_, settings)| settings));
+    let mut given: BTreeSet<String> = options
+        .get_arguments()
+        .filter(|option| is_given(of_command, option))
+        .filter_map(|option| option.get_long().map(str::to_owned))
+        .collect();
+    let mut keys = input_keys(of_command);
+    let mut before = Vec::new();
+    for settings in sources {
+        let names: Vec<_> = settings
+            .iter()
+            .map(|setting| setting.name.clone())
+            .collect();
+        for setting in settings {
+            before.extend(words_of(&command, options, &given, &mut keys, &setting)?);
+        }
+        given.extend(names);
+    }
+    let place = words
+        .iter()
+        .position(|word| word == name)
+        .map_or(1, |at| at + 1);
+    let mut words = words;
+    words.splice(place..place, before);
+    Ok(Completed { words, line })
+}
+
+/// The command line, without any option that has to be given.
+fn relaxed(command: &Command) -> Command {
+    let mut command = command.clone();
+    for subcommand in command.get_subcommands_mut() {
+        *subcommand = subcommand.clone().mut_args(|arg| arg.required(false));
+    }
+    command.build();
+    command
+}
+
+/// Returns true if the user or the environment gives an option.
+fn is_given(matches: &ArgMatches, option: &Arg) -> bool {
+    let from = matches.value_source(option.get_id().as_str());
+    matches!(
+        from,
+        Some(ValueSource::CommandLine | ValueSource::EnvVariable)
+    )
+}
+
+/// The keys of the user's `--input`: a setting adds others.
+fn input_keys(matches: &ArgMatches) -> BTreeSet<String> {
+    let given = matches.try_get_raw("input").ok().flatten();
+    let given = given.into_iter().flatten();
+    given.map(|value| key_of(value)).collect()
+}
+
+/// The key of `KEY=VALUE`.
+fn key_of(value: &OsStr) -> String {
+    let text = value.to_string_lossy();
+    let key = text.split('=').next().unwrap_or_default();
+    key.to_owned()
+}
+
+/// The settings of the recording that is replayed or shown.
+fn of_recording(name: &str, matches: &ArgMatches) -> Result<Option<Vec<Setting>>, Failure> {
+    let argument = match name {
+        "replay" => "trajectory",
+        "view" => "recording",
+        _ => return Ok(None),
+    };
+    let ignores = matches.get_flag("ignore_settings");
+    let path = matches.get_one::<PathBuf>(argument);
+    match path.filter(|path| !ignores && path.is_file()) {
+        Some(path) => {
+            let settings = settings_of(path)?;
+            Ok(settings.map(|it| recorded::settings(path, &it, stated_in(matches))))
+        }
+        None => Ok(None),
+    }
+}
+
+/// The settings of a file that is a recording.
+fn settings_of(path: &Path) -> Result<Option<Settings>, Failure> {
+    let trajectory = Trajectory::open(path).map_err(ReplayError::from)?;
+    Ok(trajectory.settings().cloned())
+}
+
+/// The scale and the kind of cells that the user states.
+fn stated_in(matches: &ArgMatches) -> (Option<MapScale>, Option<FeltCells>) {
+    let scale = matches.try_get_one::<MapScale>("scale");
+    let input = matches.try_get_many::<InputSetting>("input").ok().flatten();
+    let cells = input.into_iter().flatten().find_map(InputSetting::cells);
+    (scale.ok().flatten().copied(), cells)
+}
+
+/// The settings file of a command, and what it says.
+fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Setting>)>, Failure> {
+    if !COMMANDS.contains(&name) {
+        return Ok(None);
+    }
+    let path = match matches.get_one::<PathBuf>("settings") {
+        Some(path) if path.as_os_str() == "none" => return Ok(None),
+        Some(path) => path.clone(),
+        None if Path::new(USUAL_FILE).exists() => USUAL_FILE.into(),
+        None => return Ok(None),
+    };
+    if path
+        .extension()
+        .is_some_and(|extension| extension == "toml")
+    {
+        let command = Cli::command();
+        let settings = file::read(&path, |key| is_known(&command, key))?;
+        return Ok(Some((path, settings)));
+    }
+    let settings = settings_of(&path)?
+        .ok_or_else(|| {
+            format!(
+                "{} is no recording with settings, and no .toml",
+                path.display()
+            )
+        })
+        .or_hint("name a recording or a FILE.toml with --settings")?;
+    let settings = recorded::settings(&path, &settings, stated_in(matches));
+    Ok(Some((path, settings)))
+}
+
+/// Returns true if one of the commands has an option of a name.
+fn is_known(command: &Command, name: &str) -> bool {
+    let mut commands = COMMANDS
+        .iter()
+        .filter_map(|known| command.find_subcommand(known));
+    !NOT_IN_FILE.contains(&name) && commands.any(|known| option(known, name).is_some())
+}
+
+fn option<'c>(command: &'c Command, name: &str) -> Option<&'c Arg> {
+    let mut options = command.get_arguments();
+    options.find(|option| option.get_long() == Some(name))
+}
+
+/// The words of a setting; none where a given option stands for it or against it, or the command has
+/// no such option.
+fn words_of(
+    command: &Command,
+    of: &Command,
+    given: &BTreeSet<String>,
+    keys: &mut BTreeSet<String>,
+    setting: &Setting,
+) -> Result<Vec<OsString>, Failure> {
+    let name = setting.name.as_str();
+    let Some(option) = option(of, name) else {
+        return Ok(vec![]);
+    };
+    let is_given = |other: &&Arg| other.get_long().is_some_and(|name| given.contains(name));
+    let is_against = |other: &Arg| {
+        let has = |one, other| of.get_arg_conflicts_with(one).contains(&other);
+        has(option, other) || has(other, option)
+    };
+    let is_input = name == "input";
+    let is_out =
+        (!is_input && given.contains(name)) || of.get_arguments().filter(is_given).any(is_against);
+    if is_out {
+        return Ok(vec![]);
+    }
+    let is_flag = matches!(option.get_action(), ArgAction::SetTrue);
+    let mut words = Vec::new();
+    for value in &setting.values {
+        if is_input && !keys.insert(key_of(value)) {
+            continue;
+        }
+        let word = match (is_flag, value.to_str()) {
+            (true, Some("true")) => format!("--{name}").into(),
+            (true, Some("false")) => continue,
+            (true, _) => {
+                return Err(format!("{}: {name} is true or false", setting.place))
+                    .or_hint("write it without quotation marks");
+            }
+            (false, _) => {
+                let mut word = OsString::from(format!("--{name}="));
+                word.push(value);
+                word
+            }
+        };
+        check(command, of.get_name(), &word, setting)?;
+        words.push(word);
+    }
+    Ok(words)
+}
+
+/// Checks that a word of a setting is one that the command takes.
+fn check(command: &Command, name: &str, word: &OsStr, setting: &Setting) -> Result<(), Failure> {
+    let program = OsStr::new("hapterra");
+    let words = [program, OsStr::new(name), word];
+    let Err(error) = command.clone().try_get_matches_from(words) else {
+        return Ok(());
+    };
+    let text = error.render().to_string();
+    let what = text.lines().next().unwrap_or_default();
+    let what = what.strip_prefix("error: ").unwrap_or(what);
+    Err(format!("{}: {what}", setting.place)).or_hint(format!(
+        "hapterra {name} --help says what --{} takes",
+        setting.name
+    ))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,174 @@
+//! The settings of a recording as options.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use super::Setting;
+use crate::cli::options::exaggeration::Exaggeration;
+use crate::cli::options::quantity::{FORCE, LENGTH, STIFFNESS};
+use crate::cli::options::rendering::Rendering;
+use crate::cli::options::scale::MapScale;
+use crate::cli::options::surface::SurfaceChoice;
+use crate::replay::Settings;
+use crate::replay::settings::Felt;
+use crate::terrain::FeltCells;
+
+/// The options that a recording was made with. The user may state a scale and cells of another kind:
+/// the recorded proportions stay.
+pub(super) fn settings(
+    path: &Path,
+    recorded: &Settings,
+    (scale, stated_cells): (Option<MapScale>, Option<FeltCells>),
+) -> Vec<Setting> {
+    let Felt {
+        cells,
+        level,
+        cell_mm,
+        tip_mm,
+        measured_at,
+        ..
+    } = &recorded.felt;
+    let exaggeration = height(&recorded.felt, scale, stated_cells.unwrap_or(*cells));
+    let max_force = FORCE.say(recorded.force.max_force_n);
+    let mut options: Vec<(&str, OsString)> = vec![
+        ("input", in_words(*cells).into()),
+        ("scale", MapScale::CellMm(*cell_mm).to_string().into()),
+        ("exaggeration", exaggeration.to_string().into()),
+        ("level", level.to_string().into()),
+        ("tip", LENGTH.say(tip_mm).into()),
+        ("max-force", max_force.into()),
+        ("surface", surface_file(path).into()),
+    ];
+    if let Some([x, y]) = measured_at {
+        options.push(("at", format!("{x},{y}").into()));
+    }
+    if let Some(materials) = &recorded.materials {
+        options.push(("materials", materials.file.clone().into()));
+    }
+    let setting = |(name, value): (&str, OsString)| Setting {
+        name: name.to_owned(),
+        values: vec![value],
+        place: path.display().to_string(),
+    };
+    options.into_iter().map(setting).collect()
+}
+
+/// The recorded height, at the scale that the user states. Cells of another kind have another size on
+/// the ground: there the factor keeps the proportions.
+fn height(felt: &Felt, scale: Option<MapScale>, cells: FeltCells) -> Exaggeration {
+    let cell_mm = match scale {
+        None => Some(felt.cell_mm),
+        Some(scale) => scale.cell_mm(felt.cell_m),
+    };
+    match (felt.exaggeration, cell_mm) {
+        (Some(times), _) if cells != felt.cells => Exaggeration::Times(times),
+        (_, Some(cell_mm)) => Exaggeration::MmPerUnit(felt.height_at_cell_mm(cell_mm)),
+        (times, None) => Exaggeration::Times(times.unwrap_or(1.0)),
+    }
+}
+
+/// The recording as a file with a surface: a name alone might be a surface's.
+fn surface_file(path: &Path) -> PathBuf {
+    match path.extension() {
+        Some(_) => path.to_owned(),
+        None => Path::new(".").join(path),
+    }
+}
+
+/// Lines on the options that differ from a recording, whose settings stand for all the others.
+pub(in crate::cli) fn differences(
+    rendering: &Rendering,
+    cells: FeltCells,
+    (path, recorded): (&Path, &Settings),
+) -> Vec<String> {
+    let (felt, force, surface) = (&recorded.felt, &recorded.force, &rendering.surface);
+    let number = |name: &str, value: Option<f32>, recorded: f32, say: &dyn Fn(f32) -> String| {
+        (
+            name.to_owned(),
+            say(value.unwrap_or(recorded)),
+            say(recorded),
+        )
+    };
+    let recorded_height = height(felt, rendering.scale, cells);
+    let exaggeration = rendering.exaggeration.unwrap_or(recorded_height);
+    let recorded_height = match (exaggeration, felt.exaggeration) {
+        (Exaggeration::MmPerUnit(_), _) => recorded_height.to_string(),
+        (_, Some(times)) => times.to_string(),
+        (_, None) => "an unknown one".to_owned(),
+    };
+    let scale = MapScale::CellMm(felt.cell_mm);
+    let stated_scale = rendering.scale.unwrap_or(scale);
+    let level = rendering.level.unwrap_or(felt.level);
+    let tip_mm = rendering.tip.unwrap_or(felt.tip_mm);
+    let materials = recorded.materials.as_ref().map(|it| it.file.clone().into());
+    let shown = |file: &Option<PathBuf>| {
+        let file = file.as_ref().map(|file| file.display().to_string());
+        file.unwrap_or_else(|| "none".to_owned())
+    };
+    let own = "its own".to_owned();
+    let lines = [
+        (
+            "input".into(),
+            in_words(cells).into(),
+            in_words(felt.cells).into(),
+        ),
+        ("scale".into(), stated_scale.to_string(), scale.to_string()),
+        (
+            "exaggeration".into(),
+            exaggeration.to_string(),
+            recorded_height,
+        ),
+        ("level".into(), level.to_string(), felt.level.to_string()),
+        ("tip".into(), LENGTH.say(tip_mm), LENGTH.say(felt.tip_mm)),
+        (
+            "surface".into(),
+            surface_in_words(surface.surface.as_ref(), path),
+            own,
+        ),
+        number(
+            "stiffness",
+            surface.stiffness,
+            force.stiffness_n_per_mm,
+            &|it| STIFFNESS.say(it),
+        ),
+        number(
+            "friction",
+            surface.friction,
+            force.friction.dynamic_mu,
+            &|it| it.to_string(),
+        ),
+        number("max-force", surface.max_force, force.max_force_n, &|it| {
+            FORCE.say(it)
+        }),
+        (
+            "materials".into(),
+            shown(&surface.materials),
+            shown(&materials),
+        ),
+    ];
+    let lines = lines
+        .into_iter()
+        .filter(|(_, given, recorded)| given != recorded);
+    let line = |(name, given, recorded): (String, String, String)| {
+        format!("--{name} {given}, where the recording has {recorded}")
+    };
+    lines.map(line).collect()
+}
+
+fn in_words(cells: FeltCells) -> &'static str {
+    match cells {
+        FeltCells::Stored => "cells=stored",
+        FeltCells::Square => "cells=square",
+    }
+}
+
+/// The surface that is asked for; that of the recording is its own.
+fn surface_in_words(surface: Option<&SurfaceChoice>, recording: &Path) -> String {
+    match surface {
+        Some(SurfaceChoice::Named(named)) => named.name.to_owned(),
+        Some(SurfaceChoice::File(file)) if *file != surface_file(recording) => {
+            file.display().to_string()
+        }
+        Some(SurfaceChoice::File(_)) | None => "its own".to_owned(),
+    }
+}

@@ -1,0 +1,267 @@
+use std::fs;
+
+use clap::Parser as _;
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{ForceLaw, Shading};
+
+use super::*;
+use crate::cli::options::exaggeration::Exaggeration;
+use crate::cli::options::surface::{SurfaceChoice, SurfaceOptions};
+use crate::replay::Rule;
+use crate::replay::settings::Device;
+use crate::terrain::{Scale, Terrain};
+use heightfield::Raster;
+
+/// The words of a command with a settings file.
+fn completed(text: &str, line: &str) -> Result<Vec<String>, String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s.toml");
+    fs::write(&file, text).expect("written");
+    let file = file.display().to_string();
+    let words = format!("hapterra {line} --settings {file}");
+    let words = words.split_whitespace().map(OsString::from).collect();
+    let completed = complete(&Cli::command(), words).map_err(|failure| failure.text())?;
+    assert_eq!(completed.line, Some(format!("settings       {file}")));
+    let parsed = Cli::try_parse_from(&completed.words);
+    parsed.map_err(|error| error.render().to_string())?;
+    let words = completed.words.iter().map(|word| word.to_string_lossy());
+    let without = words.map(|word| word.replace(&file, "FILE"));
+    Ok(without.filter(|word| word.starts_with("--")).collect())
+}
+
+#[test]
+fn settings_stand_before_the_words_of_the_user() {
+    let text = "scale = \"5m/mm\"\ntip = 2\nsurface = \"sand\"\ninput = [\"band=2\", \"cell=30m\"]\nview = true\n";
+    let words = completed(text, "run t.tif").expect("settings");
+    assert_eq!(
+        words,
+        [
+            "--input=band=2",
+            "--input=cell=30m",
+            "--scale=5m/mm",
+            "--surface=sand",
+            "--tip=2",
+            "--view",
+            "--settings"
+        ]
+    );
+    let words = completed("view = false\n", "run t.tif").expect("settings");
+    assert_eq!(words, ["--settings"]);
+}
+
+#[test]
+fn command_line_wins() {
+    let text =
+        "scale = \"5m/mm\"\ninput = [\"band=2\", \"cell=30m\"]\nat = \"1,2\"\ncrs = \"lonlat\"\n";
+    let words = completed(text, "run t.tif --scale 1mm/cell --input band=1").expect("settings");
+    assert_eq!(
+        words,
+        [
+            "--at=1,2",
+            "--crs=lonlat",
+            "--input=cell=30m",
+            "--scale",
+            "--input",
+            "--settings"
+        ]
+    );
+    // A box is fitted: it goes with neither a place nor a scale.
+    let words = completed(text, "run t.tif --bbox 1,2,3,4").expect("settings");
+    assert_eq!(
+        words,
+        [
+            "--crs=lonlat",
+            "--input=band=2",
+            "--input=cell=30m",
+            "--bbox",
+            "--settings"
+        ]
+    );
+}
+
+#[test]
+fn keys_of_other_commands_are_left_alone() {
+    let text = "rounds = 3\nsilence = \"30s\"\nrows-are-ticks = true\n";
+    let words = completed(text, "demo t.tif").expect("settings");
+    assert_eq!(words, ["--rounds=3", "--settings"]);
+    let words = completed(text, "run t.tif").expect("settings");
+    assert_eq!(words, ["--silence=30s", "--settings"]);
+}
+
+#[test]
+fn surface_may_stand_in_the_file() {
+    let text = "device = \"native\"\n[surface.default]\nfriction = 0.4\n";
+    let words = completed(text, "run t.tif").expect("settings");
+    assert_eq!(words, ["--device=native", "--surface=FILE", "--settings"]);
+}
+
+#[test]
+fn errors_name_file_and_line() {
+    for (text, wanted) in [
+        (
+            "tip = 2\nscales = 3\n",
+            "line 2: no command has an option --scales",
+        ),
+        ("settings = \"a.toml\"\n", "line 1: no command has"),
+        ("\ntip = \"2m\"\n", "line 2: invalid value '2m' for '--tip"),
+        ("view = 1\n", "line 1: view is true or false"),
+        ("view = \"yes\"\n", "line 1: view is true or false"),
+        ("[tip]\nx = 1\n", "line 1: tip is a text, a number"),
+        ("tip = 2\ntip = 3\n", "duplicate"),
+        ("tip\n", "s.toml"),
+        ("at = \"1,2\"\nbbox = \"1,2,3,4\"\n", "cannot be used with"),
+    ] {
+        let why = completed(text, "run t.tif").expect_err(text);
+        assert!(why.contains(wanted), "{text}: {why}");
+    }
+}
+
+#[test]
+fn no_settings_are_read_where_none_are_wanted() {
+    let words =
+        |line: &str| -> Vec<OsString> { line.split_whitespace().map(OsString::from).collect() };
+    for line in [
+        "hapterra run t.tif --settings none",
+        "hapterra info t.tif",
+        "hapterra run --help",
+        "hapterra",
+        "hapterra run t.tif --nonsense",
+    ] {
+        let completed = complete(&Cli::command(), words(line)).map_err(|failure| failure.text());
+        let completed = completed.expect(line);
+        assert_eq!((completed.words, completed.line), (words(line), None));
+    }
+    let missing = complete(
+        &Cli::command(),
+        words("hapterra run t.tif --settings no.toml"),
+    );
+    assert!(missing.is_err());
+}
+
+/// A recording of cells of 2 mm under a soft spring with friction, as a file in a folder.
+fn recording(folder: &Path) -> (PathBuf, Settings) {
+    let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
+    let scale = Scale::new(2.0, 6.0).expect("valid");
+    let terrain = Terrain::new(&raster, scale, 1).expect("terrain");
+    let law = ForceLaw {
+        stiffness_n_per_mm: 0.3,
+        max_force_n: 4.0,
+        friction: Friction::coulomb(0.25),
+        shading: Shading::Smooth,
+        ..ForceLaw::PREMIUM
+    };
+    let device = Device {
+        board: "native".into(),
+        firmware: String::new(),
+        tick_hz: 1000,
+    };
+    let settings = Settings::new("t.tif", &terrain, (law, Rule::Swept), None, device);
+    let path = folder.join("felt.csv");
+    let lines = settings.to_toml();
+    let lines: String = lines.lines().map(|line| format!("# {line}\n")).collect();
+    fs::write(&path, lines + "t_s,x_mm,y_mm,z_mm\n0,1,1,1\n").expect("written");
+    (path, settings)
+}
+
+/// A replay with the settings of a recording, and the lines on what differs.
+fn replayed(more: &str) -> (crate::cli::replay::Args, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, settings) = recording(folder.path());
+    let line = format!("hapterra replay t.tif {} -o x.csv {more}", path.display());
+    let words = line.split_whitespace().map(OsString::from).collect();
+    let completed = complete(&Cli::command(), words).map_err(|failure| failure.text());
+    let cli = Cli::try_parse_from(completed.expect(more).words).expect(more);
+    let crate::cli::Command::Replay(args) = cli.command else {
+        panic!("{more}");
+    };
+    let cells = args.terrain.reading.cells();
+    let lines = differences(&args.rendering, cells, (&path, &settings));
+    (args, lines)
+}
+
+#[test]
+fn options_of_a_recording_are_those_of_its_making() {
+    let (args, lines) = replayed("");
+    assert_eq!(lines, [""; 0]);
+    let rendering = &args.rendering;
+    assert_eq!(rendering.scale, Some(MapScale::CellMm(2.0)));
+    assert_eq!(rendering.exaggeration, Some(Exaggeration::MmPerUnit(6.0)));
+    assert_eq!((rendering.level, rendering.tip), (Some(1), Some(0.0)));
+    let (args, _) = replayed("--ignore-settings");
+    assert_eq!(args.rendering.scale, None);
+}
+
+#[test]
+fn options_win_over_a_recording_and_are_named() {
+    // Half as large, and half as high.
+    let (args, lines) = replayed("--scale 1mm/cell --stiffness 0.5");
+    assert_eq!(
+        args.rendering.exaggeration,
+        Some(Exaggeration::MmPerUnit(3.0))
+    );
+    assert_eq!(
+        lines,
+        [
+            "--scale 1mm/cell, where the recording has 2mm/cell",
+            "--stiffness 0.5N/mm, where the recording has 0.3N/mm"
+        ]
+    );
+    // Other cells keep the factor.
+    let (args, lines) = replayed("--input cells=stored");
+    assert_eq!(args.rendering.exaggeration, Some(Exaggeration::Times(3.0)));
+    assert_eq!(lines.len(), 1, "{lines:?}");
+    let (_, lines) = replayed("--exaggeration 2 --surface sand --friction 0.7");
+    assert_eq!(
+        lines,
+        [
+            "--exaggeration 2, where the recording has 3",
+            "--surface sand, where the recording has its own",
+            "--friction 0.7, where the recording has 0.25"
+        ]
+    );
+}
+
+#[test]
+fn recorded_surface_has_all_bits_of_its_law() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, settings) = recording(folder.path());
+    let options = SurfaceOptions {
+        surface: Some(SurfaceChoice::File(path.clone())),
+        max_force: Some(4.0),
+        ..SurfaceOptions::default()
+    };
+    let law = options
+        .load()
+        .map(|surface| surface.law)
+        .map_err(|it| it.text());
+    assert_eq!(law, Ok(settings.law()));
+    // A friction of one's own brings its static part, and leaves shading as it is.
+    let rough = SurfaceOptions {
+        friction: Some(0.7),
+        ..options
+    };
+    let law = rough
+        .load()
+        .map(|surface| surface.law)
+        .map_err(|it| it.text());
+    let friction = Friction::coulomb(0.7);
+    assert_eq!(
+        law,
+        Ok(ForceLaw {
+            friction,
+            ..settings.law()
+        })
+    );
+    // So may `run` take it.
+    let line = format!("hapterra run t.tif --settings {}", path.display());
+    let words = line.split_whitespace().map(OsString::from).collect();
+    let completed = complete(&Cli::command(), words).map_err(|failure| failure.text());
+    let words = completed.expect("a recording").words;
+    for word in [
+        "--scale=2mm/cell",
+        "--exaggeration=6mm/unit",
+        "--max-force=4N",
+    ] {
+        assert!(words.contains(&word.into()), "{words:?}");
+    }
+}

@@ -1,0 +1,304 @@
+//! Limits of stiffness that trials on the virtual arm found, and the warnings of a surface above them.
+//!
+//! `hapterra-lab stability` makes the trials; its tests hold these tables to them.
+
+use hapterra_core::force::{ForceLaw, MaterialTable, Texture};
+use hapterra_core::rate::TickRate;
+use hapterra_core::wire::hello::DeviceHello;
+
+/// Stiffness up to which a press is still in a limp hand, N/mm: ticks a second, without and
+/// with the passivity controller.
+pub type StillUpTo = [(u32, f32, f32); 4];
+
+/// At [`SHORT_US`]. Tried again in the tests.
+pub const STILL_N_PER_MM: StillUpTo = [
+    (1_000, 2.0, 6.0),
+    (2_000, 3.0, 8.0),
+    (4_000, 4.0, 8.0),
+    (10_000, 4.0, 8.0),
+];
+
+/// At [`LONG_US`].
+pub const STILL_LATE_N_PER_MM: StillUpTo = [
+    (1_000, 1.0, 3.0),
+    (2_000, 1.0, 3.0),
+    (4_000, 1.0, 3.0),
+    (10_000, 1.5, 3.0),
+];
+
+/// Stiffness up to which force comes in well on an arm with a tenth of the model's friction, with the
+/// controller, N/mm (`Entered::is_good` of the trials), by ticks a second: in the
+/// ramp, and while the clutch closes. Tried again in the tests.
+pub const ENTERS_N_PER_MM: [(u32, f32); 4] =
+    [(1_000, 1.0), (2_000, 2.0), (4_000, 2.0), (10_000, 2.0)];
+
+/// The same at [`LONG_US`].
+pub const ENTERS_LATE_N_PER_MM: [(u32, f32); 4] =
+    [(1_000, 1.0), (2_000, 1.0), (4_000, 1.0), (10_000, 0.5)];
+
+/// Latencies that were tried, µs: that of boards whose converters command the amplifiers, and that
+/// of duty cycles. Each is at least what such a board states; a test of the images compares them.
+pub const SHORT_US: u16 = 310;
+/// See [`SHORT_US`].
+pub const LONG_US: u16 = 1_240;
+
+/// What is left of that on a textured surface, whose steepest slopes rock a limp hand, too; and
+/// what is left at [`LONG_US`].
+pub const LEFT_WITH_TEXTURE: f32 = 0.5;
+/// See [`LEFT_WITH_TEXTURE`].
+pub const LEFT_LATE_WITH_TEXTURE: f32 = 1.0 / 3.0;
+
+/// Warns of a surface that is too stiff for a device's tick rate and latency.
+pub fn warn(law: &ForceLaw, device: &DeviceHello) {
+    let (rate, latency_us) = (TickRate::new(device.tick_hz), device.latency_us);
+    let warnings = rate.map(|rate| [warning(law, rate, latency_us), too_fine(&law.texture, rate)]);
+    for warning in warnings.into_iter().flatten().flatten() {
+        tracing::warn!("{warning}");
+    }
+}
+
+/// The same of a surface of several materials, once for each warning. The device takes the
+/// controller for the stiffest of them.
+pub fn warn_of(law: &ForceLaw, materials: Option<&MaterialTable>, device: &DeviceHello) {
+    let Some(table) = materials else {
+        return warn(law, device);
+    };
+    for warning in warnings_of(law, table, device.tick_hz, device.latency_us) {
+        tracing::warn!("{warning}");
+    }
+}
+
+fn warnings_of(
+    law: &ForceLaw,
+    table: &MaterialTable,
+    tick_hz: u32,
+    latency_us: u16,
+) -> Vec<String> {
+    let mut told = Vec::new();
+    let Some(rate) = TickRate::new(tick_hz) else {
+        return told;
+    };
+    let scale = table.stiffness_scale(law);
+    for material in table.materials() {
+        let mut law = material.law(law);
+        law.stiffness_n_per_mm *= scale;
+        let warnings = [
+            warning(&law, rate, latency_us),
+            too_fine(&law.texture, rate),
+        ];
+        told.extend(warnings.into_iter().flatten());
+    }
+    told.sort();
+    told.dedup();
+    told
+}
+
+/// What has to be said of a texture so fine that a slow hand does not feel it in whole.
+fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
+    let (wavelength, shortest) = (texture.wavelength_mm, Texture::shortest_mm(rate));
+    let hz = rate.hz();
+    let whole_mm_s = wavelength * hz as f32 / 8.0;
+    (!texture.is_none() && wavelength < shortest).then(|| {
+        format!(
+            "a texture with a wavelength of {wavelength} mm: at {hz} ticks a second it fades from {whole_mm_s:.0} mm/s on, and is gone at twice that; from {shortest} mm on a slow hand feels it in whole"
+        )
+    })
+}
+
+/// What has to be said of a surface at a device's rate and latency; `None` where every hand on the
+/// virtual arm holds it still, and theory does not speak against it.
+#[must_use]
+fn warning(law: &ForceLaw, rate: TickRate, latency_us: u16) -> Option<String> {
+    let (stiffness, hz) = (law.stiffness_n_per_mm, rate.hz());
+    let latency_s = 1e-6 * f32::from(latency_us);
+    let is_controlled = law.is_controlled();
+    let with = if is_controlled { "with" } else { "without" };
+    let still = still_n_per_mm(rate, latency_us, is_controlled, &law.texture);
+    let late = match latency_us > SHORT_US {
+        true => format!(" and {:.2} ms to the motors", 1e3 * latency_s),
+        false => String::new(),
+    };
+    if stiffness > still {
+        let shakes = match law.texture.is_none() {
+            true => "shakes",
+            false => "may shake on a texture",
+        };
+        return Some(format!(
+            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand {shakes} above {still} N/mm at {hz} ticks a second{late}, {with} the passivity controller (hapterra-lab stability)"
+        ));
+    }
+    let enters = enters_n_per_mm(rate, latency_us);
+    (stiffness > enters).then(|| {
+        format!(
+            "a stiffness of {stiffness} N/mm: on a virtual arm with a tenth of a Premium 1.5's friction the tip trembles above {enters} N/mm at {hz} ticks a second{late}, in the ramp or after the clutch (hapterra-lab stability)"
+        )
+    })
+}
+
+/// As [`still_n_per_mm`], for force that comes in.
+fn enters_n_per_mm(rate: TickRate, latency_us: u16) -> f32 {
+    let tried = match latency_us > SHORT_US {
+        true => ENTERS_LATE_N_PER_MM,
+        false => ENTERS_N_PER_MM,
+    };
+    let slower = tried.iter().rev().find(|(hz, _)| *hz <= rate.hz());
+    slower.unwrap_or(&tried[0]).1
+}
+
+/// Of the rates that were tried, the fastest that is no faster counts; of the latencies, the one
+/// that is not shorter.
+fn still_n_per_mm(rate: TickRate, latency_us: u16, is_controlled: bool, texture: &Texture) -> f32 {
+    let (tried, left) = match latency_us > SHORT_US {
+        true => (STILL_LATE_N_PER_MM, LEFT_LATE_WITH_TEXTURE),
+        false => (STILL_N_PER_MM, LEFT_WITH_TEXTURE),
+    };
+    let slower = tried.iter().rev().find(|(hz, ..)| *hz <= rate.hz());
+    let (_, without, with) = slower.unwrap_or(&tried[0]);
+    let even = if is_controlled { *with } else { *without };
+    match texture.is_none() {
+        true => even,
+        false => left * even,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hapterra_core::force::{Controller, Damping, Material, Pattern};
+
+    use super::*;
+
+    fn told(stiffness_n_per_mm: f32, hz: u32, controller: Controller) -> String {
+        told_late(stiffness_n_per_mm, hz, SHORT_US, controller)
+    }
+
+    fn told_late(
+        stiffness_n_per_mm: f32,
+        hz: u32,
+        latency_us: u16,
+        controller: Controller,
+    ) -> String {
+        let law = ForceLaw {
+            stiffness_n_per_mm,
+            damping: Damping {
+                controller,
+                ..Damping::NONE
+            },
+            ..ForceLaw::PREMIUM
+        };
+        let rate = TickRate::new(hz).expect("a rate");
+        warning(&law, rate, latency_us).unwrap_or_default()
+    }
+
+    #[test]
+    fn the_stiffest_and_the_finest_of_several_materials_are_warned_of() {
+        let soft = Material::of(&ForceLaw::PREMIUM);
+        let stiff = Material {
+            stiffness_n_per_mm: 8.0,
+            ..soft
+        };
+        let fine = Material {
+            texture: Texture {
+                pattern: Pattern::Grain,
+                amplitude_mm: 0.03,
+                wavelength_mm: 0.3,
+                ..Texture::NONE
+            },
+            ..soft
+        };
+        let told = |materials: &[Material], law: &ForceLaw| {
+            let table = MaterialTable::new(materials).expect("some");
+            warnings_of(law, &table, 1000, SHORT_US).join("; ")
+        };
+        let law = ForceLaw::PREMIUM;
+        assert_eq!(told(&[soft, soft], &law), "");
+        let both = told(&[soft, stiff, fine, stiff], &law);
+        assert_eq!(both.matches("a stiffness of 8 N/mm").count(), 1, "{both}");
+        assert!(both.contains("wavelength of 0.3 mm"));
+        // A scene that is twice as stiff is so on each of them.
+        let twice = ForceLaw {
+            stiffness_n_per_mm: 1.0,
+            ..law
+        };
+        assert!(told(&[soft, stiff], &twice).contains("a stiffness of 16 N/mm"));
+    }
+
+    #[test]
+    fn a_texture_is_warned_of_that_fades_under_a_slow_hand() {
+        let told = |wavelength_mm, hz| {
+            let texture = Texture {
+                pattern: Pattern::Grain,
+                wavelength_mm,
+                ..Texture::NONE
+            };
+            too_fine(&texture, TickRate::new(hz).expect("a rate")).unwrap_or_default()
+        };
+        let fine = told(0.3, 1000);
+        assert!(
+            fine.contains("from 38 mm/s on") && fine.contains("from 0.4 mm on"),
+            "{fine}"
+        );
+        assert_eq!(
+            [told(0.3, 2000), told(0.4, 1000)],
+            [String::new(), String::new()]
+        );
+        assert_eq!(too_fine(&Texture::NONE, TickRate::DEFAULT), None);
+    }
+
+    #[test]
+    fn a_textured_surface_is_warned_of_at_half_the_stiffness() {
+        let told = |stiffness_n_per_mm| {
+            let law = ForceLaw {
+                stiffness_n_per_mm,
+                texture: Texture {
+                    pattern: Pattern::Grain,
+                    amplitude_mm: 0.1,
+                    wavelength_mm: 1.0,
+                    ..Texture::NONE
+                },
+                ..ForceLaw::PREMIUM
+            };
+            warning(&law, TickRate::DEFAULT, SHORT_US).unwrap_or_default()
+        };
+        assert_eq!(told(1.0), "");
+        let shakes = told(3.1);
+        assert!(
+            shakes.contains("may shake on a texture above 3 N/mm"),
+            "{shakes}"
+        );
+        assert!(!told(3.0).contains("shake"));
+    }
+
+    #[test]
+    fn a_surface_is_warned_of_by_the_rate() {
+        for (stiffness, hz) in [(0.5, 1000), (1.0, 1000), (2.0, 2000), (2.0, 10_000)] {
+            assert_eq!(told(stiffness, hz, Controller::On), "", "{hz}");
+        }
+        let trembles = told(1.5, 1000, Controller::On);
+        assert!(
+            trembles.contains("the tip trembles above 1 N/mm"),
+            "{trembles}"
+        );
+        let shakes = |stiffness, hz, controller| {
+            told(stiffness, hz, controller).contains("a limp hand shakes above")
+        };
+        assert!(shakes(3.5, 1000, Controller::Off) && !shakes(3.5, 1000, Controller::On));
+        assert!(shakes(6.5, 1000, Controller::On) && !shakes(6.5, 3000, Controller::On));
+        assert!(shakes(3.5, 3000, Controller::Off) && !shakes(3.5, 4000, Controller::Off));
+    }
+
+    #[test]
+    fn a_surface_is_warned_of_by_the_latency() {
+        let trembles = told_late(1.5, 1000, 1231, Controller::On);
+        assert!(
+            trembles.contains("above 1 N/mm at 1000 ticks a second and 1.23 ms to the motors"),
+            "{trembles}"
+        );
+        let shakes = |stiffness, controller| {
+            told_late(stiffness, 1000, 1231, controller).contains("a limp hand shakes above")
+        };
+        assert!(shakes(1.5, Controller::Off) && !shakes(1.5, Controller::On));
+        assert!(shakes(4.0, Controller::On) && !shakes(3.0, Controller::On));
+        // Still without the latency.
+        assert!(!told_late(4.0, 1000, SHORT_US, Controller::On).contains("shakes"));
+    }
+}
