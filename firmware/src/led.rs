@@ -29,6 +29,25 @@ const FLASH_AND_GAP: u32 = 400;
 const PAUSE: u32 = 1_500;
 
 impl LedPattern {
+    /// States and how each looks, for people.
+    pub const MEANINGS: [(&'static str, &'static str); 6] = [
+        ("amplifiers off", "a short flash every two seconds"),
+        (
+            "waits for the dead-man switch or for a small force",
+            "four flashes a second",
+        ),
+        ("amplifiers on", "lit"),
+        (
+            "amplifiers on, in contact",
+            "lit, with four short gaps a second",
+        ),
+        ("a fault", "as many flashes as its number, then a pause"),
+        (
+            "a chip that the program refuses",
+            "a long and a short flash, then a pause",
+        ),
+    ];
+
     /// The pattern for the guard's report, and for whether the HIP touches.
     #[must_use]
     pub const fn of(report: &Report, touching: bool) -> Self {

@@ -5,6 +5,7 @@ use hapterra::replay::Rule;
 
 /// Arguments of `hapterra-lab replay`.
 #[derive(Debug, clap::Args)]
+#[group(skip)]
 pub struct Args {
     /// As of `hapterra replay`.
     #[command(flatten)]

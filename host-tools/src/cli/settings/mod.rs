@@ -132,7 +132,7 @@ fn is_given(matches: &ArgMatches, option: &Arg) -> bool {
 fn input_keys(matches: &ArgMatches) -> BTreeSet<String> {
     let given = matches.try_get_raw("input").ok().flatten();
     let given = given.into_iter().flatten();
-    given.map(|value| key_of(value)).collect()
+    given.map(key_of).collect()
 }
 
 /// The key of `KEY=VALUE`.

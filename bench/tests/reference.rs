@@ -1,0 +1,196 @@
+//! The pages of the reference that the code writes: `cargo xtask docs` compares them, and
+//! `cargo xtask docs --write` writes them anew.
+
+use std::fmt::Write as _;
+
+use clap::builder::StyledStr;
+use clap::{Arg, ArgAction, Command, CommandFactory as _};
+use hapterra_core::guard::{Blockers, Fault, Limits};
+use hapterra_firmware::led::LedPattern;
+use hapterra_tests::repository;
+
+/// Longest line of a page, characters.
+const MAX_LINE: usize = 120;
+const MARK: &str = "<!-- Written by `cargo xtask docs --write`: change the texts in the code. -->";
+
+/// Compares a page with what the code says, or writes it.
+fn check(page: &str, text: &str) {
+    let path = repository().join("docs/reference").join(page);
+    if std::env::var_os("HAPTERRA_DOCS").is_some_and(|wanted| wanted == "write") {
+        std::fs::write(&path, text).expect("written");
+    }
+    let kept = std::fs::read_to_string(&path).unwrap_or_default();
+    let first = kept.lines().zip(text.lines()).find(|(old, new)| old != new);
+    assert!(
+        kept == text,
+        "docs/reference/{page} is old: type cargo xtask docs --write. First: {first:#?}"
+    );
+}
+
+/// One item of a list, on lines of the page's length.
+fn item(page: &mut String, text: &str) {
+    let mut line = "-".to_owned();
+    for word in text.split_whitespace() {
+        if line.chars().count() + 1 + word.chars().count() > MAX_LINE {
+            *page += &line;
+            *page += "\n";
+            line = " ".to_owned();
+        }
+        line += " ";
+        line += word;
+    }
+    *page += &line;
+    *page += "\n";
+}
+
+/// As a sentence of its own.
+fn sentence(text: &str) -> String {
+    let text = text.trim().trim_end_matches('.');
+    let mut letters = text.chars();
+    let first = letters
+        .next()
+        .map(|letter| letter.to_uppercase().to_string());
+    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
+}
+
+fn shown(text: Option<&StyledStr>) -> String {
+    text.map(ToString::to_string).unwrap_or_default()
+}
+
+/// What `-h` says of an option or argument.
+fn about(arg: &Arg) -> String {
+    let mut text = format!("`{arg}`: {}", sentence(&shown(arg.get_help())));
+    let takes_value = arg.get_action().takes_values();
+    let values = arg.get_possible_values();
+    let values = values
+        .iter()
+        .filter(|value| takes_value && !value.is_hide_set());
+    let values: Vec<_> = values
+        .map(|value| format!("`{}`", value.get_name()))
+        .collect();
+    if !values.is_empty() {
+        // Writing to a String cannot fail.
+        let _ = write!(text, " One of {}.", values.join(", "));
+    }
+    let defaults = arg.get_default_values().iter();
+    let defaults: Vec<_> = defaults.map(|value| value.to_string_lossy()).collect();
+    if takes_value && !defaults.is_empty() {
+        let _ = write!(text, " Default: `{}`.", defaults.join(","));
+    }
+    text
+}
+
+/// Options and arguments that are this command's own: those of all commands are named once.
+fn own(command: &Command) -> Vec<&Arg> {
+    let arguments = command.get_arguments();
+    let is_own = |arg: &&Arg| {
+        let is_of_all = arg.is_global_set()
+            || matches!(arg.get_action(), ArgAction::Version)
+            || matches!(
+                arg.get_action(),
+                ArgAction::Help | ArgAction::HelpShort | ArgAction::HelpLong
+            );
+        !is_of_all && !arg.is_hide_set()
+    };
+    arguments.filter(is_own).collect()
+}
+
+fn subcommand(page: &mut String, program: &str, command: &mut Command) {
+    let _ = write!(
+        page,
+        "\n## {program} {}\n\n{}\n\n",
+        command.get_name(),
+        sentence(&shown(command.get_about()))
+    );
+    let is_positional = |arg: &&&Arg| arg.is_positional();
+    let arguments = own(command);
+    let first = arguments.iter().filter(is_positional);
+    let then = arguments.iter().filter(|arg| !arg.is_positional());
+    for arg in first.chain(then) {
+        item(page, &about(arg));
+    }
+}
+
+/// The command of a program, as it is parsed.
+fn built(mut command: Command) -> Command {
+    command = command.term_width(100);
+    command.build();
+    command
+}
+
+/// Every option of every subcommand, and those of all, which are defined once.
+fn definitions(program: &Command) -> usize {
+    let options = |command: &Command| {
+        let options = own(command).into_iter().filter(|arg| !arg.is_positional());
+        options.map(|arg| arg.get_id().clone()).collect::<Vec<_>>()
+    };
+    let mut all: Vec<_> = program.get_subcommands().flat_map(options).collect();
+    all.sort();
+    all.dedup();
+    // --verbose, --help, --version.
+    all.len() + 3
+}
+
+#[test]
+fn command_line_is_that_of_the_programs() {
+    let mut programs = [
+        built(hapterra::cli::Cli::command()),
+        built(hapterra_lab::cli::Cli::command()),
+    ];
+    let all = definitions(&programs[0]);
+    let run = programs[0].find_subcommand_mut("run").expect("a command");
+    let help = run.render_help().to_string();
+    let lines = help.trim_end().lines().count();
+    let options = help
+        .lines()
+        .filter(|line| line.trim_start().starts_with('-'))
+        .count();
+    let mut page = format!(
+        "# Command line\n\n{MARK}\n\n\
+         This page lists what `hapterra` and `hapterra-lab` take, as `-h` prints it. `--help` of a command explains\n\
+         more. All commands take `-v` (up to `-vvv`) for more messages, `-h` and `--help`.\n\n\
+         | size | |\n| --- | ---: |\n\
+         | options of `hapterra` | {all} |\n\
+         | options in `hapterra run -h` | {options} |\n\
+         | lines of `hapterra run -h` | {lines} |\n"
+    );
+    for program in &mut programs {
+        let name = program.get_name().to_owned();
+        let commands = program.get_subcommands_mut();
+        for command in commands.filter(|command| command.get_name() != "help") {
+            subcommand(&mut page, &name, command);
+        }
+    }
+    check("command-line.md", &page);
+}
+
+#[test]
+fn faults_are_those_of_the_code() {
+    let mut page = format!(
+        "# Faults, blockers, limits and the LED\n\n{MARK}\n\n\
+         This page lists what a board reports, with the names of `hapterra status` and of recordings.\n\n\
+         ## Faults\n\n\
+         A fault switches the amplifiers off. It stays until it is cleared: `hapterra status --clear`.\n\n"
+    );
+    for fault in Fault::ALL {
+        let (meaning, remedy) = (sentence(fault.meaning()), sentence(fault.what_to_do()));
+        item(
+            &mut page,
+            &format!("**{} {fault:?}**: {meaning} {remedy}", fault.number()),
+        );
+    }
+    page +=
+        "\n## Blockers\n\nA blocker keeps the arm from being armed while its cause is there.\n\n";
+    for (name, meaning) in Blockers::all().meanings() {
+        item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
+    }
+    page += "\n## Limits\n\nA limit is why the force is not that of the surface.\n\n";
+    for (name, meaning) in Limits::all().meanings() {
+        item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
+    }
+    page += "\n## LED\n\n| state | status LED |\n| --- | --- |\n";
+    for (state, looks) in LedPattern::MEANINGS {
+        let _ = writeln!(page, "| {state} | {looks} |");
+    }
+    check("faults.md", &page);
+}
