@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(short, long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
 
-    /// Write the finest level that has at most so many samples
+    /// Largest number of samples; the finest level within it is written
     #[arg(long, value_name = "N", default_value_t = 4_000_000, value_parser = clap::value_parser!(u64).range(1024..))]
     pub most_samples: u64,
 }

@@ -33,8 +33,9 @@ pub struct Args {
     #[arg(long, num_args = 0, default_missing_value = "", value_parser = formats::Printed)]
     pub formats: Option<formats::Printed>,
 
-    /// Work out what the tiles take on a link of so many megabytes a second (1 where no
-    /// number is given), and how many cells a second the HIP may move along an axis
+    /// Show the tiles on a link of this many megabytes a second [1 without a number]
+    ///
+    /// Bytes of a tile, tiles a second, and the cells a second that the HIP may move along an axis.
     #[arg(long, value_name = "MB_PER_S", num_args = 0..=1, default_missing_value = "1", value_parser = rate)]
     pub link: Option<f64>,
 

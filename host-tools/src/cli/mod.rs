@@ -6,7 +6,8 @@
 //! - [`failure`] and `hints`: what an error looks like, and what to do about it;
 //! - `guardian`: the process that outlives one whose arm may be armed;
 //! - [`report`]: what a command exists to print;
-//! - `moved`: what earlier versions had, and what to type now;
+//! - `settings`: settings files and recordings in place of options;
+//! - `moved` and `old_options`: what earlier versions had, and what to type now;
 //! - `log` and `sparing`: diagnostics, and lines that a device can cause kept to so many
 //!   a second.
 
@@ -50,7 +51,7 @@ use terminal::voice;
 
 /// Touch terrain of any size through a Phantom.
 #[derive(Debug, Parser)]
-#[command(name = "hapterra", version, propagate_version = true)]
+#[command(name = "hapterra", version)]
 pub struct Cli {
     /// Say more: -v progress, -vv details, -vvv everything
     #[arg(short, long, action = ArgAction::Count, global = true)]
@@ -68,17 +69,17 @@ pub enum Command {
     Info(info::Args),
     /// Write a terrain's heights for the page that touches it in a browser
     Cut(cut::Args),
-    /// Serve a terrain to a device and watch what is felt
+    /// Serve a terrain to a device and record what it renders
     Run(run::Args),
-    /// Show it all: a terrain, a board, a hand that tours it, and a picture
+    /// Show it all: a terrain, a board, a scripted hand on it, and a picture
     Demo(demo::Args),
-    /// Feel a trajectory tick by tick and write what was felt
+    /// Render the forces along a trajectory, tick by tick
     Replay(replay::Args),
-    /// Show a recording again in the viewer, to scrub and replay
+    /// Show a recording in the viewer, to scrub and replay
     View(view::Args),
     /// Show boards, debug probes and ports that can be seen from here
     List(list::Args),
-    /// Show how a device is: calibration, what keeps it from arming, faults, figures
+    /// Show a device: calibration, what keeps it from arming, faults, figures
     Status(status::Args),
     /// Bring a board and its arm up for the first time, step by step, with a log
     Bringup(bringup::Args),
@@ -182,3 +183,6 @@ pub fn finish(verbose: u8, command: impl FnOnce() -> Result<(), Failure>) -> u8 
     heightfield_gdal::exit_if_stuck(code);
     code
 }
+
+#[cfg(test)]
+mod help_tests;

@@ -60,18 +60,18 @@ pub struct Args {
     #[command(flatten)]
     pub terrain: TerrainFile,
 
-    /// Device: usb, usb:SERIAL, tcp:HOST:PORT or native; may be repeated
+    /// Device: usb, usb:SERIAL, tcp:HOST:PORT or native
     ///
-    /// usb:SERIAL: `hapterra list` shows it. native: the application in this program, with a virtual
+    /// May be repeated. usb:SERIAL: `hapterra list` shows it. native: the application in this program, with a virtual
     /// Phantom in a scripted hand. tcp:HOST:PORT+plant:HOST:PORT: an emulated board, whose virtual arm
     /// in a scripted hand is moved over its second line. Several devices render the terrain at once,
     /// each with its own arm.
     #[arg(long, default_value = "usb")]
     pub device: Vec<ServedDevice>,
 
-    /// File for the recording, tick by tick: CSV, or Parquet if its name ends in .parquet
+    /// File for the recording: CSV, or Parquet as FILE.parquet
     ///
-    /// With several devices OUT-1, OUT-2 and so on, in their order.
+    /// A row for each tick. With several devices OUT-1, OUT-2 and so on, in their order.
     #[arg(short, long, value_name = "OUT", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
 
@@ -79,11 +79,13 @@ pub struct Args {
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub duration: Option<f64>,
 
-    /// Time after which the device disarms if it hears nothing from here, as 10s
+    /// Disarm after this time without a message from here, as 10s
+    ///
+    /// The device does so by itself; a number alone is in seconds.
     #[arg(long, value_name = "TIME", default_value_t = Patience::REAL_SILENCE_S, value_parser = silence)]
     pub silence: u16,
 
-    /// Serve a real board although its log of `hapterra bringup` is not complete
+    /// Serve a real board without a complete log of hapterra bringup
     #[arg(long)]
     pub unchecked: bool,
 

@@ -554,3 +554,53 @@ fn a_home_that_is_too_far_to_be_addressed_is_named() {
     assert!(scene(&view).is_ok());
     assert_eq!(scene(&far), Err(PlaceError::FarAway(far.home_mm)));
 }
+
+#[test]
+fn place_in_another_reference_system_is_the_same_place() {
+    let grids = made();
+    let (degrees, utm, bare) = (&grids[0].1, &grids[2].1, &grids[6].1);
+    let ground = |raster: &Raster, place, coordinates| {
+        let view = seen(raster, &at(place, coordinates, Sizing::Fit));
+        view.map(|(_, view)| view.home_ground)
+    };
+    let near = |found: [f64; 2], place: [f64; 2], within: f64| {
+        (0..2).all(|axis| (found[axis] - place[axis]).abs() < within)
+    };
+    // NAD83 and WGS 84 count as one.
+    let place = [386_200.0, 3_790_100.0];
+    for code in [26911, 32611] {
+        let found = ground(utm, place, Coordinates::Epsg(code)).expect("there");
+        assert!(near(found, place, 1e-2), "EPSG:{code}: {found:?}");
+    }
+    let lonlat = [10.02_f64, 60.015_f64];
+    let radius_m = 6_378_137.0;
+    let half = 0.5 * lonlat[1].to_radians();
+    let web = [
+        radius_m * lonlat[0].to_radians(),
+        radius_m * (std::f64::consts::FRAC_PI_4 + half).tan().ln(),
+    ];
+    let found = ground(degrees, web, Coordinates::Epsg(3857)).expect("there");
+    assert!(near(found, lonlat, 1e-7), "{found:?}");
+    let sides = [386_100.0, 3_790_050.0, 386_300.0, 3_790_200.0];
+    let laid = |coordinates| {
+        let (_, view) = seen(utm, &boxed(sides, coordinates)).expect("there");
+        view.laid_mm
+    };
+    let (own, other) = (laid(OWN), laid(Coordinates::Epsg(32611)));
+    for side in 0..4 {
+        assert!((own[side] - other[side]).abs() < 1e-2, "{own:?} {other:?}");
+    }
+    let error = |raster, place, code| {
+        let found = ground(raster, place, Coordinates::Epsg(code));
+        found.expect_err("no such place").to_string()
+    };
+    let why = error(utm, place, 1);
+    assert!(why.contains("no reference system EPSG:1"), "{why}");
+    let why = error(bare, place, 32611);
+    assert!(why.contains("states no reference system"), "{why}");
+    let why = error(utm, [9e9, 9e9], 32612);
+    assert!(
+        why.contains("no place of") || why.contains("outside"),
+        "{why}"
+    );
+}

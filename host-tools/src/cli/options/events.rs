@@ -10,9 +10,9 @@ use crate::events::{Server, Watcher};
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 #[command(next_help_heading = "While it is touched")]
 pub struct EventOptions {
-    /// Send events as lines of JSON to programs at this port of 127.0.0.1; 0 takes a free one
+    /// Send events as lines of JSON at this port of 127.0.0.1
     ///
-    /// With PORT,N every N-th sample is sent, too, of the thousand that a device reports a second.
+    /// 0 takes a free one. With PORT,N every N-th sample is sent, too, of the thousand that a device reports a second.
     #[arg(long, value_name = "PORT[,N]", value_parser = events)]
     pub events: Option<Events>,
 }

@@ -19,19 +19,21 @@ const FLAT_MM: f64 = 4.0;
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Place and scale")]
 pub struct Placing {
-    /// Place under the arm's home position; 1 mm is a haptic cell unless --scale says more
+    /// Place under the arm's home position
+    ///
+    /// At 1mm/cell, unless --scale is given.
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = numbers::<2>,
           conflicts_with = "bbox")]
     pub at: Option<[f64; 2]>,
 
-    /// Part of the terrain to fit to the workspace of the arm: west, south, east, north
+    /// Part of the terrain to fit to the arm's workspace
     #[arg(long, value_name = "W,S,E,N", allow_hyphen_values = true, value_parser = numbers::<4>,
           conflicts_with = "scale")]
     pub bbox: Option<[f64; 4]>,
 
-    /// Coordinates of --at and --bbox: file, lonlat or EPSG:N [default: file]
+    /// Coordinates of --at and --bbox: file, lonlat or EPSG:N
     ///
-    /// file: x and y of the file's reference system (columns and rows from the south-west sample where
+    /// [default: file] file: x and y of the file's reference system (columns and rows from the south-west sample where
     /// it has none); lonlat: degrees of WGS 84, on another body its own; EPSG:N: x and y, east before
     /// north, of that reference system.
     #[arg(long, value_name = "CRS", value_parser = coordinates)]

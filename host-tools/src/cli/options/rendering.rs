@@ -19,28 +19,30 @@ const RADII_MM: [f64; 2] = [0.0, 100.0];
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Place and scale")]
 pub struct Rendering {
-    /// Size: ground metres a device millimetre (5m/mm), or of a haptic cell (1.5mm/cell)
+    /// Ground metres a device millimetre (5m/mm), or 1.5mm/cell
     ///
     /// [default: replay 1mm/cell; else the terrain is fitted to the workspace, and with --at it is
-    /// 1mm/cell] A number alone is in m/mm.
+    /// 1mm/cell] mm/cell is the size of a haptic cell; a number alone is in m/mm.
     #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
     pub scale: Option<MapScale>,
 
-    /// Height: times true to scale, auto, or device millimetres a unit (0.05mm/unit) [default: 1]
+    /// Heights: times true to scale, auto, or 0.05mm/unit
     ///
-    /// auto: as many times as make 15 mm of relief, and once where there is more. A file that states no
+    /// [default: 1] mm/unit: device millimetres a vertical unit of the file. auto: as many times as make 15 mm of relief, and once where there is more. A file that states no
     /// size of its cells has no true scale: without this option a vertical unit is 1 mm, or the relief
     /// is fitted.
     #[arg(long, value_name = "TIMES|auto", allow_hyphen_values = true)]
     pub exaggeration: Option<Exaggeration>,
 
-    /// Level of detail: every 2^LEVEL-th sample [default: replay 0, else by the encoders]
+    /// Level of detail: every 2^LEVEL-th sample
+    ///
+    /// [default: replay 0, else the finest that the encoders resolve]
     #[arg(long)]
     pub level: Option<u8>,
 
-    /// Radius of the ball at the tip in mm, as 2mm [default: 7 mm, replay 0]
+    /// Radius of the ball at the tip, as 2mm
     ///
-    /// The HIP is the ball's centre; 0 is a point, the default with --level. The level is such that the
+    /// [default: 7 mm; replay 0] The HIP is the ball's centre; 0 is a point, the default with --level. The level is such that the
     /// radius is at most 8 cells.
     #[arg(long, value_name = "MM", allow_negative_numbers = true,
           value_parser = |text: &str| LENGTH.read_within(text, RADII_MM))]

@@ -33,9 +33,9 @@ const NOT_IN_FILE: [&str; 4] = ["settings", "help", "version", "verbose"];
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Settings")]
 pub struct SettingsOption {
-    /// Settings: a FILE.toml, a recording, or none [default: hapterra.toml, if it exists]
+    /// FILE.toml, a recording, or none
     ///
-    /// Its keys are the names of options, as device = "usb" and scale = "5m/mm"; [surface.default] may
+    /// [default: hapterra.toml, if it exists] Its keys are the names of options, as device = "usb" and scale = "5m/mm"; [surface.default] may
     /// have a surface in place. Options given on the command line win.
     #[arg(long, value_name = "FILE|none", value_hint = ValueHint::FilePath)]
     pub settings: Option<PathBuf>,
@@ -132,7 +132,7 @@ fn is_given(matches: &ArgMatches, option: &Arg) -> bool {
 fn input_keys(matches: &ArgMatches) -> BTreeSet<String> {
     let given = matches.try_get_raw("input").ok().flatten();
     let given = given.into_iter().flatten();
-    given.map(|value| key_of(value)).collect()
+    given.map(key_of).collect()
 }
 
 /// The key of `KEY=VALUE`.

@@ -187,9 +187,8 @@ fn options_of_a_recording_are_those_of_its_making() {
     assert_eq!(rendering.scale, Some(MapScale::CellMm(2.0)));
     assert_eq!(rendering.exaggeration, Some(Exaggeration::MmPerUnit(6.0)));
     assert_eq!((rendering.level, rendering.tip), (Some(1), Some(0.0)));
-    let (args, lines) = replayed("--ignore-settings");
+    let (args, _) = replayed("--ignore-settings");
     assert_eq!(args.rendering.scale, None);
-    assert!(!lines.is_empty());
 }
 
 #[test]

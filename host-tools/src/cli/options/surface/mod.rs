@@ -24,9 +24,9 @@ use table::{Look, PassivityName, ShadingName, TableFile};
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Surface")]
 pub struct SurfaceOptions {
-    /// Surface: ice, sand, rock, or a file with one [default: ice]
+    /// Surface: ice, sand, rock, or a file
     ///
-    /// ice: 0.5 N/mm without friction. sand: 0.4 N/mm, friction 0.5, damping 2 Ns/m, grain of 0.1 mm
+    /// [default: ice] ice: 0.5 N/mm without friction. sand: 0.4 N/mm, friction 0.5, damping 2 Ns/m, grain of 0.1 mm
     /// every 1.5 mm. rock: 0.8 N/mm, friction 0.4 and 0.6 at rest, grain of 0.05 mm every 0.8 mm.
     /// FILE.toml: stiffness, friction, static_friction, viscous_friction, damping, texture ("grain" or
     /// "grating") and its texture_amplitude, texture_wavelength, texture_direction and texture_seed
@@ -35,7 +35,7 @@ pub struct SurfaceOptions {
     #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, value_parser = choice())]
     pub surface: Option<SurfaceChoice>,
 
-    /// Stiffness in N/mm, as 0.5N/mm [default: the surface's]
+    /// Stiffness, as 0.5N/mm [default: the surface's]
     #[arg(long, value_name = "N/MM", value_parser = |text: &str| STIFFNESS.read_single(text),
           allow_negative_numbers = true)]
     pub stiffness: Option<f32>,
@@ -44,12 +44,14 @@ pub struct SurfaceOptions {
     #[arg(long, value_name = "MU", allow_negative_numbers = true)]
     pub friction: Option<f32>,
 
-    /// Largest force in N [default: 8.5]
+    /// Largest force, as 8N [default: 8.5]
     #[arg(long, value_name = "N", value_parser = |text: &str| FORCE.read_single(text),
           allow_negative_numbers = true)]
     pub max_force: Option<f32>,
 
-    /// Raster of classes of the ground, as land cover; --surface has what each feels like
+    /// Raster of classes of the ground; --surface has them
+    ///
+    /// As land cover: in a grid and a reference system of its own.
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub materials: Option<PathBuf>,
 }

@@ -1,0 +1,37 @@
+//! How much the command line asks of its readers.
+
+use std::collections::BTreeSet;
+
+use clap::CommandFactory as _;
+
+use super::Cli;
+
+/// What `hapterra run -h` prints at 100 columns.
+const RUN: &str = include_str!("run_help.txt");
+
+#[test]
+fn short_help_of_run_fits_a_screen() {
+    let mut command = Cli::command().term_width(100);
+    command.build();
+    let run = command.find_subcommand_mut("run").expect("run");
+    let help = run.render_help().to_string();
+    assert_eq!(help, RUN, "\n{help}");
+    assert!(help.lines().count() <= 60, "{} lines", help.lines().count());
+    let options = help
+        .lines()
+        .filter(|line| line.trim_start().starts_with('-'));
+    assert!(options.count() <= 24);
+}
+
+#[test]
+fn options_are_few() {
+    let command = Cli::command();
+    let mut options = BTreeSet::new();
+    for subcommand in command.get_subcommands() {
+        let own = subcommand.get_opts();
+        // Those that several commands share are defined once.
+        let own = own.map(|it| (it.get_long(), it.get_help().map(ToString::to_string)));
+        options.extend(own);
+    }
+    assert!(options.len() < 65, "{}: {options:?}", options.len());
+}
