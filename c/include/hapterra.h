@@ -1,8 +1,8 @@
 /* Touch a height field from C and C++: millimetres in, newtons out.
  *
  * Frame: x east, y north, z up, from the south-west sample at height zero. An object belongs to one
- * thread at a time. What a function points to stays the caller's, and is used during the call only,
- * unless the function says otherwise.
+ * thread at a time. Pointers stay the caller's, and are used during the call only, unless the function
+ * states otherwise.
  *
  * Made by cbindgen from the library: `HAPTERRA_WRITE=1 cargo test -p hapterra-c --test header`. */
 
@@ -21,7 +21,7 @@ enum HapterraStatus
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * All is well.
+   * Success.
    */
   HAPTERRA_STATUS_OK = 0,
   /**
@@ -33,15 +33,15 @@ enum HapterraStatus
    */
   HAPTERRA_STATUS_BAD_POINTER = 2,
   /**
-   * The terrain has no heights yet, or the contact has not begun.
+   * The terrain has no heights yet, or the contact was not begun.
    */
   HAPTERRA_STATUS_NOT_BEGUN = 3,
   /**
-   * A terrain of such a size, or with so many samples, cannot be.
+   * The size or the number of samples is not possible.
    */
   HAPTERRA_STATUS_SIZE = 4,
   /**
-   * The millimetres of a cell or of a vertical unit are no scale.
+   * The millimetres of a cell or of a vertical unit are not a valid scale.
    */
   HAPTERRA_STATUS_SCALE = 5,
   /**
@@ -61,7 +61,7 @@ enum HapterraStatus
    */
   HAPTERRA_STATUS_RATE = 9,
   /**
-   * A place is not a number, or too far away.
+   * A position is not a number, or too far away.
    */
   HAPTERRA_STATUS_PLACE = 10,
   /**
@@ -73,19 +73,19 @@ enum HapterraStatus
    */
   HAPTERRA_STATUS_FAR = 12,
   /**
-   * A number is none of an enumeration's.
+   * A number is not a value of its enumeration.
    */
   HAPTERRA_STATUS_CHOICE = 13,
   /**
-   * There is no memory.
+   * Memory could not be allocated.
    */
   HAPTERRA_STATUS_MEMORY = 14,
   /**
-   * The library is at fault. The object cannot be used any more but for its end.
+   * A defect of the library. The object can only be freed.
    */
   HAPTERRA_STATUS_INTERNAL = 15,
   /**
-   * A tip is no ball that can touch these cells.
+   * The radius of a tip is not possible on these cells.
    */
   HAPTERRA_STATUS_TIP = 16,
 };
@@ -98,7 +98,7 @@ typedef uint32_t HapterraStatus;
 #endif // __cplusplus
 
 /**
- * Which normals a force follows.
+ * The normals that a force follows.
  */
 enum HapterraShading
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -106,11 +106,11 @@ enum HapterraShading
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * Those of the cells: an edge between cells is felt as an edge.
+   * Normals of the cells: the force turns at once where two cells meet.
    */
   HAPTERRA_SHADING_NONE = 0,
   /**
-   * Normals that turn evenly over the edges.
+   * Normals that turn evenly from cell to cell.
    */
   HAPTERRA_SHADING_SMOOTH = 1,
 };
@@ -123,7 +123,7 @@ typedef uint32_t HapterraShading;
 #endif // __cplusplus
 
 /**
- * What a texture looks like.
+ * The pattern of a texture.
  */
 enum HapterraTexture
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -152,7 +152,7 @@ typedef uint32_t HapterraTexture;
 #endif // __cplusplus
 
 /**
- * Which row of an array comes first.
+ * The order of the rows of an array.
  */
 enum HapterraRowOrder
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -177,7 +177,7 @@ typedef uint32_t HapterraRowOrder;
 #endif // __cplusplus
 
 /**
- * What a proxy is doing.
+ * The state of a proxy.
  */
 enum HapterraState
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -193,15 +193,15 @@ enum HapterraState
    */
   HAPTERRA_STATE_TOUCHING = 1,
   /**
-   * The surface has come to an end, and the last force fades away.
+   * The surface has ended, and the last force ramps down.
    */
   HAPTERRA_STATE_FADING = 2,
   /**
-   * The HIP is below the surface and has not been above it: no force until it has.
+   * The HIP is below the surface and was not above it yet: no force until it was.
    */
   HAPTERRA_STATE_BELOW_GROUND = 3,
   /**
-   * The HIP is in a hole or outside and has not been above the surface: no force.
+   * The HIP is in a no-data area or outside, and was not above the surface yet: no force.
    */
   HAPTERRA_STATE_OUTSIDE = 4,
 };
@@ -214,22 +214,22 @@ typedef uint32_t HapterraState;
 #endif // __cplusplus
 
 /**
- * One haptic interface point (HIP) over a terrain. Made by `hapterra_contact_new`, it has not begun.
+ * One haptic interface point (HIP) over a terrain, created by `hapterra_contact_new` and not begun.
  */
 typedef struct HapterraContact HapterraContact;
 
 /**
- * A height field. Made by `hapterra_terrain_new`, it has no heights yet.
+ * A height field, created by `hapterra_terrain_new` without heights.
  */
 typedef struct HapterraTerrain HapterraTerrain;
 
 /**
- * How a surface is rendered. Fill it with `hapterra_surface_default`, then change what you like; it
+ * The parameters of a surface. Fill it with `hapterra_surface_default`, then change what you like; it
  * is checked when it is used. 48 bytes.
  */
 typedef struct HapterraSurface {
   /**
-   * Newtons for a millimetre between HIP and proxy; not negative.
+   * Stiffness, N/mm; not negative.
    */
   float stiffness_n_per_mm;
   /**
@@ -261,29 +261,29 @@ typedef struct HapterraSurface {
    */
   uint32_t texture;
   /**
-   * How far a texture reaches above and below the surface, mm, 0 to 2, and at most an eighth of
+   * Height of a texture above and below the surface, mm, 0 to 2, and at most an eighth of
    * its wavelength.
    */
   float texture_amplitude_mm;
   /**
-   * From ridge to ridge, mm, 0.25 to 100.
+   * Wavelength of a texture, mm, 0.25 to 100.
    */
   float texture_wavelength_mm;
   /**
-   * In which direction the ridges of a grating follow each other, degrees from east to north.
+   * Direction across the ridges of a grating, degrees from east to north.
    */
   float texture_direction_deg;
   /**
-   * Which of the textures that are alike.
+   * Seed of a texture: another variant of the same pattern.
    */
   uint32_t texture_seed;
 } HapterraSurface;
 
 /**
  * Reads heights of a block of samples into `heights`, row by row from the south and each row from
- * west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for a hole. `column` and `row` count
+ * west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for no-data. `column` and `row` count
  * from the south-west sample. Returns 0, or any other number for an error. `user` is the pointer
- * that was given with the function. It is called during calls with a contact or terrain only, and
+ * that was passed with the function. It is called during calls with a contact or terrain only, and
  * must not end by an exception or `longjmp`.
  */
 typedef uint32_t (*HapterraRead)(void *user,
@@ -294,7 +294,7 @@ typedef uint32_t (*HapterraRead)(void *user,
                                  double *heights);
 
 /**
- * A step's answer. 64 bytes.
+ * The result of a step. 64 bytes.
  */
 typedef struct HapterraStep {
   /**
@@ -346,13 +346,13 @@ HapterraStatus hapterra_surface_default(struct HapterraSurface *surface);
 struct HapterraTerrain *hapterra_terrain_new(void);
 
 /**
- * Ends a terrain; null is left alone. Contacts on it stay as they are.
+ * Frees a terrain; null is ignored. Contacts on it stay as they are.
  */
 void hapterra_terrain_free(struct HapterraTerrain *terrain);
 
 /**
- * Gives a terrain `columns` times `rows` heights in millimetres, `cell_mm` apart, row by row in a
- * `HapterraRowOrder`, each row from west to east; NaN is a hole. They are copied. Contacts that
+ * Sets `columns` times `rows` heights in millimetres, `cell_mm` apart, row by row in a
+ * `HapterraRowOrder`, each row from west to east; NaN is no-data. They are copied. Contacts that
  * have begun keep the terrain that they have.
  *
  * # Safety
@@ -391,7 +391,7 @@ HapterraStatus hapterra_terrain_set_reader(struct HapterraTerrain *terrain,
                                            double cell_mm);
 
 /**
- * Says how many millimetres a unit of the heights is, where they are not millimetres. It counts for
+ * Sets the millimetres of a unit of the heights, if they are not millimetres. It counts for
  * the heights that the terrain has, and for contacts that begin later.
  */
 HapterraStatus hapterra_terrain_set_height_scale(struct HapterraTerrain *terrain,
@@ -407,7 +407,7 @@ HapterraStatus hapterra_terrain_set_tip(struct HapterraTerrain *terrain,
                                         double tip_mm);
 
 /**
- * Says of which material each sample is: the number of one of the surfaces of
+ * Sets the material of each sample: the number of one of the surfaces of
  * `hapterra_contact_begin`, row by row in a `HapterraRowOrder`. There are as many as the terrain
  * has samples, and they are copied.
  *
@@ -420,7 +420,7 @@ HapterraStatus hapterra_terrain_set_materials(struct HapterraTerrain *terrain,
                                               uint32_t order);
 
 /**
- * Returns the height of the surface at a place, mm, or of a ball's centre over it; NaN in a hole, off the terrain, where it cannot
+ * Returns the height of the surface at a place, mm, or of a ball's centre over it; NaN in a no-data area, off the terrain, where it cannot
  * be read, and for null.
  */
 double hapterra_terrain_height_mm(const struct HapterraTerrain *terrain,
@@ -439,7 +439,7 @@ const char *hapterra_terrain_message(const struct HapterraTerrain *terrain);
 struct HapterraContact *hapterra_contact_new(void);
 
 /**
- * Ends a contact; null is left alone.
+ * Frees a contact; null is ignored.
  */
 void hapterra_contact_free(struct HapterraContact *contact);
 
@@ -459,7 +459,7 @@ HapterraStatus hapterra_contact_begin(struct HapterraContact *contact,
                                       uint32_t rate_hz);
 
 /**
- * Puts other surfaces in between two steps, as `hapterra_contact_begin` takes them. The proxy stays
+ * Changes the surfaces between two steps, as `hapterra_contact_begin` takes them. The proxy stays
  * where it is, and the next force is that of the other surface.
  *
  * # Safety
@@ -501,16 +501,16 @@ HapterraStatus hapterra_contact_run(struct HapterraContact *contact,
 const char *hapterra_contact_message(const struct HapterraContact *contact);
 
 /**
- * Returns memory of so many bytes, aligned to 16, that the caller owns until `hapterra_free`; null
+ * Returns memory of `bytes` bytes, aligned to 16, that the caller owns until `hapterra_free`; null
  * for no bytes, and where there is none. Meant for WebAssembly; C has `malloc`.
  */
 void *hapterra_alloc(size_t bytes);
 
 /**
- * Gives memory back that `hapterra_alloc` returned for the same number of bytes. Null is left alone.
+ * Frees memory that `hapterra_alloc` returned for the same number of bytes. Null is ignored.
  *
  * # Safety
- * `pointer` is null, or came from `hapterra_alloc(bytes)` and has not been given back.
+ * `pointer` is null, or came from `hapterra_alloc(bytes)` and was not freed.
  */
 void hapterra_free(void *pointer,
                    size_t bytes);

@@ -10,7 +10,7 @@ use crate::status::{Failure, HapterraStatus, Message};
 use crate::surface::{HapterraSurface, surface};
 use crate::terrain::HapterraTerrain;
 
-/// What a proxy is doing.
+/// The state of a proxy.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraState {
@@ -18,15 +18,15 @@ pub enum HapterraState {
     Free = 0,
     /// The proxy is on the surface and the HIP below it.
     Touching = 1,
-    /// The surface has come to an end, and the last force fades away.
+    /// The surface has ended, and the last force ramps down.
     Fading = 2,
-    /// The HIP is below the surface and has not been above it: no force until it has.
+    /// The HIP is below the surface and was not above it yet: no force until it was.
     BelowGround = 3,
-    /// The HIP is in a hole or outside and has not been above the surface: no force.
+    /// The HIP is in a no-data area or outside, and was not above the surface yet: no force.
     Outside = 4,
 }
 
-/// A step's answer. 64 bytes.
+/// The result of a step. 64 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HapterraStep {
@@ -61,7 +61,7 @@ impl From<Step> for HapterraStep {
     }
 }
 
-/// One haptic interface point (HIP) over a terrain. Made by `hapterra_contact_new`, it has not begun.
+/// One haptic interface point (HIP) over a terrain, created by `hapterra_contact_new` and not begun.
 #[derive(Default)]
 pub struct HapterraContact {
     contact: Option<Contact>,
@@ -90,7 +90,7 @@ pub extern "C" fn hapterra_contact_new() -> Box<HapterraContact> {
     Box::default()
 }
 
-/// Ends a contact; null is left alone.
+/// Frees a contact; null is ignored.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_contact_free(contact: Option<Box<HapterraContact>>) {
     drop(contact);
@@ -123,7 +123,7 @@ pub unsafe extern "C" fn hapterra_contact_begin(
     })
 }
 
-/// Puts other surfaces in between two steps, as `hapterra_contact_begin` takes them. The proxy stays
+/// Changes the surfaces between two steps, as `hapterra_contact_begin` takes them. The proxy stays
 /// where it is, and the next force is that of the other surface.
 ///
 /// # Safety

@@ -7,7 +7,7 @@ use std::ptr::null_mut;
 /// Aligned for every type of the header.
 const ALIGNMENT: usize = 16;
 
-/// Returns memory of so many bytes, aligned to 16, that the caller owns until `hapterra_free`; null
+/// Returns memory of `bytes` bytes, aligned to 16, that the caller owns until `hapterra_free`; null
 /// for no bytes, and where there is none. Meant for WebAssembly; C has `malloc`.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_alloc(bytes: usize) -> *mut c_void {
@@ -18,10 +18,10 @@ pub extern "C" fn hapterra_alloc(bytes: usize) -> *mut c_void {
     }
 }
 
-/// Gives memory back that `hapterra_alloc` returned for the same number of bytes. Null is left alone.
+/// Frees memory that `hapterra_alloc` returned for the same number of bytes. Null is ignored.
 ///
 /// # Safety
-/// `pointer` is null, or came from `hapterra_alloc(bytes)` and has not been given back.
+/// `pointer` is null, or came from `hapterra_alloc(bytes)` and was not freed.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub unsafe extern "C" fn hapterra_free(pointer: *mut c_void, bytes: usize) {
     if let Ok(layout) = Layout::from_size_align(bytes, ALIGNMENT)

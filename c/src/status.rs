@@ -8,17 +8,17 @@ use hapterra_touch::{ContactError, StepError, TerrainError};
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraStatus {
-    /// All is well.
+    /// Success.
     Ok = 0,
     /// A pointer is null.
     NullPointer = 1,
     /// A pointer is not aligned, or a count is larger than memory.
     BadPointer = 2,
-    /// The terrain has no heights yet, or the contact has not begun.
+    /// The terrain has no heights yet, or the contact was not begun.
     NotBegun = 3,
-    /// A terrain of such a size, or with so many samples, cannot be.
+    /// The size or the number of samples is not possible.
     Size = 4,
-    /// The millimetres of a cell or of a vertical unit are no scale.
+    /// The millimetres of a cell or of a vertical unit are not a valid scale.
     Scale = 5,
     /// Heights are too tall or too steep.
     Heights = 6,
@@ -28,19 +28,19 @@ pub enum HapterraStatus {
     Material = 8,
     /// No tick rate: 1,000 to 10,000 in whole thousands.
     Rate = 9,
-    /// A place is not a number, or too far away.
+    /// A position is not a number, or too far away.
     Place = 10,
     /// The reader of heights returned an error.
     Unread = 11,
     /// A path is too long for one step.
     Far = 12,
-    /// A number is none of an enumeration's.
+    /// A number is not a value of its enumeration.
     Choice = 13,
-    /// There is no memory.
+    /// Memory could not be allocated.
     Memory = 14,
-    /// The library is at fault. The object cannot be used any more but for its end.
+    /// A defect of the library. The object can only be freed.
     Internal = 15,
-    /// A tip is no ball that can touch these cells.
+    /// The radius of a tip is not possible on these cells.
     Tip = 16,
 }
 

@@ -9,17 +9,17 @@ use hapterra_touch::{
 use crate::border::array;
 use crate::status::{Failure, HapterraStatus};
 
-/// Which normals a force follows.
+/// The normals that a force follows.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraShading {
-    /// Those of the cells: an edge between cells is felt as an edge.
+    /// Normals of the cells: the force turns at once where two cells meet.
     None = 0,
-    /// Normals that turn evenly over the edges.
+    /// Normals that turn evenly from cell to cell.
     Smooth = 1,
 }
 
-/// What a texture looks like.
+/// The pattern of a texture.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraTexture {
@@ -31,12 +31,12 @@ pub enum HapterraTexture {
     Grating = 2,
 }
 
-/// How a surface is rendered. Fill it with `hapterra_surface_default`, then change what you like; it
+/// The parameters of a surface. Fill it with `hapterra_surface_default`, then change what you like; it
 /// is checked when it is used. 48 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HapterraSurface {
-    /// Newtons for a millimetre between HIP and proxy; not negative.
+    /// Stiffness, N/mm; not negative.
     pub stiffness_n_per_mm: f32,
     /// Largest force, N; not negative.
     pub max_force_n: f32,
@@ -52,14 +52,14 @@ pub struct HapterraSurface {
     pub shading: u32,
     /// A `HapterraTexture`.
     pub texture: u32,
-    /// How far a texture reaches above and below the surface, mm, 0 to 2, and at most an eighth of
+    /// Height of a texture above and below the surface, mm, 0 to 2, and at most an eighth of
     /// its wavelength.
     pub texture_amplitude_mm: f32,
-    /// From ridge to ridge, mm, 0.25 to 100.
+    /// Wavelength of a texture, mm, 0.25 to 100.
     pub texture_wavelength_mm: f32,
-    /// In which direction the ridges of a grating follow each other, degrees from east to north.
+    /// Direction across the ridges of a grating, degrees from east to north.
     pub texture_direction_deg: f32,
-    /// Which of the textures that are alike.
+    /// Seed of a texture: another variant of the same pattern.
     pub texture_seed: u32,
 }
 

@@ -7,7 +7,7 @@ use hapterra_touch::{Block, Height, Heights, RowOrder, Terrain, TerrainError, Un
 use crate::border::{array, caught};
 use crate::status::{Failure, HapterraStatus, Message};
 
-/// Which row of an array comes first.
+/// The order of the rows of an array.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraRowOrder {
@@ -17,7 +17,7 @@ pub enum HapterraRowOrder {
     SouthFirst = 1,
 }
 
-/// A height field. Made by `hapterra_terrain_new`, it has no heights yet.
+/// A height field, created by `hapterra_terrain_new` without heights.
 #[derive(Default)]
 pub struct HapterraTerrain {
     pub(crate) terrain: Option<Terrain>,
@@ -25,9 +25,9 @@ pub struct HapterraTerrain {
 }
 
 /// Reads heights of a block of samples into `heights`, row by row from the south and each row from
-/// west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for a hole. `column` and `row` count
+/// west to east: `columns` times `rows`, at most 33 × 33, or 52 × 52 under a tip, NaN for no-data. `column` and `row` count
 /// from the south-west sample. Returns 0, or any other number for an error. `user` is the pointer
-/// that was given with the function. It is called during calls with a contact or terrain only, and
+/// that was passed with the function. It is called during calls with a contact or terrain only, and
 /// must not end by an exception or `longjmp`.
 pub type HapterraRead = Option<
     extern "C" fn(
@@ -120,14 +120,14 @@ pub extern "C" fn hapterra_terrain_new() -> Box<HapterraTerrain> {
     Box::default()
 }
 
-/// Ends a terrain; null is left alone. Contacts on it stay as they are.
+/// Frees a terrain; null is ignored. Contacts on it stay as they are.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_free(terrain: Option<Box<HapterraTerrain>>) {
     drop(terrain);
 }
 
-/// Gives a terrain `columns` times `rows` heights in millimetres, `cell_mm` apart, row by row in a
-/// `HapterraRowOrder`, each row from west to east; NaN is a hole. They are copied. Contacts that
+/// Sets `columns` times `rows` heights in millimetres, `cell_mm` apart, row by row in a
+/// `HapterraRowOrder`, each row from west to east; NaN is no-data. They are copied. Contacts that
 /// have begun keep the terrain that they have.
 ///
 /// # Safety
@@ -187,7 +187,7 @@ pub extern "C" fn hapterra_terrain_set_reader(
     })
 }
 
-/// Says how many millimetres a unit of the heights is, where they are not millimetres. It counts for
+/// Sets the millimetres of a unit of the heights, if they are not millimetres. It counts for
 /// the heights that the terrain has, and for contacts that begin later.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_set_height_scale(
@@ -219,7 +219,7 @@ pub extern "C" fn hapterra_terrain_set_tip(
     })
 }
 
-/// Says of which material each sample is: the number of one of the surfaces of
+/// Sets the material of each sample: the number of one of the surfaces of
 /// `hapterra_contact_begin`, row by row in a `HapterraRowOrder`. There are as many as the terrain
 /// has samples, and they are copied.
 ///
@@ -242,7 +242,7 @@ pub unsafe extern "C" fn hapterra_terrain_set_materials(
     })
 }
 
-/// Returns the height of the surface at a place, mm, or of a ball's centre over it; NaN in a hole, off the terrain, where it cannot
+/// Returns the height of the surface at a place, mm, or of a ball's centre over it; NaN in a no-data area, off the terrain, where it cannot
 /// be read, and for null.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_terrain_height_mm(

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Sounds each touch: louder the faster the tip comes, deeper where the ground is water.
+"""Sounds each touch: louder for a faster tip, deeper on water.
 
     sound_impacts.py PORT [--text]
 
@@ -21,12 +21,12 @@ import wave
 
 PLAYERS = ("paplay", "aplay", "afplay")
 RATE_HZ = 44_100
-# A tip of this speed sounds as loud as can be, mm/s.
+# The speed of the loudest sound, mm/s.
 LOUDEST_MM_S = 300.0
 
 
 def lines(port):
-    """The events of a session, from its beginning; waits for it to begin."""
+    """Yields the events of a session from its start; waits for the start."""
     while True:
         try:
             stream = socket.create_connection(("127.0.0.1", port))

@@ -18,7 +18,7 @@ SPEAKERS = (["spd-say", "--wait"], ["espeak-ng"], ["espeak"], ["say"])
 
 
 def lines(port):
-    """The events of a session, from its beginning; waits for it to begin."""
+    """Yields the events of a session from its start; waits for the start."""
     while True:
         try:
             stream = socket.create_connection(("127.0.0.1", port))
@@ -54,7 +54,7 @@ def main():
         elif process is None or process.poll() is not None:
             process = subprocess.Popen([*speaker, text])
         else:
-            # Still speaking: the height is spoken when it comes again.
+            # Still speaking: the next event has the height, too.
             continue
         spoken = height
 

@@ -94,6 +94,10 @@ silent! {
     CPLParseXMLString(*const c_char) -> *mut c_void = ptr::null_mut();
     CPLDestroyXMLNode(*mut c_void) -> () = ();
     VSIReadDirRecursive(*const c_char) -> *mut *mut c_char = ptr::null_mut();
+    VSIAllocFilesystemPluginCallbacksStruct() -> *mut c_void = ptr::null_mut();
+    VSIInstallPluginHandler(*const c_char, *const c_void) -> c_int = -1;
+    VSIFreeFilesystemPluginCallbacksStruct(*mut c_void) -> () = ();
+    CSLAddString(*mut *mut c_char, *const c_char) -> *mut *mut c_char = ptr::null_mut();
     VSIFOpenL(*const c_char, *const c_char) -> *mut c_void = ptr::null_mut();
     VSIFSeekL(*mut c_void, u64, c_int) -> c_int = -1;
     VSIFTellL(*mut c_void) -> u64 = 0;

@@ -8,22 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::Error;
 use crate::library::Library;
-use crate::settings;
-
-/// VRTs inside VRTs.
-const MAX_NESTING: u32 = 16;
-/// A VRT of 40,000 files has half as many bytes.
-const MAX_VRT_BYTES: u64 = 32 << 20;
-/// Files that a VRT names, directly or by another VRT.
-const MAX_FILES: usize = 1 << 17;
-/// A longer text is no name of a file.
-const MAX_NAME: usize = 4096;
-/// GDAL tells a VRT by its first bytes.
-const HEAD_BYTES: u64 = 1024;
-const VRT: &str = "<VRTDataset";
-/// Signs that divide a name of a driver's or of a virtual file system's, as in
-/// `NETCDF:"ocean.nc":depth`.
-const DIVIDERS: [char; 7] = [':', '"', ',', '?', '&', '{', '}'];
+use crate::vrt::{self, Named};
 
 /// Checks that a file, what lies beside it and what it names as a VRT are regular files.
 ///
@@ -49,46 +34,37 @@ impl Names<'_> {
     fn follow(mut self, path: &Path) -> Result<(), Error> {
         let mut open = vec![(path.to_owned(), 0)];
         while let Some((path, depth)) = open.pop() {
-            let Some(text) = vrt(&path)? else {
+            let Some(text) = text_of_vrt(&path)? else {
                 continue;
             };
-            if depth > MAX_NESTING {
-                return refused(&path, &format!("VRTs lie in each other {depth} deep"));
+            if depth > vrt::MAX_NESTING {
+                return refused(&path, &vrt::too_deep(depth));
             }
             let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-            let mut texts = vec![text];
-            while let Some(text) = texts.pop() {
-                for (node, value) in self.library.xml_texts(&text)? {
-                    if value.trim_start().starts_with(VRT) {
-                        texts.push(value);
-                    } else if is_address(&node, &value) && !settings::is_fetching_allowed() {
-                        return refused(
-                            &path,
-                            "it names what is elsewhere, and nothing is fetched",
-                        );
-                    } else if may_be_name(&node, &value) {
-                        let found = self.named(&value, &folder)?;
-                        open.extend(found.into_iter().map(|path| (path, depth + 1)));
-                    }
+            for named in vrt::names(self.library, &text)? {
+                if let Err(why) = named.check_here() {
+                    return refused(&path, &why);
                 }
+                let found = self.files_of(&named, &folder)?;
+                open.extend(found.into_iter().map(|path| (path, depth + 1)));
             }
         }
         Ok(())
     }
 
     /// The files that a text names, which were not looked at before.
-    fn named(&mut self, text: &str, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    fn files_of(&mut self, named: &Named, folder: &Path) -> Result<Vec<PathBuf>, Error> {
         let mut found = Vec::new();
-        let parts = text.split(DIVIDERS).chain([text]);
-        for part in parts.filter(|part| !part.is_empty()) {
+        for part in named.parts() {
             for name in [part, part.trim_start_matches('/')] {
                 for path in [folder.join(name), PathBuf::from(name)] {
                     if self.seen.contains(&path) || fs::metadata(&path).is_err() {
                         continue;
                     }
                     check_kind(&path)?;
-                    if self.seen.len() >= MAX_FILES {
-                        return refused(&path, &format!("more than {MAX_FILES} files are named"));
+                    if self.seen.len() >= vrt::MAX_FILES {
+                        let why = format!("more than {} files are named", vrt::MAX_FILES);
+                        return refused(&path, &why);
                     }
                     self.seen.insert(path.clone());
                     found.push(path);
@@ -99,44 +75,24 @@ impl Names<'_> {
     }
 }
 
-/// Whether a text of a VRT names what a driver of its own would ask a server for. GDAL itself looks
-/// at addresses that begin with `/vsi`.
-fn is_address(node: &str, value: &str) -> bool {
-    let node = node.to_ascii_lowercase();
-    let is_local = ["/vsi", "vrt://"]
-        .iter()
-        .any(|local| value.starts_with(local));
-    (node.ends_with("filename") || node.ends_with("dataset")) && value.contains("://") && !is_local
-}
-
-/// Whether a text of a VRT may name a file. Most are numbers.
-fn may_be_name(node: &str, value: &str) -> bool {
-    let node = node.to_ascii_lowercase();
-    let names_files = ["filename", "dataset", "dem"];
-    value.len() <= MAX_NAME
-        && (names_files.iter().any(|end| node.ends_with(end)) || value.parse::<f64>().is_err())
-}
-
 /// The text of a VRT; none where a file is something else.
-fn vrt(path: &Path) -> Result<Option<String>, Error> {
+fn text_of_vrt(path: &Path) -> Result<Option<String>, Error> {
     let Ok(mut file) = File::open(path) else {
         return Ok(None);
     };
     let mut bytes = Vec::new();
     let is_read = |result: std::io::Result<usize>| result.is_ok();
-    if !is_read(file.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes))
-        || !bytes.windows(VRT.len()).any(|part| part == VRT.as_bytes())
+    if !is_read(file.by_ref().take(vrt::HEAD_BYTES).read_to_end(&mut bytes)) || !vrt::begins(&bytes)
     {
         return Ok(None);
     }
-    let rest = MAX_VRT_BYTES + 1 - bytes.len() as u64;
+    let rest = vrt::MAX_BYTES + 1 - bytes.len() as u64;
     if !is_read(file.take(rest).read_to_end(&mut bytes)) {
         return Ok(None);
     }
-    match bytes.len() as u64 > MAX_VRT_BYTES {
-        true => refused(path, &format!("a VRT of more than {MAX_VRT_BYTES} bytes")),
-        // GDAL stops at a zero byte, too.
-        false => Ok(Some(String::from_utf8_lossy(&bytes).replace('\0', " "))),
+    match bytes.len() as u64 > vrt::MAX_BYTES {
+        true => refused(path, &vrt::too_large()),
+        false => Ok(Some(String::from_utf8_lossy(&bytes).into_owned())),
     }
 }
 

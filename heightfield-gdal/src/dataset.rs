@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use crate::band::Band;
 use crate::error::Error;
+use crate::file_system::{self, Mounted};
 use crate::functions::Handle;
 use crate::library::Loaded;
 use crate::text::{from_c, list_from_c, path_to_c, to_c};
@@ -27,6 +28,8 @@ const OF_ALL: [&str; 1] = ["OVERVIEW_LEVEL"];
 pub struct Dataset {
     pub(crate) loaded: Arc<Loaded>,
     handle: Handle,
+    /// Where its files are, if GDAL reads them through its caller.
+    files: Option<Arc<Mounted>>,
 }
 
 // SAFETY: GDAL lets a dataset go to another thread as long as one thread at a time uses it, which
@@ -45,6 +48,7 @@ pub struct Subdataset {
 impl Dataset {
     pub(crate) fn open(loaded: Arc<Loaded>, path: &Path, options: &[&str]) -> Result<Self, Error> {
         loaded.prepare_thread();
+        let files = mounted_in(path);
         let path = path_to_c(path)?;
         let options: Result<Vec<_>, _> = options.iter().map(|option| to_c(option)).collect();
         let options = options?;
@@ -60,7 +64,11 @@ impl Dataset {
         if handle.is_null() {
             return Err(loaded.refused("no driver knows the file"));
         }
-        let dataset = Self { loaded, handle };
+        let dataset = Self {
+            loaded,
+            handle,
+            files,
+        };
         dataset.check_options(&options)?;
         Ok(dataset)
     }
@@ -112,6 +120,7 @@ impl Dataset {
     /// The same file as a tree of arrays.
     pub(crate) fn open_arrays(loaded: Arc<Loaded>, path: &Path) -> Result<Self, Error> {
         loaded.prepare_thread();
+        let files = mounted_in(path);
         let path = path_to_c(path)?;
         let none = ptr::null();
         // SAFETY: the path stays for the call.
@@ -121,8 +130,19 @@ impl Dataset {
         };
         match handle.is_null() {
             true => Err(loaded.refused("it has no arrays")),
-            false => Ok(Self { loaded, handle }),
+            false => Ok(Self {
+                loaded,
+                handle,
+                files,
+            }),
         }
+    }
+
+    /// Why a file that GDAL reads through its caller could not be read, since this was called last.
+    /// What GDAL gives then may lack it, also where it says nothing.
+    #[must_use]
+    pub fn take_fault(&self) -> Option<std::io::Error> {
+        self.files.as_ref()?.take_fault()
     }
 
     pub(crate) const fn handle(&self) -> Handle {
@@ -238,6 +258,10 @@ impl Dataset {
         // SAFETY: the dataset is open; the list is copied.
         unsafe { list_from_c((functions.GDALGetMetadata)(self.handle, domain.as_ptr())) }
     }
+}
+
+fn mounted_in(path: &Path) -> Option<Arc<Mounted>> {
+    file_system::at(&path.to_string_lossy()).map(|(mounted, _)| mounted)
 }
 
 impl Drop for Dataset {

@@ -34,6 +34,39 @@ pub(crate) struct XmlNode {
     pub(crate) child: *const XmlNode,
 }
 
+/// A file's kind and size as `VSIStatBufL` has them.
+#[cfg(any(target_os = "linux", target_os = "android"))]
+pub(crate) type Stat = libc::stat64;
+/// A file's kind and size as `VSIStatBufL` has them.
+#[cfg(not(any(target_os = "linux", target_os = "android")))]
+pub(crate) type Stat = libc::stat;
+
+/// The beginning of `VSIFilesystemPluginCallbacksStruct` of `cpl_vsi.h`. Newer versions have more
+/// fields behind it, so that GDAL itself makes room for one, with a null pointer in each field.
+#[repr(C)]
+pub(crate) struct Callbacks {
+    pub(crate) user_data: *mut c_void,
+    pub(crate) stat:
+        Option<unsafe extern "C" fn(*mut c_void, *const c_char, *mut Stat, c_int) -> c_int>,
+    /// `unlink`, `rename`, `mkdir`, `rmdir`, `read_dir`: files are read only, and no folder is listed.
+    of_folders: [*const c_void; 5],
+    pub(crate) open:
+        Option<unsafe extern "C" fn(*mut c_void, *const c_char, *const c_char) -> *mut c_void>,
+    pub(crate) tell: Option<unsafe extern "C" fn(*mut c_void) -> u64>,
+    pub(crate) seek: Option<unsafe extern "C" fn(*mut c_void, u64, c_int) -> c_int>,
+    pub(crate) read: Option<unsafe extern "C" fn(*mut c_void, *mut c_void, usize, usize) -> usize>,
+    /// `read_multi_range`, `get_range_status`.
+    of_ranges: [*const c_void; 2],
+    pub(crate) eof: Option<unsafe extern "C" fn(*mut c_void) -> c_int>,
+    /// `write`, `flush`, `truncate`.
+    of_writing: [*const c_void; 3],
+    pub(crate) close: Option<unsafe extern "C" fn(*mut c_void) -> c_int>,
+    /// `nBufferSize`, `nCacheSize`: GDAL keeps nothing of the files.
+    of_caching: [usize; 2],
+    pub(crate) sibling_files:
+        Option<unsafe extern "C" fn(*mut c_void, *const c_char) -> *mut *mut c_char>,
+}
+
 macro_rules! functions {
     ($($name:ident: ($($argument:ty),*) $(-> $result:ty)?;)*) => {
         /// Each function by its name in C.
@@ -123,6 +156,10 @@ functions! {
     CPLParseXMLString: (*const c_char) -> *mut XmlNode;
     CPLDestroyXMLNode: (*mut XmlNode);
     VSIReadDirRecursive: (*const c_char) -> *mut *mut c_char;
+    VSIAllocFilesystemPluginCallbacksStruct: () -> *mut Callbacks;
+    VSIInstallPluginHandler: (*const c_char, *const Callbacks) -> c_int;
+    VSIFreeFilesystemPluginCallbacksStruct: (*mut Callbacks);
+    CSLAddString: (*mut *mut c_char, *const c_char) -> *mut *mut c_char;
     VSIFOpenL: (*const c_char, *const c_char) -> Handle;
     VSIFSeekL: (Handle, u64, c_int) -> c_int;
     VSIFTellL: (Handle) -> u64;

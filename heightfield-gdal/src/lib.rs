@@ -15,6 +15,7 @@
 //!
 //! - [`Library`]: finds and loads libgdal, versions 3.4 and newer, and lists its drivers;
 //! - [`Dataset`]: a file, a folder or whatever else a driver opens, for reading;
+//! - [`Library::mount`]: has GDAL read files through their caller, as those at a server;
 //! - [`Library::entries`], [`Library::length`]: what is in an archive;
 //! - [`Band`]: its samples, overviews and masks, and what they mean;
 //! - [`SpatialReference`]: a reference system by its text or code, as PROJ knows it.
@@ -28,8 +29,10 @@
 mod axes;
 mod band;
 mod beforehand;
+mod callbacks;
 mod dataset;
 mod error;
+mod file_system;
 mod functions;
 mod in_time;
 mod library;
@@ -37,11 +40,13 @@ mod settings;
 mod srs;
 mod text;
 mod virtual_files;
+mod vrt;
 
 pub use axes::Axis;
 pub use band::{Band, Mask, Sample, SampleType, Window};
 pub use dataset::{Dataset, Subdataset};
 pub use error::Error;
+pub use file_system::{FileSystem, Mount, ReadAt};
 pub use in_time::exit_if_stuck;
 pub use library::{Driver, Library, Version};
 pub use settings::Settings;

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::beforehand;
 use crate::dataset::Dataset;
 use crate::error::Error;
+use crate::file_system::PREFIX;
 use crate::functions::{Functions, Handle, silence_hdf5};
 use crate::in_time;
 use crate::settings::Settings;
@@ -203,7 +204,8 @@ impl Library {
     pub fn open_part(&self, name: &str, options: &[&str]) -> Result<Dataset, Error> {
         let dataset = in_time::open(&self.loaded, Path::new(name), options)?;
         // One on disk is looked into; here, it may name pipes, devices and addresses.
-        match name.starts_with("/vsi") && dataset.driver() == "VRT" {
+        let is_in_archive = name.starts_with("/vsi") && !name.starts_with(PREFIX);
+        match is_in_archive && dataset.driver() == "VRT" {
             true => Err(Error::NotOpened {
                 path: name.into(),
                 why: "a VRT inside an archive may name any file: unpack the archive".into(),

@@ -23,22 +23,19 @@ const FETCHED: &str = "CPL_VSIL_CURL_ALLOWED_EXTENSIONS";
 /// | `GDAL_NUM_THREADS` | 1 | it decodes on the caller's thread |
 /// | `GDAL_VRT_ENABLE_PYTHON` | `NO` | a VRT runs no program |
 /// | `GDAL_SKIP` | drivers of servers and data bases | a file leads to no network |
-/// | `CPL_VSIL_CURL_ALLOWED_EXTENSIONS` | none, unless [`may_fetch`](Self::may_fetch) or the environment has it | the same |
+/// | `CPL_VSIL_CURL_ALLOWED_EXTENSIONS` | none, unless the environment has it | the same |
 /// | `CPL_VSIL_GZIP_WRITE_PROPERTIES` | `NO` | nothing is written beside an archive |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Bytes of blocks that GDAL keeps.
     pub cache_bytes: u64,
-    /// Whether a file may name what is elsewhere, as a VRT does, and GDAL fetches it.
-    pub may_fetch: bool,
 }
 
 impl Default for Settings {
-    /// 64 MiB, and nothing is fetched.
+    /// 64 MiB.
     fn default() -> Self {
         Self {
             cache_bytes: 64 << 20,
-            may_fetch: false,
         }
     }
 }
@@ -63,7 +60,7 @@ impl Settings {
             ("GDAL_SKIP", SKIPPED),
             ("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO"),
         ];
-        if !self.may_fetch && !is_fetching_allowed() {
+        if !is_fetching_allowed() {
             options.push((FETCHED, nothing.as_str()));
         }
         for (name, value) in options {

@@ -16,7 +16,6 @@ mod transform;
 mod wkt;
 
 use super::globe::Globe;
-pub(crate) use by_gdal::of_file;
 pub(super) use datum::Datum;
 pub use datum::LonLat;
 pub(crate) use definition::{vertical, vertical_beside};

@@ -116,6 +116,16 @@ impl FileBytes {
         &self.data
     }
 
+    /// Its path or URL; none of bytes in memory.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match &self.data {
+            Data::File(_, path) => Some(path),
+            Data::Remote(_, url) => Some(Path::new(url)),
+            #[cfg(test)]
+            Data::Memory(_) => None,
+        }
+    }
+
     /// The files at URLs among which this one is.
     pub(super) const fn elsewhere(&self) -> &Elsewhere {
         &self.elsewhere

@@ -100,7 +100,7 @@ use storage::Storage;
 /// # Errors
 /// Why there is none that can be used.
 pub fn gdal() -> Result<heightfield_gdal::Library, heightfield_gdal::Error> {
-    formats::gdal::library()
+    heightfield_gdal::Library::load(heightfield_gdal::Settings::default())
 }
 
 /// Names of the formats that are read without GDAL.

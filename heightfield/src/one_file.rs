@@ -4,7 +4,7 @@ use super::beside::{Notes, remark_unread};
 use super::format::{Claim, Format};
 use super::formats::{FORMATS, gdal, headered, raw};
 use super::guard::guarded;
-use super::input::{Data, FileBytes};
+use super::input::FileBytes;
 use super::{BadRaster, Decoded, OpenOptions};
 
 /// Enough of a file to tell every format by its beginning.
@@ -74,11 +74,12 @@ fn or_by_gdal(
     options: &OpenOptions,
 ) -> Result<Decoded, BadRaster> {
     use BadRaster::{ByGdal, HeaderMissing, UnknownFormat, Unsupported};
-    let (fault, path) = match (decoded, input.data()) {
-        (
-            Err(fault @ (HeaderMissing(_) | UnknownFormat | Unsupported { .. })),
-            Data::File(_, path),
-        ) if options.gdal => (fault, path),
+    let (fault, path) = match (decoded, input.path()) {
+        (Err(fault @ (HeaderMissing(_) | UnknownFormat | Unsupported { .. })), Some(path))
+            if options.gdal =>
+        {
+            (fault, path)
+        }
         (decoded, _) => return decoded,
     };
     match (gdal::decode(path, options), fault) {

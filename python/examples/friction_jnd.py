@@ -92,13 +92,13 @@ def person(device):
     read, and the marks, do not say which stroke has more friction."""
 
     def feels(number, friction):
-        """Lets the person feel a stroke. Returns whether the force was in to its end."""
+        """Renders a stroke for the person. Returns True if the arm was armed to its end."""
         if not device.is_armed:
             device.arm()
         device.params.friction = friction
         device.mark(f"stroke {number}")
         input(f"Stroke the surface, then press Enter ({number} of 2). ")
-        # A dead-man switch that was let go is a fault, which only arm() clears.
+        # A released dead-man switch is a fault, which only arm() clears.
         return device.is_armed
 
     def judge(first, second):

@@ -25,7 +25,7 @@ fn the_same_seed_gives_the_same_campaign() {
 
 #[test]
 fn the_report_that_is_kept_has_every_kind() {
-    let path = repository().join("docs/reference/campaign.md");
+    let path = repository().join("log/campaign.md");
     let page = std::fs::read_to_string(path).expect("the report is kept");
     assert_eq!(report::missing(&page), []);
 }

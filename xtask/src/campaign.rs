@@ -9,12 +9,12 @@ use anyhow::Result;
 use crate::run::{cargo, output, root, run, timed};
 
 /// Runs the campaign with the user's arguments. Without a segment it writes the report to
-/// `docs/reference/campaign.md`, or to `docs/reference/link-campaign.md` with `--link`.
+/// `log/campaign.md`, or to `log/link-campaign.md` with `--link`.
 pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
     let words: Vec<_> = words.collect();
     let page = match words.iter().any(|word| word == "--link") {
-        true => "docs/reference/link-campaign.md",
-        false => "docs/reference/campaign.md",
+        true => "log/link-campaign.md",
+        false => "log/campaign.md",
     };
     let whole = !words.iter().any(|word| word == "--segment");
     timed("the campaign", || {
@@ -44,6 +44,7 @@ fn commit() -> Option<String> {
         "--untracked-files=no",
         "--",
         ":!docs",
+        ":!log",
     ];
     let changed = if git(&tracked)?.trim().is_empty() {
         ""

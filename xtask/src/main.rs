@@ -68,10 +68,10 @@ cargo xtask COMMAND
   soak --seed N --scene K [--rough]  one of them again
   campaign [--seconds N] [--seed S] [--segment K [--effects]]
                          the closed loop with everything going wrong at random, 10,000 s of
-                         arm time unless told otherwise; writes docs/reference/campaign.md
+                         arm time unless told otherwise; writes log/campaign.md
   campaign --link [--seconds N] [--seed S] [--segment K]
                          faults of the link, killed and hostile hosts and devices, an hour of
-                         device time unless told otherwise; writes docs/reference/link-campaign.md
+                         device time unless told otherwise; writes log/link-campaign.md
   fuzz TARGET MINUTES    libFuzzer on `terrain` (files of every format), `text` (recordings,
                          calibrations, tables, commands), `tick`, `tile` or `wire`; installs
                          cargo-fuzz and a nightly compiler where they are missing

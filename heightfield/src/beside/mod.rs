@@ -39,6 +39,22 @@ pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     std::iter::once(path.to_owned()).chain(there).collect()
 }
 
+/// Names of the files beside the one at a URL that belong to it. A TIFF of many that a VRT names is
+/// asked for three of them only.
+pub(super) fn names_at_url(input: &FileBytes, url: &str) -> Result<Vec<String>, BadRaster> {
+    let ends = match input.extension() {
+        "tif" | "tiff" => &["msk", "ovr", "aux.xml"][..],
+        _ => &NEIGHBOURS[..],
+    };
+    look_for(input, ends.iter().copied());
+    let mut names = Vec::new();
+    for beside in ends.iter().flat_map(|end| neighbour(url, end)) {
+        let found = elsewhere(url, &[beside], input)?;
+        names.extend(found.map(|found| found.name().to_owned()));
+    }
+    Ok(names)
+}
+
 /// Files with these extensions are about to be asked for: at a server, all at once.
 fn look_for(input: &FileBytes, extensions: impl Iterator<Item = &'static str>) {
     if let Data::Remote(_, url) = input.data() {
@@ -125,7 +141,7 @@ fn candidates(path: &Path, extension: &str) -> [PathBuf; 4] {
 }
 
 /// A path with an extension behind its own.
-fn appended(path: &Path, extension: &str) -> PathBuf {
+pub(super) fn appended(path: &Path, extension: &str) -> PathBuf {
     let mut name: OsString = path.as_os_str().to_owned();
     name.push(".");
     name.push(extension);

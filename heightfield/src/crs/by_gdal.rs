@@ -1,28 +1,18 @@
 //! Reference systems that nothing here knows, through libgdal's PROJ, where there is one.
 
-use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use heightfield_gdal::{AxisUnit, Library, Settings, SpatialReference};
+use heightfield_gdal::{AxisUnit, SpatialReference};
 
 use super::datum::Datum;
 use super::shift::Shift;
 use super::system::{ReferenceSystem, Unit};
+use crate::gdal;
 use crate::globe::Globe;
-
-fn library() -> Option<Library> {
-    Library::load(Settings::default()).ok()
-}
-
-/// The system that the keys of a GeoTIFF spell out.
-pub(crate) fn of_file(path: &Path) -> Option<ReferenceSystem> {
-    let dataset = library()?.open(path, &[]).ok()?;
-    ReferenceSystem::from_wkt(&dataset.wkt()?).0
-}
 
 /// The system with a code of EPSG's.
 pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
-    let found = library()?.reference_of_epsg(code).ok()?;
+    let found = gdal().ok()?.reference_of_epsg(code).ok()?;
     described(&found).map(|system| system.with_code(code))
 }
 
@@ -45,7 +35,7 @@ pub(super) fn of_text(text: &str) -> Option<ReferenceSystem> {
 }
 
 fn found_by_text(text: &str) -> Option<ReferenceSystem> {
-    let found = library()?.reference_of_text(text).ok()?;
+    let found = gdal().ok()?.reference_of_text(text).ok()?;
     let code = found.epsg.and_then(|code| u16::try_from(code).ok());
     let known = code.and_then(ReferenceSystem::from_code);
     known.or_else(|| described(&found))

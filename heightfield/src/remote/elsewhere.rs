@@ -23,7 +23,11 @@ const BETWEEN_TRIES: Duration = Duration::from_secs(1);
 
 /// Files at URLs, open or being opened. Clones are of the same.
 #[derive(Clone)]
-pub struct Elsewhere(Arc<Shared>);
+pub struct Elsewhere {
+    shared: Arc<Shared>,
+    /// Whoever has this clone waits, whatever the others do.
+    always_waits: bool,
+}
 
 struct Shared {
     line: Arc<Line>,
@@ -42,15 +46,26 @@ enum Known {
 
 impl Default for Elsewhere {
     fn default() -> Self {
-        Self(Arc::new(Shared {
-            line: Arc::default(),
-            files: Mutex::new(LruCache::new(MOST_FILES)),
-            answered: Condvar::new(),
-        }))
+        Self {
+            shared: Arc::new(Shared {
+                line: Arc::default(),
+                files: Mutex::new(LruCache::new(MOST_FILES)),
+                answered: Condvar::new(),
+            }),
+            always_waits: false,
+        }
     }
 }
 
 impl Elsewhere {
+    /// The same files for a thread that may wait.
+    pub(crate) fn waiting(&self) -> Self {
+        Self {
+            always_waits: true,
+            ..self.clone()
+        }
+    }
+
     /// The file at a URL. A file that is open is not opened again, and one that is missing
     /// is not looked for again.
     ///
@@ -62,13 +77,13 @@ impl Elsewhere {
         let mut has_asked = false;
         let mut files = self.files();
         loop {
-            let waits = self.0.line.waits();
+            let waits = self.always_waits || self.shared.line.waits();
             match files.get(url).cloned() {
                 Some(Known::Open(file)) => return Ok(file),
                 Some(Known::OnItsWay) if !waits => return Err(ErrorKind::WouldBlock.into()),
                 Some(Known::OnItsWay) => {
                     has_asked = true;
-                    let waited = self.0.answered.wait(files);
+                    let waited = self.shared.answered.wait(files);
                     files = waited.unwrap_or_else(PoisonError::into_inner);
                 }
                 Some(Known::Failed(at, kind, why)) => {
@@ -103,27 +118,30 @@ impl Elsewhere {
 
     /// From now on nobody waits, or everybody does again.
     pub(crate) fn stop_waiting(&self, stop: bool) {
-        self.0.line.stop_waiting(stop);
+        self.shared.line.stop_waiting(stop);
     }
 
     /// Has pages of files kept for another run; the first folder that is named counts.
     pub(crate) fn set_disk_cache(&self, disk: &DiskCache) {
-        self.0.line.set_disk_cache(disk);
+        self.shared.line.set_disk_cache(disk);
     }
 
     /// The terrain is open: from now on what goes wrong is told.
     pub(crate) fn touch(&self) {
-        self.0.line.touch();
+        self.shared.line.touch();
     }
 
     fn files(&self) -> MutexGuard<'_, LruCache<String, Known>> {
         // Nothing that panics runs while this is held.
-        self.0.files.lock().unwrap_or_else(PoisonError::into_inner)
+        self.shared
+            .files
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     fn ask(&self, background: &'static Runtime, files: &mut LruCache<String, Known>, url: &str) {
         files.put(url.to_owned(), Known::OnItsWay);
-        let (line, asked) = (self.0.line.clone(), url.to_owned());
+        let (line, asked) = (self.shared.line.clone(), url.to_owned());
         let work = async move {
             let _turn = line.turn().await;
             store::open(&asked).await
@@ -137,13 +155,13 @@ impl Elsewhere {
     fn answered(&self, background: &'static Runtime, url: String, opened: Result<Opened>) {
         let known = match opened {
             Ok(opened) => {
-                let file = RemoteFile::new(&in_text(&url), &self.0.line, background, opened);
+                let file = RemoteFile::new(&in_text(&url), &self.shared.line, background, opened);
                 Known::Open(Arc::new(file))
             }
             Err(error) => Known::Failed(Instant::now(), error.kind(), error.to_string()),
         };
         self.files().put(url, known);
-        self.0.answered.notify_all();
+        self.shared.answered.notify_all();
     }
 }
 

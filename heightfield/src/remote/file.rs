@@ -143,6 +143,15 @@ impl RemoteFile {
     /// [`ErrorKind::WouldBlock`] where they are on their way and nobody may wait;
     /// [`is_outage`]; that the file was changed.
     pub(crate) fn read_at(self: &Arc<Self>, offset: u64, count: usize) -> Result<Vec<u8>> {
+        self.read(offset, count, self.line.waits())
+    }
+
+    /// The same for a thread that may wait.
+    pub(crate) fn read_waiting(self: &Arc<Self>, offset: u64, count: usize) -> Result<Vec<u8>> {
+        self.read(offset, count, true)
+    }
+
+    fn read(self: &Arc<Self>, offset: u64, count: usize, waits: bool) -> Result<Vec<u8>> {
         let end = offset.checked_add(count as u64);
         let Some(end) = end.filter(|end| *end <= self.len()) else {
             return Err(ErrorKind::UnexpectedEof.into());
@@ -154,7 +163,7 @@ impl RemoteFile {
         self.want(once(wanted.clone()));
         let mut bytes = Vec::with_capacity(count);
         for number in pages::of(&wanted, self.len()) {
-            let page = self.page(number)?;
+            let page = self.page(number, waits)?;
             let first = number * pages::PAGE;
             let from = offset.saturating_sub(first) as usize;
             let to = (end - first).min(page.len() as u64) as usize;
@@ -164,7 +173,7 @@ impl RemoteFile {
     }
 
     /// A page; waited for where that may be.
-    fn page(self: &Arc<Self>, number: u64) -> Result<Arc<[u8]>> {
+    fn page(self: &Arc<Self>, number: u64, waits: bool) -> Result<Arc<[u8]>> {
         let key = (self.number, number);
         let mut has_waited = false;
         loop {
@@ -172,7 +181,7 @@ impl RemoteFile {
             if let Some(page) = held.pages.get(key) {
                 return Ok(page);
             }
-            if !self.line.waits() {
+            if !waits {
                 return Err(ErrorKind::WouldBlock.into());
             }
             match held.troubles.get(&self.number) {

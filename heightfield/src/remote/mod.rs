@@ -54,8 +54,8 @@ pub use elsewhere::Elsewhere;
 #[cfg(feature = "remote")]
 pub(crate) use file::RemoteFile;
 pub(crate) use reader::RemoteReader;
-pub(crate) use url::neighbour;
 pub use url::{file_name, is_url, without_key};
+pub(crate) use url::{gdal_names, neighbour, parts, without_rest};
 
 /// A failure of the line or the server: another try may go well.
 const OUTAGE: ErrorKind = ErrorKind::ConnectionAborted;

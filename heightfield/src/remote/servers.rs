@@ -15,7 +15,7 @@ use object_store::{ObjectStore, RetryConfig};
 
 use super::errors::wrong;
 use super::requests::Connector;
-use super::url::shown;
+use super::url::without_rest;
 
 /// A request is given up after so long, and when nothing comes for so long.
 const REQUEST: &str = "60 seconds";
@@ -52,7 +52,7 @@ pub(super) fn at(url: &str) -> Result<(Server, Path)> {
 fn parts(url: &str) -> Result<(String, Path)> {
     let (scheme, rest) = url.split_once("://").unwrap_or_default();
     let scheme = scheme.to_ascii_lowercase();
-    let named = shown(rest);
+    let named = without_rest(rest);
     if named.to_ascii_lowercase().contains("%2f") || named.ends_with('/') {
         let why = "a file's name ends in no slash and has none in it (%2F)";
         return Err(Error::new(ErrorKind::InvalidInput, why));

@@ -22,20 +22,20 @@ pub fn without_key(path: &Path) -> String {
 
 /// The same of a URL: neither what follows its path nor a name and password before the host.
 pub(super) fn in_text(url: &str) -> String {
-    let (scheme, rest) = shown(url).split_once("://").unwrap_or(("", url));
+    let (scheme, rest) = without_rest(url).split_once("://").unwrap_or(("", url));
     let (host, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
     let host = host.rsplit('@').next().unwrap_or_default();
     format!("{scheme}://{host}{path}")
 }
 
 /// A URL without what follows its path, which may be a key that opens it.
-pub(crate) fn shown(url: &str) -> &str {
+pub(crate) fn without_rest(url: &str) -> &str {
     split(url).0
 }
 
 /// The last part of a URL's path.
 pub fn file_name(url: &str) -> &str {
-    shown(url).rsplit('/').next().unwrap_or_default()
+    without_rest(url).rsplit('/').next().unwrap_or_default()
 }
 
 /// The URLs that a file beside another may have: with another extension, and with one
@@ -49,6 +49,30 @@ pub(crate) fn neighbour(url: &str, extension: &str) -> [String; 2] {
         format!("{folder}{stem}.{extension}{rest}"),
         format!("{path}.{extension}{rest}"),
     ]
+}
+
+/// A URL up to the slash behind its host or bucket, its path from there, and what follows, which may
+/// be a key.
+pub(crate) fn parts(url: &str) -> [&str; 3] {
+    let (named, rest) = split(url);
+    let host = named.find("://").map_or(0, |at| at + 3);
+    let path = named[host..]
+        .find('/')
+        .map_or(named.len(), |at| host + at + 1);
+    [&named[..path], &named[path..], rest]
+}
+
+/// Beginnings of the names that GDAL has for what is at the same host or in the same bucket; one
+/// that contains another comes before it.
+pub(crate) fn gdal_names(root: &str) -> Vec<String> {
+    let (scheme, host) = root.split_once("://").unwrap_or_default();
+    let of_gdal = match scheme {
+        "s3" | "s3a" => format!("/vsis3/{host}"),
+        "gs" => format!("/vsigs/{host}"),
+        "http" | "https" => format!("/vsicurl/{root}"),
+        _ => format!("/vsiaz/{}", host.split('@').next().unwrap_or_default()),
+    };
+    vec![of_gdal, root.to_owned()]
 }
 
 /// Up to the path's end, and what follows.
@@ -98,6 +122,8 @@ mod tests {
                 "https://h/d.e/a.b.tif.prj?sig=x/y.z"
             ]
         );
+        assert_eq!(parts(url), ["https://h/", "d.e/a.b.tif", "?sig=x/y.z"]);
+        assert_eq!(parts("s3://bucket/a"), ["s3://bucket/", "a", ""]);
         assert_eq!(
             neighbour("s3://b.c/dem", "hdr"),
             ["s3://b.c/dem.hdr", "s3://b.c/dem.hdr"]

@@ -8,9 +8,9 @@
 >>> contact.step([50, 50, -1]).force_n
 (0.0, 0.0, 0.5)
 
-Lengths are millimetres of the hand: x east, y north, z up, origin at the south-west sample at
+Lengths are device millimetres: x east, y north, z up, origin at the south-west sample at
 height zero. The haptic interface point (HIP) is where the hand is; the proxy stays on the surface,
-and a spring between them makes the force. Forces are those of ``hapterra replay`` on the same
+and a spring between them makes the force. Forces equal those of ``hapterra replay`` on the same
 heights, bit for bit.
 """
 

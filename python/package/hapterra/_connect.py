@@ -99,7 +99,7 @@ def connect(
     """A device, to load a terrain on and arm.
 
     A person's hand is in an arm: read docs/safety.md first. The device is driven by the command
-    ``hapterra`` in a process of its own, so whatever Python does holds no arm up.
+    ``hapterra`` in a process of its own, so the arm never waits for Python.
 
     Parameters
     ----------
@@ -108,11 +108,11 @@ def connect(
         ("native", in real time) or on a board in QEMU ("emulated", as fast as that is), with a
         virtual arm in a scripted hand that tours the terrain once.
     record : path, optional
-        Where what is felt is recorded: CSV, or Parquet where it ends in .parquet.
+        File for the recording: CSV, or Parquet if its name ends in .parquet.
     sample_every : int
-        Every so many of the thousand samples a second one comes to ``samples()``.
+        ``samples()`` has every N-th of the thousand samples a second.
     buffer : int
-        Samples, and events, that wait to be taken; beyond them the oldest are dropped.
+        Size of the queues of samples and of events; if one is full, its oldest item is dropped.
     quiet : bool
         Pass on only what a person has to do or is warned of, as in an experiment, where a person
         must not read which surface it is.
@@ -168,7 +168,7 @@ class Device:
     def load(
         self, terrain: Terrain | _Path, surface: Surface | _Path | None = None, **options: Any
     ) -> None:
-        """Says what is touched next.
+        """Sets what is touched next.
 
         Parameters
         ----------
@@ -315,14 +315,14 @@ class Device:
 
     @property
     def is_armed(self) -> bool:
-        """Whether the force is in, as far as is known."""
+        """Returns True if the arm is armed, as far as is known."""
         own(self._pid)
         session = self._session
         return session is not None and not session.is_over and session.mode == "armed"
 
     @property
     def is_disarmed(self) -> bool:
-        """Whether the board has confirmed at the end of the last session that it is disarmed."""
+        """Returns True if the board confirmed at the end of the last session that it is disarmed."""
         own(self._pid)
         return self._session is None and self._confirmed
 
@@ -339,15 +339,15 @@ class Device:
 
     @property
     def dropped(self) -> int:
-        """Samples that were dropped since ``arm()``, because nobody took them in time."""
+        """Samples that were dropped since ``arm()``, because they were not read in time."""
         return self._samples.dropped
 
     def samples(self) -> Iterator[Sample]:
-        """The samples as they come, until the session is over; the oldest that is kept first."""
+        """The samples as they arrive, until the session is over; the oldest in the queue first."""
         return iter(self._samples)
 
     def events(self) -> Iterator[dict[str, Any]]:
-        """Events as they come, but for samples: contact, place, material, limits, as
+        """Events as they arrive, except samples: contact, place, material, limits, as
         docs/how-to/events.md has them."""
         return iter(self._events)
 

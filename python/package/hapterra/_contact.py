@@ -1,4 +1,4 @@
-"""Contacts, and what their steps are."""
+"""Contacts and their steps."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STEP = np.dtype(
 
 
 class State(enum.IntEnum):
-    """What a proxy is doing."""
+    """The state of a proxy."""
 
     #: The HIP is in the air, and so is the proxy: no force.
     FREE = 0
@@ -49,7 +49,7 @@ _STATES = list(State)
 
 
 class Step(NamedTuple):
-    """One step's answer."""
+    """The result of one step."""
 
     #: The force on the hand, N: east, north, up.
     force_n: tuple[float, float, float]
@@ -62,7 +62,7 @@ class Step(NamedTuple):
 
 
 class StepError(ValueError):
-    """A step of a path that has not happened. The steps before it have."""
+    """A step of a path that was not possible; ``steps`` are those before it."""
 
     #: The steps before it, as ``Contact.run`` returns them; ``len(steps)`` is the row that failed.
     steps: npt.NDArray[np.void]
@@ -90,12 +90,12 @@ class Contact:
     ----------
     terrain : Terrain
     surface : Surface, optional
-        0.5 N/mm without friction where there is none.
+        By default 0.5 N/mm without friction.
     rate : int
-        Steps a second, 1000 to 10000 in whole thousands: damping and viscous friction go by it.
+        Steps a second, 1000 to 10000 in whole thousands; damping and viscous friction use it.
 
     The first place should be above the terrain: a path that begins below it has the state
-    BELOW_GROUND, and no force until it has been above. A contact is one hand's: give each thread
+    BELOW_GROUND, and no force until the HIP was above. A contact is one hand's: give each thread
     its own. A terrain may be shared.
     """
 
@@ -111,7 +111,7 @@ class Contact:
     def step(self, hip_mm: Iterable[float]) -> Step:
         """One step with the HIP at a place: east, north, up, mm.
 
-        Raises ValueError for a place that cannot be; the step has not happened then.
+        Raises ValueError for an impossible position; the contact is then unchanged.
         """
         east, north, up = hip_mm
         force, proxy, state, surface = self._native.step(east, north, up)
@@ -138,7 +138,7 @@ class Contact:
         Raises
         ------
         StepError
-            At the first step that cannot happen, with those before it.
+            At the first step that is not possible, with those before it.
         """
         rows, remarks, error = self._native.run(*arguments(path_mm, t))
         for remark in remarks:
@@ -149,7 +149,7 @@ class Contact:
         return steps
 
     def set_surface(self, surface: Surface) -> None:
-        """Puts another surface in between two steps; the proxy stays where it is."""
+        """Changes the surface between two steps; the proxy stays where it is."""
         self._native.set_surface(surface)
 
     def __repr__(self) -> str:

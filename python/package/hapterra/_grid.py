@@ -43,7 +43,7 @@ class Grid:
     corner: tuple[float, float]
 
     def source(self) -> dict[str, Any]:
-        """What was stated, and how many samples are holes."""
+        """The stated properties, and the number of no-data samples."""
         return {
             "origin": self.origin,
             "cell": self.cell,

@@ -1,4 +1,4 @@
-"""Recordings of what was felt, and rendering them again."""
+"""Recordings, and rendering them again."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Recording:
 
     @property
     def views(self) -> list[dict[str, Any]]:
-        """The placements that were put in meanwhile, by the ``number`` in the column ``view``."""
+        """The placements after the first one, by the ``number`` in the column ``view``."""
         return list(self.settings.get("view", []))
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -61,9 +61,9 @@ class Recording:
         Parameters
         ----------
         terrain : path, optional
-            The terrain file, where it is not where the recording says.
+            The terrain file, if it is not at the recorded place.
         output : path, optional
-            A file for the new recording, .csv or .parquet; a temporary one where there is none.
+            A file for the new recording, .csv or .parquet; by default a temporary one.
         **changes
             Options of the command by their names: ``friction=0.1``, ``surface="sand"``,
             ``ignore_settings=True``, ... (``hapterra replay --help``). Without any, the forces are

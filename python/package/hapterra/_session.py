@@ -45,7 +45,7 @@ _NEWS = re.compile(r"view \d|the view stays as it was|(?!recording)[a-z]+  ")
 
 
 class DeviceError(CommandError):
-    """A device that cannot be armed, has refused something, or has gone."""
+    """A device that cannot be armed, has refused a request, or is gone."""
 
 
 class NotDisarmedError(DeviceError):

@@ -36,13 +36,13 @@ class Terrain:
     ----------
     heights : array of shape (rows, columns)
         Any real type and memory order. Rows lie from west to east. NaN, or a masked sample, is a
-        hole: there is no surface and no force. The samples are copied.
+        no-data: there is no surface and no force. The samples are copied.
     cell_mm : float
-        Millimetres of the hand from a sample to the next.
+        Device millimetres from a sample to the next.
     height_mm_per_unit : float
-        Millimetres of the hand for one unit of the heights.
+        Device millimetres for one unit of the heights.
     origin : "upper" or "lower"
-        Which end the first row lies at, as in matplotlib's imshow: "upper" is north, as in images
+        The end at which the first row lies, as in matplotlib's imshow: "upper" is north, as in images
         and GeoTIFF, "lower" is south.
     materials : array of integers of the same shape, optional
         A material for each sample: 0 is the surface itself, 1 the first of
@@ -83,9 +83,9 @@ class Terrain:
         )
         #: Rows and columns.
         self.shape: tuple[int, int] = samples.shape
-        #: Millimetres of the hand from a sample to the next.
+        #: Device millimetres from a sample to the next.
         self.cell_mm = float(cell_mm)
-        #: Millimetres of the hand for one unit of the heights.
+        #: Device millimetres for one unit of the heights.
         self.height_mm_per_unit = float(height_mm_per_unit)
         self._has_materials = materials is not None
         #: What the data stated about itself; none of a plain array.
@@ -114,10 +114,10 @@ class Terrain:
             A file, a folder, a pattern as "tiles/*.tif", a GDAL .vrt, a STAC's .json; a URL where
             the package is built with ``remote``.
         cell_mm : float
-            Millimetres of the hand from a sample to the next; 1, as of ``hapterra replay``. Cells that
+            Device millimetres from a sample to the next; by default 1, as in ``hapterra replay``. Cells that
             are no squares on the ground are resampled to squares of their shorter side.
         scale : "100 m/mm", or metres as a number
-            Ground for a millimetre of the hand, in place of ``cell_mm``.
+            Ground for a device millimetre, in place of ``cell_mm``.
         exaggeration : float or "auto"
             Times true to scale. A unit of heights is a millimetre times this where the file does
             not know how large its cells are.
@@ -131,8 +131,8 @@ class Terrain:
         ValueError, OSError
             With the command's text and hint.
 
-        What has to be fetched is waited for. Where that fails, a step is an OSError and may be
-        tried again. Damaged parts of a file are holes, and warnings.
+        A step waits for what has to be fetched. If that fails, the step is an OSError and may be
+        tried again. Damaged parts of a file are no-data, with a warning.
         """
         how = {"cell_mm": cell_mm, "scale": scale, "exaggeration": exaggeration}
         paths = files(source)
@@ -165,7 +165,7 @@ class Terrain:
         terrain. ``cell_mm``, ``scale`` and ``exaggeration`` are as of ``open``, and this terrain's own
         where they are left out; cells are true to scale at the place.
 
-        Raises ValueError for a place outside or in a hole, and a terrain without coordinates.
+        Raises ValueError for a place outside or without data, and for a terrain without coordinates.
         """
         place, lonlat, size = pair("at", at), is_lonlat(crs), pair("size_mm", size_mm)
         lies = self._lies()
@@ -216,7 +216,7 @@ class Terrain:
         """A terrain of a DataArray of two dimensions, true to scale times ``exaggeration``.
 
         Row order and cell size are those of its coordinates, units those of ``attrs["units"]``,
-        and ``attrs["_FillValue"]`` makes holes. ``source`` of the result reports them. What is not
+        and ``attrs["_FillValue"]`` marks no-data. ``source`` of the result reports them. What is not
         stated has to be given: ``x`` and ``y`` name the dimensions, ``ground_unit`` and
         ``height_unit`` are "m", "km", "ft" and the like, and ``height_mm_per_unit`` takes the place
         of both units and of the exaggeration.
@@ -239,7 +239,7 @@ class Terrain:
         """A terrain of a band of an open rasterio dataset, true to scale times ``exaggeration``.
 
         Row order and cell size are those of its transform, the units those of its reference system
-        and of the band; its no-data value or mask makes holes, and its scale and offset are
+        and of the band; its no-data value or mask marks no-data, and its scale and offset are
         applied. ``source`` of the result reports them. The rest is as in ``from_xarray``.
         """
         how = Laid(cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
@@ -279,7 +279,7 @@ class Terrain:
         return self._native.size_mm
 
     def height_mm(self, east_mm: float, north_mm: float) -> float | None:
-        """The height of the surface at a place, mm, or of the ball's centre; None in a hole and off
+        """The height of the surface at a place, mm, or of the ball's centre; None without data and off
         the terrain."""
         return self._native.height_mm(east_mm, north_mm)
 

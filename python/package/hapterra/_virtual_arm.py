@@ -96,7 +96,7 @@ class VirtualArm:
         ValueError
             A target that the arm cannot reach.
         StepError
-            At the first step that cannot happen, with those before it.
+            At the first step that is not possible, with those before it.
         """
         rows, remarks, error = self._native.run(contact._native, *arguments(targets_mm, t))
         for remark in remarks:

@@ -1,7 +1,7 @@
 //! Runs the closed-loop campaign: `hapterra-campaign --seconds N --seed S`, or
 //! one segment of it with `--segment K [--effects]`; with `--link` the campaign of link faults.
 //! `cargo xtask campaign` builds it with full optimisation and puts the report into
-//! `docs/reference/campaign.md` or `docs/reference/link-campaign.md`.
+//! `log/campaign.md` or `log/link-campaign.md`.
 
 #![forbid(unsafe_code)]
 

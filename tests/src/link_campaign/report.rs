@@ -1,4 +1,4 @@
-//! The report of a campaign of link faults: `docs/reference/link-campaign.md`.
+//! The report of a campaign of link faults: `log/link-campaign.md`.
 
 use super::fault::Kind;
 use super::surface::OFF_SURFACE;

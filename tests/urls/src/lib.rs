@@ -28,3 +28,10 @@ pub(crate) fn listening<S: Future<Output = ()> + Send + 'static>(
     runtime.spawn(serve(listener));
     (port, runtime)
 }
+
+/// Whether there is a libgdal; without one, a test that wants it says so.
+#[must_use]
+pub fn has_gdal() -> bool {
+    let found = heightfield::gdal();
+    found.inspect_err(|why| eprintln!("skipped: {why}")).is_ok()
+}

@@ -1,14 +1,18 @@
 //! Of a file at a URL what is touched is fetched, and is the same as of the file on disk.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::shared;
 use hapterra_tests::tiffs::{DATA, floats_in_a_strip, placed, tiff};
 use hapterra_url_tests::cog::cog;
+use hapterra_url_tests::has_gdal;
 use hapterra_url_tests::http::{Fault, Server};
-use heightfield::{OpenOptions, Raster};
+use heightfield::{BadRaster, OpenOptions, Raster};
 
 fn height(column: u32, row: u32) -> f32 {
     (column * 7 % 1000) as f32 + 0.25 * (row % 400) as f32
@@ -157,6 +161,9 @@ fn of_a_strip_that_has_all_samples_the_rows_that_are_touched_are_fetched() {
 
 #[test]
 fn a_vrt_and_its_files_may_be_elsewhere() {
+    if !has_gdal() {
+        return;
+    }
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);
     let server = Server::of(folder.path());
@@ -183,14 +190,20 @@ fn a_vrt_and_its_files_may_be_elsewhere() {
         )
     };
     write("there.vrt", vrt("west.tif", 1).as_bytes()).expect("written");
+    let raster = open(server.url("there.vrt"));
+    for (column, row) in [(0, 0), (799, 599), (800, 3), (1599, 300)] {
+        let expected = f64::from(height(column, 599 - row));
+        assert_eq!(raster.height(column, row), expected, "{column} {row}");
+    }
+    // From here to elsewhere is another matter.
     let here = folder.path().join("here.vrt");
     std::fs::write(&here, vrt(&server.url("west.tif"), 0)).expect("written");
-    for raster in [open(server.url("there.vrt")), open(here)] {
-        for (column, row) in [(0, 0), (799, 599), (800, 3), (1599, 300)] {
-            let expected = f64::from(height(column, 599 - row));
-            assert_eq!(raster.height(column, row), expected, "{column} {row}");
-        }
-    }
+    let refused = Raster::open(&here, &OpenOptions::default()).expect_err("an address");
+    let refused = refused.to_string();
+    assert!(
+        refused.contains(&server.url("")) && refused.contains("open its URL"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -208,9 +221,89 @@ fn real_files_are_the_same_from_a_server() {
     let Some(folder) = shared("dem/real") else {
         return;
     };
-    let server = Server::of(&folder);
+    let compared = same_from_a_server(&folder);
+    assert!(compared > 10, "{compared} files");
+}
+
+#[test]
+fn files_that_gdal_reads_are_the_same_from_a_server() {
+    if !has_gdal() {
+        return;
+    }
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data");
+    for (name, files) in [("by_gdal", 9), ("netcdf", 9), ("only_gdal", 4)] {
+        let compared = same_from_a_server(&data.join(name));
+        assert!(compared >= files, "{compared} files of {name}");
+    }
+}
+
+#[test]
+fn archives_are_the_same_from_a_server() {
+    if !has_gdal() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);
+    let heights = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 10\n1 2 3\n4 5 6\n";
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+    gzip.write_all(heights.as_bytes()).expect("packed");
+    write("hills.asc.gz", &gzip.finish().expect("packed")).expect("written");
+    write("hills.tar", &tar("hills.asc", heights.as_bytes())).expect("written");
+    assert_eq!(same_from_a_server(folder.path()), 2);
+    let server = Server::of(folder.path());
+    assert_eq!(open(server.url("hills.tar")).height(2, 1), 3.0);
+}
+
+/// A tar file of one file.
+fn tar(name: &str, bytes: &[u8]) -> Vec<u8> {
+    let mut header = [0_u8; 512];
+    let size = format!("{:011o}", bytes.len());
+    for (at, text) in [
+        (0, name),
+        (100, "0000644"),
+        (108, "0000000"),
+        (116, "0000000"),
+        (124, &size),
+        (136, "00000000000"),
+        (148, "        "),
+        (156, "0"),
+        (257, "ustar"),
+        (263, "00"),
+    ] {
+        header[at..][..text.len()].copy_from_slice(text.as_bytes());
+    }
+    let sum: u32 = header.iter().map(|byte| u32::from(*byte)).sum();
+    header[148..155].copy_from_slice(format!("{sum:06o}\0").as_bytes());
+    let mut tar = [&header[..], bytes].concat();
+    tar.resize(tar.len().next_multiple_of(512) + 1024, 0);
+    tar
+}
+
+#[test]
+fn a_stac_at_a_url_is_refused_with_the_files_to_make_a_vrt_of() {
+    if !has_gdal() {
+        return;
+    }
+    let item = |id: &str, href: &str| {
+        format!(r#"{{"id":"{id}","assets":{{"data":{{"href":"{href}","type":"image/tiff"}}}}}}"#)
+    };
+    let items = [item("a", "./west.tif"), item("b", "https://other/east.tif")].join(",");
+    let stac = format!(r#"{{"type":"FeatureCollection","features":[{items}]}}"#);
+    let (_folder, _, server) = served("items.json", stac.as_bytes());
+    let refused = Raster::open(server.url("items.json?key=a"), &OpenOptions::default());
+    let error = refused.expect_err("a STAC");
+    let BadRaster::ToBuild { files, .. } = error.fault() else {
+        panic!("{error}");
+    };
+    let west = format!("/vsicurl/{}", server.url("west.tif"));
+    assert_eq!(*files, [&west, "/vsicurl/https://other/east.tif"]);
+}
+
+/// Compares the files of a folder with the same from a server; how many were opened.
+fn same_from_a_server(folder: &Path) -> u32 {
+    let server = Server::of(folder);
     let mut compared = 0;
-    for entry in std::fs::read_dir(&folder).expect("a folder") {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
         let entry = entry.expect("an entry");
         let size = entry.metadata().expect("its size").len();
         if size > 16 << 20 || !entry.path().is_file() {
@@ -226,7 +319,7 @@ fn real_files_are_the_same_from_a_server() {
                 assert_eq!(here, there, "{name}");
                 continue;
             }
-            (here, there) => panic!("{name}: {here:?} {there:?}"),
+            (here, there) => panic!("{name}: {:?}, and there {:?}", here.err(), there.err()),
         };
         assert_eq!(here.format(), there.format(), "{name}");
         assert_eq!(here.cell(), there.cell(), "{name}");
@@ -240,5 +333,5 @@ fn real_files_are_the_same_from_a_server() {
         }
         compared += 1;
     }
-    assert!(compared > 10, "{compared} files");
+    compared
 }

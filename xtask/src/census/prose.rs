@@ -65,10 +65,11 @@ pub(super) fn pages(root: &Path) -> Result<Vec<(PathBuf, Page)>> {
 }
 
 fn page(text: &str) -> Page {
-    let is_word = |word: &&str| word.contains(char::is_alphanumeric);
     let shown = without_comments(text);
     let mut page = Page {
-        words: shown.split_whitespace().filter(is_word).count(),
+        words: { shown.split_whitespace() }
+            .filter(|word| is_word(word))
+            .count(),
         lines: text.lines().count(),
         longest_line: text
             .lines()
@@ -83,6 +84,11 @@ fn page(text: &str) -> Page {
         page.longest_sentence = page.longest_sentence.max(words);
     }
     page
+}
+
+/// Returns true if a part between spaces is a word, and no dash or mark of a list.
+fn is_word(part: &str) -> bool {
+    part.contains(char::is_alphanumeric)
 }
 
 /// A page without its comments, which nobody sees.
@@ -114,7 +120,7 @@ fn sentences(text: &str) -> Vec<usize> {
         }
         if is_prose {
             for word in line.split_whitespace() {
-                words += 1;
+                words += usize::from(is_word(word));
                 if word.ends_with(['.', '!', '?', ':', ';']) {
                     end(&mut words);
                 }

@@ -1,12 +1,13 @@
 //! A band that GDAL reads, block by block.
 
 use std::hash::Hasher;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use heightfield_gdal::{Band, Dataset, Mask, Sample, SampleType as Stored, Window};
 use twox_hash::XxHash64;
 
-use super::{NAME, fault};
+use super::place::Place;
+use super::{NAME, at_url, fault};
 use crate::blocks::{
     Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, usual_block,
 };
@@ -33,11 +34,21 @@ pub(super) const fn held(stored: Stored) -> SampleType {
     }
 }
 
+/// What of a file is open, and how it is opened again.
+pub(super) struct Source {
+    pub(super) place: Arc<Place>,
+    /// What GDAL calls it.
+    pub(super) name: String,
+    pub(super) options: Vec<String>,
+}
+
 /// A band in its file. It is read by one thread, and nobody who is served waits for that one
 /// ([`Blocks`](crate::blocks::Blocks)).
 pub(super) struct GdalBlocks {
-    /// GDAL is used by one thread at a time.
-    dataset: Mutex<Dataset>,
+    source: Source,
+    /// GDAL is used by one thread at a time. None where its server has not answered: what GDAL then
+    /// remembers of it is wrong.
+    dataset: Mutex<Option<Dataset>>,
     /// Number of the band.
     number: u32,
     held: SampleType,
@@ -52,6 +63,7 @@ pub(super) struct GdalBlocks {
 
 impl GdalBlocks {
     pub(super) fn new(
+        source: Source,
         dataset: Dataset,
         number: u32,
         stored: SampleType,
@@ -100,13 +112,49 @@ impl GdalBlocks {
             overviews: coarser,
             is_masked,
             index: hasher.finish(),
-            dataset: Mutex::new(dataset),
+            source,
+            dataset: Mutex::new(Some(dataset)),
         })
     }
 
-    fn dataset(&self) -> MutexGuard<'_, Dataset> {
-        // A panic in between has changed nothing of it.
-        self.dataset.lock().unwrap_or_else(PoisonError::into_inner)
+    fn opened_again(&self) -> Result<Dataset, BadRaster> {
+        let Source {
+            place,
+            name,
+            options,
+        } = &self.source;
+        let options: Vec<_> = options.iter().map(String::as_str).collect();
+        place.open_again(name, &options)
+    }
+
+    fn read_from(&self, dataset: &Dataset, image: usize, part: &Part) -> Result<Block, BadRaster> {
+        let full = dataset.band(self.number).map_err(fault)?;
+        let band = match image.checked_sub(1) {
+            None => full,
+            Some(coarser) => {
+                let overviews = full.overviews();
+                let overview = (self.overviews.get(coarser)).and_then(|at| overviews.get(*at));
+                *overview.ok_or_else(|| BadRaster::damaged("GDAL: an overview has gone"))?
+            }
+        };
+        let samples = match self.has_codes {
+            true => {
+                let colour = |number| read::<u8>(&dataset.band(number).map_err(fault)?, part);
+                codes([colour(1)?, colour(2)?, colour(3)?])
+            }
+            false => {
+                let mut samples = self.held.none();
+                with_samples!(&mut samples, values => *values = read(&band, part)?);
+                samples
+            }
+        };
+        let mask = self.is_masked.then(|| band.mask_band()).flatten();
+        let holes = mask.map(|mask| holes(&mask, part)).transpose()?;
+        Ok(Block {
+            samples,
+            holes: holes.filter(|holes| !holes.is_clear()),
+            is_lacking: false,
+        })
     }
 }
 
@@ -141,34 +189,18 @@ impl BlockReader for GdalBlocks {
     }
 
     fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
-        let dataset = self.dataset();
-        let full = dataset.band(self.number).map_err(fault)?;
-        let band = match image.checked_sub(1) {
-            None => full,
-            Some(coarser) => {
-                let overviews = full.overviews();
-                let overview = (self.overviews.get(coarser)).and_then(|at| overviews.get(*at));
-                *overview.ok_or_else(|| BadRaster::damaged("GDAL: an overview has gone"))?
-            }
+        // A panic in between has changed nothing of it.
+        let mut open = self.dataset.lock().unwrap_or_else(PoisonError::into_inner);
+        let dataset = match open.take() {
+            Some(dataset) => dataset,
+            None => self.opened_again()?,
         };
-        let samples = match self.has_codes {
-            true => {
-                let colour = |number| read::<u8>(&dataset.band(number).map_err(fault)?, part);
-                codes([colour(1)?, colour(2)?, colour(3)?])
-            }
-            false => {
-                let mut samples = self.held.none();
-                with_samples!(&mut samples, values => *values = read(&band, part)?);
-                samples
-            }
-        };
-        let mask = self.is_masked.then(|| band.mask_band()).flatten();
-        let holes = mask.map(|mask| holes(&mask, part)).transpose()?;
-        Ok(Block {
-            samples,
-            holes: holes.filter(|holes| !holes.is_clear()),
-            is_lacking: false,
-        })
+        let block = self.read_from(&dataset, image, part);
+        if let Some(error) = dataset.take_fault() {
+            return Err(at_url::fault(error));
+        }
+        *open = Some(dataset);
+        block
     }
 
     fn index(&self) -> u64 {

@@ -2,22 +2,24 @@
 //! wants it. It is asked last, so that a machine with it reads nothing in another way than one
 //! without.
 //!
-//! A file goes through here in this order: an archive is looked into (`packed`), GDAL opens what
+//! A file goes through here in this order: GDAL gets a name for it, also where it is at a URL
+//! (`place`, `at_url`), an archive is looked into (`packed`), GDAL opens what
 //! was named or its label, one of several rasters is chosen, and its first band becomes blocks
 //! (`blocks`). What GDAL reads otherwise than its file means it is put right: NetCDF's depths and
 //! places (`netcdf`), and STAC items that do not say where their files lie (`stac`).
 
+mod at_url;
 mod blocks;
 mod names;
 mod netcdf;
 mod packed;
+mod place;
 mod stac;
 
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use heightfield_gdal::{Dataset, Error, Library, SampleType as Stored, Settings};
+use heightfield_gdal::{Dataset, Error, Library, SampleType as Stored};
 
 use super::{headered, height_name, is_read_here};
 use crate::blocks::{BlockReader, Part};
@@ -27,9 +29,10 @@ use crate::file_layout::FileLayout;
 use crate::geometry::{metres_in, unknown_unit};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
-use crate::{BadRaster, OpenOptions, ReferenceSystem};
-use blocks::{GdalBlocks, Turned, held};
+use crate::{BadRaster, OpenOptions, ReferenceSystem, gdal};
+use blocks::{GdalBlocks, Source, Turned, held};
 pub(crate) use names::by_beginning;
+use place::Place;
 
 /// The name in messages.
 const NAME: &str = "GDAL";
@@ -44,14 +47,6 @@ const COLOURS: std::ops::RangeInclusive<u32> = 3..=4;
 /// The words with which GDAL says that no driver knows a file.
 const UNKNOWN: [&str; 2] = ["not recognized as", "no driver knows"];
 
-/// The libgdal of this machine; it is loaded the first time.
-///
-/// # Errors
-/// Why there is none that can be used.
-pub(crate) fn library() -> Result<Library, Error> {
-    Library::load(Settings::default())
-}
-
 /// Reads a file, folder or whatever else a driver opens.
 ///
 /// # Errors
@@ -59,31 +54,53 @@ pub(crate) fn library() -> Result<Library, Error> {
 /// libgdal; else what is wrong with the file.
 pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
     let head = head(path, options)?;
-    let library = library().map_err(|why| match names::of(path, &head) {
+    let library = gdal().map_err(|why| match names::of(path, &head) {
         Some(format) => BadRaster::WantsGdal { format, why },
         None => BadRaster::UnknownFormat,
     })?;
-    match packed::Packing::of(&head) {
-        Some(packing) => {
-            let (entry, options) = packing.entry(&library, path, options)?;
-            let mut decoded = opened(&library, &entry, &head, &options)?;
-            decoded.format = format!("{} in {}", decoded.format, packing.name());
-            Ok(decoded)
-        }
-        None => opened(&library, path, &head, options),
+    let place = Arc::new(Place::of(&library, path, &head, &options.elsewhere)?);
+    let decoded = match packed::Packing::of(&head) {
+        Some(packing) => of_archive(packing, &library, &place, &head, options),
+        None => opened(&library, &place, &place.path, &head, options),
+    };
+    match (decoded, place.take_fault()) {
+        (Ok(decoded), None) => Ok(decoded),
+        (_, Some(error)) => Err(at_url::fault(error)),
+        (Err(fault), None) => Err(place.in_words(fault)),
     }
+}
+
+fn of_archive(
+    packing: packed::Packing,
+    library: &Library,
+    place: &Arc<Place>,
+    head: &[u8],
+    options: &OpenOptions,
+) -> Result<Decoded, BadRaster> {
+    let (entry, options) = packing.entry(library, place, options)?;
+    let mut decoded = opened(library, place, &entry, head, &options)?;
+    decoded.format = format!("{} in {}", decoded.format, packing.name());
+    Ok(decoded)
 }
 
 /// The files that a file which only GDAL reads names, or that lie beside it.
 pub(crate) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     let options = OpenOptions::default();
     let is_own = head(path, &options).is_ok_and(|head| is_read_here(&head));
-    match library() {
+    match gdal() {
         Ok(library) if !is_own => {
             open(&library, path, &options).map_or(Vec::new(), |it| it.files())
         }
         _ => Vec::new(),
     }
+}
+
+/// The reference system that GDAL finds in a file.
+pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
+    let library = gdal().ok()?;
+    let place = Place::of(&library, input.path()?, &[], input.elsewhere()).ok()?;
+    let dataset = library.open(&place.path, &[]).ok()?;
+    ReferenceSystem::from_wkt(&dataset.wkt()?).0
 }
 
 /// The first bytes; none of a folder.
@@ -96,14 +113,21 @@ fn head(path: &Path, options: &OpenOptions) -> Result<Vec<u8>, BadRaster> {
 
 fn opened(
     library: &Library,
+    place: &Arc<Place>,
     path: &Path,
     head: &[u8],
     options: &OpenOptions,
 ) -> Result<Decoded, BadRaster> {
+    let of_stac = || stac::refused(place, options);
+    if place.is_served()
+        && let Some(refused) = of_stac()?
+    {
+        return Err(refused);
+    }
     let dataset = match open(library, path, options) {
         Err(BadRaster::UnknownFormat) => match label_beside(path) {
             Some(label) => {
-                let mut decoded = opened(library, &label, head, options)?;
+                let mut decoded = opened(library, place, &label, head, options)?;
                 let name = label.file_name().unwrap_or_default().display().to_string();
                 decoded
                     .remarks
@@ -113,36 +137,35 @@ fn opened(
             None if path.is_dir() && names::of(path, head).is_some() => {
                 return Err(no_raster(&format!("version {}", library.version())));
             }
-            None => return Err(stac::refused(path, options)?.unwrap_or(BadRaster::UnknownFormat)),
+            None => return Err(of_stac()?.unwrap_or(BadRaster::UnknownFormat)),
         },
-        Err(fault @ BadRaster::ByGdal(_)) => {
-            return Err(stac::refused(path, options)?.unwrap_or(fault));
-        }
+        Err(fault @ BadRaster::ByGdal(_)) => return Err(of_stac()?.unwrap_or(fault)),
         dataset => dataset?,
     };
     let driver = dataset.driver();
     if BY_HEADER.contains(&driver.as_str()) && headered::is_of_another_kind(head) {
         return Err(BadRaster::UnknownFormat);
     }
-    if driver == "GRASSASCIIGrid" && has_stars(path)? {
+    if driver == "GRASSASCIIGrid" && has_stars(place, options)? {
         let why =
             "it reads * as a height of 0: write a number for holes (r.out.ascii null_value=-9999)";
         return Err(BadRaster::ByGdal(Error::Refused(why.into())));
     }
     let part = match chosen(&dataset, options) {
         Err(fault @ (BadRaster::SeveralHeights { .. } | BadRaster::NoSuchPart { .. })) => {
-            return Err(stac::refused(path, options)?.unwrap_or(fault));
+            return Err(of_stac()?.unwrap_or(fault));
         }
         part => part?,
     };
-    let dataset = match part {
-        Some(name) => library
-            .open_part(&name, &open_options(options))
-            .map_err(fault)?,
-        None => dataset,
+    let (dataset, name) = match part {
+        Some(name) => {
+            let part = library.open_part(&name, &open_options(options));
+            (part.map_err(fault)?, name)
+        }
+        None => (dataset, path.display().to_string()),
     };
-    stac::check_places(library, &dataset, path, options)?;
-    decoded(library, path, dataset, options)
+    stac::check_places(library, &dataset, place, options)?;
+    decoded(library, place, dataset, name, options)
 }
 
 fn open_options(options: &OpenOptions) -> Vec<&str> {
@@ -154,8 +177,9 @@ fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset
 }
 
 /// Whether a text has a star, as GRASS writes where there is no height.
-fn has_stars(path: &Path) -> Result<bool, BadRaster> {
-    let mut reader = BufReader::new(File::open(path).map_err(BadRaster::Unreadable)?);
+fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, BadRaster> {
+    let input = FileBytes::open(&place.source, &options.elsewhere)?;
+    let mut reader = input.reader()?;
     loop {
         let chunk = reader.fill_buf().map_err(BadRaster::Unreadable)?;
         if chunk.is_empty() || chunk.contains(&b'*') {
@@ -220,8 +244,9 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ba
 
 fn decoded(
     library: &Library,
-    path: &Path,
+    place: &Arc<Place>,
     dataset: Dataset,
+    name: String,
     options: &OpenOptions,
 ) -> Result<Decoded, BadRaster> {
     let bands = dataset.bands();
@@ -241,9 +266,14 @@ fn decoded(
     let (no_data, scale, offset) = (band.no_data(), band.scale(), band.offset());
     let unit = band.unit();
     let (driver, map, wkt) = (dataset.driver(), dataset.geo_transform(), dataset.wkt());
-    let conventions = netcdf::Conventions::of(library, path, &dataset, &band)?;
+    let conventions = netcdf::Conventions::of(library, &place.path, &dataset, &band)?;
     let block = band.block_size();
-    let blocks = GdalBlocks::new(dataset, number, held(stored), has_codes)?;
+    let source = Source {
+        place: place.clone(),
+        name,
+        options: options.open_options.clone(),
+    };
+    let blocks = GdalBlocks::new(source, dataset, number, held(stored), has_codes)?;
     let overviews = blocks.images().iter().skip(1);
     let file_layout = FileLayout {
         bands,

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::packed::Packing;
+use crate::beside::appended;
 
 /// Formats by how a file begins, or a part of its first kibibyte.
 const BEGINNINGS: [(&str, &[u8]); 18] = [
@@ -75,11 +76,4 @@ pub(super) fn of(path: &Path, head: &[u8]) -> Option<&'static str> {
     let extension = path.extension()?.to_string_lossy().to_lowercase();
     let known = EXTENSIONS.iter().find(|(end, _)| *end == extension);
     known.map(|(_, name)| *name)
-}
-
-fn appended(path: &Path, extension: &str) -> std::path::PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".");
-    name.push(extension);
-    name.into()
 }

@@ -7,6 +7,7 @@ use flate2::read::MultiGzDecoder;
 use heightfield_gdal::{Error, Library};
 
 use super::fault;
+use super::place::Place;
 use crate::format::Claim;
 use crate::formats::claim_of;
 use crate::{BadRaster, OpenOptions};
@@ -62,10 +63,14 @@ impl Packing {
     pub(super) fn entry(
         self,
         library: &Library,
-        path: &Path,
+        place: &Place,
         options: &OpenOptions,
     ) -> Result<(PathBuf, OpenOptions), BadRaster> {
-        let absolute = std::path::absolute(path).map_err(BadRaster::Unreadable)?;
+        let path = &place.path;
+        let absolute = match place.is_served() {
+            true => path.clone(),
+            false => std::path::absolute(path).map_err(BadRaster::Unreadable)?,
+        };
         let inside = absolute.display();
         let is_tar = match self {
             Self::Gzip => {

@@ -9,7 +9,10 @@ use glob::Pattern;
 use heightfield_gdal::{Dataset, Library};
 use serde_json::Value;
 
-use crate::{BadRaster, OpenOptions};
+use super::place::Place;
+use crate::input::FileBytes;
+use crate::remote::{is_url, without_rest};
+use crate::{BadRaster, OpenOptions, file_name};
 
 /// A larger document is no list of items that can be opened. In memory it takes fifty times as much.
 const MAX_BYTES: u64 = 4 << 20;
@@ -28,8 +31,11 @@ struct Item {
 }
 
 /// Why a document of items is not read; none where a file is something else.
-pub(super) fn refused(path: &Path, options: &OpenOptions) -> Result<Option<BadRaster>, BadRaster> {
-    let items = items(path, options)?;
+pub(super) fn refused(
+    place: &Place,
+    options: &OpenOptions,
+) -> Result<Option<BadRaster>, BadRaster> {
+    let items = items(&place.source, options)?;
     items
         .map(|items| to_build("GDAL does not open it as items of a STAC", &items))
         .transpose()
@@ -42,10 +48,10 @@ pub(super) fn refused(path: &Path, options: &OpenOptions) -> Result<Option<BadRa
 pub(super) fn check_places(
     library: &Library,
     opened: &Dataset,
-    path: &Path,
+    place: &Place,
     options: &OpenOptions,
 ) -> Result<(), BadRaster> {
-    let Some(items) = items(path, options)? else {
+    let Some(items) = items(&place.source, options)? else {
         return Ok(());
     };
     let full = |path: &Path| std::fs::canonicalize(path).ok();
@@ -103,19 +109,22 @@ fn to_build(why: &str, items: &[Item]) -> Result<BadRaster, BadRaster> {
 
 /// The items of a document; none where it is something else.
 fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, BadRaster> {
-    let bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
-    let is_named = path
+    let url = path.to_str().filter(|path| is_url(path));
+    let named = url.map_or(path, |url| Path::new(file_name(url)));
+    let is_named = named
         .extension()
         .is_some_and(|end| end == "json" || end == "geojson");
-    if !is_named || !path.is_file() {
+    if !is_named || path.is_dir() {
         return Ok(None);
     }
-    if bytes > MAX_BYTES {
+    let input = FileBytes::open(path, &options.elsewhere)?;
+    if input.len() > MAX_BYTES {
         return Err(BadRaster::AbsurdSize(format!(
-            "a JSON document of {bytes} bytes"
+            "a JSON document of {} bytes",
+            input.len()
         )));
     }
-    let text = std::fs::read(path).map_err(BadRaster::Unreadable)?;
+    let text = input.head(MAX_BYTES)?;
     let document: Value = serde_json::from_slice(&text)
         .map_err(|error| BadRaster::Damaged(format!("it is no JSON: {error}")))?;
     let asked = match &options.variable {
@@ -130,7 +139,9 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, BadRas
         _ if document["assets"].is_object() => vec![&document],
         _ => return Ok(None),
     };
-    let folder = path.parent().unwrap_or(Path::new(""));
+    // Also of a URL, without what follows its path.
+    let named = url.map_or(path, |url| Path::new(without_rest(url)));
+    let folder = named.parent().unwrap_or(Path::new(""));
     let items = features
         .into_iter()
         .map(|item| Item::of(item, asked.as_ref(), folder));
@@ -225,9 +236,13 @@ fn file(href: &str, folder: &Path) -> String {
         Some(("gs", rest)) => format!("/vsigs/{rest}"),
         Some(("file", rest)) => rest.to_owned(),
         Some(_) => format!("/vsicurl/{href}"),
-        None => folder
-            .join(href.trim_start_matches("./"))
-            .display()
-            .to_string(),
+        None => {
+            let joined = folder.join(href.trim_start_matches("./"));
+            let joined = joined.display().to_string();
+            match is_url(&joined) {
+                true => file(&joined, Path::new("")),
+                false => joined,
+            }
+        }
     }
 }

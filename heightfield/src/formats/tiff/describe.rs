@@ -28,11 +28,8 @@ pub(super) fn describe(
     decoded.offset = metadata.offset.unwrap_or(0.0);
     decoded.remarks.extend(metadata.remarks);
     // What keys spell out libgdal reads.
-    let file = match input.data() {
-        Data::File(_, path) if options.gdal => Some(path.as_path()),
-        _ => None,
-    };
-    georef::apply(image, decoded, metadata.metres_per_vertical_unit, file);
+    let by_gdal = options.gdal.then_some(input);
+    georef::apply(image, decoded, metadata.metres_per_vertical_unit, by_gdal);
     match decoded.place {
         None => lay_out_by_world_file(input, &WORLD_FILES, decoded)?,
         Some(_) if input.is_outline() => {}

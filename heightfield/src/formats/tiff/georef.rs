@@ -1,7 +1,5 @@
 //! Where the image lies: reference system, map to the ground, units.
 
-use std::path::Path;
-
 use geotiff_core::geokeys::{
     GEODETIC_CRS_TYPE, GEOG_ANGULAR_UNITS, GEOG_CITATION, GT_CITATION, GT_MODEL_TYPE,
     GT_RASTER_TYPE, GeoKeyDirectory, PROJ_CITATION, PROJ_LINEAR_UNITS, PROJECTED_CRS_TYPE,
@@ -15,6 +13,7 @@ use crate::crs::{self, ReferenceSystem};
 use crate::decoded::Decoded;
 use crate::file_layout::SamplesAre;
 use crate::ground_map::GroundMap;
+use crate::input::FileBytes;
 use crate::placed::GroundUnit;
 
 const MODEL_PIXEL_SCALE: u16 = 33550;
@@ -29,7 +28,12 @@ const GEO_ASCII_PARAMS: u16 = 34737;
 /// Sets reference system, place, cell size, units and orientation as far as the file
 /// states them. `stated` are the metres in a vertical unit by the file's own notes.
 /// `file` is where libgdal may read what keys spell out.
-pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>, file: Option<&Path>) {
+pub(super) fn apply(
+    image: &Ifd,
+    decoded: &mut Decoded,
+    stated: Option<f64>,
+    by_gdal: Option<&FileBytes>,
+) {
     let keys = GeoKeys::read(image);
     let of_code = |key| keys.code(key);
     let both = [PROJECTED_CRS_TYPE, GEODETIC_CRS_TYPE];
@@ -42,7 +46,7 @@ pub(super) fn apply(image: &Ifd, decoded: &mut Decoded, stated: Option<f64>, fil
         .or_else(beside);
     let stated = stated.or_else(|| of_code(VERTICAL_UNITS).and_then(metres_of_code));
     decoded.set_vertical(system, stated);
-    decoded.system = keys.system(file);
+    decoded.system = keys.system(by_gdal);
     decoded.file_layout.samples_are = keys.samples_are();
     if let Some(map) = ground_map(image, &keys) {
         decoded.format = decoded.format.replacen("TIFF", "GeoTIFF", 1);
@@ -141,7 +145,7 @@ impl GeoKeys {
     }
 
     /// The horizontal reference system: by its code, or by what it is called.
-    fn system(&self, file: Option<&Path>) -> Option<ReferenceSystem> {
+    fn system(&self, by_gdal: Option<&FileBytes>) -> Option<ReferenceSystem> {
         let code = match self.is_projected()? {
             true => self.known(PROJECTED_CRS_TYPE),
             false => self.known(GEODETIC_CRS_TYPE),
@@ -163,7 +167,7 @@ impl GeoKeys {
         });
         let unknown = code.map(|code| format!("EPSG:{code}, not known here"));
         let name = unknown.as_deref().or(own_name).or(self.text(GT_CITATION));
-        Some(user_defined::system(self, is_projected, name, file))
+        Some(user_defined::system(self, is_projected, name, by_gdal))
     }
 
     /// Projections that no keys are made for are written as Esri's text into the citation.

@@ -1,13 +1,13 @@
 //! Reference systems without a code, which a GeoTIFF's keys spell out: libgdal reads them, where there
-//! is one and the file is here; else the name, the unit and the ellipsoid are known.
-
-use std::path::Path;
+//! is one; else the name, the unit and the ellipsoid are known.
 
 use geotiff_core::geokeys::{GEODETIC_CRS_TYPE, GEOG_CITATION};
 
 use super::georef::GeoKeys;
 use crate::Globe;
-use crate::crs::{self, Datum, ReferenceSystem, Unit};
+use crate::crs::{Datum, ReferenceSystem, Unit};
+use crate::formats::gdal;
+use crate::input::FileBytes;
 
 const SEMI_MAJOR_AXIS: u16 = 2057;
 const SEMI_MINOR_AXIS: u16 = 2058;
@@ -18,9 +18,9 @@ pub(super) fn system(
     keys: &GeoKeys,
     is_projected: bool,
     name: Option<&str>,
-    file: Option<&Path>,
+    by_gdal: Option<&FileBytes>,
 ) -> ReferenceSystem {
-    if let Some(system) = file.and_then(crs::of_file) {
+    if let Some(system) = by_gdal.and_then(gdal::system_of) {
         return system;
     }
     let (unit, otherwise) = match is_projected {

@@ -1,0 +1,249 @@
+//! GDAL reads files through its caller.
+
+use std::collections::BTreeMap;
+use std::io::{self, ErrorKind};
+use std::sync::{Arc, Mutex};
+
+use heightfield_gdal::{Error, FileSystem, Library, Mount, ReadAt, Settings, Window};
+
+/// Files in memory, and what goes wrong with them.
+#[derive(Clone, Default)]
+struct Files {
+    by_name: Arc<BTreeMap<String, Vec<u8>>>,
+    /// Names that no server answers for.
+    silent: Arc<Mutex<Vec<String>>>,
+    opened: Arc<Mutex<Vec<String>>>,
+    roots: Vec<String>,
+}
+
+struct Bytes(Vec<u8>);
+
+impl ReadAt for Bytes {
+    fn bytes(&self) -> u64 {
+        self.0.len() as u64
+    }
+
+    fn read_at(&self, at: u64, count: usize) -> io::Result<Vec<u8>> {
+        Ok(self.0[at as usize..][..count].to_vec())
+    }
+}
+
+impl FileSystem for Files {
+    fn open(&self, name: &str) -> io::Result<Box<dyn ReadAt>> {
+        self.opened.lock().expect("no panic").push(name.to_owned());
+        if self
+            .silent
+            .lock()
+            .expect("no panic")
+            .iter()
+            .any(|it| it == name)
+        {
+            return Err(ErrorKind::ConnectionAborted.into());
+        }
+        assert_ne!(name, "panic.dat", "a panic that must not reach C");
+        let file = self.by_name.get(name).ok_or(ErrorKind::NotFound)?;
+        Ok(Box::new(Bytes(file.clone())))
+    }
+
+    fn beside(&self, name: &str) -> io::Result<Vec<String>> {
+        let header = name.replace(".dat", ".hdr");
+        let own = name.rsplit('/').next().unwrap_or_default();
+        let beside = header.rsplit('/').next().unwrap_or_default().to_owned();
+        let is_there = beside != own && self.by_name.contains_key(&header);
+        Ok(is_there.then_some(beside).into_iter().collect())
+    }
+
+    fn roots(&self) -> &[String] {
+        &self.roots
+    }
+}
+
+/// ENVI's raw samples, 0 to 11 and as many more, with their header.
+fn field(first: u32) -> [Vec<u8>; 2] {
+    let samples = (0..12).map(|at| (first + at) as f32);
+    let header = "ENVI\nsamples = 4\nlines = 3\nbands = 1\ndata type = 4\ninterleave = bsq\n\
+                  byte order = 0\nheader offset = 0\n";
+    [samples.flat_map(f32::to_le_bytes).collect(), header.into()]
+}
+
+fn vrt(source: &str, is_relative: bool) -> Vec<u8> {
+    let relative = u8::from(is_relative);
+    format!(
+        "<VRTDataset rasterXSize=\"4\" rasterYSize=\"3\"><VRTRasterBand dataType=\"Float32\" band=\"1\">\
+         <SimpleSource><SourceFilename relativeToVRT=\"{relative}\">{source}</SourceFilename>\
+         </SimpleSource></VRTRasterBand></VRTDataset>"
+    )
+    .into_bytes()
+}
+
+fn mounted(vrts: &[(&str, Vec<u8>)]) -> Option<(Library, Mount, Files)> {
+    let gdal = Library::load(Settings::default())
+        .inspect_err(|why| eprintln!("skipped: {why}; {}", Error::how_to_install()))
+        .ok()?;
+    let mut by_name = BTreeMap::new();
+    for (folder, first) in [("a/west", 0), ("a/east", 100), ("a/panic", 0)] {
+        let [samples, header] = field(first);
+        by_name.insert(format!("{folder}.dat"), samples);
+        by_name.insert(format!("{folder}.hdr"), header);
+    }
+    let vrts = vrts
+        .iter()
+        .map(|(name, text)| ((*name).to_owned(), text.clone()));
+    by_name.extend(vrts);
+    let files = Files {
+        by_name: Arc::new(by_name),
+        roots: vec!["/vsicurl/http://h/".into(), "http://h/".into()],
+        ..Files::default()
+    };
+    let mount = gdal.mount(Box::new(files.clone())).expect("mounted");
+    Some((gdal, mount, files))
+}
+
+/// The last sample of a raster.
+fn last(gdal: &Library, name: &str) -> Result<f64, Error> {
+    let dataset = gdal.open(name.as_ref(), &[])?;
+    let window = Window {
+        column: 3,
+        row: 2,
+        columns: 1,
+        rows: 1,
+    };
+    let mut sample = [0.0];
+    dataset.band(1)?.read(window, &mut sample)?;
+    Ok(sample[0])
+}
+
+#[test]
+fn files_and_those_beside_them_are_read_by_name() {
+    let vrts = [
+        ("a/beside.vrt", vrt("./b/../west.dat", true)),
+        ("a/by_root.vrt", vrt("http://h/a/east.dat", false)),
+        (
+            "a/by_gdals_root.vrt",
+            vrt("/vsicurl/http://h/a/east.dat", false),
+        ),
+        ("a/outer.vrt", vrt("by_root.vrt", true)),
+    ];
+    let Some((gdal, mount, _)) = mounted(&vrts) else {
+        return;
+    };
+    for (name, expected) in [
+        ("a/west.dat", 11.0),
+        ("a/beside.vrt", 11.0),
+        ("a/by_root.vrt", 111.0),
+        ("a/by_gdals_root.vrt", 111.0),
+        ("a/outer.vrt", 111.0),
+    ] {
+        assert_eq!(last(&gdal, &mount.path(name)), Ok(expected), "{name}");
+        assert!(mount.take_fault().is_none(), "{name}");
+    }
+}
+
+#[test]
+fn what_a_file_names_on_this_computer_is_not_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [samples, header] = field(0);
+    let local = folder.path().join("west.dat");
+    std::fs::write(&local, samples).expect("written");
+    std::fs::write(local.with_extension("hdr"), header).expect("written");
+    let local = local.display().to_string();
+    let vrts = [
+        ("a/absolute.vrt", vrt(&local, true)),
+        ("a/working_folder.vrt", vrt("Cargo.toml", false)),
+        (
+            "a/driver.vrt",
+            vrt(&format!("NETCDF:&quot;{local}&quot;:z"), true),
+        ),
+        ("a/input.vrt", vrt("/vsistdin/", false)),
+        ("a/other_server.vrt", vrt("http://other/a/west.dat", false)),
+        (
+            "a/archive.vrt",
+            vrt("/vsizip//vsicurl/http://other/a.zip/west.dat", true),
+        ),
+        (
+            "a/other_files.vrt",
+            vrt("/vsiheightfield/999999/a.dat", false),
+        ),
+    ];
+    let Some((gdal, mount, _)) = mounted(&vrts) else {
+        return;
+    };
+    for (name, _) in &vrts {
+        assert!(last(&gdal, &mount.path(name)).is_err(), "{name}");
+        let why = mount.take_fault().map(|fault| fault.to_string());
+        assert!(
+            why.as_ref().is_some_and(|why| why.contains("it names")),
+            "{name}: {why:?}"
+        );
+    }
+}
+
+#[test]
+fn vrts_in_each_other_end() {
+    let number = |at: u32| format!("a/{at}.vrt");
+    let vrts: Vec<_> = (0..40)
+        .map(|at| (number(at), vrt(&format!("{}.vrt", (at + 1) % 40), true)))
+        .collect();
+    let vrts: Vec<_> = vrts
+        .iter()
+        .map(|(name, text)| (name.as_str(), text.clone()))
+        .collect();
+    let Some((gdal, mount, files)) = mounted(&vrts) else {
+        return;
+    };
+    assert!(last(&gdal, &mount.path("a/0.vrt")).is_err());
+    let fault = mount.take_fault().map(|fault| fault.to_string());
+    assert!(fault.is_some_and(|fault| fault.contains("deep")));
+    let opened = files.opened.lock().expect("no panic").clone();
+    assert!(!opened.contains(&number(20)), "{opened:?}");
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_a_fault_and_one_that_is_missing_is_none() {
+    let vrts = [
+        ("a/both.vrt", vrt("east.dat", true)),
+        ("a/gone.vrt", vrt("gone.dat", true)),
+    ];
+    let Some((gdal, mount, files)) = mounted(&vrts) else {
+        return;
+    };
+    files
+        .silent
+        .lock()
+        .expect("no panic")
+        .push("a/east.dat".into());
+    assert!(last(&gdal, &mount.path("a/both.vrt")).is_err());
+    let fault = mount.take_fault().map(|fault| fault.kind());
+    assert_eq!(fault, Some(ErrorKind::ConnectionAborted));
+    assert!(last(&gdal, &mount.path("a/gone.vrt")).is_err());
+    assert!(mount.take_fault().is_none());
+    // Neither a name outside nor a panic leads further than to an error.
+    for name in ["../a/west.dat", "", "a/", "a/../../x.dat", "panic.dat"] {
+        assert!(last(&gdal, &mount.path(name)).is_err(), "{name}");
+    }
+    let gone = mount.path("a/west.dat");
+    drop(mount);
+    assert!(last(&gdal, &gone).is_err(), "nothing is mounted any more");
+}
+
+#[test]
+fn a_dataset_keeps_its_files_and_reports_what_they_lack() {
+    let Some((gdal, mount, _)) = mounted(&[]) else {
+        return;
+    };
+    let dataset = gdal
+        .open(mount.path("a/west.dat").as_ref(), &[])
+        .expect("opened");
+    drop(mount);
+    let window = Window {
+        column: 0,
+        row: 2,
+        columns: 4,
+        rows: 1,
+    };
+    let mut row = [0.0_f32; 4];
+    let band = dataset.band(1).expect("there");
+    band.read(window, &mut row).expect("read");
+    assert_eq!(row, [8.0, 9.0, 10.0, 11.0]);
+    assert!(dataset.take_fault().is_none());
+}

@@ -1,0 +1,146 @@
+//! Files at URLs, which GDAL reads through this program's own client: keys, redirects, pages and
+//! time limits are the same as of files that are read here.
+
+use std::fs::File;
+use std::io::{self, copy};
+use std::path::Path;
+use std::sync::Arc;
+
+use heightfield_gdal::{FileSystem, ReadAt};
+use tempfile::TempDir;
+
+use crate::BadRaster;
+use crate::beside;
+use crate::input::FileBytes;
+use crate::remote::{Elsewhere, RemoteFile, file_name, gdal_names, parts};
+
+/// Beginnings of files that GDAL reads from a disk only (NetCDF, HDF5, HDF4), or from their first
+/// byte on (gzip): they are fetched as a whole.
+const FETCHED: [&[u8]; 4] = [
+    b"CDF",
+    b"\x89HDF\r\n\x1a\n",
+    b"\x0e\x03\x13\x01",
+    b"\x1f\x8b",
+];
+/// No larger file is fetched as a whole.
+const MAX_FETCHED_BYTES: u64 = 1 << 30;
+/// It takes no more than one of so many parts of what is free on the disk.
+const PARTS_OF_FREE: u64 = 2;
+
+/// The files at one host or in one bucket.
+#[derive(Clone)]
+pub(super) struct Served {
+    elsewhere: Elsewhere,
+    /// As `https://host/`.
+    root: String,
+    /// What follows the path of each URL, which may be a key.
+    rest: String,
+    roots: Arc<[String]>,
+}
+
+impl Served {
+    /// The server of a URL, and the file's name there.
+    pub(super) fn of(url: &str, elsewhere: &Elsewhere) -> (Self, String) {
+        let [root, name, rest] = parts(url);
+        let served = Self {
+            elsewhere: elsewhere.waiting(),
+            root: root.to_owned(),
+            rest: rest.to_owned(),
+            roots: gdal_names(root).into(),
+        };
+        (served, name.to_owned())
+    }
+
+    fn url(&self, name: &str) -> String {
+        let rest = if name.contains('?') { "" } else { &self.rest };
+        format!("{}{name}{rest}", self.root)
+    }
+}
+
+impl FileSystem for Served {
+    fn open(&self, name: &str) -> io::Result<Box<dyn ReadAt>> {
+        let file = self.elsewhere.open(&self.url(name))?;
+        Ok(Box::new(Remote(file)))
+    }
+
+    fn beside(&self, name: &str) -> io::Result<Vec<String>> {
+        let url = self.url(name);
+        let input = FileBytes::open(Path::new(&url), &self.elsewhere).map_err(io_error)?;
+        beside::names_at_url(&input, &url).map_err(io_error)
+    }
+
+    fn roots(&self) -> &[String] {
+        &self.roots
+    }
+}
+
+/// An open file at a URL, read by a thread that may wait.
+struct Remote(Arc<RemoteFile>);
+
+impl ReadAt for Remote {
+    fn bytes(&self) -> u64 {
+        self.0.len()
+    }
+
+    fn read_at(&self, at: u64, count: usize) -> io::Result<Vec<u8>> {
+        self.0.read_waiting(at, count)
+    }
+}
+
+fn io_error(fault: BadRaster) -> io::Error {
+    match fault {
+        BadRaster::Elsewhere(error) | BadRaster::Unreadable(error) => error,
+        fault => io::Error::other(fault.to_string()),
+    }
+}
+
+/// What went wrong with a file that GDAL read through this program.
+pub(super) fn fault(error: io::Error) -> BadRaster {
+    match error.kind() {
+        // A refusal of its content, and not of its server.
+        io::ErrorKind::Other => BadRaster::Unreadable(error),
+        _ => BadRaster::elsewhere(error),
+    }
+}
+
+/// Whether a file that begins so is fetched as a whole.
+pub(super) fn is_fetched(head: &[u8]) -> bool {
+    FETCHED.iter().any(|bytes| head.starts_with(bytes))
+}
+
+/// A file, and what GDAL notes beside it, in a folder that goes when it is dropped.
+///
+/// # Errors
+/// [`BadRaster::AbsurdSize`] where it is too large for that.
+pub(super) fn fetched(url: &str, elsewhere: &Elsewhere) -> Result<(TempDir, String), BadRaster> {
+    let input = FileBytes::open(Path::new(url), elsewhere)?;
+    let folder = tempfile::tempdir().map_err(BadRaster::Unreadable)?;
+    let free = fs4::available_space(folder.path()).unwrap_or(u64::MAX);
+    let most = MAX_FETCHED_BYTES.min(free / PARTS_OF_FREE);
+    if input.len() > most {
+        return Err(BadRaster::AbsurdSize(format!(
+            "{} MB, of which {} MB fit here: a file of this format at a URL is fetched as a whole",
+            input.len() >> 20,
+            most >> 20
+        )));
+    }
+    let name = plain_name(url);
+    let notes = beside::find_appended(&input, "aux.xml")?;
+    let notes = notes.map(|notes| (notes, format!("{name}.aux.xml")));
+    for (bytes, name) in [(input, name.clone())].into_iter().chain(notes) {
+        let mut file = File::create(folder.path().join(name)).map_err(BadRaster::Unreadable)?;
+        copy(&mut bytes.reader()?, &mut file)
+            .map_err(|error| BadRaster::from_io(error, "what is at the URL"))?;
+    }
+    Ok((folder, name))
+}
+
+/// A name on every system, with the extension of the file at a URL.
+fn plain_name(url: &str) -> String {
+    let plain = |c: char| match c.is_ascii_alphanumeric() || ".-_".contains(c) {
+        true => c,
+        false => '_',
+    };
+    let name: String = file_name(url).chars().map(plain).collect();
+    format!("_{name}").replacen("_.", "_", 1)
+}

@@ -1,0 +1,105 @@
+//! Where GDAL finds a file, and what has to stay there while it reads.
+
+use std::path::{Path, PathBuf};
+
+use heightfield_gdal::{Dataset, Error, Library, Mount};
+use tempfile::TempDir;
+
+use super::at_url::{self, Served, fetched, is_fetched};
+use super::fault;
+use crate::BadRaster;
+use crate::remote::{Elsewhere, is_url, without_key};
+
+/// A file here or at a URL.
+pub(super) struct Place {
+    library: Library,
+    /// What the user calls it.
+    pub(super) source: PathBuf,
+    /// What GDAL calls it.
+    pub(super) path: PathBuf,
+    served: Option<(Served, Mount)>,
+    _fetched: Option<TempDir>,
+}
+
+impl Place {
+    /// A file that begins with some bytes.
+    pub(super) fn of(
+        library: &Library,
+        source: &Path,
+        head: &[u8],
+        elsewhere: &Elsewhere,
+    ) -> Result<Self, BadRaster> {
+        let here = Self {
+            library: library.clone(),
+            source: source.to_owned(),
+            path: source.to_owned(),
+            served: None,
+            _fetched: None,
+        };
+        let Some(url) = source.to_str().filter(|source| is_url(source)) else {
+            return Ok(here);
+        };
+        if is_fetched(head) {
+            let (folder, name) = fetched(url, elsewhere)?;
+            return Ok(Self {
+                path: folder.path().join(name),
+                _fetched: Some(folder),
+                ..here
+            });
+        }
+        let (served, name) = Served::of(url, elsewhere);
+        let mount = library.mount(Box::new(served.clone())).map_err(fault)?;
+        Ok(Self {
+            path: mount.path(&name).into(),
+            served: Some((served, mount)),
+            ..here
+        })
+    }
+
+    /// Whether GDAL reads it through this program.
+    pub(super) const fn is_served(&self) -> bool {
+        self.served.is_some()
+    }
+
+    /// GDAL's refusal without the folder of the file, which the user has named or knows nothing of.
+    pub(super) fn in_words(&self, refusal: BadRaster) -> BadRaster {
+        let folder = self
+            .path
+            .parent()
+            .map(|folder| folder.display().to_string());
+        match (refusal, folder.filter(|folder| !folder.is_empty())) {
+            (BadRaster::ByGdal(Error::Refused(words)), Some(folder)) => {
+                let words = words.replace(&format!("{folder}/"), "");
+                BadRaster::ByGdal(Error::Refused(words))
+            }
+            (BadRaster::ByGdal(Error::Slow { seconds, .. }), _) => {
+                let path = without_key(&self.source).into();
+                BadRaster::ByGdal(Error::Slow { path, seconds })
+            }
+            (refusal, _) => refusal,
+        }
+    }
+
+    /// Why something at its server could not be read.
+    pub(super) fn take_fault(&self) -> Option<std::io::Error> {
+        let (_, mount) = self.served.as_ref()?;
+        mount.take_fault()
+    }
+
+    /// Opens a part of the file anew after something could not be read: GDAL remembers it.
+    pub(super) fn open_again(&self, name: &str, options: &[&str]) -> Result<Dataset, BadRaster> {
+        let Some((served, mount)) = &self.served else {
+            return self.library.open_part(name, options).map_err(fault);
+        };
+        let new = self
+            .library
+            .mount(Box::new(served.clone()))
+            .map_err(fault)?;
+        let name = name.replace(&mount.path(""), &new.path(""));
+        let opened = self.library.open_part(&name, options).map_err(fault);
+        match new.take_fault() {
+            Some(error) => Err(at_url::fault(error)),
+            None => opened,
+        }
+    }
+}
