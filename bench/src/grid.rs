@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use hapterra::synth::{Kind, Synth};
-use hapterra::terrain::{FeltCells, FeltGrid};
+use hapterra::terrain::{HapticCells, HapticGrid};
 use heightfield::Raster;
 
 /// Most samples along a side; a larger field is cut to its middle.
-pub const LARGEST_SIDE: u32 = 4097;
+pub const MAX_SIDE: u32 = 4097;
 
 /// Heights in cells, row by row from the south, with no hole.
 #[derive(Clone, Debug)]
@@ -54,11 +54,11 @@ impl Grid {
     /// A terrain file's field at true proportions where it knows them, else
     /// one cell a vertical unit, times `steepness`.
     pub fn from_raster(path: &Path, raster: &Raster, steepness: f64) -> Self {
-        let scale = FeltGrid::new(raster, FeltCells::Stored)
+        let scale = HapticGrid::new(raster, HapticCells::Stored)
             .cells_per_vertical_unit()
             .unwrap_or(1.0)
             * steepness;
-        let [width, height] = [raster.columns(), raster.rows()].map(|n| n.min(LARGEST_SIDE));
+        let [width, height] = [raster.columns(), raster.rows()].map(|n| n.min(MAX_SIDE));
         let first = [(raster.columns() - width) / 2, (raster.rows() - height) / 2];
         let summary = raster.summary();
         let mut row_of = (u32::MAX, vec![0.0; width as usize]);

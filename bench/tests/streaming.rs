@@ -8,7 +8,7 @@ use hapterra_lab::streaming::{LATENCIES_MS, RATES, Reading, Row, SIDES};
 
 /// Bytes that the host may take for any terrain, 10⁶: the device in the same process is one of
 /// these megabytes.
-const MOST_MB: f64 = 256.0;
+const MAX_MB: f64 = 256.0;
 
 fn rows(path: &Path) -> Vec<Row> {
     let mut table = csv::Reader::from_path(path).expect("it is there");
@@ -87,7 +87,7 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
             assert!(large.open_bytes < Some(2_000_000), "{large:?}");
         }
         for row in [small, large] {
-            assert!(row.peak_mb.is_none_or(|peak| peak < MOST_MB), "{row:?}");
+            assert!(row.peak_mb.is_none_or(|peak| peak < MAX_MB), "{row:?}");
         }
     }
 }
@@ -160,7 +160,7 @@ fn the_kept_figures_are_of_all_sizes_and_latencies_and_within_their_bounds() {
                 let [row] = found[..] else {
                     panic!("{side} {latency} {link}: {} rows", found.len());
                 };
-                assert!(row.peak_mb < Some(MOST_MB), "{row:?}");
+                assert!(row.peak_mb < Some(MAX_MB), "{row:?}");
                 assert!(row.held_straight.is_some() && row.missing()[1][2].is_some());
                 assert_eq!(row.holes_underlaid, Some(0), "{row:?}");
             }

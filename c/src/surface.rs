@@ -3,7 +3,7 @@
 use std::mem::MaybeUninit;
 
 use hapterra_touch::{
-    Damping, ForceLaw, Friction, Material, Pattern, Shading, Surface, SurfaceError, Texture,
+    Damping, Friction, Material, Pattern, Shading, Surface, SurfaceError, SurfaceParams, Texture,
 };
 
 use crate::border::array;
@@ -64,7 +64,7 @@ pub struct HapterraSurface {
 }
 
 impl HapterraSurface {
-    pub(crate) fn of(law: &ForceLaw) -> Self {
+    pub(crate) fn of(law: &SurfaceParams) -> Self {
         Self {
             stiffness_n_per_mm: law.stiffness_n_per_mm,
             max_force_n: law.max_force_n,
@@ -88,12 +88,12 @@ impl HapterraSurface {
         }
     }
 
-    pub(crate) fn law(&self) -> Result<ForceLaw, Failure> {
+    pub(crate) fn law(&self) -> Result<SurfaceParams, Failure> {
         let unknown = |what: &str, number: u32, known: &str| {
             let message = format!("{what} is {number}: give {known}");
             Failure::new(HapterraStatus::Choice, message)
         };
-        Ok(ForceLaw {
+        Ok(SurfaceParams {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             max_force_n: self.max_force_n,
             friction: Friction {
@@ -144,7 +144,7 @@ pub extern "C" fn hapterra_surface_default(
     let Some(surface) = surface else {
         return HapterraStatus::NullPointer;
     };
-    surface.write(HapterraSurface::of(&ForceLaw::PREMIUM));
+    surface.write(HapterraSurface::of(&SurfaceParams::PREMIUM));
     HapterraStatus::Ok
 }
 

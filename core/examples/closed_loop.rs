@@ -6,13 +6,13 @@
 //! ```
 
 use hapterra_core::Vec3;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::{Drive, Mode, Sense};
-use hapterra_core::phantom::{BadCalibration, Calibration, Mechanism};
+use hapterra_core::guard::{GuardInputs, GuardOutputs, Mode};
+use hapterra_core::phantom::{Calibration, CalibrationError, Kinematics};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Scene, Source};
-use hapterra_core::terrain::{FieldSize, FieldStorage, Tile, TileKey};
+use hapterra_core::terrain::{FieldSize, Tile, TileArena, TileKey};
 use hapterra_core::tick::{Command, Haptics};
 
 const TICK_S: f32 = TickRate::DEFAULT.tick_s();
@@ -22,7 +22,7 @@ const SIZE: FieldSize = FieldSize::new(64, 64);
 
 /// An arm with a person's hand on it: three joints with inertia and friction.
 struct Arm {
-    mechanism: Mechanism,
+    mechanism: Kinematics,
     angles: Vec3,
     rates: Vec3,
 }
@@ -48,7 +48,7 @@ impl Arm {
 
     /// Goes on for a tick, with these motor currents and a hand that is drawn to a
     /// height over the tip's home, mm.
-    fn go_on(&mut self, drive: &Drive, wanted_mm: f32) {
+    fn go_on(&mut self, drive: &GuardOutputs, wanted_mm: f32) {
         let pose = self.mechanism.pose(self.counts(), [0; 3]);
         let wanted = self.mechanism.home_mm() + Vec3::Z * wanted_mm;
         let hand = pose.torques_nm((wanted - pose.tip_mm()) * Self::GRIP_N_PER_MM);
@@ -61,8 +61,8 @@ impl Arm {
     }
 }
 
-pub(crate) fn main() -> Result<(), BadCalibration> {
-    let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5)?;
+pub(crate) fn main() -> Result<(), CalibrationError> {
+    let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5)?;
     let mut arm = Arm {
         mechanism,
         angles: Vec3::ZERO,
@@ -70,7 +70,7 @@ pub(crate) fn main() -> Result<(), BadCalibration> {
     };
 
     // The loop, in memory that is owned here.
-    let mut storage = FieldStorage::<2>::new();
+    let mut storage = TileArena::<2>::new();
     let mut spare = Tile::VACANT;
     let mut haptics = Haptics::new(storage.slots(), TickRate::DEFAULT, None);
     haptics.configure(mechanism);
@@ -82,7 +82,7 @@ pub(crate) fn main() -> Result<(), BadCalibration> {
         underlay: None,
         cell_mm: 2.0,
         home: GridPoint::new([32, 32, 0], Vec3::Z * (ABOVE_PLANE_MM / 2.0)),
-        law: ForceLaw::PREMIUM,
+        law: SurfaceParams::PREMIUM,
         source: Source::Encoders,
         hold_clock: false,
         materials: None,
@@ -105,10 +105,10 @@ pub(crate) fn main() -> Result<(), BadCalibration> {
         let time_s = f32::from(tick) * TICK_S;
         // Armed after the switch is pressed and force has come in; then down.
         let wanted_mm = (-8.0 * (time_s - 2.5)).clamp(-20.0, 0.0);
-        let sense = Sense {
+        let sense = GuardInputs {
             counts: arm.counts(),
             dead_man: tick > 10,
-            ..Sense::default()
+            ..GuardInputs::default()
         };
         let outcome = haptics.tick(&sense, true);
         arm.go_on(&outcome.drive, wanted_mm);

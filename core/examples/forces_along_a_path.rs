@@ -9,9 +9,9 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactSettings};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::terrain::{BadField, FieldSize, FieldStorage};
+use hapterra_core::terrain::{FieldError, FieldSize, TileArena};
 
 /// Millimetres a cell: a hill of 8 cells is 16 mm high.
 const CELL_MM: f32 = 2.0;
@@ -29,8 +29,8 @@ fn path(t: f32) -> Vec3 {
     Vec3::new(5.0 + 50.0 * t, 20.3, (9.0 - 80.0 * t).max(1.0))
 }
 
-pub(crate) fn main() -> Result<(), BadField> {
-    let mut field = FieldStorage::<2>::from_fn(FieldSize::new(60, 40), hill)?;
+pub(crate) fn main() -> Result<(), FieldError> {
+    let mut field = TileArena::<2>::from_fn(FieldSize::new(60, 40), hill)?;
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
 
@@ -40,12 +40,12 @@ pub(crate) fn main() -> Result<(), BadField> {
         let at = path(f32::from(tick) / f32::from(TICKS));
         let hip = GridPoint::new([0; 3], at);
         let output = contact.step(&window, &hip);
-        let force_n = ForceLaw::PREMIUM
+        let force_n = SurfaceParams::PREMIUM
             .spring()
             .force_n(output.displacement * CELL_MM);
         strongest = strongest.max(force_n.length());
         if tick % 50 == 0 {
-            let proxy = output.proxy.seen_from([0; 3]);
+            let proxy = output.proxy.relative_to([0; 3]);
             println!(
                 "{:7.2} {:6.2}   {:7.2} {:6.2}   {:10.2} N {:6.2} {:6.2}   {:?}",
                 at.x, at.z, proxy.x, proxy.z, force_n.x, force_n.y, force_n.z, output.state

@@ -11,9 +11,9 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::{
-    FieldSize, FieldStorage, POSTS, Tile, TileDemand, TileKey, TileRequester, Window,
+    FieldSize, RequestHint, TILE_SAMPLES, Tile, TileArena, TileKey, TileRequester, Window,
 };
-use hapterra_core::wire::frame::{BadFrame, FrameReader, MAX_FRAME, decode, encode};
+use hapterra_core::wire::frame::{FrameError, FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::session::{InSession, SessionNumber};
 
@@ -31,22 +31,25 @@ fn height(x: i32, y: i32) -> f32 {
 }
 
 /// The bytes in a frame, as the reader at the other end of the link gets them.
-fn travel(frame: &[u8]) -> Result<Vec<u8>, BadFrame> {
+fn travel(frame: &[u8]) -> Result<Vec<u8>, FrameError> {
     let mut reader = FrameReader::<MAX_FRAME>::new();
     let (_, content) = reader.push(frame);
-    content.unwrap_or(Err(BadFrame::Encoding)).map(Vec::from)
+    content.unwrap_or(Err(FrameError::Encoding)).map(Vec::from)
 }
 
 /// The host: answers a request for a tile with its heights.
-fn host(request: &[u8]) -> Result<Vec<u8>, BadFrame> {
+fn host(request: &[u8]) -> Result<Vec<u8>, FrameError> {
     let content = travel(request)?;
     let InSession { session, message } = decode(&content)?;
-    let ToHost::Need { epoch, key } = message else {
-        return Err(BadFrame::Content);
+    let ToHost::TileRequest { epoch, key } = message else {
+        return Err(FrameError::Content);
     };
     let first = key.index.first_cell();
-    let samples = (0..(POSTS * POSTS) as i32).map(|i| {
-        let (x, y) = (first.x + i % POSTS as i32, first.y + i / POSTS as i32);
+    let samples = (0..(TILE_SAMPLES * TILE_SAMPLES) as i32).map(|i| {
+        let (x, y) = (
+            first.x + i % TILE_SAMPLES as i32,
+            first.y + i / TILE_SAMPLES as i32,
+        );
         let inside = x <= SIZE.columns && y <= SIZE.rows;
         if inside { height(x, y) } else { f32::NAN }
     });
@@ -67,21 +70,21 @@ fn host(request: &[u8]) -> Result<Vec<u8>, BadFrame> {
 }
 
 /// The device: takes a tile into a free buffer, and gives its key.
-fn load(frame: &[u8], buffer: &mut Tile) -> Result<TileKey, BadFrame> {
+fn load(frame: &[u8], buffer: &mut Tile) -> Result<TileKey, FrameError> {
     let content = travel(frame)?;
     let InSession { message, .. } = decode(&content)?;
     let ToDevice::Tile(TileMessage { key, heights, .. }) = message else {
-        return Err(BadFrame::Content);
+        return Err(FrameError::Content);
     };
     let Heights::Samples { base, bytes } = heights else {
-        return Err(BadFrame::Content);
+        return Err(FrameError::Content);
     };
-    buffer.load(key, base, bytes).or(Err(BadFrame::Content))?;
+    buffer.load(key, base, bytes).or(Err(FrameError::Content))?;
     Ok(key)
 }
 
-pub(crate) fn main() -> Result<(), BadFrame> {
-    let mut storage = FieldStorage::<4>::new();
+pub(crate) fn main() -> Result<(), FrameError> {
+    let mut storage = TileArena::<4>::new();
     let mut spare = Tile::VACANT;
     let mut free = &mut spare;
     let mut window = Window::new(storage.slots());
@@ -102,14 +105,14 @@ pub(crate) fn main() -> Result<(), BadFrame> {
         let output = *contact.step(&window, &hip);
         touching += u32::from(output.state == ContactState::Touching);
         waiting += u32::from(output.missing_tile.is_some());
-        let demand = TileDemand {
+        let demand = RequestHint {
             missing_tile: output.missing_tile,
             proxy: output.proxy.column(),
             hip: hip.column(),
             velocity: [0.1, 0.0],
         };
         while let Some(key) = requester.next_request(tick, &demand) {
-            let message = ToHost::Need { epoch: EPOCH, key };
+            let message = ToHost::TileRequest { epoch: EPOCH, key };
             let session = SESSION;
             let mut buffer = [0; 32];
             let frame =

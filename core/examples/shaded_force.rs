@@ -5,7 +5,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactSettings};
 use hapterra_core::force::{Shader, Shading};
 use hapterra_core::grid::GridPoint;
-use hapterra_core::terrain::{FieldSize, FieldStorage};
+use hapterra_core::terrain::{FieldSize, TileArena};
 
 /// Heights of a section, cells: the ground is the same from south to north.
 const SECTION: [f32; 11] = [1.5, 1.5, 1.0, 0.5, 1.0, 1.5, 1.0, 0.5, 0.5, 6.5, 6.5];
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// The picture.
 pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     let size = FieldSize::new(SECTION.len() as i32 - 1, 4);
-    let mut field = FieldStorage::<1>::from_fn(size, |x, _| SECTION[x as usize])?;
+    let mut field = TileArena::<1>::from_fn(size, |x, _| SECTION[x as usize])?;
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut shader = Shader::of(Shading::Smooth).ok_or("no shading")?;

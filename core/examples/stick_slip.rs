@@ -7,7 +7,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactSettings, Friction};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::rate::TickRate;
-use hapterra_core::terrain::{FieldSize, FieldStorage};
+use hapterra_core::terrain::{FieldSize, TileArena};
 
 const FRICTION: Friction = Friction {
     static_mu: 0.6,
@@ -84,7 +84,7 @@ pub(crate) fn drawn() -> Result<String, Box<dyn Error>> {
 /// A hand that goes east, and what it drags.
 fn dragged() -> Result<Vec<Seen>, Box<dyn Error>> {
     let size = FieldSize::new(64, 4);
-    let mut field = FieldStorage::<2>::from_fn(size, |_, _| 0.0)?;
+    let mut field = TileArena::<2>::from_fn(size, |_, _| 0.0)?;
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ.with_friction(FRICTION));
     // Counted from the place where the tip comes down.

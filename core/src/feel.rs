@@ -13,7 +13,7 @@ use crate::contact::{Contact, ContactSettings};
 use crate::force::{Effects, FeltWith, MaterialTable, Moment, Shares};
 use crate::grid::GridPoint;
 use crate::guard::Guard;
-use crate::phantom::{Mechanism, Pose, to_terrain_frame};
+use crate::phantom::{Kinematics, Pose, to_terrain_frame};
 use crate::rate::TickRate;
 use crate::scene::{Scene, Source};
 use crate::terrain::{TileIndex, Window};
@@ -31,7 +31,7 @@ pub(crate) enum Mover<'a> {
         /// The guard, which knows velocity, last force and shares.
         guard: &'a Guard,
         /// The arm's settings.
-        mechanism: &'a Mechanism,
+        mechanism: &'a Kinematics,
         /// Its pose.
         pose: &'a Pose,
         /// The clutch's share of the force.

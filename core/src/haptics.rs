@@ -5,10 +5,10 @@ use crate::contact::Contact;
 use crate::feel::Feel;
 use crate::force::MaterialTable;
 use crate::guard::thermal::Temperatures;
-use crate::guard::{Drive, Fault, Guard, Jog, Report, Sense};
-use crate::phantom::{Calibration, Mechanism};
+use crate::guard::{Fault, Guard, GuardInputs, GuardOutputs, Jog, Report};
+use crate::phantom::{Calibration, Kinematics};
 use crate::rate::TickRate;
-use crate::scene::{Health, Point, Scene, Source, View};
+use crate::scene::{Health, HipCommand, Scene, Source, View};
 use crate::terrain::{Tile, TileKey, Window};
 
 /// From the beginning of a tick until its force acts, s, where a board says nothing else.
@@ -33,7 +33,7 @@ pub enum Command<'t> {
     /// A filled tile.
     Tile(&'t mut Tile),
     /// A haptic interface point for one tick, in a scene fed by points.
-    Point(Point),
+    Hip(HipCommand),
     /// Arm, once nothing blocks it and the dead-man switch is pressed.
     Arm,
     /// Drop the scene and arm for a jog in its place: a small current in one motor
@@ -93,16 +93,16 @@ pub struct Board {
 /// ```
 /// use hapterra_core::Vec3;
 /// use hapterra_core::contact::ContactState;
-/// use hapterra_core::force::ForceLaw;
+/// use hapterra_core::force::SurfaceParams;
 /// use hapterra_core::grid::GridPoint;
-/// use hapterra_core::guard::Sense;
+/// use hapterra_core::guard::GuardInputs;
 /// use hapterra_core::rate::TickRate;
-/// use hapterra_core::scene::{Point, Scene, Source};
-/// use hapterra_core::terrain::{FieldSize, FieldStorage, Tile, TileKey};
+/// use hapterra_core::scene::{HipCommand, Scene, Source};
+/// use hapterra_core::terrain::{FieldSize, TileArena, Tile, TileKey};
 /// use hapterra_core::tick::{Command, Haptics};
 ///
 /// let size = FieldSize::new(32, 32);
-/// let (mut storage, mut tile) = (FieldStorage::<1>::new(), Tile::VACANT);
+/// let (mut storage, mut tile) = (TileArena::<1>::new(), Tile::VACANT);
 /// tile.fill_from(TileKey::new(0, 0, 0), 0, size, |_x, _y| 2.0).expect("in range");
 ///
 /// let mut haptics = Haptics::new(storage.slots(), TickRate::DEFAULT, None);
@@ -114,7 +114,7 @@ pub struct Board {
 ///     underlay: None,
 ///     cell_mm: 1.0,
 ///     home: GridPoint::default(),
-///     law: ForceLaw::PREMIUM,
+///     law: SurfaceParams::PREMIUM,
 ///     source: Source::Points,
 ///     hold_clock: false,
 ///     materials: None,
@@ -124,8 +124,8 @@ pub struct Board {
 /// let mut sample = Default::default();
 /// for (seq, height) in [(0, 5.0), (1, 1.0)] {
 ///     let hip = GridPoint::new([10, 10, 0], Vec3::new(0.5, 0.5, height));
-///     haptics.accept(Command::Point(Point { seq, hip }))?;
-///     let outcome = haptics.tick(&Sense::default(), true);
+///     haptics.accept(Command::Hip(Point { seq, hip }))?;
+///     let outcome = haptics.tick(&GuardInputs::default(), true);
 ///     assert_eq!(outcome.answers, Some(seq));
 ///     sample = outcome.sample;
 /// }
@@ -138,7 +138,7 @@ pub struct Board {
 pub struct Haptics<'t, const D: usize> {
     pub(crate) guard: Guard,
     pub(crate) clutch: Clutch,
-    pub(crate) mechanism: Option<Mechanism>,
+    pub(crate) mechanism: Option<Kinematics>,
     pub(crate) scene: Option<Scene>,
     /// Counts in the zero pose, once they are known.
     pub(crate) zero: Option<[i32; 3]>,
@@ -146,7 +146,7 @@ pub struct Haptics<'t, const D: usize> {
     pub(crate) rate: TickRate,
     /// Number of the view that is felt.
     pub(crate) view: u8,
-    pub(crate) point: Option<Point>,
+    pub(crate) point: Option<HipCommand>,
     pub(crate) feel: Feel,
     pub(crate) window: Window<'t, D>,
 }
@@ -213,10 +213,10 @@ impl<'t, const D: usize> Haptics<'t, D> {
             Command::ClutchInput(held) => self.clutch.press(held),
             Command::Mark(_) => {}
             Command::Tile(tile) => back = self.take_tile(tile),
-            Command::Point(Point { seq, hip }) => {
+            Command::Hip(HipCommand { seq, hip }) => {
                 // Whatever bits came over the wire.
                 let hip = hip.normalised();
-                self.point = Some(Point { seq, hip });
+                self.point = Some(HipCommand { seq, hip });
             }
             Command::Arm => self.guard.arm(),
             Command::Jog(jog) => {
@@ -234,7 +234,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// Swaps the arm's settings between ticks. The caller sees to it that the arm is disarmed; if
     /// it is not, it is switched off.
-    pub fn configure(&mut self, mechanism: Mechanism) {
+    pub fn configure(&mut self, mechanism: Kinematics) {
         self.guard.stop();
         self.guard.configure(&mechanism);
         self.mechanism = Some(mechanism);
@@ -367,13 +367,13 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// The calibration in force.
     #[must_use]
     pub fn calibration(&self) -> Option<&Calibration> {
-        self.mechanism.as_ref().map(Mechanism::calibration)
+        self.mechanism.as_ref().map(Kinematics::calibration)
     }
 
     /// The state of the guard and what was measured, after a tick.
     #[must_use]
-    pub fn health(&self, sense: &Sense, drive: &Drive) -> Health {
-        let angles = |m: &Mechanism| m.angles(sense.counts, self.zero.unwrap_or_default());
+    pub fn health(&self, sense: &GuardInputs, drive: &GuardOutputs) -> Health {
+        let angles = |m: &Kinematics| m.angles(sense.counts, self.zero.unwrap_or_default());
         Health {
             report: self.guard.report(),
             sense: *sense,

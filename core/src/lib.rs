@@ -7,13 +7,13 @@
 //! ```
 //! use hapterra_core::Vec3;
 //! use hapterra_core::contact::{Contact, ContactSettings, ContactState};
-//! use hapterra_core::force::ForceLaw;
+//! use hapterra_core::force::SurfaceParams;
 //! use hapterra_core::grid::GridPoint;
-//! use hapterra_core::terrain::{FieldSize, FieldStorage};
+//! use hapterra_core::terrain::{FieldSize, TileArena};
 //!
 //! // 40 × 40 cells that rise to the east, one cell in four.
 //! let size = FieldSize::new(40, 40);
-//! let mut slope = FieldStorage::<2>::from_fn(size, |x, _y| 0.25 * x as f32)?;
+//! let mut slope = TileArena::<2>::from_fn(size, |x, _y| 0.25 * x as f32)?;
 //! let window = slope.window();
 //!
 //! // The HIP comes down through the air and goes one cell into the ground.
@@ -27,9 +27,9 @@
 //! assert_eq!(output.state, ContactState::Touching);
 //!
 //! // At 2 mm a cell: up, and back down the slope.
-//! let force_n = ForceLaw::PREMIUM.spring().force_n(output.displacement * 2.0);
+//! let force_n = SurfaceParams::PREMIUM.spring().force_n(output.displacement * 2.0);
 //! assert!(force_n.z > 0.9 && force_n.x < -0.2 && force_n.y.abs() < 1e-6);
-//! # Ok::<(), hapterra_core::terrain::BadField>(())
+//! # Ok::<(), hapterra_core::terrain::FieldError>(())
 //! ```
 //!
 //! Longer examples come with the crate, among them `forces_along_a_path`,

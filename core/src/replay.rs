@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::guard::Drive;
+use crate::guard::GuardOutputs;
 use crate::haptics::Haptics;
 use crate::tick::{Outcome, write_nothing, write_output};
 
@@ -10,7 +10,7 @@ impl<const D: usize> Haptics<'_, D> {
     /// One tick. It is repeated until the point was felt with all of its terrain; only then is
     /// the point answered.
     pub(crate) fn tick_point(&mut self, outcome: &mut Outcome) {
-        outcome.drive = Drive::default();
+        outcome.drive = GuardOutputs::default();
         outcome.answers = None;
         let sample = &mut outcome.sample;
         let mut force_n = Vec3::ZERO;

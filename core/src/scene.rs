@@ -7,9 +7,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::ContactState;
-use crate::force::ForceLaw;
+use crate::force::SurfaceParams;
 use crate::grid::{GridPoint, MAX_CELL};
-use crate::guard::{Fault, Limits, Mode, Report, Sense};
+use crate::guard::{Fault, GuardInputs, Limits, Mode, Report};
 use crate::terrain::{FieldSize, TileIndex, Underlay};
 
 /// Where the haptic interface point comes from.
@@ -41,7 +41,7 @@ pub struct Scene {
     /// The point of the terrain that is at the tip in the home pose.
     pub home: GridPoint,
     /// Spring and limit.
-    pub law: ForceLaw,
+    pub law: SurfaceParams,
     /// Where the haptic interface point comes from.
     pub source: Source,
     /// On an emulated board: let its clock stand still while the host owes a
@@ -93,7 +93,7 @@ pub const MARK_GAP_MS: u32 = 10;
 
 /// A haptic interface point (HIP) for one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Point {
+pub struct HipCommand {
     /// Number, repeated in the answer.
     pub seq: u32,
     /// The HIP, cells over the terrain.
@@ -102,7 +102,7 @@ pub struct Point {
 
 /// One tick's record; not a sample of the terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Sample {
+pub struct TickRecord {
     /// Tick since the scene was taken.
     pub tick: u32,
     /// Haptic interface point (HIP), cells over the terrain.
@@ -140,7 +140,7 @@ pub struct Health {
     /// The guard.
     pub report: Report,
     /// Encoders and safety inputs.
-    pub sense: Sense,
+    pub sense: GuardInputs,
     /// The counts of the zero pose, once the arm was zeroed.
     pub zero: Option<[i32; 3]>,
     /// Joint angles by the calibration, rad; as if zeroed at zero counts where

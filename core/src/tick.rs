@@ -14,20 +14,20 @@ use glam::Vec3;
 use crate::contact::ContactOutput;
 use crate::feel::{Feel, Mover};
 use crate::grid::GridPoint;
-use crate::guard::{Drive, Limits, Report, SceneKind, Sense, Surroundings};
+use crate::guard::{GuardInputs, GuardOutputs, Limits, Report, SceneKind, Surroundings};
 pub use crate::haptics::{Board, Command, Haptics, HipSource, LATENCY_S, RefusedScene};
-use crate::phantom::{Mechanism, Pose, to_device_frame, to_terrain_frame};
+use crate::phantom::{Kinematics, Pose, to_device_frame, to_terrain_frame};
 use crate::scalar::smaller;
-use crate::scene::{Sample, Scene, Source};
+use crate::scene::{Scene, Source, TickRecord};
 use crate::terrain::SETTLING_MM_S;
 
 /// One tick's result.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
     /// For the amplifiers.
-    pub drive: Drive,
+    pub drive: GuardOutputs,
     /// For telemetry.
-    pub sample: Sample,
+    pub sample: TickRecord,
     /// The number of the point that this tick answers.
     pub answers: Option<u32>,
 }
@@ -35,14 +35,14 @@ pub struct Outcome {
 impl<const D: usize> Haptics<'_, D> {
     /// One tick with what the encoders and safety inputs say. `watchdog_live`:
     /// whether the board's watchdog is being fed.
-    pub fn tick(&mut self, sense: &Sense, watchdog_live: bool) -> Outcome {
+    pub fn tick(&mut self, sense: &GuardInputs, watchdog_live: bool) -> Outcome {
         let mut outcome = Outcome::default();
         self.tick_into(sense, watchdog_live, &mut outcome);
         outcome
     }
 
     /// As [`Haptics::tick`], into a place that stays: nothing is copied.
-    pub fn tick_into(&mut self, sense: &Sense, watchdog_live: bool, outcome: &mut Outcome) {
+    pub fn tick_into(&mut self, sense: &GuardInputs, watchdog_live: bool, outcome: &mut Outcome) {
         self.tick = self.tick.wrapping_add(1);
         let pose = self.watch(sense, watchdog_live);
         match &self.scene {
@@ -57,12 +57,12 @@ impl<const D: usize> Haptics<'_, D> {
     ///
     /// A board calls it in every tick of a replay in which no point is under way;
     /// [`Haptics::tick_into`] sees to the others.
-    pub fn follow(&mut self, sense: &Sense, watchdog_live: bool) {
+    pub fn follow(&mut self, sense: &GuardInputs, watchdog_live: bool) {
         self.watch(sense, watchdog_live);
     }
 
     /// Where the arm is, and what the guard makes of it.
-    fn watch(&mut self, sense: &Sense, watchdog_live: bool) -> Option<Pose> {
+    fn watch(&mut self, sense: &GuardInputs, watchdog_live: bool) -> Option<Pose> {
         let zero = self.zero.unwrap_or_default();
         let mechanism = self.mechanism.as_ref();
         let pose = mechanism.map(|mechanism| mechanism.pose(sense.counts, zero));
@@ -101,7 +101,7 @@ impl<const D: usize> Haptics<'_, D> {
     }
 
     /// The force that the HIP wants, N, terrain frame.
-    fn wanted_n(&mut self, pose: &Pose, sample: &mut Sample) -> Vec3 {
+    fn wanted_n(&mut self, pose: &Pose, sample: &mut TickRecord) -> Vec3 {
         let (Some(mechanism), Some(scene)) = (&self.mechanism, &mut self.scene) else {
             write_nothing(sample);
             return Vec3::ZERO;
@@ -128,7 +128,7 @@ impl<const D: usize> Haptics<'_, D> {
 
     /// The currents of a force, A, and of the arm's weight.
     #[inline]
-    fn drive(&mut self, pose: &Pose, force_n: Vec3, drive: &mut Drive) {
+    fn drive(&mut self, pose: &Pose, force_n: Vec3, drive: &mut GuardOutputs) {
         *drive = match &self.mechanism {
             Some(mechanism) if self.guard.mode().drives() => {
                 let wanted_a = self.guard.jog_currents_a().unwrap_or_else(|| {
@@ -138,7 +138,7 @@ impl<const D: usize> Haptics<'_, D> {
                 });
                 self.guard.limit_currents(wanted_a)
             }
-            _ => Drive::default(),
+            _ => GuardOutputs::default(),
         };
         if !drive.enabled {
             drive.held = self.guard.held();
@@ -151,9 +151,9 @@ impl<const D: usize> Haptics<'_, D> {
     fn tick_without_arm(&mut self, outcome: &mut Outcome) {
         let sample = &mut outcome.sample;
         write_nothing(sample);
-        outcome.drive = Drive {
+        outcome.drive = GuardOutputs {
             held: self.guard.held(),
-            ..Drive::default()
+            ..GuardOutputs::default()
         };
         self.write_state(Vec3::ZERO, sample);
     }
@@ -172,7 +172,7 @@ impl<const D: usize> Haptics<'_, D> {
 
     /// Writes the loop's state into the sample: all but the contact's output and what
     /// the caller measures.
-    pub(crate) fn write_state(&self, force_n: Vec3, sample: &mut Sample) {
+    pub(crate) fn write_state(&self, force_n: Vec3, sample: &mut TickRecord) {
         let Report {
             mode,
             mut limits,
@@ -195,7 +195,7 @@ impl<const D: usize> Haptics<'_, D> {
 
     /// Whether the proxy is over the underlay, over a tile that has not settled, or over nothing
     /// where an underlay is on its way.
-    fn is_over_coarse_ground(&self, sample: &Sample) -> bool {
+    fn is_over_coarse_ground(&self, sample: &TickRecord) -> bool {
         let cell = sample.proxy.column();
         let scene = self.scene.as_ref();
         scene.is_some_and(|scene| scene.underlay.is_some() && scene.size.has_cell(cell))
@@ -204,14 +204,14 @@ impl<const D: usize> Haptics<'_, D> {
 }
 
 /// Writes the contact's output into the sample.
-pub(crate) fn write_output(hip: GridPoint, feel: &Feel, sample: &mut Sample) {
+pub(crate) fn write_output(hip: GridPoint, feel: &Feel, sample: &mut TickRecord) {
     write_contact(hip, feel.contact().output(), sample);
     sample.missing_tile = feel.missing_tile();
 }
 
 // A call: it is needed in several places.
 #[inline(never)]
-fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut Sample) {
+fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut TickRecord) {
     sample.hip = hip;
     sample.proxy = output.proxy;
     sample.state = output.state;
@@ -221,12 +221,12 @@ fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut Sample) {
 /// Nothing is felt.
 #[cold]
 #[inline(never)]
-pub(crate) fn write_nothing(sample: &mut Sample) {
+pub(crate) fn write_nothing(sample: &mut TickRecord) {
     write_contact(GridPoint::default(), &ContactOutput::default(), sample);
 }
 
 /// Where the tip is over the terrain.
-fn place(mechanism: &Mechanism, scene: &Scene, pose: &Pose) -> GridPoint {
+fn place(mechanism: &Kinematics, scene: &Scene, pose: &Pose) -> GridPoint {
     let moved_mm = to_terrain_frame(pose.tip_mm() - mechanism.home_mm());
     GridPoint::new(
         scene.home.cell(),

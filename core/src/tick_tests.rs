@@ -5,15 +5,15 @@ use std::vec::Vec;
 use super::*;
 use crate::cases::cases;
 use crate::contact::ContactState;
-use crate::force::{Controller, Damping, ForceLaw};
+use crate::force::{Controller, Damping, SurfaceParams};
 use crate::grid::{Cell, MAX_CELL};
 use crate::guard::{Blockers, Fault, Mode};
 use crate::phantom::Calibration;
 use crate::rate::TickRate;
-use crate::scene::Point;
+use crate::scene::HipCommand;
 use crate::terrain::testing::buffers;
 use crate::terrain::{
-    CoarseTile, FieldSize, POSTS, Tile, TileDemand, TileKey, TileRequester, Underlay,
+    CoarseTile, FieldSize, RequestHint, TILE_SAMPLES, Tile, TileKey, TileRequester, Underlay,
 };
 
 #[path = "tick_tests/materials.rs"]
@@ -26,12 +26,12 @@ mod views;
 const SIZE: i32 = 640;
 
 /// The spring alone: these arms are put from place to place, which no controller takes for a hand.
-const SPRING: ForceLaw = ForceLaw {
+const SPRING: SurfaceParams = SurfaceParams {
     damping: Damping {
         controller: Controller::Off,
         ..Damping::NONE
     },
-    ..ForceLaw::PREMIUM
+    ..SurfaceParams::PREMIUM
 };
 
 fn scene(source: Source) -> Scene {
@@ -59,7 +59,7 @@ struct Device<'t, const D: usize> {
     /// The material of a sample, in a scene that has some; `None` for tiles that come without.
     material: fn(TileKey, [i32; 2]) -> Option<u8>,
     size: FieldSize,
-    demand: TileDemand,
+    demand: RequestHint,
     served: usize,
     dead_man: bool,
 }
@@ -70,7 +70,7 @@ impl<'t, const D: usize> Device<'t, D> {
         let mut next = || spare.pop().expect("a tile for every slot");
         let slots = core::array::from_fn(|_| core::array::from_fn(|_| next()));
         let mut haptics = Haptics::new(slots, TickRate::DEFAULT, None);
-        let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5);
+        let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5);
         haptics.configure(mechanism.expect("valid"));
         let scene = scene(source);
         assert!(matches!(haptics.accept(Command::Scene(scene)), Ok(None)));
@@ -83,7 +83,7 @@ impl<'t, const D: usize> Device<'t, D> {
             height,
             material: |_, _| None,
             size: scene.size,
-            demand: TileDemand::default(),
+            demand: RequestHint::default(),
             served: 0,
             dead_man: false,
         }
@@ -115,13 +115,13 @@ impl<'t, const D: usize> Device<'t, D> {
 
     /// One tick, then every tile that is wanted.
     fn tick(&mut self, counts: [i32; 3]) -> Outcome {
-        let sense = Sense {
+        let sense = GuardInputs {
             counts,
             dead_man: self.dead_man,
-            ..Sense::default()
+            ..GuardInputs::default()
         };
         let outcome = self.haptics.tick(&sense, true);
-        self.demand = TileDemand {
+        self.demand = RequestHint {
             missing_tile: outcome.sample.missing_tile,
             proxy: outcome.sample.proxy.column(),
             hip: outcome.sample.hip.column(),
@@ -140,8 +140,8 @@ impl<'t, const D: usize> Device<'t, D> {
         let tile = self.spare.pop().expect("as many spares as requests");
         tile.fill_from(key, 0, self.size, self.height).unwrap();
         let first = key.index.first_cell();
-        let materials = (0..POSTS * POSTS).map(|i| {
-            let (col, row) = ((i % POSTS) as i32, (i / POSTS) as i32);
+        let materials = (0..TILE_SAMPLES * TILE_SAMPLES).map(|i| {
+            let (col, row) = ((i % TILE_SAMPLES) as i32, (i / TILE_SAMPLES) as i32);
             (self.material)(key, [first.x + col, first.y + row])
         });
         if let Some(materials) = materials.collect::<Option<Vec<_>>>() {
@@ -163,15 +163,19 @@ impl<'t, const D: usize> Device<'t, D> {
     }
 
     /// Feels one point, however many ticks that takes.
-    fn feel(&mut self, seq: u32, hip: GridPoint) -> Sample {
+    fn feel(&mut self, seq: u32, hip: GridPoint) -> TickRecord {
         assert!(
             self.haptics
-                .accept(Command::Point(Point { seq, hip }))
+                .accept(Command::Hip(HipCommand { seq, hip }))
                 .is_ok_and(|spare| spare.is_none())
         );
         for _ in 0..20_000 {
             let outcome = self.tick([0; 3]);
-            assert_eq!(outcome.drive, Drive::default(), "replay drives no motor");
+            assert_eq!(
+                outcome.drive,
+                GuardOutputs::default(),
+                "replay drives no motor"
+            );
             if outcome.answers == Some(seq) {
                 return outcome.sample;
             }
@@ -303,7 +307,7 @@ fn disarmed_the_same_is_felt_by_nobody() {
         "the contact is there"
     );
     assert_eq!(last.sample.force_n, Vec3::ZERO);
-    assert_eq!(last.drive, Drive::default());
+    assert_eq!(last.drive, GuardOutputs::default());
 }
 
 #[test]
@@ -314,7 +318,7 @@ fn the_weight_of_the_arm_is_held_with_the_sign_of_the_calibration() {
             motor_sign: Vec3::new(1.0, motor_sign.y, motor_sign.z),
             ..Calibration::PREMIUM_1_5
         };
-        let mechanism = Mechanism::new(&record).expect("valid");
+        let mechanism = Kinematics::new(&record).expect("valid");
         let pose = Pose::from_angles(&record, Vec3::new(0.1, 0.4, 0.3));
         let currents = mechanism.currents_a(mechanism.gravity_nm(&pose));
         let per_ampere = 11.2 * 0.0234;
@@ -344,10 +348,10 @@ fn a_fault_is_latched_until_cleared_and_counts_lost_have_to_be_zeroed() {
     let mut device = Device::<4>::armed(&mut tiles, plane);
     assert!(device.tick([0; 3]).drive.enabled);
     let outcome = device.tick([5000, 0, 0]);
-    assert_eq!(outcome.drive, Drive::default());
+    assert_eq!(outcome.drive, GuardOutputs::default());
     assert_eq!(outcome.sample.fault, Some(Fault::EncoderJump));
     for _ in 0..3 {
-        assert_eq!(device.tick([5000, 0, 0]).drive, Drive::default());
+        assert_eq!(device.tick([5000, 0, 0]).drive, GuardOutputs::default());
     }
     // Only the one that was seen.
     device.say(Command::ClearFault(Some(Fault::Hardware)));
@@ -408,13 +412,13 @@ fn settings_a_new_zero_and_a_replay_switch_off_at_once() {
         let mut tiles = buffers::<4>();
         let (mut device, _) = pressed(&mut tiles);
         device.say(command);
-        assert_eq!(device.tick([0; 3]).drive, Drive::default());
+        assert_eq!(device.tick([0; 3]).drive, GuardOutputs::default());
     }
     let mut tiles = buffers::<4>();
     let (mut device, _) = pressed(&mut tiles);
-    let mechanism = Mechanism::new(&Calibration::PREMIUM_1_0).expect("valid");
+    let mechanism = Kinematics::new(&Calibration::PREMIUM_1_0).expect("valid");
     device.haptics.configure(mechanism);
-    assert_eq!(device.tick([0; 3]).drive, Drive::default());
+    assert_eq!(device.tick([0; 3]).drive, GuardOutputs::default());
     let model = device.haptics.calibration().map(|c| c.model);
     assert_eq!(model, Some(crate::phantom::Model::Premium10));
 }
@@ -438,13 +442,13 @@ fn wave(device: &mut Device<'_, 4>, ticks: i32) -> [i32; 3] {
         if n % 2 == 0 {
             let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
             let seq = n.unsigned_abs();
-            device.say(Command::Point(Point { seq, hip }));
-            assert_eq!(device.tick(counts).drive, Drive::default());
+            device.say(Command::Hip(HipCommand { seq, hip }));
+            assert_eq!(device.tick(counts).drive, GuardOutputs::default());
         } else {
-            let sense = Sense {
+            let sense = GuardInputs {
                 counts,
                 dead_man: true,
-                ..Sense::default()
+                ..GuardInputs::default()
             };
             device.haptics.follow(&sense, true);
         }
@@ -478,9 +482,9 @@ fn a_jump_during_a_replay_is_noticed() {
             let _ = device.tick(counts);
         } else {
             device.haptics.follow(
-                &Sense {
+                &GuardInputs {
                     counts,
-                    ..Sense::default()
+                    ..GuardInputs::default()
                 },
                 true,
             );
@@ -499,9 +503,12 @@ fn a_replay_drives_nothing_and_says_why_it_cannot_be_armed() {
     wave(&mut device, 60);
     device.dead_man = true;
     let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
-    device.say(Command::Point(Point { seq: 100, hip }));
+    device.say(Command::Hip(HipCommand { seq: 100, hip }));
     for _ in 0..200 {
-        assert_eq!(device.tick([5_900, -5_900, 0]).drive, Drive::default());
+        assert_eq!(
+            device.tick([5_900, -5_900, 0]).drive,
+            GuardOutputs::default()
+        );
     }
     let report = device.haptics.report();
     assert_eq!(report.mode, Mode::Disarmed);
@@ -523,7 +530,7 @@ fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
         let outcome = device.tick([0; 3]);
         assert_eq!(
             (outcome.drive, outcome.sample.state),
-            (Drive::default(), ContactState::Waiting)
+            (GuardOutputs::default(), ContactState::Waiting)
         );
     }
     let report = device.haptics.report();
@@ -585,7 +592,7 @@ fn a_small_window_feels_what_a_whole_one_feels() {
         let cell = [at[0], at[1], random(24) as i32 - 12];
         let hip = GridPoint::new(cell, Vec3::splat(random(1000) as f32 / 1000.0));
         let (a, b) = (small.feel(seq, hip), large.feel(seq, hip));
-        let same = Sample {
+        let same = TickRecord {
             tick: a.tick,
             work: a.work,
             ..b
@@ -653,9 +660,9 @@ fn held_outputs_reach_the_drive_only_while_the_amplifiers_are_off() {
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     let held = Vec3::new(0.5, -0.5, 0.1);
     device.say(Command::HoldOutputs(Some(held.to_array())));
-    let expected = Drive {
+    let expected = GuardOutputs {
         held,
-        ..Drive::default()
+        ..GuardOutputs::default()
     };
     assert_eq!(device.tick([0; 3]).drive, expected);
     device.arm([0; 3]);

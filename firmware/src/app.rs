@@ -3,7 +3,7 @@
 
 use hapterra_core::guard::Fault;
 use hapterra_core::guard::thermal::Temperatures;
-use hapterra_core::phantom::Mechanism;
+use hapterra_core::phantom::Kinematics;
 use hapterra_core::terrain::Tile;
 use hapterra_core::tick::{self, Haptics};
 use hapterra_core::wire::hello::SerialNumber;
@@ -98,11 +98,11 @@ pub struct Application<'t, E, A: Amplifiers, C, const D: usize> {
 
 /// The arm of the stored calibration, if this firmware and this board can work with it,
 /// and what the host is told of it.
-fn usable(stored: &Stored, full_scale_a: f32) -> (Option<Mechanism>, CalibrationSource) {
+fn usable(stored: &Stored, full_scale_a: f32) -> (Option<Kinematics>, CalibrationSource) {
     let bad = match stored {
         Stored::Found(calibration) => {
             let fits = calibration.check_board(full_scale_a);
-            match fits.and_then(|()| Mechanism::new(calibration)) {
+            match fits.and_then(|()| Kinematics::new(calibration)) {
                 Ok(mechanism) => return (Some(mechanism), CalibrationSource::Stored),
                 Err(bad) => bad,
             }

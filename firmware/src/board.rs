@@ -5,13 +5,13 @@
 //! amplifiers and tick timer; they are here. [`crate::amplifier`]
 //! builds amplifiers from embedded-hal's pins, duty cycles and SPI.
 
-pub use hapterra_core::guard::Sense;
+pub use hapterra_core::guard::GuardInputs;
 use hapterra_core::rate::TickRate;
 
 /// The encoders, the safety inputs and what the amplifiers say.
 pub trait Encoders {
     /// Reads everything the tick needs, as of now. Bounded, never waits.
-    fn sense(&mut self) -> Sense;
+    fn sense(&mut self) -> GuardInputs;
 }
 
 /// Amplifiers that are off: there is no way to make a current flow.
@@ -21,7 +21,7 @@ pub trait Amplifiers: Sized {
 
     /// Commands zero current, then switches the power stages on. Outputs that can be
     /// asked and do not read back as they were set leave the power stages off, and
-    /// [`Sense::outputs_not_as_set`] says so in the next tick.
+    /// [`GuardInputs::outputs_not_as_set`] says so in the next tick.
     fn enable(self) -> Self::Enabled;
 
     /// A tick with the power stages off: puts these shares of full scale, each cut to

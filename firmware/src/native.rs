@@ -4,7 +4,7 @@
 //! while [`Link::may_stand_still`] is false, as the emulated board's clock does; in
 //! real time it calls it a thousand times a second regardless.
 
-use hapterra_core::guard::Drive;
+use hapterra_core::guard::GuardOutputs;
 use hapterra_core::guard::thermal::Temperatures;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::hello::SerialNumber;
@@ -12,7 +12,7 @@ use hapterra_core::wire::status::BootReport;
 
 use crate::amplifier::CURRENT_LOOP_US;
 use crate::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
-use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, Sense, TickClock};
+use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, GuardInputs, TickClock};
 use crate::haptic_loop::HapticLoop;
 use crate::link::Link;
 use crate::monitor::{Monitor, Part};
@@ -27,10 +27,10 @@ pub const FULL_SCALE_A: f32 = 5.5;
 
 /// Encoders and switches that read what the caller last set.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct VirtualEncoders(pub Sense);
+pub struct VirtualEncoders(pub GuardInputs);
 
 impl Encoders for VirtualEncoders {
-    fn sense(&mut self) -> Sense {
+    fn sense(&mut self) -> GuardInputs {
         self.0
     }
 }
@@ -213,7 +213,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
 
     /// Runs one tick with these encoders and switches, then the link's task. Returns
     /// what the amplifiers got.
-    pub fn tick(&mut self, sense: Sense) -> Drive {
+    pub fn tick(&mut self, sense: GuardInputs) -> GuardOutputs {
         let drive = self.tick_alone(sense);
         self.poll();
         // No watchdog is behind this, but the tick wants to see one fed.
@@ -222,7 +222,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
     }
 
     /// Runs one tick alone, as if the link's task hung.
-    pub fn tick_alone(&mut self, sense: Sense) -> Drive {
+    pub fn tick_alone(&mut self, sense: GuardInputs) -> GuardOutputs {
         self.haptic_loop.encoders_mut().0 = sense;
         let drive = self.haptic_loop.tick();
         if let Some((copy, words)) = self.haptic_loop.motors_to_keep()

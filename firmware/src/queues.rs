@@ -5,9 +5,9 @@
 //! ever waits for a lock, and no tile is reachable from both halves at once.
 
 use hapterra_core::force::MaterialTable;
-use hapterra_core::phantom::Mechanism;
+use hapterra_core::phantom::Kinematics;
 use hapterra_core::scene::Health;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::terrain::{IN_FLIGHT, Tile};
 use hapterra_core::tick::Command;
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -31,9 +31,9 @@ const HEALTH: usize = 2;
 
 /// One tick as the loop reports it to the link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct TickRecord {
+pub(crate) struct QueuedTick {
     /// What the tick measured and computed.
-    pub(crate) sample: Sample,
+    pub(crate) sample: TickRecord,
     /// The number of the point that this tick answers.
     pub(crate) answers: Option<u32>,
 }
@@ -63,8 +63,8 @@ pub(crate) struct Queues<'t> {
     commands: Queue<Command<'t>, COMMANDS>,
     /// Room for every buffer that can be on its way back.
     spent: Queue<&'t mut Tile, { SPARES + 1 }>,
-    records: Queue<TickRecord, RECORDS>,
-    settings: Queue<Mechanism, SETTINGS>,
+    records: Queue<QueuedTick, RECORDS>,
+    settings: Queue<Kinematics, SETTINGS>,
     materials: Queue<MaterialTable, MATERIALS>,
     health: Queue<LoopReport, HEALTH>,
     monitor: Monitor,
@@ -74,8 +74,8 @@ pub(crate) struct Queues<'t> {
 pub(crate) struct LoopEnds<'t> {
     pub(crate) commands: Consumer<'t, Command<'t>>,
     pub(crate) spent: Producer<'t, &'t mut Tile>,
-    pub(crate) records: Producer<'t, TickRecord>,
-    pub(crate) settings: Consumer<'t, Mechanism>,
+    pub(crate) records: Producer<'t, QueuedTick>,
+    pub(crate) settings: Consumer<'t, Kinematics>,
     pub(crate) materials: Consumer<'t, MaterialTable>,
     pub(crate) health: Producer<'t, LoopReport>,
     pub(crate) monitor: &'t Monitor,
@@ -85,8 +85,8 @@ pub(crate) struct LoopEnds<'t> {
 pub(crate) struct LinkEnds<'t> {
     pub(crate) commands: Producer<'t, Command<'t>>,
     pub(crate) spent: Consumer<'t, &'t mut Tile>,
-    pub(crate) records: Consumer<'t, TickRecord>,
-    pub(crate) settings: Producer<'t, Mechanism>,
+    pub(crate) records: Consumer<'t, QueuedTick>,
+    pub(crate) settings: Producer<'t, Kinematics>,
     pub(crate) materials: Producer<'t, MaterialTable>,
     pub(crate) health: Consumer<'t, LoopReport>,
     pub(crate) monitor: &'t Monitor,

@@ -21,7 +21,7 @@
 //! it says so.
 
 use embedded_storage::nor_flash::NorFlash;
-use hapterra_core::phantom::{BadCalibration, BadRecord, Calibration, RECORD_BYTES};
+use hapterra_core::phantom::{Calibration, CalibrationError, RECORD_BYTES, RecordError};
 
 /// Number and complement.
 const HEAD: usize = 8;
@@ -33,7 +33,7 @@ const MARK_AT: usize = HEAD + RECORD_BYTES + 24;
 pub const PLACE: usize = MARK_AT + MARK.len();
 /// The most places of an area that are used. Saving a record reads all of them, which may
 /// take no more than a fraction of the watchdog's time.
-const MOST_PLACES: u32 = 8;
+const MAX_PLACES: u32 = 8;
 
 /// What was found in the memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,7 +48,7 @@ pub enum Stored {
     /// A whole record that this firmware does not work with, because a number of it makes
     /// no sense or is above what the model or the board may have. No older record is taken
     /// instead: somebody wanted this one.
-    Refused(BadCalibration),
+    Refused(CalibrationError),
     /// Something, but no record that could be read.
     Damaged,
 }
@@ -71,7 +71,7 @@ pub enum StoreError {
 enum Place {
     Blank,
     /// A record and its number; why it cannot be worked with, if so.
-    Record(u32, Result<Calibration, BadCalibration>),
+    Record(u32, Result<Calibration, CalibrationError>),
     /// A record that was being written when the power went.
     CutOff,
     /// A record that was whole once.
@@ -82,7 +82,7 @@ enum Place {
 #[derive(Default)]
 struct Contents {
     /// The newest record and its number.
-    newest: Option<(u32, Result<Calibration, BadCalibration>)>,
+    newest: Option<(u32, Result<Calibration, CalibrationError>)>,
     /// The area that the newest record is in.
     area: usize,
     has_damage: bool,
@@ -170,7 +170,7 @@ impl<F: NorFlash> CalibrationStore<F> {
     }
 
     fn places(&self) -> u32 {
-        (self.size / PLACE as u32).min(MOST_PLACES)
+        (self.size / PLACE as u32).min(MAX_PLACES)
     }
 
     fn at(&self, area: usize, place: u32) -> u32 {
@@ -231,13 +231,13 @@ impl<F: NorFlash> CalibrationStore<F> {
 }
 
 /// Decodes a place's record and number; nothing unless both are whole.
-fn decoded(written: &[u8]) -> Option<(u32, Result<Calibration, BadCalibration>)> {
+fn decoded(written: &[u8]) -> Option<(u32, Result<Calibration, CalibrationError>)> {
     let (number, rest) = written.split_first_chunk()?;
     let (check, record) = rest.split_first_chunk()?;
     let [number, check] = [number, check].map(|word| u32::from_le_bytes(*word));
     let calibration = match Calibration::decode(record) {
         Ok(calibration) => Ok(calibration),
-        Err(BadRecord::Invalid(bad)) => Err(bad),
+        Err(RecordError::Invalid(bad)) => Err(bad),
         Err(_) => return None,
     };
     (check == !number).then_some((number, calibration))

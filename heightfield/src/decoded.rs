@@ -11,11 +11,11 @@ use super::height_summary::HeightSummary;
 use super::place::Place;
 use super::samples::{SampleValue, with_samples};
 use super::storage::Storage;
-use super::{BadRaster, Certainty, VerticalDatum};
+use super::{Certainty, RasterError, VerticalDatum};
 
 /// No height is larger than this (in the file's vertical unit), whatever the
 /// planet: such a sample is a no-data value that the file forgot to declare.
-pub const LARGEST_HEIGHT: f64 = 1e30;
+pub const MAX_HEIGHT: f64 = 1e30;
 
 /// What a decoder hands over: samples in file order and all that the file says
 /// about them.
@@ -66,11 +66,13 @@ pub(super) struct Decoded {
 /// Columns and rows as numbers of samples that can be addressed.
 ///
 /// # Errors
-/// [`BadRaster::AbsurdSize`] when there are more than a `u32` can count.
-pub(super) fn sides(columns: u64, rows: u64) -> Result<(u32, u32), BadRaster> {
+/// [`RasterError::AbsurdSize`] when there are more than a `u32` can count.
+pub(super) fn sides(columns: u64, rows: u64) -> Result<(u32, u32), RasterError> {
     match (u32::try_from(columns), u32::try_from(rows)) {
         (Ok(columns), Ok(rows)) => Ok((columns, rows)),
-        _ => Err(BadRaster::AbsurdSize(format!("{columns} × {rows} samples"))),
+        _ => Err(RasterError::AbsurdSize(format!(
+            "{columns} × {rows} samples"
+        ))),
     }
 }
 
@@ -196,21 +198,21 @@ impl Decoded {
 impl Decoded {
     /// Checks what every format must satisfy, and summarises the heights. `no_data`
     /// replaces what the file says.
-    pub(super) fn check(&mut self, no_data: Option<f64>) -> Result<Survey, BadRaster> {
+    pub(super) fn check(&mut self, no_data: Option<f64>) -> Result<Survey, RasterError> {
         let (columns, rows) = (u64::from(self.columns), u64::from(self.rows));
         if columns < 2 || rows < 2 {
-            return Err(BadRaster::TooSmall { columns, rows });
+            return Err(RasterError::TooSmall { columns, rows });
         }
         if let Some(samples) = self.storage.held()
             && columns.checked_mul(rows) != u64::try_from(samples.len()).ok()
         {
-            return Err(BadRaster::damaged(format!(
+            return Err(RasterError::damaged(format!(
                 "{} samples where {columns} × {rows} were promised",
                 samples.len()
             )));
         }
         if !(self.scale.is_finite() && self.offset.is_finite()) || self.scale == 0.0 {
-            return Err(BadRaster::damaged(format!(
+            return Err(RasterError::damaged(format!(
                 "heights are stored with scale {} and offset {}",
                 self.scale, self.offset
             )));
@@ -232,7 +234,7 @@ impl Decoded {
         let doubts = seen.into_inner().remarks(self.no_data.is_some());
         self.remarks.extend(doubts);
         match survey.summary.has_none() {
-            true => Err(BadRaster::AllNoData {
+            true => Err(RasterError::AllNoData {
                 // Some were looked at twice.
                 samples: survey.summary.holes.min(columns * rows),
             }),
@@ -250,7 +252,7 @@ impl Decoded {
     /// Height of a stored value; NaN in a hole. A value that is no height is a hole.
     pub(super) fn height_of(&self, stored: f64) -> f64 {
         let height = stored * self.scale + self.offset;
-        match self.no_data == Some(stored) || height.abs() > LARGEST_HEIGHT {
+        match self.no_data == Some(stored) || height.abs() > MAX_HEIGHT {
             true => f64::NAN,
             false => height,
         }

@@ -1,6 +1,6 @@
 //! Stored values that are no heights, or may be none, though the file does not declare them.
 
-use super::decoded::LARGEST_HEIGHT;
+use super::decoded::MAX_HEIGHT;
 
 /// Values that programs write where there is no data.
 const LOW: [f64; 5] = [-32_768.0, -32_767.0, -9999.0, -99_999.0, -999.0];
@@ -38,7 +38,7 @@ impl Outermost {
         if stored.is_nan() {
             return;
         }
-        if stored.abs() > LARGEST_HEIGHT {
+        if stored.abs() > MAX_HEIGHT {
             self.beyond += 1;
             return;
         }

@@ -1,7 +1,7 @@
 //! Heights encoded in the colours of a picture, as web maps hand them out.
 
 use super::decoded::Decoded;
-use super::{BadRaster, Encoding, Samples};
+use super::{Encoding, RasterError, Samples};
 
 impl Encoding {
     /// Height in metres of the code 0, and metres in a step of the code.
@@ -35,8 +35,8 @@ pub(super) fn codes([red, green, blue]: [Vec<u8>; 3]) -> Samples {
 }
 
 /// Returns the fault of a picture that has no codes.
-pub(super) fn no_codes(what: &str) -> BadRaster {
-    BadRaster::NotAHeightField(format!(
+pub(super) fn no_codes(what: &str) -> RasterError {
+    RasterError::NotAHeightField(format!(
         "{what}, and heights are encoded in pictures of red, green and blue of 8 bits"
     ))
 }

@@ -11,11 +11,11 @@ use crate::shown::shown;
 #[error("{}", shown(&format!("{fault} ({})", without_key(path))))]
 pub struct Error {
     path: PathBuf,
-    fault: BadRaster,
+    fault: RasterError,
 }
 
 impl Error {
-    pub(super) fn new(path: &Path, fault: BadRaster) -> Self {
+    pub(super) fn new(path: &Path, fault: RasterError) -> Self {
         Self {
             path: path.to_path_buf(),
             fault,
@@ -28,7 +28,7 @@ impl Error {
     }
 
     /// What is wrong with it.
-    pub fn fault(&self) -> &BadRaster {
+    pub fn fault(&self) -> &RasterError {
         &self.fault
     }
 }
@@ -36,13 +36,13 @@ impl Error {
 /// What is wrong with a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum BadRaster {
+pub enum RasterError {
     /// The operating system does not let us read it.
     #[error("cannot read the file: {0}")]
     Unreadable(std::io::Error),
     /// What is at a URL cannot be read, or not at present.
     #[error("cannot read what is there: {0}")]
-    Elsewhere(std::io::Error),
+    RemoteFetcher(std::io::Error),
     /// It is on its way from elsewhere, and nobody may wait for it.
     #[error("it has not come yet")]
     NotYet,
@@ -165,7 +165,7 @@ pub enum BadRaster {
         /// The file.
         file: PathBuf,
         /// What is wrong with it.
-        fault: Box<BadRaster>,
+        fault: Box<RasterError>,
     },
     /// A file among many that is on no grid.
     #[error("cannot be one of many files: {0}")]
@@ -211,7 +211,7 @@ pub enum BadRaster {
     DecoderFailed(&'static str),
 }
 
-impl BadRaster {
+impl RasterError {
     /// Damage described in place.
     pub(super) fn damaged(what: impl Into<String>) -> Self {
         Self::Damaged(what.into())
@@ -229,14 +229,14 @@ impl BadRaster {
     pub(super) fn elsewhere(error: std::io::Error) -> Self {
         match is_on_its_way(&error) {
             true => Self::NotYet,
-            false => Self::Elsewhere(error),
+            false => Self::RemoteFetcher(error),
         }
     }
 
     /// Whether another try may find more: nothing is known of the file's samples.
     pub(super) fn is_of_the_line(&self) -> bool {
         match self {
-            Self::Elsewhere(error) => !is_missing(error),
+            Self::RemoteFetcher(error) => !is_missing(error),
             Self::InTile { fault, .. } => fault.is_of_the_line(),
             Self::NotYet => true,
             _ => false,

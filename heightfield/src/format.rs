@@ -1,7 +1,7 @@
 //! What every terrain format tells about itself.
 
 use super::input::FileBytes;
-use super::{BadRaster, Decoded, OpenOptions};
+use super::{Decoded, OpenOptions, RasterError};
 
 /// A format that can be read. Each file or folder of `formats` declares one.
 pub(super) struct Format {
@@ -15,7 +15,7 @@ pub(super) struct Format {
     /// What a file has several of, so that the user may choose.
     pub(super) parts: Parts,
     /// Reads the heights of a file.
-    pub(super) decode: fn(&FileBytes, &OpenOptions) -> Result<Decoded, BadRaster>,
+    pub(super) decode: fn(&FileBytes, &OpenOptions) -> Result<Decoded, RasterError>,
 }
 
 /// What a file of a format has several of.
@@ -42,10 +42,10 @@ impl Format {
     /// Checks that the user chooses by what the format has.
     ///
     /// # Errors
-    /// [`BadRaster::NoSuchPart`].
-    pub(super) fn check_choice(&self, options: &OpenOptions) -> Result<(), BadRaster> {
+    /// [`RasterError::NoSuchPart`].
+    pub(super) fn check_choice(&self, options: &OpenOptions) -> Result<(), RasterError> {
         if options.encoding.is_some() && !["PNG", "TIFF"].contains(&self.name) {
-            return Err(BadRaster::NoSuchPart {
+            return Err(RasterError::NoSuchPart {
                 asked: "picture with heights in its colours".into(),
                 there: format!("the file is {}", self.name),
             });
@@ -56,7 +56,7 @@ impl Format {
                 Parts::Bands => "bands, chosen by number",
             };
             let there = format!("{} has {has}", self.name);
-            Err(BadRaster::NoSuchPart { asked, there })
+            Err(RasterError::NoSuchPart { asked, there })
         };
         match (&options.variable, options.band) {
             (Some(variable), _) => refused(format!("variable {variable}")),

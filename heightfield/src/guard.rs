@@ -4,13 +4,13 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
 
-use super::BadRaster;
+use super::RasterError;
 
 thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs a decoder; a panic inside becomes [`BadRaster::DecoderFailed`] and prints
+/// Runs a decoder; a panic inside becomes [`RasterError::DecoderFailed`] and prints
 /// nothing.
 ///
 /// The decoders of image and science formats are other people's code that is given
@@ -20,13 +20,13 @@ thread_local! {
 /// touches, so nothing half-done outlives the panic.
 pub(super) fn guarded<T>(
     decoder: &'static str,
-    decode: impl FnOnce() -> Result<T, BadRaster>,
-) -> Result<T, BadRaster> {
+    decode: impl FnOnce() -> Result<T, RasterError>,
+) -> Result<T, RasterError> {
     silence_guarded_panics();
     let outer = GUARDED.replace(true);
     let outcome = catch_unwind(AssertUnwindSafe(decode));
     GUARDED.set(outer);
-    outcome.unwrap_or(Err(BadRaster::DecoderFailed(decoder)))
+    outcome.unwrap_or(Err(RasterError::DecoderFailed(decoder)))
 }
 
 /// Keeps the panics of guarded decoders off the user's screen; all others are
@@ -51,8 +51,8 @@ mod tests {
 
     #[test]
     fn a_panic_in_a_decoder_is_an_error() {
-        let outcome: Result<(), BadRaster> = guarded("test", || panic!("index out of range"));
-        assert!(matches!(outcome, Err(BadRaster::DecoderFailed("test"))));
+        let outcome: Result<(), RasterError> = guarded("test", || panic!("index out of range"));
+        assert!(matches!(outcome, Err(RasterError::DecoderFailed("test"))));
         assert!(!GUARDED.get());
     }
 }

@@ -5,10 +5,10 @@ use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::BadRaster;
+use super::RasterError;
 use crate::disk_cache::FileStamp;
 use crate::regular_file;
-use crate::remote::{Elsewhere, RemoteFile, RemoteReader, file_name, is_url};
+use crate::remote::{RemoteFetcher, RemoteFile, RemoteReader, file_name, is_url};
 
 /// Deflate packs at most this many bytes into one.
 pub(super) const DEFLATE_RATIO: u64 = 1040;
@@ -25,7 +25,7 @@ pub(super) struct FileBytes {
     data: Data,
     outline: bool,
     /// Where neighbours that have URLs are.
-    elsewhere: Elsewhere,
+    elsewhere: RemoteFetcher,
 }
 
 /// Where the bytes are.
@@ -41,7 +41,7 @@ pub(super) enum Data {
 
 impl FileBytes {
     /// A file on disk or at a URL.
-    pub(super) fn open(path: &Path, elsewhere: &Elsewhere) -> Result<Self, BadRaster> {
+    pub(super) fn open(path: &Path, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
         let bytes = match path.to_str().filter(|name| is_url(name)) {
             Some(url) => Self::at_url(url, elsewhere)?,
             None => Self::on_disk(path)?,
@@ -52,15 +52,15 @@ impl FileBytes {
         })
     }
 
-    fn at_url(url: &str, elsewhere: &Elsewhere) -> Result<Self, BadRaster> {
-        let file = elsewhere.open(url).map_err(BadRaster::elsewhere)?;
+    fn at_url(url: &str, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
+        let file = elsewhere.open(url).map_err(RasterError::elsewhere)?;
         let (len, data) = (file.len(), Data::Remote(file, url.to_owned()));
         Ok(Self::new(file_name(url), len, data))
     }
 
-    fn on_disk(path: &Path) -> Result<Self, BadRaster> {
-        let file = regular_file::open(path).map_err(BadRaster::Unreadable)?;
-        let metadata = file.metadata().map_err(BadRaster::Unreadable)?;
+    fn on_disk(path: &Path) -> Result<Self, RasterError> {
+        let file = regular_file::open(path).map_err(RasterError::Unreadable)?;
+        let metadata = file.metadata().map_err(RasterError::Unreadable)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let data = Data::File(file, path.to_owned());
         Ok(Self::new(&name, metadata.len(), data))
@@ -81,7 +81,7 @@ impl FileBytes {
             len,
             data,
             outline: false,
-            elsewhere: Elsewhere::default(),
+            elsewhere: RemoteFetcher::default(),
         }
     }
 
@@ -127,7 +127,7 @@ impl FileBytes {
     }
 
     /// The files at URLs among which this one is.
-    pub(super) const fn elsewhere(&self) -> &Elsewhere {
+    pub(super) const fn elsewhere(&self) -> &RemoteFetcher {
         &self.elsewhere
     }
 
@@ -142,12 +142,12 @@ impl FileBytes {
     }
 
     /// A buffered reader at the start.
-    pub(super) fn reader(&self) -> Result<Box<dyn ReadSeek + '_>, BadRaster> {
+    pub(super) fn reader(&self) -> Result<Box<dyn ReadSeek + '_>, RasterError> {
         Ok(match &self.data {
             Data::File(file, _) => {
                 let mut file = file;
                 file.seek(SeekFrom::Start(0))
-                    .map_err(BadRaster::Unreadable)?;
+                    .map_err(RasterError::Unreadable)?;
                 Box::new(BufReader::with_capacity(1 << 16, file))
             }
             #[cfg(test)]
@@ -160,10 +160,10 @@ impl FileBytes {
     }
 
     /// The same bytes for somebody who keeps them; `None` where they are in memory.
-    pub(super) fn again(&self) -> Result<Option<Self>, BadRaster> {
+    pub(super) fn again(&self) -> Result<Option<Self>, RasterError> {
         let data = match &self.data {
             Data::File(file, path) => {
-                let file = file.try_clone().map_err(BadRaster::Unreadable)?;
+                let file = file.try_clone().map_err(RasterError::Unreadable)?;
                 Data::File(file, path.clone())
             }
             Data::Remote(file, url) => Data::Remote(file.clone(), url.clone()),
@@ -198,10 +198,12 @@ impl FileBytes {
     }
 
     /// Bytes at a place of the file.
-    pub(super) fn read_at(&self, at: u64, count: u64) -> Result<Vec<u8>, BadRaster> {
+    pub(super) fn read_at(&self, at: u64, count: u64) -> Result<Vec<u8>, RasterError> {
         let is_inside = at.checked_add(count).is_some_and(|end| end <= self.len);
         let (true, Ok(room)) = (is_inside, usize::try_from(count)) else {
-            return Err(BadRaster::Truncated("it ends before its samples do".into()));
+            return Err(RasterError::Truncated(
+                "it ends before its samples do".into(),
+            ));
         };
         let read = match &self.data {
             Data::File(file, _) => {
@@ -212,16 +214,16 @@ impl FileBytes {
             Data::Memory(bytes) => Ok(bytes[at as usize..][..room].to_vec()),
             Data::Remote(file, _) => file.read_at(at, room),
         };
-        read.map_err(|error| BadRaster::from_io(error, "the samples"))
+        read.map_err(|error| RasterError::from_io(error, "the samples"))
     }
 
     /// The first bytes, up to `count` of them.
-    pub(super) fn head(&self, count: u64) -> Result<Vec<u8>, BadRaster> {
+    pub(super) fn head(&self, count: u64) -> Result<Vec<u8>, RasterError> {
         let mut head = Vec::new();
         self.reader()?
             .take(count)
             .read_to_end(&mut head)
-            .map_err(|error| BadRaster::from_io(error, "its beginning"))?;
+            .map_err(|error| RasterError::from_io(error, "its beginning"))?;
         Ok(head)
     }
 
@@ -229,13 +231,18 @@ impl FileBytes {
     /// bytes there are, before room is made for them.
     ///
     /// # Errors
-    /// [`BadRaster::AbsurdSize`].
-    pub(super) fn check_holds(&self, columns: u32, rows: u32, bytes: u64) -> Result<(), BadRaster> {
+    /// [`RasterError::AbsurdSize`].
+    pub(super) fn check_holds(
+        &self,
+        columns: u32,
+        rows: u32,
+        bytes: u64,
+    ) -> Result<(), RasterError> {
         let samples = u64::from(columns) * u64::from(rows);
         let room = self.len.saturating_mul(DEFLATE_RATIO);
         match samples.checked_mul(bytes) {
             Some(promised) if promised <= room => Ok(()),
-            _ => Err(BadRaster::AbsurdSize(format!(
+            _ => Err(RasterError::AbsurdSize(format!(
                 "{columns} × {rows} samples in a file of {} bytes",
                 self.len
             ))),

@@ -23,7 +23,7 @@
 //!
 //! **Holes.** No-data as the format states it, NaN, masked samples and tiles
 //! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. So is a sample
-//! beyond [`LARGEST_HEIGHT`], with a remark.
+//! beyond [`MAX_HEIGHT`], with a remark.
 
 #![forbid(unsafe_code)]
 
@@ -74,8 +74,8 @@ mod timeouts;
 use std::path::{Path, PathBuf};
 
 pub use crs::{LonLat, ReferenceSystem};
-pub use decoded::LARGEST_HEIGHT;
-pub use error::{BadRaster, Error};
+pub use decoded::MAX_HEIGHT;
+pub use error::{Error, RasterError};
 pub use file_layout::{FileLayout, SamplesAre};
 pub use geometry::metres_in;
 pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
@@ -86,7 +86,7 @@ pub use ground_map::Bounds;
 pub use height_summary::HeightSummary;
 pub use mosaic::files_read_with;
 pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
-pub use remote::{Elsewhere, file_name, is_url, without_key};
+pub use remote::{RemoteFetcher, file_name, is_url, without_key};
 pub use samples::{Endian, SampleType, Samples};
 
 use blocks::Survey;
@@ -116,7 +116,7 @@ pub fn own_formats() -> impl Iterator<Item = &'static str> {
 pub struct Raster {
     source: Decoded,
     survey: Survey,
-    elsewhere: Elsewhere,
+    elsewhere: RemoteFetcher,
     /// Empty where it was made in memory.
     path: PathBuf,
 }
@@ -147,7 +147,7 @@ impl Raster {
     /// are to say the same of it.
     ///
     /// # Errors
-    /// As [`Raster::open`]; [`BadRaster::UnknownFormat`] where there is no libgdal, too.
+    /// As [`Raster::open`]; [`RasterError::UnknownFormat`] where there is no libgdal, too.
     pub fn open_by_gdal(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
         Self::opened(path.as_ref(), options, open::decode_by_gdal)
     }
@@ -155,7 +155,7 @@ impl Raster {
     fn opened(
         path: &Path,
         options: &OpenOptions,
-        decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, BadRaster>,
+        decode: impl Fn(&Path, &OpenOptions) -> Result<Decoded, RasterError>,
     ) -> Result<Self, Error> {
         options.elsewhere.set_disk_cache(&options.disk_cache);
         decode(path, options)
@@ -185,7 +185,7 @@ impl Raster {
         columns: u32,
         rows: u32,
         mut height: impl FnMut(u32, u32) -> f32,
-    ) -> Result<Self, BadRaster> {
+    ) -> Result<Self, RasterError> {
         let mut samples = Vec::with_capacity(columns as usize * rows as usize);
         for row in 0..rows {
             samples.extend((0..columns).map(|column| height(column, row)));
@@ -209,12 +209,12 @@ impl Raster {
         self
     }
 
-    fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, BadRaster> {
+    fn checked(mut source: Decoded, no_data: Option<f64>) -> Result<Self, RasterError> {
         let survey = source.check(no_data)?;
         Ok(Self {
             source,
             survey,
-            elsewhere: Elsewhere::default(),
+            elsewhere: RemoteFetcher::default(),
             path: PathBuf::new(),
         })
     }

@@ -5,13 +5,13 @@ use super::format::{Claim, Format};
 use super::formats::{FORMATS, gdal, headered, raw};
 use super::guard::guarded;
 use super::input::FileBytes;
-use super::{BadRaster, Decoded, OpenOptions};
+use super::{Decoded, OpenOptions, RasterError};
 
 /// Enough of a file to tell every format by its beginning.
 const HEAD_BYTES: u64 = 1024;
 
 /// Decodes a file, by GDAL where nothing here reads it.
-pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
     if let Some(layout) = options.raw {
         check_no_open_options("raw samples", options)?;
         return with_notes(input, options, |options| {
@@ -20,7 +20,7 @@ pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded
     }
     let head = input.head(HEAD_BYTES)?;
     if head.is_empty() {
-        return Err(BadRaster::Truncated("it is empty".into()));
+        return Err(RasterError::Truncated("it is empty".into()));
     }
     let decoded = with_notes(input, options, |options| decode_here(input, &head, options));
     or_by_gdal(decoded, input, options)
@@ -30,8 +30,8 @@ pub(super) fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded
 fn with_notes(
     input: &FileBytes,
     options: &OpenOptions,
-    decode: impl FnOnce(&OpenOptions) -> Result<Decoded, BadRaster>,
-) -> Result<Decoded, BadRaster> {
+    decode: impl FnOnce(&OpenOptions) -> Result<Decoded, RasterError>,
+) -> Result<Decoded, RasterError> {
     let notes = Notes::read(input, options.band.unwrap_or(1));
     let mut decoded = decode(&OpenOptions {
         no_data: options.no_data.or(notes.no_data),
@@ -49,7 +49,7 @@ fn decode_here(
     input: &FileBytes,
     head: &[u8],
     options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
+) -> Result<Decoded, RasterError> {
     if let Some(format) = by_content(head) {
         return decode_as(format, input, options);
     }
@@ -61,7 +61,7 @@ fn decode_here(
         return Ok(decoded);
     }
     let format = match gdal::by_beginning(head) {
-        Some(_) => return Err(BadRaster::UnknownFormat),
+        Some(_) => return Err(RasterError::UnknownFormat),
         None => by_extension(input.extension())?,
     };
     decode_as(format, input, options)
@@ -69,11 +69,11 @@ fn decode_here(
 
 /// What is not known or not supported here is given to GDAL.
 fn or_by_gdal(
-    decoded: Result<Decoded, BadRaster>,
+    decoded: Result<Decoded, RasterError>,
     input: &FileBytes,
     options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
-    use BadRaster::{ByGdal, HeaderMissing, UnknownFormat, Unsupported};
+) -> Result<Decoded, RasterError> {
+    use RasterError::{ByGdal, HeaderMissing, UnknownFormat, Unsupported};
     let (fault, path) = match (decoded, input.path()) {
         (Err(fault @ (HeaderMissing(_) | UnknownFormat | Unsupported { .. })), Some(path))
             if options.gdal =>
@@ -85,9 +85,9 @@ fn or_by_gdal(
     match (gdal::decode(path, options), fault) {
         (Ok(decoded), _) => Ok(decoded),
         (Err(by_gdal), UnknownFormat) => Err(by_gdal),
-        (Err(by_gdal @ BadRaster::WantsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
+        (Err(by_gdal @ RasterError::WantsGdal { .. }), HeaderMissing(_)) => Err(by_gdal),
         // GDAL's words on what is known here, or a refusal that says what is missing.
-        (Err(UnknownFormat | ByGdal(_) | BadRaster::WantsGdal { .. }), fault) => Err(fault),
+        (Err(UnknownFormat | ByGdal(_) | RasterError::WantsGdal { .. }), fault) => Err(fault),
         (Err(by_gdal), _) => Err(by_gdal),
     }
 }
@@ -96,7 +96,7 @@ fn decode_as(
     format: &Format,
     input: &FileBytes,
     options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
+) -> Result<Decoded, RasterError> {
     tracing::debug!(format.name, name = input.name(), "recognised");
     format.check_choice(options)?;
     check_no_open_options(format.name, options)?;
@@ -104,10 +104,10 @@ fn decode_as(
 }
 
 /// Checks that no open option is given for a file that is read without GDAL.
-fn check_no_open_options(format: &str, options: &OpenOptions) -> Result<(), BadRaster> {
+fn check_no_open_options(format: &str, options: &OpenOptions) -> Result<(), RasterError> {
     match &options.open_options[..] {
         [] => Ok(()),
-        [first, ..] => Err(BadRaster::NoSuchPart {
+        [first, ..] => Err(RasterError::NoSuchPart {
             asked: format!("open option {first}"),
             there: format!("the file is {format}, which is read without GDAL"),
         }),
@@ -118,17 +118,17 @@ fn by_content(head: &[u8]) -> Option<&'static Format> {
     FORMATS.iter().find(|format| (format.begins)(head))
 }
 
-fn by_extension(extension: &str) -> Result<&'static Format, BadRaster> {
+fn by_extension(extension: &str) -> Result<&'static Format, RasterError> {
     let mut claims = FORMATS
         .iter()
         .filter_map(|format| Some((format, format.claim(extension)?)));
     match claims.next() {
         Some((format, Claim::Decides)) => Ok(format),
-        Some((format, Claim::Promises)) => Err(BadRaster::Unfamiliar(format!(
+        Some((format, Claim::Promises)) => Err(RasterError::Unfamiliar(format!(
             "its name says {}, its content does not begin like one",
             format.name
         ))),
-        _ if raw::EXTENSIONS.contains(&extension) => Err(BadRaster::RawSizeMissing),
-        _ => Err(BadRaster::UnknownFormat),
+        _ if raw::EXTENSIONS.contains(&extension) => Err(RasterError::RawSizeMissing),
+        _ => Err(RasterError::UnknownFormat),
     }
 }

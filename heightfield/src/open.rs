@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 use super::formats::gdal;
 use super::input::FileBytes;
-use super::{BadRaster, Decoded, OpenOptions, mosaic, one_file};
+use super::{Decoded, OpenOptions, RasterError, mosaic, one_file};
 
 /// Decodes a terrain: a file, which may be packed, or many that are one.
-pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     if let Some(files) = mosaic::named(path).transpose() {
         return match files.and_then(|files| decode_all(&files, options)) {
             // Some formats are folders.
-            Err(fault @ BadRaster::NoTiles(_)) if options.gdal && path.is_dir() => {
+            Err(fault @ RasterError::NoTiles(_)) if options.gdal && path.is_dir() => {
                 match gdal::decode(path, options) {
-                    Err(BadRaster::UnknownFormat) => Err(fault),
+                    Err(RasterError::UnknownFormat) => Err(fault),
                     decoded => decoded,
                 }
             }
@@ -24,14 +24,14 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadR
 }
 
 /// Decodes files as one terrain.
-pub(super) fn decode_all(files: &[PathBuf], options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(super) fn decode_all(files: &[PathBuf], options: &OpenOptions) -> Result<Decoded, RasterError> {
     if files.is_empty() {
-        return Err(BadRaster::NoTiles("no file is named".into()));
+        return Err(RasterError::NoTiles("no file is named".into()));
     }
     mosaic::of_files(files.to_vec(), options)
 }
 
 /// Decodes a file by GDAL alone.
-pub(super) fn decode_by_gdal(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(super) fn decode_by_gdal(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     gdal::decode(path, options)
 }

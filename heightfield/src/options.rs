@@ -2,7 +2,7 @@
 
 use super::samples::{Endian, SampleType};
 use crate::disk_cache::DiskCache;
-use crate::remote::Elsewhere;
+use crate::remote::RemoteFetcher;
 
 /// How to open a file. The default believes the file.
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ pub struct OpenOptions {
     /// and are read in blocks when they are touched.
     pub most_in_memory_bytes: u64,
     /// The files at URLs that are read with these options.
-    pub elsewhere: Elsewhere,
+    pub elsewhere: RemoteFetcher,
     /// Where coarse samples are kept that are made of a terrain in its file. The default
     /// keeps nothing.
     pub disk_cache: DiskCache,
@@ -62,7 +62,7 @@ impl Default for OpenOptions {
             classes: false,
             gdal: true,
             most_in_memory_bytes: u64::from(Self::IN_MEMORY_MB) << 20,
-            elsewhere: Elsewhere::default(),
+            elsewhere: RemoteFetcher::default(),
             disk_cache: DiskCache::off(),
         }
     }

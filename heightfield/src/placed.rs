@@ -6,7 +6,7 @@ use super::decoded::Decoded;
 use super::ground_map::{Bounds, GroundMap};
 use super::place::Place;
 use super::tangents::Tangents;
-use super::{BadRaster, CellSize, CellUnit, Certainty, Globe};
+use super::{CellSize, CellUnit, Certainty, Globe, RasterError};
 
 /// The unit of a file's coordinates, as the file states it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,8 +118,8 @@ impl Decoded {
     /// it.
     ///
     /// # Errors
-    /// [`BadRaster::CellKnown`] where it does.
-    pub(super) fn with_ground_cell(mut self, side_m: Option<f64>) -> Result<Self, BadRaster> {
+    /// [`RasterError::CellKnown`] where it does.
+    pub(super) fn with_ground_cell(mut self, side_m: Option<f64>) -> Result<Self, RasterError> {
         let Some(side_m) = side_m else {
             return Ok(self);
         };
@@ -128,7 +128,7 @@ impl Decoded {
             .filter(|cell| cell.certainty != Certainty::Assumed)
         {
             let (east, north) = cell.ground_metres();
-            return Err(BadRaster::CellKnown(format!("{east:.3} × {north:.3} m")));
+            return Err(RasterError::CellKnown(format!("{east:.3} × {north:.3} m")));
         }
         let metre = CellUnit::Length { metres: 1.0 };
         let sides = match self.cell {

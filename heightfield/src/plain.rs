@@ -13,7 +13,7 @@ use super::input::FileBytes;
 use super::read::Stored;
 use super::samples::{Endian, SampleType, Samples, with_samples};
 use super::storage::Storage;
-use super::{BadRaster, OpenOptions, thinned};
+use super::{OpenOptions, RasterError, thinned};
 use crate::disk_cache::FileStamp;
 
 /// Samples of a block each way.
@@ -86,7 +86,7 @@ impl Plain {
         self,
         input: &FileBytes,
         options: &OpenOptions,
-    ) -> Result<Storage, BadRaster> {
+    ) -> Result<Storage, RasterError> {
         let count = u64::from(self.columns) * u64::from(self.rows);
         let bytes = count.saturating_mul(self.stored.bytes());
         let most = match input.remote() {
@@ -106,7 +106,7 @@ impl Plain {
     }
 
     /// A part of the image that has such samples.
-    fn read(&self, input: &FileBytes, part: &Part, grain: Grain) -> Result<Samples, BadRaster> {
+    fn read(&self, input: &FileBytes, part: &Part, grain: Grain) -> Result<Samples, RasterError> {
         if self.sample > self.row {
             let part = turned(part);
             let samples = self.turned().read(input, &part, grain.turned())?;
@@ -278,7 +278,7 @@ impl BlockReader for PlainBlocks {
         }
     }
 
-    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         self.want(image, std::slice::from_ref(part));
         Ok(Block {
             samples: self.plain.read(&self.input, part, self.grain(image))?,

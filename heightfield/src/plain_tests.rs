@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::input::FileBytes;
-use crate::{Elsewhere, Raster, RawLayout};
+use crate::{Raster, RawLayout, RemoteFetcher};
 
 const SIZE: [u32; 2] = [1100, 700];
 
@@ -25,7 +25,7 @@ fn file(folder: &Path) -> (FileBytes, Plain) {
     }
     let path = folder.join("samples.raw");
     std::fs::write(&path, bytes).expect("written");
-    let input = FileBytes::open(&path, &Elsewhere::default()).expect("there");
+    let input = FileBytes::open(&path, &RemoteFetcher::default()).expect("there");
     let plain = Plain {
         columns: SIZE[0],
         rows: SIZE[1],

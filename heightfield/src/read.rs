@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use super::BadRaster;
+use super::RasterError;
 use super::samples::{Endian, SampleType, SampleValue, Samples, with_samples};
 
 /// The type of a sample in a file.
@@ -38,13 +38,13 @@ impl Stored {
     }
 
     /// Room for `count` samples; the caller has checked that the file holds them.
-    pub(super) fn room(self, count: u64) -> Result<Samples, BadRaster> {
+    pub(super) fn room(self, count: u64) -> Result<Samples, RasterError> {
         let mut samples = self.held().none();
         let reserved = usize::try_from(count).ok().and_then(
             |count| with_samples!(&mut samples, values => values.try_reserve_exact(count).ok()),
         );
         reserved.ok_or_else(|| {
-            BadRaster::AbsurdSize(format!("{count} samples are more than memory can hold"))
+            RasterError::AbsurdSize(format!("{count} samples are more than memory can hold"))
         })?;
         Ok(samples)
     }

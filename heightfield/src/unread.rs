@@ -4,7 +4,7 @@
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
 
-use super::BadRaster;
+use super::RasterError;
 use super::blocks::Part;
 
 /// So many are known at most: what is found beyond is tried, and told of, again.
@@ -36,7 +36,7 @@ impl Unread {
     }
 
     /// Says once of a part of an image that it cannot be read.
-    pub(super) fn warn(&self, image: usize, part: &Part, fault: &BadRaster) {
+    pub(super) fn warn(&self, image: usize, part: &Part, fault: &RasterError) {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if known.len() < MOST && !known.insert((image, [part.column, part.row])) {
             return;

@@ -5,7 +5,7 @@ use quick_xml::{Reader, XmlVersion};
 
 /// No note is deeper, and none has more attributes.
 const DEEPEST: usize = 16;
-const MOST_ATTRIBUTES: usize = 64;
+const MAX_ATTRIBUTES: usize = 64;
 
 /// An element whose end was read, and those around it.
 #[derive(Debug, Default)]
@@ -74,9 +74,9 @@ fn element(start: &BytesStart<'_>) -> Result<Element, String> {
         let value = attribute.normalized_value(XmlVersion::Implicit1_0);
         let value = value.map_err(|fault| fault.to_string())?;
         attributes.push((attribute.key.as_ref().to_owned(), value.into_owned()));
-        if attributes.len() > MOST_ATTRIBUTES {
+        if attributes.len() > MAX_ATTRIBUTES {
             return Err(format!(
-                "an element has more than {MOST_ATTRIBUTES} attributes"
+                "an element has more than {MAX_ATTRIBUTES} attributes"
             ));
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! `hapterra-lab stability` makes the trials; its tests hold these tables to them.
 
-use hapterra_core::force::{ForceLaw, MaterialTable, Texture};
+use hapterra_core::force::{MaterialTable, SurfaceParams, Texture};
 use hapterra_core::rate::TickRate;
 use hapterra_core::wire::hello::DeviceHello;
 
@@ -49,7 +49,7 @@ pub const LEFT_WITH_TEXTURE: f32 = 0.5;
 pub const LEFT_LATE_WITH_TEXTURE: f32 = 1.0 / 3.0;
 
 /// Warns of a surface that is too stiff for a device's tick rate and latency.
-pub fn warn(law: &ForceLaw, device: &DeviceHello) {
+pub fn warn(law: &SurfaceParams, device: &DeviceHello) {
     let (rate, latency_us) = (TickRate::new(device.tick_hz), device.latency_us);
     let warnings = rate.map(|rate| [warning(law, rate, latency_us), too_fine(&law.texture, rate)]);
     for warning in warnings.into_iter().flatten().flatten() {
@@ -59,7 +59,7 @@ pub fn warn(law: &ForceLaw, device: &DeviceHello) {
 
 /// The same of a surface of several materials, once for each warning. The device takes the
 /// controller for the stiffest of them.
-pub fn warn_of(law: &ForceLaw, materials: Option<&MaterialTable>, device: &DeviceHello) {
+pub fn warn_of(law: &SurfaceParams, materials: Option<&MaterialTable>, device: &DeviceHello) {
     let Some(table) = materials else {
         return warn(law, device);
     };
@@ -69,7 +69,7 @@ pub fn warn_of(law: &ForceLaw, materials: Option<&MaterialTable>, device: &Devic
 }
 
 fn warnings_of(
-    law: &ForceLaw,
+    law: &SurfaceParams,
     table: &MaterialTable,
     tick_hz: u32,
     latency_us: u16,
@@ -108,7 +108,7 @@ fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
 /// What has to be said of a surface at a device's rate and latency; `None` where every hand on the
 /// virtual arm holds it still, and theory does not speak against it.
 #[must_use]
-fn warning(law: &ForceLaw, rate: TickRate, latency_us: u16) -> Option<String> {
+fn warning(law: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<String> {
     let (stiffness, hz) = (law.stiffness_n_per_mm, rate.hz());
     let latency_s = 1e-6 * f32::from(latency_us);
     let is_controlled = law.is_controlled();
@@ -177,13 +177,13 @@ mod tests {
         latency_us: u16,
         controller: Controller,
     ) -> String {
-        let law = ForceLaw {
+        let law = SurfaceParams {
             stiffness_n_per_mm,
             damping: Damping {
                 controller,
                 ..Damping::NONE
             },
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
         let rate = TickRate::new(hz).expect("a rate");
         warning(&law, rate, latency_us).unwrap_or_default()
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn the_stiffest_and_the_finest_of_several_materials_are_warned_of() {
-        let soft = Material::of(&ForceLaw::PREMIUM);
+        let soft = Material::of(&SurfaceParams::PREMIUM);
         let stiff = Material {
             stiffness_n_per_mm: 8.0,
             ..soft
@@ -205,17 +205,17 @@ mod tests {
             },
             ..soft
         };
-        let told = |materials: &[Material], law: &ForceLaw| {
+        let told = |materials: &[Material], law: &SurfaceParams| {
             let table = MaterialTable::new(materials).expect("some");
             warnings_of(law, &table, 1000, SHORT_US).join("; ")
         };
-        let law = ForceLaw::PREMIUM;
+        let law = SurfaceParams::PREMIUM;
         assert_eq!(told(&[soft, soft], &law), "");
         let both = told(&[soft, stiff, fine, stiff], &law);
         assert_eq!(both.matches("a stiffness of 8 N/mm").count(), 1, "{both}");
         assert!(both.contains("wavelength of 0.3 mm"));
         // A scene that is twice as stiff is so on each of them.
-        let twice = ForceLaw {
+        let twice = SurfaceParams {
             stiffness_n_per_mm: 1.0,
             ..law
         };
@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn a_textured_surface_is_warned_of_at_half_the_stiffness() {
         let told = |stiffness_n_per_mm| {
-            let law = ForceLaw {
+            let law = SurfaceParams {
                 stiffness_n_per_mm,
                 texture: Texture {
                     pattern: Pattern::Grain,
@@ -255,7 +255,7 @@ mod tests {
                     wavelength_mm: 1.0,
                     ..Texture::NONE
                 },
-                ..ForceLaw::PREMIUM
+                ..SurfaceParams::PREMIUM
             };
             warning(&law, TickRate::DEFAULT, SHORT_US).unwrap_or_default()
         };

@@ -70,7 +70,7 @@ impl NamedSurface {
 
 #[cfg(test)]
 mod tests {
-    use hapterra_core::force::ForceLaw;
+    use hapterra_core::force::SurfaceParams;
     use hapterra_core::rate::TickRate;
 
     use super::*;
@@ -89,7 +89,7 @@ mod tests {
             );
         }
         let ice = NamedSurface::find("ice").map(|ice| ice.material);
-        assert_eq!(ice, Some(Material::of(&ForceLaw::PREMIUM)));
+        assert_eq!(ice, Some(Material::of(&SurfaceParams::PREMIUM)));
         assert_eq!(NamedSurface::find("mud"), None);
     }
 }

@@ -9,10 +9,10 @@ use hapterra::cli::Failure;
 use hapterra::cli::options::exaggeration::Exaggeration;
 use hapterra::cli::options::terrain_file::{ReadingOptions, assumed_unit};
 use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, View, ViewOptions};
-use hapterra::terrain::{FeltCells, INTERPOLATED_STEP, Terrain as Laid};
+use hapterra::terrain::{HapticCells, INTERPOLATED_STEP, Terrain as Laid};
 use hapterra_core::phantom::Calibration;
 use hapterra_touch::{Block, Heights, Terrain as Touched, Unread};
-use heightfield::{BadRaster, Error, Raster};
+use heightfield::{Error, Raster, RasterError};
 use pyo3::exceptions::{PyFileNotFoundError, PyOSError};
 use pyo3::{PyErr, PyResult};
 use self_cell::self_cell;
@@ -118,7 +118,7 @@ impl Opened {
     fn laid(raster: Arc<Raster>, size: &Size, target: Target) -> PyResult<Self> {
         let read = Arc::clone(&raster);
         let over = Over::try_new(raster, |raster| {
-            let grid = target.grid(raster, FeltCells::Square)?;
+            let grid = target.grid(raster, HapticCells::Square)?;
             let options = ViewOptions {
                 target,
                 sizing: size.sizing(),
@@ -302,10 +302,10 @@ pub(crate) fn failed(failure: Failure) -> PyErr {
 /// A file that cannot be opened: `OSError` where it cannot be read, else `ValueError`.
 fn unread(error: Error) -> PyErr {
     let raised = match error.fault() {
-        BadRaster::Unreadable(io) if io.kind() == std::io::ErrorKind::NotFound => {
+        RasterError::Unreadable(io) if io.kind() == std::io::ErrorKind::NotFound => {
             PyFileNotFoundError::new_err
         }
-        BadRaster::Unreadable(_) | BadRaster::Elsewhere(_) | BadRaster::NotYet => {
+        RasterError::Unreadable(_) | RasterError::RemoteFetcher(_) | RasterError::NotYet => {
             PyOSError::new_err
         }
         _ => pyo3::exceptions::PyValueError::new_err,

@@ -1,17 +1,17 @@
 //! Surfaces.
 
 use hapterra_touch::{
-    Damping, ForceLaw, Friction, Material, Pattern, Shading, Surface as Touched, Texture,
+    Damping, Friction, Material, Pattern, Shading, Surface as Touched, SurfaceParams, Texture,
 };
 use pyo3::types::{PyDict, PyDictMethods};
 use pyo3::{Bound, Py, PyResult, Python, pyclass, pymethods};
 
 use crate::refused;
 
-const LIKE: ForceLaw = ForceLaw::PREMIUM;
+const LIKE: SurfaceParams = SurfaceParams::PREMIUM;
 /// The command's defaults of a texture, mm.
 const WAVELENGTH_MM: f32 = 1.0;
-const MOST_AMPLITUDE_MM: f32 = 0.2;
+const MAX_AMPLITUDE_MM: f32 = 0.2;
 
 /// How a surface is rendered. All parameters are by keyword, and checked.
 ///
@@ -71,7 +71,7 @@ impl Surface {
         texture_seed: u32,
         materials: Vec<Py<Self>>,
     ) -> PyResult<Self> {
-        let law = ForceLaw {
+        let law = SurfaceParams {
             stiffness_n_per_mm: stiffness,
             max_force_n: max_force,
             friction: Friction {
@@ -89,7 +89,7 @@ impl Surface {
                 pattern => Texture {
                     pattern,
                     amplitude_mm: texture_amplitude
-                        .unwrap_or((0.1 * texture_wavelength).min(MOST_AMPLITUDE_MM)),
+                        .unwrap_or((0.1 * texture_wavelength).min(MAX_AMPLITUDE_MM)),
                     wavelength_mm: texture_wavelength,
                     direction_deg: texture_direction,
                     seed: texture_seed,

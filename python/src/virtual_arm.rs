@@ -2,7 +2,7 @@
 
 use hapterra::phantom::{HandModel, PhantomModel, Placement, Plant};
 use hapterra_core::Vec3;
-use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_touch::{Contact as Touched, StepError};
 use pyo3::types::PyByteArray;
 use pyo3::{PyResult, Python, pyclass, pymethods};
@@ -19,7 +19,7 @@ const ROW: usize = 104;
 pub(crate) struct VirtualArm {
     hand: HandModel,
     placement: Placement,
-    mechanism: Mechanism,
+    mechanism: Kinematics,
 }
 
 #[pymethods]
@@ -44,7 +44,7 @@ impl VirtualArm {
                 grip_ns_per_m,
             },
             placement: Placement { home_mm },
-            mechanism: Mechanism::new(&Calibration::PREMIUM_1_5).map_err(refused)?,
+            mechanism: Kinematics::new(&Calibration::PREMIUM_1_5).map_err(refused)?,
         })
     }
 

@@ -3,7 +3,7 @@
 //! tiles that a link of 1,000 kB/s carries in a second (docs/explanation/tiles-and-levels.md).
 
 use hapterra::synth::{Kind, Synth};
-use hapterra::terrain::{FeltCells, FeltGrid, Terrain, TileBuffer};
+use hapterra::terrain::{HapticCells, HapticGrid, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::message::Heights;
 use hapterra_tests::shared;
@@ -21,7 +21,7 @@ fn main() {
         Some(path) => Raster::open(path, &OpenOptions::default()).expect("opens"),
         None => made().expect("a raster"),
     };
-    let grid = FeltGrid::new(&raster, FeltCells::default());
+    let grid = HapticGrid::new(&raster, HapticCells::default());
     let scale = grid.true_scale(1.0).expect("scale");
     println!("radius_cells,felt_cells_in_radius,bytes_a_tile,tiles_per_s,times_link");
     for radius in [0.0, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0] {

@@ -7,9 +7,9 @@ use crate::hapterra_binary;
 
 /// Address space of a child that holds 256 MB of terrain, KiB: the program itself takes some 100 MB
 /// of it.
-pub const MOST_KIB: u32 = 400_000;
+pub const MAX_KIB: u32 = 400_000;
 
-/// Runs `hapterra info` on a file in [`MOST_KIB`] of address space, with these options.
+/// Runs `hapterra info` on a file in [`MAX_KIB`] of address space, with these options.
 ///
 /// # Panics
 /// When it does not start.
@@ -32,7 +32,7 @@ fn command(path: &Path, options: &[&str]) -> Command {
     let mut command = match cfg!(unix) {
         true => {
             let mut shell = Command::new("sh");
-            let limited = format!("ulimit -v {MOST_KIB}; exec \"$0\" info \"$@\"");
+            let limited = format!("ulimit -v {MAX_KIB}; exec \"$0\" info \"$@\"");
             shell.arg("-c").arg(limited).arg(hapterra_binary());
             shell
         }

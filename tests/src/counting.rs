@@ -11,12 +11,12 @@ use std::process::{Command, Stdio};
 
 use hapterra_core::Vec3;
 use hapterra_core::grid::{Cell, GridPoint};
-use hapterra_core::guard::Sense;
-use hapterra_core::scene::{Point, Scene};
-use hapterra_core::terrain::{CoarseTile, FieldSize, POSTS, TileKey};
+use hapterra_core::guard::GuardInputs;
+use hapterra_core::scene::{HipCommand, Scene};
+use hapterra_core::terrain::{CoarseTile, FieldSize, TILE_SAMPLES, TileKey};
 use hapterra_core::wire::frame::{MAX_FRAME, encode};
 use hapterra_core::wire::materials::{
-    MOST_TABLE_BYTES, MOST_TILE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
+    MAX_TABLE_BYTES, MAX_TILE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
 };
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::plant::Sensed;
@@ -221,9 +221,9 @@ impl CountingBoard {
         write_replays(folder.path(), &[held]);
         let mut frames = Frames::create(&folder.path().join("counts.frames"));
         for (tick, counts) in (0..).zip(counts) {
-            let sense = Sense {
+            let sense = GuardInputs {
                 counts: *counts,
-                ..Sense::default()
+                ..GuardInputs::default()
             };
             frames.add(&Sensed { tick, sense });
         }
@@ -336,8 +336,8 @@ fn write_replays(folder: &Path, replays: &[Replay<'_>]) {
         frames.add_scene(replay.scene, replay.materials);
         for (seq, event) in (0..).zip(replay.events) {
             match event {
-                Event::Hip(hip) => frames.add(&ToDevice::Point(Point { seq, hip: *hip })),
-                Event::Before(seq) => frames.add(&ToDevice::Point(Point {
+                Event::Hip(hip) => frames.add(&ToDevice::Hip(HipCommand { seq, hip: *hip })),
+                Event::Before(seq) => frames.add(&ToDevice::Hip(HipCommand {
                     seq: *seq,
                     hip: GridPoint::default(),
                 })),
@@ -376,15 +376,15 @@ fn coarse_bytes(size: FieldSize, place: CoarseTile, field: &dyn Samples) -> Vec<
 fn bytes_of(size: FieldSize, first: Cell, apart: i32, height: impl Fn(i32, i32) -> f32) -> Vec<u8> {
     let post = |i: usize| {
         let [x, y] = [
-            first.x + (i % POSTS) as i32 * apart,
-            first.y + (i / POSTS) as i32 * apart,
+            first.x + (i % TILE_SAMPLES) as i32 * apart,
+            first.y + (i / TILE_SAMPLES) as i32 * apart,
         ];
         match size.columns < x || size.rows < y || x < 0 || y < 0 {
             true => f32::NAN,
             false => height(x, y),
         }
     };
-    let posts = (0..POSTS * POSTS).map(post);
+    let posts = (0..TILE_SAMPLES * TILE_SAMPLES).map(post);
     posts.flat_map(f32::to_le_bytes).collect()
 }
 
@@ -411,7 +411,7 @@ impl Frames {
         let Some(materials) = materials else {
             return self.add(&ToDevice::Scene(*scene));
         };
-        let mut room = [0; MOST_TABLE_BYTES];
+        let mut room = [0; MAX_TABLE_BYTES];
         self.add(&ToDevice::MaterialScene(MaterialScene {
             scene: *scene,
             table: table_bytes(&materials.told(), &mut room),
@@ -424,10 +424,10 @@ impl Frames {
         };
         let first = tile.key.index.first_cell();
         let class = |i: usize| {
-            let (col, row) = (i % POSTS, i / POSTS);
+            let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
             materials.class(first.x + col as i32, first.y + row as i32)
         };
-        let mut room = [0; MOST_TILE_BYTES];
+        let mut room = [0; MAX_TILE_BYTES];
         let materials = TileMaterials::pack(&std::array::from_fn(class), &mut room);
         self.add(&ToDevice::MaterialTile(MaterialTile { tile, materials }));
     }

@@ -81,7 +81,7 @@ fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
         ToDevice::Scene(scene) => {
             *taken = Some((session, scene.epoch));
             let (epoch, accepted) = (scene.epoch, true);
-            wire::from_device(session, &ToHost::SceneTaken { epoch, accepted })
+            wire::from_device(session, &ToHost::SceneAck { epoch, accepted })
         }
         // What a host asks before it serves.
         ToDevice::GetCalibration { number } => {
@@ -98,7 +98,7 @@ fn answer_to(content: &[u8], taken: &mut Taken) -> Vec<u8> {
 }
 
 fn needs(session: SessionNumber, epoch: u32) -> Vec<u8> {
-    let need = |i: i32| ToHost::Need {
+    let need = |i: i32| ToHost::TileRequest {
         epoch,
         key: TileKey::new(0, i % 2, 0),
     };

@@ -1,6 +1,6 @@
 //! Files of real ground that several tests slide over.
 
-use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Terrain};
 use heightfield::{OpenOptions, Raster};
 
 use crate::shared;
@@ -77,7 +77,7 @@ pub fn all_files() -> Vec<(String, Raster)> {
 /// When it cannot be felt so.
 #[must_use]
 pub fn terrain(raster: &Raster) -> Terrain<'_> {
-    let grid = FeltGrid::new(raster, FeltCells::Square);
+    let grid = HapticGrid::new(raster, HapticCells::Square);
     let scale = grid.true_scale(1.0).expect("scale");
     Terrain::over(grid, scale, 0).expect("terrain")
 }

@@ -179,7 +179,7 @@ impl OnBoard {
             bytes = &bytes[taken..];
             let frame = frame.map(|frame| frame.and_then(decode::<InSession<ToHost>>));
             if let Some(Ok(said)) = frame {
-                self.unanswered -= i32::from(matches!(said.message, ToHost::Alive { .. }));
+                self.unanswered -= i32::from(matches!(said.message, ToHost::Heartbeat { .. }));
             }
         }
     }
@@ -189,13 +189,14 @@ impl OnBoard {
         let mut reader = FrameReader::<MAX_FRAME>::new();
         let (_, content) = reader.push(frame);
         let message = content.and_then(Result::ok).and_then(said_by_host);
-        self.unanswered += i32::from(message.is_some_and(|said| said.message == ToDevice::Alive));
+        self.unanswered +=
+            i32::from(message.is_some_and(|said| said.message == ToDevice::Heartbeat));
         self.link.send(frame).expect("the board is there");
     }
 
     /// Waits until the board has done with all that it was sent. Returns what it said.
     fn settle(&mut self, session: SessionNumber) -> Vec<u8> {
-        self.send(&from_host(session, &ToDevice::Alive));
+        self.send(&from_host(session, &ToDevice::Heartbeat));
         let mut said = vec![];
         while self.unanswered > 0 {
             let more = self.read();

@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 use hapterra::synth::Kind;
 use hapterra_tests::timeouts::end_of;
 use hapterra_tests::{hapterra_binary, shared, terrain_file};
-use heightfield::{BadRaster, OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, RasterError};
 
 /// Address space a child may use. The program itself takes some 100 MB of it.
 const MEMORY_KIB: u64 = 1 << 20;
@@ -123,13 +123,13 @@ fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
     let missing = Raster::open(folder.join("missing.tif"), &OpenOptions::default());
     assert!(matches!(
         missing.expect_err("missing").fault(),
-        BadRaster::Unreadable(_)
+        RasterError::Unreadable(_)
     ));
     // Of a folder it is the first file, by name, that is to be a terrain.
     let itself = Raster::open(&folder, &OpenOptions::default());
     let itself = itself.expect_err("a folder");
     match itself.fault() {
-        BadRaster::InTile { file, fault } => {
+        RasterError::InTile { file, fault } => {
             assert!(file.ends_with("cut.hgt.gz"), "{itself}");
             assert!(fault.to_string().contains("truncated"), "{itself}");
         }
@@ -222,7 +222,7 @@ fn damaged_copies_of_good_files_never_panic() {
                     Ok(_) => opened += 1,
                     Err(error) => {
                         panicked +=
-                            usize::from(matches!(error.fault(), BadRaster::DecoderFailed(_)));
+                            usize::from(matches!(error.fault(), RasterError::DecoderFailed(_)));
                     }
                 }
             }

@@ -4,34 +4,34 @@
 use hapterra_core::Vec3;
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::{
-    Controller, Damping, ForceLaw, Material, MaterialTable, Pattern, Shading, Texture,
+    Controller, Damping, Material, MaterialTable, Pattern, Shading, SurfaceParams, Texture,
 };
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_tests::campaign::felt::FeltWatch;
 use hapterra_tests::campaign::ground::Felt;
 
-const LAW: ForceLaw = ForceLaw {
+const LAW: SurfaceParams = SurfaceParams {
     damping: Damping {
         controller: Controller::On,
         ..Damping::NONE
     },
-    ..ForceLaw::PREMIUM
+    ..SurfaceParams::PREMIUM
 };
 
-const OFF: ForceLaw = ForceLaw {
+const OFF: SurfaceParams = SurfaceParams {
     damping: Damping {
         controller: Controller::Off,
         ..Damping::NONE
     },
-    ..ForceLaw::PREMIUM
+    ..SurfaceParams::PREMIUM
 };
 
 /// A tick in level ground at height 0, in cells of half a millimetre.
-fn at(tick: u32, height: f32, force_n: Vec3) -> Sample {
+fn at(tick: u32, height: f32, force_n: Vec3) -> TickRecord {
     let place = |height| GridPoint::new([20, 20, 0], Vec3::new(0.5, 0.5, height));
-    Sample {
+    TickRecord {
         tick,
         hip: place(height),
         proxy: place(height.max(0.0)),
@@ -41,18 +41,18 @@ fn at(tick: u32, height: f32, force_n: Vec3) -> Sample {
             false => ContactState::Free,
         },
         mode: Mode::Armed,
-        ..Sample::default()
+        ..TickRecord::default()
     }
 }
 
-fn watch(law: &ForceLaw, table: Option<&[Material]>) -> FeltWatch {
+fn watch(law: &SurfaceParams, table: Option<&[Material]>) -> FeltWatch {
     let table = table.map(|all| MaterialTable::new(all).expect("some"));
     FeltWatch::new(Felt::of(law, table.as_ref()), 0.5)
 }
 
 /// What is said of one tick, 2 mm deep.
-fn said(law: &ForceLaw, force_n: Vec3, limits: Limits) -> Result<(), String> {
-    let sample = Sample {
+fn said(law: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
+    let sample = TickRecord {
         limits,
         ..at(0, -4.0, force_n)
     };
@@ -61,7 +61,7 @@ fn said(law: &ForceLaw, force_n: Vec3, limits: Limits) -> Result<(), String> {
 
 #[test]
 fn a_force_that_pulls_is_told_but_where_it_is_on_its_way() {
-    let shaded = ForceLaw {
+    let shaded = SurfaceParams {
         shading: Shading::Smooth,
         ..LAW
     };
@@ -77,7 +77,7 @@ fn a_force_that_pulls_is_told_but_where_it_is_on_its_way() {
 #[test]
 fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
     let plain = OFF;
-    let textured = ForceLaw {
+    let textured = SurfaceParams {
         texture: Texture {
             pattern: Pattern::Grating,
             amplitude_mm: 0.1,
@@ -86,7 +86,7 @@ fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
         },
         ..plain
     };
-    let most = |law: &ForceLaw, most_n: f32| {
+    let most = |law: &SurfaceParams, most_n: f32| {
         let force = |newtons: f32| said(law, Vec3::Z * newtons, Limits::empty());
         assert_eq!(force(most_n), Ok(()), "{law:?}");
         assert!(force(1.01 * most_n).is_err(), "{law:?}");
@@ -110,12 +110,12 @@ fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
 
 /// In and out of the ground at 50 mm/s, with this much more force on the way out: whether it is
 /// told, and how much was given.
-fn tap(law: &ForceLaw, more: f32, is_calm: bool) -> (bool, f32) {
+fn tap(law: &SurfaceParams, more: f32, is_calm: bool) -> (bool, f32) {
     taps(law, more, is_calm, 1)
 }
 
 /// The same so many times, without leaving the ground between.
-fn taps(law: &ForceLaw, more: f32, is_calm: bool, times: usize) -> (bool, f32) {
+fn taps(law: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool, f32) {
     let mut watch = watch(law, None);
     let into = (0..20).map(|i| (0.5 - 0.1 * i as f32, 1.0));
     let dip = (0..30).map(|i: i32| match i < 15 {
@@ -144,7 +144,7 @@ fn a_contact_that_gives_is_told_with_the_controller_on() {
     // Not while something goes wrong, or without the controller.
     assert_eq!(tap(&LAW, 0.5, false), (false, 0.0));
     assert_eq!(tap(&OFF, 0.0, true), (false, 0.0));
-    let shaded = ForceLaw {
+    let shaded = SurfaceParams {
         shading: Shading::Smooth,
         ..LAW
     };
@@ -160,7 +160,7 @@ fn a_contact_that_gives_is_told_with_the_controller_on() {
 fn ramped(times: f32) -> Result<(), String> {
     let mut watch = watch(&LAW, None);
     let mut look = |tick: u32, mode: Mode, force_n: f32, limits: Limits| {
-        let sample = Sample {
+        let sample = TickRecord {
             mode,
             limits,
             ..at(tick, -4.0, Vec3::Z * force_n)
@@ -199,7 +199,7 @@ fn a_tap_in_the_ramp_that_gives_is_told() {
             };
             let more = if phase < 100 { 1.0 } else { 1.0 + more };
             let spring_n = -0.25 * height.min(0.0) * share * more;
-            let sample = Sample {
+            let sample = TickRecord {
                 mode: match tick {
                     0 => Mode::Confirming,
                     _ => Mode::Ramping,
@@ -219,7 +219,7 @@ fn a_tap_in_the_ramp_that_gives_is_told() {
 fn a_force_that_grows_on_its_way_out_is_told() {
     let told = |second_n: f32| {
         let mut watch = watch(&LAW, None);
-        let fades = |tick, force_n| Sample {
+        let fades = |tick, force_n| TickRecord {
             mode: Mode::Fading,
             limits: Limits::FADING,
             ..at(tick, -4.0, Vec3::Z * force_n)
@@ -233,7 +233,7 @@ fn a_force_that_grows_on_its_way_out_is_told() {
 fn a_force_with_an_open_clutch_is_told() {
     let told = |limits| {
         let mut watch = watch(&LAW, None);
-        let open = |tick, force_n| Sample {
+        let open = |tick, force_n| TickRecord {
             limits,
             ..at(tick, -4.0, force_n)
         };

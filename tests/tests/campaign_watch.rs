@@ -3,9 +3,9 @@
 
 use hapterra::phantom::{Encoder, PhantomModel, kinematics};
 use hapterra_core::Vec3;
-use hapterra_core::guard::{Drive, Fault, Mode, Sense};
+use hapterra_core::guard::{Fault, GuardInputs, GuardOutputs, Mode};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_tests::campaign::extremes::OFF_COUNTS;
 use hapterra_tests::campaign::hostile;
 use hapterra_tests::campaign::watch::{Truth, Watch};
@@ -18,8 +18,8 @@ const POSE: [f64; 3] = [0.0, 0.2, 0.3];
 /// A tick as it may be: what a test changes in it is what must be told.
 #[derive(Clone)]
 struct Tick {
-    drive: Drive,
-    sense: Sense,
+    drive: GuardOutputs,
+    sense: GuardInputs,
     truth: Truth,
 }
 
@@ -29,15 +29,15 @@ impl Tick {
         let model = PhantomModel::premium_1_5();
         let counts = counts(&model, POSE);
         Self {
-            drive: Drive {
+            drive: GuardOutputs {
                 currents_a: currents(&model, force_n),
                 enabled: true,
                 held: Vec3::ZERO,
             },
-            sense: Sense {
+            sense: GuardInputs {
                 counts: std::array::from_fn(|i| counts[i] + ZERO[i]),
                 dead_man: true,
-                ..Sense::default()
+                ..GuardInputs::default()
             },
             truth: Truth {
                 q_rad: POSE,
@@ -105,7 +105,7 @@ fn each_wrong_current_is_told() {
 
 #[test]
 fn amplifiers_on_against_an_input_are_told() {
-    let forge: [fn(&mut Sense); 4] = [
+    let forge: [fn(&mut GuardInputs); 4] = [
         |sense| sense.dead_man = false,
         |sense| sense.emergency_stop = true,
         |sense| sense.hardware_failed = true,
@@ -122,7 +122,7 @@ fn amplifiers_on_against_an_input_are_told() {
 fn outputs_are_held_only_when_asked_for_and_with_the_amplifiers_off() {
     let held = |enabled, held, may_hold| {
         let mut tick = Tick::pushing(up(0.0));
-        tick.drive = Drive {
+        tick.drive = GuardOutputs {
             currents_a: Vec3::ZERO,
             enabled,
             held,
@@ -235,17 +235,17 @@ fn every_hostile_calibration_is_refused_and_would_be_told() {
     assert!(above > 1_600, "{above}");
 }
 
-fn sample(tick: u32, force_n: Vec3) -> Sample {
-    Sample {
+fn sample(tick: u32, force_n: Vec3) -> TickRecord {
+    TickRecord {
         tick,
         mode: Mode::Armed,
         force_n,
-        ..Sample::default()
+        ..TickRecord::default()
     }
 }
 
 /// What is said of the last of these samples; the others pass.
-fn told(samples: &[Sample]) -> Result<(), String> {
+fn told(samples: &[TickRecord]) -> Result<(), String> {
     let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let (last, before) = samples.split_last().expect("one");
     for sample in before {

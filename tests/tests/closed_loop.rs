@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use hapterra::link::{Arming, Event, Native, Patience, Session};
+use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::PlacedTerrain;
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::replay::Record;
@@ -11,13 +11,13 @@ use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Figures;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::force::SurfaceParams;
+use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_firmware::native::StoppedClock;
 use heightfield::Raster;
 
 /// Runs a device until a tick; every sample it reported.
-fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec<Sample> {
+fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec<TickRecord> {
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig.arming())));
     let device = Box::new(device);
     let (mut session, _) = Session::open(
@@ -25,11 +25,14 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
         scene,
         Some(Arming::VIRTUAL),
         device,
-        Patience::EMULATED,
+        Timeouts::EMULATED,
     )
     .expect("opened");
     let mut samples = Vec::new();
-    while samples.last().is_none_or(|last: &Sample| last.tick < ticks) {
+    while samples
+        .last()
+        .is_none_or(|last: &TickRecord| last.tick < ticks)
+    {
         let mut take = |event: Event<'_>| {
             if let Event::Sample(sample) = event {
                 samples.push(*sample);
@@ -44,7 +47,7 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
 
 /// A plane 20 mm up, felt with a stiffness, and a hand that presses with 2 N
 /// in its middle and lifts. Returns the samples and when the lift begins.
-fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
+fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
     let raster = Raster::from_fn(101, 101, |_, _| 20.0).expect("raster");
     let scale = Scale::new(2.0, 1.0).expect("scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
@@ -59,10 +62,10 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<Sample>, usize, Scale) {
     // With all its weight, which the device holds.
     let model = PhantomModel::premium_1_5();
     let rig = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
-    let law = ForceLaw {
+    let law = SurfaceParams {
         stiffness_n_per_mm,
         max_force_n: 8.5,
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     };
     let home = scale.to_grid(home_mm).expect("addressable");
     let scene = terrain.scene(law, Source::Encoders, home);
@@ -113,7 +116,7 @@ fn slid_across_terrain_the_proxy_stays_on_the_surface_and_the_force_in_bounds() 
         let raster = Synth::new(kind, 2, 30.0).raster(400, 400).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-        let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("placed");
+        let placed = PlacedTerrain::new(&terrain, SurfaceParams::PREMIUM).expect("placed");
         let ticks = (placed.duration_s() * 1e3) as u32;
         let rig = placed.held_phantom();
         let samples = run(&terrain, placed.scene(), rig, ticks);

@@ -9,7 +9,7 @@ use std::time::Duration;
 use hapterra::phantom::PlacedTerrain;
 use hapterra::synth::Kind;
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_tests::timeouts::{set_age, set_just_changed};
 use hapterra_tests::{hapterra_binary, terrain_file};
 use heightfield::disk_cache::DiskCache;
@@ -318,7 +318,7 @@ fn another_tour_of_a_large_file_is_planned_without_reading_it() {
         // Ten samples from one planned place to the next: coarse ones serve.
         let scale = Scale::new(0.05, 0.05).expect("a scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
-        let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("in reach");
+        let placed = PlacedTerrain::new(&terrain, SurfaceParams::PREMIUM).expect("in reach");
         (placed.home_mm(), raster.blocks_read() - before)
     };
     let (home, read) = plan();

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use hapterra_tests::readers::Reader;
-use heightfield::{BadRaster, OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, RasterError};
 
 const HOLE: (u32, u32) = (3, 4);
 
@@ -117,7 +117,7 @@ fn a_band_is_chosen_by_its_number() {
             let error = reader.open(&path(name), &of_band(bands + 1));
             let error = error.expect_err(name);
             assert!(
-                matches!(error.fault(), BadRaster::NoSuchPart { .. }),
+                matches!(error.fault(), RasterError::NoSuchPart { .. }),
                 "{error}"
             );
             let there = format!("bands 1 to {bands}");
@@ -144,7 +144,10 @@ fn a_cell_size_is_for_files_that_state_none() {
         ..OpenOptions::default()
     };
     let error = Raster::open(path("lerc_i16.tif"), &sized).expect_err("it states 30 m");
-    assert!(matches!(error.fault(), BadRaster::CellKnown(_)), "{error}");
+    assert!(
+        matches!(error.fault(), RasterError::CellKnown(_)),
+        "{error}"
+    );
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("bare.asc");
     for header in ["cellsize 1", "dx 1\ndy 2"] {
@@ -199,7 +202,7 @@ fn a_damaged_copy_never_panics_and_is_bounded() {
             // A panic of a decoder would be an error, too: none is wanted.
             if let Err(error) = Raster::open(&file, &OpenOptions::default()) {
                 assert!(
-                    !matches!(error.fault(), BadRaster::DecoderFailed(_)),
+                    !matches!(error.fault(), RasterError::DecoderFailed(_)),
                     "{name}: {error}"
                 );
             }

@@ -3,20 +3,20 @@
 use hapterra::replay::on_native;
 use hapterra::terrain::Terrain;
 use hapterra_core::contact::{Contact, ContactSettings, ContactState, Friction};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::Sample;
-use hapterra_core::terrain::{FieldSize, FieldStorage};
+use hapterra_core::scene::TickRecord;
+use hapterra_core::terrain::{FieldSize, TileArena};
 use hapterra_tests::chance::Chance;
 use hapterra_tests::field::{point, position};
 use hapterra_tests::invariants::surface::distance;
 use hapterra_tests::real_ground::{self, terrain};
 use heightfield::Raster;
 
-fn law(friction: Friction) -> ForceLaw {
-    ForceLaw {
+fn law(friction: Friction) -> SurfaceParams {
+    SurfaceParams {
         friction,
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     }
 }
 
@@ -25,7 +25,7 @@ const CAUGHT_MM: f64 = 20.0;
 
 /// What a HIP feels that slides around the middle of a terrain on an ellipse, `depth` mm
 /// deep, so many millimetres a tick. A hand that the edge of a hole has caught lifts for a tick.
-fn slide(terrain: &Terrain<'_>, law: ForceLaw, depth: f64, speed: f64) -> Vec<Sample> {
+fn slide(terrain: &Terrain<'_>, law: SurfaceParams, depth: f64, speed: f64) -> Vec<TickRecord> {
     let mut replayer = on_native(terrain, law).expect("opened");
     let size = terrain.size_mm();
     let radius = size[0].min(size[1]) / 3.0;
@@ -39,7 +39,7 @@ fn slide(terrain: &Terrain<'_>, law: ForceLaw, depth: f64, speed: f64) -> Vec<Sa
         let Some(ground) = terrain.height_mm(at[0], at[1]) else {
             continue; // over a hole
         };
-        let behind = |last: &Sample| distance(position(&last.proxy), position(&last.hip));
+        let behind = |last: &TickRecord| distance(position(&last.proxy), position(&last.hip));
         let is_caught = felt.last().is_none_or(|last| behind(last) > CAUGHT_MM);
         let above = if is_caught { 1.0 } else { -depth };
         let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
@@ -50,7 +50,7 @@ fn slide(terrain: &Terrain<'_>, law: ForceLaw, depth: f64, speed: f64) -> Vec<Sa
 
 /// Tangential over normal force at a place of the surface, by the slopes of the terrain
 /// there; none beside a line of the grid, where there are several.
-fn ratio(terrain: &Terrain<'_>, sample: &Sample) -> Option<f64> {
+fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
     let [x, y, _] = position(&sample.proxy);
     let is_inside = |c: f64| (0.002..0.998).contains(&(c - c.floor()));
     if !(is_inside(x) && is_inside(y)) {
@@ -96,7 +96,7 @@ fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> V
     // behind the HIP, comes over many cells at once.
     let trails = 2.0 * depth * (1.0 + mu * mu).sqrt() + 3.0 * speed;
     let slides = felt.windows(2).filter(|pair| {
-        let touches = |sample: &Sample| sample.state == ContactState::Touching;
+        let touches = |sample: &TickRecord| sample.state == ContactState::Touching;
         let behind = distance(position(&pair[0].proxy), position(&pair[0].hip));
         let moves = pair[0].proxy != pair[1].proxy;
         touches(&pair[0]) && touches(&pair[1]) && moves && behind < trails
@@ -183,7 +183,7 @@ fn live(
     friction: Friction,
     hz: u32,
 ) -> [u32; 2] {
-    let mut field = Box::new(FieldStorage::<8>::new());
+    let mut field = Box::new(TileArena::<8>::new());
     let posts = (0..257).flat_map(|y| (0..257).map(move |x| [x, y]));
     let heights: Vec<f32> = posts
         .map(|[x, y]| height(f64::from(x), f64::from(y)).map_or(f32::NAN, |h| h as f32))

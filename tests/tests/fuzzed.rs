@@ -5,14 +5,14 @@ use std::panic::catch_unwind;
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::WORK_PER_TICK;
-use hapterra_core::force::{ForceLaw, Material, MaterialTable};
+use hapterra_core::force::{Material, MaterialTable, SurfaceParams};
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::{Point, Source};
+use hapterra_core::scene::{HipCommand, Source};
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
-use hapterra_core::terrain::{POSTS, TileKey};
+use hapterra_core::terrain::{TILE_SAMPLES, TileKey};
 use hapterra_core::tick::Outcome;
 use hapterra_core::wire::materials::{
-    MOST_TABLE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
+    MAX_TABLE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
 };
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::request::Request;
@@ -128,7 +128,7 @@ fn a_tick_that_may_not_be_is_refused() {
     let refuses = |change: fn(&mut Outcome)| {
         let mut outcome = Outcome::default();
         change(&mut outcome);
-        catch_unwind(|| tick::look(&outcome, &ForceLaw::PREMIUM)).is_err()
+        catch_unwind(|| tick::look(&outcome, &SurfaceParams::PREMIUM)).is_err()
     };
     assert!(!refuses(|_| ()));
     assert!(!refuses(|o| o.sample.work = WORK_PER_TICK));
@@ -145,9 +145,9 @@ fn a_tick_that_may_not_be_is_refused() {
 /// Whole messages on the line, cut into the target's chunks.
 fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
     let samples = [0.5f32.to_le_bytes(); 33 * 33].concat();
-    let material = Material::of(&ForceLaw::PREMIUM);
+    let material = Material::of(&SurfaceParams::PREMIUM);
     let table = MaterialTable::new(&[material; 2]).expect("two");
-    let mut room = [0; MOST_TABLE_BYTES];
+    let mut room = [0; MAX_TABLE_BYTES];
     let mut line = Vec::new();
     for seq in 0..1 + chance.below(6) as u32 {
         let key = TileKey::new(0, chance.below(3) as i32, 0);
@@ -198,7 +198,7 @@ fn sensible_talk(chance: &mut Chance) -> Vec<u8> {
                 number: seq as u8 + 2,
                 request: Request::ClearFault { seen: None },
             },
-            _ => ToDevice::Point(Point { seq, hip }),
+            _ => ToDevice::Hip(HipCommand { seq, hip }),
         };
         line.extend(wire::message(&said));
     }
@@ -220,8 +220,8 @@ fn no_bytes_break_the_link() {
 /// Hills in steps of a 32nd of a cell, some of them with holes, packed.
 fn sensible_tile(chance: &mut Chance) -> Vec<u8> {
     let (rough, holes) = (chance.between(0.0, 40.0), chance.below(3) * 40);
-    let heights: [f32; POSTS * POSTS] = std::array::from_fn(|i| {
-        let height = (i % POSTS) as f64 + chance.between(0.0, rough);
+    let heights: [f32; TILE_SAMPLES * TILE_SAMPLES] = std::array::from_fn(|i| {
+        let height = (i % TILE_SAMPLES) as f64 + chance.between(0.0, rough);
         match chance.below(holes.max(1)) {
             1 => f32::NAN,
             _ => height.round() as f32 / 32.0,

@@ -62,7 +62,7 @@ fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let said = wire::changed(frame, |message| match message {
         ToHost::Hello(hello) => rename(hello),
         ToHost::Status { status, .. } => rename(&mut status.device),
-        ToHost::SceneTaken { epoch: taken, .. } => *epoch = *taken,
+        ToHost::SceneAck { epoch: taken, .. } => *epoch = *taken,
         ToHost::Telemetry(_) => has_samples = true,
         _ => {}
     });
@@ -71,7 +71,7 @@ fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
         for column in 0..REQUESTS {
             let key = TileKey::new(9, i32::MAX - column, i32::MIN);
             let request = wire::changed(frame, |message| {
-                *message = ToHost::Need { epoch: *epoch, key };
+                *message = ToHost::TileRequest { epoch: *epoch, key };
             });
             said.extend(request.expect("the device's own"));
         }

@@ -6,16 +6,16 @@ use std::io;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Arming, Event, LinkError, Native, Patience, Session, Transport};
+use hapterra::link::{Arming, Event, LinkError, Native, Session, Timeouts, Transport};
 use hapterra::phantom::PlacedTerrain;
-use hapterra::replay::{Replayer, on_native};
+use hapterra::replay::{OfflineDevice, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Mode;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::hello::PROTOCOL;
 use hapterra_core::wire::message::ToHost;
@@ -28,13 +28,13 @@ use hapterra_tests::walk::wander;
 use heightfield::Raster;
 
 /// A device in memory answers at once: what has not come in a moment is lost.
-const AT_ONCE: Patience = Patience {
+const AT_ONCE: Timeouts = Timeouts {
     again: Duration::from_millis(2),
     alive: Duration::from_millis(2),
     greet_again: Duration::from_millis(10),
     give_up: HANG,
     goodbye: HANG,
-    ..Patience::REAL_TIME
+    ..Timeouts::REAL_TIME
 };
 
 fn fractal() -> Raster {
@@ -47,7 +47,7 @@ fn unit() -> Scale {
     Scale::new(1.0, 1.0).expect("scale")
 }
 
-fn felt(sample: &Sample) -> (GridPoint, GridPoint, [u32; 3], ContactState) {
+fn felt(sample: &TickRecord) -> (GridPoint, GridPoint, [u32; 3], ContactState) {
     let bits = sample.force_n.to_array().map(f32::to_bits);
     (sample.hip, sample.proxy, bits, sample.state)
 }
@@ -56,9 +56,9 @@ fn felt(sample: &Sample) -> (GridPoint, GridPoint, [u32; 3], ContactState) {
 fn a_bad_link_changes_nothing_that_is_felt() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let law = ForceLaw::PREMIUM;
+    let law = SurfaceParams::PREMIUM;
     let path = wander(&terrain, 9, 1200, 1.0);
-    let walk = |replayer: &mut Replayer<'_>| -> Vec<_> {
+    let walk = |replayer: &mut OfflineDevice<'_>| -> Vec<_> {
         let hips = path
             .iter()
             .map(|mm| unit().to_grid(*mm).expect("addressable"));
@@ -76,7 +76,8 @@ fn a_bad_link_changes_nothing_that_is_felt() {
     ] {
         let link = Faulty::new(Native::for_replay(), fault, one_in, 1);
         let harmed = Rc::clone(&link.harmed);
-        let mut replayer = Replayer::open(&terrain, law, Box::new(link), AT_ONCE).expect("opened");
+        let mut replayer =
+            OfflineDevice::open(&terrain, law, Box::new(link), AT_ONCE).expect("opened");
         let got = walk(&mut replayer);
         assert!(expected == got, "{fault:?} changed what is felt");
         let tally = replayer.tally();
@@ -128,7 +129,7 @@ impl Transport for Tap {
 fn telemetry_that_is_lost_is_counted() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("placed");
+    let placed = PlacedTerrain::new(&terrain, SurfaceParams::PREMIUM).expect("placed");
     let rig = placed.held_phantom();
     let made = Rc::new(Cell::new((0, 0)));
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig)));
@@ -165,12 +166,12 @@ fn telemetry_that_is_lost_is_counted() {
 fn a_host_that_dies_and_returns_finds_the_device_where_it_was() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let placed = PlacedTerrain::new(&terrain, ForceLaw::PREMIUM).expect("placed");
+    let placed = PlacedTerrain::new(&terrain, SurfaceParams::PREMIUM).expect("placed");
     let rig = placed.held_phantom();
     let device: Native = Native::new(StoppedClock, Some(Box::new(rig)));
     let device = Rc::new(RefCell::new(device));
     let watch = |session: &mut Session<'_>, until: u32| {
-        let mut last = Sample::default();
+        let mut last = TickRecord::default();
         while last.tick < until {
             session
                 .poll(Duration::ZERO, &mut |event| {
@@ -229,7 +230,8 @@ fn a_device_that_restarts_ends_a_replay_with_a_word() {
         }
     }
     let link = Box::new(Restarting(Native::for_replay(), 0));
-    let mut replayer = Replayer::open(&terrain, ForceLaw::PREMIUM, link, AT_ONCE).expect("opened");
+    let mut replayer =
+        OfflineDevice::open(&terrain, SurfaceParams::PREMIUM, link, AT_ONCE).expect("opened");
     let path = wander(&terrain, 9, 100, 1.0);
     let mut hips = path
         .iter()
@@ -278,7 +280,7 @@ fn the_host_says_which_versions_do_not_fit() {
     }
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let replayer = Replayer::open(&terrain, ForceLaw::PREMIUM, Box::new(Newer), AT_ONCE);
+    let replayer = OfflineDevice::open(&terrain, SurfaceParams::PREMIUM, Box::new(Newer), AT_ONCE);
     let error = replayer.err().expect("refused").to_string();
     let (ours, theirs) = (PROTOCOL, PROTOCOL + 1);
     assert!(error.contains("version mismatch"), "{error}");

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use hapterra::cli::options::surface::table::TableFile;
-use hapterra::link::{Emulator, Patience};
+use hapterra::link::{Emulator, Timeouts};
 use hapterra::materials::{ClassMaterial, Looks, Materials};
-use hapterra::replay::{Replayer, on_native};
+use hapterra::replay::{OfflineDevice, on_native};
 use hapterra::synth::{Kind, Synth};
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
 use hapterra_core::contact::{ContactState, Friction};
-use hapterra_core::force::{ForceLaw, Material, Pattern, Shading, Texture};
+use hapterra_core::force::{Material, Pattern, Shading, SurfaceParams, Texture};
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::walk::wander;
@@ -330,7 +330,7 @@ fn the_table_for_worldcover_names_all_of_its_classes_and_can_be_felt() {
 
 /// Materials of all kinds in patches of some cells, over a terrain.
 fn patchwork(raster: &Raster) -> Materials {
-    let plain = Material::of(&ForceLaw::PREMIUM);
+    let plain = Material::of(&SurfaceParams::PREMIUM);
     let texture = |pattern, wavelength_mm| Texture {
         pattern,
         amplitude_mm: 0.1,
@@ -376,7 +376,7 @@ fn patchwork(raster: &Raster) -> Materials {
     Materials::over(("terrain", raster), classes, looks).expect("they overlap")
 }
 
-fn walk(replayer: &mut Replayer<'_>, path: &[[f64; 3]]) -> Vec<(ContactState, [u32; 9])> {
+fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<(ContactState, [u32; 9])> {
     let scale = *replayer.terrain().scale();
     let feel = |mm: &[f64; 3]| {
         let hip = scale.to_grid(*mm).expect("addressable");
@@ -394,15 +394,15 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
     let raster = Synth::new(Kind::Fractal, 3, 25.0).raster(150, 140);
     let raster = raster.expect("raster");
     let materials = patchwork(&raster);
-    let grid = FeltGrid::new(&raster, FeltCells::Stored);
+    let grid = HapticGrid::new(&raster, HapticCells::Stored);
     let scale = Scale::new(0.8, 0.9).expect("scale");
     let one = Terrain::over(grid, scale, 0).expect("terrain");
     let several = grid.with_materials(Some(&materials));
     let several = Terrain::over(several, scale, 0).expect("terrain");
     let path = wander(&one, 17, 400, -1.0);
-    let law = ForceLaw {
+    let law = SurfaceParams {
         shading: Shading::Smooth,
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     };
     let mut native = on_native(&several, law).expect("opened");
     let expected = walk(&mut native, &path);
@@ -421,7 +421,7 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let _plant = lines.plant;
     let link = Box::new(lines.link);
-    let mut board = Replayer::open(&several, law, link, Patience::EMULATED).expect("opened");
+    let mut board = OfflineDevice::open(&several, law, link, Timeouts::EMULATED).expect("opened");
     let got = walk(&mut board, &path);
     for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
         assert_eq!(expected, got, "row {i} at {:?}", path[i]);

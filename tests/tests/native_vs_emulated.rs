@@ -5,13 +5,13 @@
 use std::process::Command;
 use std::time::Duration;
 
-use hapterra::link::{Emulator, Patience};
-use hapterra::replay::{Replayer, on_native};
+use hapterra::link::{Emulator, Timeouts};
+use hapterra::replay::{OfflineDevice, on_native};
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
-use hapterra_core::scene::Sample;
+use hapterra_core::force::{Pattern, Shading, SurfaceParams, Texture};
+use hapterra_core::scene::TickRecord;
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
 use hapterra_tests::timeouts::pass;
@@ -29,7 +29,7 @@ type Felt = (
     ContactState,
 );
 
-fn felt(sample: &Sample) -> Felt {
+fn felt(sample: &TickRecord) -> Felt {
     let bits = |v: hapterra_core::Vec3| v.to_array().map(f32::to_bits);
     (
         sample.hip.cell(),
@@ -41,7 +41,7 @@ fn felt(sample: &Sample) -> Felt {
     )
 }
 
-fn walk(replayer: &mut Replayer<'_>, path: &[[f64; 3]]) -> Vec<Felt> {
+fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<Felt> {
     let scale = *replayer.terrain().scale();
     let mut feel = |mm: &[f64; 3]| {
         let hip = scale.to_grid(*mm).expect("addressable");
@@ -65,8 +65,8 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         return;
     };
     let made = |kind| Synth::new(kind, 3, 25.0).raster(150, 140).expect("raster");
-    let plain = ForceLaw::PREMIUM;
-    let with = |pattern| ForceLaw {
+    let plain = SurfaceParams::PREMIUM;
+    let with = |pattern| SurfaceParams {
         shading: Shading::Smooth,
         texture: Texture {
             pattern,
@@ -90,7 +90,8 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
         let _plant = lines.plant;
         let link = Box::new(lines.link);
-        let mut board = Replayer::open(&terrain, law, link, Patience::EMULATED).expect("opened");
+        let mut board =
+            OfflineDevice::open(&terrain, law, link, Timeouts::EMULATED).expect("opened");
         assert_eq!(board.device().board.as_str(), "mps2-an386");
         let got = walk(&mut board, &path);
         for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {

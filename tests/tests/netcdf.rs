@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use heightfield::{BadRaster, OpenOptions, Raster, gdal};
+use heightfield::{OpenOptions, Raster, RasterError, gdal};
 
 const SIZE: (u32, u32) = (90, 70);
 const HOLE: (u32, u32) = (3, 4);
@@ -327,13 +327,13 @@ fn a_variable_is_chosen_by_its_name() {
     let refused = |options: &OpenOptions| Raster::open(&file, options).expect_err("refused");
     let error = refused(&OpenOptions::default());
     assert!(
-        matches!(error.fault(), BadRaster::SeveralHeights { .. }),
+        matches!(error.fault(), RasterError::SeveralHeights { .. }),
         "{error}"
     );
     assert!(error.to_string().contains("bed, ice"), "{error}");
     let error = refused(&named("z"));
     assert!(
-        matches!(error.fault(), BadRaster::NoSuchPart { .. }),
+        matches!(error.fault(), RasterError::NoSuchPart { .. }),
         "{error}"
     );
     assert!(error.to_string().contains("bed, ice"), "{error}");
@@ -373,6 +373,6 @@ fn a_packing_that_is_not_read_is_no_damage() {
     }
     match Raster::open(path("early.nc"), &OpenOptions::default()) {
         Ok(_) => eprintln!("skipped: this GDAL has the filter"),
-        Err(error) => assert!(matches!(error.fault(), BadRaster::ByGdal(_)), "{error}"),
+        Err(error) => assert!(matches!(error.fault(), RasterError::ByGdal(_)), "{error}"),
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hapterra::place::{Coordinates, Target};
-use hapterra::terrain::{FeltCells, FeltGrid};
+use hapterra::terrain::{HapticCells, HapticGrid};
 use hapterra_tests::readers::Reader;
 use hapterra_tests::{hapterra_binary, info};
 use heightfield::{OpenOptions, Raster};
@@ -138,8 +138,8 @@ fn what_a_map_shears_is_felt_in_its_true_shape() {
     let mut sheared = 0;
     for row in rows() {
         let raster = row.raster();
-        let grid = FeltGrid::new(&raster, FeltCells::Square);
-        let worst = |grid: &FeltGrid<'_>| {
+        let grid = HapticGrid::new(&raster, HapticCells::Square);
+        let worst = |grid: &HapticGrid<'_>| {
             let [u, v] = [grid.columns(), grid.rows()].map(|count| 0.5 * (f64::from(count) - 1.0));
             grid.worst_in([u, v, u, v])
                 .expect("a cell of known size")
@@ -148,7 +148,7 @@ fn what_a_map_shears_is_felt_in_its_true_shape() {
         assert!(worst(&grid) < 1e-3, "{}: {}", row.file, worst(&grid));
         if row.lean.abs() > 2e-3 {
             sheared += 1;
-            let stored = FeltGrid::new(&raster, FeltCells::Stored);
+            let stored = HapticGrid::new(&raster, HapticCells::Stored);
             let off = worst(&stored);
             // Half of the shear is what the longest and the shortest direction are off.
             assert!(off > 0.4 * row.lean.abs(), "{}: {off}", row.file);
@@ -197,7 +197,7 @@ fn info_says_what_its_longitudes_and_latitudes_are() {
 fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
     let path = format!("{FOLDER}/sheared.tif");
     let raster = Raster::open(&path, &OpenOptions::default()).expect("a terrain");
-    let grid = FeltGrid::new(&raster, FeltCells::Square);
+    let grid = HapticGrid::new(&raster, HapticCells::Square);
     assert!(grid.is_resampled() && !grid.is_distorted());
     // 5 cells along a column of the felt grid are straight north on the map.
     let [from, to] = [[2.0, 0.0], [2.0, 4.0]].map(|cell| grid.to_ground(cell));

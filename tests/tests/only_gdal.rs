@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use hapterra_tests::{bounded, hapterra_binary, stand_in};
-use heightfield::{BadRaster, OpenOptions, Raster, files_read_with, gdal};
+use heightfield::{OpenOptions, Raster, RasterError, files_read_with, gdal};
 
 /// Whether there is a libgdal; says so where not.
 fn has_gdal() -> bool {
@@ -87,7 +87,10 @@ fn what_gdal_does_not_know_keeps_its_own_error() {
     let path = folder.path().join("letter.doc");
     std::fs::write(&path, "Dear friend").expect("written");
     let error = Raster::open(&path, &OpenOptions::default()).expect_err("no terrain");
-    assert!(matches!(error.fault(), BadRaster::UnknownFormat), "{error}");
+    assert!(
+        matches!(error.fault(), RasterError::UnknownFormat),
+        "{error}"
+    );
     let cut = folder.path().join("cut.img");
     let bytes = std::fs::read(file("erdas.img")).expect("readable");
     std::fs::write(&cut, &bytes[..bytes.len() / 2]).expect("written");

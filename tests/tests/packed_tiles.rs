@@ -4,16 +4,16 @@
 
 use std::path::Path;
 
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
+use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain, TileBuffer};
 use hapterra_core::grid::Cell;
-use hapterra_core::terrain::{POSTS, TILE_CELLS, Tile, TileKey};
+use hapterra_core::terrain::{TILE_CELLS, TILE_SAMPLES, Tile, TileKey};
 use hapterra_core::wire::message::{Heights, TileMessage};
 use hapterra_firmware::link::fill_tile;
 use hapterra_tests::shared;
-use heightfield::{BadRaster, OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, RasterError};
 
 /// Bytes of a tile's samples as floats.
-const FLOATS: usize = 4 * POSTS * POSTS;
+const FLOATS: usize = 4 * TILE_SAMPLES * TILE_SAMPLES;
 
 #[test]
 fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
@@ -29,14 +29,14 @@ fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
             // Archives of NumPy are not read, and some formats not without libgdal.
             Err(error)
                 if path.extension().is_some_and(|end| end == "npz")
-                    || matches!(error.fault(), BadRaster::WantsGdal { .. }) =>
+                    || matches!(error.fault(), RasterError::WantsGdal { .. }) =>
             {
                 println!("skipped: {error}");
                 continue;
             }
             Err(error) => panic!("{error}"),
         };
-        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        let grid = HapticGrid::new(&raster, HapticCells::Square);
         let scale = grid.true_scale(1.0).expect("a scale");
         let mean = checked(&path, &grid, scale, 0);
         println!("{}: {mean} bytes a tile", path.display());
@@ -52,7 +52,7 @@ fn tiles_of_real_terrain_arrive_as_they_were_made_and_take_less() {
 }
 
 /// Holds all tiles against the file; the mean bytes of those that are no single number.
-fn checked(path: &Path, grid: &FeltGrid<'_>, scale: Scale, level: u8) -> usize {
+fn checked(path: &Path, grid: &HapticGrid<'_>, scale: Scale, level: u8) -> usize {
     let terrain = Terrain::over(*grid, scale, level).expect("terrain");
     let last = terrain.size().map(|cells| (cells - 1) / TILE_CELLS as i32);
     let mut buffer = TileBuffer::default();
@@ -83,14 +83,14 @@ fn checked(path: &Path, grid: &FeltGrid<'_>, scale: Scale, level: u8) -> usize {
 /// Holds the samples against the file; where `felt` states a size, those within it.
 fn assert_held(
     tile: &Tile,
-    grid: &FeltGrid<'_>,
+    grid: &HapticGrid<'_>,
     scale: &Scale,
     felt: Option<[i32; 2]>,
     context: &dyn Fn() -> String,
 ) {
     let key = tile.key().expect("a tile");
-    for row in 0..POSTS as u32 {
-        for col in 0..POSTS as u32 {
+    for row in 0..TILE_SAMPLES as u32 {
+        for col in 0..TILE_SAMPLES as u32 {
             let place = [key.index.col, key.index.row].map(|i| i.unsigned_abs() * 32);
             let (x, y) = (place[0] + col, place[1] + row);
             let is_off = |[columns, rows]: [i32; 2]| x as i32 > columns || y as i32 > rows;

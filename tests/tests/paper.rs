@@ -4,7 +4,7 @@ use hapterra::published::{Heights, Paper, Start};
 use hapterra_core::contact::ContactState;
 use hapterra_core::contact::closest_point::nearest_downhill;
 use hapterra_core::contact::surface::patch::Patch;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_tests::field::{FieldContact, position};
 
 /// What a rule says of a HIP: whether there is contact, and the proxy.
@@ -185,7 +185,7 @@ fn surface(x: f64, y: f64) -> f64 {
 
 #[test]
 fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
-    let law = ForceLaw::PREMIUM;
+    let law = SurfaceParams::PREMIUM;
     let mut contact = FieldContact::new(64, rolling);
     contact.feel([30.5, 30.5, 3.0]);
     for depth in [0.01, 0.1, 0.5] {

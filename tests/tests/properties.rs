@@ -20,7 +20,7 @@ const REGRESSIONS: &str = concat!(
 );
 /// Patches along a side.
 const SIDE: usize = 6;
-const POSTS: usize = (SIDE + 1) * (SIDE + 1);
+const TILE_SAMPLES: usize = (SIDE + 1) * (SIDE + 1);
 
 fn terrain(heights: &[f32]) -> Terrain {
     let side = SIDE as i32;
@@ -36,7 +36,7 @@ fn gentle() -> impl Strategy<Value = Vec<f32>> {
         (-8..8_i32).prop_map(|h| h as f32 / 4.0),
         -2.0..2.0_f32,
     ];
-    vec(height, POSTS)
+    vec(height, TILE_SAMPLES)
 }
 
 /// As steep as a tile may be, with holes.
@@ -50,7 +50,7 @@ fn wild() -> impl Strategy<Value = Vec<f32>> {
         1 => Just(f32::INFINITY),
         1 => Just(f32::MIN_POSITIVE / 4.0),
     ];
-    vec(height, POSTS)
+    vec(height, TILE_SAMPLES)
 }
 
 /// A coordinate: on the lines of the grid, between them, or off the field.

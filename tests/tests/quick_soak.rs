@@ -1,11 +1,11 @@
 //! A fixed number of the soak's scenes; `cargo xtask soak MINUTES` for more.
 
 use hapterra_tests::scene::run::Surface;
-use hapterra_tests::soak::{Broken, Tally, Until, soak};
+use hapterra_tests::soak::{Broken, LinkStats, Until, soak};
 
 const SEED: u64 = 2027;
 
-fn thousand(surface: Surface) -> Tally {
+fn thousand(surface: Surface) -> LinkStats {
     let tally = soak(SEED, surface, 0, Until::Scenes(1000), 2, |_| {});
     println!("{tally}");
     let total = tally.total();

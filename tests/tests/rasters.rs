@@ -5,11 +5,11 @@
 
 use std::path::{Path, PathBuf};
 
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain, TileBuffer};
+use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::readers::Reader;
 use hapterra_tests::shared;
-use heightfield::{BadRaster, CellUnit, OpenOptions, PngChannel, Raster, gdal};
+use heightfield::{CellUnit, OpenOptions, PngChannel, Raster, RasterError, gdal};
 
 const COLUMNS: usize = 512;
 const ROWS: usize = 400;
@@ -151,9 +151,12 @@ fn raw_samples_decode_with_a_stated_layout() {
     assert_heights(&raster, &truth_f32(&folder), name);
 
     let wrong = open_raw(SampleType::I16, 513, name, None).expect_err("another size");
-    assert!(matches!(wrong.fault(), BadRaster::Damaged(_)), "{wrong}");
+    assert!(matches!(wrong.fault(), RasterError::Damaged(_)), "{wrong}");
     let short = open_raw(SampleType::F64, 512, name, None).expect_err("too short");
-    assert!(matches!(short.fault(), BadRaster::Truncated(_)), "{short}");
+    assert!(
+        matches!(short.fault(), RasterError::Truncated(_)),
+        "{short}"
+    );
 }
 
 #[test]
@@ -190,7 +193,7 @@ fn cells_and_units_come_from_the_file() {
         return;
     };
     let raster = open(&folder.join("i16_scale_offset_ft.tif"));
-    let felt = FeltGrid::new(&raster, FeltCells::Stored);
+    let felt = HapticGrid::new(&raster, HapticCells::Stored);
     // 30 m of the map; UTM shrinks the ground by 0.026 % there.
     let side = felt.side_m().expect("known");
     assert!((side - 30.007_77).abs() < 1e-4, "{side}");
@@ -204,7 +207,7 @@ fn cells_and_units_come_from_the_file() {
     assert!(rotated.remarks()[0].contains("rotated by 11.3°"));
 
     let picture = open(&folder.join("png_gray16.png"));
-    let felt = FeltGrid::new(&picture, FeltCells::Stored);
+    let felt = HapticGrid::new(&picture, HapticCells::Stored);
     assert_eq!(
         (felt.side_m(), felt.cells_per_vertical_unit()),
         (None, None)
@@ -278,7 +281,7 @@ fn every_real_file_opens() {
             summary.highest
         );
         assert!(
-            FeltGrid::new(&raster, FeltCells::Stored)
+            HapticGrid::new(&raster, HapticCells::Stored)
                 .cells_per_vertical_unit()
                 .is_some(),
             "{name}: true proportions"
@@ -435,7 +438,7 @@ fn files_too_small_for_a_surface_are_refused() {
     for name in ["odd_1x1.tif", "odd_1xN.tif"] {
         let error = Raster::open(folder.join(name), &OpenOptions::default()).expect_err(name);
         assert!(
-            matches!(error.fault(), BadRaster::TooSmall { .. }),
+            matches!(error.fault(), RasterError::TooSmall { .. }),
             "{error}"
         );
     }
@@ -459,10 +462,10 @@ fn third_party_tiffs_are_read_or_refused_for_what_they_are() {
             Err(error) => assert!(
                 matches!(
                     error.fault(),
-                    BadRaster::NotAHeightField(_)
-                        | BadRaster::ColourBands { .. }
-                        | BadRaster::TooSmall { .. }
-                        | BadRaster::AllNoData { .. }
+                    RasterError::NotAHeightField(_)
+                        | RasterError::ColourBands { .. }
+                        | RasterError::TooSmall { .. }
+                        | RasterError::AllNoData { .. }
                 ),
                 "{error}"
             ),
@@ -505,7 +508,7 @@ fn a_colour_picture_needs_its_channel_named() {
     };
     let error = Raster::open(&path, &options).expect_err("there is no grey channel");
     assert!(
-        matches!(error.fault(), BadRaster::AmbiguousChannels(_)),
+        matches!(error.fault(), RasterError::AmbiguousChannels(_)),
         "{error}"
     );
 }

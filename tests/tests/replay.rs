@@ -1,12 +1,12 @@
 //! What a replay feels, against a dense search in `f64` that shares no code
 //! with the loop.
 
-use hapterra::replay::{Replayer, Rule, on_native};
+use hapterra::replay::{OfflineDevice, Rule, on_native};
 use hapterra::synth::{Kind, Synth};
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
-use hapterra_core::scene::Sample;
+use hapterra_core::force::SurfaceParams;
+use hapterra_core::scene::TickRecord;
 use hapterra_tests::oracle::Oracle;
 use hapterra_tests::shared;
 use hapterra_tests::walk::wander;
@@ -28,7 +28,7 @@ const ON_BORDER: f64 = 1e-6;
 /// Error of the force, N, at stiffnesses near the usual.
 const FORCE_N: f64 = 1e-4;
 
-fn mm(sample: &Sample, scale: &Scale) -> ([f64; 3], [f64; 3]) {
+fn mm(sample: &TickRecord, scale: &Scale) -> ([f64; 3], [f64; 3]) {
     (scale.to_mm(&sample.hip), scale.to_mm(&sample.proxy))
 }
 
@@ -45,7 +45,7 @@ fn heights<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     }
 }
 
-fn feel(replayer: &mut Replayer<'_>, hip_mm: [f64; 3]) -> Sample {
+fn feel(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     let hip = replayer.terrain().scale().to_grid(hip_mm);
     replayer.feel(hip.expect("addressable")).expect("felt")
 }
@@ -63,7 +63,7 @@ fn judge(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
     let terrain = Terrain::new(raster, scale, 0).expect("terrain");
     let height = heights(&terrain);
     let oracle = Oracle::new(terrain.size().map(i64::from), &height);
-    let law = ForceLaw::PREMIUM;
+    let law = SurfaceParams::PREMIUM;
     let mut replayer = on_native(&terrain, law).expect("opened");
     let mut touched = 0;
     let mut near_holes = 0;
@@ -146,7 +146,7 @@ fn on_real_terrains_too_whatever_their_holes() {
     ] {
         let Some(path) = shared(file) else { return };
         let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
-        let grid = FeltGrid::new(&raster, FeltCells::default());
+        let grid = HapticGrid::new(&raster, HapticCells::default());
         let scale = grid.true_scale(cell_mm).expect("scale");
         eprint!("{file}: ");
         let touched = judge(&raster, scale, 5, 2000);
@@ -155,8 +155,8 @@ fn on_real_terrains_too_whatever_their_holes() {
 }
 
 /// A replayer by a contact rule.
-fn opened<'t>(terrain: &'t Terrain<'t>, rule: Rule) -> Replayer<'t> {
-    let law = ForceLaw::PREMIUM;
+fn opened<'t>(terrain: &'t Terrain<'t>, rule: Rule) -> OfflineDevice<'t> {
+    let law = SurfaceParams::PREMIUM;
     let replayer = on_native(terrain, law).expect("opened");
     match rule {
         Rule::Swept => replayer,
@@ -194,7 +194,7 @@ fn contact_begins_and_ends_at_the_surface() {
 fn no_force_until_the_hip_has_been_above() {
     let raster = synthetic(Kind::Plane);
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
-    let mut replayer = on_native(&terrain, ForceLaw::PREMIUM).expect("opened");
+    let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
     let ground = terrain.height_mm(60.0, 50.0).expect("known");
     for depth in [5.0, 1.0, 0.1] {
         let sample = feel(&mut replayer, [60.0, 50.0, ground - depth]);
@@ -244,7 +244,7 @@ fn over_a_hole_and_off_the_data_there_is_nothing_to_feel() {
 fn the_edge_of_a_hole_lets_go_without_a_kick_and_does_not_hook() {
     let raster = holed();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
-    let mut replayer = on_native(&terrain, ForceLaw::PREMIUM).expect("opened");
+    let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
     feel(&mut replayer, [30.0, 50.5, 7.0]);
     let mut last = feel(&mut replayer, [30.0, 50.5, 4.0]);
     let mut largest_step = 0.0f32;
@@ -274,7 +274,7 @@ fn a_fast_sweep_does_not_pass_through_a_peak() {
     let raster = raster.expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let sweep = || {
-        let mut replayer = on_native(&terrain, ForceLaw::PREMIUM).expect("opened");
+        let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
         feel(&mut replayer, [28.0, 32.3, 5.0]);
         feel(&mut replayer, [36.0, 32.3, 5.0])
     };
@@ -291,7 +291,7 @@ fn the_same_trajectory_gives_the_same_bits_again() {
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let path = wander(&terrain, 3, 1500, 1.0);
     let run = || -> Vec<_> {
-        let mut replayer = on_native(&terrain, ForceLaw::PREMIUM).expect("opened");
+        let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
         path.iter()
             .map(|hip| feel(&mut replayer, *hip))
             .map(|s| {

@@ -1,7 +1,7 @@
 //! Random walks judged a second time: by a list of all places a proxy may rest
 //! (`hapterra_tests::minima`), and by looking densely at the HIP paths.
 
-use hapterra::terrain::{FeltCells, FeltGrid};
+use hapterra::terrain::{HapticCells, HapticGrid};
 use hapterra_core::contact::ContactState;
 use hapterra_tests::chance::Chance;
 use hapterra_tests::invariants::judge::Judge;
@@ -204,7 +204,7 @@ fn on_real_terrain_every_proxy_rests_at_a_closest_point() {
 /// At most 200 × 200 patches of its middle, lowest sample near zero.
 fn cut(raster: &Raster, steepness: f64) -> Terrain {
     const MOST: u32 = 200;
-    let scale = FeltGrid::new(raster, FeltCells::Stored)
+    let scale = HapticGrid::new(raster, HapticCells::Stored)
         .cells_per_vertical_unit()
         .unwrap_or(1.0)
         * steepness;

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use hapterra::link::Native;
 use hapterra::synth::Kind;
-use hapterra_core::guard::Sense;
+use hapterra_core::guard::GuardInputs;
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::served::{Served, signal, terrain, told};
 use hapterra_tests::timeouts::end_of;
@@ -80,13 +80,13 @@ impl Pair {
 }
 
 /// Lines that are heard before one that is waited for, at most.
-const MOST_LINES: usize = 60;
+const MAX_LINES: usize = 60;
 
 /// Reads lines until each of these has begun one.
 fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
     let mut lines = BufReader::with_capacity(1, from);
     let mut missing: Vec<&String> = beginnings.iter().collect();
-    for _ in 0..MOST_LINES {
+    for _ in 0..MAX_LINES {
         if missing.is_empty() {
             break;
         }
@@ -301,7 +301,7 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
 fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
     // A current flows that nobody commanded.
     let conducts = Served::with(|| {
-        let current = Box::new(|_, sense: &mut Sense, _: &_| {
+        let current = Box::new(|_, sense: &mut GuardInputs, _: &_| {
             sense.measured_ma = Some([2_000, 0, 0]);
         });
         let device = Native::for_replay().restless().meddled_with(current);

@@ -4,8 +4,8 @@ use hapterra::replay::on_native;
 use hapterra::terrain::Terrain;
 use hapterra_core::Vec3;
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::{ForceLaw, Shading};
-use hapterra_core::scene::Sample;
+use hapterra_core::force::{Shading, SurfaceParams};
+use hapterra_core::scene::TickRecord;
 use hapterra_tests::field::position;
 use hapterra_tests::real_ground;
 
@@ -17,9 +17,9 @@ const ROUND: f64 = 300.0;
 const LONG_STEP: f64 = 0.03;
 
 /// Most that a shaded round gives, mJ, at an even depth of 0.3 mm (`docs/explanation/effects.md`).
-const MOST_EVEN_MJ: f64 = 0.06;
+const MAX_EVEN_MJ: f64 = 0.06;
 /// The same at depths from 0.5 to 1.5 mm.
-const MOST_DEEP_MJ: f64 = 0.14;
+const MAX_DEEP_MJ: f64 = 0.14;
 
 /// A closed way of [`ROUND`] over a terrain that is true to scale, a cell a millimetre.
 struct Circle<'c> {
@@ -33,10 +33,10 @@ struct Circle<'c> {
 
 impl Circle<'_> {
     /// What a HIP feels that goes round once, where it touches.
-    fn felt(&self, terrain: &Terrain<'_>, shading: Shading) -> Vec<Sample> {
-        let law = ForceLaw {
+    fn felt(&self, terrain: &Terrain<'_>, shading: Shading) -> Vec<TickRecord> {
+        let law = SurfaceParams {
             shading,
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
         let mut replayer = on_native(terrain, law).expect("opened");
         let size = terrain.size_mm();
@@ -75,7 +75,7 @@ fn degrees(a: Vec3, b: Vec3) -> f32 {
 
 /// Largest change of the force's direction from one HIP to the next, degrees, where the proxy
 /// goes no farther than so many cells: over a ridge it goes as far as it is deep, at once.
-fn largest_turn(felt: &[Sample], farthest: f32) -> f32 {
+fn largest_turn(felt: &[TickRecord], farthest: f32) -> f32 {
     let pairs = felt.windows(2);
     let near = pairs.filter(|pair| pair[0].proxy.to(&pair[1].proxy).length() <= farthest);
     let turns = near.map(|pair| degrees(pair[0].force_n, pair[1].force_n));
@@ -83,7 +83,7 @@ fn largest_turn(felt: &[Sample], farthest: f32) -> f32 {
 }
 
 /// What the force gives to a HIP on its way, mJ.
-fn given_mj(felt: &[Sample]) -> f64 {
+fn given_mj(felt: &[TickRecord]) -> f64 {
     let gives = felt.windows(2).map(|pair| {
         let force = 0.5 * (pair[0].force_n + pair[1].force_n).as_dvec3();
         let (from, to) = (position(&pair[0].hip), position(&pair[1].hip));
@@ -163,6 +163,6 @@ fn a_shaded_round_gives_no_more_than_the_page_says() {
         most = [0, 1].map(|i| most[i].max(largest[i]));
     }
     println!("{rounds} rounds: up to {most:.4?} mJ");
-    assert!(most[0] <= MOST_EVEN_MJ, "{most:?}");
-    assert!(most[1] <= MOST_DEEP_MJ, "{most:?}");
+    assert!(most[0] <= MAX_EVEN_MJ, "{most:?}");
+    assert!(most[1] <= MAX_DEEP_MJ, "{most:?}");
 }

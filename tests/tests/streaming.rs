@@ -4,7 +4,7 @@
 use hapterra::replay::on_native;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use heightfield::Raster;
 
 const SIDE: u32 = 4096;
@@ -26,7 +26,7 @@ fn a_field_of_4096_by_4096_streams_through_a_window() {
     .expect("raster");
     let before = peak_mib();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
-    let mut replayer = on_native(&terrain, ForceLaw::PREMIUM).expect("opened");
+    let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
     let window = u64::from(replayer.device().window).pow(2);
     let mut touched = 0u32;
     let steps = 40_000;
@@ -67,7 +67,7 @@ fn coarser_levels_feel_the_same_terrain_with_fewer_tiles() {
     let tiles = [0u8, 3].map(|level| {
         let scale = Scale::new(0.25, 0.25).expect("scale");
         let terrain = Terrain::new(&raster, scale, level).expect("terrain");
-        let mut replayer = on_native(&terrain, ForceLaw::PREMIUM).expect("opened");
+        let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
         for i in 0..2000 {
             let [x, y] = [10.0 + 0.1 * f64::from(i), 128.0];
             let ground = terrain.height_mm(x, y).expect("known");

@@ -5,10 +5,10 @@ use std::process::Command;
 
 use hapterra::replay::on_native;
 use hapterra::synth::{Kind, Synth};
-use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Terrain};
 use hapterra_core::contact::{ContactOutput, ContactState};
-use hapterra_core::force::{ForceLaw, Pattern, Shading, Texture};
-use hapterra_core::scene::Sample;
+use hapterra_core::force::{Pattern, Shading, SurfaceParams, Texture};
+use hapterra_core::scene::TickRecord;
 use hapterra_tests::field::position;
 use hapterra_tests::invariants::seen::Seen;
 use hapterra_tests::invariants::texture::TextureJudge;
@@ -53,7 +53,7 @@ fn rasters() -> Vec<(&'static str, Raster)> {
 /// What a HIP feels on a circle, half a millimetre deep, that sets out from the air. In the middle
 /// it lifts twice and goes fast for some time. A cell is a millimetre, so that the force is half of
 /// the displacement, to the bit.
-fn circle(terrain: &Terrain<'_>, law: ForceLaw) -> Vec<Sample> {
+fn circle(terrain: &Terrain<'_>, law: SurfaceParams) -> Vec<TickRecord> {
     let mut replayer = on_native(terrain, law).expect("opened");
     let size = terrain.size_mm();
     let radius = STEP * f64::from(STEPS) / std::f64::consts::TAU;
@@ -78,7 +78,7 @@ fn circle(terrain: &Terrain<'_>, law: ForceLaw) -> Vec<Sample> {
 
 /// The textured tick as the judge sees it: the displacement is what the same scene without
 /// texture makes.
-fn seen(plain: &Sample, textured: &Sample) -> Seen {
+fn seen(plain: &TickRecord, textured: &TickRecord) -> Seen {
     let felt = ContactOutput {
         state: textured.state,
         proxy: textured.proxy,
@@ -95,16 +95,16 @@ fn seen(plain: &Sample, textured: &Sample) -> Seen {
 #[test]
 fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
     for (name, raster) in &rasters() {
-        let grid = FeltGrid::new(raster, FeltCells::Square);
+        let grid = HapticGrid::new(raster, HapticCells::Square);
         let scale = grid.true_scale(1.0).expect("scale");
         let terrain = Terrain::over(grid, scale, 0).expect("terrain");
-        let law = ForceLaw {
+        let law = SurfaceParams {
             shading: Shading::Smooth,
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
         let plain = circle(&terrain, law);
         for texture in [GRAIN, GRATING] {
-            let textured = circle(&terrain, ForceLaw { texture, ..law });
+            let textured = circle(&terrain, SurfaceParams { texture, ..law });
             assert_eq!(plain.len(), textured.len());
             let mut judge = TextureJudge::new(texture);
             let (mut touched, mut most) = (0, 0.0_f32);

@@ -4,16 +4,16 @@
 use std::time::Duration;
 
 use hapterra::link::{
-    Arming, Ask, Emulator, Event, INSTRUCTIONS_PER_COUNT, Patience, Session, serve_plant,
+    Arming, Ask, Emulator, Event, INSTRUCTIONS_PER_COUNT, Session, Timeouts, serve_plant,
 };
 use hapterra::phantom::PlacedTerrain;
 use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Mean;
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::{Controller, Damping, ForceLaw};
+use hapterra_core::force::{Controller, Damping, SurfaceParams};
 use hapterra_core::guard::Mode;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::status::Status;
 use hapterra_tests::emulation::emulated_board;
 
@@ -23,18 +23,18 @@ use hapterra_tests::emulation::emulated_board;
 const IN_CONTACT: f64 = 2_500.0;
 
 /// The demonstration's samples on the emulated board, and how it is afterwards.
-fn felt() -> Option<(Vec<Sample>, Status)> {
+fn felt() -> Option<(Vec<TickRecord>, Status)> {
     let (qemu, image) = emulated_board()?;
     let raster = Synth::new(Kind::Fractal, 1, 30.0)
         .raster(400, 400)
         .expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
-    let law = ForceLaw {
+    let law = SurfaceParams {
         damping: Damping {
             controller: Controller::Off,
             ..Damping::NONE
         },
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     };
     let placed = PlacedTerrain::new(&terrain, law).expect("placed");
     let mut rig = placed.held_phantom();
@@ -45,10 +45,10 @@ fn felt() -> Option<(Vec<Sample>, Status)> {
         // Until the board goes.
         scope.spawn(move || serve_plant(&mut plant, &mut rig, &|| false));
         let link = Box::new(lines.link);
-        let (scene, patience) = (placed.scene(), Patience::EMULATED);
+        let (scene, patience) = (placed.scene(), Timeouts::EMULATED);
         let opened = Session::open(&terrain, scene, Some(Arming::VIRTUAL), link, patience);
         let (mut session, _) = opened.expect("opened");
-        let (mut samples, mut status): (Vec<Sample>, Option<Status>) = (vec![], None);
+        let (mut samples, mut status): (Vec<TickRecord>, Option<Status>) = (vec![], None);
         let mut asked = false;
         while status.is_none() {
             session

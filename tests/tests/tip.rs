@@ -3,13 +3,13 @@
 
 use std::process::Command;
 
-use hapterra::replay::{Replayer, on_native};
+use hapterra::replay::{OfflineDevice, on_native};
 use hapterra::synth::Kind;
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};
-use hapterra_core::force::ForceLaw;
-use hapterra_core::scene::Sample;
+use hapterra_core::force::SurfaceParams;
+use hapterra_core::scene::TickRecord;
 use hapterra_tests::walk::wander;
 use hapterra_tests::{UNCONTROLLED, hapterra_binary, shared, terrain_file};
 use heightfield::{OpenOptions, Raster};
@@ -70,14 +70,14 @@ fn ground<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     }
 }
 
-fn feel(replayer: &mut Replayer<'_>, hip_mm: [f64; 3]) -> Sample {
+fn feel(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     let hip = replayer.terrain().scale().to_grid(hip_mm);
     replayer.feel(hip.expect("addressable")).expect("felt")
 }
 
 /// The terrain that a ball of a radius in cells feels, and a point.
 fn terrains(raster: &Raster, scale: Scale, radius: f64) -> [Terrain<'_>; 2] {
-    let grid = FeltGrid::new(raster, FeltCells::default());
+    let grid = HapticGrid::new(raster, HapticCells::default());
     let ball = grid.with_tip(radius * scale.cell_mm());
     [ball, grid].map(|grid| Terrain::over(grid, scale, 0).expect("terrain"))
 }
@@ -101,7 +101,7 @@ fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
     let height = ground(terrain);
     let mut off = Vec::new();
     for seed in 0..3 {
-        let mut replayer = on_native(terrain, ForceLaw::PREMIUM).expect("opened");
+        let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
         for hip_mm in raised(wander(point, seed, rows, 0.5), &terrains) {
             let sample = feel(&mut replayer, hip_mm);
             if sample.state == ContactState::Touching {
@@ -117,11 +117,11 @@ fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
 }
 
 /// The part of the radius that a proxy is off at most.
-const MOST_OFF: f64 = 0.02;
+const MAX_OFF: f64 = 0.02;
 
 /// Walks over a raster, and checks that the centre is a radius away from the ground.
 fn check_distance(name: &str, raster: &Raster, radius: f64) {
-    let scale = FeltGrid::new(raster, FeltCells::default()).true_scale(1.0);
+    let scale = HapticGrid::new(raster, HapticCells::default()).true_scale(1.0);
     let off = walked(raster, scale.expect("scale"), radius, 1_000);
     let share = |part: f64| off[(part * (off.len() - 1) as f64) as usize];
     let found = format!(
@@ -132,7 +132,7 @@ fn check_distance(name: &str, raster: &Raster, radius: f64) {
     );
     eprintln!("{name}, {radius} cells, {} ticks: {found}", off.len());
     assert!(off.len() > 1500, "{name}: the walk hardly touches");
-    assert!(share(1.0) < MOST_OFF, "{name}, {radius} cells: {found}");
+    assert!(share(1.0) < MAX_OFF, "{name}, {radius} cells: {found}");
 }
 
 /// Radii in cells, of a millimetre.
@@ -182,9 +182,9 @@ fn felt_passes(radius: f64, speed: f64, (most_beside, friction): (f64, f32)) -> 
     let pole = |x: u32, y: u32| if (x, y) == (60, 30) { 20.0 } else { 0.0 };
     let raster = Raster::from_fn(120, 60, pole).expect("raster");
     let [terrain, _] = terrains(&raster, Scale::new(1.0, 1.0).expect("scale"), radius);
-    let law = ForceLaw {
+    let law = SurfaceParams {
         friction: Friction::coulomb(friction),
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     };
     let mut replayer = on_native(&terrain, law).expect("opened");
     let is_felt = |pass: &u32| {
@@ -239,7 +239,7 @@ fn friction_holds_a_ball_at_a_pole_at_any_speed() {
 
 /// Steps of the force of more than 0.05 N over a path, by what feels it.
 fn steps_of_force(terrain: &Terrain<'_>, path: &[[f64; 3]]) -> usize {
-    let mut replayer = on_native(terrain, ForceLaw::PREMIUM).expect("opened");
+    let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
     let forces = path.iter().map(|hip| feel(&mut replayer, *hip).force_n);
     let forces: Vec<_> = forces.collect();
     let is_step = |pair: &&[Vec3]| (pair[1] - pair[0]).length() > 0.05;
@@ -273,7 +273,7 @@ fn steps_of_force_on_lidar_fall_five_times_under_a_ball() {
         return;
     };
     let raster = Raster::open(path, &OpenOptions::default()).expect("opens");
-    let grid = FeltGrid::new(&raster, FeltCells::default());
+    let grid = HapticGrid::new(&raster, HapticCells::default());
     // As large as a Premium's workspace fits it.
     let scale = grid.true_scale(0.23).expect("scale");
     let ball = Terrain::over(grid.with_tip(7.0), scale, 2).expect("terrain");
@@ -297,7 +297,7 @@ fn samples_without_data_have_none_under_a_ball() {
     let hole = |x: u32, y: u32| (20..30).contains(&x) && (10..50).contains(&y);
     let raster = Raster::from_fn(60, 60, |x, y| if hole(x, y) { f32::NAN } else { 3.0 });
     let raster = raster.expect("raster");
-    let grid = FeltGrid::new(&raster, FeltCells::default()).with_tip(4.0);
+    let grid = HapticGrid::new(&raster, HapticCells::default()).with_tip(4.0);
     let terrain = Terrain::over(grid, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let point = Terrain::over(grid.with_tip(0.0), Scale::new(1.0, 1.0).expect("scale"), 0);
     let point = point.expect("terrain");

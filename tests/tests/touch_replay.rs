@@ -2,13 +2,13 @@
 
 use hapterra::materials::{ClassMaterial, Looks, Materials};
 use hapterra::replay::{on_native_at, state_name};
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
 use hapterra_core::rate::TickRate;
 use hapterra_tests::walk::wander;
 use hapterra_touch as touch;
 use hapterra_touch::{
-    Contact, Damping, ForceLaw, Friction, Material, Pattern, RowOrder, Shading, State, Surface,
-    Texture,
+    Contact, Damping, Friction, Material, Pattern, RowOrder, Shading, State, Surface,
+    SurfaceParams, Texture,
 };
 use heightfield::{OpenOptions, Raster};
 
@@ -42,8 +42,8 @@ fn npy(descr: &str, samples: impl Iterator<Item = Vec<u8>>) -> Raster {
     Raster::open(&path, &OpenOptions::default()).expect("a raster")
 }
 
-fn rough() -> ForceLaw {
-    ForceLaw {
+fn rough() -> SurfaceParams {
+    SurfaceParams {
         stiffness_n_per_mm: 0.4,
         max_force_n: 6.0,
         friction: Friction {
@@ -80,7 +80,7 @@ fn name(state: State) -> &'static str {
 fn same(
     terrain: &Terrain<'_>,
     contact: &mut Contact,
-    law: ForceLaw,
+    law: SurfaceParams,
     rate: u32,
     seed: u64,
 ) -> usize {
@@ -123,7 +123,7 @@ fn forces_over_an_array_are_those_of_a_replay() {
     let ground = touch::Terrain::from_slice(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, &heights);
     let ground = ground.expect("a terrain");
     for (law, rate, seed) in [
-        (ForceLaw::PREMIUM, 1_000, 1),
+        (SurfaceParams::PREMIUM, 1_000, 1),
         (rough(), 1_000, 2),
         (rough(), 4_000, 3),
     ] {
@@ -146,7 +146,7 @@ fn forces_under_a_tip_are_those_of_a_replay() {
     let ground = touch::Terrain::from_slice(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, &heights);
     let ground = ground.expect("a terrain");
     for (tip_mm, seed) in [(0.2, 6), (1.0, 7), (2.0, 8), (8.0 * CELL_MM, 9)] {
-        let grid = FeltGrid::new(&raster, FeltCells::default()).with_tip(tip_mm);
+        let grid = HapticGrid::new(&raster, HapticCells::default()).with_tip(tip_mm);
         let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
         let surface = Surface::new(rough()).expect("a surface");
         let ball = ground.clone().with_tip(tip_mm).expect("a ball");
@@ -210,7 +210,7 @@ fn materials_are_those_of_a_replay() {
     };
     let over = Materials::over(("heights", &raster), ("classes", of_classes), looks);
     let over = over.expect("they overlap");
-    let grid = FeltGrid::new(&raster, FeltCells::default()).with_materials(Some(&over));
+    let grid = HapticGrid::new(&raster, HapticCells::default()).with_materials(Some(&over));
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
     let law = over.law(&rough());
     let ground = touch::Terrain::from_vec(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, heights);

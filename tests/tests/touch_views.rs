@@ -5,19 +5,19 @@ use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Arming, Event, Native, Patience, Session};
+use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::place::{
     Bounds, Coordinates, Laid, Reach, Sizing, SurfaceChange, Target, View, ViewChange, ViewOptions,
 };
 use hapterra::steering::{Steer, Steering};
-use hapterra::terrain::FeltCells;
+use hapterra::terrain::HapticCells;
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};
-use hapterra_core::force::{Damping, ForceLaw, Pattern, Shading, Texture};
+use hapterra_core::force::{Damping, Pattern, Shading, SurfaceParams, Texture};
 use hapterra_core::guard::{Limits, MAX_SLEW_N_PER_S, Mode};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_firmware::native::StoppedClock;
 use heightfield::{OpenOptions, Raster};
 
@@ -30,7 +30,7 @@ const RESOLUTION_MM: f64 = 0.5;
 /// tremble.
 const PUSH_N: f64 = 1.2;
 /// Of the spring, N/mm.
-const STIFFNESS: f32 = ForceLaw::PREMIUM.stiffness_n_per_mm;
+const STIFFNESS: f32 = SurfaceParams::PREMIUM.stiffness_n_per_mm;
 /// Most that the force changes in a tick, N: all of it goes out in 100 ticks, and the hand
 /// that gives way moves some 0.1 mm.
 const GENTLE_N: f32 = 0.12;
@@ -52,7 +52,7 @@ fn hills() -> Raster {
 struct Touching<'t> {
     session: Session<'t>,
     steering: Steering<'t>,
-    samples: Vec<Sample>,
+    samples: Vec<TickRecord>,
     said: Vec<String>,
     /// Whether the board's clutch input is held.
     pedal: Rc<Cell<bool>>,
@@ -76,12 +76,12 @@ fn pressed_at<T>(
     seconds: f64,
     play: impl FnOnce(&mut Touching<'_>) -> T,
 ) -> T {
-    let grid = options.target.grid(raster, FeltCells::default());
+    let grid = options.target.grid(raster, HapticCells::default());
     let grid = grid.expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = View::new(&grid, &reach, options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
-    let law = ForceLaw::PREMIUM;
+    let law = SurfaceParams::PREMIUM;
     let scene = view.scene(&terrain, law).expect("a scene");
     let [east, north, _] = view.home_mm;
     let surface = |x: f64, y: f64| terrain.height_mm(x, y);
@@ -95,7 +95,7 @@ fn pressed_at<T>(
     let foot = Rc::clone(&pedal);
     let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())))
         .meddled_with(Box::new(move |_, sense, _| sense.clutch = foot.get()));
-    let (arming, patience) = (Some(Arming::VIRTUAL), Patience::EMULATED);
+    let (arming, patience) = (Some(Arming::VIRTUAL), Timeouts::EMULATED);
     let opened = Session::open(&terrain, scene, arming, Box::new(device), patience);
     let bounds = Bounds {
         first: Laid { view, law },
@@ -148,14 +148,14 @@ impl Touching<'_> {
         }
     }
 
-    fn run(&mut self, ticks: u32) -> Sample {
+    fn run(&mut self, ticks: u32) -> TickRecord {
         let last = self.samples.last().expect("samples").tick;
         self.run_to(last + ticks);
         *self.samples.last().expect("samples")
     }
 
     /// Wants something, and waits until it is done and the force is there again.
-    fn steer(&mut self, steer: Steer) -> Sample {
+    fn steer(&mut self, steer: Steer) -> TickRecord {
         self.steering.steer(steer);
         for _ in 0..200_000 {
             self.poll();
@@ -166,11 +166,11 @@ impl Touching<'_> {
         panic!("{steer:?} is never done: {:?}", self.said);
     }
 
-    fn change(&mut self, change: ViewChange) -> Sample {
+    fn change(&mut self, change: ViewChange) -> TickRecord {
         self.steer(Steer::Change(change))
     }
 
-    fn last(&self) -> Sample {
+    fn last(&self) -> TickRecord {
         *self.samples.last().expect("samples")
     }
 
@@ -181,13 +181,13 @@ impl Touching<'_> {
 
 /// The arm stays armed, no tick changes the force by more than this, and none makes more of it than
 /// there was at the beginning.
-fn judge(samples: &[Sample], most_n: f32) {
+fn judge(samples: &[TickRecord], most_n: f32) {
     // The hand is pushed back, and its damping adds to the press while it moves.
     judge_press(samples, most_n, 1.03);
 }
 
 /// The same with so many times the force of the beginning while the hand is pushed back.
-fn judge_press(samples: &[Sample], most_n: f32, most_times: f32) {
+fn judge_press(samples: &[TickRecord], most_n: f32, most_times: f32) {
     for pair in samples.windows(2) {
         let [before, after] = [pair[0], pair[1]];
         assert_eq!(after.mode, Mode::Armed, "tick {}", after.tick);
@@ -214,13 +214,13 @@ fn judge_press(samples: &[Sample], most_n: f32, most_times: f32) {
 }
 
 /// The ground is felt again as it was: the press has come back, and no more than it.
-fn assert_pressed(sample: &Sample, before: &Sample, what: &str) {
+fn assert_pressed(sample: &TickRecord, before: &TickRecord, what: &str) {
     assert_felt(sample, what);
     let share = sample.force_n.length() / before.force_n.length();
     assert!((0.98..1.02).contains(&share), "{what}: {share} of before");
 }
 
-fn assert_felt(sample: &Sample, what: &str) {
+fn assert_felt(sample: &TickRecord, what: &str) {
     assert_eq!(sample.state, ContactState::Touching, "{what}");
     // The controller acts on every scene, and encoders of half a millimetre give it work.
     let others = sample.limits.difference(Limits::ENERGY_TAKEN_BACK);
@@ -297,7 +297,7 @@ fn panned_made_steeper_and_softer_while_it_is_pressed_the_force_makes_no_step() 
         assert!((share - in_series(soft, hard)).abs() < 0.02, "{share}");
         let harder = touching.change(ViewChange::Stiffness(2.0));
         assert_pressed(&harder, &first, "as hard as before");
-        let depth = |sample: &Sample| sample.hip.to(&sample.proxy).length();
+        let depth = |sample: &TickRecord| sample.hip.to(&sample.proxy).length();
         let deeper = depth(&softer) / depth(&harder);
         let wanted = 2.0 * in_series(soft, hard);
         assert!(
@@ -341,7 +341,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
         }
         assert_eq!(touching.said, [""; 0]);
         let law = touching.steering.now().law;
-        let wanted = ForceLaw {
+        let wanted = SurfaceParams {
             friction: Friction {
                 static_mu: 0.5,
                 dynamic_mu: 0.3,
@@ -353,7 +353,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             },
             shading: Shading::Smooth,
             texture,
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
         assert_eq!(law, wanted);
         let friction = SurfaceChange::Friction {
@@ -369,7 +369,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
         assert_eq!(touching.steering.now().law, wanted, "it stays as it was");
         let reset = touching.change(ViewChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
-        assert_eq!(touching.steering.now().law, ForceLaw::PREMIUM);
+        assert_eq!(touching.steering.now().law, SurfaceParams::PREMIUM);
         judge(&touching.samples[began..], GENTLE_N);
     });
 }
@@ -499,7 +499,7 @@ fn slope_of_degrees(axis: usize) -> Raster {
 }
 
 /// How steep a pressing hand feels the ground, to the east and to the north.
-fn felt_slope(sample: &Sample) -> [f64; 2] {
+fn felt_slope(sample: &TickRecord) -> [f64; 2] {
     let [x, y, z] = sample.force_n.to_array().map(f64::from);
     [-x / z, -y / z]
 }
@@ -522,7 +522,7 @@ fn a_far_pan(axis: usize) {
         let most = most_times(&touching.samples[began..]);
         let began = touching.samples.len();
         let wanted = [[1.0, 0.0], [0.0, 1.0]][axis];
-        let is_true = |sample: &Sample, where_: &str| {
+        let is_true = |sample: &TickRecord, where_: &str| {
             let felt = felt_slope(sample);
             eprintln!("{where_}: {felt:?}");
             for (felt, wanted) in felt.iter().zip(wanted) {
@@ -568,7 +568,7 @@ fn a_far_pan(axis: usize) {
 }
 
 /// The largest force of some samples, in times the first one's.
-fn most_times(samples: &[Sample]) -> f32 {
+fn most_times(samples: &[TickRecord]) -> f32 {
     let forces = samples.iter().map(|sample| sample.force_n.length());
     let most = forces.fold(0.0, f32::max) / samples[0].force_n.length();
     eprintln!("at most {most} times the force of the beginning");

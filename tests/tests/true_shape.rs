@@ -4,9 +4,9 @@
 use std::path::PathBuf;
 
 use hapterra::replay::on_native;
-use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use heightfield::{OpenOptions, Raster};
 
 /// Samples along a side, and degrees between them.
@@ -45,7 +45,7 @@ fn plane(latitude_deg: f64, slope: [f64; 2]) -> PathBuf {
 
 /// The force over the middle of a terrain, a cell deep.
 fn force(terrain: &Terrain<'_>) -> [f64; 3] {
-    let mut replayer = on_native(terrain, ForceLaw::PREMIUM).expect("opened");
+    let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
     let [east, north] = terrain.size_mm().map(|size| size / 2.0);
     let ground = terrain.height_mm(east, north).expect("known");
     for depth in [-2.0, 1.0] {
@@ -65,7 +65,7 @@ fn a_slope_of_degrees_feels_as_steep_as_it_is_in_every_direction() {
         for slope in [[1.0, 0.0], [0.0, 1.0], [0.5, -0.5]] {
             let raster = Raster::open(plane(latitude, slope), &OpenOptions::default());
             let raster = raster.expect("opens");
-            let grid = FeltGrid::new(&raster, FeltCells::Square);
+            let grid = HapticGrid::new(&raster, HapticCells::Square);
             let scale = grid.true_scale(1.0).expect("scale");
             let terrain = Terrain::over(grid, scale, 0).expect("terrain");
             let [x, y, z] = force(&terrain);
@@ -122,7 +122,7 @@ fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
 #[test]
 fn stored_cells_are_felt_as_squares_of_the_same_area() {
     let raster = Raster::open(plane(60.0, [1.0, 0.0]), &OpenOptions::default()).expect("opens");
-    let grid = FeltGrid::new(&raster, FeltCells::Stored);
+    let grid = HapticGrid::new(&raster, HapticCells::Stored);
     assert_eq!((grid.columns(), grid.rows()), (SIDE, SIDE));
     let terrain = Terrain::over(grid, grid.true_scale(1.0).expect("scale"), 0);
     let [x, _, z] = force(&terrain.expect("terrain"));

@@ -5,17 +5,17 @@ use std::path::Path;
 use std::time::Duration;
 
 use hapterra::link::{
-    Arming, Client, Emulator, Event, Patience, State, Tally, Transport, move_arm_while,
+    Arming, Client, Emulator, Event, LinkStats, State, Timeouts, Transport, move_arm_while,
 };
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::place::Reach;
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::Limits;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_core::terrain::CoarseTile;
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::shared;
@@ -52,7 +52,7 @@ impl<'t> Slide<'t> {
         let middle = terrain.size_mm().map(|side| 0.5 * side);
         let [x, y] = middle;
         let ground = surface(x, y).expect("ground in the middle");
-        let (hand, law) = (HandModel::default(), ForceLaw::PREMIUM);
+        let (hand, law) = (HandModel::default(), SurfaceParams::PREMIUM);
         let wall = f64::from(law.stiffness_n_per_mm);
         let ends = [[x + AWAY_MM, y + 10.0], [x - AWAY_MM, y - 10.0]];
         let mut touch = Touch::start(&surface, &hand, wall, middle, 10.0).press(1.5, 0.3);
@@ -78,7 +78,7 @@ impl<'t> Slide<'t> {
         let home = home.expect("addressable");
         let scene = self
             .terrain
-            .scene(ForceLaw::PREMIUM, Source::Encoders, home);
+            .scene(SurfaceParams::PREMIUM, Source::Encoders, home);
         // Its time goes on, as a board's does.
         let scene = Scene {
             hold_clock: false,
@@ -98,8 +98,8 @@ impl<'t> Slide<'t> {
         scene: Scene,
         rate: usize,
         device: &mut dyn Stepped,
-    ) -> (Vec<Sample>, Client<'t>) {
-        let (arming, patience) = (Some(Arming::VIRTUAL), Patience::REAL_TIME);
+    ) -> (Vec<TickRecord>, Client<'t>) {
+        let (arming, patience) = (Some(Arming::VIRTUAL), Timeouts::REAL_TIME);
         let mut client = Client::numbered(self.terrain, scene, arming, patience, SEED);
         let (mut out, mut is_open) = (vec![], false);
         client.greet(ms(0), &mut out);
@@ -199,7 +199,7 @@ struct Ground {
     step_n: f32,
 }
 
-fn judged(terrain: &Terrain<'_>, samples: &[Sample]) -> Ground {
+fn judged(terrain: &Terrain<'_>, samples: &[TickRecord]) -> Ground {
     let mut ground = Ground::default();
     for sample in samples {
         ground.lacked += u32::from(sample.limits.contains(Limits::TERRAIN_MISSING));
@@ -222,7 +222,12 @@ fn judged(terrain: &Terrain<'_>, samples: &[Sample]) -> Ground {
     ground
 }
 
-fn holds(name: &str, slide: &Slide<'_>, scene: &Scene, (samples, tally): &(Vec<Sample>, Tally)) {
+fn holds(
+    name: &str,
+    slide: &Slide<'_>,
+    scene: &Scene,
+    (samples, tally): &(Vec<TickRecord>, LinkStats),
+) {
     assert_eq!(tally.lost + tally.dropped, 0, "{name}");
     let ground = judged(slide.terrain, samples);
     let stated = slide.stated_error_mm(scene);
@@ -251,14 +256,19 @@ fn holds(name: &str, slide: &Slide<'_>, scene: &Scene, (samples, tally): &(Vec<S
     );
 }
 
-fn in_memory(slide: &Slide<'_>, scene: Scene) -> (Vec<Sample>, Tally) {
+fn in_memory(slide: &Slide<'_>, scene: Scene) -> (Vec<TickRecord>, LinkStats) {
     let mut device = InMemory::new(slide.rig.clone());
     let (samples, client) = slide.felt(scene, BYTES_A_TICK, &mut device);
     (samples, client.tally().clone())
 }
 
 /// As [`in_memory`], on the emulated board, which then says goodbye.
-fn on_board(slide: &Slide<'_>, scene: Scene, qemu: &Path, image: &Path) -> (Vec<Sample>, Tally) {
+fn on_board(
+    slide: &Slide<'_>,
+    scene: Scene,
+    qemu: &Path,
+    image: &Path,
+) -> (Vec<TickRecord>, LinkStats) {
     let (emulator, lines) = Emulator::start(qemu, image).expect("starts");
     let mut board = OnBoard::new(lines.link, lines.plant, slide.rig.clone());
     let (samples, mut client) = slide.felt(scene, REAL_BYTES_A_TICK, &mut board);

@@ -5,9 +5,9 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Bulk, BulkEndpoints, Event, Patience, Session, is_hapterra};
+use hapterra::link::{Bulk, BulkEndpoints, Event, Session, Timeouts, is_hapterra};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
@@ -230,7 +230,7 @@ fn visit(then: impl FnOnce(&mut Session<'_>, &Rc<RefCell<Board>>)) {
         .scale
         .to_grid([128.3, 128.6, 4.0])
         .expect("addressable");
-    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
+    let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home);
     let (board, found) = enumerated();
     let board = Rc::new(RefCell::new(board));
     let opened = Session::open(
@@ -238,7 +238,7 @@ fn visit(then: impl FnOnce(&mut Session<'_>, &Rc<RefCell<Board>>)) {
         scene,
         None,
         link(&board, &found),
-        Patience::EMULATED,
+        Timeouts::EMULATED,
     );
     let (mut session, device) = opened.expect("opened");
     assert_eq!(device.board, "scripted");

@@ -4,7 +4,7 @@
 use hapterra::phantom::{PhantomModel, kinematics};
 use hapterra_core::Vec3;
 use hapterra_core::guard::{LIMIT_MARGIN_RAD, WORKING_SHARE};
-use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_firmware::amplifier::offset_code;
 use hapterra_tests::campaign::extremes::OFF_COUNTS;
 use hapterra_tests::campaign::levers::{force, is_near_singular};
@@ -43,7 +43,7 @@ fn converted(current_a: f32) -> f64 {
 #[test]
 fn an_encoder_off_by_two_ticks_jumps_makes_no_force_above_the_records() {
     let record = Calibration::PREMIUM_1_5;
-    let mechanism = Mechanism::new(&record).expect("valid");
+    let mechanism = Kinematics::new(&record).expect("valid");
     let model = PhantomModel::premium_1_5();
     let mut worst = 0.0_f64;
     let mut judged = 0;

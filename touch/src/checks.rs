@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use hapterra_core::grid::MAX_CELL;
 use hapterra_core::terrain::MAX_STEP_CELLS;
 
-use crate::scale::BadScale;
+use crate::scale::ScaleError;
 use crate::tip::TipError;
 
 /// Heights that are no terrain.
@@ -51,7 +51,7 @@ pub enum TerrainError {
     },
     /// The millimetres of a cell or of a vertical unit.
     #[error(transparent)]
-    Scale(#[from] BadScale),
+    Scale(#[from] ScaleError),
     /// A tip that is no ball over these cells.
     #[error(transparent)]
     Tip(#[from] TipError),

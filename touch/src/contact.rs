@@ -7,7 +7,7 @@ use hapterra_core::force::MaterialTable;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::guard::Limits;
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_core::terrain::FieldSize;
 
 use crate::checks::TerrainError;
@@ -18,7 +18,7 @@ use crate::terrain::Terrain;
 use crate::tick_loop::TickLoop;
 
 /// Ticks in which a force comes in again after a change, at most, at every rate.
-const MOST_SETTLING: u32 = 4_096;
+const MAX_SETTLING: u32 = 4_096;
 
 /// A haptic interface point (HIP) and its proxy over a terrain: millimetres in, newtons out.
 ///
@@ -222,7 +222,7 @@ impl Contact {
         self.materials = surface.table().map_or(0, |table| table.materials().len());
         // The loop begins anew: points where the HIP was let it find out that the proxy is in the air,
         // or let the force come in again. They need no heights that were not read before.
-        for _ in 0..MOST_SETTLING {
+        for _ in 0..MAX_SETTLING {
             match self.last.map(|hip| self.sample(hip, [0.0; 3])) {
                 Some(Ok(sample)) if sample.limits.contains(Limits::BOUNDARY_FADING) => {}
                 _ => break,
@@ -237,7 +237,7 @@ impl Contact {
         &self.terrain
     }
 
-    fn sample(&mut self, hip: GridPoint, hip_mm: [f64; 3]) -> Result<Sample, StepError> {
+    fn sample(&mut self, hip: GridPoint, hip_mm: [f64; 3]) -> Result<TickRecord, StepError> {
         let [east_mm, north_mm, _] = hip_mm;
         let felt = self.tick_loop.step(hip, &self.terrain, self.materials);
         match felt {
@@ -248,7 +248,7 @@ impl Contact {
         }
     }
 
-    fn state(&self, sample: &Sample, [east, north, up]: [f64; 3]) -> State {
+    fn state(&self, sample: &TickRecord, [east, north, up]: [f64; 3]) -> State {
         match sample.state {
             ContactState::Free => State::Free,
             ContactState::Touching => State::Touching,

@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use hapterra_core::grid::MAX_CELL;
-use hapterra_core::terrain::{MAX_STEP_CELLS, POSTS, TILE_CELLS, Tile, TileKey};
+use hapterra_core::terrain::{MAX_STEP_CELLS, TILE_CELLS, TILE_SAMPLES, Tile, TileKey};
 
 use crate::checks::TerrainError;
 use crate::heights::{Block, Unread};
@@ -130,10 +130,10 @@ impl Terrain {
             // The sample under the middle of a ball.
             let under = |felt: u32| libm::floor(f64::from(felt) * part + 0.5) as u32;
             let [column, row] = first;
-            let samples = (0..POSTS as u32).flat_map(|v| {
+            let samples = (0..TILE_SAMPLES as u32).flat_map(|v| {
                 let line = of.row(under(row + v));
                 let at = move |u| line.get(under(column + u) as usize);
-                (0..POSTS as u32).map(move |u| at(u).copied().unwrap_or(0))
+                (0..TILE_SAMPLES as u32).map(move |u| at(u).copied().unwrap_or(0))
             });
             // Checked when they were put together.
             let set = tile.set_materials(materials, samples);
@@ -148,7 +148,7 @@ impl Terrain {
         let Some(ball) = &self.ball else {
             let end = [self.columns, self.rows].map(i64::from);
             let from = first.map(i64::from);
-            let to = [0, 1].map(|axis| (from[axis] + POSTS as i64).min(end[axis]));
+            let to = [0, 1].map(|axis| (from[axis] + TILE_SAMPLES as i64).min(end[axis]));
             let block = self.read_cells(from, to, room)?;
             if self.height_step > 0.0 {
                 for height in room.iter_mut() {
@@ -157,12 +157,12 @@ impl Terrain {
             }
             return Ok(block.columns as usize);
         };
-        let (samples, nodes) = self.samples_around(ball, first, POSTS, room)?;
+        let (samples, nodes) = self.samples_around(ball, first, TILE_SAMPLES, room)?;
         *room = ball.centres(&samples, nodes);
         for height in room.iter_mut() {
             *height = tip::rounded(within(*height));
         }
-        Ok(POSTS)
+        Ok(TILE_SAMPLES)
     }
 
     /// Reads the samples that a ball's nodes depend on, `side` of them each way from a felt sample on,

@@ -21,9 +21,9 @@ pub mod tip;
 pub use checks::TerrainError;
 pub use contact::{Contact, ContactError, RunError, State, Step, StepError};
 pub use hapterra_core::contact::Friction;
-pub use hapterra_core::force::{Damping, ForceLaw, Material, Pattern, Shading, Texture};
+pub use hapterra_core::force::{Damping, Material, Pattern, Shading, SurfaceParams, Texture};
 pub use heights::{Block, Height, Heights, RowOrder, Unread};
-pub use scale::{BadScale, Scale};
+pub use scale::{Scale, ScaleError};
 pub use surface::{Surface, SurfaceError};
 pub use terrain::Terrain;
 

@@ -14,7 +14,7 @@ pub struct Scale {
 
 /// A number that no terrain can be scaled with.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum BadScale {
+pub enum ScaleError {
     /// A cell that is not longer than nothing.
     #[error("a cell of {0} mm in the hand: it must be longer than zero, and finite")]
     Cell(f64),
@@ -28,15 +28,15 @@ impl Scale {
     /// heights. A negative height turns the relief upside down.
     ///
     /// # Errors
-    /// [`BadScale`] for a cell that is not positive, or numbers that are not finite or that single
+    /// [`ScaleError`] for a cell that is not positive, or numbers that are not finite or that single
     /// precision cannot hold.
-    pub fn new(cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, BadScale> {
+    pub fn new(cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, ScaleError> {
         let as_single = cell_mm as f32;
         if !(as_single.is_normal() && as_single > 0.0) {
-            return Err(BadScale::Cell(cell_mm));
+            return Err(ScaleError::Cell(cell_mm));
         }
         if !height_mm_per_unit.is_finite() {
-            return Err(BadScale::Height(height_mm_per_unit));
+            return Err(ScaleError::Height(height_mm_per_unit));
         }
         Ok(Self {
             cell_mm,

@@ -3,22 +3,22 @@
 use core::ops::RangeInclusive;
 
 use hapterra_core::contact::Friction;
-use hapterra_core::force::{Damping, ForceLaw, Material, MaterialTable, Texture};
+use hapterra_core::force::{Damping, Material, MaterialTable, SurfaceParams, Texture};
 
 /// How a surface is rendered: stiffness, limit, friction, damping, shading, texture, and materials
 /// where it is not the same everywhere. Checked when it is made; all of it acts in every step.
 ///
 /// ```
-/// use hapterra_touch::{ForceLaw, Friction, Shading, Surface};
+/// use hapterra_touch::{SurfaceParams, Friction, Shading, Surface};
 ///
-/// let params = ForceLaw {
+/// let params = SurfaceParams {
 ///     friction: Friction::coulomb(0.4),
 ///     shading: Shading::Smooth,
-///     ..ForceLaw::PREMIUM
+///     ..SurfaceParams::PREMIUM
 /// };
 /// let surface = Surface::new(params)?;
 ///
-/// let params = ForceLaw { friction: Friction::coulomb(-1.0), ..params };
+/// let params = SurfaceParams { friction: Friction::coulomb(-1.0), ..params };
 /// let error = Surface::new(params).unwrap_err();
 /// assert_eq!(error.to_string(), "dynamic friction is -1: give 0 to 10");
 /// # Ok::<(), hapterra_touch::SurfaceError>(())
@@ -26,7 +26,7 @@ use hapterra_core::force::{Damping, ForceLaw, Material, MaterialTable, Texture};
 #[doc(alias = "stiffness")]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
-    params: ForceLaw,
+    params: SurfaceParams,
     /// The surface itself first; empty where all is of one material.
     table: MaterialTable,
 }
@@ -79,7 +79,7 @@ impl Surface {
     ///
     /// # Errors
     /// [`SurfaceError`] names the number that is out of bounds.
-    pub fn new(params: ForceLaw) -> Result<Self, SurfaceError> {
+    pub fn new(params: SurfaceParams) -> Result<Self, SurfaceError> {
         let table = MaterialTable::EMPTY;
         check(&params)?;
         Ok(Self { params, table })
@@ -111,7 +111,7 @@ impl Surface {
 
     /// Its parameters.
     #[must_use]
-    pub const fn params(&self) -> &ForceLaw {
+    pub const fn params(&self) -> &SurfaceParams {
         &self.params
     }
 
@@ -137,18 +137,18 @@ impl Surface {
 }
 
 impl Default for Surface {
-    /// [`ForceLaw::PREMIUM`]: 0.5 N/mm, without friction.
+    /// [`SurfaceParams::PREMIUM`]: 0.5 N/mm, without friction.
     fn default() -> Self {
         Self {
-            params: ForceLaw::PREMIUM,
+            params: SurfaceParams::PREMIUM,
             table: MaterialTable::EMPTY,
         }
     }
 }
 
-/// Checks what [`ForceLaw::is_valid`] does, and says what is wrong.
-fn check(params: &ForceLaw) -> Result<(), SurfaceError> {
-    let ForceLaw {
+/// Checks what [`SurfaceParams::is_valid`] does, and says what is wrong.
+fn check(params: &SurfaceParams) -> Result<(), SurfaceError> {
+    let SurfaceParams {
         stiffness_n_per_mm,
         max_force_n,
         friction,
@@ -164,7 +164,7 @@ fn check(params: &ForceLaw) -> Result<(), SurfaceError> {
         0.0..=Friction::MOST,
     )?;
     within("static friction", friction.static_mu, 0.0..=Friction::MOST)?;
-    let most_s = Friction::MOST_VISCOUS_S;
+    let most_s = Friction::MAX_VISCOUS_S;
     within("viscous friction, s,", friction.viscous_s, 0.0..=most_s)?;
     if friction.static_mu < friction.dynamic_mu {
         return Err(SurfaceError::Friction {
@@ -172,7 +172,7 @@ fn check(params: &ForceLaw) -> Result<(), SurfaceError> {
             dynamic_mu: friction.dynamic_mu,
         });
     }
-    let most = Damping::MOST_NS_PER_M;
+    let most = Damping::MAX_NS_PER_M;
     within("damping, N·s/m,", damping.ns_per_m, 0.0..=most)?;
     if texture.is_none() {
         return Ok(());
@@ -184,7 +184,7 @@ fn check(params: &ForceLaw) -> Result<(), SurfaceError> {
         shortest..=longest,
     )?;
     let steepest_mm = texture.wavelength_mm * Texture::STEEPEST;
-    let most_mm = steepest_mm.min(Texture::MOST_AMPLITUDE_MM);
+    let most_mm = steepest_mm.min(Texture::MAX_AMPLITUDE_MM);
     within(
         "texture amplitude, mm,",
         texture.amplitude_mm,

@@ -11,8 +11,8 @@ fn flat(height: f64) -> Terrain {
     Terrain::from_fn(40, 40, 0.5, |_, _| height).expect("a terrain")
 }
 
-fn params(change: impl FnOnce(&mut ForceLaw)) -> ForceLaw {
-    let mut params = ForceLaw::PREMIUM;
+fn params(change: impl FnOnce(&mut SurfaceParams)) -> SurfaceParams {
+    let mut params = SurfaceParams::PREMIUM;
     change(&mut params);
     params
 }
@@ -169,7 +169,7 @@ fn every_parameter_changes_the_force() {
         ]
     });
     let path: Vec<_> = path.collect();
-    let run = |params: ForceLaw| {
+    let run = |params: SurfaceParams| {
         let surface = Surface::new(params).expect("a surface");
         let mut contact = Contact::new(terrain.clone(), surface).expect("a contact");
         let steps = contact.run(path.iter().copied()).expect("steps");
@@ -181,7 +181,7 @@ fn every_parameter_changes_the_force() {
         wavelength_mm: 1.0,
         ..Texture::NONE
     };
-    let plain = run(ForceLaw::PREMIUM);
+    let plain = run(SurfaceParams::PREMIUM);
     let viscous = Friction {
         viscous_s: 0.02,
         ..Friction::NONE
@@ -190,7 +190,7 @@ fn every_parameter_changes_the_force() {
         static_mu: 0.6,
         ..Friction::coulomb(0.2)
     };
-    let changed: [ForceLaw; 7] = [
+    let changed: [SurfaceParams; 7] = [
         params(|it| it.stiffness_n_per_mm = 0.6),
         params(|it| it.max_force_n = 0.7),
         params(|it| it.friction = Friction::coulomb(0.2)),
@@ -248,7 +248,7 @@ fn parameters_out_of_bounds_are_named() {
     }
     assert_eq!(
         Surface::default(),
-        Surface::new(ForceLaw::PREMIUM).expect("valid")
+        Surface::new(SurfaceParams::PREMIUM).expect("valid")
     );
 }
 
@@ -341,7 +341,7 @@ fn another_surface_keeps_the_contact() {
 fn materials_are_felt_where_they_lie() {
     let soft = Material {
         stiffness_n_per_mm: 0.1,
-        ..Material::of(&ForceLaw::PREMIUM)
+        ..Material::of(&SurfaceParams::PREMIUM)
     };
     let surface = Surface::default()
         .with_materials(&[soft])

@@ -5,9 +5,9 @@ use alloc::vec::Vec;
 
 use hapterra_core::force::MaterialTable;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::Sense;
+use hapterra_core::guard::GuardInputs;
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Point, Sample, Scene, View};
+use hapterra_core::scene::{HipCommand, Scene, TickRecord, View};
 use hapterra_core::terrain::{Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome, RefusedScene};
 use self_cell::{MutBorrow, self_cell};
@@ -19,7 +19,7 @@ use crate::terrain::Terrain;
 const WINDOW: usize = 16;
 /// Ticks that a step may take, at most: a path over 20,000 cells of rough ground takes about a
 /// hundredth.
-const MOST_TICKS: u32 = 1 << 20;
+const MAX_TICKS: u32 = 1 << 20;
 
 self_cell!(
     /// Tiles, and the loop that borrows them.
@@ -97,7 +97,7 @@ impl TickLoop {
         hip: GridPoint,
         terrain: &Terrain,
         materials: usize,
-    ) -> Result<Option<Sample>, NoTile> {
+    ) -> Result<Option<TickRecord>, NoTile> {
         self.0
             .with_dependent_mut(|_, running| running.step(hip, terrain, materials))
     }
@@ -131,13 +131,13 @@ impl<'t> Running<'t> {
         hip: GridPoint,
         terrain: &Terrain,
         materials: usize,
-    ) -> Result<Option<Sample>, NoTile> {
+    ) -> Result<Option<TickRecord>, NoTile> {
         self.seq = self.seq.wrapping_add(1);
         let seq = self.seq;
         // A point is never refused, and brings no tile.
-        let _ = self.accept(Command::Point(Point { seq, hip }));
-        let sense = Sense::default();
-        for _ in 0..MOST_TICKS {
+        let _ = self.accept(Command::Hip(HipCommand { seq, hip }));
+        let sense = GuardInputs::default();
+        for _ in 0..MAX_TICKS {
             self.haptics.tick_into(&sense, true, &mut self.outcome);
             if self.outcome.answers == Some(seq) {
                 return Ok(Some(self.outcome.sample));

@@ -188,6 +188,6 @@ fn parse_damping(text: &str) -> Result<Damping, String> {
         ns_per_m,
         ..Damping::NONE
     });
-    let most = Damping::MOST_NS_PER_M;
+    let most = Damping::MAX_NS_PER_M;
     { damping.filter(Damping::is_valid) }.ok_or_else(|| format!("expected 0 to {most} N·s/m"))
 }

@@ -3,7 +3,7 @@
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::{
-    CoarseTile, FieldSize, SETTLING_MM_S, TILE_CELLS, Tile, TileDemand, TileKey, TileRequester,
+    CoarseTile, FieldSize, RequestHint, SETTLING_MM_S, TILE_CELLS, Tile, TileKey, TileRequester,
     Underlay,
 };
 
@@ -92,7 +92,7 @@ fn felt(due: u32, underlay: Option<Underlay>) -> Vec<Answer> {
             converged: felt.converged,
             displacement: felt.displacement.to_array(),
         });
-        let focus = TileDemand {
+        let focus = RequestHint {
             missing_tile: felt.missing_tile,
             proxy: felt.proxy.column(),
             hip: hip.grid.column(),

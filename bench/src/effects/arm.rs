@@ -3,9 +3,9 @@
 use std::fmt;
 
 use hapterra::phantom::{Encoder, PhantomModel, Placement};
-use hapterra_core::force::ForceLaw;
-use hapterra_core::guard::{Mode, Sense};
-use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::force::SurfaceParams;
+use hapterra_core::guard::{GuardInputs, Mode};
+use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::scene::Source;
 use hapterra_core::terrain::Tile;
 use hapterra_core::tick::{Command, Haptics, Outcome};
@@ -140,10 +140,10 @@ impl<'g> Arm<'g> {
     /// The loop that the arm is driven by.
     pub(super) fn open<'t>(
         &self,
-        law: ForceLaw,
+        law: SurfaceParams,
         tiles: &'t mut [Tile],
     ) -> Result<Box<Haptics<'t, WINDOW>>, NotMeasured> {
-        let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5);
+        let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5);
         let mechanism = mechanism.map_err(|why| NotMeasured(why.to_string()))?;
         let home = Hip::at(self.placement.home_mm).grid;
         let scene = replay::scene(self.grid, law, Source::Encoders, home);
@@ -156,7 +156,7 @@ impl<'g> Arm<'g> {
     }
 
     /// What the way feels like under a law, with what is looked at.
-    pub(super) fn feel(&self, law: ForceLaw, way: &Way) -> Result<Vec<Felt>, NotMeasured> {
+    pub(super) fn feel(&self, law: SurfaceParams, way: &Way) -> Result<Vec<Felt>, NotMeasured> {
         let mut tiles = replay::tiles();
         let mut driven = Driven::begin(self, law, way, &mut tiles)?;
         for place in &way.down {
@@ -176,7 +176,7 @@ pub(super) struct Driven<'t> {
 impl<'t> Driven<'t> {
     pub(super) fn begin(
         arm: &Arm<'_>,
-        law: ForceLaw,
+        law: SurfaceParams,
         way: &Way,
         tiles: &'t mut [Tile],
     ) -> Result<Self, NotMeasured> {
@@ -184,11 +184,11 @@ impl<'t> Driven<'t> {
         let mut driven = Self { haptics };
         let counts = way.down.first().map_or([0; 3], |place| place.counts);
         for tick in 0..ARMING {
-            let sense = Sense {
+            let sense = GuardInputs {
                 counts,
                 // Pressed after a moment.
                 dead_man: tick > 10,
-                ..Sense::default()
+                ..GuardInputs::default()
             };
             driven.haptics.tick(&sense, true);
             if driven.haptics.report().mode == Mode::Armed {
@@ -200,10 +200,10 @@ impl<'t> Driven<'t> {
 
     #[inline]
     pub(super) fn tick(&mut self, place: &Place) -> Outcome {
-        let sense = Sense {
+        let sense = GuardInputs {
             counts: place.counts,
             dead_man: true,
-            ..Sense::default()
+            ..GuardInputs::default()
         };
         self.haptics.tick(&sense, true)
     }

@@ -2,7 +2,7 @@
 //! tip's own; and whether it ever pulls.
 
 use hapterra::phantom::{Placement, kinematics};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured, Place, Way};
 use super::felt::Felt;
@@ -38,7 +38,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
 
 /// How far each force is from the documented one, mN, with the nearest of some velocities.
 fn off_mn(
-    law: &ForceLaw,
+    law: &SurfaceParams,
     felt: &[Felt],
     velocities_mm_s: impl Fn(usize) -> Vec<Vector>,
 ) -> Vec<f64> {
@@ -54,7 +54,7 @@ fn off_mn(
 }
 
 /// F' = F − b (v·f) f, where b |v·f| counts at most |F|.
-fn damped_n(law: &ForceLaw, spring_mm: Vector, velocity_mm_s: Vector) -> Vector {
+fn damped_n(law: &SurfaceParams, spring_mm: Vector, velocity_mm_s: Vector) -> Vector {
     let deep = length(spring_mm);
     if deep == 0.0 {
         return [0.0; 3];
@@ -120,7 +120,7 @@ mod tests {
         let way = arm.tap(2000).expect("in reach");
         let law = Effect::Damping.law();
         let felt = arm.feel(law, &way).expect("felt");
-        let off = |law: &ForceLaw, felt: &[Felt]| {
+        let off = |law: &SurfaceParams, felt: &[Felt]| {
             worst(off_mn(law, felt, |tick| by_foaw(&arm, &way, tick)))
         };
         assert!(off(&law, &felt) < ROUNDING && worst(pulls_mn(&felt)) == 0.0);

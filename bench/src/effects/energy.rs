@@ -3,7 +3,7 @@
 
 use crate::stability::grasp::Grasp;
 use hapterra::phantom::{HeldPhantom, PhantomModel, Placement, Script};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured};
 use super::law::Effect;
@@ -15,7 +15,7 @@ use crate::grid::Grid;
 /// The stiffness up to which docs/explanation/stability.md states what a tap gives, N/mm.
 const STIFFNESS: f32 = 1.5;
 /// Most that a tap may give there, mJ: nothing, to within a hundredth.
-const MOST_MJ: f64 = 0.01;
+const MAX_MJ: f64 = 0.01;
 /// The hand, mm/s; from so far above the surface to so far below it, mm.
 const SPEEDS: [f64; 3] = [100.0, 200.0, 500.0];
 const ABOVE: f64 = 30.0;
@@ -31,8 +31,8 @@ const LATE_S: f64 = 0.08e-3;
 
 pub(super) fn measure(grid: &Grid) -> Result<Vec<Error>, NotMeasured> {
     let mut rows = Vec::new();
-    for (effect, bound) in [(Effect::None, None), (Effect::Controller, Some(MOST_MJ))] {
-        let law = ForceLaw {
+    for (effect, bound) in [(Effect::None, None), (Effect::Controller, Some(MAX_MJ))] {
+        let law = SurfaceParams {
             stiffness_n_per_mm: STIFFNESS,
             ..effect.law()
         };
@@ -72,7 +72,7 @@ fn given_mj(parts: &[Part]) -> Vec<f64> {
 /// A hand that taps on the middle of a terrain.
 fn tapped(
     grid: &Grid,
-    law: ForceLaw,
+    law: SurfaceParams,
     grasp: Grasp,
     speed_mm_s: f64,
 ) -> Result<Vec<Part>, NotMeasured> {
@@ -152,7 +152,7 @@ mod tests {
         let most = |more: f64| given_mj(&spring(more)).into_iter().fold(f64::MIN, f64::max);
         assert!(most(0.0).abs() < 0.005, "{}", most(0.0));
         // 72 mJ go in; a five-thousandth more comes out.
-        assert!(most(0.0005) > MOST_MJ, "{}", most(0.0005));
+        assert!(most(0.0005) > MAX_MJ, "{}", most(0.0005));
         assert!(most(-0.0005) < 0.0);
     }
 
@@ -170,7 +170,7 @@ mod tests {
             assert_eq!(given.len(), TAPS);
             given.into_iter().fold(f64::MIN, f64::max)
         };
-        assert!(most(Controller::Off) > 10.0 * MOST_MJ);
-        assert!(most(Controller::On) <= MOST_MJ);
+        assert!(most(Controller::Off) > 10.0 * MAX_MJ);
+        assert!(most(Controller::On) <= MAX_MJ);
     }
 }

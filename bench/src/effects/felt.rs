@@ -3,7 +3,7 @@
 use hapterra_core::contact::ContactState;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Limits;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_tests::invariants::surface::Patch;
 
 use super::vector::{Vector, minus};
@@ -32,7 +32,7 @@ const LESS: Limits = Limits::FORCE_CLAMPED
     .union(Limits::BOUNDARY_FADING);
 
 impl Felt {
-    pub(super) fn of(sample: &Sample) -> Self {
+    pub(super) fn of(sample: &TickRecord) -> Self {
         let touches = sample.state == ContactState::Touching;
         Self {
             hip: wide(&sample.hip),

@@ -15,8 +15,8 @@ use crate::path::{self, Dice};
 const STEP: f64 = 0.01;
 const DEPTH: f64 = 0.3;
 /// What docs/explanation/effects.md states for that speed, percent of the coefficient.
-const MOST_ABOVE: f64 = 3.1;
-const MOST_BELOW: f64 = 5.0;
+const MAX_ABOVE: f64 = 3.1;
+const MAX_BELOW: f64 = 5.0;
 /// Places where the tip is held, and ticks at each.
 const PLACES: usize = 40;
 const HELD: usize = 200;
@@ -47,12 +47,12 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     let rows = [
         sliding.error(
             ("force ratio above the dynamic coefficient", "%"),
-            MOST_ABOVE,
+            MAX_ABOVE,
             part(1.0),
         ),
         sliding.error(
             ("force ratio below the dynamic coefficient", "%"),
-            MOST_BELOW,
+            MAX_BELOW,
             part(-1.0),
         ),
         held.error(
@@ -149,9 +149,9 @@ mod tests {
             (above, -off.iter().copied().fold(f64::INFINITY, f64::min))
         };
         let (above, below) = worst(0.3);
-        assert!(above < MOST_ABOVE && below < MOST_BELOW, "{above} {below}");
-        assert!(worst(0.3 * 1.05).0 > MOST_ABOVE);
-        assert!(worst(0.3 * 0.95).1 > MOST_BELOW);
+        assert!(above < MAX_ABOVE && below < MAX_BELOW, "{above} {below}");
+        assert!(worst(0.3 * 1.05).0 > MAX_ABOVE);
+        assert!(worst(0.3 * 0.95).1 > MAX_BELOW);
     }
 
     #[test]

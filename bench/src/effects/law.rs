@@ -1,7 +1,7 @@
 //! The effects that are compared, each as the law of a scene.
 
 use hapterra_core::contact::Friction;
-use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
+use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams, Texture};
 
 /// What a surface does besides pushing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,9 +74,9 @@ impl Effect {
 
     /// The law of a scene with this effect, and no other. The controller is off where it is
     /// not asked for.
-    pub(super) fn law(self) -> ForceLaw {
+    pub(super) fn law(self) -> SurfaceParams {
         let of = |effect| self == effect || self == Self::All;
-        let mut law = ForceLaw::PREMIUM;
+        let mut law = SurfaceParams::PREMIUM;
         if of(Self::Friction) {
             law.friction = FRICTION;
         }

@@ -1,9 +1,9 @@
 //! What is felt along a path of points, in lock-step.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Point, Scene, Source};
+use hapterra_core::scene::{HipCommand, Scene, Source};
 use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics};
 
@@ -16,7 +16,7 @@ use crate::product::{buffers, fill};
 /// Tiles along the side of the window.
 pub(super) const WINDOW: usize = SIDE / TILE_CELLS;
 /// Ticks that a point may take: more than any does whose tiles are here.
-const MOST_TICKS: usize = 1000;
+const MAX_TICKS: usize = 1000;
 
 /// Buffers for a loop's tiles.
 pub(super) fn tiles() -> Vec<Tile> {
@@ -24,7 +24,7 @@ pub(super) fn tiles() -> Vec<Tile> {
 }
 
 /// A scene over the whole of a grid.
-pub(super) fn scene(grid: &Grid, law: ForceLaw, source: Source, home: GridPoint) -> Scene {
+pub(super) fn scene(grid: &Grid, law: SurfaceParams, source: Source, home: GridPoint) -> Scene {
     Scene {
         epoch: 1,
         level: 0,
@@ -66,14 +66,14 @@ pub(super) fn open<'t>(
 }
 
 /// What each point feels like under a law.
-pub(super) fn feel(grid: &Grid, law: ForceLaw, hips: &[Hip]) -> Vec<Felt> {
+pub(super) fn feel(grid: &Grid, law: SurfaceParams, hips: &[Hip]) -> Vec<Felt> {
     let mut tiles = tiles();
     let scene = scene(grid, law, Source::Points, GridPoint::default());
     let mut haptics = open(grid, scene, &mut tiles);
     let mut answer = |(seq, hip): (u32, &Hip)| {
-        let point = Point { seq, hip: hip.grid };
-        let _ = haptics.accept(Command::Point(point));
-        let mut ticks = (0..MOST_TICKS).map(|_| haptics.tick(&Default::default(), true));
+        let point = HipCommand { seq, hip: hip.grid };
+        let _ = haptics.accept(Command::Hip(point));
+        let mut ticks = (0..MAX_TICKS).map(|_| haptics.tick(&Default::default(), true));
         let answered = ticks.find(|outcome| outcome.answers.is_some());
         answered.map(|outcome| Felt::of(&outcome.sample))
     };

@@ -16,7 +16,7 @@ const DEPTH: f64 = 0.02;
 /// What rounding may do to a direction, degrees: that of the soak's judge.
 const ROUNDING: f64 = 0.06;
 /// A shaded force turns by so much at most where an unshaded one turns by 60°, degrees.
-const MOST_TURN: f64 = 6.0;
+const MAX_TURN: f64 = 6.0;
 /// That holds where the proxy goes no farther than this in a tick, cells.
 const FARTHEST: f64 = 0.05;
 /// A force is turned by at most so much, degrees.
@@ -35,7 +35,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
             ROUNDING,
             off(grid, &shaded),
         ),
-        own.error(turn, MOST_TURN, turns(&shaded)),
+        own.error(turn, MAX_TURN, turns(&shaded)),
         none.error(turn, None, turns(&plain)),
     ];
     rows.into_iter().flatten().collect()

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use hapterra_core::force::{ForceLaw, Texture};
+use hapterra_core::force::{SurfaceParams, Texture};
 
 use super::felt::Felt;
 use super::law::Effect;
@@ -19,9 +19,9 @@ use crate::path;
 const STEPS: [(&str, f64); 2] = [("slide 0.05", 0.05), ("slide 0.18", 0.18)];
 const DEPTH: f64 = 0.3;
 /// Percent of the amplitude: the product's sine is off by 0.05, and places are rounded.
-const MOST_HIGH: f64 = 0.06;
+const MAX_HIGH: f64 = 0.06;
 /// Percent of the steepest slope's force: that of the soak's judge.
-const MOST_ALONG: f64 = 1.0;
+const MAX_ALONG: f64 = 1.0;
 /// What a tick of a millisecond leaves of a speed that was above.
 const KEEPS: f64 = 0.9;
 
@@ -34,9 +34,9 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
             let off = off_percent(&law, &feel(grid, law, &slide.hips));
             let place = Place(&grid.name, name, effect.name());
             let [high, along] = [0, 1].map(|i| off.iter().map(|off| off[i]).collect());
-            errors.extend(place.error(("felt height off", "% of A"), MOST_HIGH, high));
+            errors.extend(place.error(("felt height off", "% of A"), MAX_HIGH, high));
             let what = ("force along the surface off", "% of the steepest");
-            errors.extend(place.error(what, MOST_ALONG, along));
+            errors.extend(place.error(what, MAX_ALONG, along));
         }
     }
     errors
@@ -44,7 +44,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 
 /// How far what is felt is from the formula, tick by tick: along the force without texture,
 /// percent of the amplitude, and across it, percent of what the steepest slope does.
-fn off_percent(law: &ForceLaw, felt: &[Felt]) -> Vec<[f64; 2]> {
+fn off_percent(law: &SurfaceParams, felt: &[Felt]) -> Vec<[f64; 2]> {
     let texture = &law.texture;
     let (amplitude, stiffness) = (
         f64::from(texture.amplitude_mm),
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::state::terrain;
 
-    fn worst(law: &ForceLaw, felt: &[Felt]) -> [f64; 2] {
+    fn worst(law: &SurfaceParams, felt: &[Felt]) -> [f64; 2] {
         let off = off_percent(law, felt);
         [0, 1].map(|i| off.iter().map(|off| off[i]).fold(0.0, f64::max))
     }
@@ -137,7 +137,7 @@ mod tests {
             let law = effect.law();
             let felt = feel(&grid, law, &slide.hips);
             let [high, along] = worst(&law, &felt);
-            assert!(high < MOST_HIGH && along < MOST_ALONG, "{high} {along}");
+            assert!(high < MAX_HIGH && along < MAX_ALONG, "{high} {along}");
             let wrong: [fn(&mut Texture); 3] = [
                 |texture| texture.seed += 1,
                 |texture| texture.amplitude_mm *= 1.01,
@@ -147,7 +147,7 @@ mod tests {
                 let mut other = law;
                 change(&mut other.texture);
                 let [high, _] = worst(&other, &felt);
-                assert!(high > 10.0 * MOST_HIGH, "{other:?}: {high}");
+                assert!(high > 10.0 * MAX_HIGH, "{other:?}: {high}");
             }
             // A hundredth of a wave to the east.
             let mut shifted = felt.clone();
@@ -155,7 +155,7 @@ mod tests {
                 felt.hip[0] += 0.01;
                 felt.proxy[0] += 0.01;
             }
-            assert!(worst(&law, &shifted)[0] > 10.0 * MOST_HIGH);
+            assert!(worst(&law, &shifted)[0] > 10.0 * MAX_HIGH);
             // Valleys where there should be ridges.
             let mut inverse = felt.clone();
             for felt in &mut inverse {
@@ -171,7 +171,7 @@ mod tests {
         let slide = path::slide_at(&grid, "", [0.18, DEPTH], 2000);
         let law = Effect::Grating.law();
         let mut felt = feel(&grid, law, &slide.hips);
-        assert!(worst(&law, &felt)[0] < MOST_HIGH);
+        assert!(worst(&law, &felt)[0] < MAX_HIGH);
         for felt in &mut felt {
             let added = wanted(&law.texture, felt.proxy, felt.spring(), 1.0);
             felt.force_n = plus(felt.spring(), added, 1.0).map(|x| x * 0.5);

@@ -1,6 +1,6 @@
 //! All effects at once: the surface pushes, and no more than its parts may.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured};
 use super::felt::Felt;
@@ -11,7 +11,7 @@ use crate::compare::Effort;
 use crate::grid::Grid;
 
 /// Degrees between a force that does not pull and the spring.
-const MOST_TURN: f64 = 90.0;
+const MAX_TURN: f64 = 90.0;
 /// Percent of the bound.
 const WHOLE: f64 = 100.0;
 
@@ -23,7 +23,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
         let felt = arm.feel(law, &way)?;
         let place = Place(&grid.name, way.name, Effect::All.name());
         let turn = ("force off the spring's direction", "°");
-        errors.extend(place.error(turn, MOST_TURN, off_degrees(&felt)));
+        errors.extend(place.error(turn, MAX_TURN, off_degrees(&felt)));
         let share = ("size of the force", "% of its bound");
         errors.extend(place.error(share, WHOLE, shares(&law, &felt)));
     }
@@ -39,7 +39,7 @@ fn off_degrees(felt: &[Felt]) -> Vec<f64> {
 }
 
 /// Each force over the most it may be, percent.
-fn shares(law: &ForceLaw, felt: &[Felt]) -> Vec<f64> {
+fn shares(law: &SurfaceParams, felt: &[Felt]) -> Vec<f64> {
     let felt = felt.iter().filter(|felt| felt.whole);
     let share = felt.map(|felt| length(felt.force_n) / most_n(law, length(felt.spring())));
     share.map(|share| 100.0 * share).collect()
@@ -47,7 +47,7 @@ fn shares(law: &ForceLaw, felt: &[Felt]) -> Vec<f64> {
 
 /// Shading keeps the size; texture adds its height along the force and at most λ/7.6 across it;
 /// damping and controller add as much again.
-fn most_n(law: &ForceLaw, depth_mm: f64) -> f64 {
+fn most_n(law: &SurfaceParams, depth_mm: f64) -> f64 {
     let [amplitude, wavelength] =
         [law.texture.amplitude_mm, law.texture.wavelength_mm].map(f64::from);
     let deep = depth_mm + amplitude.min(depth_mm);
@@ -73,8 +73,8 @@ mod tests {
             (off_degrees(&felt)[0], shares(&law, &felt)[0])
         };
         let (turn, share) = seen([0.1, 0.0, 0.5]);
-        assert!(turn < MOST_TURN && share < WHOLE);
-        assert!(seen([0.1, 0.0, -0.01]).0 > MOST_TURN);
+        assert!(turn < MAX_TURN && share < WHOLE);
+        assert!(seen([0.1, 0.0, -0.01]).0 > MAX_TURN);
         assert!(seen([0.0, 0.0, 1.2]).1 > WHOLE);
     }
 }

@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
-use hapterra_core::force::{Damping, ForceLaw, Texture};
+use hapterra_core::force::{Damping, SurfaceParams, Texture};
 use hapterra_core::grid::GridPoint;
-use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Sample, Scene, Source};
-use hapterra_core::terrain::{FieldSize, Tile, TileDemand, TileKey, TileRequester};
+use hapterra_core::scene::{Scene, Source, TickRecord};
+use hapterra_core::terrain::{FieldSize, RequestHint, Tile, TileKey, TileRequester};
 use hapterra_core::tick::{Board, Command, Haptics};
 
 use super::surface_work::SurfaceWork;
@@ -25,12 +25,12 @@ pub(super) const HOME: Placement = Placement {
     home_mm: [128.0, 128.0, 24.0],
 };
 /// Largest force, N: that of every other scene.
-const MOST_N: f32 = ForceLaw::PREMIUM.max_force_n;
+const MAX_N: f32 = SurfaceParams::PREMIUM.max_force_n;
 
 /// What happened in one tick.
 pub(super) struct Step {
     /// What the tick reported.
-    pub(super) sample: Sample,
+    pub(super) sample: TickRecord,
     /// Height of the tip by its encoders at the beginning of it, mm.
     pub(super) read_up_mm: f64,
     /// True place of the tip after it, east, north and up, mm.
@@ -69,7 +69,7 @@ pub(super) fn run(felt: &Felt, mut arm: HeldPhantom, look: &mut dyn FnMut(f64, &
         fault: None,
     };
     let mut haptics = Haptics::<WINDOW>::on_board(slots, &board);
-    let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).ok();
+    let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).ok();
     if let Some(mechanism) = mechanism {
         haptics.configure(mechanism);
     }
@@ -99,7 +99,7 @@ pub(super) fn run(felt: &Felt, mut arm: HeldPhantom, look: &mut dyn FnMut(f64, &
         let read_up_mm = read_up_mm(&arm, sense.counts);
         let outcome = haptics.tick(&sense, true);
         let sample = outcome.sample;
-        let demand = TileDemand {
+        let demand = RequestHint {
             missing_tile: sample.missing_tile,
             proxy: sample.proxy.column(),
             hip: sample.hip.column(),
@@ -192,12 +192,12 @@ fn scene(felt: &Felt) -> Scene {
         underlay: None,
         cell_mm: CELL_MM as f32,
         home: GridPoint::new([east as i32, north as i32, up as i32], Vec3::ZERO),
-        law: ForceLaw {
+        law: SurfaceParams {
             stiffness_n_per_mm: felt.stiffness_n_per_mm as f32,
-            max_force_n: MOST_N,
+            max_force_n: MAX_N,
             damping: felt.damping,
             texture: felt.texture,
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         },
         source: Source::Encoders,
         hold_clock: false,

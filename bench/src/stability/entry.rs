@@ -8,7 +8,7 @@
 //! - the *energy given*: the work of the surface, more than a spring does that becomes stiffer
 //!   by the same share.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{Limits, WORKING_SHARE};
 
 use super::contact_loop::{CELL_MM, HOME, PLANE_MM, Step};
@@ -29,7 +29,7 @@ const AFTER_S: f64 = 10.0;
 /// Swings are looked for from so long after the hand has begun to press with all of it on, s.
 const SETTLES_S: f64 = 0.25;
 /// The guard's clamp, N.
-const CLAMP_N: f64 = (WORKING_SHARE * ForceLaw::PREMIUM.max_force_n) as f64;
+const CLAMP_N: f64 = (WORKING_SHARE * SurfaceParams::PREMIUM.max_force_n) as f64;
 /// And in so long a time each, s.
 const WINDOW_S: f64 = 0.25;
 
@@ -53,14 +53,14 @@ pub struct Entered {
 
 impl Entered {
     /// Most that the tip may swing, mm, and most energy that may be given, mJ.
-    pub const MOST_SWING_MM: f64 = 0.3;
-    /// See [`Self::MOST_SWING_MM`].
-    pub const MOST_GIVEN_MJ: f64 = 0.05;
+    pub const MAX_SWING_MM: f64 = 0.3;
+    /// See [`Self::MAX_SWING_MM`].
+    pub const MAX_GIVEN_MJ: f64 = 0.05;
 
     /// Whether force came in well.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        self.swing_mm <= Self::MOST_SWING_MM && self.given_mj <= Self::MOST_GIVEN_MJ
+        self.swing_mm <= Self::MAX_SWING_MM && self.given_mj <= Self::MAX_GIVEN_MJ
     }
 }
 
@@ -154,7 +154,9 @@ impl Judge {
         // The guard clamps after the clutch's share, and before that of the ramp.
         let most_n = match self.entry {
             Entry::Ramp => CLAMP_N,
-            Entry::Clutch => f64::from(ForceLaw::PREMIUM.max_force_n).min(CLAMP_N / self.share),
+            Entry::Clutch => {
+                f64::from(SurfaceParams::PREMIUM.max_force_n).min(CLAMP_N / self.share)
+            }
         };
         let spring_n = stretched_n.min(most_n);
         // Beyond the clamp the force stays as it is.

@@ -238,8 +238,8 @@ fn what_is_said_before_a_surface_is_felt_is_what_the_trials_show() {
 fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
     let texture = Texture {
         pattern: Pattern::Grain,
-        amplitude_mm: Texture::MOST_AMPLITUDE_MM,
-        wavelength_mm: Texture::MOST_AMPLITUDE_MM / Texture::STEEPEST,
+        amplitude_mm: Texture::MAX_AMPLITUDE_MM,
+        wavelength_mm: Texture::MAX_AMPLITUDE_MM / Texture::STEEPEST,
         ..Texture::NONE
     };
     assert!(texture.is_valid());

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use hapterra::terrain::{FeltCells, FeltGrid, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Terrain};
 use heightfield::{OpenOptions, Raster};
 use serde::{Deserialize, Serialize};
 
@@ -98,7 +98,7 @@ impl Case {
 /// # Errors
 /// When it cannot be felt so.
 pub(super) fn terrain(raster: &Raster) -> Result<Terrain<'_>, NotMeasured> {
-    let grid = FeltGrid::new(raster, FeltCells::default());
+    let grid = HapticGrid::new(raster, HapticCells::default());
     let scale = grid
         .true_scale(CELL_MM)
         .map_err(|error| NotMeasured(error.to_string()))?;

@@ -6,11 +6,11 @@
 
 use std::time::{Duration, Instant};
 
-use hapterra::link::{Client, Event, Patience, Tally};
+use hapterra::link::{Client, Event, LinkStats, Timeouts};
 use hapterra::terrain::Terrain;
-use hapterra_core::guard::Sense;
+use hapterra_core::guard::GuardInputs;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Sample, Scene};
+use hapterra_core::scene::{Scene, TickRecord};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode};
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::session::InSession;
@@ -94,7 +94,7 @@ impl<'t> Chain<'t> {
     ) -> Self {
         // Whoever holds the arm waits for no server.
         terrain.raster().stop_waiting();
-        let mut client = Client::numbered(terrain, scene, None, Patience::REAL_TIME, 1);
+        let mut client = Client::numbered(terrain, scene, None, Timeouts::REAL_TIME, 1);
         let (mut line, mut out) = (Line::new(bytes_a_tick), vec![]);
         client.greet(Duration::ZERO, &mut out);
         line.send(&out);
@@ -124,7 +124,7 @@ impl<'t> Chain<'t> {
     }
 
     /// What went over the link so far.
-    pub(super) const fn tally(&self) -> &Tally {
+    pub(super) const fn tally(&self) -> &LinkStats {
         self.client.tally()
     }
 
@@ -134,8 +134,8 @@ impl<'t> Chain<'t> {
     /// When host and device do not understand each other.
     pub(super) fn tick(
         &mut self,
-        sense: Sense,
-        take: &mut dyn FnMut(&Sample),
+        sense: GuardInputs,
+        take: &mut dyn FnMut(&TickRecord),
     ) -> Result<(), NotMeasured> {
         self.now += 1;
         let board = &mut self.board;

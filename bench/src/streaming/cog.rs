@@ -171,7 +171,7 @@ fn directory(image: &Image, list: u32, is_overview: bool, stored: &Stored, next:
 mod tests {
     use super::*;
     use crate::streaming::relief::PERIOD;
-    use hapterra::terrain::{FeltCells, FeltGrid};
+    use hapterra::terrain::{HapticCells, HapticGrid};
     use heightfield::{OpenOptions, Raster};
 
     #[test]
@@ -188,7 +188,7 @@ mod tests {
         };
         let raster = Raster::open(&path, &options).expect("opens");
         assert_eq!([raster.columns(), raster.rows()], [side; 2]);
-        let grid = FeltGrid::new(&raster, FeltCells::default());
+        let grid = HapticGrid::new(&raster, HapticCells::default());
         assert_eq!(grid.cells_per_vertical_unit(), Some(1.0 / CELL_M));
         assert!(raster.bounds().is_some(), "it knows its place");
         let synth = hapterra::synth::Synth::new(hapterra::synth::Kind::Fractal, 17, 600.0);

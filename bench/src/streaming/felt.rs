@@ -2,7 +2,7 @@
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 /// Counts of ticks. Every tick that the device tells of is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub(super) struct Felt {
 
 impl Felt {
     /// Counts a tick.
-    pub(super) fn add(&mut self, sample: &Sample) {
+    pub(super) fn add(&mut self, sample: &TickRecord) {
         self.ticks += 1;
         let is_missing = lacks_terrain(sample);
         self.missing += u32::from(is_missing);
@@ -30,7 +30,7 @@ impl Felt {
 }
 
 /// Whether terrain that might be felt was not on the device: a hole in what is felt.
-pub(super) fn lacks_terrain(sample: &Sample) -> bool {
+pub(super) fn lacks_terrain(sample: &TickRecord) -> bool {
     sample.limits.contains(Limits::TERRAIN_MISSING)
 }
 
@@ -40,10 +40,10 @@ mod tests {
 
     #[test]
     fn a_tick_is_missing_its_terrain_or_felt_or_coarse_or_free() {
-        let sample = |limits, state| Sample {
+        let sample = |limits, state| TickRecord {
             limits,
             state,
-            ..Sample::default()
+            ..TickRecord::default()
         };
         let mut felt = Felt::default();
         let fading = Limits::BOUNDARY_FADING;

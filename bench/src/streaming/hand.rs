@@ -3,8 +3,8 @@
 use hapterra::phantom::{Encoder, PhantomModel, Placement};
 use hapterra::place::Reach;
 use hapterra::terrain::Terrain;
-use hapterra_core::force::ForceLaw;
-use hapterra_core::guard::Sense;
+use hapterra_core::force::SurfaceParams;
+use hapterra_core::guard::GuardInputs;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Scene, Source};
 
@@ -56,7 +56,7 @@ impl Hand {
         let scene = Scene {
             hold_clock: false,
             materials: None,
-            ..terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home)
+            ..terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home)
         };
         Ok(match late {
             Late::Hole => scene,
@@ -71,7 +71,7 @@ impl Hand {
     ///
     /// # Errors
     /// When the arm does not reach it.
-    pub(super) fn below(&self, place: [f64; 3]) -> Result<Sense, NotMeasured> {
+    pub(super) fn below(&self, place: [f64; 3]) -> Result<GuardInputs, NotMeasured> {
         self.sense(place, -DEPTH)
     }
 
@@ -79,17 +79,17 @@ impl Hand {
     ///
     /// # Errors
     /// When the arm does not reach it.
-    pub(super) fn above(&self, place: [f64; 3]) -> Result<Sense, NotMeasured> {
+    pub(super) fn above(&self, place: [f64; 3]) -> Result<GuardInputs, NotMeasured> {
         self.sense(place, ABOVE)
     }
 
-    fn sense(&self, [east, north, height]: [f64; 3], up: f64) -> Result<Sense, NotMeasured> {
+    fn sense(&self, [east, north, height]: [f64; 3], up: f64) -> Result<GuardInputs, NotMeasured> {
         let at_mm = [east, north, height + up].map(|cells| cells * CELL_MM);
         let joints = self.placement.joints_at(&self.model, at_mm);
         let joints = joints.map_err(|error| NotMeasured(error.to_string()))?;
-        Ok(Sense {
+        Ok(GuardInputs {
             counts: std::array::from_fn(|joint| self.encoders[joint].counts(joints[joint])),
-            ..Sense::default()
+            ..GuardInputs::default()
         })
     }
 }

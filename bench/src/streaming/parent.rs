@@ -17,7 +17,7 @@ use super::{NotMeasured, Plan, SIDES, cog};
 use super::server::Server;
 
 /// A file with no more samples than this is measured as a whole, too: 800 MB of them.
-const MOST_WHOLE: u64 = 200_000_000;
+const MAX_WHOLE: u64 = 200_000_000;
 /// What precedes a row on standard output of a case's process.
 const ROW: &str = "row ";
 /// What precedes the reason why it ends.
@@ -126,7 +126,7 @@ impl Subject<'_> {
             stands_while_reading: self.plan.stands_while_reading && latency_ms == 0,
         };
         let on_disk = path.display().to_string();
-        if samples <= MOST_WHOLE && !is_whole {
+        if samples <= MAX_WHOLE && !is_whole {
             tell(&format!("{}: read as a whole", self.name));
             let whole = case(Reading::Whole, 0, on_disk.clone());
             run(&whole, &mut || None, done)?;

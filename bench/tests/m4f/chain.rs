@@ -3,7 +3,9 @@
 
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::{Controller, Damping, ForceLaw, Material, Pattern, Shading, Texture};
+use hapterra_core::force::{
+    Controller, Damping, Material, Pattern, Shading, SurfaceParams, Texture,
+};
 use hapterra_core::grid::Cell;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{CoarseTile, Underlay};
@@ -87,18 +89,18 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         arm.row(board, name, target, (counts, arm.scene()), state)
     };
     let fast_rough = (&fast[..], rough(arm.scene()));
-    let smooth = |law| ForceLaw {
+    let smooth = |law| SurfaceParams {
         shading: Shading::Smooth,
         ..law
     };
-    let damped = |law| ForceLaw {
+    let damped = |law| SurfaceParams {
         damping: Damping {
             ns_per_m: 2.0,
             controller: Controller::On,
         },
         ..law
     };
-    let grained = |law| ForceLaw {
+    let grained = |law| SurfaceParams {
         texture: Texture {
             pattern: Pattern::Grain,
             amplitude_mm: 0.1,
@@ -126,12 +128,12 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         law
     };
     let all = with_law(all, coarse);
-    let hard = |law| ForceLaw {
+    let hard = |law| SurfaceParams {
         stiffness_n_per_mm: 0.8,
         ..law
     };
     let two = arm.classes(&[arm.scene().law, hard(arm.scene().law)]);
-    let other = |law: ForceLaw| {
+    let other = |law: SurfaceParams| {
         let mut law = hard(law);
         law.texture.pattern = Pattern::Grating;
         law.friction.dynamic_mu = 0.1;
@@ -295,7 +297,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     ]
 }
 
-fn with_controller(mut law: ForceLaw, controller: Controller) -> ForceLaw {
+fn with_controller(mut law: SurfaceParams, controller: Controller) -> SurfaceParams {
     law.damping.controller = controller;
     law
 }
@@ -314,7 +316,7 @@ impl<'g> Arm<'g> {
 
     /// The materials of these laws, in squares of five samples: sliding, one is nearly always on
     /// its way in.
-    fn classes(&self, laws: &[ForceLaw]) -> Materials {
+    fn classes(&self, laws: &[SurfaceParams]) -> Materials {
         let table: Vec<Material> = laws.iter().map(Material::of).collect();
         let size = [self.grid.columns as i32, self.grid.rows as i32];
         let count = table.len() as i32;

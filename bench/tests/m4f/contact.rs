@@ -2,7 +2,7 @@
 //! on the host, and the long sweeps.
 
 use hapterra_core::contact::Friction;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{FieldSize, TileKey};
@@ -161,14 +161,14 @@ fn size(grid: &Grid) -> FieldSize {
 
 /// The same on a rough surface.
 pub(crate) fn rough(scene: Scene) -> Scene {
-    with_law(scene, |law| ForceLaw {
+    with_law(scene, |law| SurfaceParams {
         friction: ROUGH,
         ..law
     })
 }
 
 /// The same under another law.
-pub(crate) fn with_law(scene: Scene, change: impl FnOnce(ForceLaw) -> ForceLaw) -> Scene {
+pub(crate) fn with_law(scene: Scene, change: impl FnOnce(SurfaceParams) -> SurfaceParams) -> Scene {
     let law = change(scene.law);
     Scene { law, ..scene }
 }
@@ -183,7 +183,7 @@ pub(crate) fn scene(grid: &Grid) -> Scene {
         underlay: None,
         cell_mm: 1.0,
         home: GridPoint::default(),
-        law: ForceLaw::PREMIUM,
+        law: SurfaceParams::PREMIUM,
         source: Source::Points,
         hold_clock: false,
         materials: None,

@@ -1,7 +1,7 @@
 //! Filling a buffer with a tile, in each form in which tiles travel, and with bytes that
 //! are made to take long.
 
-use hapterra_core::terrain::POSTS;
+use hapterra_core::terrain::TILE_SAMPLES;
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
 use hapterra_core::wire::message::Heights;
 use hapterra_lab::path::Dice;
@@ -12,7 +12,7 @@ use super::contact::scene;
 use super::table::{Row, Target, Tick};
 
 const TILES: usize = 100;
-const SAMPLES: usize = POSTS * POSTS;
+const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
 /// All of them.
 pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
@@ -58,7 +58,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
 fn packed(steps: &[Step], mut rough: impl FnMut() -> f64) -> Vec<Vec<u8>> {
     let mut tile = |_| {
         let heights: [f32; SAMPLES] = std::array::from_fn(|i| {
-            let slope = (i % POSTS + i / POSTS) / 4;
+            let slope = (i % TILE_SAMPLES + i / TILE_SAMPLES) / 4;
             (slope as f64 * unit(steps) + rough()) as f32
         });
         let mut buffer = [0; MAX_PACKED];

@@ -11,7 +11,7 @@
 
 use super::budget::Budget;
 use crate::grid::{Cell, GridPoint};
-use crate::terrain::{Ground, TILE_CELLS, Window};
+use crate::terrain::{CellContent, TILE_CELLS, Window};
 
 /// Distance of the HIP from the nearest patch, in cells, at which nothing is felt.
 pub const REACH: f32 = 0.5;
@@ -77,9 +77,9 @@ fn beside_patches<const D: usize>(
     budget: &mut Budget,
 ) -> Target {
     let mut is_patch = |cell| match window.ground(cell) {
-        Ground::Patch(_) => true,
-        Ground::Hole => false,
-        Ground::Missing => {
+        CellContent::Patch(_) => true,
+        CellContent::Hole => false,
+        CellContent::Missing => {
             budget.lacks(cell);
             false
         }

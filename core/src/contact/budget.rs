@@ -66,7 +66,7 @@ pub(super) const INTERSECTION: u32 = 8;
 pub(super) const ON_BORDER: u32 = ARRIVAL + 4 * SLOPE;
 /// Units of the largest piece of work. A tick that put work off has spent more than its budget
 /// less this.
-pub const LARGEST_PIECE: u32 = ON_BORDER;
+pub const MAX_PIECE: u32 = ON_BORDER;
 
 /// What a tick has spent, and what it may; and the terrain that it had to do without.
 #[derive(Debug)]

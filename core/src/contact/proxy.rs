@@ -242,10 +242,10 @@ impl Contact {
     /// use hapterra_core::Vec3;
     /// use hapterra_core::contact::{Contact, ContactSettings, ContactState};
     /// use hapterra_core::grid::GridPoint;
-    /// use hapterra_core::terrain::{FieldSize, FieldStorage};
+    /// use hapterra_core::terrain::{FieldSize, TileArena};
     ///
     /// // Flat ground at height 2, felt by a HIP that goes down and along.
-    /// let mut field = FieldStorage::<2>::from_fn(FieldSize::new(40, 40), |_, _| 2.0)?;
+    /// let mut field = TileArena::<2>::from_fn(FieldSize::new(40, 40), |_, _| 2.0)?;
     /// let window = field.window();
     /// let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     /// let hip = |x, z| GridPoint::new([20, 20, 0], Vec3::new(x, 0.5, z));
@@ -255,7 +255,7 @@ impl Contact {
     /// assert_eq!(output.state, ContactState::Touching);
     /// assert!((output.displacement - Vec3::new(0.0, 0.0, 0.1)).length() < 1e-6);
     /// assert_eq!(output.proxy, hip(0.4, 2.0));
-    /// # Ok::<(), hapterra_core::terrain::BadField>(())
+    /// # Ok::<(), hapterra_core::terrain::FieldError>(())
     /// ```
     #[inline]
     pub fn step<const D: usize>(

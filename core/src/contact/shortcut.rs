@@ -14,7 +14,7 @@ use super::surface::{HipView, SurfacePoint};
 use super::sweep::lower;
 use super::tolerance::BESIDE_OF_NEAR_HIP;
 use crate::grid::{Cell, GridPoint};
-use crate::terrain::{CellBox, Ground, Window};
+use crate::terrain::{CellBox, CellContent, Window};
 
 /// Whether a free HIP's path is clear, by one comparison or by a look at the nine
 /// samples around it.
@@ -53,7 +53,7 @@ impl Follow {
         if !(is_inside(point.u) && is_inside(point.v)) {
             return None;
         }
-        let Ground::Patch(corners) = window.ground(point.cell) else {
+        let CellContent::Patch(corners) = window.ground(point.cell) else {
             return None;
         };
         let patch = Patch::new(corners.heights);
@@ -71,7 +71,7 @@ impl Follow {
     /// patch.
     #[inline]
     pub(super) fn to(&mut self, view: &HipView) -> Followed {
-        let patch = self.patch.seen_from(view.altitude(), self.base);
+        let patch = self.patch.relative_to(view.altitude(), self.base);
         let (p, q) = view.in_patch(self.point.cell);
         let (u, v) = (self.point.u, self.point.v);
         if passes_over(&patch, &self.point, (p - u, q - v)) {

@@ -3,8 +3,8 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::passivity::{MOST_MJ, Moment, Motion, Passivity, Takes};
-use super::{FeltWith, ForceLaw, clamp_length};
+use super::passivity::{MAX_MJ, Moment, Motion, Passivity, Takes};
+use super::{FeltWith, SurfaceParams, clamp_length};
 use crate::scalar::{larger, smaller};
 
 /// What a shaded force may give on the way to an edge, and take beyond it, before it is turned
@@ -45,7 +45,7 @@ pub enum Controller {
 
 impl Damping {
     /// Most that a scene may ask for, N·s/m.
-    pub const MOST_NS_PER_M: f32 = 20.0;
+    pub const MAX_NS_PER_M: f32 = 20.0;
     /// None, and the controller.
     pub const NONE: Self = Self {
         ns_per_m: 0.0,
@@ -61,7 +61,7 @@ impl Damping {
     /// Whether its number is one that a loop can work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        (0.0..=Self::MOST_NS_PER_M).contains(&self.ns_per_m)
+        (0.0..=Self::MAX_NS_PER_M).contains(&self.ns_per_m)
     }
 }
 
@@ -69,7 +69,7 @@ impl Damping {
 /// any has none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Damper {
-    law: ForceLaw,
+    law: SurfaceParams,
     controller: Option<Passivity>,
 }
 
@@ -77,7 +77,7 @@ impl Damper {
     /// Of a scene. Points have no hand that energy could be given to.
     // A call: it is made by two, once for a scene.
     #[inline(never)]
-    pub(crate) fn of(law: &ForceLaw, felt: &FeltWith) -> Option<Self> {
+    pub(crate) fn of(law: &SurfaceParams, felt: &FeltWith) -> Option<Self> {
         let is_controlled = felt.arm && law.is_controlled();
         let controller = is_controlled.then(|| Passivity::new(felt));
         (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {
@@ -87,7 +87,7 @@ impl Damper {
     }
 
     /// The surface is another one from this tick on, of the same controller.
-    pub(crate) const fn feels(&mut self, law: &ForceLaw) {
+    pub(crate) const fn feels(&mut self, law: &SurfaceParams) {
         self.law = *law;
     }
 
@@ -106,7 +106,7 @@ impl Damper {
         // None of the turn is left at twice as much, and more than the book holds is forgotten.
         let gives_mj = smaller(
             EDGE_GIVES * spring_n * (cell_mm + depth_mm) + LEAST_MJ,
-            0.5 * MOST_MJ,
+            0.5 * MAX_MJ,
         );
         let over = self.created_mj() / gives_mj - 1.0;
         smaller(larger(1.0 - over, 0.0), 1.0)

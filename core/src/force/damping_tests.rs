@@ -11,7 +11,7 @@ use super::*;
 use crate::rate::TickRate;
 
 /// A scene's damper with an arm.
-fn damper(law: &ForceLaw, hz: u32) -> Option<Damper> {
+fn damper(law: &SurfaceParams, hz: u32) -> Option<Damper> {
     Damper::of(law, &felt(hz, 0.1e-3))
 }
 
@@ -25,14 +25,14 @@ fn felt(hz: u32, latency_s: f32) -> FeltWith {
     }
 }
 
-fn law(stiffness_n_per_mm: f32, ns_per_m: f32, controller: Controller) -> ForceLaw {
-    ForceLaw {
+fn law(stiffness_n_per_mm: f32, ns_per_m: f32, controller: Controller) -> SurfaceParams {
+    SurfaceParams {
         stiffness_n_per_mm,
         damping: Damping {
             ns_per_m,
             controller,
         },
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     }
 }
 
@@ -67,7 +67,7 @@ fn the_controller_acts_on_every_arm_unless_it_is_off() {
         assert!(acts(stiffness, hz, Controller::default()), "{hz} Hz");
         assert!(!acts(stiffness, hz, Controller::Off), "{hz} Hz");
     }
-    assert_eq!(ForceLaw::PREMIUM.damping.controller, Controller::On);
+    assert_eq!(SurfaceParams::PREMIUM.damping.controller, Controller::On);
     // Points have no hand.
     let points = FeltWith {
         arm: false,
@@ -194,7 +194,7 @@ impl Taps {
 
     /// Energy that the surface gives in each of a few taps, mJ, integrated a hundred times a tick.
     /// The force changes by no more than the guard lets it.
-    fn given_mj(self, law: &ForceLaw) -> Vec<f64> {
+    fn given_mj(self, law: &SurfaceParams) -> Vec<f64> {
         const DEEP_MM: f64 = 3.0;
         let mut damper = Damper::of(law, &felt(self.hz, self.told_s as f32));
         let tick_s = 1.0 / f64::from(self.hz);
@@ -266,7 +266,7 @@ fn with_the_controller_no_tap_gives_energy_and_without_it_every_one_does() {
 
 /// Energy, mJ, that a point which holds the proxy gives to a tip on circles of 4 mm round it,
 /// 200 mm/s fast, in a second: no motion is along the force.
-fn given_on_circles_mj(law: &ForceLaw, hz: u32) -> f64 {
+fn given_on_circles_mj(law: &SurfaceParams, hz: u32) -> f64 {
     const RADIUS_MM: f64 = 4.0;
     let tick_s = 1.0 / f64::from(hz);
     let tip_mm = |t_s: f64| {
@@ -320,11 +320,11 @@ fn across_a_shaded_or_textured_force_nothing_is_taken() {
         wavelength_mm: 2.0,
         ..Texture::NONE
     };
-    let shaded = ForceLaw {
+    let shaded = SurfaceParams {
         shading: Shading::Smooth,
         ..law(1.0, 0.0, Controller::On)
     };
-    let textured = ForceLaw {
+    let textured = SurfaceParams {
         texture,
         ..law(1.0, 0.0, Controller::On)
     };

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::in_force::MaterialInForce;
-use super::{Damper, FeltWith, ForceLaw, MaterialTable, Shader, Texturer};
+use super::{Damper, FeltWith, MaterialTable, Shader, SurfaceParams, Texturer};
 use crate::contact::{Contact, Friction};
 use crate::scalar::root;
 use crate::terrain::{TileIndex, Window};
@@ -21,7 +21,7 @@ pub(crate) struct Effects {
 impl Effects {
     /// Of a scene without materials.
     #[inline(never)]
-    pub(crate) fn of(law: &ForceLaw, felt: &FeltWith) -> Option<Self> {
+    pub(crate) fn of(law: &SurfaceParams, felt: &FeltWith) -> Option<Self> {
         let shader = Shader::of(law.shading);
         let texturer = Texturer::of(&law.texture, felt.cell_mm, felt.rate);
         let damper = Damper::of(law, felt);
@@ -39,7 +39,7 @@ impl Effects {
     #[inline(never)]
     pub(crate) fn with_materials(
         table: &MaterialTable,
-        law: &ForceLaw,
+        law: &SurfaceParams,
         felt: &FeltWith,
     ) -> Option<Self> {
         let material = MaterialInForce::of(table, law, felt.cell_mm, felt.rate)?;
@@ -126,7 +126,7 @@ impl Effects {
     }
 
     /// The law that is felt, where it is another than the scene's.
-    pub(crate) fn law<'l>(&'l self, of_scene: &'l ForceLaw) -> &'l ForceLaw {
+    pub(crate) fn law<'l>(&'l self, of_scene: &'l SurfaceParams) -> &'l SurfaceParams {
         self.material
             .as_ref()
             .map_or(of_scene, MaterialInForce::law)

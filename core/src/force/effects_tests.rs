@@ -5,15 +5,15 @@ use crate::contact::ContactSettings;
 use crate::force::{Controller, Damping, Moment, Shading, Shares};
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
-use crate::terrain::{FieldSize, FieldStorage};
+use crate::terrain::{FieldSize, TileArena};
 
-const LAW: ForceLaw = ForceLaw {
+const LAW: SurfaceParams = SurfaceParams {
     shading: Shading::Smooth,
     damping: Damping {
         controller: Controller::On,
         ..Damping::NONE
     },
-    ..ForceLaw::PREMIUM
+    ..SurfaceParams::PREMIUM
 };
 
 fn felt() -> FeltWith {
@@ -42,10 +42,10 @@ fn created(effects: &mut Effects, created_mj: f32) {
 }
 
 /// The displacement beside a ridge, without shading and with it, where the book has so much in it.
-fn beside_a_ridge(law: &ForceLaw, created_mj: f32) -> [Vec3; 2] {
+fn beside_a_ridge(law: &SurfaceParams, created_mj: f32) -> [Vec3; 2] {
     let size = FieldSize::new(40, 40);
     let ridge = |x: i32, _| -0.5 * (x - 20).abs() as f32;
-    let mut field = FieldStorage::<2>::from_fn(size, ridge).expect("it fits");
+    let mut field = TileArena::<2>::from_fn(size, ridge).expect("it fits");
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     for height in [1.0, -0.5] {
@@ -103,11 +103,11 @@ fn what_the_book_holds_at_most_is_enough_to_turn_no_force() {
 /// Slides 20 mm over facets of two cells, so deep, and compares each tick with the same without the
 /// controller: the largest step of the force of both, N, and the share of the turn that was left.
 fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] {
-    let law = ForceLaw {
+    let law = SurfaceParams {
         stiffness_n_per_mm,
         ..LAW
     };
-    let uncontrolled = ForceLaw {
+    let uncontrolled = SurfaceParams {
         damping: Damping {
             controller: Controller::Off,
             ..Damping::NONE
@@ -116,7 +116,7 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
     };
     let height = |x: f32| slope * (x.rem_euclid(4.0) - 2.0).abs();
     let size = FieldSize::new(60, 60);
-    let mut field = FieldStorage::<2>::from_fn(size, |x, _| height(x as f32)).expect("it fits");
+    let mut field = TileArena::<2>::from_fn(size, |x, _| height(x as f32)).expect("it fits");
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut controlled = Effects::of(&law, &felt()).expect("shaded");
@@ -193,7 +193,7 @@ fn a_slide_over_facets_is_as_smooth_with_the_controller_as_without() {
 
 #[test]
 fn without_the_controller_nothing_is_known_of_energy_and_all_of_it_is_turned() {
-    let uncontrolled = ForceLaw {
+    let uncontrolled = SurfaceParams {
         damping: Damping {
             controller: Controller::Off,
             ..Damping::NONE

@@ -7,7 +7,7 @@
 //! nothing was felt before.
 
 use super::material::{MATERIAL_CHANGE_S, Material, MaterialTable};
-use super::{ForceLaw, Texture, Texturer};
+use super::{SurfaceParams, Texture, Texturer};
 use crate::contact::{Contact, ContactState, Friction};
 use crate::rate::TickRate;
 use crate::terrain::Window;
@@ -25,7 +25,7 @@ pub(crate) struct MaterialInForce {
     /// What multiplies the stiffness.
     scale: f32,
     /// The law as it is felt. Its texture is the one whose share is felt.
-    law: ForceLaw,
+    law: SurfaceParams,
     /// How much of that texture is felt.
     texture_share: f32,
     cell_mm: f32,
@@ -38,7 +38,7 @@ impl MaterialInForce {
     /// Before anything is felt: the default.
     pub(crate) fn of(
         table: &MaterialTable,
-        law: &ForceLaw,
+        law: &SurfaceParams,
         cell_mm: f32,
         rate: TickRate,
     ) -> Option<Self> {
@@ -62,7 +62,7 @@ impl MaterialInForce {
     }
 
     /// The law that is felt.
-    pub(crate) const fn law(&self) -> &ForceLaw {
+    pub(crate) const fn law(&self) -> &SurfaceParams {
         &self.law
     }
 
@@ -169,7 +169,7 @@ impl MaterialInForce {
 
     /// Puts all of a material in force but its texture.
     fn feels(&mut self, material: &Material) {
-        self.law = ForceLaw {
+        self.law = SurfaceParams {
             texture: self.law.texture,
             ..material.law(&self.law)
         };

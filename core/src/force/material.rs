@@ -7,7 +7,7 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use super::{ForceLaw, Texture};
+use super::{SurfaceParams, Texture};
 use crate::contact::Friction;
 use crate::crc::{CRC, add};
 use crate::force::Damping;
@@ -33,7 +33,7 @@ pub struct Material {
 impl Material {
     /// What a scene's law says of its surface.
     #[must_use]
-    pub const fn of(law: &ForceLaw) -> Self {
+    pub const fn of(law: &SurfaceParams) -> Self {
         Self {
             stiffness_n_per_mm: law.stiffness_n_per_mm,
             friction: law.friction,
@@ -45,8 +45,8 @@ impl Material {
     /// A law over this material; what is no surface's (the limit, the controller, the normals)
     /// stays.
     #[must_use]
-    pub const fn law(&self, law: &ForceLaw) -> ForceLaw {
-        ForceLaw {
+    pub const fn law(&self, law: &SurfaceParams) -> SurfaceParams {
+        SurfaceParams {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             friction: self.friction,
             damping: Damping {
@@ -61,23 +61,23 @@ impl Material {
     /// Whether its numbers are such that a loop can work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        self.law(&ForceLaw::PREMIUM).is_valid()
+        self.law(&SurfaceParams::PREMIUM).is_valid()
     }
 }
 
 /// Most materials, the default among them: an index is half a byte.
-const MOST_MATERIALS: usize = 16;
+const MAX_MATERIALS: usize = 16;
 
 /// The materials of a scene. The first is the default: what is felt where the ground has no
 /// class, or one that the table does not name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MaterialTable {
-    materials: Vec<Material, MOST_MATERIALS>,
+    materials: Vec<Material, MAX_MATERIALS>,
 }
 
 impl MaterialTable {
     /// Most materials, the default among them.
-    pub const MOST: usize = MOST_MATERIALS;
+    pub const MOST: usize = MAX_MATERIALS;
     /// A table without any, which no scene can have.
     pub const EMPTY: Self = Self {
         materials: Vec::new(),
@@ -147,7 +147,7 @@ impl MaterialTable {
     /// By how much a law multiplies the stiffness of all materials: its own stiffness, over the
     /// default's. A view that is twice as stiff is so on each material.
     #[must_use]
-    pub fn stiffness_scale(&self, law: &ForceLaw) -> f32 {
+    pub fn stiffness_scale(&self, law: &SurfaceParams) -> f32 {
         let default = self.at(0).map_or(0.0, |default| default.stiffness_n_per_mm);
         match default > 0.0 {
             true => law.stiffness_n_per_mm / default,
@@ -158,12 +158,12 @@ impl MaterialTable {
     /// A law as stiff as the stiffest material under it, and as damped as the most damped: what
     /// a rule of stability has to hold for.
     #[must_use]
-    pub fn hardest(&self, law: &ForceLaw) -> ForceLaw {
+    pub fn hardest(&self, law: &SurfaceParams) -> SurfaceParams {
         let most = |of: fn(&Material) -> f32| {
             let all = self.materials.iter().map(of);
             all.fold(0.0, |most: f32, one| most.max(one))
         };
-        ForceLaw {
+        SurfaceParams {
             stiffness_n_per_mm: most(|m| m.stiffness_n_per_mm) * self.stiffness_scale(law),
             damping: Damping {
                 ns_per_m: most(|m| m.damping_ns_per_m),

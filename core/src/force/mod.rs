@@ -34,7 +34,7 @@ pub use texturer::Texturer;
 /// is made of all of it by the tick; of the spring alone by [`Self::spring`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ForceLaw {
+pub struct SurfaceParams {
     /// Newtons for a millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,
     /// Largest force in newtons; the direction is kept.
@@ -49,7 +49,7 @@ pub struct ForceLaw {
     pub texture: Texture,
 }
 
-impl ForceLaw {
+impl SurfaceParams {
     /// 0.5 N/mm and 8.5 N on a surface like ice: what a Phantom Premium 1.5 can hold.
     pub const PREMIUM: Self = Self {
         stiffness_n_per_mm: 0.5,
@@ -134,7 +134,9 @@ mod tests {
 
     #[test]
     fn proportional_below_the_limit() {
-        let f = ForceLaw::PREMIUM.spring().force_n(Vec3::new(0.0, 0.0, 4.0));
+        let f = SurfaceParams::PREMIUM
+            .spring()
+            .force_n(Vec3::new(0.0, 0.0, 4.0));
         assert_eq!(f, Vec3::new(0.0, 0.0, 2.0));
     }
 
@@ -145,14 +147,14 @@ mod tests {
             Vec3::splat(3e38),
             Vec3::new(18.0, 0.0, 0.1),
         ] {
-            let f = ForceLaw::PREMIUM.spring().force_n(displacement);
+            let f = SurfaceParams::PREMIUM.spring().force_n(displacement);
             assert!(
                 f.length() <= 8.5 && f.length() > 8.499_99,
                 "{displacement} -> {f}"
             );
             assert!(f.x.signum() == displacement.x.signum());
         }
-        let f = ForceLaw::PREMIUM
+        let f = SurfaceParams::PREMIUM
             .spring()
             .force_n(Vec3::new(300.0, -400.0, 0.0));
         assert!((f - Vec3::new(5.1, -6.8, 0.0)).length() < 1e-5);
@@ -162,7 +164,9 @@ mod tests {
     fn not_a_number_gives_no_force() {
         for bad in [f32::NAN, f32::INFINITY] {
             assert_eq!(
-                ForceLaw::PREMIUM.spring().force_n(Vec3::new(0.0, bad, 1.0)),
+                SurfaceParams::PREMIUM
+                    .spring()
+                    .force_n(Vec3::new(0.0, bad, 1.0)),
                 Vec3::ZERO
             );
         }

@@ -14,23 +14,23 @@
 use glam::Vec3;
 
 use super::depth::Depth;
-use super::yielding::Yielding;
-use super::{FeltWith, ForceLaw, Spring};
+use super::yielding::RateLimitSoftening;
+use super::{FeltWith, Spring, SurfaceParams};
 use crate::scalar::{larger, smaller};
 
 /// More than this is forgotten, mJ.
-pub(super) const MOST_MJ: f32 = 2.0;
+pub(super) const MAX_MJ: f32 = 2.0;
 /// Most damping, as ticks of the stiffness, besides the latency. What the velocity is off by,
 /// some 0.1 of a count a tick, makes a force of so many times the spring's for 0.1 of a count.
-const MOST_TICKS: f32 = 2.0;
+const MAX_TICKS: f32 = 2.0;
 /// The same across the force: an even motion creates what half of it takes.
-const MOST_TICKS_ACROSS: f32 = 1.0;
+const MAX_TICKS_ACROSS: f32 = 1.0;
 /// Below this share of the force hardly any leaves the guard, and damping is not scaled up to it.
 const LEAST_SHARE: f32 = 1e-4;
 /// Forces kept: those on their way, the one that acts and the one before it. A power of two.
 const KEPT: usize = 16;
 /// Most ticks that a force may come late: what is later is taken to come then.
-const MOST_LATE: usize = KEPT - 2;
+const MAX_LATE: usize = KEPT - 2;
 
 /// The observer's book, and the controller.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +39,7 @@ pub(super) struct Passivity {
     /// From the beginning of a tick until its force acts, s: so many ticks, and a part of one.
     latency_s: f32,
     late: (usize, f32),
-    yielding: Yielding,
+    yielding: RateLimitSoftening,
     created_mj: f32,
     /// The same when this tick's force has acted for a tick, all but the work of that force, for
     /// a force before the guard's share.
@@ -124,14 +124,14 @@ impl Shares {
 impl Passivity {
     pub(super) fn new(felt: &FeltWith) -> Self {
         let tick_s = felt.rate.tick_s();
-        let latency_s = felt.latency_s.max(0.0).min(MOST_LATE as f32 * tick_s);
+        let latency_s = felt.latency_s.max(0.0).min(MAX_LATE as f32 * tick_s);
         let late = latency_s / tick_s;
         let whole = late as usize;
         Self {
             tick_s,
             latency_s,
             late: (whole, late - whole as f32),
-            yielding: Yielding::NONE,
+            yielding: RateLimitSoftening::NONE,
             created_mj: 0.0,
             coming_mj: 0.0,
             stiffness_n_per_mm: 0.0,
@@ -151,7 +151,7 @@ impl Passivity {
 
     pub(super) const fn rest(&mut self) {
         (self.created_mj, self.coming_mj, self.before) = (0.0, 0.0, None);
-        (self.yielding, self.asked) = (Yielding::NONE, Asked::NONE);
+        (self.yielding, self.asked) = (RateLimitSoftening::NONE, Asked::NONE);
     }
 
     /// Books what happened since the tick before, and what is going to happen until this tick's
@@ -161,7 +161,7 @@ impl Passivity {
     /// The spring is that of the force which leaves the guard: the law's, times all shares. A
     /// spring that becomes stiffer puts energy in. Ramp and clutch are meant to do so, each once,
     /// and that energy is not booked; everything else is.
-    pub(super) fn observe(&mut self, law: &ForceLaw, now: &Moment) {
+    pub(super) fn observe(&mut self, law: &SurfaceParams, now: &Moment) {
         let depth = Depth::of(now.displacement_mm, now.velocity_mm_s);
         let Shares {
             clutch,
@@ -200,7 +200,7 @@ impl Passivity {
             softening,
             speed,
         });
-        // At most `MOST_LATE` ticks.
+        // At most `MAX_LATE` ticks.
         let on_their_way = (0..whole).map(|ticks| self.asked.ago(ticks));
         let sum_n = on_their_way.fold(acting_n * part, |sum_n, asked_n| sum_n + asked_n);
         let gives_mj = sum_n.dot(now.velocity_mm_s) * self.tick_s;
@@ -224,11 +224,11 @@ impl Passivity {
             }
         };
         let created_mj = within(self.coming_mj + motion.along * self.tick_s);
-        let along = takes(created_mj, motion.along_squared, MOST_TICKS);
+        let along = takes(created_mj, motion.along_squared, MAX_TICKS);
         let left_mj = within(created_mj - along * motion.along_squared * self.tick_s);
         Takes {
             along,
-            across: takes(left_mj, motion.across_squared, MOST_TICKS_ACROSS),
+            across: takes(left_mj, motion.across_squared, MAX_TICKS_ACROSS),
         }
     }
 }
@@ -251,5 +251,5 @@ pub(super) struct Takes {
 
 /// What is kept of an energy, mJ: what is no number counts as none.
 fn within(mj: f32) -> f32 {
-    smaller(larger(mj, 0.0), MOST_MJ)
+    smaller(larger(mj, 0.0), MAX_MJ)
 }

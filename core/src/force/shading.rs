@@ -57,11 +57,11 @@ impl Shader {
     /// use hapterra_core::contact::{Contact, ContactSettings};
     /// use hapterra_core::force::{Shader, Shading};
     /// use hapterra_core::grid::GridPoint;
-    /// use hapterra_core::terrain::{FieldSize, FieldStorage};
+    /// use hapterra_core::terrain::{FieldSize, TileArena};
     ///
     /// // A valley of two slopes that meet in column 20.
     /// let size = FieldSize::new(40, 40);
-    /// let mut field = FieldStorage::<2>::from_fn(size, |x, _| 0.5 * (x - 20).abs() as f32)?;
+    /// let mut field = TileArena::<2>::from_fn(size, |x, _| 0.5 * (x - 20).abs() as f32)?;
     /// let window = field.window();
     /// let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     /// let mut shader = Shader::of(Shading::Smooth).expect("smooth");
@@ -72,7 +72,7 @@ impl Shader {
     /// let (plain, shaded) = (contact.output().displacement, shader.shade(&window, &contact));
     /// assert!((shaded.length() - plain.length()).abs() < 1e-6);
     /// assert!(shaded.x.abs() < 0.2 * plain.x.abs());
-    /// # Ok::<(), hapterra_core::terrain::BadField>(())
+    /// # Ok::<(), hapterra_core::terrain::FieldError>(())
     /// ```
     pub fn shade<const D: usize>(&mut self, window: &Window<'_, D>, contact: &Contact) -> Vec3 {
         let output = contact.output();
@@ -114,8 +114,8 @@ fn met_by(slopes: &SlopesAt, force: Vec3) -> Slopes {
 }
 
 /// Cosine and sine of the most that a force is turned: 60°. A bend of 120° is felt evenly.
-const MOST_COS: f32 = 0.5;
-const MOST_SIN: f32 = 0.866_025_4;
+const MAX_COS: f32 = 0.5;
+const MAX_SIN: f32 = 0.866_025_4;
 
 /// The shortest turn from one direction to another: `cos` of its angle, and the axis times
 /// its `sin`.
@@ -141,7 +141,7 @@ impl Turn {
         }
         let (from, to) = (normal(from), normal(to));
         let (cos, axis) = (from.dot(to), from.cross(to));
-        if cos >= MOST_COS {
+        if cos >= MAX_COS {
             return Self { cos, axis };
         }
         let squared = axis.length_squared();
@@ -150,8 +150,8 @@ impl Turn {
             return Self::default();
         }
         Self {
-            cos: MOST_COS,
-            axis: axis * (MOST_SIN * one_over_root(squared)),
+            cos: MAX_COS,
+            axis: axis * (MAX_SIN * one_over_root(squared)),
         }
     }
 

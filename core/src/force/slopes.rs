@@ -12,7 +12,7 @@ use crate::contact::surface::HipView;
 use crate::contact::surface::patch::mix;
 use crate::grid::GridPoint;
 use crate::scalar::one_over_root;
-use crate::terrain::{Corners, Ground, TileIndex, Window};
+use crate::terrain::{CellContent, Corners, TileIndex, Window};
 
 /// Cosine of the bend up to which the direction changes along a whole edge: 45°.
 const GENTLE: f32 = core::f32::consts::FRAC_1_SQRT_2;
@@ -43,7 +43,7 @@ impl SlopesAt {
     /// neighbours; `None` where there is no patch.
     pub(crate) fn point<const D: usize>(window: &Window<'_, D>, at: &GridPoint) -> Option<Self> {
         let view = HipView::new(*at);
-        let (cell, Ground::Patch(own)) = view.ground(window) else {
+        let (cell, CellContent::Patch(own)) = view.ground(window) else {
             return None;
         };
         let (u, v) = view.in_patch(cell);

@@ -52,7 +52,7 @@ impl Texture {
     /// and has to be less than the part of a wave with which fading begins.
     pub const WAVELENGTHS_MM: (f32, f32) = (0.25, 100.0);
     /// Most that a texture may reach above the surface, mm.
-    pub const MOST_AMPLITUDE_MM: f32 = 2.0;
+    pub const MAX_AMPLITUDE_MM: f32 = 2.0;
     /// Most of it to a wavelength: it slopes by up to 38°.
     pub const STEEPEST: f32 = 0.125;
     /// Speed that a wave has to be felt at in whole, mm/s: of a finger that explores slowly.
@@ -73,7 +73,7 @@ impl Texture {
         let most_mm = self.wavelength_mm * Self::STEEPEST;
         self.is_none()
             || (shortest..=longest).contains(&self.wavelength_mm)
-                && (0.0..=Self::MOST_AMPLITUDE_MM).contains(&self.amplitude_mm)
+                && (0.0..=Self::MAX_AMPLITUDE_MM).contains(&self.amplitude_mm)
                 && self.amplitude_mm <= most_mm
                 && (-360.0..=360.0).contains(&self.direction_deg)
     }

@@ -6,7 +6,7 @@ use super::*;
 use crate::cases::cases;
 use crate::contact::{Contact, ContactSettings};
 use crate::force::Pattern;
-use crate::terrain::{FieldSize, FieldStorage};
+use crate::terrain::{FieldSize, TileArena};
 
 const RATE: TickRate = TickRate::DEFAULT;
 /// A tick, s.
@@ -313,7 +313,7 @@ fn the_share_of_a_texture_neither_flutters_nor_jumps() {
 #[test]
 fn the_proxy_is_not_moved_and_texture_is_along_the_slopes_normal() {
     let size = FieldSize::new(60, 60);
-    let mut field = FieldStorage::<2>::from_fn(size, |x, _| 0.75 * x as f32).expect("a field");
+    let mut field = TileArena::<2>::from_fn(size, |x, _| 0.75 * x as f32).expect("a field");
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
     let mut texturer = texturer(&GRATING);
@@ -353,7 +353,7 @@ fn what_no_number_is_gives_none() {
         ] {
             let at = GridPoint::new([i32::MAX; 3], Vec3::splat(bad));
             let felt = texturer.add(Vec3::new(0.0, bad, 1.0), &at);
-            let force = crate::force::ForceLaw::PREMIUM.spring().force_n(felt);
+            let force = crate::force::SurfaceParams::PREMIUM.spring().force_n(felt);
             assert!(force.is_finite(), "{bad}: {force}");
         }
         // And is forgotten.

@@ -24,13 +24,13 @@ const RECOVERS_MJ_PER_S: f32 = 5.0;
 
 /// The share of the stiffness that is felt.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Yielding {
+pub(super) struct RateLimitSoftening {
     share: f32,
     /// How long the tip has rested, s.
     rested_s: f32,
 }
 
-impl Yielding {
+impl RateLimitSoftening {
     /// The whole stiffness.
     pub(super) const NONE: Self = Self {
         share: 1.0,

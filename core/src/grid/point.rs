@@ -93,7 +93,7 @@ impl GridPoint {
 
     /// The point in cells relative to the lower corner of `cell`.
     #[must_use]
-    pub fn seen_from(&self, cell: [i32; 3]) -> Vec3 {
+    pub fn relative_to(&self, cell: [i32; 3]) -> Vec3 {
         Vec3::new(
             self.cell[0].wrapping_sub(cell[0]) as f32 + self.frac[0],
             self.cell[1].wrapping_sub(cell[1]) as f32 + self.frac[1],

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::{Fault, Sense};
+use super::{Fault, GuardInputs};
 use crate::rate::TickRate;
 
 /// How long after the enable an amplifier need not be ready yet, ms. An ESCON's digital
@@ -73,7 +73,7 @@ impl Feedback {
     }
 
     /// Whether an amplifier that is on says for too long that it is not ready.
-    pub(super) fn is_unready(&mut self, sense: &Sense) -> bool {
+    pub(super) fn is_unready(&mut self, sense: &GuardInputs) -> bool {
         self.on = self.on.saturating_add(1);
         let counts = sense.amplifier_not_ready && self.on > self.enable_ticks;
         self.unready = if counts { self.unready + 1 } else { 0 };
@@ -92,7 +92,7 @@ impl Feedback {
     }
 
     /// The amplifiers are off.
-    pub(super) const fn rest(&mut self, sense: &Sense) {
+    pub(super) const fn rest(&mut self, sense: &GuardInputs) {
         self.is_measured = sense.measured_ma.is_some();
         self.on = 0;
         self.unready = 0;
@@ -102,7 +102,12 @@ impl Feedback {
     /// returns the fault that a measured current is not what was commanded. Without monitors
     /// there is nothing to compare; monitors that are there no more, while the amplifiers are
     /// `on`, are a fault of the board's wiring.
-    pub(super) fn check(&mut self, sense: &Sense, commanded_a: Vec3, on: bool) -> Option<Fault> {
+    pub(super) fn check(
+        &mut self,
+        sense: &GuardInputs,
+        commanded_a: Vec3,
+        on: bool,
+    ) -> Option<Fault> {
         let Some([a, b, c]) = sense.measured_ma else {
             self.measured_a = Vec3::ZERO;
             return (on && self.is_measured).then_some(Fault::Hardware);

@@ -16,7 +16,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::Fault;
-use crate::phantom::{Calibration, Mechanism};
+use crate::phantom::{Calibration, Kinematics};
 use crate::rate::TickRate;
 
 /// Most current of a jog, as a share of what the motor can bear for ever: 0.31 A on a
@@ -95,7 +95,7 @@ impl JogRun {
         &mut self,
         moved: [i32; 3],
         hz: f32,
-        mechanism: &Mechanism,
+        mechanism: &Kinematics,
         angles_rad: Vec3,
         gain: f32,
     ) -> Option<Fault> {

@@ -1,8 +1,8 @@
 use std::vec::Vec;
 
 use super::*;
-use crate::guard::{Blockers, Drive, Mode, Report, Sense};
-use crate::terrain::FieldStorage;
+use crate::guard::{Blockers, GuardInputs, GuardOutputs, Mode, Report};
+use crate::terrain::TileArena;
 use crate::tick::{Command, Haptics};
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
@@ -10,18 +10,18 @@ const RECORD: Calibration = Calibration::PREMIUM_1_5;
 /// The loop without a scene, and joints that answer currents as the test says.
 struct Bench<'t> {
     haptics: Haptics<'t, 1>,
-    sense: Sense,
+    sense: GuardInputs,
     rate: TickRate,
-    drives: Vec<Drive>,
+    drives: Vec<GuardOutputs>,
 }
 
 impl<'t> Bench<'t> {
-    fn new(storage: &'t mut FieldStorage<1>, rate: TickRate) -> Self {
+    fn new(storage: &'t mut TileArena<1>, rate: TickRate) -> Self {
         let mut haptics = Haptics::new(storage.slots(), rate, None);
-        haptics.configure(Mechanism::new(&RECORD).expect("valid"));
+        haptics.configure(Kinematics::new(&RECORD).expect("valid"));
         let mut bench = Self {
             haptics,
-            sense: Sense::default(),
+            sense: GuardInputs::default(),
             rate,
             drives: Vec::new(),
         };
@@ -38,7 +38,7 @@ impl<'t> Bench<'t> {
     }
 
     /// One tick; once a millisecond the encoders go on as `moves` says of the currents.
-    fn tick(&mut self, moves: impl Fn(Vec3) -> [i32; 3]) -> Drive {
+    fn tick(&mut self, moves: impl Fn(Vec3) -> [i32; 3]) -> GuardOutputs {
         let drive = self.haptics.tick(&self.sense, true).drive;
         self.drives.push(drive);
         let is_ms = (self.drives.len() as u32).is_multiple_of(self.rate.ticks(1));
@@ -73,7 +73,7 @@ fn held(current: Vec3) -> [i32; 3] {
 #[test]
 fn one_motor_gets_the_current_for_the_time_and_nothing_else() {
     for rate in [1_000, 10_000].map(|hz| TickRate::new(hz).expect("in range")) {
-        let (mut storage, ms) = (FieldStorage::<1>::new(), rate.ticks(1) as usize);
+        let (mut storage, ms) = (TileArena::<1>::new(), rate.ticks(1) as usize);
         let mut bench = Bench::new(&mut storage, rate);
         bench.jog(JOG, 4_000, held);
         assert_eq!(bench.report().fault, None);
@@ -97,7 +97,7 @@ fn one_motor_gets_the_current_for_the_time_and_nothing_else() {
 
 #[test]
 fn it_takes_a_press_and_is_over_when_it_is_over() {
-    let mut storage = FieldStorage::<1>::new();
+    let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     // Without a jog, and with nothing to feel, the arm cannot be armed.
     bench.say(Command::Arm);
@@ -124,7 +124,7 @@ fn it_takes_a_press_and_is_over_when_it_is_over() {
 /// Also where no tick came in between, and in the tick after its force has gone out.
 #[test]
 fn a_plain_arm_does_not_arm_for_a_jog_of_before() {
-    let mut storage = FieldStorage::<1>::new();
+    let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     for between in [Some(Command::Disarm), None] {
         bench.say(Command::Jog(JOG));
@@ -148,7 +148,7 @@ fn a_plain_arm_does_not_arm_for_a_jog_of_before() {
 
 #[test]
 fn whatever_blocks_arming_blocks_a_jog() {
-    let mut storage = FieldStorage::<1>::new();
+    let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     bench.sense.emergency_stop = true;
     bench.jog(JOG, 1_000, held);
@@ -164,12 +164,12 @@ fn whatever_blocks_arming_blocks_a_jog() {
 
 #[test]
 fn letting_go_ends_a_jog_within_the_tick() {
-    let mut storage = FieldStorage::<1>::new();
+    let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
     bench.jog(JOG, 1_500, held);
     assert!(bench.report().mode.drives());
     bench.sense.dead_man = false;
-    assert_eq!(bench.tick(held), Drive::default());
+    assert_eq!(bench.tick(held), GuardOutputs::default());
     assert_eq!(bench.report().fault, Some(Fault::DeadManReleased));
 }
 
@@ -177,7 +177,7 @@ fn letting_go_ends_a_jog_within_the_tick() {
 fn a_joint_that_runs_away_is_a_fault_whichever_it_is() {
     for axis in 0..3 {
         for speed in [9, -9, 30, 2] {
-            let mut storage = FieldStorage::<1>::new();
+            let mut storage = TileArena::<1>::new();
             let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
             // Not the motor's own joint, for two of the three.
             bench.jog(JOG, 4_000, |current| {
@@ -203,7 +203,7 @@ fn a_motor_whose_encoder_stands_is_found_at_half_the_current() {
             [i32::from(current.y < -0.1 && current.y > -0.11), 0, 0]
         },
     ] {
-        let mut storage = FieldStorage::<1>::new();
+        let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
         bench.jog(JOG, 4_000, moves);
         assert_eq!(bench.report().fault, Some(Fault::NoMotion));
@@ -228,7 +228,7 @@ fn no_host_gets_more_than_a_jog_may_be() {
             hold_ms,
         };
         assert!(!jog.is_valid(&RECORD), "{jog:?}");
-        let mut storage = FieldStorage::<1>::new();
+        let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
         bench.jog(jog, 10_000, |current| held(-current));
         let most = bench
@@ -238,7 +238,7 @@ fn no_host_gets_more_than_a_jog_may_be() {
         assert!(most.fold(0.0, f32::max) <= JOG_SHARE * 1.24);
         let on = bench.drives.iter().filter(|drive| drive.enabled).count();
         assert!(on <= 2_100 + usize::from(JOG_MOST_MS) + 10, "{on}");
-        let one = |drive: &Drive| drive.currents_a * Vec3::Y == drive.currents_a;
+        let one = |drive: &GuardOutputs| drive.currents_a * Vec3::Y == drive.currents_a;
         assert!(bench.drives.iter().all(one), "{jog:?}");
     }
     assert!(JOG.is_valid(&RECORD));
@@ -253,11 +253,11 @@ fn a_scene_or_new_settings_end_a_jog() {
         |bench| {
             bench
                 .haptics
-                .configure(Mechanism::new(&RECORD).expect("valid"));
+                .configure(Kinematics::new(&RECORD).expect("valid"));
         },
     ];
     for end in ends {
-        let mut storage = FieldStorage::<1>::new();
+        let mut storage = TileArena::<1>::new();
         let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
         bench.jog(JOG, 1_500, held);
         assert!(bench.report().mode.drives());

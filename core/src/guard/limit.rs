@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Blockers, Drive, Fault, Guard, Limits, Mode, SMALL_FORCE_N};
+use super::{Blockers, Fault, Guard, GuardOutputs, Limits, Mode, SMALL_FORCE_N};
 use crate::scalar::{clamp_length, is_finite};
 
 impl Guard {
@@ -79,12 +79,12 @@ impl Guard {
     /// scaled down together so that none exceeds what its motor may have now;
     /// off unless the amplifiers may be on.
     #[must_use]
-    pub fn limit_currents(&mut self, wanted_a: Vec3) -> Drive {
+    pub fn limit_currents(&mut self, wanted_a: Vec3) -> GuardOutputs {
         if !is_finite(wanted_a) {
             self.trip(Fault::NotANumber);
         }
         if !self.mode().drives() {
-            return Drive::default();
+            return GuardOutputs::default();
         }
         let allowed_a = self.motors.allowed_a;
         let load = wanted_a.abs();
@@ -103,7 +103,7 @@ impl Guard {
             true => self.currents_a.abs().max(self.feedback.measured_a()),
             false => self.currents_a,
         });
-        Drive {
+        GuardOutputs {
             currents_a: self.currents_a,
             enabled: true,
             held: Vec3::ZERO,

@@ -35,7 +35,7 @@ pub use jog::{FAR_RAD as JOG_FAR_RAD, FAST_RAD_S as JOG_FAST_RAD_S, JOG_MOST_MS,
 pub use mode::Mode;
 pub use stall::TRAVEL as TRAVEL_WHILE_ONE_STANDS;
 
-use crate::phantom::{JointLimits, Mechanism, Pose};
+use crate::phantom::{JointLimits, Kinematics, Pose};
 pub use crate::rate::MAX_SLEW_N_PER_S;
 use crate::rate::TickRate;
 use arming::Arming;
@@ -60,7 +60,7 @@ pub const LIMIT_MARGIN_RAD: f32 = 0.087;
 
 /// What the encoders, the safety inputs and the amplifiers say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Sense {
+pub struct GuardInputs {
     /// Counts of axes 1 to 3 since power-up.
     pub counts: [i32; 3],
     /// Whether the dead-man switch is held.
@@ -84,7 +84,7 @@ pub struct Sense {
 #[derive(Clone, Copy, Debug)]
 pub struct Surroundings<'a> {
     /// The arm and its pose, if there is a calibration.
-    pub arm: Option<(&'a Mechanism, &'a Pose)>,
+    pub arm: Option<(&'a Kinematics, &'a Pose)>,
     /// Whether the arm has been zeroed.
     pub zeroed: bool,
     /// What there is to feel.
@@ -106,7 +106,7 @@ pub enum SceneKind {
 
 /// What the amplifiers are to be given.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Drive {
+pub struct GuardOutputs {
     /// Motor currents of the three axes, amperes. Zero unless enabled.
     pub currents_a: Vec3,
     /// Whether the amplifiers are to be on.
@@ -135,11 +135,11 @@ pub struct Report {
 ///
 /// ```
 /// use hapterra_core::Vec3;
-/// use hapterra_core::guard::{Fault, Guard, Mode, SceneKind, Sense, Surroundings};
-/// use hapterra_core::phantom::{Calibration, Mechanism};
+/// use hapterra_core::guard::{Fault, Guard, Mode, SceneKind, GuardInputs, Surroundings};
+/// use hapterra_core::phantom::{Calibration, Kinematics};
 /// use hapterra_core::rate::TickRate;
 ///
-/// let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5)?;
+/// let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5)?;
 /// let pose = mechanism.pose([0; 3], [0; 3]);
 /// let mut guard = Guard::new(TickRate::DEFAULT, None);
 /// guard.configure(&mechanism);
@@ -147,7 +147,7 @@ pub struct Report {
 /// let mut force_n = Vec3::ZERO;
 /// for tick in 0..3_000 {
 ///     // The dead-man switch is pressed after a moment.
-///     let sense = Sense { dead_man: tick > 10, ..Sense::default() };
+///     let sense = GuardInputs { dead_man: tick > 10, ..GuardInputs::default() };
 ///     let around = Surroundings {
 ///         arm: Some((&mechanism, &pose)),
 ///         zeroed: true,
@@ -163,7 +163,7 @@ pub struct Report {
 /// assert!((force_n.z - 0.9 * 8.5).abs() < 1e-3);
 /// guard.trip(Fault::Hardware);
 /// assert_eq!(guard.limit_force(Vec3::Z), Vec3::ZERO);
-/// # Ok::<(), hapterra_core::phantom::BadCalibration>(())
+/// # Ok::<(), hapterra_core::phantom::CalibrationError>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
@@ -219,7 +219,7 @@ impl Guard {
     }
 
     /// Takes the bounds of an arm.
-    pub fn configure(&mut self, mechanism: &Mechanism) {
+    pub fn configure(&mut self, mechanism: &Kinematics) {
         self.max_force_n = WORKING_SHARE * mechanism.calibration().max_force_n;
         let limits = &mechanism.calibration().limits;
         self.stops = limits.widened(LIMIT_MARGIN_RAD);
@@ -281,7 +281,7 @@ impl Guard {
     /// How fast the tip of a driven arm moves, device frame, mm/s, by the readings of every
     /// millisecond (FOAW).
     #[must_use]
-    pub fn tip_velocity_mm_s(&self, mechanism: &Mechanism, pose: &Pose) -> Vec3 {
+    pub fn tip_velocity_mm_s(&self, mechanism: &Kinematics, pose: &Pose) -> Vec3 {
         self.speed.velocity_mm_s(mechanism, pose)
     }
 

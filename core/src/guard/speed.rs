@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
-use crate::phantom::{Mechanism, Pose, Readings};
+use crate::phantom::{Kinematics, Pose, Readings};
 use crate::rate::TickRate;
 
 /// The tip may stay above twice the speed limit for this many readings, a
 /// millisecond each.
-const MOST_READINGS_TOO_FAST: u32 = 5;
+const MAX_READINGS_TOO_FAST: u32 = 5;
 
 /// Watches the tip's speed, once a millisecond.
 #[derive(Clone, Copy, Debug, Default)]
@@ -54,7 +54,7 @@ impl SpeedMonitor {
         }
     }
 
-    pub(super) fn configure(&mut self, mechanism: &Mechanism) {
+    pub(super) fn configure(&mut self, mechanism: &Kinematics) {
         let record = mechanism.calibration();
         self.limit_mm_s = record.max_speed_mm_s;
         let (l1, l2) = (record.l1_mm, record.l2_mm);
@@ -80,7 +80,7 @@ impl SpeedMonitor {
     pub(super) fn check(
         &mut self,
         counts: [i32; 3],
-        mechanism: &Mechanism,
+        mechanism: &Kinematics,
         pose: &Pose,
     ) -> SpeedCheck {
         self.ticks += 1;
@@ -101,14 +101,14 @@ impl SpeedMonitor {
         let over = speed / self.limit_mm_s - 1.0;
         self.share = 1.0 - over.clamp(0.0, 1.0);
         self.too_fast = if over < 1.0 { 0 } else { self.too_fast + 1 };
-        match self.too_fast > MOST_READINGS_TOO_FAST {
+        match self.too_fast > MAX_READINGS_TOO_FAST {
             true => SpeedCheck::TooFast,
             false => SpeedCheck::Moved(moved),
         }
     }
 
     /// How fast the tip is, device frame, mm/s.
-    pub(super) fn velocity_mm_s(&self, mechanism: &Mechanism, pose: &Pose) -> Vec3 {
+    pub(super) fn velocity_mm_s(&self, mechanism: &Kinematics, pose: &Pose) -> Vec3 {
         let counts = self.readings.velocity();
         pose.tip_velocity_mm_s(counts * self.hz * mechanism.radians_per_count())
     }
@@ -137,7 +137,7 @@ mod tests {
     /// A hand that speeds up and slows down at random, past the limit and back.
     #[test]
     fn the_rough_look_decides_as_the_close_one() {
-        let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid");
+        let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");
         let mut rough = SpeedMonitor::new(TickRate::DEFAULT);
         rough.configure(&mechanism);
         let mut close = rough;

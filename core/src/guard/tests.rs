@@ -11,8 +11,8 @@ use crate::phantom::Calibration;
 /// A guard and what it is told.
 struct Bench {
     guard: Guard,
-    mechanism: Mechanism,
-    sense: Sense,
+    mechanism: Kinematics,
+    sense: GuardInputs,
     zeroed: bool,
     scene: SceneKind,
     watchdog_live: bool,
@@ -28,13 +28,13 @@ impl Bench {
     }
 
     fn at(rate: TickRate) -> Self {
-        let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid");
+        let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");
         let mut guard = Guard::new(rate, None);
         guard.configure(&mechanism);
         Self {
             guard,
             mechanism,
-            sense: Sense::default(),
+            sense: GuardInputs::default(),
             zeroed: true,
             scene: SceneKind::Arm,
             watchdog_live: true,
@@ -46,7 +46,7 @@ impl Bench {
     }
 
     /// One tick in the order of the loop.
-    fn tick(&mut self) -> Drive {
+    fn tick(&mut self) -> GuardOutputs {
         let pose = self.mechanism.pose(self.sense.counts, [0; 3]);
         let around = Surroundings {
             arm: self.calibrated.then_some((&self.mechanism, &pose)),
@@ -65,7 +65,7 @@ impl Bench {
         self.note();
         self.zeroed &= !lost;
         assert_eq!(drive.enabled, self.guard.mode().drives());
-        assert!(drive.enabled || drive == Drive::default());
+        assert!(drive.enabled || drive == GuardOutputs::default());
         drive
     }
 
@@ -325,7 +325,7 @@ fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
         bench.ticks(10);
         let before = bench.sense;
         spoil(&mut bench);
-        assert_eq!(bench.tick(), Drive::default(), "{fault:?}");
+        assert_eq!(bench.tick(), GuardOutputs::default(), "{fault:?}");
         assert_eq!(bench.guard.report().fault, Some(fault));
         assert_eq!(bench.force_n, Vec3::ZERO);
         // The cause is gone; the fault is not.
@@ -452,7 +452,7 @@ fn currents_keep_their_direction_at_the_peak_and_say_so() {
             .contains(Limits::CURRENT_LIMITED)
     );
     let nothing = bench.guard.limit_currents(Vec3::new(f32::NAN, 0.0, 0.0));
-    assert_eq!(nothing, Drive::default());
+    assert_eq!(nothing, GuardOutputs::default());
     assert_eq!(bench.guard.report().fault, Some(Fault::NotANumber));
 }
 
@@ -485,7 +485,7 @@ fn a_winding_above_its_limit_is_a_fault() {
         // As if the amplifier gave more than it was asked for.
         bench.guard.motors.heat(Vec3::Y * 5.5);
     }
-    assert_eq!(bench.tick(), Drive::default());
+    assert_eq!(bench.tick(), GuardOutputs::default());
     assert_eq!(bench.guard.report().fault, Some(Fault::MotorTooHot));
     // Cleared while it is hot, it trips again; warmth is not forgotten.
     bench.guard.clear();
@@ -559,7 +559,7 @@ fn disarmed_by_the_host_force_goes_out_without_a_step() {
     bench.guard.disarm();
     bench.tick();
     bench.sense.dead_man = false;
-    assert_eq!(bench.tick(), Drive::default());
+    assert_eq!(bench.tick(), GuardOutputs::default());
     assert_eq!(
         (bench.guard.mode(), bench.guard.report().fault),
         (Mode::Disarmed, None)

@@ -32,7 +32,7 @@ pub const TRIP_C: f32 = 110.0;
 pub const UNSEEN_K: f32 = 5.0;
 /// More than any node can be above the one beside it, K. With the amplifiers off the model goes
 /// no farther, either: monitors without supply may tell of currents for hours that never flowed.
-const MOST_K: Vec3 = Vec3::splat(200.0);
+const MAX_K: Vec3 = Vec3::splat(200.0);
 
 /// What the two nodes of each motor are above the air, K: all that the model has to
 /// know of what was before.
@@ -77,7 +77,7 @@ impl Temperatures {
     /// believed against sense.
     #[must_use]
     pub fn after_reset(self) -> Option<Self> {
-        let possible = |k: Vec3| k.cmpge(Vec3::ZERO).all() && k.cmple(MOST_K).all();
+        let possible = |k: Vec3| k.cmpge(Vec3::ZERO).all() && k.cmple(MAX_K).all();
         let is_possible = possible(self.winding_k) && possible(self.housing_k);
         // Not above what derating ends at: a board that resets over and over must not
         // trip by that alone.
@@ -157,8 +157,8 @@ impl Motors {
     pub fn rest(&mut self, measured_a: Vec3) {
         self.heat(measured_a);
         // With the amplifiers on, the arm trips long before.
-        self.at.winding_k = self.at.winding_k.min(MOST_K);
-        self.at.housing_k = self.at.housing_k.min(MOST_K);
+        self.at.winding_k = self.at.winding_k.min(MAX_K);
+        self.at.housing_k = self.at.housing_k.min(MAX_K);
     }
 
     /// Lets `currents_a` flow for a tick.

@@ -1,12 +1,12 @@
 //! The checks of a tick's inputs, before anything is driven.
 
 use super::speed::SpeedCheck;
-use super::{Blockers, Fault, Guard, Limits, Mode, SceneKind, Sense, Surroundings};
+use super::{Blockers, Fault, Guard, GuardInputs, Limits, Mode, SceneKind, Surroundings};
 
 impl Guard {
     /// Checks every input of a tick before anything is driven. Returns whether the
     /// encoders lost counts, so that the arm has to be zeroed again.
-    pub fn watch(&mut self, sense: &Sense, around: &Surroundings<'_>) -> bool {
+    pub fn watch(&mut self, sense: &GuardInputs, around: &Surroundings<'_>) -> bool {
         self.limits = Limits::empty();
         // Before the arm is zeroed its position means nothing, nor does a jump.
         let jumped = around.zeroed && self.has_jumped(sense.counts);
@@ -47,7 +47,7 @@ impl Guard {
         jumped
     }
 
-    fn watch_driven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
+    fn watch_driven(&mut self, sense: &GuardInputs, around: &Surroundings<'_>) {
         if let Some(fault) = self.find_fault(sense, around) {
             return self.trip(fault);
         }
@@ -61,7 +61,7 @@ impl Guard {
     }
 
     /// The first fault that may not be while the amplifiers are on.
-    fn find_fault(&mut self, sense: &Sense, around: &Surroundings<'_>) -> Option<Fault> {
+    fn find_fault(&mut self, sense: &GuardInputs, around: &Surroundings<'_>) -> Option<Fault> {
         let Some((mechanism, pose)) = around.arm else {
             return Some(Fault::CalibrationCorrupt);
         };
@@ -101,7 +101,7 @@ impl Guard {
         }
     }
 
-    fn watch_undriven(&mut self, sense: &Sense, around: &Surroundings<'_>) {
+    fn watch_undriven(&mut self, sense: &GuardInputs, around: &Surroundings<'_>) {
         // Nothing is commanded: what flows all the same is what was measured.
         self.motors.rest(self.feedback.measured_a());
         self.feedback.rest(sense);
@@ -113,7 +113,7 @@ impl Guard {
     }
 
     /// What keeps the arm from being armed, besides what the user has to do.
-    fn find_blockers(&self, sense: &Sense, around: &Surroundings<'_>) -> Blockers {
+    fn find_blockers(&self, sense: &GuardInputs, around: &Surroundings<'_>) -> Blockers {
         let outside = around.arm.is_some_and(|(_, pose)| {
             let q = pose.angles();
             !(self.stops.each_allows(q) && self.stops.linkage_allows(q))

@@ -12,7 +12,7 @@
 use glam::Vec3;
 
 use super::calibration::Calibration;
-use super::check::{BadCalibration, Bound, CalibrationField, check};
+use super::check::{Bound, CalibrationError, CalibrationField, check};
 
 /// A record's speed limit may be above the preset's by this: at twice the limit no force
 /// is left, and that has to be below the speed at which counts are taken for a jump.
@@ -36,7 +36,7 @@ const ROUNDING: f32 = 1e-4;
 
 impl Calibration {
     /// Whether the record stays within its model's ceilings.
-    pub(super) fn check_ceilings(&self) -> Result<(), BadCalibration> {
+    pub(super) fn check_ceilings(&self) -> Result<(), CalibrationError> {
         let preset = self.model.preset();
         let (mine, theirs) = (&self.thermal, &preset.thermal);
         let (peak, continuous) = (self.peak_current_a, self.continuous_current_a);
@@ -98,7 +98,7 @@ impl Calibration {
     }
 
     /// Whether the arm is about as large, as finely counted and as free to turn as the model.
-    fn check_geometry(&self, preset: &Self) -> Result<(), BadCalibration> {
+    fn check_geometry(&self, preset: &Self) -> Result<(), CalibrationError> {
         self.at_most(CalibrationField::L1, self.l1_mm, LINK_SHARE * preset.l1_mm)?;
         self.at_most(CalibrationField::L2, self.l2_mm, LINK_SHARE * preset.l2_mm)?;
         self.check_counts(preset)?;
@@ -125,7 +125,7 @@ impl Calibration {
 
     /// Whether a radian of each joint has about as many counts as the model's. Where it has
     /// not, the number that is farther from the preset's is named.
-    fn check_counts(&self, preset: &Self) -> Result<(), BadCalibration> {
+    fn check_counts(&self, preset: &Self) -> Result<(), CalibrationError> {
         let (least, most) = match preset.has_guessed_ratios() {
             true => COUNTS_SHARE_OF_A_GUESS,
             false => COUNTS_SHARE,
@@ -157,8 +157,8 @@ impl Calibration {
     /// `full_scale_a` is the current at the ends of its outputs' range, A.
     ///
     /// # Errors
-    /// [`BadCalibration`] names the axis.
-    pub fn check_board(&self, full_scale_a: f32) -> Result<(), BadCalibration> {
+    /// [`CalibrationError`] names the axis.
+    pub fn check_board(&self, full_scale_a: f32) -> Result<(), CalibrationError> {
         for axis in 0..3 {
             let value = self.peak_current_a[axis];
             let bound = Bound::Board { max: full_scale_a };
@@ -187,7 +187,7 @@ impl Calibration {
         field: CalibrationField,
         values: Vec3,
         most: Vec3,
-    ) -> Result<(), BadCalibration> {
+    ) -> Result<(), CalibrationError> {
         for axis in 0..3 {
             let (value, most) = (values[axis], most[axis]);
             let bound = self.bound(field.range().0, most);
@@ -202,7 +202,7 @@ impl Calibration {
         field: CalibrationField,
         value: f32,
         most: f32,
-    ) -> Result<(), BadCalibration> {
+    ) -> Result<(), CalibrationError> {
         let bound = self.bound(field.range().0, most);
         check(field, None, value, bound, value <= most * (1.0 + ROUNDING))
     }
@@ -212,7 +212,7 @@ impl Calibration {
         field: CalibrationField,
         value: f32,
         least: f32,
-    ) -> Result<(), BadCalibration> {
+    ) -> Result<(), CalibrationError> {
         let bound = self.bound(least, field.range().1);
         check(field, None, value, bound, value >= least * (1.0 - ROUNDING))
     }

@@ -122,7 +122,7 @@ impl CalibrationField {
 /// Why a record cannot be worked with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct BadCalibration {
+pub struct CalibrationError {
     /// The number that is wrong.
     pub field: CalibrationField,
     /// The axis, 1 to 3, where there is one for each.
@@ -155,7 +155,7 @@ pub enum Bound {
     },
 }
 
-impl fmt::Display for BadCalibration {
+impl fmt::Display for CalibrationError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (min, max, unit) = self.field.range();
         write!(f, "{:?}", self.field)?;
@@ -187,15 +187,15 @@ impl fmt::Display for BadCalibration {
     }
 }
 
-impl core::error::Error for BadCalibration {}
+impl core::error::Error for CalibrationError {}
 
 impl Calibration {
     /// Whether every number is one that the loop can work with, and within what the
     /// model may have.
     ///
     /// # Errors
-    /// [`BadCalibration`] names the first that is not.
-    pub fn validate(&self) -> Result<(), BadCalibration> {
+    /// [`CalibrationError`] names the first that is not.
+    pub fn validate(&self) -> Result<(), CalibrationError> {
         let (limits, thermal) = (&self.limits, &self.thermal);
         let (min, max) = (limits.min_rad, limits.max_rad);
         one(CalibrationField::CountsPerTurn, self.counts_per_turn)?;
@@ -261,10 +261,10 @@ pub(super) fn check(
     value: f32,
     bound: Bound,
     good: bool,
-) -> Result<(), BadCalibration> {
+) -> Result<(), CalibrationError> {
     match good {
         true => Ok(()),
-        false => Err(BadCalibration {
+        false => Err(CalibrationError {
             field,
             axis: axis.map(|axis| axis as u8 + 1),
             value,
@@ -274,21 +274,21 @@ pub(super) fn check(
 }
 
 /// A number in its range.
-fn one(field: CalibrationField, value: f32) -> Result<(), BadCalibration> {
+fn one(field: CalibrationField, value: f32) -> Result<(), CalibrationError> {
     let (min, max, _) = field.range();
     let good = (min..=max).contains(&value);
     check(field, None, value, Bound::Range, good)
 }
 
 /// A number for each axis in its range.
-fn each(field: CalibrationField, values: Vec3) -> Result<(), BadCalibration> {
+fn each(field: CalibrationField, values: Vec3) -> Result<(), CalibrationError> {
     let (min, max, _) = field.range();
     let (min, max) = (Vec3::splat(min), Vec3::splat(max));
     each_is(field, values, values.cmpge(min) & values.cmple(max))
 }
 
 /// A number for each axis that is as it has to be.
-fn each_is(field: CalibrationField, values: Vec3, good: BVec3) -> Result<(), BadCalibration> {
+fn each_is(field: CalibrationField, values: Vec3, good: BVec3) -> Result<(), CalibrationError> {
     (0..3).try_for_each(|axis| {
         let (value, good) = (values[axis], good.test(axis));
         check(field, Some(axis), value, Bound::Range, good)

@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::calibration::Calibration;
-use super::check::BadCalibration;
+use super::check::CalibrationError;
 use super::kinematics::Pose;
 
 /// A valid record and what follows from it.
@@ -13,9 +13,9 @@ use super::kinematics::Pose;
 ///
 /// ```
 /// use hapterra_core::Vec3;
-/// use hapterra_core::phantom::{Calibration, Mechanism};
+/// use hapterra_core::phantom::{Calibration, Kinematics};
 ///
-/// let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5)?;
+/// let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5)?;
 /// let pose = mechanism.pose([0, 0, 0], [0, 0, 0]); // in the zero pose
 /// // Device frame: x toward the user, z up; the fore link hangs down.
 /// assert!((pose.tip_mm() - Vec3::new(209.55, 0.0, -169.545)).length() < 1e-3);
@@ -28,22 +28,22 @@ use super::kinematics::Pose;
 /// // And back from a tip to angles and counts.
 /// let angles = mechanism.calibration().joints_at(pose.tip_mm()).expect("in reach");
 /// assert_eq!(mechanism.counts(angles, [0, 0, 0]), [0, 0, 0]);
-/// # Ok::<(), hapterra_core::phantom::BadCalibration>(())
+/// # Ok::<(), hapterra_core::phantom::CalibrationError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mechanism {
+pub struct Kinematics {
     calibration: Calibration,
     radians_per_count: Vec3,
     amperes_per_nm: Vec3,
     home_mm: Vec3,
 }
 
-impl Mechanism {
+impl Kinematics {
     /// Checks a record and prepares it.
     ///
     /// # Errors
-    /// [`BadCalibration`] names the number that cannot be worked with.
-    pub fn new(calibration: &Calibration) -> Result<Self, BadCalibration> {
+    /// [`CalibrationError`] names the number that cannot be worked with.
+    pub fn new(calibration: &Calibration) -> Result<Self, CalibrationError> {
         calibration.validate()?;
         let per_ampere = calibration.motor_sign * calibration.ratio * calibration.torque_constant;
         Ok(Self {

@@ -51,7 +51,7 @@ fn the_tip_of_counts_is_within_a_micrometre_over_the_workspace_of_every_preset()
                 zero_rad,
                 ..model.preset()
             };
-            let mechanism = Mechanism::new(&record).expect("valid");
+            let mechanism = Kinematics::new(&record).expect("valid");
             let (mut worst, mut poses) = (0.0f64, 0);
             for q in workspace(&record, cases(3, 24) as usize) {
                 let counts = mechanism.counts(q, [0; 3]);
@@ -76,7 +76,7 @@ fn counts_are_those_of_the_pose_wherever_the_counters_stood_in_the_zero_pose() {
         zero_rad: Vec3::new(0.0, 0.2, 0.3),
         ..Calibration::PREMIUM_1_5
     };
-    let mechanism = Mechanism::new(&record).expect("valid");
+    let mechanism = Kinematics::new(&record).expect("valid");
     for zero in [[0; 3], [12_345, -777, i32::MAX - 10]] {
         assert_eq!(mechanism.counts(record.zero_rad, zero), zero);
         let q = Vec3::new(0.4, -0.1, 0.6);
@@ -89,7 +89,7 @@ fn counts_are_those_of_the_pose_wherever_the_counters_stood_in_the_zero_pose() {
 
 #[test]
 fn one_count_moves_the_tip_by_what_the_data_sheet_says() {
-    let mechanism = Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid");
+    let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");
     let home = mechanism.pose([0; 3], [0; 3]).tip_mm();
     assert_eq!(home, mechanism.home_mm());
     for (axis, expected_um) in [24.2, 28.7, 23.2].into_iter().enumerate() {
@@ -106,7 +106,7 @@ fn a_newton_upwards_at_home_takes_the_current_that_the_lever_says() {
         motor_sign: Vec3::new(1.0, -1.0, 1.0),
         ..Calibration::PREMIUM_1_5
     };
-    let mechanism = Mechanism::new(&record).expect("valid");
+    let mechanism = Kinematics::new(&record).expect("valid");
     let pose = mechanism.pose([0; 3], [0; 3]);
     let currents = mechanism.currents_a(pose.torques_nm(Vec3::Z));
     let expected = Vec3::new(0.0, -0.209_55 / (11.2 * 0.0234), 0.0);
@@ -119,5 +119,5 @@ fn a_record_that_makes_no_sense_gives_no_mechanism() {
         ratio: Vec3::ZERO,
         ..Calibration::PREMIUM_1_5
     };
-    assert!(Mechanism::new(&record).is_err());
+    assert!(Kinematics::new(&record).is_err());
 }

@@ -1,6 +1,6 @@
 //! The Phantom: encoder counts to tip position, tip force to motor currents.
 //!
-//! Read `calibration` (what is known of an arm), [`Mechanism`] (what follows
+//! Read `calibration` (what is known of an arm), [`Kinematics`] (what follows
 //! from it, worked out outside the tick), [`Pose`] (tip and torques), and
 //! [`Readings`] (velocity). `presets`, `check`, `ceiling` and `record` are about
 //! the calibration itself: records to begin with, checks, what no record can raise, and
@@ -22,11 +22,11 @@ mod trig;
 mod velocity;
 
 pub use calibration::{Calibration, JointLimits, Model, Thermal};
-pub use check::{BadCalibration, Bound, CalibrationField};
+pub use check::{Bound, CalibrationError, CalibrationField};
 pub use inverse::Unreachable;
 pub(crate) use kinematics::to_device_frame;
 pub use kinematics::{Pose, to_terrain_frame};
-pub use mechanism::Mechanism;
-pub use record::{BadRecord, RECORD_BYTES, VERSION as RECORD_VERSION};
+pub use mechanism::Kinematics;
+pub use record::{RECORD_BYTES, RecordError, VERSION as RECORD_VERSION};
 pub use trig::sin_cos;
 pub use velocity::{Readings, WINDOW as VELOCITY_WINDOW};

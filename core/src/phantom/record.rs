@@ -10,7 +10,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::calibration::Calibration;
-use super::check::BadCalibration;
+use super::check::CalibrationError;
 use crate::crc;
 
 /// Version of the layout. Any change to [`Calibration`] is a new one.
@@ -31,7 +31,7 @@ struct Record {
 
 /// Why bytes are no calibration record.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum BadRecord {
+pub enum RecordError {
     /// They do not begin as a record does.
     #[error("these bytes are no calibration record")]
     NotARecord,
@@ -46,7 +46,7 @@ pub enum BadRecord {
     Damaged,
     /// An undamaged record with a number that makes no sense.
     #[error("the calibration record does not make sense: {0}")]
-    Invalid(#[source] BadCalibration),
+    Invalid(#[source] CalibrationError),
 }
 
 impl Calibration {
@@ -64,17 +64,17 @@ impl Calibration {
     /// Reads a record and checks it as a whole.
     ///
     /// # Errors
-    /// [`BadRecord`].
-    pub fn decode(bytes: &[u8]) -> Result<Self, BadRecord> {
-        let rest = bytes.strip_prefix(&MAGIC).ok_or(BadRecord::NotARecord)?;
-        let version = rest.first_chunk().ok_or(BadRecord::Damaged)?;
+    /// [`RecordError`].
+    pub fn decode(bytes: &[u8]) -> Result<Self, RecordError> {
+        let rest = bytes.strip_prefix(&MAGIC).ok_or(RecordError::NotARecord)?;
+        let version = rest.first_chunk().ok_or(RecordError::Damaged)?;
         let found = u16::from_le_bytes(*version);
         if found != VERSION {
-            return Err(BadRecord::Version { found });
+            return Err(RecordError::Version { found });
         }
-        let (record, _) = crc::take::<Record>(bytes).ok_or(BadRecord::Damaged)?;
+        let (record, _) = crc::take::<Record>(bytes).ok_or(RecordError::Damaged)?;
         let calibration = record.calibration;
-        calibration.validate().map_err(BadRecord::Invalid)?;
+        calibration.validate().map_err(RecordError::Invalid)?;
         Ok(calibration)
     }
 }
@@ -113,17 +113,20 @@ mod tests {
             bad[bit / 8] ^= 1 << (bit % 8);
             let error = Calibration::decode(&bad).expect_err("damaged");
             let expected = match bit / 8 {
-                0..4 => matches!(error, BadRecord::NotARecord),
-                4..6 => matches!(error, BadRecord::Version { .. }),
-                _ => matches!(error, BadRecord::Damaged),
+                0..4 => matches!(error, RecordError::NotARecord),
+                4..6 => matches!(error, RecordError::Version { .. }),
+                _ => matches!(error, RecordError::Damaged),
             };
             assert!(expected, "bit {bit}: {error:?}");
         }
         for length in (0..good.len()).step_by(lengths) {
             assert!(Calibration::decode(&good[..length]).is_err(), "{length}");
         }
-        assert_eq!(Calibration::decode(&[0xFF; 64]), Err(BadRecord::NotARecord));
-        assert_eq!(Calibration::decode(&[0; 64]), Err(BadRecord::NotARecord));
+        assert_eq!(
+            Calibration::decode(&[0xFF; 64]),
+            Err(RecordError::NotARecord)
+        );
+        assert_eq!(Calibration::decode(&[0; 64]), Err(RecordError::NotARecord));
     }
 
     #[test]
@@ -134,6 +137,6 @@ mod tests {
         };
         let mut buffer = [0; RECORD_BYTES];
         let error = Calibration::decode(record.encode(&mut buffer)).expect_err("nonsense");
-        assert!(matches!(error, BadRecord::Invalid(_)), "{error}");
+        assert!(matches!(error, RecordError::Invalid(_)), "{error}");
     }
 }

@@ -25,13 +25,13 @@ impl CoarseTile {
     /// comes than a tick has time for.
     pub const LEAST_SHIFT: u8 = 2;
     /// The coarsest, as a power of two: all that positions can count.
-    pub const MOST_SHIFT: u8 = 24;
+    pub const MAX_SHIFT: u8 = 24;
 
     /// Whether it is one that the loop can work with, in a scene of this level.
     #[must_use]
     pub fn is_valid(&self, level: u8) -> bool {
         let Cell { x, y } = self.first;
-        (Self::LEAST_SHIFT..=Self::MOST_SHIFT).contains(&self.shift)
+        (Self::LEAST_SHIFT..=Self::MAX_SHIFT).contains(&self.shift)
             && level.checked_add(self.shift).is_some()
             && x.unsigned_abs().max(y.unsigned_abs()) <= MAX_CELL.unsigned_abs()
     }

@@ -10,7 +10,7 @@ pub const TILE_SHIFT: u32 = 5;
 pub const TILE_CELLS: usize = 1 << TILE_SHIFT;
 /// Samples along a tile's side; the last row and column are shared with the
 /// next tile, so that a patch never needs two tiles.
-pub const POSTS: usize = TILE_CELLS + 1;
+pub const TILE_SAMPLES: usize = TILE_CELLS + 1;
 
 /// Side of the smallest block whose maximum is kept, as a power of two.
 ///

@@ -16,12 +16,12 @@ mod window;
 
 pub use coarse_tile::CoarseTile;
 pub use extent::{CellBox, FieldSize};
-pub use index::{POSTS, TILE_CELLS, TILE_SHIFT, TileIndex, TileKey};
+pub use index::{TILE_CELLS, TILE_SAMPLES, TILE_SHIFT, TileIndex, TileKey};
 pub use settling::SETTLING_MM_S;
-pub use storage::{BadField, FieldStorage};
-pub use tile::{BadTile, MAX_STEP_CELLS, Tile};
+pub use storage::{FieldError, TileArena};
+pub use tile::{MAX_STEP_CELLS, Tile, TileError};
 pub use tile_requests::{
-    HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, RETRY_TICKS, TileDemand, TileRequester,
+    HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, RETRY_TICKS, RequestHint, TileRequester,
 };
 pub use underlay::Underlay;
-pub use window::{Corners, Ground, Window};
+pub use window::{CellContent, Corners, Window};

@@ -25,7 +25,7 @@ use super::index::{TileIndex, wrap};
 pub const SETTLING_MM_S: f32 = 50.0;
 
 /// How far the tiles of a window may be from the underlay.
-pub(super) struct Settling<const D: usize> {
+pub(super) struct TileBlend<const D: usize> {
     /// By slot: how far now, and from how far on the tile is the surface as it is; cells.
     pub(super) slots: [[Allowance; D]; D],
     /// How many tiles settle.
@@ -48,7 +48,7 @@ impl Allowance {
     };
 }
 
-impl<const D: usize> Settling<D> {
+impl<const D: usize> TileBlend<D> {
     pub(super) const NOTHING: Self = Self {
         slots: [[Allowance::ANY; D]; D],
         count: 0,

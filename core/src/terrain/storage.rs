@@ -9,32 +9,32 @@ use crate::grid::MAX_CELL;
 /// Memory of a window of `D × D` tiles, 5.5 kB each; may hold a whole field.
 ///
 /// Without an allocator it lives wherever its owner puts it. On a desktop, put
-/// large ones on the heap: `Box::new(FieldStorage::<16>::new())`, then
+/// large ones on the heap: `Box::new(TileArena::<16>::new())`, then
 /// [`Self::fill`].
 ///
 /// ```
 /// use hapterra_core::grid::Cell;
-/// use hapterra_core::terrain::{FieldSize, FieldStorage, Ground};
+/// use hapterra_core::terrain::{FieldSize, TileArena, CellContent};
 ///
 /// // A ramp of 40 × 20 cells that rises by half a cell from cell to cell.
 /// let size = FieldSize::new(40, 20);
-/// let mut ramp = FieldStorage::<2>::from_fn(size, |x, _y| 0.5 * x as f32)?;
+/// let mut ramp = TileArena::<2>::from_fn(size, |x, _y| 0.5 * x as f32)?;
 /// let window = ramp.window();
-/// let Ground::Patch(corners) = window.ground(Cell::new(10, 3)) else {
+/// let CellContent::Patch(corners) = window.ground(Cell::new(10, 3)) else {
 ///     panic!("the field has a surface there");
 /// };
 /// assert_eq!(corners.heights, [5.0, 5.5, 5.0, 5.5]);
-/// # Ok::<(), hapterra_core::terrain::BadField>(())
+/// # Ok::<(), hapterra_core::terrain::FieldError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct FieldStorage<const D: usize> {
+pub struct TileArena<const D: usize> {
     tiles: [[Tile; D]; D],
     size: FieldSize,
 }
 
 /// Why heights are no field that a storage can hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BadField {
+pub enum FieldError {
     /// No cells, or more than there is room for.
     #[error("a field of {} × {} cells; this storage holds from 1 × 1 to {most} × {most}", size.columns, size.rows)]
     Size {
@@ -53,9 +53,9 @@ pub enum BadField {
     Step,
 }
 
-impl<const D: usize> FieldStorage<D> {
+impl<const D: usize> TileArena<D> {
     /// Most cells a side that a field may have.
-    pub const MOST_CELLS: i32 = {
+    pub const MAX_CELLS: i32 = {
         assert!(
             D <= MAX_CELL as usize / TILE_CELLS,
             "that many cells cannot be told apart"
@@ -77,11 +77,11 @@ impl<const D: usize> FieldStorage<D> {
     /// for a hole. It is called row by row from the south.
     ///
     /// # Errors
-    /// [`BadField::Size`] when the size is not one that fits.
+    /// [`FieldError::Size`] when the size is not one that fits.
     pub fn from_fn(
         size: FieldSize,
         mut height: impl FnMut(i32, i32) -> f32,
-    ) -> Result<Self, BadField> {
+    ) -> Result<Self, FieldError> {
         let mut storage = Self::new();
         let columns = size.columns.saturating_add(1).max(1);
         storage.fill(size, (0..).map(|i| height(i % columns, i / columns)))?;
@@ -92,37 +92,37 @@ impl<const D: usize> FieldStorage<D> {
     /// west to east. NaN is a hole.
     ///
     /// ```
-    /// # use hapterra_core::terrain::{BadField, FieldSize, FieldStorage};
+    /// # use hapterra_core::terrain::{FieldError, FieldSize, TileArena};
     /// // Two cells side by side have three samples in each of two rows.
     /// let heights = [0.0, 1.0, 0.0, 0.0, 1.0, 0.0];
-    /// let field = FieldStorage::<1>::from_slice(FieldSize::new(2, 1), &heights)?;
+    /// let field = TileArena::<1>::from_slice(FieldSize::new(2, 1), &heights)?;
     /// assert_eq!(field.top(), 2);
-    /// let more = FieldStorage::<1>::from_slice(FieldSize::new(2, 2), &heights);
-    /// assert_eq!(more.unwrap_err(), BadField::Count(9));
-    /// # Ok::<(), BadField>(())
+    /// let more = TileArena::<1>::from_slice(FieldSize::new(2, 2), &heights);
+    /// assert_eq!(more.unwrap_err(), FieldError::Count(9));
+    /// # Ok::<(), FieldError>(())
     /// ```
     ///
     /// # Errors
-    /// [`BadField`] when the size is not one that fits, or there are more or fewer
+    /// [`FieldError`] when the size is not one that fits, or there are more or fewer
     /// heights than a field of this size has.
-    pub fn from_slice(size: FieldSize, heights: &[f32]) -> Result<Self, BadField> {
+    pub fn from_slice(size: FieldSize, heights: &[f32]) -> Result<Self, FieldError> {
         let mut storage = Self::new();
         let mut heights = heights.iter().copied();
         storage.fill(size, &mut heights)?;
         match heights.len() {
             0 => Ok(storage),
-            _ => Err(BadField::Count(samples(size))),
+            _ => Err(FieldError::Count(samples(size))),
         }
     }
 
     /// Holds a field of rows of heights, as [`Self::from_slice`].
     ///
     /// ```
-    /// # use hapterra_core::terrain::{BadField, FieldSize, FieldStorage};
+    /// # use hapterra_core::terrain::{FieldError, FieldSize, TileArena};
     /// let rows = (0..=2).map(|y| [0.0, 0.5 * y as f32]);
-    /// let field = FieldStorage::<1>::from_rows(FieldSize::new(1, 2), rows)?;
+    /// let field = TileArena::<1>::from_rows(FieldSize::new(1, 2), rows)?;
     /// assert_eq!(field.top(), 2);
-    /// # Ok::<(), BadField>(())
+    /// # Ok::<(), FieldError>(())
     /// ```
     ///
     /// # Errors
@@ -130,7 +130,7 @@ impl<const D: usize> FieldStorage<D> {
     pub fn from_rows<R: IntoIterator<Item = f32>>(
         size: FieldSize,
         rows: impl IntoIterator<Item = R>,
-    ) -> Result<Self, BadField> {
+    ) -> Result<Self, FieldError> {
         let mut storage = Self::new();
         storage.fill(size, rows.into_iter().flatten())?;
         Ok(storage)
@@ -145,20 +145,20 @@ impl<const D: usize> FieldStorage<D> {
         &mut self,
         size: FieldSize,
         heights: impl IntoIterator<Item = f32>,
-    ) -> Result<(), BadField> {
+    ) -> Result<(), FieldError> {
         self.size = FieldSize::new(0, 0);
         for tile in self.tiles.as_flattened_mut() {
             tile.clear();
         }
-        let fits = |cells: i32| (1..=Self::MOST_CELLS).contains(&cells);
+        let fits = |cells: i32| (1..=Self::MAX_CELLS).contains(&cells);
         if !fits(size.columns) || !fits(size.rows) {
-            let most = Self::MOST_CELLS;
-            return Err(BadField::Size { size, most });
+            let most = Self::MAX_CELLS;
+            return Err(FieldError::Size { size, most });
         }
         let mut heights = heights.into_iter();
         for y in 0..=size.rows {
             for x in 0..=size.columns {
-                let height = heights.next().ok_or(BadField::Count(samples(size)))?;
+                let height = heights.next().ok_or(FieldError::Count(samples(size)))?;
                 self.set(x as usize, y as usize, height);
             }
         }
@@ -166,7 +166,7 @@ impl<const D: usize> FieldStorage<D> {
         let held = self.tiles.as_flattened().iter();
         if !held.into_iter().all(Tile::is_climbable) {
             self.size = FieldSize::new(0, 0);
-            return Err(BadField::Step);
+            return Err(FieldError::Step);
         }
         for index in size.tiles() {
             let tile = &mut self.tiles[index.row as usize][index.col as usize];
@@ -215,7 +215,7 @@ impl<const D: usize> FieldStorage<D> {
     }
 }
 
-impl<const D: usize> Default for FieldStorage<D> {
+impl<const D: usize> Default for TileArena<D> {
     fn default() -> Self {
         Self::new()
     }
@@ -239,7 +239,7 @@ fn shares(sample: usize) -> impl Iterator<Item = (usize, usize)> {
 mod tests {
     use super::*;
     use crate::grid::{Altitude, Cell};
-    use crate::terrain::{CellBox, Corners, Ground};
+    use crate::terrain::{CellBox, CellContent, Corners};
     use std::format;
 
     fn rough(x: i32, y: i32) -> f32 {
@@ -248,24 +248,24 @@ mod tests {
 
     #[test]
     fn every_patch_reads_back_its_samples_also_across_tiles() {
-        let mut storage = FieldStorage::<2>::from_fn(FieldSize::new(40, 33), rough).unwrap();
+        let mut storage = TileArena::<2>::from_fn(FieldSize::new(40, 33), rough).unwrap();
         let window = storage.window();
         for (x, y) in [(0, 0), (31, 31), (32, 31), (31, 32), (32, 32), (39, 32)] {
             let heights = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(u, v)| rough(x + u, y + v));
             let corners = Corners { base: 0, heights };
             assert_eq!(
                 window.ground(Cell::new(x, y)),
-                Ground::Patch(corners),
+                CellContent::Patch(corners),
                 "{x} {y}"
             );
         }
-        assert_eq!(window.ground(Cell::new(40, 0)), Ground::Hole);
-        assert_eq!(window.ground(Cell::new(0, 33)), Ground::Hole);
+        assert_eq!(window.ground(Cell::new(40, 0)), CellContent::Hole);
+        assert_eq!(window.ground(Cell::new(0, 33)), CellContent::Hole);
     }
 
     #[test]
     fn it_fills_whole_tiles_as_well_as_parts_of_them() {
-        let mut storage = FieldStorage::<2>::new();
+        let mut storage = TileArena::<2>::new();
         for (columns, rows) in [(64, 64), (1, 1), (32, 33)] {
             let size = FieldSize::new(columns, rows);
             let heights = core::iter::repeat_n(2.5, ((columns + 1) * (rows + 1)) as usize);
@@ -276,23 +276,23 @@ mod tests {
             assert!(window.is_clear(whole, Altitude::new(3, 0.0)));
             assert!(!window.is_clear(whole, Altitude::new(2, 0.25)));
             let last = window.ground(whole.to);
-            assert!(matches!(last, Ground::Patch(_)), "{last:?}");
+            assert!(matches!(last, CellContent::Patch(_)), "{last:?}");
         }
     }
 
     #[test]
     fn what_does_not_fit_is_an_error_and_leaves_nothing() {
-        let mut storage = FieldStorage::<1>::from_fn(FieldSize::new(5, 5), rough).unwrap();
+        let mut storage = TileArena::<1>::from_fn(FieldSize::new(5, 5), rough).unwrap();
         for (columns, rows) in [(33, 1), (1, i32::MAX), (0, 5), (5, i32::MIN)] {
             let size = FieldSize::new(columns, rows);
             let error = storage.fill(size, core::iter::repeat(0.0)).unwrap_err();
-            assert_eq!(error, BadField::Size { size, most: 32 });
-            assert_eq!(storage.window().ground(Cell::default()), Ground::Hole);
+            assert_eq!(error, FieldError::Size { size, most: 32 });
+            assert_eq!(storage.window().ground(Cell::default()), CellContent::Hole);
         }
         let size = FieldSize::new(2, 2);
-        let few = FieldStorage::<1>::from_slice(size, &[0.0; 8]).unwrap_err();
-        let many = FieldStorage::<1>::from_slice(size, &[0.0; 10]).unwrap_err();
-        assert_eq!((few, many), (BadField::Count(9), BadField::Count(9)));
+        let few = TileArena::<1>::from_slice(size, &[0.0; 8]).unwrap_err();
+        let many = TileArena::<1>::from_slice(size, &[0.0; 10]).unwrap_err();
+        assert_eq!((few, many), (FieldError::Count(9), FieldError::Count(9)));
         assert_eq!(
             format!("{few}"),
             "a field of this size has 9 heights: one more than cells each way"
@@ -303,17 +303,17 @@ mod tests {
     fn field_with_too_steep_step_is_refused() {
         let size = FieldSize::new(40, 40);
         let wall = |height: f32| {
-            FieldStorage::<2>::from_fn(size, move |x, _| if x > 32 { height } else { 0.0 })
+            TileArena::<2>::from_fn(size, move |x, _| if x > 32 { height } else { 0.0 })
         };
         assert!(wall(MAX_STEP_CELLS).is_ok());
-        assert_eq!(wall(MAX_STEP_CELLS + 1.0).err(), Some(BadField::Step));
+        assert_eq!(wall(MAX_STEP_CELLS + 1.0).err(), Some(FieldError::Step));
         let mut tile = std::boxed::Box::new(Tile::VACANT);
         let refused = tile.fill(TileKey::new(0, 0, 0), 0, |_, row| {
             1e4 * row as f32 * row as f32
         });
         assert_eq!(
             (refused, tile.key()),
-            (Err(crate::terrain::BadTile::Step), None)
+            (Err(crate::terrain::TileError::Step), None)
         );
     }
 }

@@ -1,7 +1,7 @@
 //! A tile: 32 × 32 patches of terrain, and the maxima that let a sweep skip it.
 
 use super::extent::FieldSize;
-use super::index::{BLOCK_SHIFT, POSTS, TILE_CELLS, TileIndex, TileKey};
+use super::index::{BLOCK_SHIFT, TILE_CELLS, TILE_SAMPLES, TileIndex, TileKey};
 use super::packed::Unpacker;
 use crate::grid::{Altitude, Cell, MAX_CELL};
 
@@ -15,7 +15,7 @@ pub const MAX_STEP_CELLS: f32 = 1e4;
 /// Why the bytes of a tile were refused. The buffer is left vacant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum BadTile {
+pub enum TileError {
     /// Not 33 × 33 little-endian `f32`.
     Length,
     /// The base lies outside ±[`MAX_CELL`].
@@ -52,7 +52,7 @@ pub struct Tile {
     base: i32,
     /// Heights above `base` in cells, `[row][column]` from the south-west;
     /// NaN where there is no surface.
-    posts: [[f32; POSTS]; POSTS],
+    posts: [[f32; TILE_SAMPLES]; TILE_SAMPLES],
     blocks: [[f32; BLOCKS]; BLOCKS],
     quarters: [[f32; QUARTERS]; QUARTERS],
     highest: f32,
@@ -61,7 +61,7 @@ pub struct Tile {
     has_materials: bool,
     /// Which material of the scene's table each sample has, as `posts`; not looked at
     /// unless the tile came with them.
-    materials: [[u8; POSTS]; POSTS],
+    materials: [[u8; TILE_SAMPLES]; TILE_SAMPLES],
 }
 
 impl Tile {
@@ -72,13 +72,13 @@ impl Tile {
         content: Content::Nothing,
         is_whole: false,
         base: 0,
-        posts: [[0.0; POSTS]; POSTS],
+        posts: [[0.0; TILE_SAMPLES]; TILE_SAMPLES],
         blocks: [[0.0; BLOCKS]; BLOCKS],
         quarters: [[0.0; QUARTERS]; QUARTERS],
         highest: 0.0,
         lowest: 0.0,
         has_materials: false,
-        materials: [[0; POSTS]; POSTS],
+        materials: [[0; TILE_SAMPLES]; TILE_SAMPLES],
     };
 
     /// Which tile this is; `None` for a vacant buffer.
@@ -103,13 +103,13 @@ impl Tile {
     /// the south.
     ///
     /// # Errors
-    /// [`BadTile::Materials`] unless there are exactly 33 × 33 of them, each below `count`. The
+    /// [`TileError::Materials`] unless there are exactly 33 × 33 of them, each below `count`. The
     /// buffer is left vacant, as where it was vacant before.
     pub fn set_materials(
         &mut self,
         count: usize,
         materials: impl IntoIterator<Item = u8>,
-    ) -> Result<(), BadTile> {
+    ) -> Result<(), TileError> {
         self.set_materials_from(count, &mut materials.into_iter())
     }
 
@@ -119,7 +119,7 @@ impl Tile {
         &mut self,
         count: usize,
         materials: &mut dyn Iterator<Item = u8>,
-    ) -> Result<(), BadTile> {
+    ) -> Result<(), TileError> {
         let mut is_right = self.content != Content::Nothing;
         for place in self.materials.as_flattened_mut() {
             // One that is missing is beyond every table.
@@ -128,7 +128,7 @@ impl Tile {
         }
         if !is_right || materials.next().is_some() {
             self.vacate();
-            return Err(BadTile::Materials);
+            return Err(TileError::Materials);
         }
         self.has_materials = true;
         Ok(())
@@ -160,13 +160,13 @@ impl Tile {
     /// and row in `0..33`. NaN is a hole; so is anything beyond ±[`MAX_CELL`].
     ///
     /// # Errors
-    /// [`BadTile::Base`] when `base` is out of range, [`BadTile::Step`] when it is too steep.
+    /// [`TileError::Base`] when `base` is out of range, [`TileError::Step`] when it is too steep.
     pub fn fill(
         &mut self,
         key: TileKey,
         base: i32,
         mut height: impl FnMut(usize, usize) -> f32,
-    ) -> Result<(), BadTile> {
+    ) -> Result<(), TileError> {
         self.fill_with(key, base, &mut height)
     }
 
@@ -177,18 +177,18 @@ impl Tile {
         key: TileKey,
         base: i32,
         height: &mut dyn FnMut(usize, usize) -> f32,
-    ) -> Result<(), BadTile> {
+    ) -> Result<(), TileError> {
         self.vacate();
         if base.unsigned_abs() > MAX_CELL.unsigned_abs() {
-            return Err(BadTile::Base);
+            return Err(TileError::Base);
         }
-        for row in 0..POSTS {
-            for col in 0..POSTS {
+        for row in 0..TILE_SAMPLES {
+            for col in 0..TILE_SAMPLES {
                 self.set(col, row, height(col, row));
             }
         }
         if !self.is_climbable() {
-            return Err(BadTile::Step);
+            return Err(TileError::Step);
         }
         self.close(key, base);
         Ok(())
@@ -198,11 +198,11 @@ impl Tile {
     pub(super) fn is_climbable(&self) -> bool {
         // A hole has no step.
         let steps = |a: f32, b: f32| (a - b).abs() > MAX_STEP_CELLS;
-        let in_row = |row: &[f32; POSTS]| {
+        let in_row = |row: &[f32; TILE_SAMPLES]| {
             let next = row.iter().skip(1);
             row.iter().zip(next).any(|(a, b)| steps(*a, *b))
         };
-        let between = |south: &[f32; POSTS], north: &[f32; POSTS]| {
+        let between = |south: &[f32; TILE_SAMPLES], north: &[f32; TILE_SAMPLES]| {
             south.iter().zip(north).any(|(a, b)| steps(*a, *b))
         };
         let north = self.posts.iter().skip(1);
@@ -217,7 +217,7 @@ impl Tile {
     /// Forgets the tile, and makes every sample a hole.
     pub(super) fn clear(&mut self) {
         self.vacate();
-        self.posts = [[f32::NAN; POSTS]; POSTS];
+        self.posts = [[f32::NAN; TILE_SAMPLES]; TILE_SAMPLES];
     }
 
     /// Sets a sample of a vacant buffer.
@@ -247,7 +247,7 @@ impl Tile {
         base: i32,
         size: FieldSize,
         mut height: impl FnMut(i32, i32) -> f32,
-    ) -> Result<(), BadTile> {
+    ) -> Result<(), TileError> {
         let first = key.index.first_cell();
         self.fill(key, base, |col, row| {
             let (x, y) = (first.x + col as i32, first.y + row as i32);
@@ -261,16 +261,16 @@ impl Tile {
     /// Fills the buffer from little-endian `f32` heights, rows from the south.
     ///
     /// # Errors
-    /// [`BadTile::Length`] unless there are exactly 33 × 33 of them.
-    pub fn load(&mut self, key: TileKey, base: i32, bytes: &[u8]) -> Result<(), BadTile> {
+    /// [`TileError::Length`] unless there are exactly 33 × 33 of them.
+    pub fn load(&mut self, key: TileKey, base: i32, bytes: &[u8]) -> Result<(), TileError> {
         self.vacate();
         let (posts, rest) = bytes.as_chunks::<4>();
-        if posts.len() != POSTS * POSTS || !rest.is_empty() {
-            return Err(BadTile::Length);
+        if posts.len() != TILE_SAMPLES * TILE_SAMPLES || !rest.is_empty() {
+            return Err(TileError::Length);
         }
         self.fill(key, base, |col, row| {
             posts
-                .get(row * POSTS + col)
+                .get(row * TILE_SAMPLES + col)
                 .map_or(f32::NAN, |le| f32::from_le_bytes(*le))
         })
     }
@@ -279,14 +279,14 @@ impl Tile {
     /// buffer.
     ///
     /// # Errors
-    /// [`BadTile::Packed`] unless the bytes are the packed heights of a tile, and no more.
-    pub fn unpack(&mut self, key: TileKey, base: i32, bytes: &[u8]) -> Result<(), BadTile> {
+    /// [`TileError::Packed`] unless the bytes are the packed heights of a tile, and no more.
+    pub fn unpack(&mut self, key: TileKey, base: i32, bytes: &[u8]) -> Result<(), TileError> {
         self.vacate();
-        let mut heights = Unpacker::new(bytes).ok_or(BadTile::Packed)?;
+        let mut heights = Unpacker::new(bytes).ok_or(TileError::Packed)?;
         self.fill(key, base, |col, _| heights.next(col))?;
         if !heights.is_at_end() {
             self.vacate();
-            return Err(BadTile::Packed);
+            return Err(TileError::Packed);
         }
         Ok(())
     }
@@ -466,29 +466,29 @@ mod tests {
     #[test]
     fn a_tile_is_all_or_nothing() {
         let mut tile = filled(|_, _| 0.0);
-        assert_eq!(tile.load(KEY, 0, &[0; 7]), Err(BadTile::Length));
+        assert_eq!(tile.load(KEY, 0, &[0; 7]), Err(TileError::Length));
         assert_eq!(tile.key(), None);
-        let bytes = [0u8; 4 * POSTS * POSTS];
-        assert_eq!(tile.load(KEY, i32::MAX, &bytes), Err(BadTile::Base));
+        let bytes = [0u8; 4 * TILE_SAMPLES * TILE_SAMPLES];
+        assert_eq!(tile.load(KEY, i32::MAX, &bytes), Err(TileError::Base));
         assert_eq!(tile.load(KEY, 0, &bytes), Ok(()));
         assert_eq!(tile.key(), Some(KEY));
     }
 
     #[test]
     fn materials_are_those_of_the_table_and_as_many_as_samples() {
-        const ALL: usize = POSTS * POSTS;
+        const ALL: usize = TILE_SAMPLES * TILE_SAMPLES;
         let mut tile = filled(|_, _| 0.0);
         let kinds = |count: usize| (0..count).map(|i| (i % 5) as u8);
         assert_eq!(tile.material(Cell::new(0, 0), [0, 0]), None, "it has none");
         assert_eq!(tile.set_materials(5, kinds(ALL)), Ok(()));
-        let at = |col: usize, row: usize| ((row * POSTS + col) % 5) as u8;
+        let at = |col: usize, row: usize| ((row * TILE_SAMPLES + col) % 5) as u8;
         assert_eq!(tile.material(Cell::new(31, 2), [1, 1]), Some(at(32, 3)));
         assert_eq!(tile.material(Cell::new(-1, 34), [0, 0]), Some(at(31, 2)));
         for (count, of) in [(4, ALL), (5, ALL - 1), (5, ALL + 1), (0, ALL)] {
             let mut tile = filled(|_, _| 0.0);
             assert_eq!(
                 tile.set_materials(count, kinds(of)),
-                Err(BadTile::Materials)
+                Err(TileError::Materials)
             );
             assert_eq!(tile.key(), None);
         }
@@ -496,7 +496,7 @@ mod tests {
         tile.fill(KEY, 0, |_, _| 1.0).unwrap();
         assert_eq!(tile.material(Cell::new(0, 0), [0, 0]), None);
         tile.vacate();
-        assert_eq!(tile.set_materials(5, kinds(ALL)), Err(BadTile::Materials));
+        assert_eq!(tile.set_materials(5, kinds(ALL)), Err(TileError::Materials));
     }
 
     #[test]

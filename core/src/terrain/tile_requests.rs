@@ -29,7 +29,7 @@ const LOOK_AHEAD: i32 = 8;
 
 /// Where the loop needs terrain, as the last tick left it, in cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TileDemand {
+pub struct RequestHint {
     /// The tile without which the tick could not be completed.
     pub missing_tile: Option<TileIndex>,
     /// The cell of the proxy.
@@ -40,7 +40,7 @@ pub struct TileDemand {
     pub velocity: [f32; 2],
 }
 
-impl TileDemand {
+impl RequestHint {
     /// The tile around which others are wanted: without it nothing goes on.
     fn centre(&self) -> TileIndex {
         self.missing_tile.unwrap_or(TileIndex::holding(self.proxy))
@@ -51,13 +51,13 @@ impl TileDemand {
 ///
 /// ```
 /// use hapterra_core::grid::Cell;
-/// use hapterra_core::terrain::{FieldSize, TileDemand, TileKey, TileRequester};
+/// use hapterra_core::terrain::{FieldSize, RequestHint, TileKey, TileRequester};
 ///
 /// let mut requester = TileRequester::<4>::new();
 /// requester.reset(0, FieldSize::new(10_000, 10_000));
 /// // HIP and proxy are in the middle of a tile and move east, 0.1 cell a tick.
 /// let cell = Cell::new(80, 48);
-/// let demand = TileDemand { proxy: cell, hip: cell, velocity: [0.1, 0.0], ..TileDemand::default() };
+/// let demand = RequestHint { proxy: cell, hip: cell, velocity: [0.1, 0.0], ..RequestHint::default() };
 /// assert_eq!(requester.next_request(0, &demand), Some(TileKey::new(0, 2, 1)));
 /// assert_eq!(requester.next_request(0, &demand), Some(TileKey::new(0, 3, 1)));
 /// assert_eq!(requester.next_request(0, &demand), None);
@@ -170,7 +170,7 @@ impl<const D: usize> TileRequester<D> {
 
     /// The next tile to ask for at tick `now`, most urgent first; `None` when
     /// nothing is wanted or enough is under way. Call until `None`.
-    pub fn next_request(&mut self, now: u32, demand: &TileDemand) -> Option<TileKey> {
+    pub fn next_request(&mut self, now: u32, demand: &RequestHint) -> Option<TileKey> {
         if let Some(key) = self.next_repeat(now, demand) {
             return Some(key);
         }
@@ -189,7 +189,7 @@ impl<const D: usize> TileRequester<D> {
     /// The same of tiles that were asked for before and have not come: for a device that has no
     /// room for more.
     #[inline(never)]
-    pub fn next_repeat(&mut self, now: u32, demand: &TileDemand) -> Option<TileKey> {
+    pub fn next_repeat(&mut self, now: u32, demand: &RequestHint) -> Option<TileKey> {
         self.now = now;
         let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
         let (level, centre) = (self.level, demand.centre());
@@ -206,7 +206,7 @@ impl<const D: usize> TileRequester<D> {
     ///
     /// Only tiles nearer to the centre than half the torus are candidates, so
     /// that none can push out a tile that is nearer.
-    fn most_urgent(&self, demand: &TileDemand) -> Option<TileKey> {
+    fn most_urgent(&self, demand: &RequestHint) -> Option<TileKey> {
         let centre = demand.centre();
         // Over an underlay nothing waits for a tile that the HIP has left when it comes.
         let first = if self.underlay[0].is_some() {
@@ -271,7 +271,7 @@ mod tests {
     use crate::terrain::CoarseTile;
     use std::vec::Vec;
 
-    fn drain(requester: &mut TileRequester<4>, now: u32, demand: &TileDemand) -> Vec<(i32, i32)> {
+    fn drain(requester: &mut TileRequester<4>, now: u32, demand: &RequestHint) -> Vec<(i32, i32)> {
         core::iter::from_fn(|| requester.next_request(now, demand))
             .map(|k| (k.index.col, k.index.row))
             .collect()
@@ -294,11 +294,11 @@ mod tests {
         requester
     }
 
-    fn at(x: i32, y: i32) -> TileDemand {
-        TileDemand {
+    fn at(x: i32, y: i32) -> RequestHint {
+        RequestHint {
             proxy: Cell::new(x, y),
             hip: Cell::new(x, y),
-            ..TileDemand::default()
+            ..RequestHint::default()
         }
     }
 
@@ -364,7 +364,7 @@ mod tests {
                 }
             }
             // One cell a tick: in 60 ticks the HIP is two tiles on.
-            let demand = TileDemand {
+            let demand = RequestHint {
                 velocity: [1.0, 0.0],
                 ..at(16 * 32 + 16, 48)
             };
@@ -379,7 +379,7 @@ mod tests {
     #[test]
     fn what_holds_the_proxy_up_comes_first() {
         let mut requester = requester();
-        let demand = TileDemand {
+        let demand = RequestHint {
             missing_tile: Some(TileIndex::new(9, 9)),
             ..at(48, 48)
         };
@@ -389,7 +389,7 @@ mod tests {
     #[test]
     fn a_moving_hand_wants_what_lies_ahead() {
         let mut requester = requester();
-        let demand = TileDemand {
+        let demand = RequestHint {
             velocity: [0.3, 0.0],
             ..at(48, 48)
         };
@@ -455,7 +455,7 @@ mod tests {
     #[test]
     fn never_asks_outside_the_field_nor_for_more_than_the_limit() {
         let mut requester = requester();
-        let demand = TileDemand {
+        let demand = RequestHint {
             velocity: [-f32::MAX, f32::NAN],
             ..at(0, 0)
         };

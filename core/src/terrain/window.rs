@@ -5,14 +5,14 @@ mod unsettled;
 use super::extent::{CellBox, FieldSize};
 use super::index::{BLOCK_SHIFT, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
-use super::settling::Settling;
+use super::settling::TileBlend;
 use super::tile::Tile;
 use super::underlay::Laid;
 use crate::grid::{Altitude, Cell};
 
 /// What lies in a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ground {
+pub enum CellContent {
     /// A patch.
     Patch(Corners),
     /// No surface: no data, or outside the field.
@@ -51,23 +51,23 @@ impl Corners {
 /// ```
 /// use hapterra_core::grid::{Altitude, Cell};
 /// use hapterra_core::terrain::{
-///     CellBox, FieldSize, FieldStorage, Ground, Tile, TileKey, Window,
+///     CellBox, FieldSize, TileArena, Ground, Tile, TileKey, Window,
 /// };
 ///
 /// // A field far larger than the window, no sample of which exceeds 5 cells.
 /// let size = FieldSize::new(10_000, 10_000);
-/// let mut storage = FieldStorage::<2>::new();
+/// let mut storage = TileArena::<2>::new();
 /// let mut window = Window::new(storage.slots());
 /// window.reset(0, size, 5);
 /// let cell = Cell::new(7_000, 3_000);
-/// assert_eq!(window.ground(cell), Ground::Missing);
+/// assert_eq!(window.ground(cell), CellContent::Missing);
 ///
 /// // A tile comes in, and a buffer for the next one goes out.
 /// let mut spare = Tile::VACANT;
 /// let key = TileKey::holding(0, cell);
 /// spare.fill_from(key, 0, size, |_x, _y| 1.5).expect("base 0 is in range");
 /// assert_eq!(window.install(&mut spare).key(), None);
-/// let Ground::Patch(corners) = window.ground(cell) else { panic!("a patch") };
+/// let CellContent::Patch(corners) = window.ground(cell) else { panic!("a patch") };
 /// assert_eq!(corners.heights, [1.5; 4]);
 ///
 /// // Nothing around the cell reaches two cells up.
@@ -87,7 +87,7 @@ pub struct Window<'t, const D: usize> {
     pub(super) slots: [[&'t mut Tile; D]; D],
     pyramid: MaxPyramid<D>,
     pub(super) underlay: Laid<'t>,
-    pub(super) settling: Settling<D>,
+    pub(super) settling: TileBlend<D>,
 }
 
 impl<'t, const D: usize> Window<'t, D> {
@@ -110,7 +110,7 @@ impl<'t, const D: usize> Window<'t, D> {
             size,
             top,
             underlay: Laid::NOTHING,
-            settling: Settling::NOTHING,
+            settling: TileBlend::NOTHING,
         };
         for key in size.tiles() {
             window.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].become_surface();
@@ -192,9 +192,9 @@ impl<'t, const D: usize> Window<'t, D> {
     /// What lies in `cell`.
     #[must_use]
     #[inline]
-    pub fn ground(&self, cell: Cell) -> Ground {
+    pub fn ground(&self, cell: Cell) -> CellContent {
         if !self.has_cell(cell) {
-            return Ground::Hole;
+            return CellContent::Hole;
         }
         let Some(tile) = self.held(TileIndex::holding(cell)) else {
             return self.unsettled_ground(cell);
@@ -202,9 +202,9 @@ impl<'t, const D: usize> Window<'t, D> {
         let heights = tile.corners(cell);
         let [sw, se, nw, ne] = heights;
         if (sw + se + nw + ne).is_nan() {
-            return Ground::Hole;
+            return CellContent::Hole;
         }
-        Ground::Patch(Corners {
+        CellContent::Patch(Corners {
             base: tile.base(),
             heights,
         })
@@ -219,9 +219,9 @@ impl<'t, const D: usize> Window<'t, D> {
         }
         let Some(tile) = self.held(TileIndex::holding(cell)) else {
             return match self.unsettled_ground(cell) {
-                Ground::Patch(corners) => Some(corners),
-                Ground::Hole => Some(Corners::NONE),
-                Ground::Missing => None,
+                CellContent::Patch(corners) => Some(corners),
+                CellContent::Hole => Some(Corners::NONE),
+                CellContent::Missing => None,
             };
         };
         Some(Corners {
@@ -364,11 +364,14 @@ mod tests {
                 rough(x + 1, y + 1),
             ];
             let corners = Corners { base: 0, heights };
-            assert_eq!(field.window.ground(Cell::new(x, y)), Ground::Patch(corners));
+            assert_eq!(
+                field.window.ground(Cell::new(x, y)),
+                CellContent::Patch(corners)
+            );
         }
-        assert_eq!(field.window.ground(Cell::new(-1, 0)), Ground::Hole);
-        assert_eq!(field.window.ground(Cell::new(640, 9)), Ground::Hole);
-        assert_eq!(field.window.ground(Cell::new(600, 9)), Ground::Missing);
+        assert_eq!(field.window.ground(Cell::new(-1, 0)), CellContent::Hole);
+        assert_eq!(field.window.ground(Cell::new(640, 9)), CellContent::Hole);
+        assert_eq!(field.window.ground(Cell::new(600, 9)), CellContent::Missing);
     }
 
     #[test]

@@ -72,7 +72,8 @@ impl<'t> Ground<'t> {
         tile.fill_from(key, 0, FieldSize::new(64, 32), |_, _| 0.0)
             .expect("in range");
         let border = self.border;
-        let samples = (0..POSTS * POSTS).map(|i| col * 32 + (i % POSTS) as i32);
+        let samples =
+            (0..TILE_SAMPLES * TILE_SAMPLES).map(|i| col * 32 + (i % TILE_SAMPLES) as i32);
         let materials = samples.map(|x| u8::from(x >= border));
         tile.set_materials(2, materials).expect("of the table");
         self.spare
@@ -80,19 +81,19 @@ impl<'t> Ground<'t> {
     }
 
     /// What is felt at a place, where a missing tile comes `late` ticks after it is missed.
-    fn at(&mut self, [x, y, z]: [f32; 3], late: u32) -> Sample {
+    fn at(&mut self, [x, y, z]: [f32; 3], late: u32) -> TickRecord {
         let seq = self.seq;
         self.seq += 1;
         let hip = GridPoint::new([0, 10, 0], Vec3::new(x, y, z));
         assert!(
             self.haptics
-                .accept(Command::Point(Point { seq, hip }))
+                .accept(Command::Hip(HipCommand { seq, hip }))
                 .is_ok_and(|spare| spare.is_none())
         );
         let mut missed = 0;
         for _ in 0..200 {
             self.ticks += 1;
-            let outcome = self.haptics.tick(&Sense::default(), true);
+            let outcome = self.haptics.tick(&GuardInputs::default(), true);
             if outcome.answers == Some(seq) {
                 return outcome.sample;
             }
@@ -277,7 +278,7 @@ fn damping_is_that_of_the_material() {
 }
 
 /// What points feel on the way over a tile's border and one of classes, where tiles come late.
-fn felt(late: u32, border: i32, shading: Shading) -> (Vec<Sample>, u32) {
+fn felt(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) {
     let rough = Material {
         friction: Friction::coulomb(0.5),
         texture: GRATING,

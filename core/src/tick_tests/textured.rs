@@ -46,12 +46,12 @@ fn felt(late: u32) -> (Vec<Vec3>, u32) {
         let height = if seq == 0 { 1.0 } else { -0.5 };
         let hip = GridPoint::new([0, 10, 0], Vec3::new(x, 0.5, height));
         assert!(matches!(
-            haptics.accept(Command::Point(Point { seq, hip })),
+            haptics.accept(Command::Hip(HipCommand { seq, hip })),
             Ok(None)
         ));
         loop {
             ticks += 1;
-            let outcome = haptics.tick(&Sense::default(), true);
+            let outcome = haptics.tick(&GuardInputs::default(), true);
             if outcome.answers == Some(seq) {
                 forces.push(outcome.sample.force_n);
                 break;

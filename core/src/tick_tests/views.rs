@@ -37,7 +37,7 @@ impl<'t> Watched<'t> {
         }
     }
 
-    fn tick(&mut self) -> Sample {
+    fn tick(&mut self) -> TickRecord {
         let now = self.device.tick(self.counts);
         assert_eq!(now.sample.mode, Mode::Armed);
         assert!(now.drive.enabled, "the arm stays armed");
@@ -48,7 +48,7 @@ impl<'t> Watched<'t> {
         now.sample
     }
 
-    fn ticks(&mut self, count: usize) -> Sample {
+    fn ticks(&mut self, count: usize) -> TickRecord {
         (0..count).fold(self.last.sample, |_, _| self.tick())
     }
 
@@ -138,7 +138,7 @@ fn while_the_clutch_is_held_there_is_no_force_and_the_terrain_goes_with_the_hand
 }
 
 /// Moves the arm there, some counts in each tick.
-fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> Sample {
+fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
     let from = arm.counts;
     for n in 1..=ticks {
         arm.counts = [0, 1, 2].map(|axis| from[axis] + (counts[axis] - from[axis]) * n / ticks);
@@ -376,10 +376,10 @@ fn without_its_tiles_a_view_is_not_felt_and_the_clutch_stays_open() {
     arm.device.say(Command::View(wanted));
     arm.clutch(LetGo);
     let outcome = |arm: &mut Watched<'_>| {
-        let sense = Sense {
+        let sense = GuardInputs {
             counts: DEEP,
             dead_man: true,
-            ..Sense::default()
+            ..GuardInputs::default()
         };
         arm.device.haptics.tick(&sense, true)
     };

@@ -7,18 +7,18 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
-use super::materials::{MOST_TABLE_BYTES, MaterialTile, TileMaterials, table_bytes};
+use super::materials::{MAX_TABLE_BYTES, MaterialTile, TileMaterials, table_bytes};
 use super::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
 use super::request::{Answer, Refusal, Request};
 use super::session::{InSession, LastSession, SampleCount, SessionEnd, SessionNumber};
 use crate::clutch::ClutchHold;
 use crate::contact::{ContactState, Friction};
 use crate::force::{
-    Controller, Damping, ForceLaw, Material, MaterialTable, Pattern, Shading, Texture,
+    Controller, Damping, Material, MaterialTable, Pattern, Shading, SurfaceParams, Texture,
 };
 use crate::grid::{Cell, GridPoint};
 use crate::guard::{Fault, Limits, Mode};
-use crate::scene::{Sample, Scene, Source, View};
+use crate::scene::{Scene, Source, TickRecord, View};
 use crate::terrain::{CoarseTile, FieldSize, TileIndex, TileKey, Underlay};
 
 fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
@@ -53,7 +53,7 @@ fn a_scene() {
         underlay: Some(UNDERLAY),
         cell_mm: 1.5,
         home: GridPoint::new([320, -7, 5], Vec3::new(0.25, 0.5, 0.0)),
-        law: ForceLaw {
+        law: SurfaceParams {
             damping: Damping {
                 ns_per_m: 2.0,
                 controller: Controller::Off,
@@ -66,7 +66,7 @@ fn a_scene() {
                 direction_deg: -45.0,
                 seed: 300,
             },
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         },
         source: Source::Points,
         hold_clock: true,
@@ -102,7 +102,7 @@ fn a_scene() {
 
 #[test]
 fn a_sample() {
-    let sample = Sample {
+    let sample = TickRecord {
         tick: 9,
         hip: GridPoint::new([1, 2, 3], Vec3::X * 0.5),
         proxy: GridPoint::new([1, 2, 4], Vec3::X * 0.5),
@@ -154,7 +154,7 @@ fn a_view_and_the_clutch() {
         underlay: Some(UNDERLAY),
         cell_mm: 1.5,
         home: GridPoint::default(),
-        law: ForceLaw::PREMIUM,
+        law: SurfaceParams::PREMIUM,
         source: Source::Encoders,
         hold_clock: false,
         materials: None,
@@ -189,7 +189,7 @@ fn a_view_and_the_clutch() {
 #[test]
 fn a_tile_and_the_request_for_it() {
     let key = TileKey::new(1, -2, 100);
-    let request = ToHost::Need { epoch: 7, key };
+    let request = ToHost::TileRequest { epoch: 7, key };
     assert_eq!(bytes(&request), [2, 7, 1, 3, 0xC8, 0x01]);
     let tile = ToDevice::Tile(TileMessage {
         epoch: 7,
@@ -260,7 +260,7 @@ fn a_tile_with_materials_and_their_table() {
         std::vec![0xAC, 0x02],
     ]
     .concat();
-    let mut room = [0; MOST_TABLE_BYTES];
+    let mut room = [0; MAX_TABLE_BYTES];
     assert_eq!(table_bytes(&table, &mut room), wanted);
 }
 
@@ -324,7 +324,10 @@ fn a_detach_and_its_answer() {
 #[test]
 fn a_hello_that_is_over() {
     for (end, byte) in [(SessionEnd::Replaced, 2), (SessionEnd::HostSilent, 3)] {
-        assert_eq!(bytes(&ToHost::Over { number: 9, end }), [12, 9, byte]);
+        assert_eq!(
+            bytes(&ToHost::SessionClosed { number: 9, end }),
+            [12, 9, byte]
+        );
     }
 }
 

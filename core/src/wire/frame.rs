@@ -12,7 +12,7 @@ pub const MAX_FRAME: usize = 5120;
 /// Why a frame was not understood. It is dropped; the link goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum BadFrame {
+pub enum FrameError {
     /// Longer than the reader's buffer.
     TooLong,
     /// Not COBS.
@@ -56,12 +56,12 @@ impl<'b> Flavor for Framing<'b> {
 /// Reads a message from a frame's decoded bytes, check sum included.
 ///
 /// # Errors
-/// [`BadFrame::Content`] when the check sum does not fit, or the bytes are no
+/// [`FrameError::Content`] when the check sum does not fit, or the bytes are no
 /// `T` or more than one.
-pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, BadFrame> {
+pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, FrameError> {
     match crc::take(bytes) {
         Some((message, [])) => Ok(message),
-        _ => Err(BadFrame::Content),
+        _ => Err(FrameError::Content),
     }
 }
 
@@ -90,7 +90,7 @@ impl<const N: usize> FrameReader<N> {
     /// Returns how many bytes were taken and, at a frame's end, its decoded
     /// bytes (to be read with [`decode`]) or why there are none. Empty frames
     /// are passed over: a sender may put a zero in front to start clean.
-    pub fn push(&mut self, bytes: &[u8]) -> (usize, Option<Result<&[u8], BadFrame>>) {
+    pub fn push(&mut self, bytes: &[u8]) -> (usize, Option<Result<&[u8], FrameError>>) {
         if self.ended {
             (self.ended, self.overflowed) = (false, false);
             self.frame.clear();
@@ -103,14 +103,14 @@ impl<const N: usize> FrameReader<N> {
         };
         self.ended = true;
         if self.overflowed {
-            return (end + 1, Some(Err(BadFrame::TooLong)));
+            return (end + 1, Some(Err(FrameError::TooLong)));
         }
         if self.frame.is_empty() {
             return (end + 1, None);
         }
         let length = cobs::decode_in_place(&mut self.frame).ok();
         let decoded = length.and_then(|length| self.frame.get(..length));
-        (end + 1, Some(decoded.ok_or(BadFrame::Encoding)))
+        (end + 1, Some(decoded.ok_or(FrameError::Encoding)))
     }
 }
 
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    fn frames(reader: &mut FrameReader<64>, mut bytes: &[u8]) -> Vec<Result<u32, BadFrame>> {
+    fn frames(reader: &mut FrameReader<64>, mut bytes: &[u8]) -> Vec<Result<u32, FrameError>> {
         let mut found = Vec::new();
         while !bytes.is_empty() {
             let (taken, frame) = reader.push(bytes);
@@ -179,6 +179,6 @@ mod tests {
         let mut reader = FrameReader::new();
         assert_eq!(frames(&mut reader, &[0xA5; 1000]), []);
         let found = frames(&mut reader, &[&[0], &*frame(9)].concat());
-        assert_eq!(found, [Err(BadFrame::TooLong), Ok(9)]);
+        assert_eq!(found, [Err(FrameError::TooLong), Ok(9)]);
     }
 }

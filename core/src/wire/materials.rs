@@ -4,23 +4,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::force::MaterialTable;
 use crate::scene::Scene;
-use crate::terrain::{BadTile, POSTS, Tile};
+use crate::terrain::{TILE_SAMPLES, Tile, TileError};
 
 use super::tile::TileMessage;
 
 /// Samples of a tile.
-const SAMPLES: usize = POSTS * POSTS;
+const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 /// Bytes of a tile's materials at most: two samples a byte.
-pub const MOST_TILE_BYTES: usize = SAMPLES.div_ceil(2);
+pub const MAX_TILE_BYTES: usize = SAMPLES.div_ceil(2);
 /// Bytes of a table at most.
-pub const MOST_TABLE_BYTES: usize = 640;
+pub const MAX_TABLE_BYTES: usize = 640;
 
 /// A scene with materials, and their table: so neither comes without the other.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialScene<'a> {
     /// The scene, which names the table by its check sum ([`Scene::materials`]).
     pub scene: Scene,
-    /// The table as postcard writes it ([`table_bytes`]), at most [`MOST_TABLE_BYTES`].
+    /// The table as postcard writes it ([`table_bytes`]), at most [`MAX_TABLE_BYTES`].
     #[serde(borrow)]
     pub table: &'a [u8],
 }
@@ -37,7 +37,7 @@ impl MaterialScene<'_> {
 
 /// Writes a table as it travels; every table fits.
 #[must_use]
-pub fn table_bytes<'b>(table: &MaterialTable, room: &'b mut [u8; MOST_TABLE_BYTES]) -> &'b [u8] {
+pub fn table_bytes<'b>(table: &MaterialTable, room: &'b mut [u8; MAX_TABLE_BYTES]) -> &'b [u8] {
     match postcard::to_slice(table, room) {
         Ok(bytes) => bytes,
         Err(_) => &[],
@@ -62,7 +62,7 @@ pub enum TileMaterials<'a> {
     One(u8),
     /// Pairs of bytes: a material, and how many samples more than one in turn have it.
     Runs(#[serde(borrow)] &'a [u8]),
-    /// Two samples a byte, the first in the lower half: [`MOST_TILE_BYTES`] bytes, the last
+    /// Two samples a byte, the first in the lower half: [`MAX_TILE_BYTES`] bytes, the last
     /// half of which is zero.
     Each(#[serde(borrow)] &'a [u8]),
 }
@@ -70,7 +70,7 @@ pub enum TileMaterials<'a> {
 impl<'a> TileMaterials<'a> {
     /// The materials of a tile's samples, below 16 each, in the form that takes fewest bytes.
     #[must_use]
-    pub fn pack(materials: &[u8; SAMPLES], room: &'a mut [u8; MOST_TILE_BYTES]) -> Self {
+    pub fn pack(materials: &[u8; SAMPLES], room: &'a mut [u8; MAX_TILE_BYTES]) -> Self {
         if materials.iter().all(|material| *material == materials[0]) {
             return Self::One(materials[0]);
         }
@@ -90,9 +90,9 @@ impl<'a> TileMaterials<'a> {
     /// Gives a filled tile these materials of a table of `count`.
     ///
     /// # Errors
-    /// [`BadTile::Materials`] unless they are those of 33 × 33 samples, and of the table. The
+    /// [`TileError::Materials`] unless they are those of 33 × 33 samples, and of the table. The
     /// buffer is left vacant.
-    pub fn fill(&self, tile: &mut Tile, count: usize) -> Result<(), BadTile> {
+    pub fn fill(&self, tile: &mut Tile, count: usize) -> Result<(), TileError> {
         match *self {
             Self::One(material) => {
                 tile.set_materials(count, core::iter::repeat_n(material, SAMPLES))
@@ -111,7 +111,7 @@ impl<'a> TileMaterials<'a> {
             Self::Each(bytes) => {
                 let halves = bytes.iter().flat_map(|byte| [byte & 15, byte >> 4]);
                 let is_ended = bytes.last().is_some_and(|last| last >> 4 == 0);
-                match bytes.len() == MOST_TILE_BYTES && is_ended {
+                match bytes.len() == MAX_TILE_BYTES && is_ended {
                     true => tile.set_materials(count, halves.take(SAMPLES)),
                     false => tile.set_materials(count, core::iter::empty()),
                 }
@@ -121,7 +121,7 @@ impl<'a> TileMaterials<'a> {
 }
 
 /// Writes runs; how many bytes they take, where that is less than two samples a byte.
-fn runs(materials: &[u8; SAMPLES], room: &mut [u8; MOST_TILE_BYTES]) -> Option<usize> {
+fn runs(materials: &[u8; SAMPLES], room: &mut [u8; MAX_TILE_BYTES]) -> Option<usize> {
     let mut length = 0;
     let alike = materials.chunk_by(|one, next| one == next);
     // A byte counts 256 samples.
@@ -137,7 +137,7 @@ fn runs(materials: &[u8; SAMPLES], room: &mut [u8; MOST_TILE_BYTES]) -> Option<u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force::{ForceLaw, Material};
+    use crate::force::{Material, SurfaceParams};
     use crate::grid::Cell;
     use crate::terrain::TileKey;
     use std::boxed::Box;
@@ -152,13 +152,13 @@ mod tests {
     }
 
     fn materials(of: impl Fn(usize, usize) -> u8) -> [u8; SAMPLES] {
-        core::array::from_fn(|i| of(i % POSTS, i / POSTS))
+        core::array::from_fn(|i| of(i % TILE_SAMPLES, i / TILE_SAMPLES))
     }
 
     /// What a tile has after it was filled.
     fn read(tile: &Tile) -> Vec<u8> {
         let at = |i: usize| {
-            let (col, row) = (i % POSTS, i / POSTS);
+            let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
             let (x, y) = (col.min(31), row.min(31));
             tile.material(Cell::new(x as i32, y as i32), [col - x, row - y])
         };
@@ -168,13 +168,13 @@ mod tests {
     #[test]
     fn they_come_back_from_the_shortest_form() {
         let noise = |col: usize, row: usize| ((col * 7919 + row * 104_729) % 61 % 16) as u8;
-        let mut room = [0xAA; MOST_TILE_BYTES];
+        let mut room = [0xAA; MAX_TILE_BYTES];
         let border = |col: usize, row: usize| u8::from(col + row / 3 > 20) * 9;
         for (all, most) in [
             (materials(|_, _| 15), 1),
             (materials(|_, row| u8::from(row > 16)), 12),
-            (materials(border), 2 * 2 * POSTS),
-            (materials(noise), MOST_TILE_BYTES),
+            (materials(border), 2 * 2 * TILE_SAMPLES),
+            (materials(noise), MAX_TILE_BYTES),
         ] {
             let packed = TileMaterials::pack(&all, &mut room);
             let length = match packed {
@@ -187,7 +187,10 @@ mod tests {
             assert_eq!(read(&tile), all);
             // And the table has to have them all.
             let largest = usize::from(*all.iter().max().expect("some"));
-            assert_eq!(packed.fill(&mut filled(), largest), Err(BadTile::Materials));
+            assert_eq!(
+                packed.fill(&mut filled(), largest),
+                Err(TileError::Materials)
+            );
         }
     }
 
@@ -204,16 +207,16 @@ mod tests {
         for bytes in &runs {
             let mut tile = filled();
             let filled = TileMaterials::Runs(bytes).fill(&mut tile, 16);
-            assert_eq!(filled, Err(BadTile::Materials), "{bytes:?}");
+            assert_eq!(filled, Err(TileError::Materials), "{bytes:?}");
             assert_eq!(tile.key(), None);
         }
         let right = with(&[3, 64]);
         assert_eq!(TileMaterials::Runs(&right).fill(&mut filled(), 16), Ok(()));
-        let each = [0x11; MOST_TILE_BYTES + 1];
-        for length in [0, MOST_TILE_BYTES - 1, MOST_TILE_BYTES, MOST_TILE_BYTES + 1] {
+        let each = [0x11; MAX_TILE_BYTES + 1];
+        for length in [0, MAX_TILE_BYTES - 1, MAX_TILE_BYTES, MAX_TILE_BYTES + 1] {
             let mut tile = filled();
             let filled = TileMaterials::Each(&each[..length]).fill(&mut tile, 16);
-            assert_eq!(filled, Err(BadTile::Materials), "{length}");
+            assert_eq!(filled, Err(TileError::Materials), "{length}");
             assert_eq!(tile.key(), None);
         }
         assert!(TileMaterials::One(2).fill(&mut filled(), 2).is_err());
@@ -221,10 +224,10 @@ mod tests {
 
     #[test]
     fn the_largest_table_fits_and_a_scene_has_its_own() {
-        let mut material = Material::of(&ForceLaw::PREMIUM);
+        let mut material = Material::of(&SurfaceParams::PREMIUM);
         material.texture.seed = u32::MAX;
         let table = MaterialTable::new(&[material; MaterialTable::MOST]).expect("fits");
-        let mut room = [0; MOST_TABLE_BYTES];
+        let mut room = [0; MAX_TABLE_BYTES];
         let bytes = table_bytes(&table, &mut room).to_vec();
         assert!(bytes.len() > 600, "{}", bytes.len());
         let scene = |materials| Scene {
@@ -235,7 +238,7 @@ mod tests {
             underlay: None,
             cell_mm: 1.0,
             home: crate::grid::GridPoint::default(),
-            law: ForceLaw::PREMIUM,
+            law: SurfaceParams::PREMIUM,
             source: crate::scene::Source::Points,
             hold_clock: false,
             materials,

@@ -14,7 +14,7 @@ use super::status::Status;
 pub use super::tile::{Heights, TileMessage};
 use crate::guard::Report;
 use crate::phantom::Calibration;
-use crate::scene::{Point, Sample, Scene, View};
+use crate::scene::{HipCommand, Scene, TickRecord, View};
 use crate::terrain::TileKey;
 
 /// Samples in a telemetry message, at most.
@@ -33,9 +33,9 @@ pub enum ToDevice<'a> {
     #[serde(borrow)]
     Tile(TileMessage<'a>),
     /// A haptic interface point for one tick, in a scene fed by points.
-    Point(Point),
-    /// The host is there. Answered by [`ToHost::Alive`].
-    Alive,
+    Hip(HipCommand),
+    /// The host is there. Answered by [`ToHost::Heartbeat`].
+    Heartbeat,
     /// Asks for something to be done, once.
     Request {
         /// Tells requests of a session apart: one more than the last, wrapping.
@@ -63,7 +63,7 @@ pub enum ToDevice<'a> {
     /// looked. Answered by [`ToHost::Detached`].
     Detach,
     /// Another view of the scene in force, while the clutch is open
-    /// ([`Request::Clutch`]): the arm stays armed. Answered by [`ToHost::SceneTaken`] with
+    /// ([`Request::Clutch`]): the arm stays armed. Answered by [`ToHost::SceneAck`] with
     /// the epoch of the view's scene.
     View(View),
     /// As [`Self::Scene`], of a scene with materials.
@@ -82,14 +82,14 @@ pub enum ToHost {
     /// Answers a hello.
     Hello(DeviceHello),
     /// Answers a scene.
-    SceneTaken {
+    SceneAck {
         /// The scene's epoch.
         epoch: u32,
         /// Whether the scene was valid and is now in force.
         accepted: bool,
     },
     /// Asks for a tile.
-    Need {
+    TileRequest {
         /// The scene it belongs to.
         epoch: u32,
         /// Which tile.
@@ -102,7 +102,7 @@ pub enum ToHost {
         /// The point's number.
         seq: u32,
         /// The tick's sample.
-        sample: Sample,
+        sample: TickRecord,
     },
     /// The state of the guard; sent at the beginning of a session and whenever
     /// it changes.
@@ -123,8 +123,8 @@ pub enum ToHost {
     },
     /// Answers a request.
     Answer(Answer),
-    /// Answers [`ToDevice::Alive`].
-    Alive {
+    /// Answers [`ToDevice::Heartbeat`].
+    Heartbeat {
         /// The samples of this session that were sent before this message.
         count: SampleCount,
         /// Epoch of the scene that the device holds, if any.
@@ -139,7 +139,7 @@ pub enum ToHost {
     /// Answers [`ToDevice::Detach`]: the session is over.
     Detached,
     /// Answers a hello of a session that is over and opens no more.
-    Over {
+    SessionClosed {
         /// The number of the hello that this answers.
         number: u8,
         /// Why: [`SessionEnd::Replaced`] where another session was opened since,
@@ -150,7 +150,7 @@ pub enum ToHost {
     Marked {
         /// The request's number.
         number: u8,
-        /// The tick that was marked ([`Sample::tick`]).
+        /// The tick that was marked ([`TickRecord::tick`]).
         tick: u32,
     },
 }
@@ -165,5 +165,5 @@ pub struct Telemetry {
     /// link was slow.
     pub dropped: u32,
     /// The samples.
-    pub samples: Vec<Sample, BATCH>,
+    pub samples: Vec<TickRecord, BATCH>,
 }

@@ -19,7 +19,7 @@
 //! use hapterra_core::wire::session::{InSession, SessionNumber};
 //!
 //! let session = SessionNumber::new(0x1234_5678);
-//! let alive = InSession { session, message: ToDevice::Alive };
+//! let alive = InSession { session, message: ToDevice::Heartbeat };
 //! let mut buffer = [0; 32];
 //! let frame = encode(&alive, &mut buffer).expect("it fits");
 //!

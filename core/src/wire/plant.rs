@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::guard::Sense;
+use crate::guard::GuardInputs;
 
 /// Plant to board: what the encoders and switches say at a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -13,7 +13,7 @@ pub struct Sensed {
     /// The tick this is for.
     pub tick: u32,
     /// Encoders and switches.
-    pub sense: Sense,
+    pub sense: GuardInputs,
 }
 
 /// Board to plant: what the amplifiers were given in a tick.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::clutch::ClutchHold;
 use crate::guard::{Blockers, Fault, Jog};
-use crate::phantom::{BadCalibration, Calibration};
+use crate::phantom::{Calibration, CalibrationError};
 
 /// What a host asks a device to do. New kinds go to the end.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,7 +77,7 @@ pub enum Refusal {
     NotWhileArmed,
     /// The calibration has a number that cannot be worked with.
     #[error("the calibration cannot be used: {0}")]
-    Calibration(BadCalibration),
+    Calibration(CalibrationError),
     /// There is no calibration to do this with.
     #[error("there is no calibration")]
     NoCalibration,

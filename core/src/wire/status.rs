@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::hello::DeviceHello;
 use crate::guard::Fault;
-use crate::phantom::{BadCalibration, Model};
+use crate::phantom::{CalibrationError, Model};
 use crate::scene::Health;
 
 /// Why the board last started.
@@ -121,7 +121,7 @@ pub enum CalibrationSource {
     /// This session's host; it is gone when the device restarts.
     Session,
     /// There is none: the stored record is whole, and cannot be worked with.
-    Refused(BadCalibration),
+    Refused(CalibrationError),
 }
 
 /// Ticks and what they cost, in counts of the device's clock.

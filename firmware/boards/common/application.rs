@@ -6,7 +6,7 @@ use core::cell::Cell;
 use critical_section::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use hapterra_core::guard::Drive;
+use hapterra_core::guard::GuardOutputs;
 use hapterra_firmware::app::{self, Application, Hardware, TileBuffers, WorkingMemory};
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
@@ -48,7 +48,9 @@ pub(crate) fn assemble(
 /// Runs a tick in the haptic interrupt, whose own variable `slot` is. Returns the loop and
 /// what the amplifiers were left with, but nothing the first time: start-up raises the
 /// interrupt once, before there is a tick to be late for, to fetch the loop.
-pub(crate) fn tick<'s>(slot: &'s mut Option<&'static mut Loop>) -> Option<(&'s mut Loop, Drive)> {
+pub(crate) fn tick<'s>(
+    slot: &'s mut Option<&'static mut Loop>,
+) -> Option<(&'s mut Loop, GuardOutputs)> {
     let Some(haptic_loop) = slot else {
         *slot = critical_section::with(|cs| HANDOVER.borrow(cs).take());
         return None;

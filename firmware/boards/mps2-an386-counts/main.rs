@@ -45,8 +45,8 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactOutput, ContactSettings, work_per_tick};
 use hapterra_core::force::MaterialTable;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::Sense;
-use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::guard::GuardInputs;
+use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{Tile, Window};
@@ -113,7 +113,7 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
                     spare = window.install(spare);
                 }
             }
-            ToDevice::Point(point) => {
+            ToDevice::Hip(point) => {
                 let hip = black_box(point.hip);
                 // Where they lie is not worked out while the instructions are counted.
                 let (window, contact) = (black_box(&window), black_box(&mut contact));
@@ -153,9 +153,9 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
                 fill_material_tile(buffer, &tile, count);
                 spare = haptics.accept(Command::Tile(buffer)).ok().flatten();
             }
-            ToDevice::Point(point) => {
-                let _ = haptics.accept(Command::Point(black_box(point)));
-                let sense = black_box(Sense::default());
+            ToDevice::Hip(point) => {
+                let _ = haptics.accept(Command::Hip(black_box(point)));
+                let sense = black_box(GuardInputs::default());
                 let (cost, ()) = stopwatch.counted(|| tick(&mut haptics, &sense, &mut outcome));
                 let is_answered = u32::from(outcome.answers.is_some());
                 let sample = &outcome.sample;
@@ -210,7 +210,7 @@ fn step<'c>(
 fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, records: &mut Records) {
     let tiles = TILES.take().each_mut().map(|row| row.each_mut());
     let mut haptics = Haptics::new(tiles, TickRate::DEFAULT, None);
-    haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid"));
+    haptics.configure(Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid"));
     let count = match table {
         Some(table) => take_scene(&mut haptics, scene, table),
         None => {
@@ -232,7 +232,7 @@ fn chain(scene: &Scene, table: Option<&MaterialTable>, frames: &mut Frames, reco
         if next == Some(at) {
             next = take_tiles(&mut haptics, &mut spares, frames, count);
         }
-        let sense = black_box(Sense {
+        let sense = black_box(GuardInputs {
             dead_man: true,
             ..sense
         });
@@ -266,7 +266,7 @@ fn take_tiles(
         match message {
             ToDevice::Tile(tile) => fill_tile(buffer, &tile).expect("the host made it well"),
             ToDevice::MaterialTile(tile) => fill_material_tile(buffer, &tile, count),
-            ToDevice::Point(point) => {
+            ToDevice::Hip(point) => {
                 *spare = Some(buffer);
                 return Some(point.seq);
             }
@@ -278,11 +278,11 @@ fn take_tiles(
 }
 
 /// Arms as a user does, force fully in.
-fn arm(haptics: &mut Haptics<'static, WINDOW>, at: Sense, outcome: &mut Outcome) {
+fn arm(haptics: &mut Haptics<'static, WINDOW>, at: GuardInputs, outcome: &mut Outcome) {
     let _ = haptics.accept(Command::Zero([0; 3]));
     let _ = haptics.accept(Command::Arm);
     for ticks in 0..2_200 {
-        let sense = Sense {
+        let sense = GuardInputs {
             dead_man: ticks > 0,
             ..at
         };
@@ -292,6 +292,6 @@ fn arm(haptics: &mut Haptics<'static, WINDOW>, at: Sense, outcome: &mut Outcome)
 
 /// A tick with the watchdog fed. A function of its own, as [`step`] is.
 #[inline(never)]
-fn tick(haptics: &mut Haptics<'static, WINDOW>, sense: &Sense, outcome: &mut Outcome) {
+fn tick(haptics: &mut Haptics<'static, WINDOW>, sense: &GuardInputs, outcome: &mut Outcome) {
     haptics.tick_into(sense, true, outcome);
 }

@@ -11,10 +11,10 @@ use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embedded_io_async::{Read, Write};
-use hapterra_core::guard::Drive;
+use hapterra_core::guard::GuardOutputs;
 use hapterra_core::wire::frame::{FrameReader, decode, encode};
 use hapterra_core::wire::plant::{Currents, Sensed};
-use hapterra_firmware::board::{Encoders, Sense, TickClock};
+use hapterra_firmware::board::{Encoders, GuardInputs, TickClock};
 use heapless::spsc::{Consumer, Producer, Queue};
 use static_cell::ConstStaticCell;
 
@@ -38,7 +38,7 @@ pub(crate) fn open() -> (PlantEncoders, PlantPort) {
     let encoders = PlantEncoders {
         counts,
         currents: to_plant,
-        latest: Sense::default(),
+        latest: GuardInputs::default(),
         unanswered: None,
     };
     let port = PlantPort {
@@ -62,13 +62,13 @@ pub(crate) fn expect(counts: bool) {
 pub(crate) struct PlantEncoders {
     counts: Consumer<'static, Sensed>,
     currents: Producer<'static, Currents>,
-    latest: Sense,
+    latest: GuardInputs,
     /// The number of the tick whose counts were read and not yet answered.
     unanswered: Option<u32>,
 }
 
 impl Encoders for PlantEncoders {
-    fn sense(&mut self) -> Sense {
+    fn sense(&mut self) -> GuardInputs {
         // Looked at in its place: taken out as an option it is copied byte by byte, twice
         // (150 instructions a tick).
         if let Some(Sensed { tick, sense }) = self.counts.peek() {
@@ -84,7 +84,7 @@ impl Encoders for PlantEncoders {
 impl PlantEncoders {
     /// Answers the counts that were read with the currents of their tick. Time stands
     /// still until there are counts for the next.
-    pub(crate) fn answer(&mut self, drive: Drive) {
+    pub(crate) fn answer(&mut self, drive: GuardOutputs) {
         let Some(tick) = self.unanswered.take() else {
             return;
         };

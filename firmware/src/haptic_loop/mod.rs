@@ -13,7 +13,7 @@ mod timing;
 use core::mem;
 
 use hapterra_core::guard::thermal::Temperatures;
-use hapterra_core::guard::{Drive, Fault, Sense};
+use hapterra_core::guard::{Fault, GuardInputs, GuardOutputs};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Scene;
 use hapterra_core::tick::{Command, Haptics, HipSource, Outcome};
@@ -21,7 +21,7 @@ use hapterra_core::tick::{Command, Haptics, HipSource, Outcome};
 use crate::board::{Amplifiers, EnabledAmplifiers, Encoders, TickClock};
 use crate::monitor::Part;
 use crate::motor_memory::{MotorLog, Words};
-use crate::queues::{LoopEnds, LoopReport, TickRecord};
+use crate::queues::{LoopEnds, LoopReport, QueuedTick};
 use clutch_input::ClutchInput;
 use liveness::Liveness;
 use mark::Mark;
@@ -55,7 +55,7 @@ pub struct HapticLoop<'t, E, A: Amplifiers, C, const D: usize> {
     mark: Mark,
     motor_log: MotorLog,
     /// An answer that found the queue full. No other tick runs before it is out.
-    unsent: Option<TickRecord>,
+    unsent: Option<QueuedTick>,
 }
 
 impl<'t, E, A, C, const D: usize> HapticLoop<'t, E, A, C, D>
@@ -94,11 +94,11 @@ where
     }
 
     /// Runs one tick. Returns what the amplifiers were left with.
-    pub fn tick(&mut self) -> Drive {
+    pub fn tick(&mut self) -> GuardOutputs {
         let began = self.timing.begin(&mut self.clock);
         if began.after_gap {
             // First of all: the force of the last tick has acted for too long already.
-            self.drive(&Drive::default());
+            self.drive(&GuardOutputs::default());
             self.give_to_haptics(Command::Trip(Fault::TickGap));
         }
         self.ends.monitor.count_tick();
@@ -173,7 +173,7 @@ where
         }
     }
 
-    fn render(&mut self, watchdog_live: bool) -> Drive {
+    fn render(&mut self, watchdog_live: bool) -> GuardOutputs {
         match self.haptics.source() {
             HipSource::Encoders | HipSource::None => self.render_arm(watchdog_live),
             HipSource::Points { pending: true } => self.render_point(watchdog_live),
@@ -184,12 +184,12 @@ where
     /// Runs the pure tick. A function of its own, and there once: the tick's code
     /// is most of an image.
     #[inline(never)]
-    fn run_tick(&mut self, sense: &Sense, watchdog_live: bool) {
+    fn run_tick(&mut self, sense: &GuardInputs, watchdog_live: bool) {
         self.haptics
             .tick_into(sense, watchdog_live, &mut self.outcome);
     }
 
-    fn render_arm(&mut self, watchdog_live: bool) -> Drive {
+    fn render_arm(&mut self, watchdog_live: bool) -> GuardOutputs {
         let sense = self.encoders.sense();
         if let Some(held) = self.clutch_input.tick(sense.clutch) {
             self.give_to_haptics(Command::ClutchInput(held));
@@ -210,8 +210,8 @@ where
 
     /// Renders the point under way. The encoders are read all the same: the arm may be
     /// moved meanwhile.
-    fn render_point(&mut self, watchdog_live: bool) -> Drive {
-        let drive = Drive::default();
+    fn render_point(&mut self, watchdog_live: bool) -> GuardOutputs {
+        let drive = GuardOutputs::default();
         self.drive(&drive);
         let sense = self.encoders.sense();
         self.run_tick(&sense, watchdog_live);
@@ -227,8 +227,8 @@ where
     }
 
     /// A tick of a replay without a point: nothing is rendered, and the arm is followed.
-    fn follow_arm(&mut self, watchdog_live: bool) -> Drive {
-        let drive = Drive::default();
+    fn follow_arm(&mut self, watchdog_live: bool) -> GuardOutputs {
+        let drive = GuardOutputs::default();
         self.drive(&drive);
         let sense = self.encoders.sense();
         self.haptics.follow(&sense, watchdog_live);
@@ -236,9 +236,9 @@ where
         drive
     }
 
-    fn record(&mut self, answers: Option<u32>) -> TickRecord {
+    fn record(&mut self, answers: Option<u32>) -> QueuedTick {
         self.timing.fill(&mut self.outcome.sample);
-        TickRecord {
+        QueuedTick {
             sample: self.outcome.sample,
             answers,
         }
@@ -246,7 +246,7 @@ where
 
     /// Reports where the guard stands, at once when that has changed and ten times a
     /// second. Where the queue is full the next tick reports.
-    fn report(&mut self, sense: &Sense, drive: &Drive) {
+    fn report(&mut self, sense: &GuardInputs, drive: &GuardOutputs) {
         let (report, marked) = (self.haptics.report(), self.mark.latest());
         if self.reporter.sends_report(&report, marked.number) && self.ends.health.ready() {
             let health = self.haptics.health(sense, drive);
@@ -262,12 +262,12 @@ where
     }
 
     /// Sends an answer, or keeps it for the next tick: answers are never lost.
-    fn answer(&mut self, record: TickRecord) {
+    fn answer(&mut self, record: QueuedTick) {
         self.unsent = self.ends.records.enqueue(record).err();
     }
 
     /// Brings the amplifiers to what the tick asks for.
-    fn drive(&mut self, drive: &Drive) {
+    fn drive(&mut self, drive: &GuardOutputs) {
         let power = self.power.take().map(|power| match (power, drive.enabled) {
             (Power::Off(off), false) => Power::Off(rested(off, drive)),
             (Power::On(on), false) => Power::Off(on.disable()),
@@ -296,12 +296,12 @@ fn take_materials<const D: usize>(
     }
 }
 
-fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: &Drive) -> A {
+fn written<A: EnabledAmplifiers>(mut amplifiers: A, drive: &GuardOutputs) -> A {
     amplifiers.write(drive.currents_a.to_array());
     amplifiers
 }
 
-fn rested<A: Amplifiers>(mut amplifiers: A, drive: &Drive) -> A {
+fn rested<A: Amplifiers>(mut amplifiers: A, drive: &GuardOutputs) -> A {
     amplifiers.rest(drive.held.to_array());
     amplifiers
 }

@@ -6,7 +6,7 @@
 
 use hapterra_core::guard::{Fault, Report};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 /// Time between two reports of where the guard stands, ms.
 const REPORT_MS: u32 = 100;
@@ -36,7 +36,7 @@ impl Reporter {
     }
 
     /// Whether this tick's sample is sent.
-    pub(super) fn sends_sample(&mut self, sample: &Sample) -> bool {
+    pub(super) fn sends_sample(&mut self, sample: &TickRecord) -> bool {
         // The first sample of a scene is always sent.
         let is_first = sample.tick == 1;
         self.ticks_since_sample = match self.ticks_since_sample + 1 {
@@ -80,9 +80,9 @@ mod tests {
     fn samples_come_a_thousand_times_a_second() {
         for khz in [1, 4, 10] {
             let mut reporter = Reporter::new(TickRate::new(khz * 1000).expect("in range"));
-            let sample = |tick| Sample {
+            let sample = |tick| TickRecord {
                 tick,
-                ..Sample::default()
+                ..TickRecord::default()
             };
             let sent: Vec<u32> = (1..=5 * khz)
                 .filter(|tick| reporter.sends_sample(&sample(*tick)))

@@ -4,12 +4,12 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 use hapterra_core::Vec3;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::{Cell, GridPoint};
 use hapterra_core::guard::{Blockers, Limits};
-use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Point, Scene, Source};
+use hapterra_core::scene::{HipCommand, Scene, Source};
 use hapterra_core::terrain::{FieldSize, Tile, TileKey};
 
 use super::*;
@@ -24,7 +24,7 @@ fn looped(source: Source) -> (Loop, LinkEnds<'static>) {
     let memory = Box::leak(Box::new(WorkingMemory::new()));
     let (loop_ends, mut link_ends) = memory.queues.split();
     let mut haptics = Haptics::new(tiles.split().0, TickRate::DEFAULT, None);
-    haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid"));
+    haptics.configure(Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid"));
     let haptic_loop = HapticLoop::new(
         haptics,
         loop_ends,
@@ -46,14 +46,14 @@ fn scene(source: Source) -> Scene {
         underlay: None,
         cell_mm: 1.0,
         home: GridPoint::new([100, 100, 10], Vec3::ZERO),
-        law: ForceLaw::PREMIUM,
+        law: SurfaceParams::PREMIUM,
         source,
         hold_clock: false,
         materials: None,
     }
 }
 
-fn drain(link_ends: &mut LinkEnds<'_>) -> Vec<TickRecord> {
+fn drain(link_ends: &mut LinkEnds<'_>) -> Vec<QueuedTick> {
     core::iter::from_fn(|| link_ends.records.dequeue()).collect()
 }
 
@@ -72,7 +72,7 @@ fn samples_that_find_no_room_are_counted() {
 fn wave(haptic_loop: &mut Loop, from: i32, ticks: i32) -> i32 {
     for n in 1..=ticks {
         haptic_loop.encoders_mut().0.counts = [from + 100 * n; 3];
-        assert_eq!(haptic_loop.tick(), Drive::default());
+        assert_eq!(haptic_loop.tick(), GuardOutputs::default());
     }
     from + 100 * ticks
 }
@@ -88,8 +88,8 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
     let at = wave(&mut haptic_loop, at, 50);
     // While a point waits for its tile; what it waits for fills the queue.
     let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
-    let point = Point { seq: 9, hip };
-    assert!(link_ends.commands.enqueue(Command::Point(point)).is_ok());
+    let point = HipCommand { seq: 9, hip };
+    assert!(link_ends.commands.enqueue(Command::Hip(point)).is_ok());
     let at = wave(&mut haptic_loop, at, 50);
     // While its answer finds no room.
     let tile = Box::leak(Box::new(Tile::VACANT));
@@ -117,8 +117,8 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
 fn an_answer_that_finds_no_room_is_kept_until_it_does() {
     let (mut haptic_loop, mut link_ends) = looped(Source::Points);
     let hip = GridPoint::new([100, 100, 2], Vec3::splat(0.5));
-    let point = Point { seq: 9, hip };
-    assert!(link_ends.commands.enqueue(Command::Point(point)).is_ok());
+    let point = HipCommand { seq: 9, hip };
+    assert!(link_ends.commands.enqueue(Command::Hip(point)).is_ok());
     // Without its tile the point waits, and what it waits for fills the queue.
     for _ in 0..100 {
         haptic_loop.tick();
@@ -238,7 +238,7 @@ fn a_refused_scene_leaves_nothing_to_render() {
         assert!(link_ends.commands.enqueue(Command::Scene(refused)).is_ok());
         assert!(link_ends.commands.enqueue(Command::Arm).is_ok());
         for _ in 0..100 {
-            assert_eq!(haptic_loop.tick(), Drive::default());
+            assert_eq!(haptic_loop.tick(), GuardOutputs::default());
         }
         // Loop and guard agree, and the guard refuses to arm for it.
         assert_eq!(haptic_loop.haptics.source(), HipSource::None);

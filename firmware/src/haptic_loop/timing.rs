@@ -4,7 +4,7 @@
 //! the timer's own count tells the time within a period only, so it cannot see that whole
 //! periods are missing, and the last force was held meanwhile.
 
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use crate::board::TickClock;
 
@@ -68,7 +68,7 @@ impl Timing {
 
     /// Writes the figures into a sample. The sample's own tick has not ended, so the
     /// cost is that of the tick before it.
-    pub(super) const fn fill(&self, sample: &mut Sample) {
+    pub(super) const fn fill(&self, sample: &mut TickRecord) {
         sample.cost = self.cost;
         sample.worst_cost = self.worst_cost;
         sample.late = self.late;

@@ -27,7 +27,7 @@ impl<'t, const D: usize> Link<'t, D> {
                 | Command::Clutch(_)
                 | Command::Mark(_)
                 | Command::Tile(_)
-                | Command::Point(_)
+                | Command::Hip(_)
                 | Command::Disarm
                 | Command::Zero(_)
                 | Command::ClearFault(_)

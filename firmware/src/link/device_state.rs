@@ -2,7 +2,7 @@
 //! what of it the host has yet to be told.
 
 use hapterra_core::guard::{Blockers, Fault, Limits, Mode, Report};
-use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::scene::Health;
 use hapterra_core::scene::Scene;
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL, SerialNumber};
@@ -186,9 +186,9 @@ impl DeviceState {
     }
 
     /// Checks a calibration as a whole, against this board, too.
-    pub(super) fn checked(&self, calibration: &Calibration) -> Result<Mechanism, Refusal> {
+    pub(super) fn checked(&self, calibration: &Calibration) -> Result<Kinematics, Refusal> {
         let fits = calibration.check_board(self.full_scale_a);
-        let mechanism = Mechanism::new(calibration).and_then(|arm| fits.map(|()| arm));
+        let mechanism = Kinematics::new(calibration).and_then(|arm| fits.map(|()| arm));
         mechanism.map_err(Refusal::Calibration)
     }
 

@@ -2,7 +2,7 @@
 //! the haptic interrupt.
 #![cfg_attr(not(feature = "defmt"), allow(unused_variables))]
 
-use hapterra_core::wire::frame::BadFrame;
+use hapterra_core::wire::frame::FrameError;
 use hapterra_core::wire::session::{SessionEnd, SessionNumber};
 
 pub(super) fn opened(session: SessionNumber, last: SessionEnd, bad_frames: u32) {
@@ -35,7 +35,7 @@ pub(super) fn scene(epoch: u32, accepted: bool) {
     defmt::info!("scene {}, accepted: {}", epoch, accepted);
 }
 
-pub(super) fn bad_frame(bad: BadFrame) {
+pub(super) fn bad_frame(bad: FrameError) {
     #[cfg(feature = "defmt")]
     defmt::debug!("dropped a frame: {}", bad);
 }

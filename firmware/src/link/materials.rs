@@ -2,7 +2,7 @@
 
 use hapterra_core::force::MaterialTable;
 use hapterra_core::scene::Scene;
-use hapterra_core::terrain::{BadTile, Tile, TileKey};
+use hapterra_core::terrain::{Tile, TileError, TileKey};
 use hapterra_core::wire::materials::{MaterialScene, TileMaterials};
 
 use super::Link;
@@ -54,14 +54,14 @@ impl<const D: usize> Link<'_, D> {
         tile: &mut Tile,
         key: TileKey,
         materials: Option<TileMaterials<'_>>,
-    ) -> Result<(), BadTile> {
+    ) -> Result<(), TileError> {
         let scene = self.scene.filter(|scene| scene.materials.is_some());
         // The underlay is of another level, and has none.
         let wanted = scene.is_some_and(|scene| scene.level == key.level);
         match (wanted, materials, self.materials) {
             (false, None, _) => Ok(()),
             (true, Some(materials), Some(known)) => materials.fill(tile, known.count),
-            _ => Err(BadTile::Materials),
+            _ => Err(TileError::Materials),
         }
     }
 }

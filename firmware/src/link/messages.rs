@@ -1,9 +1,9 @@
 //! What the link does with each message of the host.
 
-use hapterra_core::scene::{Point, Scene};
+use hapterra_core::scene::{HipCommand, Scene};
 use hapterra_core::terrain::RETRY_TICKS;
 use hapterra_core::tick::Command;
-use hapterra_core::wire::frame::{BadFrame, decode};
+use hapterra_core::wire::frame::{FrameError, decode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::session::{InSession, ONLY_LOOKS, SessionEnd, SessionNumber};
@@ -17,7 +17,11 @@ use super::{Link, ReplayProgress, log};
 
 impl<const D: usize> Link<'_, D> {
     /// Acts on a frame's decoded bytes.
-    pub(super) fn on_content(&mut self, content: &[u8], room: CommandRoom) -> Result<(), BadFrame> {
+    pub(super) fn on_content(
+        &mut self,
+        content: &[u8],
+        room: CommandRoom,
+    ) -> Result<(), FrameError> {
         self.nothing_to_request_at = None;
         if VersionCheck::is_in(content) {
             self.on_version_check(decode(content)?);
@@ -66,7 +70,7 @@ impl<const D: usize> Link<'_, D> {
                 | SessionState::Detached
                 | SessionState::Gone,
             ) => {}
-            (ToDevice::Alive, _) => self.on_alive(),
+            (ToDevice::Heartbeat, _) => self.on_alive(),
             (ToDevice::Status { number }, _) => self.tell_status(session, number),
             (ToDevice::GetCalibration { number }, _) => self.tell_calibration(session, number),
             (_, SessionState::Leaving) => {}
@@ -77,7 +81,7 @@ impl<const D: usize> Link<'_, D> {
             (ToDevice::MaterialTile(message), _) => {
                 self.take_tile(&message.tile, Some(message.materials), room);
             }
-            (ToDevice::Point(point), _) => self.take_point(point),
+            (ToDevice::Hip(point), _) => self.take_point(point),
             (ToDevice::Request { number, request }, _) => {
                 self.take_request(number, &request, room);
             }
@@ -102,7 +106,7 @@ impl<const D: usize> Link<'_, D> {
             Greeting::Over(end) => {
                 self.foreign_frames = self.foreign_frames.saturating_add(1);
                 let number = hello.number;
-                return self.say_in(session, &ToHost::Over { number, end });
+                return self.say_in(session, &ToHost::SessionClosed { number, end });
             }
             Greeting::Again => {}
             Greeting::Opens => self.open(session, hello.number, room),
@@ -154,7 +158,7 @@ impl<const D: usize> Link<'_, D> {
     fn on_alive(&mut self) {
         let (count, report) = (self.sample_count(), self.device.report());
         let epoch = self.scene.map(|scene| scene.epoch);
-        self.say(&ToHost::Alive {
+        self.say(&ToHost::Heartbeat {
             count,
             epoch,
             report,
@@ -230,7 +234,7 @@ impl<const D: usize> Link<'_, D> {
         self.replay = ReplayProgress::default();
     }
 
-    pub(super) fn on_bad_frame(&mut self, bad: BadFrame) {
+    pub(super) fn on_bad_frame(&mut self, bad: FrameError) {
         log::bad_frame(bad);
         self.bad_frames = self.bad_frames.saturating_add(1);
     }
@@ -273,12 +277,12 @@ impl<const D: usize> Link<'_, D> {
         }
         let epoch = scene.epoch;
         log::scene(epoch, accepted);
-        self.say(&ToHost::SceneTaken { epoch, accepted });
+        self.say(&ToHost::SceneAck { epoch, accepted });
     }
 
     /// Takes a point. Each is rendered once; one that was answered is answered
     /// again.
-    fn take_point(&mut self, point: Point) {
+    fn take_point(&mut self, point: HipCommand) {
         if self.renders_arm() || self.scene.is_none() {
             return;
         }

@@ -39,8 +39,8 @@ mod views;
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Point, Sample, Scene, Source};
-use hapterra_core::terrain::{Tile, TileDemand, TileRequester};
+use hapterra_core::scene::{HipCommand, Scene, Source, TickRecord};
+use hapterra_core::terrain::{RequestHint, Tile, TileRequester};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::message::ToHost;
 use hapterra_core::wire::request::Refusal;
@@ -48,7 +48,7 @@ use hapterra_core::wire::session::{SampleCount, SessionNumber};
 use heapless::{Deque, Vec};
 
 use crate::led::LedPattern;
-use crate::queues::{LinkEnds, SPARES, TickRecord};
+use crate::queues::{LinkEnds, QueuedTick, SPARES};
 use commands::CommandRoom;
 pub(crate) use device_state::{DeviceState, KnownArm};
 use loader::LoaderEntry;
@@ -68,7 +68,7 @@ pub(crate) struct Buffers {
     reader: FrameReader<MAX_FRAME>,
     tx: TxQueue,
     /// Samples on their way to the writer.
-    samples: Deque<Sample, SAMPLES>,
+    samples: Deque<TickRecord, SAMPLES>,
 }
 
 impl Buffers {
@@ -87,7 +87,7 @@ struct ReplayProgress {
     /// The number of the point that the loop is rendering.
     under_way: Option<u32>,
     /// The last answer, for a host that missed it.
-    last: Option<TickRecord>,
+    last: Option<QueuedTick>,
 }
 
 /// The device's end of the link, for a window of `D × D` tiles.
@@ -95,7 +95,7 @@ pub struct Link<'t, const D: usize> {
     /// `None` only while a message that was read borrows from it.
     reader: Option<&'t mut FrameReader<MAX_FRAME>>,
     tx: &'t mut TxQueue,
-    samples: &'t mut Deque<Sample, SAMPLES>,
+    samples: &'t mut Deque<TickRecord, SAMPLES>,
     ends: LinkEnds<'t>,
     session: Session,
     /// The session of the last host that only looks.
@@ -117,10 +117,10 @@ pub struct Link<'t, const D: usize> {
     /// nothing has changed since. Its search is long, so it does not run at every
     /// tick.
     nothing_to_request_at: Option<u32>,
-    focus: Option<TileDemand>,
-    last_record: TickRecord,
+    focus: Option<RequestHint>,
+    last_record: QueuedTick,
     spare: Vec<&'t mut Tile, SPARES>,
-    points: Deque<Point, POINTS_AHEAD>,
+    points: Deque<HipCommand, POINTS_AHEAD>,
     replay: ReplayProgress,
     /// Samples in the last telemetry message.
     batch: u32,
@@ -155,7 +155,7 @@ impl<'t, const D: usize> Link<'t, D> {
             requester: TileRequester::new(),
             nothing_to_request_at: None,
             focus: None,
-            last_record: TickRecord::default(),
+            last_record: QueuedTick::default(),
             spare: spare.into_iter().collect(),
             points: Deque::new(),
             replay: ReplayProgress::default(),
@@ -287,7 +287,7 @@ impl<'t, const D: usize> Link<'t, D> {
     }
 
     /// Answers a point with what the loop rendered there.
-    fn answer_point(&mut self, record: TickRecord) {
+    fn answer_point(&mut self, record: QueuedTick) {
         let is_open = self.session.is_open();
         if let Some(seq) = record.answers.filter(|_| is_open) {
             let sample = record.sample;

@@ -127,7 +127,7 @@ impl<const D: usize> Link<'_, D> {
             && let Some(point) = self.points.pop_front()
         {
             self.replay.under_way = Some(point.seq);
-            self.command(room, Command::Point(point));
+            self.command(room, Command::Hip(point));
         }
     }
 

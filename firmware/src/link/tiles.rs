@@ -1,14 +1,14 @@
 //! Tiles on their way: which ones the link requests, and whose buffer is where.
 
-use hapterra_core::terrain::{BadTile, Tile, TileDemand};
+use hapterra_core::terrain::{RequestHint, Tile, TileError};
 use hapterra_core::tick::Command;
-use hapterra_core::wire::frame::BadFrame;
+use hapterra_core::wire::frame::FrameError;
 use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::{Heights, TileMessage, ToHost};
 
 use super::Link;
 use super::commands::CommandRoom;
-use crate::queues::TickRecord;
+use crate::queues::QueuedTick;
 
 impl<'t, const D: usize> Link<'t, D> {
     /// Takes back the tile buffers that the loop is done with.
@@ -50,7 +50,7 @@ impl<'t, const D: usize> Link<'t, D> {
         if filled.is_err() {
             tile.vacate();
             self.give_back(tile);
-            return self.on_bad_frame(BadFrame::Content);
+            return self.on_bad_frame(FrameError::Content);
         }
         self.requester.received(key);
         self.command(room, Command::Tile(tile));
@@ -61,10 +61,10 @@ impl<'t, const D: usize> Link<'t, D> {
         let (true, Some(scene)) = (self.session.is_open(), self.scene) else {
             return;
         };
-        let focus = self.focus.unwrap_or_else(|| TileDemand {
+        let focus = self.focus.unwrap_or_else(|| RequestHint {
             proxy: scene.home.column(),
             hip: scene.home.column(),
-            ..TileDemand::default()
+            ..RequestHint::default()
         });
         let now = self.ends.monitor.ticks() / self.device.ticks_per_ms();
         if self.nothing_to_request_at == Some(now) {
@@ -81,7 +81,7 @@ impl<'t, const D: usize> Link<'t, D> {
                 return;
             };
             let epoch = scene.epoch;
-            self.say(&ToHost::Need { epoch, key });
+            self.say(&ToHost::TileRequest { epoch, key });
         }
     }
 }
@@ -90,7 +90,7 @@ impl<'t, const D: usize> Link<'t, D> {
 ///
 /// # Errors
 /// When the message's heights are not those of a tile. The buffer is then to be vacated.
-pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), BadTile> {
+pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), TileError> {
     let key = message.key;
     let mut flat = |base, height| tile.fill(key, base, |_, _| height);
     match message.heights {
@@ -103,7 +103,7 @@ pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), BadTi
 
 /// Says where the loop needs terrain after `record`, which followed `last`. The
 /// velocity is in cells a millisecond, the tile requester's unit of time, at every tick rate.
-pub(super) fn focus(last: &TickRecord, record: &TickRecord, ticks_per_ms: u32) -> TileDemand {
+pub(super) fn focus(last: &QueuedTick, record: &QueuedTick, ticks_per_ms: u32) -> RequestHint {
     let (last, sample) = (&last.sample, &record.sample);
     let ticks = sample.tick.wrapping_sub(last.tick);
     // A new scene counts its ticks from one again, and a view has other cells: neither
@@ -114,7 +114,7 @@ pub(super) fn focus(last: &TickRecord, record: &TickRecord, ticks_per_ms: u32) -
         let step = last.hip.to(&sample.hip) * (ticks_per_ms as f32 / ticks as f32);
         [step.x, step.y]
     };
-    TileDemand {
+    RequestHint {
         missing_tile: sample.missing_tile,
         proxy: sample.proxy.column(),
         hip: sample.hip.column(),

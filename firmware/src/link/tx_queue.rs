@@ -8,9 +8,9 @@ use hapterra_core::wire::version::VersionCheck;
 /// Bytes kept for answers and requests.
 const URGENT: usize = 1152;
 /// The longest urgent frame: `Status` with every number at its longest.
-pub(super) const LONGEST_URGENT: usize = 448;
+pub(super) const MAX_URGENT: usize = 448;
 /// The longest telemetry frame: eight samples, every number at its longest.
-const LONGEST_TELEMETRY: usize = 1280;
+const MAX_TELEMETRY: usize = 1280;
 
 /// Bytes of whole frames on their way out.
 struct Frames<const N: usize> {
@@ -67,7 +67,7 @@ fn in_session(session: SessionNumber, message: &ToHost, free: &mut [u8]) -> Opti
 /// Frames waiting for the writer, in two classes that never mix bytes.
 pub(super) struct TxQueue {
     urgent: Frames<URGENT>,
-    telemetry: Frames<LONGEST_TELEMETRY>,
+    telemetry: Frames<MAX_TELEMETRY>,
     /// Whether a zero goes first, which ends a frame that was cut off before.
     starts_clean: bool,
 }
@@ -93,7 +93,7 @@ impl TxQueue {
 
     /// Whether any one answer or request fits for sure.
     pub(super) fn has_room(&self) -> bool {
-        self.urgent.room() >= LONGEST_URGENT
+        self.urgent.room() >= MAX_URGENT
     }
 
     /// Whether the writer has caught up with telemetry.
@@ -158,7 +158,7 @@ mod tests {
     const SESSION: SessionNumber = SessionNumber::new(1);
 
     fn taken(epoch: u32) -> ToHost {
-        ToHost::SceneTaken {
+        ToHost::SceneAck {
             epoch,
             accepted: true,
         }
@@ -225,7 +225,7 @@ mod tests {
             pushed += 1;
         }
         assert!(pushed > 20);
-        let first = take(&mut queue, LONGEST_URGENT);
+        let first = take(&mut queue, MAX_URGENT);
         assert!(queue.has_room());
         let rest = take(&mut queue, 4096);
         let all: Vec<_> = (0..pushed).map(taken).collect();

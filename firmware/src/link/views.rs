@@ -6,7 +6,7 @@
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::{Scene, Source, View};
-use hapterra_core::terrain::TileDemand;
+use hapterra_core::terrain::RequestHint;
 use hapterra_core::tick::Command;
 use hapterra_core::wire::message::ToHost;
 
@@ -67,7 +67,7 @@ impl<const D: usize> Link<'_, D> {
         if accepted && !is_again {
             self.put_in(view, room);
         }
-        self.say(&ToHost::SceneTaken { epoch, accepted });
+        self.say(&ToHost::SceneAck { epoch, accepted });
     }
 
     /// Whether nothing is felt now: the clutch is open, as the loop has said since it is
@@ -96,10 +96,10 @@ impl<const D: usize> Link<'_, D> {
             self.requester.lay(scene.underlay);
         }
         self.requester.forget_asked();
-        self.focus = Some(TileDemand {
+        self.focus = Some(RequestHint {
             proxy: at,
             hip: at,
-            ..TileDemand::default()
+            ..RequestHint::default()
         });
         self.nothing_to_request_at = None;
         self.scene = Some(scene);

@@ -10,7 +10,7 @@ mod world_file;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use super::BadRaster;
+use super::RasterError;
 use super::input::{Data, FileBytes};
 use crate::remote::{is_missing, neighbour};
 
@@ -20,7 +20,7 @@ pub(super) use unread::remark_unread;
 pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
 
 /// No neighbour that is text is longer; what is longer is something else.
-const LONGEST_TEXT: u64 = 1 << 20;
+const MAX_TEXT: u64 = 1 << 20;
 
 /// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so
 /// that no output comes to lie over one that [`files_read_with`] does not know.
@@ -41,7 +41,7 @@ pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
 
 /// Names of the files beside the one at a URL that belong to it. A TIFF of many that a VRT names is
 /// asked for three of them only.
-pub(super) fn names_at_url(input: &FileBytes, url: &str) -> Result<Vec<String>, BadRaster> {
+pub(super) fn names_at_url(input: &FileBytes, url: &str) -> Result<Vec<String>, RasterError> {
     let ends = match input.extension() {
         "tif" | "tiff" => &["msk", "ovr", "aux.xml"][..],
         _ => &NEIGHBOURS[..],
@@ -65,7 +65,7 @@ fn look_for(input: &FileBytes, extensions: impl Iterator<Item = &'static str>) {
 
 /// The file beside `input` whose extension is `extension`, in lower or upper case:
 /// `hills.hdr` beside `hills.flt`, or `hills.flt.hdr`.
-fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, BadRaster> {
+fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, RasterError> {
     match (input.data(), known(extension)) {
         (Data::File(_, path), Some(known)) => on_disk(path, &candidates(path, known), input),
         (Data::Remote(_, url), Some(known)) => elsewhere(url, &neighbour(url, known), input),
@@ -78,7 +78,7 @@ fn find(input: &FileBytes, extension: &str) -> Result<Option<FileBytes>, BadRast
 pub(super) fn find_appended(
     input: &FileBytes,
     extension: &str,
-) -> Result<Option<FileBytes>, BadRaster> {
+) -> Result<Option<FileBytes>, RasterError> {
     match (input.data(), known(extension)) {
         (Data::File(_, path), Some(known)) => on_disk(path, &[appended(path, known)], input),
         (Data::Remote(_, url), Some(known)) => elsewhere(url, &neighbour(url, known)[1..], input),
@@ -97,7 +97,7 @@ fn on_disk(
     path: &Path,
     others: &[PathBuf],
     input: &FileBytes,
-) -> Result<Option<FileBytes>, BadRaster> {
+) -> Result<Option<FileBytes>, RasterError> {
     let mut others = others.iter().filter(|other| *other != path);
     let found = others.find(|other| other.is_file());
     let open = |other: &PathBuf| FileBytes::open(other, input.elsewhere());
@@ -110,10 +110,10 @@ fn elsewhere(
     own: &str,
     urls: &[String],
     input: &FileBytes,
-) -> Result<Option<FileBytes>, BadRaster> {
+) -> Result<Option<FileBytes>, RasterError> {
     for url in urls.iter().filter(|url| *url != own) {
         match FileBytes::open(Path::new(url), input.elsewhere()) {
-            Err(BadRaster::Elsewhere(error)) if is_missing(&error) => {}
+            Err(RasterError::RemoteFetcher(error)) if is_missing(&error) => {}
             Ok(found) if is_page(&found)? => {}
             other => return other.map(Some),
         }
@@ -123,7 +123,7 @@ fn elsewhere(
 
 /// Whether a file is a page of a web site, or empty: some servers have one for every name.
 /// No neighbour begins like one.
-fn is_page(found: &FileBytes) -> Result<bool, BadRaster> {
+fn is_page(found: &FileBytes) -> Result<bool, RasterError> {
     let head = found.head(64)?;
     let first = head.iter().find(|byte| !byte.is_ascii_whitespace());
     Ok(first.is_none_or(|first| *first == b'<'))
@@ -152,7 +152,7 @@ pub(super) fn appended(path: &Path, extension: &str) -> PathBuf {
 pub(super) fn text(
     input: &FileBytes,
     extension: &str,
-) -> Result<Option<(String, String)>, BadRaster> {
+) -> Result<Option<(String, String)>, RasterError> {
     find(input, extension)?.map(whole_text).transpose()
 }
 
@@ -160,16 +160,16 @@ pub(super) fn text(
 fn text_appended(
     input: &FileBytes,
     extension: &str,
-) -> Result<Option<(String, String)>, BadRaster> {
+) -> Result<Option<(String, String)>, RasterError> {
     find_appended(input, extension)?.map(whole_text).transpose()
 }
 
-fn whole_text(beside: FileBytes) -> Result<(String, String), BadRaster> {
+fn whole_text(beside: FileBytes) -> Result<(String, String), RasterError> {
     let name = beside.name().to_owned();
-    let bytes = beside.head(LONGEST_TEXT + 1)?;
-    if bytes.len() as u64 > LONGEST_TEXT {
-        return Err(BadRaster::AbsurdSize(format!(
-            "{name} beside it is larger than {LONGEST_TEXT} bytes: no such text is"
+    let bytes = beside.head(MAX_TEXT + 1)?;
+    if bytes.len() as u64 > MAX_TEXT {
+        return Err(RasterError::AbsurdSize(format!(
+            "{name} beside it is larger than {MAX_TEXT} bytes: no such text is"
         )));
     }
     Ok((String::from_utf8_lossy(&bytes).into_owned(), name))

@@ -1,7 +1,7 @@
 //! The reference system in a `.prj` file, as Esri's programs write it.
 
 use super::text;
-use crate::BadRaster;
+use crate::RasterError;
 use crate::crs::ReferenceSystem;
 use crate::decoded::Decoded;
 use crate::input::FileBytes;
@@ -11,7 +11,10 @@ use crate::input::FileBytes;
 ///
 /// # Errors
 /// Where it is elsewhere and cannot be read at present.
-pub(crate) fn reference_system(input: &FileBytes, decoded: &mut Decoded) -> Result<(), BadRaster> {
+pub(crate) fn reference_system(
+    input: &FileBytes,
+    decoded: &mut Decoded,
+) -> Result<(), RasterError> {
     let (wkt, name) = match text(input, "prj") {
         Ok(Some(found)) => found,
         Err(error) if error.is_of_the_line() => return Err(error),

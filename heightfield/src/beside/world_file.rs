@@ -1,7 +1,7 @@
 //! World files: six numbers in a text beside a picture, which say where its samples lie.
 
 use super::text;
-use crate::BadRaster;
+use crate::RasterError;
 use crate::decoded::Decoded;
 use crate::ground_map::GroundMap;
 use crate::input::{Data, FileBytes};
@@ -15,7 +15,7 @@ pub(crate) fn lay_out_by_world_file(
     input: &FileBytes,
     own: &[&'static str],
     decoded: &mut Decoded,
-) -> Result<(), BadRaster> {
+) -> Result<(), RasterError> {
     if let Some((map, name)) = find(input, own)? {
         super::reference_system(input, decoded)?;
         decoded.lay_out(map, None);
@@ -37,7 +37,10 @@ pub(crate) fn remark_other_place(input: &FileBytes, own: &[&'static str], decode
 }
 
 /// The map of the world file beside a file, and that file's name.
-fn find(input: &FileBytes, own: &[&'static str]) -> Result<Option<(GroundMap, String)>, BadRaster> {
+fn find(
+    input: &FileBytes,
+    own: &[&'static str],
+) -> Result<Option<(GroundMap, String)>, RasterError> {
     let extensions = || own.iter().copied().chain(["wld"]);
     super::look_for(input, extensions());
     for extension in extensions() {
@@ -45,7 +48,7 @@ fn find(input: &FileBytes, own: &[&'static str]) -> Result<Option<(GroundMap, St
             continue;
         };
         let map = read(&text).ok_or_else(|| {
-            BadRaster::damaged(format!(
+            RasterError::damaged(format!(
                 "{name} beside it is no world file: six numbers are wanted, the steps not zero"
             ))
         })?;

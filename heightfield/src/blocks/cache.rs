@@ -7,7 +7,7 @@ use lru::LruCache;
 use super::Block;
 
 /// Blocks of a terrain are kept until they take more than this, bytes.
-pub(super) const MOST_BYTES: usize = 64 << 20;
+pub(super) const MAX_BYTES: usize = 64 << 20;
 /// What a hole takes, and a block besides its samples, bytes: about.
 const ENTRY_BYTES: usize = 128;
 

@@ -20,11 +20,11 @@ pub(super) const STEPS: [u32; 3] = [8, 64, 512];
 const PIECE: u32 = 64;
 const SAMPLES: usize = (PIECE * PIECE) as usize;
 /// Pieces in memory, at most: 17 MB.
-const MOST_PIECES: usize = 512;
+const MAX_PIECES: usize = 512;
 /// Between two times at which all that is known is kept: pieces grow block by block.
 const BETWEEN_KEEPING: Duration = Duration::from_secs(5);
 /// Bytes that they take at most.
-pub(super) const MOST_BYTES: usize = MOST_PIECES * SAMPLES * (size_of::<f64>() + 1);
+pub(super) const MAX_BYTES: usize = MAX_PIECES * SAMPLES * (size_of::<f64>() + 1);
 
 /// Some samples of a coarse image, row after row; those beyond its edges are not known.
 #[derive(Clone, Debug, PartialEq)]
@@ -228,11 +228,11 @@ impl Coarse {
     }
 
     fn held(&mut self, key: Key) -> &mut Held {
-        if !self.pieces.contains(&key) && self.pieces.len() >= MOST_PIECES {
+        if !self.pieces.contains(&key) && self.pieces.len() >= MAX_PIECES {
             let gone = self.pieces.pop_lru();
             if let Some((key, held)) = gone.filter(|(_, held)| held.is_new) {
                 // A disk that is too slow for them gets those that come.
-                if self.outgoing.len() >= MOST_PIECES / 2 {
+                if self.outgoing.len() >= MAX_PIECES / 2 {
                     self.outgoing.clear();
                 }
                 self.outgoing.push((key, held.piece));

@@ -76,7 +76,7 @@ impl BlockReader for Full {
         [part.column / BLOCK[0], part.row / BLOCK[1]] != SPARSE
     }
 
-    fn read(&self, _: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read(&self, _: usize, part: &Part) -> Result<Block, RasterError> {
         let at = [part.column / BLOCK[0], part.row / BLOCK[1]];
         self.seen.reads.fetch_add(1, Ordering::Relaxed);
         self.seen
@@ -85,10 +85,10 @@ impl BlockReader for Full {
             .expect("alone")
             .push(thread::current().id());
         if at == BAD && self.seen.is_damaged.load(Ordering::Relaxed) {
-            return Err(BadRaster::Damaged("test".into()));
+            return Err(RasterError::Damaged("test".into()));
         }
         if at == LATE && self.seen.is_late.load(Ordering::Relaxed) {
-            return Err(BadRaster::NotYet);
+            return Err(RasterError::NotYet);
         }
         let rows = part.row..part.row + part.rows;
         let samples: Vec<f64> = rows

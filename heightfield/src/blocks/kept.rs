@@ -6,14 +6,14 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::super::BadRaster;
+use super::super::RasterError;
 use super::Block;
 use super::cache::{Cache, Key};
 
 /// A block that was not here yet is looked for again after so long.
 const AGAIN: Duration = Duration::from_millis(20);
 /// Blocks that are known to be on their way, at most.
-const MOST_AWAITED: usize = 1024;
+const MAX_AWAITED: usize = 1024;
 
 thread_local! {
     /// How often this thread asked for something that is not here yet.
@@ -41,7 +41,7 @@ pub(super) struct Kept {
     /// Blocks that are not here yet, and when they were looked for.
     awaited: HashMap<Key, Instant>,
     /// What the line said last.
-    pub(super) outage: Option<BadRaster>,
+    pub(super) outage: Option<RasterError>,
 }
 
 impl Kept {
@@ -80,7 +80,7 @@ impl Kept {
 
     /// Remembers a block that is not here yet.
     pub(super) fn wait_for(&mut self, key: Key) {
-        if self.awaited.len() >= MOST_AWAITED {
+        if self.awaited.len() >= MAX_AWAITED {
             self.awaited.clear();
         }
         self.awaited.insert(key, Instant::now());

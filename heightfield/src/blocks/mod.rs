@@ -35,7 +35,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use super::samples::SampleType;
-use super::{BadRaster, bilinear};
+use super::{RasterError, bilinear};
 use crate::disk_cache::DiskCache;
 use crate::remote::without_key;
 use background::{Job, Queue};
@@ -47,7 +47,7 @@ pub(super) use reader::{Block, BlockImage, BlockReader, Part, usual_block};
 pub(super) use survey::{Looks, Survey, stored_parts};
 
 /// Blocks of a larger size than this are not read one by one, bytes.
-pub(super) const LARGEST_BLOCK_BYTES: u64 = 32 << 20;
+pub(super) const MAX_BLOCK_BYTES: u64 = 32 << 20;
 /// An image serves a level that is coarser than it, or as coarse to this share: overviews
 /// of a field whose size is odd are coarser than a power of two by up to a sample.
 const AS_COARSE: f64 = 1.01;
@@ -90,7 +90,7 @@ impl Blocks {
         let shared = Shared {
             images: reader.images().to_vec(),
             reader,
-            kept: Mutex::new(Kept::new(cache::MOST_BYTES)),
+            kept: Mutex::new(Kept::new(cache::MAX_BYTES)),
             turn: Mutex::new(()),
             coarse: Mutex::new(Coarse::none()),
             disk: DiskCache::off(),
@@ -216,7 +216,7 @@ impl Shared {
     }
 
     /// What the line said last, where something did not come.
-    pub(super) fn take_outage(&self) -> Option<BadRaster> {
+    pub(super) fn take_outage(&self) -> Option<RasterError> {
         self.kept().outage.take()
     }
 
@@ -246,11 +246,11 @@ impl Shared {
         let largest = self.reader.images().iter().map(samples).max();
         let block = largest.unwrap_or(0) * self.sample_type().bytes();
         let pieces = match self.images.len() > self.reader.images().len() {
-            true => coarse::MOST_BYTES,
+            true => coarse::MAX_BYTES,
             false => 0,
         };
-        let blocks = 2 * block.min(LARGEST_BLOCK_BYTES) as usize;
-        cache::MOST_BYTES + blocks + pieces + self.reader.kept_bytes()
+        let blocks = 2 * block.min(MAX_BLOCK_BYTES) as usize;
+        cache::MAX_BYTES + blocks + pieces + self.reader.kept_bytes()
     }
 
     /// The image that serves a level of detail: the coarsest that is no coarser than it.

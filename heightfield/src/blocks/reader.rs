@@ -1,6 +1,6 @@
 //! What a format hands over that can read a part of an image without the rest.
 
-use super::super::BadRaster;
+use super::super::RasterError;
 use super::super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
 use super::survey::Looks;
 
@@ -26,7 +26,7 @@ pub(crate) trait BlockReader: Send + Sync {
     ///
     /// # Errors
     /// What is wrong with that part of the file.
-    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster>;
+    fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError>;
 
     /// Is told the file's order before anything is read: coarse levels count their samples
     /// from the south and west.

@@ -18,7 +18,7 @@ const WARNINGS: u32 = 8;
 const AHEAD: usize = 16;
 
 /// Blocks that are read ahead of the hand at once, at most.
-const MOST_PREFETCHED: usize = 16;
+const MAX_PREFETCHED: usize = 16;
 
 /// What came of reading a part of an image.
 pub(super) struct Read {
@@ -94,7 +94,7 @@ impl Shared {
 
     /// Has the blocks of a part of an image read that are not in memory. Waits for
     /// nothing, and does nothing before nobody waits any more, nor for a part of more than
-    /// [`MOST_PREFETCHED`] blocks.
+    /// [`MAX_PREFETCHED`] blocks.
     pub(super) fn prefetch(&self, image: usize, part: &Part) {
         let Some(of) = self.images.get(image).filter(|_| !self.waits()) else {
             return;
@@ -106,7 +106,7 @@ impl Shared {
         let columns = part.column / across..(part.column + (part.columns - 1)) / across + 1;
         let rows = part.row / down..(part.row + (part.rows - 1)) / down + 1;
         // Of a part that is too large nothing comes in time.
-        if columns.len() * rows.len() > MOST_PREFETCHED {
+        if columns.len() * rows.len() > MAX_PREFETCHED {
             return;
         }
         let mut wanted = vec![];

@@ -14,7 +14,7 @@ const FEW_SAMPLES: u64 = 1 << 20;
 const LOOKS: usize = 32;
 /// Of more blocks that hold samples not all are listed, but so many, spread evenly: a list of
 /// them all would take more memory than a terrain.
-const MOST_LISTED: usize = 1 << 20;
+const MAX_LISTED: usize = 1 << 20;
 
 /// Heights looked at when the file was opened.
 #[derive(Clone, Copy, Debug)]
@@ -160,8 +160,8 @@ pub(crate) fn stored_parts(of: &BlockImage, is_stored: impl Fn(&Part) -> bool) -
     let [across, down] = of.counts();
     let every = || (0..down).flat_map(|row| (0..across).map(move |column| [column, row]));
     let stored = || every().map(|at| of.part(at)).filter(&is_stored);
-    let step = match u64::from(across) * u64::from(down) > MOST_LISTED as u64 {
-        true => stored().count().div_ceil(MOST_LISTED).max(1),
+    let step = match u64::from(across) * u64::from(down) > MAX_LISTED as u64 {
+        true => stored().count().div_ceil(MAX_LISTED).max(1),
         false => 1,
     };
     stored().step_by(step).collect()
@@ -184,10 +184,10 @@ mod tests {
         assert_eq!(one.len(), 1);
         assert_eq!((one[0].column, one[0].row), (1999, 7));
         let all = stored_parts(&of, |_| true);
-        assert_eq!(all.len(), MOST_LISTED);
+        assert_eq!(all.len(), MAX_LISTED);
         assert!(all.last().is_some_and(|part| part.row == 2047));
         let third = stored_parts(&of, |part| part.row.is_multiple_of(3));
-        assert!((MOST_LISTED / 2..=MOST_LISTED).contains(&third.len()));
+        assert!((MAX_LISTED / 2..=MAX_LISTED).contains(&third.len()));
         assert!(third.iter().all(|part| part.row % 3 == 0));
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::cache::MOST_BYTES;
+use super::cache::MAX_BYTES;
 use super::*;
 use crate::decoded::Decoded;
 use crate::storage::Storage;
@@ -65,9 +65,9 @@ impl BlockReader for Field {
         !(self.fault && image == 0 && (part.column, part.row) == (64, 0))
     }
 
-    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         if self.fault && image == 0 && (part.column, part.row) == (0, 48) {
-            return Err(BadRaster::Damaged("test".into()));
+            return Err(RasterError::Damaged("test".into()));
         }
         if self.fault && image == 0 && (part.column, part.row) == (64, 48) {
             panic!("a decoder's");
@@ -193,9 +193,9 @@ fn the_memory_that_blocks_take_is_bounded() {
         }
     }
     let kept = blocks.kept.lock().expect("alone");
-    assert!(8 * read.load(Ordering::Relaxed) > 2 * MOST_BYTES as u64);
-    assert!(kept.cache.bytes() <= MOST_BYTES, "{}", kept.cache.bytes());
-    assert!(kept.cache.bytes() > MOST_BYTES / 2);
+    assert!(8 * read.load(Ordering::Relaxed) > 2 * MAX_BYTES as u64);
+    assert!(kept.cache.bytes() <= MAX_BYTES, "{}", kept.cache.bytes());
+    assert!(kept.cache.bytes() > MAX_BYTES / 2);
     drop(kept);
     // The one touched last is still there.
     let before = read.load(Ordering::Relaxed);
@@ -262,10 +262,10 @@ impl BlockReader for Slow {
         true
     }
 
-    fn read(&self, _: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read(&self, _: usize, part: &Part) -> Result<Block, RasterError> {
         if part.column == BLOCK[0] {
             if self.elsewhere {
-                return Err(BadRaster::NotYet);
+                return Err(RasterError::NotYet);
             }
             self.begun.wait();
             self.go_on.wait();
@@ -338,6 +338,6 @@ fn a_field_without_a_height_anywhere_is_refused() {
     decoded.scale = f64::MAX;
     // Every height but zero is larger than any height.
     let fault = Raster::checked(decoded, Some(0.0)).expect_err("no height");
-    assert!(matches!(fault, BadRaster::AllNoData { .. }), "{fault}");
+    assert!(matches!(fault, RasterError::AllNoData { .. }), "{fault}");
     assert_eq!(OpenOptions::default().most_in_memory_bytes, 128 << 20);
 }

@@ -41,7 +41,7 @@ use crate::regular_file;
 /// Records of another form are in another folder.
 const FORM: &str = "v1";
 /// No record is larger than this, bytes.
-const LARGEST_RECORD: usize = 1 << 20;
+const MAX_RECORD: usize = 1 << 20;
 /// A record that is read is marked as used where that was done longer ago than this.
 const USED_AGAIN: Duration = Duration::from_secs(3600);
 
@@ -63,7 +63,7 @@ struct Folder {
 
 impl DiskCache {
     /// Bytes that all records take at most unless somebody states it, in units of 2²⁰.
-    pub const MOST_MB: u32 = 1024;
+    pub const MAX_MB: u32 = 1024;
 
     /// Keeps nothing.
     #[must_use]
@@ -118,7 +118,7 @@ impl DiskCache {
 
     /// Keeps a record, in place of one of the same name, if it can.
     pub(crate) fn put(&self, name: &Name, bytes: &[u8]) {
-        let Some(folder) = self.0.as_ref().filter(|_| bytes.len() <= LARGEST_RECORD) else {
+        let Some(folder) = self.0.as_ref().filter(|_| bytes.len() <= MAX_RECORD) else {
             return;
         };
         // Nothing that panics runs while this is held.
@@ -184,7 +184,7 @@ impl Folder {
 fn read(path: &Path, name: &Name) -> io::Result<Vec<u8>> {
     let file = regular_file::open(path)?;
     let metadata = file.metadata()?;
-    let most = (LARGEST_RECORD + record::HEAD) as u64;
+    let most = (MAX_RECORD + record::HEAD) as u64;
     if metadata.len() > most {
         return Err(io::Error::other("it is no record"));
     }

@@ -160,7 +160,7 @@ fn a_folder_that_is_off_or_cannot_be_made_keeps_nothing_and_says_nothing() {
     assert!(!folder.path().join("off").exists());
     // More than the largest record.
     let cache = DiskCache::at(folder.path(), 1 << 30);
-    cache.put(&name(1), &vec![0; LARGEST_RECORD + 1]);
+    cache.put(&name(1), &vec![0; MAX_RECORD + 1]);
     assert_eq!(cache.get(&name(1)), None);
 }
 

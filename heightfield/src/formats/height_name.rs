@@ -1,6 +1,6 @@
 //! Which of several variables or arrays in a file holds the heights.
 
-use crate::BadRaster;
+use crate::RasterError;
 
 /// The place in `names` of the `asked` one; without that of the first of the names that
 /// heights `usual`ly have (words, the likeliest first), or of the only name. `kind` is
@@ -13,14 +13,14 @@ pub(super) fn choose(
     names: &[&str],
     usual: &str,
     asked: Option<&str>,
-) -> Result<usize, BadRaster> {
+) -> Result<usize, RasterError> {
     if let Some(asked) = asked {
         let exact = names.iter().position(|name| *name == asked);
         let there = match names {
             [] => format!("it has no {kind} of numbers"),
             names => format!("its {kind}s are {}", names.join(", ")),
         };
-        return exact.ok_or_else(|| BadRaster::NoSuchPart {
+        return exact.ok_or_else(|| RasterError::NoSuchPart {
             asked: format!("{kind} {asked}"),
             there,
         });
@@ -32,10 +32,10 @@ pub(super) fn choose(
     match (usual.split_whitespace().find_map(place), names) {
         (Some(place), _) => Ok(place),
         (None, [_]) => Ok(0),
-        (None, []) => Err(BadRaster::NotAHeightField(format!(
+        (None, []) => Err(RasterError::NotAHeightField(format!(
             "it has no {kind} of numbers"
         ))),
-        (None, several) => Err(BadRaster::SeveralHeights {
+        (None, several) => Err(RasterError::SeveralHeights {
             kind,
             names: several.iter().map(|name| (*name).to_owned()).collect(),
         }),

@@ -10,7 +10,7 @@ use crate::placed::GroundUnit;
 use crate::plain::Plain;
 use crate::read::Stored;
 use crate::{
-    BadRaster, CellSize, CellUnit, Certainty, Endian, OpenOptions, ReferenceSystem, SampleType,
+    CellSize, CellUnit, Certainty, Endian, OpenOptions, RasterError, ReferenceSystem, SampleType,
 };
 
 /// SRTM tiles: nothing but their name tells them.
@@ -26,7 +26,7 @@ pub(super) const FORMAT: Format = Format {
 const VOID: f64 = -32768.0;
 
 /// A tile covers one degree by one degree and shares its borders with the next.
-fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let (columns, rows) = size(input.len())?;
     let stored = Stored::Held(SampleType::I16);
     let plain = Plain::packed((columns, rows), stored, Endian::Big, 0);
@@ -60,7 +60,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster
 }
 
 /// Columns and rows of a tile of so many bytes.
-fn size(bytes: u64) -> Result<(u32, u32), BadRaster> {
+fn size(bytes: u64) -> Result<(u32, u32), RasterError> {
     // Above 50° some producers halve the columns.
     if bytes == 2 * 1801 * 3601 {
         return Ok((1801, 3601));
@@ -68,7 +68,7 @@ fn size(bytes: u64) -> Result<(u32, u32), BadRaster> {
     let side = (bytes / 2).isqrt();
     match u32::try_from(side) {
         Ok(side) if u64::from(side) * u64::from(side) * 2 == bytes => Ok((side, side)),
-        _ => Err(BadRaster::Truncated(format!(
+        _ => Err(RasterError::Truncated(format!(
             "{bytes} bytes are no square of 16-bit samples; a 3 arc-second tile \
              has 2884802, a 1 arc-second tile 25934402"
         ))),

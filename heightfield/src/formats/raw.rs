@@ -4,7 +4,7 @@ use crate::decoded::Decoded;
 use crate::input::FileBytes;
 use crate::plain::Plain;
 use crate::read::Stored;
-use crate::{BadRaster, OpenOptions, RawLayout};
+use crate::{OpenOptions, RasterError, RawLayout};
 
 /// Extensions of files that are nothing but samples.
 pub(crate) const EXTENSIONS: [&str; 4] = ["raw", "bin", "r16", "r32"];
@@ -15,21 +15,21 @@ pub(crate) fn decode(
     input: &FileBytes,
     layout: RawLayout,
     options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
+) -> Result<Decoded, RasterError> {
     let (columns, rows) = (layout.columns, layout.rows);
     let (samples, bytes) = (u64::from(columns) * u64::from(rows), layout.sample.bytes());
     let promised = samples
         .checked_mul(bytes)
-        .ok_or_else(|| BadRaster::AbsurdSize(format!("{columns} × {rows}")))?;
+        .ok_or_else(|| RasterError::AbsurdSize(format!("{columns} × {rows}")))?;
     let what = format!(
         "{columns} × {rows} samples of {bytes} bytes are {promised} bytes, the file has {}",
         input.len()
     );
     if input.len() < promised {
-        return Err(BadRaster::Truncated(what));
+        return Err(RasterError::Truncated(what));
     }
     if input.len() > promised {
-        return Err(BadRaster::damaged(format!(
+        return Err(RasterError::damaged(format!(
             "the stated size is not its size: {what}"
         )));
     }

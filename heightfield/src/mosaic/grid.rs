@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::super::decoded::Decoded;
-use super::super::{BadRaster, Bounds};
+use super::super::{Bounds, RasterError};
 
 /// Samples that lie farther than this beside the grid of the first file do not belong to it,
 /// cells.
@@ -38,7 +38,7 @@ pub(super) struct Spot {
 
 impl Grid {
     /// The grid of a file.
-    pub(super) fn of(path: &Path, first: Decoded) -> Result<Self, BadRaster> {
+    pub(super) fn of(path: &Path, first: Decoded) -> Result<Self, RasterError> {
         let (bounds, step) = laid_out(path, &first)?;
         Ok(Self {
             path: path.to_owned(),
@@ -51,9 +51,9 @@ impl Grid {
     /// Where on it a file lies.
     ///
     /// # Errors
-    /// [`BadRaster::TilesDiffer`], with what differs.
-    pub(super) fn spot(&self, path: &Path, file: &Decoded) -> Result<Spot, BadRaster> {
-        let differs = |why: String| BadRaster::TilesDiffer {
+    /// [`RasterError::TilesDiffer`], with what differs.
+    pub(super) fn spot(&self, path: &Path, file: &Decoded) -> Result<Spot, RasterError> {
+        let differs = |why: String| RasterError::TilesDiffer {
             file: path.to_owned(),
             other: self.path.clone(),
             why,
@@ -161,18 +161,18 @@ fn same_places(ours: &Decoded, theirs: &Decoded) -> bool {
 }
 
 /// Bounds and cells of a file whose rows and columns are those of its coordinates.
-fn laid_out(path: &Path, file: &Decoded) -> Result<(Bounds, [f64; 2]), BadRaster> {
-    let in_tile = |fault| BadRaster::in_tile(path, fault);
+fn laid_out(path: &Path, file: &Decoded) -> Result<(Bounds, [f64; 2]), RasterError> {
+    let in_tile = |fault| RasterError::in_tile(path, fault);
     let map = file
         .place
         .map(|place| place.map)
-        .ok_or_else(|| in_tile(BadRaster::NoPlace("it does not say where it lies".into())))?;
+        .ok_or_else(|| in_tile(RasterError::NoPlace("it does not say where it lies".into())))?;
     if !map.is_straight() {
         let why = "its rows are not along its coordinates".into();
-        return Err(in_tile(BadRaster::NoPlace(why)));
+        return Err(in_tile(RasterError::NoPlace(why)));
     }
     let bounds = map.bounds((file.columns, file.rows));
-    let bounds = bounds.ok_or_else(|| in_tile(BadRaster::damaged("it lies nowhere")))?;
+    let bounds = bounds.ok_or_else(|| in_tile(RasterError::damaged("it lies nowhere")))?;
     let (east, north) = map.steps();
     Ok((bounds, [east, north]))
 }

@@ -7,7 +7,7 @@ use super::super::blocks::Part;
 use super::super::decoded::{Decoded, sides};
 use super::super::ground_map::GroundMap;
 use super::super::samples::SampleType;
-use super::super::{BadRaster, OpenOptions};
+use super::super::{OpenOptions, RasterError};
 use super::grid::{Grid, Spot, unwrap_turns};
 use super::layers;
 use super::pool::{options_for_tiles, whole_bytes};
@@ -34,7 +34,7 @@ struct Index {
 }
 
 /// A terrain of files: where they overlap the last one with a height counts.
-pub(super) fn decoded(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(super) fn decoded(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let mut index = Index::read(files, options)?;
     let layers = index.remove_layers(options)?;
     if let Some(around) = index.grid.columns_around() {
@@ -46,7 +46,7 @@ pub(super) fn decoded(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Deco
 }
 
 impl Index {
-    fn read(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Self, BadRaster> {
+    fn read(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Self, RasterError> {
         let options = options_for_tiles(options);
         let mut index: Option<Self> = None;
         let mut empty = 0;
@@ -54,11 +54,11 @@ impl Index {
             let outline = match outline(&path, &options) {
                 Ok(outline) => outline,
                 // All of it is holes.
-                Err(BadRaster::AllNoData { samples }) => {
+                Err(RasterError::AllNoData { samples }) => {
                     empty += samples;
                     continue;
                 }
-                Err(fault) => return Err(BadRaster::in_tile(&path, fault)),
+                Err(fault) => return Err(RasterError::in_tile(&path, fault)),
             };
             let index = match &mut index {
                 Some(index) => index,
@@ -71,10 +71,10 @@ impl Index {
             };
             index.add(path, &outline)?;
         }
-        index.ok_or(BadRaster::AllNoData { samples: empty })
+        index.ok_or(RasterError::AllNoData { samples: empty })
     }
 
-    fn add(&mut self, path: PathBuf, outline: &Decoded) -> Result<(), BadRaster> {
+    fn add(&mut self, path: PathBuf, outline: &Decoded) -> Result<(), RasterError> {
         self.spots.push(self.grid.spot(&path, outline)?);
         self.is_single &= is_single(outline);
         let bytes = std::fs::metadata(&path).map_or(0, |metadata| metadata.len());
@@ -89,7 +89,7 @@ impl Index {
     }
 
     /// Leaves out what lies on the same samples as heights and is none, and tells its files.
-    fn remove_layers(&mut self, options: &OpenOptions) -> Result<Vec<PathBuf>, BadRaster> {
+    fn remove_layers(&mut self, options: &OpenOptions) -> Result<Vec<PathBuf>, RasterError> {
         let mut at_spots: HashMap<Spot, Vec<usize>> = HashMap::new();
         for (number, spot) in self.spots.iter().enumerate() {
             at_spots.entry(*spot).or_default().push(number);
@@ -118,7 +118,7 @@ impl Index {
         Ok(layers.into_iter().map(|(tile, _)| tile.path).collect())
     }
 
-    fn decoded(self, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    fn decoded(self, options: &OpenOptions) -> Result<Decoded, RasterError> {
         let ends = |low: fn(&Spot) -> i64, high: fn(&Spot) -> i64| {
             let (lows, highs) = (self.spots.iter().map(low), self.spots.iter().map(high));
             (lows.min().unwrap_or(0), highs.max().unwrap_or(0))
@@ -151,14 +151,14 @@ impl Index {
         decoded.vertical_datum = first.vertical_datum.clone();
         let ([x, y], [east, north]) = (self.grid.corner_of(west, south), self.grid.step);
         let map = GroundMap::new([x, east, 0.0], [y, 0.0, north]);
-        let map = map.ok_or_else(|| BadRaster::damaged("its files lie nowhere"))?;
+        let map = map.ok_or_else(|| RasterError::damaged("its files lie nowhere"))?;
         decoded.lay_out(map, first.ground_unit());
         Ok(decoded)
     }
 }
 
 /// What the header of a file says, which is to be small enough to be opened later.
-fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let outline = tile_file::outline(path, options)?;
     whole_bytes(&outline)?;
     Ok(outline)

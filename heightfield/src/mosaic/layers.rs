@@ -153,15 +153,15 @@ pub(super) fn heights_among(files: &[(&Path, SampleType)]) -> Option<usize> {
 
 /// Returns the remark on layers that are left out.
 pub(super) fn left_out(layers: &[PathBuf]) -> Option<String> {
-    const MOST_NAMED: usize = 4;
+    const MAX_NAMED: usize = 4;
     let name = |path: &PathBuf| {
         path.file_name()
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned()
     };
-    let named: Vec<String> = layers.iter().take(MOST_NAMED).map(name).collect();
-    let more = match layers.len().saturating_sub(MOST_NAMED) {
+    let named: Vec<String> = layers.iter().take(MAX_NAMED).map(name).collect();
+    let more = match layers.len().saturating_sub(MAX_NAMED) {
         0 => String::new(),
         more => format!(" and {more} more"),
     };

@@ -29,14 +29,14 @@ mod tile_file;
 use std::path::{Path, PathBuf};
 
 use super::formats::gdal;
-use super::{BadRaster, Decoded, OpenOptions, beside};
+use super::{Decoded, OpenOptions, RasterError, beside};
 use crate::remote::is_url;
 pub(super) use names::named;
 
 /// The terrain of the files that a path stands for.
-pub(super) fn of_files(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(super) fn of_files(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Decoded, RasterError> {
     if options.raw.is_some() {
-        return Err(BadRaster::NoPlace(
+        return Err(RasterError::NoPlace(
             "raw samples do not say where they lie, so that many files of them are no terrain"
                 .into(),
         ));

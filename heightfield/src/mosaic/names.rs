@@ -2,20 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::BadRaster;
+use super::super::RasterError;
 use super::super::format::Claim;
 use super::super::formats::claim_of;
 use crate::remote::is_url;
 
 /// No terrain has more files: the 30 m tiles of all the Earth's land are 26,450.
-const MOST_FILES: usize = 1 << 20;
+const MAX_FILES: usize = 1 << 20;
 
 /// The terrain files that a folder, or a pattern of names that is no file itself, stands
 /// for, in the order of their names; `None` where a path is neither.
 ///
 /// # Errors
-/// [`BadRaster::NoTiles`]; a folder that cannot be read.
-pub(crate) fn named(path: &Path) -> Result<Option<Vec<PathBuf>>, BadRaster> {
+/// [`RasterError::NoTiles`]; a folder that cannot be read.
+pub(crate) fn named(path: &Path) -> Result<Option<Vec<PathBuf>>, RasterError> {
     if path.to_str().is_some_and(is_url) {
         return Ok(None);
     }
@@ -27,12 +27,12 @@ pub(crate) fn named(path: &Path) -> Result<Option<Vec<PathBuf>>, BadRaster> {
         return Ok(None);
     };
     match files.len() {
-        0 => Err(BadRaster::NoTiles(match path.is_dir() {
+        0 => Err(RasterError::NoTiles(match path.is_dir() {
             true => "no file in this folder is known to hold a terrain and its place".into(),
             false => "no terrain file matches this pattern".into(),
         })),
-        count if count > MOST_FILES => Err(BadRaster::NoTiles(format!(
-            "more than {MOST_FILES} files are not read as one terrain"
+        count if count > MAX_FILES => Err(RasterError::NoTiles(format!(
+            "more than {MAX_FILES} files are not read as one terrain"
         ))),
         _ => Ok(Some(files)),
     }
@@ -45,11 +45,11 @@ fn pattern(path: &Path) -> Option<&str> {
 }
 
 /// Files of formats that know their place; folders inside are not looked into.
-fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, BadRaster> {
+fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, RasterError> {
     let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(BadRaster::Unreadable)? {
-        let path = entry.map_err(BadRaster::Unreadable)?.path();
-        if is_tile(&path) && path.is_file() && files.len() <= MOST_FILES {
+    for entry in std::fs::read_dir(folder).map_err(RasterError::Unreadable)? {
+        let path = entry.map_err(RasterError::Unreadable)?.path();
+        if is_tile(&path) && path.is_file() && files.len() <= MAX_FILES {
             files.push(path);
         }
     }
@@ -58,8 +58,8 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, BadRaster> {
 }
 
 /// Files that match; a picture and an archive of any name count where they are asked for.
-fn matching(pattern: &str) -> Result<Vec<PathBuf>, BadRaster> {
-    let wrong = |error| BadRaster::NoTiles(format!("this pattern cannot be read: {error}"));
+fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
+    let wrong = |error| RasterError::NoTiles(format!("this pattern cannot be read: {error}"));
     let found = glob::glob(pattern).map_err(wrong)?;
     // What may not be looked into holds nothing that could be read.
     let found = found.filter_map(Result::ok);
@@ -69,7 +69,7 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, BadRaster> {
         is_tile(path) || others.iter().any(|other| extension == *other)
     };
     let tiles = found.filter(|path| asked(path) && path.is_file());
-    let mut files: Vec<_> = tiles.take(MOST_FILES + 1).collect();
+    let mut files: Vec<_> = tiles.take(MAX_FILES + 1).collect();
     files.sort();
     Ok(files)
 }

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::super::BadRaster;
+use super::super::RasterError;
 use super::super::blocks::Part;
 use super::reader::Mosaic;
 use super::source::Source;
 use crate::remote::is_url;
 
 /// No more pairs of neighbours are compared, evenly spread; those on the same samples all are.
-const MOST_PAIRS: usize = 8;
+const MAX_PAIRS: usize = 8;
 /// While pairs are looked for, so many comparisons are made at most.
-const MOST_LOOKS: usize = 1 << 22;
+const MAX_LOOKS: usize = 1 << 22;
 /// All samples of a smaller overlap are compared, of a larger one so many each way.
 const FEW_SAMPLES: u64 = 4096;
 const PLACES: u32 = 5;
@@ -36,18 +36,18 @@ impl Mosaic {
     /// Remarks on files that overlap and have other heights there.
     ///
     /// # Errors
-    /// [`BadRaster::SamePlace`] where both lie on the same samples.
-    pub(super) fn remark_differences(&self) -> Result<Vec<String>, BadRaster> {
-        const MOST_NAMED: usize = 3;
+    /// [`RasterError::SamePlace`] where both lie on the same samples.
+    pub(super) fn remark_differences(&self) -> Result<Vec<String>, RasterError> {
+        const MAX_NAMED: usize = 3;
         let found = self.disagreements()?;
         let path = |number: usize| &self.sources[number].path;
         if let Some(same) = found.iter().find(|it| it.is_on_same_samples) {
-            return Err(BadRaster::SamePlace {
+            return Err(RasterError::SamePlace {
                 files: same.files.map(|number| path(number).clone()),
                 difference: same.most,
             });
         }
-        let named = found.iter().take(MOST_NAMED);
+        let named = found.iter().take(MAX_NAMED);
         Ok(named
         .map(|it| {
             let [one, other] = it.files.map(|number| {
@@ -66,7 +66,7 @@ impl Mosaic {
     ///
     /// # Errors
     /// Files that cannot be read at present.
-    fn disagreements(&self) -> Result<Vec<Disagreement>, BadRaster> {
+    fn disagreements(&self) -> Result<Vec<Disagreement>, RasterError> {
         let mut found = Vec::new();
         for pair in chosen_pairs(&self.sources) {
             found.extend(self.compared(pair)?.filter(|it| it.different > 0));
@@ -75,7 +75,7 @@ impl Mosaic {
     }
 
     /// Compares two files; `None` where one cannot be read.
-    fn compared(&self, files: [usize; 2]) -> Result<Option<Disagreement>, BadRaster> {
+    fn compared(&self, files: [usize; 2]) -> Result<Option<Disagreement>, RasterError> {
         let sources = files.map(|number| &self.sources[number]);
         let mut opened = Vec::new();
         for (number, source) in files.into_iter().zip(sources) {
@@ -147,7 +147,7 @@ fn chosen_pairs(sources: &[Source]) -> Vec<[usize; 2]> {
         for &other in &order[at + 1..] {
             let theirs = &sources[other].covers;
             looks += 1;
-            if theirs.column >= covers.column + covers.columns || looks > MOST_LOOKS {
+            if theirs.column >= covers.column + covers.columns || looks > MAX_LOOKS {
                 break;
             }
             if covers != theirs && sources[number].overlap(0, theirs).is_some() {
@@ -155,7 +155,7 @@ fn chosen_pairs(sources: &[Source]) -> Vec<[usize; 2]> {
             }
         }
     }
-    let step = others.len().div_ceil(MOST_PAIRS).max(1);
+    let step = others.len().div_ceil(MAX_PAIRS).max(1);
     chosen.extend(others.into_iter().step_by(step));
     chosen
 }

@@ -11,19 +11,19 @@ use lru::LruCache;
 
 use super::super::guard::guarded;
 use super::super::storage::Storage;
-use super::super::{BadRaster, Decoded, OpenOptions};
+use super::super::{Decoded, OpenOptions, RasterError};
 use super::source::{Opened, Source};
 use super::tile_file;
 use crate::remote::{is_url, without_key};
 
 /// No more files are open at once: each may have a mask and overviews beside it.
-const MOST_OPEN: usize = 32;
+const MAX_OPEN: usize = 32;
 /// What open files keep in memory, bytes; the one touched last may take more alone.
-const MOST_BYTES: usize = 64 << 20;
+const MAX_BYTES: usize = 64 << 20;
 /// What blocks of one file take of that, bytes.
 const SHARE_BYTES: usize = 16 << 20;
 /// A file that has no blocks is held as a whole, and has to fit, bytes.
-const MOST_WHOLE_BYTES: u64 = 64 << 20;
+const MAX_WHOLE_BYTES: u64 = 64 << 20;
 
 /// A file that is not open after so long is a hole.
 const OPEN_WITHIN: Duration = Duration::from_secs(20);
@@ -50,7 +50,7 @@ impl Pool {
 
     /// Bytes that all open files take at most: one that was just decoded beside the others.
     pub(super) const fn most_bytes() -> usize {
-        MOST_BYTES + MOST_WHOLE_BYTES as usize
+        MAX_BYTES + MAX_WHOLE_BYTES as usize
     }
 
     /// An open file; `None`, with a warning the first time, where it cannot be read.
@@ -61,7 +61,7 @@ impl Pool {
         &mut self,
         number: usize,
         source: &Source,
-    ) -> Result<Option<Arc<Opened>>, BadRaster> {
+    ) -> Result<Option<Arc<Opened>>, RasterError> {
         if let Some(opened) = self.open.get(&number) {
             return Ok(Some(opened.clone()));
         }
@@ -74,11 +74,11 @@ impl Pool {
                 self.open.push(number, opened.clone());
                 Ok(Some(opened))
             }
-            Err(fault) if fault.is_of_the_line() => Err(BadRaster::in_tile(&source.path, fault)),
+            Err(fault) if fault.is_of_the_line() => Err(RasterError::in_tile(&source.path, fault)),
             Err(fault) => {
                 self.failed.insert(number);
                 // That it holds nothing is no fault of a file among others.
-                if !matches!(fault, BadRaster::AllNoData { .. }) {
+                if !matches!(fault, RasterError::AllNoData { .. }) {
                     let path = without_key(&source.path);
                     tracing::warn!("{path} cannot be read and is a hole: {fault}");
                 }
@@ -92,7 +92,7 @@ impl Pool {
         self.open.peek(&number).map(|opened| &**opened)
     }
 
-    fn opened(&mut self, number: usize, source: &Source) -> Result<Opened, BadRaster> {
+    fn opened(&mut self, number: usize, source: &Source) -> Result<Opened, RasterError> {
         let options = self.options.clone();
         let stamps = source.stamps();
         let (path, by) = (source.path.clone(), options.clone());
@@ -105,7 +105,7 @@ impl Pool {
         let found = (decoded.columns, decoded.rows);
         let (columns, rows) = (source.covers.columns, source.covers.rows);
         if found != (columns, rows) {
-            return Err(BadRaster::damaged(format!(
+            return Err(RasterError::damaged(format!(
                 "it had {columns} × {rows} samples and now has {} × {}",
                 found.0, found.1
             )));
@@ -129,7 +129,7 @@ impl Pool {
         };
         let fewest = usize::from(more == 0);
         while self.open.len() > fewest
-            && (self.open.len() >= MOST_OPEN || bytes(&self.open).saturating_add(more) > MOST_BYTES)
+            && (self.open.len() >= MAX_OPEN || bytes(&self.open).saturating_add(more) > MAX_BYTES)
         {
             let Some((number, closed)) = self.open.pop_lru() else {
                 return;
@@ -161,34 +161,37 @@ pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
 fn in_time<T: Send + 'static>(
     source: &Source,
     within: Duration,
-    open: impl FnOnce() -> Result<T, BadRaster> + Send + 'static,
-) -> Result<T, BadRaster> {
+    open: impl FnOnce() -> Result<T, RasterError> + Send + 'static,
+) -> Result<T, RasterError> {
     if source.path.to_str().is_some_and(is_url) {
         return open();
     }
     let (send, opened) = sync_channel(1);
     let thread = Builder::new().name("opening".into());
     let spawned = thread.spawn(move || drop(send.send(open())));
-    spawned.map_err(BadRaster::Unreadable)?;
+    spawned.map_err(RasterError::Unreadable)?;
     opened.recv_timeout(within).unwrap_or_else(|_| {
         let why = format!("it was not open after {} s", within.as_secs());
-        Err(BadRaster::Unreadable(Error::new(ErrorKind::TimedOut, why)))
+        Err(RasterError::Unreadable(Error::new(
+            ErrorKind::TimedOut,
+            why,
+        )))
     })
 }
 
 /// Bytes that a file takes that is held as a whole; none where it is read in blocks.
 ///
 /// # Errors
-/// [`BadRaster::Unsupported`] where these are too many.
-pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, BadRaster> {
+/// [`RasterError::Unsupported`] where these are too many.
+pub(super) fn whole_bytes(outline: &Decoded) -> Result<u64, RasterError> {
     let Storage::Held { samples, .. } = &outline.storage else {
         return Ok(0);
     };
     let (columns, rows) = (outline.columns, outline.rows);
     let count = u64::from(columns) * u64::from(rows);
     match count.saturating_mul(samples.sample_type().bytes()) {
-        bytes if bytes <= MOST_WHOLE_BYTES => Ok(bytes),
-        _ => Err(BadRaster::Unsupported {
+        bytes if bytes <= MAX_WHOLE_BYTES => Ok(bytes),
+        _ => Err(RasterError::Unsupported {
             format: "a terrain of many files",
             feature: format!("a file of {columns} × {rows} samples that cannot be read in blocks"),
         }),

@@ -7,7 +7,7 @@ use fixedbitset::FixedBitSet;
 use twox_hash::XxHash64;
 
 use super::super::blocks::{Block, BlockImage, BlockReader, Looks, Part, not_yet};
-use super::super::{BadRaster, OpenOptions, SampleType};
+use super::super::{OpenOptions, RasterError, SampleType};
 use super::pool::Pool;
 use super::source::{Opened, Source};
 use crate::remote::{RemoteFile, is_url};
@@ -85,7 +85,7 @@ impl Mosaic {
         &self,
         number: usize,
         source: &Source,
-    ) -> Result<Option<Arc<Opened>>, BadRaster> {
+    ) -> Result<Option<Arc<Opened>>, RasterError> {
         self.pool().get(number, source)
     }
 
@@ -166,7 +166,7 @@ impl BlockReader for Mosaic {
         sources.any(|source| source.overlap(image as u32, part).is_some())
     }
 
-    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let mut filling = Filling::new(part);
         let mut is_lacking = false;
         for (number, source) in self.sources.iter().enumerate().rev() {
@@ -186,7 +186,7 @@ impl BlockReader for Mosaic {
                 let before = not_yet();
                 filling.fill(image as u8, source, opened, &places);
                 if not_yet() != before {
-                    return Err(BadRaster::NotYet);
+                    return Err(RasterError::NotYet);
                 }
             }
             is_lacking |= opened.is_none_or(|opened| opened.share().1 > 0);

@@ -4,16 +4,16 @@ use std::path::Path;
 
 use super::super::input::FileBytes;
 use super::super::one_file;
-use super::super::{BadRaster, Decoded, OpenOptions};
+use super::super::{Decoded, OpenOptions, RasterError};
 
 /// Decodes one file of many.
-pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     one_file::decode(&FileBytes::open(path, &options.elsewhere)?, options)
 }
 
 /// What the header of one file of many says. A format that has no short way there
 /// decodes the whole file.
-pub(super) fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(super) fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let input = FileBytes::open(path, &options.elsewhere)?;
     one_file::decode(&input.in_outline(true), options)
 }

@@ -8,13 +8,13 @@ use crate::disk_cache::{DiskCache, FileStamp};
 
 /// No file at a URL.
 #[derive(Clone, Debug, Default)]
-pub struct Elsewhere(());
+pub struct RemoteFetcher(());
 
 /// There is none.
 #[derive(Debug)]
 pub(crate) enum RemoteFile {}
 
-impl Elsewhere {
+impl RemoteFetcher {
     pub(crate) fn waiting(&self) -> Self {
         self.clone()
     }

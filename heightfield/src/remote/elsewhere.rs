@@ -17,13 +17,13 @@ use super::{is_outage, store};
 use crate::disk_cache::DiskCache;
 
 /// Files that are known at once: open, missing or on their way.
-const MOST_FILES: NonZeroUsize = NonZeroUsize::new(256).unwrap();
+const MAX_FILES: NonZeroUsize = NonZeroUsize::new(256).unwrap();
 /// A server that did not answer is asked again after so long, where nobody waits.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
 
 /// Files at URLs, open or being opened. Clones are of the same.
 #[derive(Clone)]
-pub struct Elsewhere {
+pub struct RemoteFetcher {
     shared: Arc<Shared>,
     /// Whoever has this clone waits, whatever the others do.
     always_waits: bool,
@@ -44,12 +44,12 @@ enum Known {
     Failed(Instant, ErrorKind, String),
 }
 
-impl Default for Elsewhere {
+impl Default for RemoteFetcher {
     fn default() -> Self {
         Self {
             shared: Arc::new(Shared {
                 line: Arc::default(),
-                files: Mutex::new(LruCache::new(MOST_FILES)),
+                files: Mutex::new(LruCache::new(MAX_FILES)),
                 answered: Condvar::new(),
             }),
             always_waits: false,
@@ -57,7 +57,7 @@ impl Default for Elsewhere {
     }
 }
 
-impl Elsewhere {
+impl RemoteFetcher {
     /// The same files for a thread that may wait.
     pub(crate) fn waiting(&self) -> Self {
         Self {
@@ -165,8 +165,8 @@ impl Elsewhere {
     }
 }
 
-impl fmt::Debug for Elsewhere {
+impl fmt::Debug for RemoteFetcher {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Elsewhere")
+        f.write_str("RemoteFetcher")
     }
 }

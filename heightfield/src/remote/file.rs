@@ -62,7 +62,7 @@ impl RemoteFile {
 
     /// Bytes that all files keep in memory together, at most.
     pub(crate) const fn kept_bytes() -> usize {
-        pages::MOST_BYTES
+        pages::MAX_BYTES
     }
 
     /// Number of bytes.

@@ -6,7 +6,7 @@
 //!
 //! A file is cut into pages. Pages that are wanted are fetched in the background, several
 //! that follow each other with one request, and those touched last are kept. Whoever reads
-//! waits for them, until somebody is served who must not ([`Elsewhere::stop_waiting`]):
+//! waits for them, until somebody is served who must not ([`RemoteFetcher::stop_waiting`]):
 //! then what is not here yet is [`std::io::ErrorKind::WouldBlock`], and comes later.
 //!
 //! Pages are kept on disk for another run (`kept`), where the server says by a tag or a time
@@ -46,11 +46,11 @@ mod url;
 use std::io::{Error, ErrorKind};
 
 #[cfg(not(feature = "remote"))]
-pub use absent::Elsewhere;
+pub use absent::RemoteFetcher;
 #[cfg(not(feature = "remote"))]
 pub(crate) use absent::RemoteFile;
 #[cfg(feature = "remote")]
-pub use elsewhere::Elsewhere;
+pub use elsewhere::RemoteFetcher;
 #[cfg(feature = "remote")]
 pub(crate) use file::RemoteFile;
 pub(crate) use reader::RemoteReader;

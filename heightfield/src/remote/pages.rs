@@ -11,12 +11,12 @@ pub(super) const PAGE: u64 = 64 << 10;
 /// Pages that one request asks for, at most.
 const RUN: u64 = 16;
 /// Pages that are kept: 64 MB, besides those on their way.
-const MOST_KEPT: usize = 1024;
+const MAX_KEPT: usize = 1024;
 /// Pages on their way at once: 32 MB.
-const MOST_COMING: usize = 512;
+const MAX_COMING: usize = 512;
 
 /// Bytes that all pages take at most.
-pub(super) const MOST_BYTES: usize = (MOST_KEPT + MOST_COMING) * PAGE as usize;
+pub(super) const MAX_BYTES: usize = (MAX_KEPT + MAX_COMING) * PAGE as usize;
 
 /// A page by the number of its file and its own.
 type Key = (u64, u64);
@@ -57,7 +57,7 @@ impl Pages {
             if self.here.contains(&key) || self.coming.contains(&key) {
                 continue;
             }
-            if self.coming.len() >= MOST_COMING {
+            if self.coming.len() >= MAX_COMING {
                 break;
             }
             self.coming.insert(key);
@@ -74,7 +74,7 @@ impl Pages {
         self.failed(file, run.clone());
         for (page, bytes) in run.zip(bytes.chunks(PAGE as usize)) {
             self.here.put((file, page), bytes.into());
-            if self.here.len() > MOST_KEPT {
+            if self.here.len() > MAX_KEPT {
                 self.here.pop_lru();
             }
         }
@@ -136,12 +136,12 @@ mod tests {
     fn neither_what_is_kept_nor_what_is_on_its_way_grows_without_end() {
         let mut pages = Pages::default();
         let asked = |runs: Vec<Range<u64>>| runs.iter().map(|run| run.end - run.start).sum::<u64>();
-        assert_eq!(asked(pages.take_missing(1, 0..10_000)), MOST_COMING as u64);
+        assert_eq!(asked(pages.take_missing(1, 0..10_000)), MAX_COMING as u64);
         assert_eq!(asked(pages.take_missing(1, 0..10_000)), 0);
         for page in 0..2000 {
             pages.arrived(1, page..page + 1, &[0]);
         }
-        assert_eq!(pages.here.len(), MOST_KEPT);
+        assert_eq!(pages.here.len(), MAX_KEPT);
         assert!(pages.get((1, 1999)).is_some() && pages.get((1, 0)).is_none());
     }
 

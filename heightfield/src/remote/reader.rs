@@ -12,7 +12,7 @@ const AHEAD: u64 = 4 << 20;
 
 /// No more than this is read from the beginning on, bytes: what a server says of a file's
 /// size may be wrong.
-const MOST_IN_ORDER: u64 = 1 << 30;
+const MAX_IN_ORDER: u64 = 1 << 30;
 
 /// Reads a remote file from any place on.
 pub(crate) struct RemoteReader {
@@ -34,7 +34,7 @@ impl Read for RemoteReader {
         if count == 0 {
             return Ok(0);
         }
-        if self.at >= MOST_IN_ORDER {
+        if self.at >= MAX_IN_ORDER {
             let why = "it is larger than 1 GB, and its format is read as a whole";
             return Err(Error::new(ErrorKind::Unsupported, why));
         }

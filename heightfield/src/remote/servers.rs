@@ -27,7 +27,7 @@ const RETRIES: usize = 3;
 const RETRIES_SECONDS: u64 = 15;
 
 /// Servers that are kept at once.
-const MOST_SERVERS: NonZeroUsize = NonZeroUsize::new(64).unwrap();
+const MAX_SERVERS: NonZeroUsize = NonZeroUsize::new(64).unwrap();
 
 /// A server, or a bucket of one.
 type Server = Arc<dyn ObjectStore>;
@@ -36,7 +36,7 @@ type Server = Arc<dyn ObjectStore>;
 /// it that are open and the token that it gave for a key: each file would ask for its own.
 pub(super) fn at(url: &str) -> Result<(Server, Path)> {
     static KNOWN: LazyLock<Mutex<LruCache<String, Server>>> =
-        LazyLock::new(|| Mutex::new(LruCache::new(MOST_SERVERS)));
+        LazyLock::new(|| Mutex::new(LruCache::new(MAX_SERVERS)));
     let (server, path) = parts(url)?;
     // A panic of the library's leaves it as it was.
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);

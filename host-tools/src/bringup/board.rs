@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use hapterra_core::guard::{Fault, Mode};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Sample, Scene};
+use hapterra_core::scene::{Scene, TickRecord};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::{Refusal, Request};
@@ -66,7 +66,7 @@ impl<'d, 't> Board<'d, 't> {
     /// [`Halt::Link`].
     pub(super) fn look_until(
         &mut self,
-        on: &mut dyn FnMut(&Sample) -> bool,
+        on: &mut dyn FnMut(&TickRecord) -> bool,
     ) -> Result<Status, Halt> {
         if (self.stops)() {
             return Err(Stopped.into());
@@ -76,7 +76,7 @@ impl<'d, 't> Board<'d, 't> {
         let passed = self
             .dialogue
             .pass(LOOK_MS, &enough, &mut |message| match message {
-                ToHost::Need { epoch, key } => Some(ToDevice::Tile(TileMessage {
+                ToHost::TileRequest { epoch, key } => Some(ToDevice::Tile(TileMessage {
                     epoch: *epoch,
                     key: *key,
                     heights: Heights::Flat {
@@ -99,7 +99,7 @@ impl<'d, 't> Board<'d, 't> {
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].
-    pub(super) fn look_with(&mut self, on: &mut dyn FnMut(&Sample)) -> Result<Status, Halt> {
+    pub(super) fn look_with(&mut self, on: &mut dyn FnMut(&TickRecord)) -> Result<Status, Halt> {
         self.look_until(&mut |sample| {
             on(sample);
             false

@@ -1,7 +1,7 @@
 //! A virtual Phantom on a virtual bench: wired, held and measured as its user does it.
 
 use glam::DVec3;
-use hapterra_core::guard::{Drive, Sense};
+use hapterra_core::guard::{GuardInputs, GuardOutputs};
 use hapterra_core::wire::status::UsbClock;
 
 use crate::calibrate::N_PER_GRAM;
@@ -78,7 +78,7 @@ pub struct VirtualBench {
     /// Whether each ready wire is off the board.
     pub(super) ready_wire_off: [bool; 3],
     mistakes: BenchMistakes,
-    drive: Drive,
+    drive: GuardOutputs,
     /// Fastest that each joint has turned since the amplifiers first came on, while they
     /// were on or had been within a tenth of a second, rad/s.
     fastest_rad_s: [f64; 3],
@@ -103,7 +103,7 @@ impl VirtualBench {
             stop_wire_off: false,
             ready_wire_off: [false; 3],
             mistakes: BenchMistakes::default(),
-            drive: Drive::default(),
+            drive: GuardOutputs::default(),
             fastest_rad_s: [0.0; 3],
             since_on_ticks: u32::MAX,
         }
@@ -117,7 +117,7 @@ impl VirtualBench {
     }
 
     /// One tick: the amplifiers got `drive`; what encoders and switches say after it.
-    pub fn tick(&mut self, drive: &Drive) -> Sense {
+    pub fn tick(&mut self, drive: &GuardOutputs) -> GuardInputs {
         self.drive = *drive;
         let left = self.goal_m - self.at_m;
         let step = left.clamp_length_max(self.speed_m_s * TICK_S);
@@ -133,12 +133,12 @@ impl VirtualBench {
         }
         let counts = self.plant.step(self.wiring.currents_a(commands_a), TICK_S);
         self.watch(drive.enabled);
-        Sense {
+        GuardInputs {
             counts: self.wiring.counts(counts),
             dead_man: self.dead_man,
             emergency_stop: self.stop_reads_pressed(),
             amplifier_not_ready: self.not_ready(),
-            ..Sense::default()
+            ..GuardInputs::default()
         }
     }
 

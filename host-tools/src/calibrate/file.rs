@@ -6,7 +6,9 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use hapterra_core::Vec3;
-use hapterra_core::phantom::{BadCalibration, BadRecord, Calibration, JointLimits, Model, Thermal};
+use hapterra_core::phantom::{
+    Calibration, CalibrationError, JointLimits, Model, RecordError, Thermal,
+};
 use serde::Deserialize;
 
 use crate::output::{Output, OutputError};
@@ -32,7 +34,7 @@ pub const MODELS: [(&str, Model); 5] = [
 /// Why a file is no calibration that can be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {fault}", path.display())]
-pub struct BadFile {
+pub struct FileError {
     path: PathBuf,
     fault: Fault,
 }
@@ -48,9 +50,9 @@ enum Fault {
     #[error("no model is called {0}")]
     Model(String),
     #[error("the calibration does not make sense: {0}")]
-    Invalid(BadCalibration),
+    Invalid(CalibrationError),
     #[error("a binary record of an earlier version, but {0}")]
-    Binary(BadRecord),
+    Binary(RecordError),
 }
 
 /// The file as it is read.
@@ -122,8 +124,8 @@ struct Limits {
 /// version.
 ///
 /// # Errors
-/// [`BadFile`] says what is wrong with which file.
-pub fn read(path: &Path) -> Result<Calibration, BadFile> {
+/// [`FileError`] says what is wrong with which file.
+pub fn read(path: &Path) -> Result<Calibration, FileError> {
     let record = regular_file::read(path, MAX_BYTES)
         .map_err(Fault::Unreadable)
         .and_then(|bytes| {
@@ -133,7 +135,7 @@ pub fn read(path: &Path) -> Result<Calibration, BadFile> {
             let text = String::from_utf8(bytes);
             from_toml(&text.map_err(|_| Fault::NotToml("it is not text".into()))?)
         });
-    record.map_err(|fault| BadFile {
+    record.map_err(|fault| FileError {
         path: path.to_owned(),
         fault,
     })

@@ -9,7 +9,7 @@ use super::gravity::N_PER_GRAM;
 use super::ratios::Direction;
 use super::review::Review;
 use super::walk::{Attendant, Stopped};
-use crate::link::Meddler;
+use crate::link::FaultInjector;
 use crate::phantom::{HandModel, PhantomModel, Plant, kinematics};
 
 /// How long a pose is held until everything is still, s.
@@ -71,7 +71,7 @@ impl VirtualUser {
     /// follow the arm, and the dead-man switch is pressed for half of every second, so
     /// that whatever waits for a press gets one.
     #[must_use]
-    pub fn hands(&self) -> Meddler {
+    pub fn hands(&self) -> FaultInjector {
         let counts = self.counts();
         Box::new(move |tick, sense, _| {
             sense.counts = counts.get();

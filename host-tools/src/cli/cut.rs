@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::failure::{Failure, OrHint};
 use super::options::terrain_file::TerrainFile;
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
-use crate::terrain::FeltGrid;
+use crate::terrain::HapticGrid;
 
 /// The heights, beside what is said of them.
 const HEIGHTS: &str = "terrain.npy";
@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let heights = args.out.join(HEIGHTS);
     keep_apart(&[&heights], &args.terrain.inputs()).or_hint(HINT)?;
     let raster = args.terrain.open()?;
-    let grid = FeltGrid::new(&raster, args.terrain.reading.cells());
+    let grid = HapticGrid::new(&raster, args.terrain.reading.cells());
     let of = [grid.columns(), grid.rows()];
     let size = |level: u8| of.map(|count| ((count - 1) >> level) + 1);
     let fits =
@@ -103,7 +103,7 @@ fn written(
 /// NumPy's format, 32-bit floats, north row first.
 fn write_npy(
     out: &mut impl Write,
-    grid: &FeltGrid<'_>,
+    grid: &HapticGrid<'_>,
     level: u8,
     [columns, rows]: [u32; 2],
 ) -> io::Result<()> {
@@ -123,7 +123,7 @@ fn write_npy(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terrain::FeltCells;
+    use crate::terrain::HapticCells;
     use heightfield::{OpenOptions, Raster};
 
     #[test]
@@ -136,7 +136,7 @@ mod tests {
             }
         };
         let raster = Raster::from_fn(7, 6, height).expect("raster");
-        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        let grid = HapticGrid::new(&raster, HapticCells::Square);
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(HEIGHTS);
         written(&path, |out| write_npy(out, &grid, 1, [4, 3])).expect("written");

@@ -22,7 +22,7 @@ use super::terminal::{interrupt, left_behind, progress, voice};
 use super::viewing::{Shown, ToBeShown, Viewing};
 use crate::events::{Event as Told, Watcher};
 use crate::link::{
-    Arming, Event, HostClock, LinkError, Native, Patience, Session, Transport, move_arm_while,
+    Arming, Event, HostClock, LinkError, Native, Session, Timeouts, Transport, move_arm_while,
 };
 use crate::materials::Materials;
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
@@ -215,7 +215,7 @@ fn show(
             if args.viewing.view || args.events.events.is_some() {
                 device = device.in_real_time();
             }
-            tour.go(Box::new(device), Patience::EMULATED)?
+            tour.go(Box::new(device), Timeouts::EMULATED)?
         }
         VirtualDevice::Emulated(board) => tour_emulated(&board, tour, arm)?,
     };
@@ -309,7 +309,7 @@ fn tour_emulated<'t>(
     let (emulator, mut lines) = board.start()?;
     let report = "please report it with the file";
     move_arm_while(&mut lines.plant, &mut arm, || {
-        match tour.go(Box::new(lines.link), Patience::EMULATED) {
+        match tour.go(Box::new(lines.link), Timeouts::EMULATED) {
             Ok(toured) => {
                 // The arm is still there while the board lets its force go out.
                 let ended = emulator.finish().map(|()| toured);
@@ -343,7 +343,7 @@ impl<'t> Tour<'_, 't> {
     fn go(
         self,
         transport: Box<dyn Transport + 't>,
-        patience: Patience,
+        patience: Timeouts,
     ) -> Result<(Toured<'t>, Option<Shown<'t>>), LinkError> {
         let (terrain, scene) = (self.placed.terrain(), self.placed.scene());
         let (control, mut events) = (self.control, self.events);

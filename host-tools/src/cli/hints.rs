@@ -5,13 +5,13 @@
 mod terrain_files;
 
 use super::failure::Hint;
-use super::options::surface::table::BadTable;
+use super::options::surface::table::TableError;
 use crate::board::ImageError;
 use crate::board::update::{UpdateError, UpdateFailure};
-use crate::calibrate::file::BadFile;
+use crate::calibrate::file::FileError;
 use crate::calibrate::{FitError, WalkError};
 use crate::link::{EmulatorError, LinkError};
-use crate::materials::BadGround;
+use crate::materials::GroundError;
 use crate::phantom::PlacingError;
 use crate::place::PlaceError;
 use crate::replay::ReplayError;
@@ -36,7 +36,7 @@ impl Hint for TerrainError {
     }
 }
 
-impl Hint for BadTable {
+impl Hint for TableError {
     fn hint(&self) -> String {
         match self {
             Self::Unreadable { .. } => "name a surface's file with --surface",
@@ -48,7 +48,7 @@ impl Hint for BadTable {
     }
 }
 
-impl Hint for BadGround {
+impl Hint for GroundError {
     fn hint(&self) -> String {
         match self {
             Self::NoSystem { unplaced, .. } => {
@@ -229,7 +229,7 @@ impl Hint for WalkError<LinkError> {
     }
 }
 
-impl Hint for BadFile {
+impl Hint for FileError {
     fn hint(&self) -> String {
         "name a file that hapterra calibrate -o has written".into()
     }

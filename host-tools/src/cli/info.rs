@@ -8,14 +8,14 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use hapterra_core::terrain::{POSTS, TILE_CELLS};
+use hapterra_core::terrain::{TILE_CELLS, TILE_SAMPLES};
 
 use super::failure::Failure;
 use super::options::placing::off_in_words;
 use super::options::terrain_file::TerrainFile;
 use super::report::put;
 use crate::place::place_in_words;
-use crate::terrain::{Distortion, FeltGrid};
+use crate::terrain::{Distortion, HapticGrid};
 use heightfield::shown::shown_json;
 use heightfield::without_key;
 use heightfield::{CellSize, CellUnit, Certainty, ReferenceSystem, SamplesAre};
@@ -58,7 +58,7 @@ fn rate(text: &str) -> Result<f64, String> {
 /// When the file cannot be opened as a height field.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let raster = args.terrain.open_without_remarks()?;
-    let grid = FeltGrid::new(&raster, args.terrain.reading.cells());
+    let grid = HapticGrid::new(&raster, args.terrain.reading.cells());
     let link = args.link.map(|rate| LinkFigures::of(&grid, rate));
     let report = FileReport {
         link: link.transpose().map_err(Failure::new)?,
@@ -167,7 +167,7 @@ struct Level {
 }
 
 impl FileReport {
-    fn new(input: &TerrainFile, grid: &FeltGrid<'_>) -> Self {
+    fn new(input: &TerrainFile, grid: &HapticGrid<'_>) -> Self {
         let raster = grid.raster();
         let summary = raster.summary();
         let layout = raster.file_layout();
@@ -324,7 +324,7 @@ impl FileReport {
 }
 
 impl Cell {
-    fn new(cell: CellSize, grid: &FeltGrid<'_>) -> Self {
+    fn new(cell: CellSize, grid: &HapticGrid<'_>) -> Self {
         let (east_m, north_m) = cell.ground_metres();
         let last = [grid.columns(), grid.rows()].map(|count| f64::from(count) - 1.0);
         let worst = grid.worst_in([0.0, 0.0, last[0], last[1]]);
@@ -390,7 +390,7 @@ impl Level {
 /// Levels of detail until one tile holds the field, or no whole cell is left of it
 /// one way.
 fn levels(columns: u32, rows: u32) -> Vec<Level> {
-    let tile_bytes = (POSTS * POSTS * size_of::<f32>()) as u64;
+    let tile_bytes = (TILE_SAMPLES * TILE_SAMPLES * size_of::<f32>()) as u64;
     let mut levels = Vec::new();
     for level in 0..=31 {
         if (columns.min(rows) - 1) >> level == 0 {

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::ValueHint;
-use hapterra_core::force::{Damping, ForceLaw};
+use hapterra_core::force::{Damping, SurfaceParams};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use super::failure::{Failure, OrHint};
 use super::options::device::{EmulatedBoard, VirtualDevice};
@@ -16,12 +16,12 @@ use super::session_summary;
 use super::settings::{SettingsOption, differences};
 use super::terminal::{interrupt, left_behind, progress};
 use super::viewing::{self, Viewing};
-use crate::link::{Patience, Transport};
+use crate::link::{Timeouts, Transport};
 use crate::materials::Materials;
 use crate::output::{Output, keep_apart};
 use crate::replay::settings::{Device, ViewSettings};
 use crate::replay::{
-    Mark, Pace, Record, ReplayError, Replayer, Rule, Settings, Summary, Ticks, Trajectory,
+    Mark, OfflineDevice, Pace, Record, ReplayError, Rule, Settings, Summary, Ticks, Trajectory,
     on_native_at, replay_trajectory,
 };
 use crate::stability;
@@ -189,7 +189,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
 /// What is felt, and how.
 struct Felt<'t> {
     terrain: &'t Terrain<'t>,
-    law: (ForceLaw, Rule),
+    law: (SurfaceParams, Rule),
     /// The rate of the recording.
     recorded_at: Option<TickRate>,
     /// The other views of the recording.
@@ -207,7 +207,7 @@ struct Felt<'t> {
 }
 
 impl<'t> Felt<'t> {
-    fn shown(&self, replayer: &Replayer<'_>) -> Result<Option<ViewFeed<'t>>, Failure> {
+    fn shown(&self, replayer: &OfflineDevice<'_>) -> Result<Option<ViewFeed<'t>>, Failure> {
         let Some(program) = &self.viewer else {
             return Ok(None);
         };
@@ -264,15 +264,15 @@ fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
 }
 
 /// Checks that a law has no effects under the published rule, which has none.
-fn check_rule(rule: Rule, law: &ForceLaw) -> Result<(), Failure> {
-    let plain = ForceLaw {
+fn check_rule(rule: Rule, law: &SurfaceParams) -> Result<(), Failure> {
+    let plain = SurfaceParams {
         stiffness_n_per_mm: law.stiffness_n_per_mm,
         max_force_n: law.max_force_n,
         damping: Damping {
             ns_per_m: 0.0,
             ..law.damping
         },
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     };
     match rule == Rule::Paper && *law != plain {
         false => Ok(()),
@@ -319,7 +319,7 @@ fn emulated(
     // The other line stays open and silent: points take the arm's place.
     let _plant = lines.plant;
     let link: Box<dyn Transport> = Box::new(lines.link);
-    let mut replayer = Replayer::open(felt.terrain, law, link, Patience::EMULATED)?;
+    let mut replayer = OfflineDevice::open(felt.terrain, law, link, Timeouts::EMULATED)?;
     let felt = replay(args, felt, trajectory, &mut replayer)?;
     replayer.say_goodbye()?;
     if let Err(why) = emulator.finish() {
@@ -355,7 +355,7 @@ fn replay<'t>(
     args: &Args,
     felt: &Felt<'t>,
     trajectory: Trajectory,
-    replayer: &mut Replayer<'t>,
+    replayer: &mut OfflineDevice<'t>,
 ) -> Result<(Summary, Ticks), Failure> {
     let mut ticks = ticks(args, felt, trajectory, replayer.device().tick_hz)?;
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
@@ -370,7 +370,7 @@ fn replay<'t>(
     let output = Output::create_or_standard_output(&args.out).map_err(ReplayError::from)?;
     let mut feed = felt.shown(replayer)?;
     let mut shown = 0;
-    let mut show = |sample: &Sample, record: &Record, (view, terrain): (u32, &Terrain<'t>)| {
+    let mut show = |sample: &TickRecord, record: &Record, (view, terrain): (u32, &Terrain<'t>)| {
         let Some(feed) = &mut feed else {
             return;
         };

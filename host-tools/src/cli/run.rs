@@ -39,7 +39,7 @@ use super::terminal::speaker::Speaker;
 use super::terminal::voice::tell;
 use super::terminal::{interrupt, left_behind};
 use super::viewing::{ToBeShown, Viewing};
-use crate::link::Patience;
+use crate::link::Timeouts;
 use crate::output::keep_apart;
 use crate::steering::keys::KEYS;
 use devices::{OneDevice, ServedDevice};
@@ -82,7 +82,7 @@ pub struct Args {
     /// Disarm after this time without a message from here, as 10s
     ///
     /// The device does so by itself; a number alone is in seconds.
-    #[arg(long, value_name = "TIME", default_value_t = Patience::REAL_SILENCE_S, value_parser = silence)]
+    #[arg(long, value_name = "TIME", default_value_t = Timeouts::REAL_SILENCE_S, value_parser = silence)]
     pub silence: u16,
 
     /// Serve a real board without a complete log of hapterra bringup

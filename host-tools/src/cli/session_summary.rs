@@ -6,7 +6,7 @@ use hapterra_core::wire::hello::DeviceHello;
 
 use super::failure::{Failure, OrHint};
 use super::options::placing;
-use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT, Tally};
+use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT, LinkStats};
 use crate::picture::{GroundFacts, SessionPicture, Surface};
 use crate::place::{View, coordinates_in_words};
 use crate::replay::Record;
@@ -21,7 +21,7 @@ pub(super) struct SessionSummary {
     pub(super) ticks: u64,
     pub(super) device: DeviceHello,
     pub(super) figures: Figures,
-    pub(super) tally: Tally,
+    pub(super) tally: LinkStats,
 }
 
 impl SessionSummary {
@@ -208,7 +208,7 @@ pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terrain::{FeltCells, FeltGrid};
+    use crate::terrain::{HapticCells, HapticGrid};
     use heightfield::Raster;
 
     /// A cell of level 3 is eight cells of the file, and as much higher.
@@ -217,7 +217,7 @@ mod tests {
         let raster = Raster::from_fn(65, 65, |column, row| (column + row) as f32);
         let raster = raster.expect("a field");
         for level in [0, 3] {
-            let grid = FeltGrid::new(&raster, FeltCells::Stored);
+            let grid = HapticGrid::new(&raster, HapticCells::Stored);
             let scale = grid.true_scale(1.0).expect("a scale");
             let words = in_words(&Terrain::over(grid, scale, level).expect("a terrain"));
             assert!(

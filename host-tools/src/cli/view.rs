@@ -11,7 +11,7 @@ use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::terminal::interrupt;
 use super::viewing;
 use crate::output::keep_apart;
-use crate::replay::{FeltRows, ReplayError, Settings, terrain_of};
+use crate::replay::{RecordingRows, ReplayError, Settings, terrain_of};
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
 use heightfield::{Raster, files_read_with};
@@ -52,7 +52,7 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the recording or the terrain; no viewer.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let rows = FeltRows::open(&args.recording).map_err(ReplayError::from)?;
+    let rows = RecordingRows::open(&args.recording).map_err(ReplayError::from)?;
     let recorded = rows.settings().filter(|_| !args.ignore_settings).cloned();
     let path = path_of(args, recorded.as_ref())?;
     let mut inputs = files_read_with(&path);
@@ -103,7 +103,7 @@ fn path_of(args: &Args, recorded: Option<&Settings>) -> Result<PathBuf, Failure>
 /// Whether the recording was cut.
 fn show<'t>(
     mut feed: ViewFeed<'t>,
-    mut rows: FeltRows,
+    mut rows: RecordingRows,
     (terrain, title, recorded): (&Terrain<'t>, &str, Option<&Settings>),
 ) -> Result<bool, Failure> {
     let mut shown = 0;

@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::failure::{Failure, Hint};
 use super::options::placing;
 use super::terminal::interrupt;
-use crate::link::{Event, Tally};
+use crate::link::{Event, LinkStats};
 use crate::place::View;
 use crate::replay::Record;
 use crate::telemetry::FeltView;
@@ -125,7 +125,7 @@ impl<'t> Shown<'t> {
     /// Takes a sample with its row, and the view that it was felt in.
     pub(in crate::cli) fn take(
         &mut self,
-        sample: &Sample,
+        sample: &TickRecord,
         record: &Record,
         (view, felt): (usize, &FeltView<'t>),
     ) {
@@ -140,7 +140,7 @@ impl<'t> Shown<'t> {
     }
 
     /// As [`ViewFeed::look`].
-    pub(in crate::cli) fn look(&mut self, tally: &Tally) {
+    pub(in crate::cli) fn look(&mut self, tally: &LinkStats) {
         self.feed.look(tally);
     }
 

@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 
 use hapterra_core::guard::{Fault, Limits, Mode};
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use super::line::{At, Event, Line, Place};
 use super::server::Sender;
@@ -80,7 +80,7 @@ impl Watcher {
     /// Takes a sample, its row and the view in which it was felt.
     pub fn take(
         &mut self,
-        sample: &Sample,
+        sample: &TickRecord,
         record: &Record,
         (view, terrain): (usize, &Terrain<'_>),
     ) {
@@ -158,7 +158,13 @@ impl Watcher {
         }
     }
 
-    fn tell_sample(&mut self, every: NonZeroU32, sample: &Sample, record: &Record, view: usize) {
+    fn tell_sample(
+        &mut self,
+        every: NonZeroU32,
+        sample: &TickRecord,
+        record: &Record,
+        view: usize,
+    ) {
         self.samples += 1;
         if self.samples < every.get() {
             return;

@@ -11,7 +11,7 @@ const AHEAD_S: f64 = 0.5;
 const BETWEEN_S: f64 = 0.05;
 /// Tiles each way beyond the one under the HIP, at most. A HIP that is faster is not
 /// caught up with: what it has passed when it comes is not asked for.
-const MOST_TILES: i32 = 8;
+const MAX_TILES: i32 = 8;
 
 /// Follows the HIP, and has what lies before it read.
 #[derive(Debug, Default)]
@@ -76,7 +76,7 @@ fn tiles(was: &GridPoint, is: &GridPoint, times: f64) -> Option<[[i32; 2]; 2]> {
         let (from, moved) = (at(is), at(is) - at(was));
         let tile = |cells: f64| (cells / f64::from(TILE_CELLS as u32)).floor() as i32;
         let (from, to) = (tile(from), tile(from + moved * times));
-        let is_near = to.saturating_sub(from).saturating_abs() <= MOST_TILES;
+        let is_near = to.saturating_sub(from).saturating_abs() <= MAX_TILES;
         is_near.then_some([from.min(to), from.max(to)])
     };
     let (east, north) = (along(0)?, along(1)?);

@@ -8,7 +8,7 @@ use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::request::Request;
 
 use super::ask::Ask;
-use super::patience::Patience;
+use super::patience::Timeouts;
 
 /// What is under way.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +59,7 @@ impl Asking {
 
     /// What is to be said now: what is under way, again where it is due, or the next where
     /// nothing is.
-    pub(super) fn due(&mut self, now: Duration, patience: &Patience) -> Option<ToDevice<'static>> {
+    pub(super) fn due(&mut self, now: Duration, patience: &Timeouts) -> Option<ToDevice<'static>> {
         self.give_up_late(now, patience);
         match &mut self.pending {
             Some(pending) if now.saturating_sub(pending.said) < patience.again => return None,
@@ -76,7 +76,7 @@ impl Asking {
         })
     }
 
-    fn give_up_late(&mut self, now: Duration, patience: &Patience) {
+    fn give_up_late(&mut self, now: Duration, patience: &Timeouts) {
         let is_late = |pending: &mut Pending| {
             now.saturating_sub(pending.since) >= patience.with(&pending.ask)
         };

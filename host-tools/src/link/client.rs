@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Point, Sample, Scene, View};
+use hapterra_core::scene::{HipCommand, Scene, TickRecord, View};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::hello::DeviceHello;
@@ -20,8 +20,8 @@ use super::ask::Ask;
 use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
 use super::messages::{FromDevice, from_device, next_frame};
-use super::patience::Patience;
-use super::tally::Tally;
+use super::patience::Timeouts;
+use super::tally::LinkStats;
 use crate::materials::{MaterialBuffer, Materials};
 use crate::terrain::{Terrain, TileBuffer};
 
@@ -37,13 +37,13 @@ pub enum Event<'e> {
         resumed: bool,
     },
     /// The sample of one tick of a scene whose HIP comes from the encoders.
-    Sample(&'e Sample),
+    Sample(&'e TickRecord),
     /// The sample at one point of a replay.
     Felt {
         /// The number that the host gave the point.
         seq: u32,
         /// HIP, proxy, force and state at the point.
-        sample: &'e Sample,
+        sample: &'e TickRecord,
     },
     /// Where the device's guard stands; told at the beginning of a session,
     /// whenever it changes, and twice a second.
@@ -69,7 +69,7 @@ pub enum Event<'e> {
     },
     /// A tick was marked, as was asked for by [`Request::Mark`].
     Marked {
-        /// The tick ([`Sample::tick`]).
+        /// The tick ([`TickRecord::tick`]).
         tick: u32,
     },
     /// A tile of the scene's level was said to the device, which may lose it and ask again.
@@ -140,8 +140,8 @@ pub struct Client<'t> {
     ahead: Ahead,
     zeroing: bool,
     /// The point of a replay that is to be felt, and when it was said.
-    point: Option<(Point, Duration)>,
-    tally: Tally,
+    point: Option<(HipCommand, Duration)>,
+    tally: LinkStats,
     samples_since_sign: u32,
     logged: Option<Duration>,
 }
@@ -171,7 +171,7 @@ impl<'t> Client<'t> {
         terrain: &'t Terrain<'t>,
         scene: Scene,
         arming: Option<Arming>,
-        patience: Patience,
+        patience: Timeouts,
     ) -> Self {
         Self::numbered(terrain, scene, arming, patience, fastrand::u64(..))
     }
@@ -182,7 +182,7 @@ impl<'t> Client<'t> {
         terrain: &'t Terrain<'t>,
         scene: Scene,
         arming: Option<Arming>,
-        patience: Patience,
+        patience: Timeouts,
         seed: u64,
     ) -> Self {
         Self {
@@ -204,7 +204,7 @@ impl<'t> Client<'t> {
             ahead: Ahead::default(),
             zeroing: false,
             point: None,
-            tally: Tally::default(),
+            tally: LinkStats::default(),
             samples_since_sign: 0,
             logged: None,
         }
@@ -218,7 +218,7 @@ impl<'t> Client<'t> {
 
     /// Counts of what went over the link so far.
     #[must_use]
-    pub const fn tally(&self) -> &Tally {
+    pub const fn tally(&self) -> &LinkStats {
         &self.tally
     }
 
@@ -236,7 +236,7 @@ impl<'t> Client<'t> {
 
     /// How long it waits for what.
     #[must_use]
-    pub const fn patience(&self) -> &Patience {
+    pub const fn patience(&self) -> &Timeouts {
         self.talk.patience()
     }
 
@@ -292,9 +292,9 @@ impl<'t> Client<'t> {
     }
 
     /// Has a point felt: says it until it is answered.
-    pub fn feel(&mut self, now: Duration, point: Point, out: &mut Vec<u8>) {
+    pub fn feel(&mut self, now: Duration, point: HipCommand, out: &mut Vec<u8>) {
         self.point = Some((point, now));
-        self.talk.say(&ToDevice::Point(point), out);
+        self.talk.say(&ToDevice::Hip(point), out);
     }
 
     /// Appends what is due to `out`.
@@ -335,7 +335,7 @@ impl<'t> Client<'t> {
             && now.saturating_sub(*said) >= again
         {
             *said = now;
-            self.talk.say(&ToDevice::Point(*point), out);
+            self.talk.say(&ToDevice::Hip(*point), out);
         }
     }
 
@@ -387,7 +387,7 @@ impl<'t> Client<'t> {
                 self.settle_view(true, on);
             }
             News::View => self.settle_view(true, on),
-            News::SceneTaken => self.on_scene_taken(now, out, on),
+            News::SceneAck => self.on_scene_taken(now, out, on),
             News::Answered(ask, message) => self.on_answered(now, ask, &message, out, on),
             News::Other(message) => self.on_message(now, message, out, on),
         }
@@ -471,7 +471,7 @@ impl<'t> Client<'t> {
     ) {
         let is_open = self.state() == State::Open;
         match message {
-            ToHost::Need { epoch, key } if is_open && epoch == self.scene.epoch => {
+            ToHost::TileRequest { epoch, key } if is_open && epoch == self.scene.epoch => {
                 // A device that asks more often than it reads is not answered more often.
                 let known = match self.zeroing {
                     true => &mut self.withheld,
@@ -506,7 +506,7 @@ impl<'t> Client<'t> {
                 });
             }
             ToHost::Guard(report) => on(Event::Guard(&report)),
-            ToHost::Alive { count, report, .. } => {
+            ToHost::Heartbeat { count, report, .. } => {
                 self.tally.told(count);
                 on(Event::Guard(&report));
             }

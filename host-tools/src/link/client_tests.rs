@@ -1,4 +1,4 @@
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::frame::{decode, encode};
@@ -50,9 +50,9 @@ fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
     let scale = Scale::new(1.0, 1.0).expect("scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
     let home = GridPoint::default();
-    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
+    let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home);
     let mut bench = Bench {
-        client: Client::new(&terrain, scene, arming, Patience::REAL_TIME),
+        client: Client::new(&terrain, scene, arming, Timeouts::REAL_TIME),
         now: ms(10_000),
         out: vec![],
         opened: 0,
@@ -84,14 +84,14 @@ impl Bench<'_> {
     }
 
     fn taken(&self) -> ToHost {
-        ToHost::SceneTaken {
+        ToHost::SceneAck {
             epoch: self.client.scene().epoch,
             accepted: true,
         }
     }
 
     fn alive(&self) -> ToHost {
-        ToHost::Alive {
+        ToHost::Heartbeat {
             count: SampleCount::default(),
             epoch: Some(self.client.scene().epoch),
             report: Report::default(),
@@ -336,7 +336,7 @@ fn tiles_wait_until_the_device_knows_its_zero() {
         let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 0, 0));
         bench.said();
         for _ in 0..3 {
-            bench.hear(&ToHost::Need { epoch, key });
+            bench.hear(&ToHost::TileRequest { epoch, key });
         }
         assert_eq!(bench.said(), Vec::<String>::new());
         let (number, result) = (1, Ok(()));
@@ -430,7 +430,7 @@ fn another_host_is_noticed() {
 
 /// The answer to the hello of this number of a session that is over.
 const fn over(number: u8, end: SessionEnd) -> ToHost {
-    ToHost::Over { number, end }
+    ToHost::SessionClosed { number, end }
 }
 
 #[test]
@@ -596,7 +596,7 @@ fn tiles_that_there_are_not_are_counted_and_seldom_told() {
         let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 77, 0));
         bench.said();
         for _ in 0..1_000 {
-            bench.hear(&ToHost::Need { epoch, key });
+            bench.hear(&ToHost::TileRequest { epoch, key });
         }
         assert_eq!(bench.client.tally().no_tiles, 1_000);
         assert_eq!(bench.client.logged, Some(bench.now));
@@ -643,7 +643,7 @@ fn a_device_that_asks_for_much_at_once_gets_each_tile_once_and_so_many() {
         let mut frame = [0; MAX_FRAME];
         for _ in 0..200 {
             let key = TileKey::new(0, 0, 0);
-            let message = ToHost::Need { epoch, key };
+            let message = ToHost::TileRequest { epoch, key };
             let framed = InSession { session, message };
             bytes.extend(encode(&framed, &mut frame).expect("fits"));
         }
@@ -668,7 +668,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
         let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
         // A device that has it already, and whose answer is lost, is told no scene anew.
         bench.out.clear();
-        bench.hear(&ToHost::Alive {
+        bench.hear(&ToHost::Heartbeat {
             count: SampleCount::default(),
             epoch: Some(epoch),
             report: Report::default(),
@@ -682,7 +682,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
         );
         assert_eq!(bench.client.scene().epoch, before);
         for _ in 0..2 {
-            bench.hear(&ToHost::SceneTaken {
+            bench.hear(&ToHost::SceneAck {
                 epoch,
                 accepted: true,
             });
@@ -707,7 +707,7 @@ fn a_view_that_is_refused_or_not_answered_leaves_the_scene_as_it_is() {
         bench.open();
         let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
         let accepted = false;
-        bench.hear(&ToHost::SceneTaken { epoch, accepted });
+        bench.hear(&ToHost::SceneAck { epoch, accepted });
         assert_eq!(bench.viewed, [(1, false)]);
         bench.put_view(2);
         for _ in 0..9 {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use hapterra_core::force::MaterialTable;
 use hapterra_core::scene::{Scene, View};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
-use hapterra_core::wire::materials::{MOST_TABLE_BYTES, MaterialScene, table_bytes};
+use hapterra_core::wire::materials::{MAX_TABLE_BYTES, MaterialScene, table_bytes};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::Answer;
 use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
@@ -16,7 +16,7 @@ use super::ask::Ask;
 use super::asking::Asking;
 use super::error::LinkError;
 use super::messages::append;
-use super::patience::Patience;
+use super::patience::Timeouts;
 
 /// Where the conversation stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +45,7 @@ pub(super) enum News {
         restarted: bool,
     },
     /// The scene is in force.
-    SceneTaken,
+    SceneAck,
     /// The view that was said is answered: it is in force, where its scene is the one that
     /// is to be.
     View,
@@ -72,7 +72,7 @@ pub(super) struct Conversation {
     materials: Option<MaterialTable>,
     /// Another view of it that was said and is not answered: since when, and when last.
     view: Option<(View, Duration, Duration)>,
-    patience: Patience,
+    patience: Timeouts,
     state: State,
     /// When the state began, and when its message was said last.
     since: Duration,
@@ -92,7 +92,7 @@ pub(super) struct Conversation {
 impl Conversation {
     pub(super) fn new(
         scene: Option<Scene>,
-        patience: Patience,
+        patience: Timeouts,
         mut numbers: fastrand::Rng,
     ) -> Self {
         let session = SessionNumber::new(numbers.u32(..));
@@ -141,7 +141,7 @@ impl Conversation {
         self.previous
     }
 
-    pub(super) const fn patience(&self) -> &Patience {
+    pub(super) const fn patience(&self) -> &Timeouts {
         &self.patience
     }
 
@@ -355,7 +355,7 @@ impl Conversation {
         else {
             return self.say(&ToDevice::Scene(scene), out);
         };
-        let mut room = [0; MOST_TABLE_BYTES];
+        let mut room = [0; MAX_TABLE_BYTES];
         let table = table_bytes(table, &mut room);
         self.say(
             &ToDevice::MaterialScene(MaterialScene { scene, table }),
@@ -380,7 +380,7 @@ impl Conversation {
     fn say_alive(&mut self, now: Duration, out: &mut Vec<u8>) {
         if self.alive_is_due || now.saturating_sub(self.alive_said) >= self.patience.alive {
             (self.alive_is_due, self.alive_said) = (false, now);
-            self.say(&ToDevice::Alive, out);
+            self.say(&ToDevice::Heartbeat, out);
         }
     }
 
@@ -432,8 +432,8 @@ impl Conversation {
         self.confirmed = true;
         Ok(match frame.message {
             ToHost::Hello(device) => self.on_hello(now, device, out)?,
-            ToHost::Over { number, end } => self.on_over(now, number, end)?,
-            ToHost::SceneTaken { epoch, accepted } => self.on_scene_taken(now, epoch, accepted)?,
+            ToHost::SessionClosed { number, end } => self.on_over(now, number, end)?,
+            ToHost::SceneAck { epoch, accepted } => self.on_scene_taken(now, epoch, accepted)?,
             message @ (ToHost::Answer(Answer { number, .. }) | ToHost::Marked { number, .. }) => {
                 self.on_answer(now, number, message)
             }
@@ -450,7 +450,7 @@ impl Conversation {
                 self.on_detached(now);
                 None
             }
-            message @ ToHost::Alive { .. } => {
+            message @ ToHost::Heartbeat { .. } => {
                 self.on_alive(now, &message, out);
                 Some(News::Other(message))
             }
@@ -466,7 +466,7 @@ impl Conversation {
     /// session is over, nor one that is left of the session before.
     fn notice(&mut self, now: Duration, frame: &InSession<ToHost>) {
         let previous = self.previous.map(|(session, _)| session);
-        let is_over = matches!(frame.message, ToHost::Over { .. });
+        let is_over = matches!(frame.message, ToHost::SessionClosed { .. });
         if !is_over && previous != Some(frame.session) {
             self.foreign = Some(now);
         }
@@ -569,7 +569,7 @@ impl Conversation {
             return Err(LinkError::SceneRefused);
         }
         self.enter(State::Open, now);
-        Ok(Some(News::SceneTaken))
+        Ok(Some(News::SceneAck))
     }
 
     fn on_answer(&mut self, now: Duration, number: u8, message: ToHost) -> Option<News> {
@@ -591,7 +591,7 @@ impl Conversation {
 
     fn on_alive(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {
         self.heard = now;
-        if let ToHost::Alive { epoch, .. } = message
+        if let ToHost::Heartbeat { epoch, .. } = message
             && self.state == State::Open
             && self.lacks_scene(*epoch)
             // The answer to a view comes, or is asked for again.

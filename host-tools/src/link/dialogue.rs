@@ -17,7 +17,7 @@ use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
 use super::line::{LOOK, Line};
 use super::messages::{FromDevice, from_device, next_frame};
-use super::patience::Patience;
+use super::patience::Timeouts;
 use super::transport::Transport;
 
 /// In this time a device tells where it stands at least once.
@@ -31,7 +31,7 @@ type OnMessage<'o> = &'o mut dyn FnMut(&ToHost) -> Option<ToDevice<'static>>;
 /// one that has only looked, or changed settings, detaches and leaves arm and scene as
 /// they are. [`Dialogue::end`] waits for the answer and returns what came of it. A
 /// dialogue that is dropped waits, too, for as long as a goodbye may take
-/// ([`Patience::goodbye`]), and logs where the arm may still be armed.
+/// ([`Timeouts::goodbye`]), and logs where the arm may still be armed.
 pub struct Dialogue<'t> {
     exchange: Exchange<'t>,
     device: DeviceHello,
@@ -54,7 +54,7 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// [`LinkError`]: nobody answers within `patience`, or in another protocol.
     pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
-        Self::with(transport, Patience::of_a_dialogue(patience))
+        Self::with(transport, Timeouts::of_a_dialogue(patience))
     }
 
     /// Only looks: the device answers questions for its status and its calibration, hears
@@ -63,10 +63,10 @@ impl<'t> Dialogue<'t> {
     /// # Errors
     /// As [`Dialogue::open`].
     pub fn look(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
-        Self::with(transport, Patience::of_a_look(patience))
+        Self::with(transport, Timeouts::of_a_look(patience))
     }
 
-    fn with(transport: Box<dyn Transport + 't>, patience: Patience) -> Result<Self, LinkError> {
+    fn with(transport: Box<dyn Transport + 't>, patience: Timeouts) -> Result<Self, LinkError> {
         // Where no session is opened there is none to end.
         let is_over = patience.silence_s == ONLY_LOOKS;
         let mut exchange = Exchange {
@@ -173,7 +173,7 @@ impl<'t> Dialogue<'t> {
         exchange.talk.listen_from(now);
         let out = &mut exchange.line.out;
         exchange.talk.put_scene(scene, now, out);
-        exchange.wait_for(|news| matches!(news, News::SceneTaken).then_some(()))
+        exchange.wait_for(|news| matches!(news, News::SceneAck).then_some(()))
     }
 
     /// Lets `ms` of the device's time pass, or less where it is `enough`; tells `on` of what
@@ -372,10 +372,10 @@ impl Drop for Exchange<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::{Meddler, Native};
+    use crate::link::{FaultInjector, Native};
     use crate::terrain::{Scale, Terrain};
     use crate::timeouts;
-    use hapterra_core::force::ForceLaw;
+    use hapterra_core::force::SurfaceParams;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::scene::Source;
     use hapterra_core::wire::frame::encode;
@@ -416,7 +416,7 @@ mod tests {
 
     #[test]
     fn a_calibration_is_taken_stored_and_refused_with_a_reason() {
-        let press: Meddler = Box::new(|tick, sense, _| sense.dead_man = tick % 1_000 >= 500);
+        let press: FaultInjector = Box::new(|tick, sense, _| sense.dead_man = tick % 1_000 >= 500);
         let device = Box::new(Native::for_replay().restless().meddled_with(press));
         let mut dialogue = Dialogue::open(device, PATIENCE).expect("it answers");
         let mut calibration = Calibration::OMNI;
@@ -475,7 +475,7 @@ mod tests {
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let home = GridPoint::default();
-        terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home)
+        terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home)
     }
 
     fn open<'t>(device: &'t mut Native<StoppedClock>) -> Dialogue<'t> {

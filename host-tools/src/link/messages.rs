@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use hapterra_core::wire::frame::{BadFrame, FrameReader, MAX_FRAME, decode, encode};
+use hapterra_core::wire::frame::{FrameError, FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::message::ToHost;
 use hapterra_core::wire::session::InSession;
 use hapterra_core::wire::version::VersionCheck;
@@ -29,8 +29,8 @@ pub(super) fn send(transport: &mut dyn Transport, message: &impl Serialize) -> i
 pub(super) fn next_frame<T>(
     reader: &mut FrameReader<MAX_FRAME>,
     bytes: &mut &[u8],
-    read: impl Fn(&[u8]) -> Result<T, BadFrame>,
-) -> Option<Result<T, BadFrame>> {
+    read: impl Fn(&[u8]) -> Result<T, FrameError>,
+) -> Option<Result<T, FrameError>> {
     while !bytes.is_empty() {
         let (taken, frame) = reader.push(bytes);
         *bytes = bytes.get(taken..).unwrap_or(&[]);
@@ -53,7 +53,7 @@ pub(super) enum FromDevice {
 }
 
 /// Reads a frame of the link.
-pub(super) fn from_device(content: &[u8]) -> Result<FromDevice, BadFrame> {
+pub(super) fn from_device(content: &[u8]) -> Result<FromDevice, FrameError> {
     match VersionCheck::is_in(content) {
         true => decode(content).map(FromDevice::Version),
         false => decode(content).map(FromDevice::Message),

@@ -54,11 +54,11 @@ pub use emulator::{
     QEMU_VARIABLE,
 };
 pub use error::LinkError;
-pub use native::{HostClock, Meddler, Native};
-pub use patience::Patience;
+pub use native::{FaultInjector, HostClock, Native};
+pub use patience::Timeouts;
 pub use plant_line::{move_arm_while, serve_plant};
 pub use session::Session;
-pub use tally::Tally;
+pub use tally::LinkStats;
 pub use tcp::Tcp;
 pub use transport::Transport;
 pub use usb::{SystemPipes, Usb};

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
 
-use hapterra_core::guard::{Drive, Sense};
+use hapterra_core::guard::{GuardInputs, GuardOutputs};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::rate::TickRate;
 use hapterra_core::wire::status::{BootReport, UsbClock};
@@ -71,9 +71,9 @@ impl TickClock for HostClock {
 pub struct Native<C: TickClock = StoppedClock> {
     device: Device<C, WINDOW>,
     arm: Option<Box<HeldPhantom>>,
-    sense: Sense,
-    drive: Drive,
-    meddler: Option<Meddler>,
+    sense: GuardInputs,
+    drive: GuardOutputs,
+    meddler: Option<FaultInjector>,
     restless: bool,
     /// Ticks run while waiting for the device to say something, at most.
     ticks_a_call: u32,
@@ -85,7 +85,7 @@ pub struct Native<C: TickClock = StoppedClock> {
 /// Stands between arm and device: is told the number of the next tick and what
 /// the amplifiers got in the last one, and may change what encoders and
 /// switches say. How tests make things go wrong, and see what comes of it.
-pub type Meddler = Box<dyn FnMut(u64, &mut Sense, &Drive)>;
+pub type FaultInjector = Box<dyn FnMut(u64, &mut GuardInputs, &GuardOutputs)>;
 
 impl Native<StoppedClock> {
     /// A device to replay trajectories on: no tick takes any time.
@@ -140,8 +140,8 @@ impl<C: TickClock> Native<C> {
         let mut native = Self {
             device: Device::new(tiles, memory, clock, stored, boot),
             arm,
-            sense: Sense::default(),
-            drive: Drive::default(),
+            sense: GuardInputs::default(),
+            drive: GuardOutputs::default(),
             meddler: None,
             restless: false,
             ticks_a_call: TICKS_A_CALL,
@@ -154,7 +154,7 @@ impl<C: TickClock> Native<C> {
 
     /// The same device with something between it and its arm.
     #[must_use]
-    pub fn meddled_with(mut self, meddler: Meddler) -> Self {
+    pub fn meddled_with(mut self, meddler: FaultInjector) -> Self {
         self.meddler = Some(meddler);
         self.read_sensors();
         self
@@ -188,7 +188,7 @@ impl<C: TickClock> Native<C> {
     pub fn in_real_time(self) -> Self {
         let tick = Duration::from_secs(1) * C::PERIOD / C::HZ;
         let mut due = Instant::now();
-        let pace: Meddler = Box::new(move |_, _, _| {
+        let pace: FaultInjector = Box::new(move |_, _, _| {
             due += tick;
             let now = Instant::now();
             let early = due.saturating_duration_since(now);
@@ -210,7 +210,7 @@ impl<C: TickClock> Native<C> {
 
     /// What the amplifiers got in the last tick.
     #[must_use]
-    pub const fn drive(&self) -> Drive {
+    pub const fn drive(&self) -> GuardOutputs {
         self.drive
     }
 

@@ -10,7 +10,7 @@ use super::ask::Ask;
 
 /// The times of the table in [`hapterra_core::wire`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patience {
+pub struct Timeouts {
     /// Between two tries to be understood.
     pub again: Duration,
     /// Between two signs of life.
@@ -27,7 +27,7 @@ pub struct Patience {
     pub silence_s: u16,
 }
 
-impl Patience {
+impl Timeouts {
     /// How long a real board lets an armed arm be while its host is silent, unless the user says
     /// otherwise, seconds: longer than a host that goes on takes to come back.
     pub const REAL_SILENCE_S: u16 = 30;
@@ -91,8 +91,8 @@ mod tests {
 
     #[test]
     fn no_real_arm_is_armed_for_long_after_its_host_is_gone() {
-        let dialogue = Patience::of_a_dialogue(Duration::from_secs(60));
-        for patience in [Patience::REAL_TIME, dialogue] {
+        let dialogue = Timeouts::of_a_dialogue(Duration::from_secs(60));
+        for patience in [Timeouts::REAL_TIME, dialogue] {
             assert!((5..=30).contains(&patience.silence_s), "{patience:?}");
         }
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hapterra_core::scene::{Point, Scene, View};
+use hapterra_core::scene::{HipCommand, Scene, View};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::request::Request;
 
@@ -11,8 +11,8 @@ use super::client::{Arming, Client, Event};
 use super::conversation::State;
 use super::error::LinkError;
 use super::line::{LOOK, Line};
-use super::patience::Patience;
-use super::tally::Tally;
+use super::patience::Timeouts;
+use super::tally::LinkStats;
 use super::transport::Transport;
 use crate::terrain::Terrain;
 
@@ -34,7 +34,7 @@ impl<'t> Session<'t> {
         scene: Scene,
         arming: Option<Arming>,
         transport: Box<dyn Transport + 't>,
-        patience: Patience,
+        patience: Timeouts,
     ) -> Self {
         Self {
             client: Client::new(terrain, scene, arming, patience),
@@ -62,7 +62,7 @@ impl<'t> Session<'t> {
         scene: Scene,
         arming: Option<Arming>,
         transport: Box<dyn Transport + 't>,
-        patience: Patience,
+        patience: Timeouts,
     ) -> Result<(Self, DeviceHello), LinkError> {
         let mut session = Self::new(terrain, scene, arming, transport, patience);
         let device = session.begin(&mut |_| {})?;
@@ -118,13 +118,13 @@ impl<'t> Session<'t> {
 
     /// Counts of what went over the link so far.
     #[must_use]
-    pub const fn tally(&self) -> &Tally {
+    pub const fn tally(&self) -> &LinkStats {
         self.client.tally()
     }
 
     /// How long it waits for what.
     #[must_use]
-    pub const fn patience(&self) -> &Patience {
+    pub const fn patience(&self) -> &Timeouts {
         self.client.patience()
     }
 
@@ -155,7 +155,7 @@ impl<'t> Session<'t> {
     ///
     /// # Errors
     /// [`LinkError::Gone`].
-    pub fn feel(&mut self, point: Point) -> Result<(), LinkError> {
+    pub fn feel(&mut self, point: HipCommand) -> Result<(), LinkError> {
         self.client.feel(self.line.now(), point, &mut self.line.out);
         self.flush()
     }

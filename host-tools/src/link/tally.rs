@@ -9,7 +9,7 @@ use hapterra_core::wire::session::SampleCount;
 /// Counts over all sessions with a device. Of every sample that the device made in a
 /// session of this host, it was received, lost or dropped, and counted once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct LinkStats {
     /// Tiles sent.
     pub tiles: u64,
     /// Of those, tiles that had been sent before: lost on the way, or asked
@@ -81,7 +81,7 @@ fn ahead(earlier: u32, later: u32) -> u32 {
     }
 }
 
-impl Tally {
+impl LinkStats {
     /// A new session's number was drawn: its samples are numbered from zero.
     pub(super) fn drawn(&mut self) {
         if self.now != Numbering::default() || self.sessions > 0 {
@@ -165,17 +165,17 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hapterra_core::scene::Sample;
+    use hapterra_core::scene::TickRecord;
 
     fn batch(first: u32, dropped: u32) -> Telemetry {
         Telemetry {
             first,
             dropped,
-            samples: [Sample::default(); 4].into_iter().collect(),
+            samples: [TickRecord::default(); 4].into_iter().collect(),
         }
     }
 
-    fn counted(tally: &Tally) -> (u64, u64, u64) {
+    fn counted(tally: &LinkStats) -> (u64, u64, u64) {
         (tally.samples, tally.lost, tally.dropped)
     }
 
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn gaps_are_loss_and_repeats_are_not_counted_twice() {
-        let mut tally = Tally::default();
+        let mut tally = LinkStats::default();
         tally.opened(None);
         assert!(tally.received(&batch(0, 0)));
         assert!(!tally.received(&batch(0, 0)));
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn loss_at_the_start_and_at_the_end_is_counted() {
-        let mut tally = Tally::default();
+        let mut tally = LinkStats::default();
         tally.opened(None);
         tally.told(count(16, 1));
         assert_eq!(counted(&tally), (0, 16, 1));
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn the_end_of_a_session_is_told_at_the_beginning_of_the_next() {
-        let mut tally = Tally::default();
+        let mut tally = LinkStats::default();
         tally.opened(None);
         assert!(tally.received(&batch(0, 0)));
         tally.drawn();
@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn a_restart_leaves_a_doubt_that_is_told() {
-        let mut tally = Tally::default();
+        let mut tally = LinkStats::default();
         tally.opened(None);
         assert!(tally.received(&batch(0, 0)));
         tally.told(count(12, 1));

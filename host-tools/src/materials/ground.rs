@@ -4,7 +4,7 @@ use heightfield::{Raster, Sides, System};
 
 /// Why classes cannot be laid over a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum BadGround {
+pub enum GroundError {
     /// One of the two says where it lies, and the other does not.
     #[error(
         "{unplaced} does not state its reference system, and {placed} does: which class lies where cannot be told"

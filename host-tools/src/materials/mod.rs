@@ -12,20 +12,20 @@ use std::hash::Hasher as _;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use hapterra_core::force::{ForceLaw, Material, MaterialTable};
-use hapterra_core::terrain::{POSTS, TileIndex};
-use hapterra_core::wire::materials::{MOST_TILE_BYTES, TileMaterials};
+use hapterra_core::force::{Material, MaterialTable, SurfaceParams};
+use hapterra_core::terrain::{TILE_SAMPLES, TileIndex};
+use hapterra_core::wire::materials::{MAX_TILE_BYTES, TileMaterials};
 use serde::{Deserialize, Serialize};
 use twox_hash::XxHash64;
 
-use crate::terrain::{FeltGrid, fingerprint};
-pub use ground::BadGround;
+use crate::terrain::{HapticGrid, fingerprint};
+pub use ground::GroundError;
 use heightfield::{Raster, ReferenceSystem};
 use heightfield::{is_url, without_key};
 use pixels::Pixels;
 
 /// Samples of a tile.
-const SAMPLES: usize = POSTS * POSTS;
+const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 /// Places along each side of a terrain that are looked at to tell which classes it has.
 const LOOKED_AT: u32 = 24;
 
@@ -81,17 +81,19 @@ impl Materials {
     /// Lays the classes of a file over a terrain.
     ///
     /// # Errors
-    /// [`BadGround`] where it cannot be told which class lies where, or none lies on the
+    /// [`GroundError`] where it cannot be told which class lies where, or none lies on the
     /// terrain.
     pub fn over(
         terrain: (&str, &Raster),
         (file, classes): (&str, Raster),
         looks: Looks,
-    ) -> Result<Self, BadGround> {
+    ) -> Result<Self, GroundError> {
         // Recordings and messages have the name.
         let file = without_key(Path::new(file));
         let pixels = Pixels::over(terrain, (&file, classes))?;
-        let table = looks.table().ok_or(BadGround::TooMany(looks.class.len()))?;
+        let table = looks
+            .table()
+            .ok_or(GroundError::TooMany(looks.class.len()))?;
         Ok(Self {
             file,
             pixels,
@@ -146,7 +148,7 @@ impl Materials {
 
     /// A law over the default material: that of a scene with these materials.
     #[must_use]
-    pub const fn law(&self, law: &ForceLaw) -> ForceLaw {
+    pub const fn law(&self, law: &SurfaceParams) -> SurfaceParams {
         self.looks.default.law(law)
     }
 
@@ -161,7 +163,7 @@ impl Materials {
     /// go on the link. Beyond the field they go on as it ends there.
     pub(crate) fn tile<'b>(
         &self,
-        (grid, last, step): (&FeltGrid<'_>, [i32; 2], f64),
+        (grid, last, step): (&HapticGrid<'_>, [i32; 2], f64),
         index: TileIndex,
         buffer: &'b mut MaterialBuffer,
     ) -> TileMaterials<'b> {
@@ -173,8 +175,8 @@ impl Materials {
         let on_terrain = terrain.georeference();
         let from_terrain = self.pixels.from(&on_terrain);
         for (i, index) in buffer.indices.iter_mut().enumerate() {
-            let column = place(first.x, i % POSTS, last[0]);
-            let row = place(first.y, i / POSTS, last[1]);
+            let column = place(first.x, i % TILE_SAMPLES, last[0]);
+            let row = place(first.y, i / TILE_SAMPLES, last[1]);
             let ground = grid.to_ground([column, row]);
             *index = self.looks.index(from_terrain.value(ground));
         }
@@ -185,7 +187,7 @@ impl Materials {
     /// some hundred places, and how many of these have the default. Of a file at a URL nothing is
     /// fetched for it.
     #[must_use]
-    pub fn told(&self, grid: &FeltGrid<'_>) -> String {
+    pub fn told(&self, grid: &HapticGrid<'_>) -> String {
         if is_url(&self.file) {
             let count = self.looks.class.len();
             return format!("{count} classes in the table; the file is read where it is touched");
@@ -222,14 +224,14 @@ impl Materials {
 /// Room for one tile's materials, used again for each.
 pub struct MaterialBuffer {
     indices: Box<[u8; SAMPLES]>,
-    bytes: Box<[u8; MOST_TILE_BYTES]>,
+    bytes: Box<[u8; MAX_TILE_BYTES]>,
 }
 
 impl Default for MaterialBuffer {
     fn default() -> Self {
         Self {
             indices: Box::new([0; SAMPLES]),
-            bytes: Box::new([0; MOST_TILE_BYTES]),
+            bytes: Box::new([0; MAX_TILE_BYTES]),
         }
     }
 }

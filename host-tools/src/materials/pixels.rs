@@ -1,6 +1,6 @@
 //! The pixel of a raster of classes in which a place of a terrain lies.
 
-use super::ground::{BadGround, place_of};
+use super::ground::{GroundError, place_of};
 use heightfield::{Georeference, LonLat, Raster};
 
 /// Places along each side of a raster that are tried to find whether two overlap.
@@ -26,7 +26,7 @@ impl Way {
     fn between(
         (terrain, on_terrain): (&str, &Georeference<'_>),
         (classes, on_classes): (&str, &Georeference<'_>),
-    ) -> Result<Self, BadGround> {
+    ) -> Result<Self, GroundError> {
         if on_terrain.reference() == on_classes.reference()
             && on_terrain.system() == on_classes.system()
         {
@@ -50,16 +50,16 @@ impl Way {
             }
             let (file, other) = (file.to_owned(), other.to_owned());
             return Err(match on.reference() {
-                None => BadGround::NoSystem {
+                None => GroundError::NoSystem {
                     unplaced: file,
                     placed: other,
                 },
-                Some(_) => BadGround::NoWay { file, other },
+                Some(_) => GroundError::NoWay { file, other },
             });
         }
         match radius_m(on_terrain) == radius_m(on_classes) {
             true => Ok(Self::LonLat),
-            false => Err(BadGround::OtherBody {
+            false => Err(GroundError::OtherBody {
                 classes: classes.to_owned(),
                 terrain: terrain.to_owned(),
             }),
@@ -111,7 +111,7 @@ impl Pixels {
     pub(super) fn over(
         (terrain, ground): (&str, &Raster),
         (file, raster): (&str, Raster),
-    ) -> Result<Self, BadGround> {
+    ) -> Result<Self, GroundError> {
         let (on_terrain, on_classes) = (ground.georeference(), raster.georeference());
         let way = Way::between((terrain, &on_terrain), (file, &on_classes))?;
         // Either may be much larger than the other.
@@ -119,7 +119,7 @@ impl Pixels {
             || has_place_on(way, (&on_classes, &raster), (&on_terrain, ground));
         match overlap {
             true => Ok(Self { raster, way }),
-            false => Err(BadGround::Apart {
+            false => Err(GroundError::Apart {
                 classes: file.to_owned(),
                 terrain: terrain.to_owned(),
                 there: place_of(&raster),

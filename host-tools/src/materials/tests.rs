@@ -1,12 +1,12 @@
 //! Classes over a terrain: which lies where.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::terrain::{Tile, TileKey};
 
 use super::*;
-use crate::terrain::{FeltCells, Scale, Terrain};
+use crate::terrain::{HapticCells, Scale, Terrain};
 use heightfield::{GroundTransform, OpenOptions};
 
 /// A raster whose south-west sample is at `origin`, in steps of so much, in the system of a code.
@@ -23,7 +23,7 @@ fn raster(
 }
 
 fn looks(classes: &[i64]) -> Looks {
-    let default = Material::of(&ForceLaw::PREMIUM);
+    let default = Material::of(&SurfaceParams::PREMIUM);
     let class = |class: &i64| ClassMaterial {
         class: *class,
         name: (*class == 10).then(|| "trees".to_owned()),
@@ -35,7 +35,7 @@ fn looks(classes: &[i64]) -> Looks {
     }
 }
 
-fn over(terrain: &Raster, classes: Raster, looks: Looks) -> Result<Materials, BadGround> {
+fn over(terrain: &Raster, classes: Raster, looks: Looks) -> Result<Materials, GroundError> {
     Materials::over(("t.tif", terrain), ("c.tif", classes), looks)
 }
 
@@ -93,7 +93,7 @@ fn classes_in_another_system_lie_where_they_are_on_the_globe() {
     let at = |x: f64| materials.index_at(&terrain, [x, 5_000_400.0]);
     assert_eq!([at(499_999.0), at(500_001.0)], [1, 2]);
     assert_eq!([at(499_900.0), at(500_100.0)], [1, 2]);
-    let grid = FeltGrid::new(&terrain, FeltCells::Square).with_materials(Some(&materials));
+    let grid = HapticGrid::new(&terrain, HapticCells::Square).with_materials(Some(&materials));
     let told = materials.told(&grid);
     assert!(
         told.contains("trees") && told.contains("class 20"),
@@ -110,7 +110,7 @@ fn a_tile_has_the_classes_of_its_level() {
     let materials = over(&terrain, classes, looks(&[1, 2])).expect("they overlap");
     let mut buffer = MaterialBuffer::default();
     for level in [0, 1] {
-        let grid = FeltGrid::new(&terrain, FeltCells::Stored).with_materials(Some(&materials));
+        let grid = HapticGrid::new(&terrain, HapticCells::Stored).with_materials(Some(&materials));
         let scale = Scale::new(1.0, 1.0).expect("valid");
         let felt = Terrain::over(grid, scale, level).expect("terrain");
         let key = TileKey::new(level, 1, 0);
@@ -123,7 +123,10 @@ fn a_tile_has_the_classes_of_its_level() {
         let wanted: Vec<u8> = (0..SAMPLES)
             .map(|i| {
                 let at = |first: i32, i: usize, last: i32| (first + i as i32).min(last) as u32;
-                let (column, row) = (at(32, i % POSTS, size[0]), at(0, i / POSTS, size[1]));
+                let (column, row) = (
+                    at(32, i % TILE_SAMPLES, size[0]),
+                    at(0, i / TILE_SAMPLES, size[1]),
+                );
                 class(column << level, row << level)
             })
             .collect();
@@ -139,9 +142,9 @@ fn a_tile_has_the_classes_of_its_level() {
 fn the_scene_names_the_table_and_another_file_of_classes_makes_another_scene() {
     let terrain = raster((41, 41), [0.0; 2], 1.0, None, |x, _| x as f32);
     let scene = |materials: Option<&Materials>| {
-        let grid = FeltGrid::new(&terrain, FeltCells::Stored).with_materials(materials);
+        let grid = HapticGrid::new(&terrain, HapticCells::Stored).with_materials(materials);
         let felt = Terrain::over(grid, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
-        felt.scene(ForceLaw::PREMIUM, Source::Points, GridPoint::default())
+        felt.scene(SurfaceParams::PREMIUM, Source::Points, GridPoint::default())
     };
     let classes = |value| raster((41, 41), [0.0; 2], 1.0, None, move |_, _| value);
     let one = over(&terrain, classes(1.0), looks(&[1])).expect("overlap");
@@ -157,14 +160,14 @@ fn what_cannot_be_laid_over_a_terrain_is_told() {
     let utm = |origin| raster((9, 9), origin, 10.0, Some(32632), |_, _| 1.0);
     let terrain = utm([500_000.0, 5_000_000.0]);
     let unplaced = Raster::from_fn(9, 9, |_, _| 1.0).expect("raster");
-    let no_system = BadGround::NoSystem {
+    let no_system = GroundError::NoSystem {
         unplaced: "c.tif".into(),
         placed: "t.tif".into(),
     };
     let bad = over(&terrain, unplaced.clone(), looks(&[1])).expect_err("no system");
     assert_eq!(bad, no_system);
     let bad = over(&unplaced, utm([0.0; 2]), looks(&[1])).expect_err("no system");
-    assert!(matches!(bad, BadGround::NoSystem { unplaced, .. } if unplaced == "t.tif"));
+    assert!(matches!(bad, GroundError::NoSystem { unplaced, .. } if unplaced == "t.tif"));
     let elsewhere = over(&terrain, utm([510_000.0, 5_000_000.0]), looks(&[1]));
     let told = elsewhere.expect_err("apart").to_string();
     assert!(
@@ -179,7 +182,7 @@ fn what_cannot_be_laid_over_a_terrain_is_told() {
     assert!(over(&unplaced, unplaced.clone(), looks(&[1])).is_ok());
     let many: Vec<i64> = (0..16).collect();
     let bad = over(&unplaced, unplaced.clone(), looks(&many));
-    assert!(matches!(bad, Err(BadGround::TooMany(16))));
+    assert!(matches!(bad, Err(GroundError::TooMany(16))));
 }
 
 /// A raster around the meridian and the equator of the body of a geographic system.
@@ -206,7 +209,7 @@ fn classes_of_another_body_are_not_laid_over_a_terrain() {
         "\"WGS_1984\",6378137.0,298.257223563",
         1.0,
     ));
-    let other = BadGround::OtherBody {
+    let other = GroundError::OtherBody {
         classes: "c.tif".into(),
         terrain: "t.tif".into(),
     };
@@ -233,7 +236,7 @@ fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
     let materials = at(500_000.0).expect("they overlap");
     assert_eq!(materials.file(), "https://host/c.tif");
     // Nothing is fetched to tell what is where.
-    let grid = FeltGrid::new(&terrain, FeltCells::Stored);
+    let grid = HapticGrid::new(&terrain, HapticCells::Stored);
     assert!(materials.told(&grid).contains("read where it is touched"));
     let apart = at(900_000.0).expect_err("elsewhere").to_string();
     assert!(apart.contains("https://host/c.tif lies"), "{apart}");

@@ -1,7 +1,7 @@
 //! A virtual Phantom in somebody's hand: all that a device has outside of
 //! itself. A hand follows a script, and the terrain lies in front of both.
 
-use hapterra_core::guard::Sense;
+use hapterra_core::guard::GuardInputs;
 
 use super::amplifier::AmplifierFault;
 use super::hand::HandModel;
@@ -96,8 +96,8 @@ impl HeldPhantom {
 
     /// What encoders, switches and amplifiers say now.
     #[must_use]
-    pub fn sense(&self) -> Sense {
-        Sense {
+    pub fn sense(&self) -> GuardInputs {
+        GuardInputs {
             counts: self.plant.counts(),
             dead_man: self.begin_s > 0.0 && self.t_s >= PRESS_S,
             emergency_stop: false,

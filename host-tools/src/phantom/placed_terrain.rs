@@ -1,6 +1,6 @@
 //! A terrain in front of the arm, with the tour of a scripted hand over it.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::{Scene, Source};
 
 use super::{HandModel, HeldPhantom, OutOfReach, PhantomModel, TourPlan};
@@ -39,7 +39,7 @@ impl<'t> PlacedTerrain<'t> {
     ///
     /// # Errors
     /// [`PlacingError`].
-    pub fn new(terrain: &'t Terrain<'t>, law: ForceLaw) -> Result<Self, PlacingError> {
+    pub fn new(terrain: &'t Terrain<'t>, law: SurfaceParams) -> Result<Self, PlacingError> {
         Self::toured(terrain, law, None)
     }
 
@@ -51,14 +51,14 @@ impl<'t> PlacedTerrain<'t> {
     pub fn in_view(
         terrain: &'t Terrain<'t>,
         home_mm: [f64; 3],
-        law: ForceLaw,
+        law: SurfaceParams,
     ) -> Result<Self, PlacingError> {
         Self::toured(terrain, law, Some(home_mm))
     }
 
     fn toured(
         terrain: &'t Terrain<'t>,
-        law: ForceLaw,
+        law: SurfaceParams,
         home_mm: Option<[f64; 3]>,
     ) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
@@ -108,7 +108,7 @@ impl<'t> PlacedTerrain<'t> {
 
     /// The force law.
     #[must_use]
-    pub const fn law(&self) -> ForceLaw {
+    pub const fn law(&self) -> SurfaceParams {
         self.scene.law
     }
 

@@ -113,8 +113,8 @@ fn a_loaded_arm_under_its_friction_does_not_creep() {
 /// The firmware's own kinematics, f32 and from counts, see the arm where it is.
 #[test]
 fn the_firmware_reads_the_counts_as_the_plant_means_them() {
-    use hapterra_core::phantom::{Calibration, Mechanism};
-    let device = Mechanism::new(&Calibration::PREMIUM_1_5).expect("valid");
+    use hapterra_core::phantom::{Calibration, Kinematics};
+    let device = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");
     for joint in 0..60 {
         let turn = f64::from(joint) / 10.0;
         let q = [0.8 * turn.sin(), 0.5 * turn.cos(), 0.4 * (2.0 * turn).sin()];

@@ -1,14 +1,14 @@
 //! Changes of a view while it is felt: the view before and what is asked for make the next
 //! one, or say why not.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 
 use super::surface_change::{SurfaceChange, SurfaceError};
 use super::view::{View, finest_level};
-use crate::terrain::{BadScale, FeltGrid, Terrain, TerrainError};
+use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 
 /// A sample of the file as large as this in the hand is felt as one even patch, mm.
-const LARGEST_CELL_MM: f64 = 50.0;
+const MAX_CELL_MM: f64 = 50.0;
 /// The longer side of a terrain as small as this in the hand tells nothing any more, mm.
 const SMALLEST_TERRAIN_MM: f64 = 5.0;
 /// Above this an arm most likely buzzes or kicks, N/mm: people hold 0.4 to 0.8 N/mm on a
@@ -92,7 +92,7 @@ pub enum ChangeError {
     Terrain(#[from] TerrainError),
     /// A scale that none can have.
     #[error(transparent)]
-    Scale(#[from] BadScale),
+    Scale(#[from] ScaleError),
 }
 
 /// A view, and the law of its force.
@@ -101,7 +101,7 @@ pub struct Laid {
     /// Place, scale, level and heights.
     pub view: View,
     /// Stiffness and limit.
-    pub law: ForceLaw,
+    pub law: SurfaceParams,
 }
 
 /// What does not change while views do.
@@ -132,7 +132,7 @@ impl Hand {
     }
 
     /// Whether the cells of a terrain at this place are others than they are felt
-    /// ([`FeltGrid::measured_anew`]).
+    /// ([`HapticGrid::measured_anew`]).
     #[must_use]
     pub fn is_far_from_measure(&self, terrain: &Terrain<'_>) -> bool {
         let cell_mm = terrain.scale_of_level_0().cell_mm();
@@ -206,7 +206,7 @@ impl Bounds {
     /// One change, at a place in felt cells of level 0.
     fn step(
         &self,
-        grid: &FeltGrid<'_>,
+        grid: &HapticGrid<'_>,
         mut laid: Laid,
         mut at: [f64; 2],
         change: &ViewChange,
@@ -311,17 +311,17 @@ fn factor_of(factor: f64) -> Result<f64, ChangeError> {
     }
 }
 
-fn within(grid: &FeltGrid<'_>, at: [f64; 2]) -> Result<(), ChangeError> {
+fn within(grid: &HapticGrid<'_>, at: [f64; 2]) -> Result<(), ChangeError> {
     let last = [grid.columns(), grid.rows()].map(|count| f64::from(count) - 1.0);
     let inside = (0..2).all(|axis| (0.0..=last[axis]).contains(&at[axis]));
     inside.then_some(()).ok_or(ChangeError::Outside)
 }
 
 /// Refuses what is too large or too small, unless it comes nearer to what is not.
-fn check_size(grid: &FeltGrid<'_>, view: &View, factor: f64) -> Result<(), ChangeError> {
+fn check_size(grid: &HapticGrid<'_>, view: &View, factor: f64) -> Result<(), ChangeError> {
     let cell_mm = view.scale.cell_mm();
     let size_mm = f64::from(grid.columns().max(grid.rows()) - 1) * cell_mm;
-    if factor > 1.0 && cell_mm > LARGEST_CELL_MM {
+    if factor > 1.0 && cell_mm > MAX_CELL_MM {
         return Err(ChangeError::NoDetail { cell_mm });
     }
     if factor < 1.0 && size_mm < SMALLEST_TERRAIN_MM {

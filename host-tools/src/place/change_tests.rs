@@ -40,7 +40,7 @@ impl Bench {
         let bounds = Bounds {
             first: Laid {
                 view,
-                law: ForceLaw::PREMIUM,
+                law: SurfaceParams::PREMIUM,
             },
             resolution_mm: reach.resolution_mm(),
             level: self.level,

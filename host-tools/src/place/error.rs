@@ -1,6 +1,6 @@
 //! Why a terrain cannot be laid in front of the arm as it was asked for.
 
-use crate::terrain::BadScale;
+use crate::terrain::ScaleError;
 
 /// Why a place or a scale cannot be had.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -150,5 +150,5 @@ pub enum PlaceError {
     NoReach,
     /// Numbers that no terrain can be scaled with.
     #[error(transparent)]
-    Scale(#[from] BadScale),
+    Scale(#[from] ScaleError),
 }

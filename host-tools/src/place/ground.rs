@@ -5,7 +5,7 @@ use super::error::PlaceError;
 use super::words::{
     asked_in_words, bounds_in_words, box_in_words, own_box_in_words, system_in_words,
 };
-use crate::terrain::FeltGrid;
+use crate::terrain::HapticGrid;
 use heightfield::{Georeference, LonLat, ReferenceSystem, Sides, System, around};
 
 /// Points along each side of a box in another system than the file's: its sides are bent on a map.
@@ -201,7 +201,7 @@ fn is_torn(points: &[[f64; 2]]) -> bool {
 
 /// A place in felt cells that has a height, and this height in the file's vertical unit.
 pub(super) fn spot(
-    grid: &FeltGrid<'_>,
+    grid: &HapticGrid<'_>,
     asked: [f64; 2],
     coordinates: Coordinates,
 ) -> Result<([f64; 2], f64), PlaceError> {
@@ -238,7 +238,7 @@ pub(super) fn spot(
 /// The part of a terrain in a box: felt cells, and its lowest and highest point in the
 /// file's vertical unit.
 pub(super) fn area(
-    grid: &FeltGrid<'_>,
+    grid: &HapticGrid<'_>,
     asked: Sides,
     coordinates: Coordinates,
 ) -> Result<(Sides, [f64; 2]), PlaceError> {
@@ -270,7 +270,7 @@ pub(super) fn area(
 
 /// Lowest and highest of the samples in a rectangle of felt cells, or of many of them
 /// where they are very many.
-fn heights(grid: &FeltGrid<'_>, [west, south, east, north]: Sides) -> Option<[f64; 2]> {
+fn heights(grid: &HapticGrid<'_>, [west, south, east, north]: Sides) -> Option<[f64; 2]> {
     let along = |from: f64, to: f64| {
         let looks = LOOKS.min((to.ceil() - from.floor()) as u32 + 1).max(2);
         (0..looks).map(move |look| {

@@ -1,7 +1,7 @@
 //! Changes of a surface while it is touched.
 
 use hapterra_core::contact::Friction;
-use hapterra_core::force::{Damping, ForceLaw, Shading, Texture};
+use hapterra_core::force::{Damping, Shading, SurfaceParams, Texture};
 
 use crate::surface::NamedSurface;
 
@@ -42,17 +42,17 @@ pub enum SurfaceError {
         static_mu: f32,
     },
     /// A time that a contact cannot work with.
-    #[error("a viscous friction of {0} s: from 0 to {most} s can be had", most = Friction::MOST_VISCOUS_S)]
+    #[error("a viscous friction of {0} s: from 0 to {most} s can be had", most = Friction::MAX_VISCOUS_S)]
     ViscousFriction(f32),
     /// More or less damping than can be had.
-    #[error("a damping of {0} N·s/m: from 0 to {most} N·s/m can be had", most = Damping::MOST_NS_PER_M)]
+    #[error("a damping of {0} N·s/m: from 0 to {most} N·s/m can be had", most = Damping::MAX_NS_PER_M)]
     Damping(f32),
     /// A relief that no hand could feel or no tick could make.
     #[error(
         "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {most} mm can be had",
         shortest = Texture::WAVELENGTHS_MM.0,
         longest = Texture::WAVELENGTHS_MM.1,
-        most = Texture::MOST_AMPLITUDE_MM
+        most = Texture::MAX_AMPLITUDE_MM
     )]
     Texture {
         /// How far it reaches above and below the surface.
@@ -72,7 +72,11 @@ impl SurfaceChange {
     ///
     /// # Errors
     /// [`SurfaceError`].
-    pub fn of(self, law: &ForceLaw, has_materials: bool) -> Result<ForceLaw, SurfaceError> {
+    pub fn of(
+        self,
+        law: &SurfaceParams,
+        has_materials: bool,
+    ) -> Result<SurfaceParams, SurfaceError> {
         let mut law = *law;
         if has_materials && !matches!(self, Self::Shading(_)) {
             return Err(SurfaceError::OfMaterials);
@@ -150,13 +154,15 @@ mod tests {
             SurfaceChange::Texture(Texture::NONE),
             texture(0.125, 1.0),
         ] {
-            let law = change.of(&ForceLaw::PREMIUM, false).expect("can be had");
+            let law = change
+                .of(&SurfaceParams::PREMIUM, false)
+                .expect("can be had");
             assert!(law.is_valid(), "{change:?}");
-            let ForceLaw {
+            let SurfaceParams {
                 stiffness_n_per_mm,
                 max_force_n,
                 ..
-            } = ForceLaw::PREMIUM;
+            } = SurfaceParams::PREMIUM;
             assert_eq!(law.stiffness_n_per_mm, stiffness_n_per_mm);
             assert_eq!(law.max_force_n, max_force_n);
         }
@@ -165,10 +171,10 @@ mod tests {
     #[test]
     fn named_surface_keeps_limit_and_shading() {
         let sand = NamedSurface::find("sand").expect("named");
-        let before = ForceLaw {
+        let before = SurfaceParams {
             max_force_n: 4.0,
             shading: Shading::Smooth,
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
         let law = SurfaceChange::Named(sand).of(&before, false).expect("sand");
         assert_eq!(Material::of(&law), sand.material);
@@ -189,14 +195,14 @@ mod tests {
             (texture(0.0, 1.0), "above 0"),
             (texture(0.01, 0.1), "from 0.25 to 100 mm"),
         ] {
-            let error = change.of(&ForceLaw::PREMIUM, false).expect_err(says);
+            let error = change.of(&SurfaceParams::PREMIUM, false).expect_err(says);
             assert!(error.to_string().contains(says), "{error}");
         }
     }
 
     #[test]
     fn materials_have_all_but_shading_by_themselves() {
-        let law = &ForceLaw::PREMIUM;
+        let law = &SurfaceParams::PREMIUM;
         let damping = SurfaceChange::Damping(1.0);
         assert_eq!(damping.of(law, true), Err(SurfaceError::OfMaterials));
         assert!(

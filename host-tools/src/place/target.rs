@@ -3,7 +3,7 @@
 use super::coordinates::Coordinates;
 use super::error::PlaceError;
 use super::ground;
-use crate::terrain::{FeltCells, FeltGrid};
+use crate::terrain::{HapticCells, HapticGrid};
 use heightfield::{Georeference, Raster, Sides, around};
 
 /// Which part of a terrain is asked for.
@@ -27,11 +27,11 @@ impl Target {
     pub fn grid<'r>(
         &self,
         raster: &'r Raster,
-        cells: FeltCells,
-    ) -> Result<FeltGrid<'r>, PlaceError> {
+        cells: HapticCells,
+    ) -> Result<HapticGrid<'r>, PlaceError> {
         Ok(match self.middle(&raster.georeference())? {
-            Some(ground) => FeltGrid::at(raster, cells, ground),
-            None => FeltGrid::new(raster, cells),
+            Some(ground) => HapticGrid::at(raster, cells, ground),
+            None => HapticGrid::new(raster, cells),
         })
     }
 

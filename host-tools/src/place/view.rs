@@ -1,6 +1,6 @@
 //! What of a terrain lies where in front of the arm, and how large.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::{Scene, Source};
 
 use super::error::PlaceError;
@@ -8,7 +8,9 @@ use super::fit::{ABOVE_MM, Extent};
 use super::ground;
 use super::reach::Reach;
 use super::target::Target;
-use crate::terrain::{BadScale, Distortion, FeltGrid, MAX_TIP_CELLS, Scale, Terrain, TerrainError};
+use crate::terrain::{
+    Distortion, HapticGrid, MAX_TIP_CELLS, Scale, ScaleError, Terrain, TerrainError,
+};
 
 /// Relief that a terrain gets in the hand where the file does not know how large its cells
 /// are, so that it has no true proportions, mm.
@@ -107,7 +109,7 @@ impl View {
     /// [`PlaceError`]: no such place or box, nothing known there, a scale that is none,
     /// heights that the arm does not reach.
     pub fn new(
-        grid: &FeltGrid<'_>,
+        grid: &HapticGrid<'_>,
         reach: &Reach,
         options: &ViewOptions,
     ) -> Result<Self, PlaceError> {
@@ -158,7 +160,7 @@ impl View {
     /// The felt cell within the arm's reach that is farthest from its true shape; of the
     /// view's own grid. `None` where the file does not know how large its cells are.
     #[must_use]
-    pub fn worst_reached(&self, grid: &FeltGrid<'_>) -> Option<Distortion> {
+    pub fn worst_reached(&self, grid: &HapticGrid<'_>) -> Option<Distortion> {
         let cells =
             |index: usize| (self.home_mm[index % 2] + self.reach_mm[index]) / self.scale.cell_mm();
         grid.worst_in([0, 1, 2, 3].map(cells))
@@ -166,7 +168,7 @@ impl View {
 
     /// The same at another scale: hand millimetres a felt cell of level 0, and a vertical
     /// unit. The place has yet to be [`Self::moved_to`].
-    pub(super) fn scaled(self, cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, BadScale> {
+    pub(super) fn scaled(self, cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, ScaleError> {
         let scale = Scale::new(cell_mm, height_mm_per_unit)?;
         let steeper = scale.height_cells(1.0) / self.scale.height_cells(1.0);
         Ok(Self {
@@ -179,7 +181,7 @@ impl View {
     /// The same over cells that are measured at another place: as large on the ground and in
     /// the hand, so that scale and exaggeration stay. The place has yet to be
     /// [`Self::moved_to`].
-    pub(super) fn measured_as(self, anew: &FeltGrid<'_>) -> Result<Self, BadScale> {
+    pub(super) fn measured_as(self, anew: &HapticGrid<'_>) -> Result<Self, ScaleError> {
         let cell_mm = self.scale.cell_mm() * self.as_large_as_in(anew);
         Ok(Self {
             scale: Scale::new(cell_mm, self.scale.height_mm_per_unit())?,
@@ -190,7 +192,7 @@ impl View {
 
     /// How many times larger a grid's cells are on the ground than the view's; once where
     /// nobody knows.
-    pub(super) fn as_large_as_in(&self, grid: &FeltGrid<'_>) -> f64 {
+    pub(super) fn as_large_as_in(&self, grid: &HapticGrid<'_>) -> f64 {
         let sides = grid.side_m().zip(self.side_m);
         sides.map_or(1.0, |(there, here)| there / here)
     }
@@ -199,9 +201,9 @@ impl View {
     /// a view at another scale and of another grid.
     pub(super) fn moved_to(
         self,
-        grid: &FeltGrid<'_>,
+        grid: &HapticGrid<'_>,
         home_mm: [f64; 3],
-        (before, grid_before): (Scale, &FeltGrid<'_>),
+        (before, grid_before): (Scale, &HapticGrid<'_>),
     ) -> Self {
         let laid = self.laid_mm.map(|mm| mm / before.cell_mm());
         let laid = grid.around_sides_of(grid_before, laid);
@@ -223,7 +225,7 @@ impl View {
     ///
     /// # Errors
     /// [`TerrainError`].
-    pub fn terrain<'r>(&self, grid: FeltGrid<'r>) -> Result<Terrain<'r>, TerrainError> {
+    pub fn terrain<'r>(&self, grid: HapticGrid<'r>) -> Result<Terrain<'r>, TerrainError> {
         Terrain::over(grid, self.scale, self.level)
     }
 
@@ -231,7 +233,7 @@ impl View {
     ///
     /// # Errors
     /// [`PlaceError::FarAway`] where the home position is farther out than can be addressed.
-    pub fn scene(&self, terrain: &Terrain<'_>, law: ForceLaw) -> Result<Scene, PlaceError> {
+    pub fn scene(&self, terrain: &Terrain<'_>, law: SurfaceParams) -> Result<Scene, PlaceError> {
         let home = terrain.scale().to_grid(self.home_mm);
         let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
         let scene = terrain.scene(law, Source::Encoders, home);
@@ -241,12 +243,12 @@ impl View {
 
 /// What is asked for of a grid, its numbers checked.
 struct Wanted<'g> {
-    grid: &'g FeltGrid<'g>,
+    grid: &'g HapticGrid<'g>,
     options: ViewOptions,
 }
 
 impl<'g> Wanted<'g> {
-    fn new(grid: &'g FeltGrid<'g>, options: &ViewOptions) -> Result<Self, PlaceError> {
+    fn new(grid: &'g HapticGrid<'g>, options: &ViewOptions) -> Result<Self, PlaceError> {
         match options.sizing {
             Sizing::GroundMPerMm(scale) if !(scale.is_finite() && scale > 0.0) => {
                 return Err(PlaceError::GroundScale(scale));
@@ -379,7 +381,7 @@ impl<'g> Wanted<'g> {
 
 /// The finest level whose cells are not finer than a count of the encoders, and in which the tip
 /// is not too many cells large; a lower one where that would leave no patch.
-pub(super) fn finest_level(grid: &FeltGrid<'_>, resolution_mm: f64, scale: &Scale) -> u8 {
+pub(super) fn finest_level(grid: &HapticGrid<'_>, resolution_mm: f64, scale: &Scale) -> u8 {
     let fewest = grid.columns().min(grid.rows()) - 1;
     let last = fewest.max(1).ilog2() as u8;
     let least_mm = resolution_mm.max(grid.tip_mm() / MAX_TIP_CELLS);

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::place::{Coordinates, ReachBox};
-use crate::terrain::FeltCells;
+use crate::terrain::HapticCells;
 use hapterra_core::Vec3;
 use hapterra_core::phantom::{Calibration, Pose};
 use heightfield::{CellSize, CellUnit, Certainty, Globe, GroundTransform, Raster};
@@ -99,8 +99,11 @@ fn reach() -> Reach {
 }
 
 /// The view, and the grid that it is of.
-fn seen<'r>(raster: &'r Raster, options: &ViewOptions) -> Result<(FeltGrid<'r>, View), PlaceError> {
-    let grid = options.target.grid(raster, FeltCells::Square)?;
+fn seen<'r>(
+    raster: &'r Raster,
+    options: &ViewOptions,
+) -> Result<(HapticGrid<'r>, View), PlaceError> {
+    let grid = options.target.grid(raster, HapticCells::Square)?;
     let view = View::new(&grid, &reach(), options)?;
     Ok((grid, view))
 }
@@ -121,9 +124,11 @@ fn boxed(sides: [f64; 4], coordinates: Coordinates) -> ViewOptions {
 }
 
 /// The coordinates under the home position of the scene that a device would get.
-fn ground_at_home(grid: &FeltGrid<'_>, view: &View) -> [f64; 2] {
+fn ground_at_home(grid: &HapticGrid<'_>, view: &View) -> [f64; 2] {
     let terrain = view.terrain(*grid).expect("a terrain");
-    let scene = view.scene(&terrain, ForceLaw::PREMIUM).expect("a scene");
+    let scene = view
+        .scene(&terrain, SurfaceParams::PREMIUM)
+        .expect("a scene");
     let [east, north, _] = terrain.scale().to_mm(&scene.home);
     grid.to_ground([east, north].map(|mm| mm / view.scale.cell_mm()))
 }
@@ -175,7 +180,7 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
         let reach = Reach::of(&record);
         for (name, raster, _) in made() {
             for times in [1.0, -2.0, 20.0] {
-                let grid = FeltGrid::new(&raster, FeltCells::Square);
+                let grid = HapticGrid::new(&raster, HapticCells::Square);
                 let options = ViewOptions {
                     heights: Heights::Exaggerated(times),
                     ..ViewOptions::default()
@@ -541,7 +546,7 @@ fn numbers_that_are_said_have_three_digits() {
 fn a_home_that_is_too_far_to_be_addressed_is_named() {
     let raster = hills();
     let grid = Target::Whole
-        .grid(&raster, FeltCells::default())
+        .grid(&raster, HapticCells::default())
         .expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = View::new(&grid, &reach, &ViewOptions::default()).expect("a view");
@@ -550,7 +555,7 @@ fn a_home_that_is_too_far_to_be_addressed_is_named() {
         home_mm: [1e15, 0.0, 0.0],
         ..view
     };
-    let scene = |view: &View| view.scene(&terrain, ForceLaw::PREMIUM);
+    let scene = |view: &View| view.scene(&terrain, SurfaceParams::PREMIUM);
     assert!(scene(&view).is_ok());
     assert_eq!(scene(&far), Err(PlaceError::FarAway(far.home_mm)));
 }

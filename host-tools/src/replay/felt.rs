@@ -2,14 +2,14 @@
 
 use std::time::{Duration, Instant, SystemTime};
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::{Point, Sample, Source, View};
+use hapterra_core::scene::{HipCommand, Source, TickRecord, View};
 use hapterra_core::terrain::TILE_CELLS;
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::published::Published;
-use crate::link::{Event, LinkError, Patience, Session, Tally, Transport};
+use crate::link::{Event, LinkError, LinkStats, Session, Timeouts, Transport};
 use crate::terrain::Terrain;
 
 /// A point may take so many times what an answer may take before the device counts as
@@ -17,7 +17,7 @@ use crate::terrain::Terrain;
 const ANSWERS_A_POINT: u32 = 8;
 
 /// Feels points on a device, in a scene of its own.
-pub struct Replayer<'t> {
+pub struct OfflineDevice<'t> {
     terrain: Terrain<'t>,
     /// Tells the epochs of this replay from those of another.
     nonce: u32,
@@ -30,16 +30,16 @@ pub struct Replayer<'t> {
     last: Option<GridPoint>,
 }
 
-impl<'t> Replayer<'t> {
+impl<'t> OfflineDevice<'t> {
     /// Puts a fresh scene in force on a device.
     ///
     /// # Errors
     /// [`LinkError`].
     pub fn open(
         terrain: &'t Terrain<'t>,
-        law: ForceLaw,
+        law: SurfaceParams,
         transport: Box<dyn Transport + 't>,
-        patience: Patience,
+        patience: Timeouts,
     ) -> Result<Self, LinkError> {
         let mut scene = terrain.scene(law, Source::Points, GridPoint::default());
         // A device that holds the scene of an earlier replay would go on from
@@ -61,7 +61,7 @@ impl<'t> Replayer<'t> {
 
     /// Renders the points by the paper's rule on the host from now on, and not on the device.
     #[must_use]
-    pub fn by_published_rule(mut self, law: ForceLaw) -> Self {
+    pub fn by_published_rule(mut self, law: SurfaceParams) -> Self {
         self.published = Some(Published::new(self.terrain.clone(), law));
         self
     }
@@ -80,7 +80,7 @@ impl<'t> Replayer<'t> {
     pub fn put_view(
         &mut self,
         terrain: Terrain<'t>,
-        law: ForceLaw,
+        law: SurfaceParams,
         hip: GridPoint,
     ) -> Result<(), LinkError> {
         self.view = self.view.wrapping_add(1);
@@ -134,7 +134,7 @@ impl<'t> Replayer<'t> {
 
     /// What went over the link so far.
     #[must_use]
-    pub const fn tally(&self) -> &Tally {
+    pub const fn tally(&self) -> &LinkStats {
         self.session.tally()
     }
 
@@ -142,19 +142,19 @@ impl<'t> Replayer<'t> {
     ///
     /// # Errors
     /// [`LinkError`]; the replay cannot go on after one.
-    pub fn feel(&mut self, hip: GridPoint) -> Result<Sample, LinkError> {
+    pub fn feel(&mut self, hip: GridPoint) -> Result<TickRecord, LinkError> {
         self.last = Some(hip);
         let seq = self.seq;
         self.seq = seq.wrapping_add(1);
         if let Some(published) = &mut self.published {
             let sample = published.step(hip);
-            return Ok(Sample {
+            return Ok(TickRecord {
                 tick: seq,
                 view: self.view,
                 ..sample
             });
         }
-        self.session.feel(Point { seq, hip })?;
+        self.session.feel(HipCommand { seq, hip })?;
         let deadline = Instant::now() + ANSWERS_A_POINT * self.session.patience().give_up;
         while Instant::now() < deadline {
             if let Some(sample) = self.answer(seq)? {
@@ -165,7 +165,7 @@ impl<'t> Replayer<'t> {
     }
 
     /// The answer to a point, if it comes soon.
-    fn answer(&mut self, expected: u32) -> Result<Option<Sample>, LinkError> {
+    fn answer(&mut self, expected: u32) -> Result<Option<TickRecord>, LinkError> {
         let (mut answer, mut restarted) = (None, false);
         let wait = Duration::from_millis(100);
         self.session.poll(wait, &mut |event| match event {
@@ -208,7 +208,7 @@ mod tests {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-        let (law, hip) = (ForceLaw::PREMIUM, GridPoint::default());
+        let (law, hip) = (SurfaceParams::PREMIUM, GridPoint::default());
         let mut replayer = on_native(&terrain, law).expect("opened");
         let (mut epochs, mut last) = (std::collections::HashSet::new(), 0);
         for view in 0..300_u32 {

@@ -2,7 +2,7 @@
 //! loop and its guard did in the tick.
 
 use hapterra_core::guard::Mode;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use super::recording::{Column, Value};
 use super::state_name;
@@ -29,7 +29,7 @@ impl LoopColumns {
 
     /// The loop's part of a sample that was felt in a view of the recording.
     #[must_use]
-    pub fn of(sample: &Sample, view: usize) -> Self {
+    pub fn of(sample: &TickRecord, view: usize) -> Self {
         let limits: Vec<_> = sample.limits.iter_names().map(|(name, _)| name).collect();
         Self {
             view: u32::try_from(view).unwrap_or(u32::MAX),

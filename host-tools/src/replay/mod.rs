@@ -16,24 +16,24 @@ pub mod settings;
 mod ticks;
 mod trajectory;
 
-pub use felt::Replayer;
+pub use felt::OfflineDevice;
 pub use loop_columns::{LoopColumns, mode_name};
 pub use marks::Mark;
 pub use recording::{Column, Record, Recording, Value};
 pub use settings::{Rule, Settings};
 pub use ticks::{Pace, Tick, Ticks};
 pub use trajectory::{
-    ColumnValues, FeltRow, FeltRows, RecordedColumns, Row, Trajectory, TrajectoryError,
+    ColumnValues, RecordedColumns, RecordingRow, RecordingRows, Row, Trajectory, TrajectoryError,
 };
 
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
-use crate::link::{LinkError, Native, Patience};
+use crate::link::{LinkError, Native, Timeouts};
 use crate::output::{Output, OutputError};
-use crate::terrain::{FeltGrid, Terrain, TerrainError};
+use crate::terrain::{HapticGrid, Terrain, TerrainError};
 use settings::ViewSettings;
 
 /// Why a replay did not come to its end. Nothing is left at the output's path.
@@ -81,7 +81,7 @@ pub struct Summary {
 const MORE: [Column; 2] = [Column::Text("state"), Column::Count("view")];
 
 /// Is told each sample and its row, and the number of its view with its terrain.
-pub type OnFelt<'f, 't> = dyn FnMut(&Sample, &Record, (u32, &Terrain<'t>)) + 'f;
+pub type OnFelt<'f, 't> = dyn FnMut(&TickRecord, &Record, (u32, &Terrain<'t>)) + 'f;
 
 /// Runs a trajectory through a device and writes what was felt to an output, which
 /// appears only when it is complete.
@@ -92,7 +92,7 @@ pub type OnFelt<'f, 't> = dyn FnMut(&Sample, &Record, (u32, &Terrain<'t>)) + 'f;
 /// # Errors
 /// [`ReplayError`] says what was wrong, with file, line and column.
 pub fn replay_trajectory<'t>(
-    replayer: &mut Replayer<'t>,
+    replayer: &mut OfflineDevice<'t>,
     ticks: &mut Ticks,
     settings: &Settings,
     output: Output,
@@ -155,7 +155,7 @@ pub fn terrain_of<'t>(
     view: &ViewSettings,
 ) -> Result<Terrain<'t>, ReplayError> {
     let grid = match view.measured_at {
-        Some(ground) => FeltGrid::at(first.raster(), first.grid().cells(), ground)
+        Some(ground) => HapticGrid::at(first.raster(), first.grid().cells(), ground)
             .with_materials(first.grid().materials())
             .with_tip(first.grid().tip_mm()),
         None => *first.grid(),
@@ -168,7 +168,7 @@ pub fn terrain_of<'t>(
 
 /// Goes over to the view of a row, as it was done where it was recorded.
 fn go_over<'t>(
-    replayer: &mut Replayer<'t>,
+    replayer: &mut OfflineDevice<'t>,
     trajectory: &mut Trajectory,
     (first, settings): (&Terrain<'t>, &Settings),
     tick: &Tick,
@@ -187,7 +187,7 @@ fn go_over<'t>(
 /// Whether nothing is felt because the HIP is below ground and came there from below, from
 /// a hole or from outside.
 #[must_use]
-pub fn is_below_ground(sample: &Sample, record: &Record, terrain: &Terrain<'_>) -> bool {
+pub fn is_below_ground(sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) -> bool {
     let [x, y, z] = record.hip_mm;
     let waits = sample.state == ContactState::Waiting && sample.missing_tile.is_none();
     waits && terrain.height_mm(x, y).is_some_and(|ground| z < ground)
@@ -196,22 +196,25 @@ pub fn is_below_ground(sample: &Sample, record: &Record, terrain: &Terrain<'_>) 
 /// A replayer on the application in this program's memory, a thousand ticks a second.
 ///
 /// # Errors
-/// As [`Replayer::open`].
-pub fn on_native<'t>(terrain: &'t Terrain<'t>, law: ForceLaw) -> Result<Replayer<'t>, LinkError> {
+/// As [`OfflineDevice::open`].
+pub fn on_native<'t>(
+    terrain: &'t Terrain<'t>,
+    law: SurfaceParams,
+) -> Result<OfflineDevice<'t>, LinkError> {
     on_native_at(TickRate::DEFAULT, terrain, law)
 }
 
 /// The same at another tick rate.
 ///
 /// # Errors
-/// As [`Replayer::open`].
+/// As [`OfflineDevice::open`].
 pub fn on_native_at<'t>(
     rate: TickRate,
     terrain: &'t Terrain<'t>,
-    law: ForceLaw,
-) -> Result<Replayer<'t>, LinkError> {
+    law: SurfaceParams,
+) -> Result<OfflineDevice<'t>, LinkError> {
     let device = Native::for_replay_at(rate);
-    Replayer::open(terrain, law, device, Patience::EMULATED)
+    OfflineDevice::open(terrain, law, device, Timeouts::EMULATED)
 }
 
 /// A state's name in a recording.

@@ -2,9 +2,9 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use crate::published::{Heights, Paper, Start};
 use crate::terrain::Terrain;
@@ -15,7 +15,7 @@ const STEPS: u32 = 20;
 /// The paper's rule in `f64`, with the spring of a law.
 pub(super) struct Published<'t> {
     rule: Paper<InCells<'t>, f64>,
-    law: ForceLaw,
+    law: SurfaceParams,
     cell_mm: f32,
 }
 
@@ -49,7 +49,7 @@ impl Heights for InCells<'_> {
 }
 
 impl<'t> Published<'t> {
-    pub(super) fn new(terrain: Terrain<'t>, law: ForceLaw) -> Self {
+    pub(super) fn new(terrain: Terrain<'t>, law: SurfaceParams) -> Self {
         let cell_mm = terrain.scale().cell_mm() as f32;
         Self {
             rule: Paper::new(InCells(terrain), Start::LastPoint, STEPS),
@@ -59,7 +59,7 @@ impl<'t> Published<'t> {
     }
 
     /// One tick.
-    pub(super) fn step(&mut self, hip: GridPoint) -> Sample {
+    pub(super) fn step(&mut self, hip: GridPoint) -> TickRecord {
         let (cell, frac) = (hip.cell(), hip.frac());
         let wide = [0, 1, 2].map(|axis| f64::from(cell[axis]) + f64::from(frac[axis]));
         let displacement = self.rule.step(wide);
@@ -70,12 +70,12 @@ impl<'t> Published<'t> {
         let displacement = displacement.map_or(Vec3::ZERO, |it| {
             Vec3::from_array(it.map(|cells| cells as f32))
         });
-        Sample {
+        TickRecord {
             hip,
             proxy: GridPoint::new(cell, frac + displacement),
             force_n: self.law.spring().force_n(displacement * self.cell_mm),
             state,
-            ..Sample::default()
+            ..TickRecord::default()
         }
     }
 }

@@ -5,14 +5,14 @@
 //! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
 
 use hapterra_core::contact::Friction;
-use hapterra_core::force::{Damping, ForceLaw, Shading, Texture};
+use hapterra_core::force::{Damping, Shading, SurfaceParams, Texture};
 use hapterra_core::wire::hello::{DeviceHello, PROTOCOL};
 use serde::{Deserialize, Serialize};
 
 use super::marks::Mark;
 use crate::materials::{Looks, Materials};
 use crate::place::Laid;
-use crate::terrain::{BadScale, FeltCells, FeltGrid, Scale, Terrain};
+use crate::terrain::{HapticCells, HapticGrid, Scale, ScaleError, Terrain};
 use heightfield::ReferenceSystem;
 use heightfield::shown::shown;
 
@@ -136,8 +136,8 @@ impl ViewSettings {
 
     /// The force law.
     #[must_use]
-    pub const fn law(&self) -> ForceLaw {
-        ForceLaw {
+    pub const fn law(&self) -> SurfaceParams {
+        SurfaceParams {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             max_force_n: self.max_force_n,
             friction: self.friction,
@@ -151,7 +151,7 @@ impl ViewSettings {
     ///
     /// # Errors
     /// Numbers that no terrain can be scaled with.
-    pub fn scale(&self) -> Result<Scale, BadScale> {
+    pub fn scale(&self) -> Result<Scale, ScaleError> {
         Scale::new(self.cell_mm, self.height_mm_per_unit)
     }
 }
@@ -174,7 +174,7 @@ pub struct TerrainFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Felt {
     /// Which cells of the file.
-    pub cells: FeltCells,
+    pub cells: HapticCells,
     /// Felt samples of level 0, west to east and south to north.
     pub samples: [u32; 2],
     /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
@@ -279,7 +279,7 @@ pub struct Device {
 
 /// Settings that cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum BadSettings {
+pub enum SettingsError {
     /// Written by a later version of the program.
     #[error("its settings are of format {found}, and this program reads format {FORMAT}")]
     Later {
@@ -310,7 +310,7 @@ impl Settings {
     pub fn new(
         file: &str,
         terrain: &Terrain<'_>,
-        (law, rule): (ForceLaw, Rule),
+        (law, rule): (SurfaceParams, Rule),
         home_mm: Option<[f64; 3]>,
         device: Device,
     ) -> Self {
@@ -377,8 +377,8 @@ impl Settings {
     /// Reads settings; none where the text is anything else.
     ///
     /// # Errors
-    /// [`BadSettings`] where the text begins as settings do and cannot be used.
-    pub fn from_toml(text: &str) -> Result<Option<Self>, BadSettings> {
+    /// [`SettingsError`] where the text begins as settings do and cannot be used.
+    pub fn from_toml(text: &str) -> Result<Option<Self>, SettingsError> {
         /// The format alone: all else may be another way in another one.
         #[derive(Deserialize)]
         struct Format {
@@ -388,18 +388,18 @@ impl Settings {
         if !text.trim_start().starts_with(KEY) {
             return Ok(None);
         }
-        let unreadable = |error: toml::de::Error| BadSettings::Unreadable(error.to_string());
+        let unreadable = |error: toml::de::Error| SettingsError::Unreadable(error.to_string());
         let Format { format } = toml::from_str(text).map_err(unreadable)?;
         if format != FORMAT {
-            return Err(BadSettings::Later { found: format });
+            return Err(SettingsError::Later { found: format });
         }
         toml::from_str(text).map(Some).map_err(unreadable)
     }
 
     /// The force law.
     #[must_use]
-    pub const fn law(&self) -> ForceLaw {
-        ForceLaw {
+    pub const fn law(&self) -> SurfaceParams {
+        SurfaceParams {
             stiffness_n_per_mm: self.force.stiffness_n_per_mm,
             max_force_n: self.force.max_force_n,
             friction: self.force.friction,
@@ -446,7 +446,7 @@ impl Settings {
 
 impl Settings {
     /// Whether a terrain has other classes than those of the recording.
-    fn has_other_classes(&self, grid: &FeltGrid<'_>) -> bool {
+    fn has_other_classes(&self, grid: &HapticGrid<'_>) -> bool {
         let now = grid.materials().map(MaterialSettings::of);
         let print = |settings: &MaterialSettings| settings.fingerprint.clone();
         self.materials.is_some() && self.materials.as_ref().map(print) != now.as_ref().map(print)
@@ -467,7 +467,7 @@ impl Device {
 
 impl Felt {
     /// In what the cells of the same heights differ, where the same kind is felt.
-    fn difference(&self, grid: &FeltGrid<'_>) -> Option<String> {
+    fn difference(&self, grid: &HapticGrid<'_>) -> Option<String> {
         if grid.cells() != self.cells {
             return None;
         }
@@ -518,7 +518,7 @@ mod tests {
     }
 
     fn settings(terrain: &Terrain<'_>) -> Settings {
-        let law = (ForceLaw::PREMIUM, Rule::Paper);
+        let law = (SurfaceParams::PREMIUM, Rule::Paper);
         let device = Device {
             board: "native".into(),
             firmware: "0.1.0".into(),
@@ -546,7 +546,7 @@ mod tests {
 
     #[test]
     fn a_law_comes_back_with_all_that_a_surface_has() {
-        let law = ForceLaw {
+        let law = SurfaceParams {
             stiffness_n_per_mm: 0.75,
             max_force_n: 6.0,
             friction: Friction::coulomb(0.3),
@@ -591,10 +591,13 @@ mod tests {
     fn anything_else_is_no_settings_and_what_is_broken_or_later_is_told() {
         assert_eq!(Settings::from_toml(" a remark\n").expect("none"), None);
         let later = Settings::from_toml("hapterra-recording = 2\nall = \"else\"");
-        assert!(matches!(later, Err(BadSettings::Later { found: 2 })));
+        assert!(matches!(later, Err(SettingsError::Later { found: 2 })));
         for broken in ["hapterra-recording = 1", "hapterra-recording 1"] {
             let read = Settings::from_toml(broken);
-            assert!(matches!(read, Err(BadSettings::Unreadable(_))), "{broken}");
+            assert!(
+                matches!(read, Err(SettingsError::Unreadable(_))),
+                "{broken}"
+            );
         }
     }
 

@@ -2,7 +2,7 @@
 
 use hapterra_core::scene::View;
 
-use crate::link::{Ask, Event, Tally};
+use crate::link::{Ask, Event, LinkStats};
 use crate::terrain::Terrain;
 
 /// Is told what happens while a terrain is served, and says what is asked of the device
@@ -24,7 +24,7 @@ pub trait Onlooker<'t> {
     }
 
     /// May show how it goes; called after each look at the line.
-    fn show(&mut self, tally: &Tally);
+    fn show(&mut self, tally: &LinkStats);
 
     /// Whether it has seen enough.
     fn is_over(&self) -> bool;

@@ -7,7 +7,7 @@ use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::session::SessionEnd;
 
 use super::onlooker::Onlooker;
-use crate::link::{Arming, Event, LinkError, Patience, Session, Tally, Transport};
+use crate::link::{Arming, Event, LinkError, LinkStats, Session, Timeouts, Transport};
 use crate::terrain::Terrain;
 
 /// Between two looks at the clock while nothing comes.
@@ -28,7 +28,7 @@ pub struct Service<'s, 't> {
     /// How the arm is armed.
     pub arming: Arming,
     /// How long is waited for what.
-    pub patience: Patience,
+    pub patience: Timeouts,
     /// Makes a line to the device. There is one line at a time: the one before is closed
     /// when this is called.
     pub connect: Connect<'s, 't>,
@@ -66,7 +66,7 @@ pub struct End {
     /// where [`End::why`] is [`LinkError::Taken`] this is no error.
     pub disarmed: Result<(), LinkError>,
     /// Counts of what went over the link.
-    pub tally: Tally,
+    pub tally: LinkStats,
 }
 
 impl<'s, 't> Service<'s, 't> {

@@ -6,13 +6,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SessionEnd};
 
 use super::{End, Onlooker, Served, Service};
-use crate::link::{Arming, Ask, Dialogue, Event, LinkError, Native, Patience, Tally, Transport};
+use crate::link::{
+    Arming, Ask, Dialogue, Event, LinkError, LinkStats, Native, Timeouts, Transport,
+};
 use crate::terrain::{Scale, Terrain};
 use heightfield::Raster;
 
@@ -21,7 +23,7 @@ const fn ms(ms: u64) -> Duration {
 }
 
 /// The device answers at once.
-const PATIENCE: Patience = Patience {
+const PATIENCE: Timeouts = Timeouts {
     again: ms(10),
     alive: ms(20),
     greet_again: ms(40),
@@ -171,7 +173,7 @@ impl Onlooker<'_> for Looks<'_> {
         vec![]
     }
 
-    fn show(&mut self, _: &Tally) {
+    fn show(&mut self, _: &LinkStats) {
         self.left -= 1;
         if self.left == 0 {
             (self.last)();
@@ -196,7 +198,7 @@ fn played<T>(
     let home = GridPoint::default();
     play(Service {
         terrain: &terrain,
-        scene: terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home),
+        scene: terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home),
         arming: Arming::default(),
         patience: PATIENCE,
         connect: Box::new(|| connect().map(|line| line as Box<dyn Transport>)),

@@ -193,7 +193,7 @@ fn factor(word: &str) -> Result<f64, &'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::marks::LONGEST_MARK;
+    use super::super::marks::MAX_MARK;
     use super::*;
 
     const fn of_surface(change: SurfaceChange) -> Steer {
@@ -306,7 +306,7 @@ mod tests {
             let wanted = Wanted::Mark(text.to_owned());
             assert_eq!(parse(line), Ok(Some(Command { at_s, wanted })), "{line}");
         }
-        let longest = "µ".repeat(LONGEST_MARK);
+        let longest = "µ".repeat(MAX_MARK);
         assert!(parse(&format!("mark {longest}")).is_ok());
         for (line, why) in [
             ("mark", "a text is missing"),

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
-use hapterra_core::scene::{Sample, Source, View};
+use hapterra_core::scene::{Source, TickRecord, View};
 use hapterra_core::wire::request::Request;
 
 use super::Steer;
@@ -200,7 +200,7 @@ impl<'r> Steering<'r> {
         self.stage = Stage::Closing;
     }
 
-    fn on_sample(&mut self, sample: &Sample) {
+    fn on_sample(&mut self, sample: &TickRecord) {
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
         let by_input = sample.limits.contains(Limits::CLUTCH_INPUT);
         let is_taken = by_input && is_open;
@@ -238,7 +238,7 @@ impl<'r> Steering<'r> {
     }
 
     /// With an open clutch: the next view, or the end.
-    fn go_on(&mut self, sample: &Sample) {
+    fn go_on(&mut self, sample: &TickRecord) {
         // A proxy that has yet to land says nothing of the ground.
         if sample.missing_tile.is_some() {
             return;
@@ -270,7 +270,7 @@ impl<'r> Steering<'r> {
     }
 
     /// Where a sample has the hand, in the view in force.
-    fn hand(&self, sample: &Sample) -> Hand {
+    fn hand(&self, sample: &TickRecord) -> Hand {
         let scale = self.terrain.scale();
         let touches = sample.state == ContactState::Touching;
         Hand {
@@ -284,7 +284,7 @@ impl<'r> Steering<'r> {
     fn next_view(
         &self,
         changes: &[ViewChange],
-        sample: &Sample,
+        sample: &TickRecord,
         waits: bool,
     ) -> Result<Option<Put<'r>>, String> {
         let hand = self.hand(sample);

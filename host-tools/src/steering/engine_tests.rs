@@ -3,7 +3,7 @@
 use super::*;
 use crate::link::hello;
 use crate::place::{Reach, Sizing, View as PlacedView, ViewOptions};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::terrain::TileIndex;
 use heightfield::Raster;
@@ -28,7 +28,7 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = PlacedView::new(&grid, &reach, &options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
-    let law = ForceLaw::PREMIUM;
+    let law = SurfaceParams::PREMIUM;
     let bounds = Bounds {
         first: Laid { view, law },
         resolution_mm: reach.resolution_mm(),
@@ -38,10 +38,10 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
 }
 
 fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
-    let sample = Sample {
+    let sample = TickRecord {
         limits,
         view: steering.number,
-        ..Sample::default()
+        ..TickRecord::default()
     };
     (0..count).for_each(|_| steering.on_event(&Event::Sample(&sample)));
 }
@@ -145,10 +145,10 @@ fn a_clutch_that_does_not_open_or_a_device_that_does_not_answer_is_given_up() {
 fn a_view_waits_for_the_tile_under_the_proxy() {
     with(|steering| {
         open(steering);
-        let waits = Sample {
+        let waits = TickRecord {
             limits: Limits::CLUTCH_OPEN,
             missing_tile: Some(TileIndex::new(0, 0)),
-            ..Sample::default()
+            ..TickRecord::default()
         };
         for _ in 0..3 {
             steering.on_event(&Event::Sample(&waits));
@@ -203,16 +203,16 @@ fn degrees() -> Raster {
 
 /// The hand goes so many millimetres north of the middle by itself, or by the clutch: no view
 /// was asked for.
-fn sample_at(steering: &Steering<'_>, north_mm: f64, limits: Limits) -> Sample {
+fn sample_at(steering: &Steering<'_>, north_mm: f64, limits: Limits) -> TickRecord {
     let cell_mm = steering.terrain.scale().cell_mm();
     let middle = steering.terrain.grid().of_ground([11.0, 55.0]);
     let [east, north] = middle.map(|cells| cells * cell_mm);
     let hip = [east, north + north_mm, 50.0];
-    Sample {
+    TickRecord {
         limits,
         view: steering.number,
         hip: steering.terrain.scale().to_grid(hip).expect("on the grid"),
-        ..Sample::default()
+        ..TickRecord::default()
     }
 }
 
@@ -252,7 +252,7 @@ fn a_clutch_that_is_taken_far_from_where_cells_were_measured_has_them_measured_a
             viewed(steering, &put.view, true);
             assert!((metres(steering).expect("known") / before - 1.0).abs() < 1e-12);
             // Once, and then it is let go when the user lets it go.
-            let open = Sample {
+            let open = TickRecord {
                 view: 1,
                 hip: put.view.hip,
                 ..open

@@ -9,7 +9,7 @@ use hapterra_core::wire::request::Request;
 use crate::link::{Ask, Event};
 
 /// Characters of a mark's text, at most.
-pub(super) const LONGEST_MARK: usize = 200;
+pub(super) const MAX_MARK: usize = 200;
 /// Marks that wait for the device, at most: each takes it 20 ms.
 const WAITING: usize = 64;
 
@@ -33,7 +33,7 @@ pub(super) fn text_of(text: &str) -> Result<String, &'static str> {
     if text.is_empty() {
         return Err("a text is missing");
     }
-    if text.chars().count() > LONGEST_MARK {
+    if text.chars().count() > MAX_MARK {
         return Err("the text of a mark has at most 200 characters");
     }
     if text.contains(char::is_control) {

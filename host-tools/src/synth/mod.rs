@@ -12,7 +12,7 @@ pub use room::NoRoom;
 pub use rows::{Grid, Interrupted};
 pub use write::{WriteError, WriteFault, write};
 
-use heightfield::{BadRaster, Raster};
+use heightfield::{Raster, RasterError};
 
 /// What a terrain looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -76,7 +76,7 @@ impl Synth {
     ///
     /// # Errors
     /// When there are fewer than 2 × 2 samples or the amplitude is not finite.
-    pub fn raster(&self, columns: u32, rows: u32) -> Result<Raster, BadRaster> {
+    pub fn raster(&self, columns: u32, rows: u32) -> Result<Raster, RasterError> {
         Raster::from_fn(columns, rows, |column, row| self.height(column, row))
     }
 }

@@ -1,6 +1,6 @@
 //! The views in which samples were felt: each sample names its own by a number.
 
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use crate::link::Event;
 use crate::place::Laid;
@@ -62,7 +62,7 @@ impl<'t> FeltViews<'t> {
 
     /// Which of them a sample was felt in, from 0 on.
     #[must_use]
-    pub fn index_of(&self, sample: &Sample) -> usize {
+    pub fn index_of(&self, sample: &TickRecord) -> usize {
         let index = self.of_number.get(usize::from(sample.view));
         index.copied().unwrap_or(0).min(self.views.len() - 1)
     }
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
     use crate::link::hello;
     use crate::place::{Reach, ViewOptions};
-    use hapterra_core::force::ForceLaw;
+    use hapterra_core::force::SurfaceParams;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::phantom::Calibration;
     use hapterra_core::scene::{Source, View};
@@ -93,15 +93,15 @@ mod tests {
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
         let view = crate::place::View::new(&grid, &reach, &options).expect("a view");
         let terrain = view.terrain(grid).expect("a terrain");
-        let law = ForceLaw::PREMIUM;
+        let law = SurfaceParams::PREMIUM;
         let views = FeltViews::new(terrain.clone());
         look(views, terrain, Laid { view, law });
     }
 
-    fn of(view: u8) -> Sample {
-        Sample {
+    fn of(view: u8) -> TickRecord {
+        TickRecord {
             view,
-            ..Sample::default()
+            ..TickRecord::default()
         }
     }
 

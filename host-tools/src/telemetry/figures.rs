@@ -2,7 +2,7 @@
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Fault;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use crate::replay::Record;
 use crate::terrain::Terrain;
@@ -63,7 +63,7 @@ pub struct Figures {
 
 impl Figures {
     /// Takes a sample and the record made of it.
-    pub fn take(&mut self, sample: &Sample, record: &Record, terrain: &Terrain<'_>) {
+    pub fn take(&mut self, sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) {
         self.samples += 1;
         self.late = self.late.max(sample.late);
         self.fault = sample.fault;

@@ -1,6 +1,6 @@
 //! A session's samples as they come: each becomes a row of a recording.
 
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::felt_views::{FeltView, FeltViews};
@@ -33,7 +33,7 @@ impl<'t> SampleLog<'t> {
     }
 
     /// Takes a sample; the row that it makes, mm and s since the beginning.
-    pub fn take(&mut self, sample: &Sample) -> Record {
+    pub fn take(&mut self, sample: &TickRecord) -> Record {
         self.view = self.views.index_of(sample);
         let terrain = &self.views.get(self.view).terrain;
         let mut record = Record::of_tick(sample, self.tick_hz, terrain.scale());

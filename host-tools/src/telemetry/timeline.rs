@@ -1,6 +1,6 @@
 //! Time since the beginning of a session, over all restarts of its device.
 
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 /// Seconds from the samples' ticks, which begin anew when a device does.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +28,7 @@ impl Timeline {
     }
 
     /// The time of a sample, s.
-    pub fn at(&mut self, sample: &Sample) -> f64 {
+    pub fn at(&mut self, sample: &TickRecord) -> f64 {
         if sample.tick < self.latest {
             self.before += u64::from(self.latest);
         }
@@ -50,9 +50,9 @@ mod tests {
     #[test]
     fn goes_on_through_a_restart() {
         let mut time = Timeline::new(1000);
-        let tick = |tick| Sample {
+        let tick = |tick| TickRecord {
             tick,
-            ..Sample::default()
+            ..TickRecord::default()
         };
         let at: Vec<f64> = [1, 500, 1, 2].map(|t| time.at(&tick(t))).to_vec();
         assert_eq!(at, [0.001, 0.5, 0.501, 0.502]);

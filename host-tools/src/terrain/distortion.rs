@@ -3,7 +3,7 @@
 //! Felt cells are all alike, as large as the file's are at one place. The file's own cells are
 //! not: those of degrees get narrower towards the poles, and a map's scale changes.
 
-use super::felt_grid::FeltGrid;
+use super::felt_grid::HapticGrid;
 use heightfield::{CellSize, Sides};
 
 /// Places looked at along each side of a rectangle, its ends among them: the size of cells
@@ -31,7 +31,7 @@ impl Distortion {
     }
 }
 
-impl FeltGrid<'_> {
+impl HapticGrid<'_> {
     /// The felt cell of a rectangle (west, south, east, north, in felt cells) that is
     /// farthest from its true shape, among 17 × 17 places of the part that is inside the
     /// field. `None` where the file does not know how large its cells are, and of a rectangle
@@ -89,15 +89,15 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terrain::FeltCells;
+    use crate::terrain::HapticCells;
     use crate::terrain::felt_grid::tests::cell;
     use heightfield::Raster;
 
-    fn grid_off(lean: f64, (east, north): (f64, f64), cells: FeltCells) -> f64 {
+    fn grid_off(lean: f64, (east, north): (f64, f64), cells: HapticCells) -> f64 {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0)
             .expect("a raster")
             .with_cell(cell(east, north, lean));
-        let grid = FeltGrid::new(&raster, cells);
+        let grid = HapticGrid::new(&raster, cells);
         grid.worst_in([-5.0, 2.0, 3.0, 90.0]).expect("known").share
     }
 
@@ -110,16 +110,16 @@ mod tests {
             (0.5, (10.0, 10.0), (1.5 / 0.75_f64.sqrt()).sqrt() - 1.0),
             (0.0, (10.0, 10.0), 0.0),
         ] {
-            let off = grid_off(lean, sides, FeltCells::Stored);
+            let off = grid_off(lean, sides, HapticCells::Stored);
             assert!((off - wanted).abs() < 1e-9, "{off} for {wanted}");
-            assert!(grid_off(lean, sides, FeltCells::Square) < 1e-9);
+            assert!(grid_off(lean, sides, HapticCells::Square) < 1e-9);
         }
     }
 
     #[test]
     fn beside_the_field_there_is_nothing_to_be_off() {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("a raster");
-        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        let grid = HapticGrid::new(&raster, HapticCells::Square);
         assert_eq!(grid.worst_in([9.0, 0.0, 12.0, 5.0]), None);
         assert_eq!(grid.worst_in([0.0, -7.0, 3.0, -1.0]), None);
     }

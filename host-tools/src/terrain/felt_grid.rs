@@ -6,7 +6,7 @@
 
 use std::hash::{Hash, Hasher};
 
-use super::{BadScale, Scale};
+use super::{Scale, ScaleError};
 use crate::materials::Materials;
 use heightfield::{CellSize, Raster, Sides, around, bilinear};
 
@@ -32,7 +32,7 @@ const MEASURED: f64 = 2.5e-4;
     serde::Deserialize,
 )]
 #[serde(rename_all = "lowercase")]
-pub enum FeltCells {
+pub enum HapticCells {
     /// As the file stores them, felt as squares whatever their shape
     Stored,
     /// Square on the ground: true to scale in every direction
@@ -43,9 +43,9 @@ pub enum FeltCells {
 /// Samples of square cells over a raster. Column 0 is the westernmost, row 0 the
 /// southernmost.
 #[derive(Clone, Copy, Debug)]
-pub struct FeltGrid<'r> {
+pub struct HapticGrid<'r> {
     raster: &'r Raster,
-    cells: FeltCells,
+    cells: HapticCells,
     /// A cell of the file where `measured_at` is.
     cell: Option<CellSize>,
     /// Where the cell was measured, in the file's coordinates; `None` for the middle.
@@ -72,10 +72,10 @@ struct Resampling {
     row_step: f64,
 }
 
-impl<'r> FeltGrid<'r> {
+impl<'r> HapticGrid<'r> {
     /// The grid in which a raster is felt, of cells as they are in the middle of the field.
     #[must_use]
-    pub fn new(raster: &'r Raster, cells: FeltCells) -> Self {
+    pub fn new(raster: &'r Raster, cells: HapticCells) -> Self {
         Self::of_cell(raster, cells, raster.cell())
     }
 
@@ -83,7 +83,7 @@ impl<'r> FeltGrid<'r> {
     /// coordinates: cells of degrees get narrower towards the poles, and a map's scale is
     /// true in few places.
     #[must_use]
-    pub fn at(raster: &'r Raster, cells: FeltCells, ground: [f64; 2]) -> Self {
+    pub fn at(raster: &'r Raster, cells: HapticCells, ground: [f64; 2]) -> Self {
         Self {
             measured_at: Some(ground),
             ..Self::of_cell(raster, cells, raster.georeference().cell_at(ground))
@@ -131,7 +131,7 @@ impl<'r> FeltGrid<'r> {
         }
         let anew = Self::at(self.raster, self.cells, ground);
         let anew = anew.with_materials(self.materials).with_tip(self.tip_mm);
-        (self.cells == FeltCells::Stored || !anew.is_distorted()).then_some(anew)
+        (self.cells == HapticCells::Stored || !anew.is_distorted()).then_some(anew)
     }
 
     /// Whether its samples are those of another grid over the same raster.
@@ -165,7 +165,7 @@ impl<'r> FeltGrid<'r> {
         [self.columns, self.rows].map(|count| f64::from(count) - 1.0)
     }
 
-    fn of_cell(raster: &'r Raster, cells: FeltCells, cell: Option<CellSize>) -> Self {
+    fn of_cell(raster: &'r Raster, cells: HapticCells, cell: Option<CellSize>) -> Self {
         let stored = Self {
             raster,
             cells,
@@ -179,14 +179,14 @@ impl<'r> FeltGrid<'r> {
             tip_mm: 0.0,
         };
         match (cells, cell) {
-            (FeltCells::Square, Some(cell)) if is_square(&cell) => {
+            (HapticCells::Square, Some(cell)) if is_square(&cell) => {
                 let (east, north) = cell.ground_metres();
                 Self {
                     side_m: Some((east * north).sqrt()),
                     ..stored
                 }
             }
-            (FeltCells::Square, Some(cell)) => stored.squared(&cell).unwrap_or(stored),
+            (HapticCells::Square, Some(cell)) => stored.squared(&cell).unwrap_or(stored),
             _ => stored,
         }
     }
@@ -233,7 +233,7 @@ impl<'r> FeltGrid<'r> {
 
     /// Which cells of the file were asked for.
     #[must_use]
-    pub const fn cells(&self) -> FeltCells {
+    pub const fn cells(&self) -> HapticCells {
         self.cells
     }
 
@@ -290,7 +290,7 @@ impl<'r> FeltGrid<'r> {
     ///
     /// # Errors
     /// As [`Scale::new`].
-    pub fn true_scale(&self, cell_mm: f64) -> Result<Scale, BadScale> {
+    pub fn true_scale(&self, cell_mm: f64) -> Result<Scale, ScaleError> {
         let cells = self.cells_per_vertical_unit();
         Scale::new(cell_mm, cells.map_or(1.0, |cells| cells * cell_mm))
     }
@@ -402,7 +402,7 @@ impl<'r> FeltGrid<'r> {
     }
 
     /// Copies heights of a row from `first_column` eastwards, one for each place in
-    /// `heights`: the same values as [`FeltGrid::height_of_level`].
+    /// `heights`: the same values as [`HapticGrid::height_of_level`].
     pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
         if self.resampling.is_none() {
             return self.raster.copy_row(level, row, first_column, heights);
@@ -413,7 +413,7 @@ impl<'r> FeltGrid<'r> {
     }
 }
 
-impl FeltGrid<'_> {
+impl HapticGrid<'_> {
     /// What the grid is besides the samples of its raster.
     pub(super) fn hash_shape<H: Hasher>(&self, hasher: &mut H) {
         (self.columns, self.rows).hash(hasher);
@@ -497,7 +497,7 @@ pub(super) mod tests {
             (10.0, 7.3, 0.0),
         ] {
             let raster = plane(cell(across, along, lean), [1.0, 0.5]);
-            let grid = FeltGrid::new(&raster, FeltCells::Square);
+            let grid = HapticGrid::new(&raster, HapticCells::Square);
             let side = grid.side_m().expect("known");
             assert_eq!(side, f64::min(across, along));
             let mut steps = 0;
@@ -522,11 +522,11 @@ pub(super) mod tests {
 
     #[test]
     fn square_cells_keep_their_exact_samples_and_so_do_stored_ones() {
-        for (cells, east) in [(FeltCells::Square, 10.009), (FeltCells::Stored, 30.0)] {
+        for (cells, east) in [(HapticCells::Square, 10.009), (HapticCells::Stored, 30.0)] {
             let raster = plane(cell(east, 10.0, 0.0), [0.3, 0.7]);
-            let grid = FeltGrid::new(&raster, cells);
+            let grid = HapticGrid::new(&raster, cells);
             assert!(!grid.is_resampled());
-            assert_eq!(grid.is_distorted(), cells == FeltCells::Stored);
+            assert_eq!(grid.is_distorted(), cells == HapticCells::Stored);
             assert_eq!((grid.columns(), grid.rows()), (41, 31));
             assert_eq!(grid.height(17, 23), raster.height(17, 23));
         }
@@ -541,7 +541,7 @@ pub(super) mod tests {
                 ..cell(30.0, 10.0, lean)
             };
             let raster = plane(cell, [0.3, 0.7]);
-            let grid = FeltGrid::new(&raster, FeltCells::Stored);
+            let grid = HapticGrid::new(&raster, HapticCells::Stored);
             let area = 300.0 * map_scale.0 * map_scale.1 * (1.0 - lean * lean).sqrt();
             let side = grid.side_m().expect("known");
             assert!((side * side / area - 1.0).abs() < 1e-12, "{side}");
@@ -553,7 +553,7 @@ pub(super) mod tests {
     #[test]
     fn the_finer_axis_keeps_its_samples_and_rows_read_as_single_samples_do() {
         let raster = plane(cell(10.0, 25.0, 0.0), [0.3, 0.7]);
-        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        let grid = HapticGrid::new(&raster, HapticCells::Square);
         assert_eq!((grid.columns(), grid.rows()), (41, 76));
         // Row 5 of 10 m is the file's row 2 of 25 m.
         assert_eq!(grid.height(7, 5), raster.height(7, 2));
@@ -575,7 +575,7 @@ pub(super) mod tests {
             _ => 1.0,
         });
         let raster = raster.expect("raster").with_cell(cell(10.0, 20.0, 0.0));
-        let grid = FeltGrid::new(&raster, FeltCells::Square);
+        let grid = HapticGrid::new(&raster, HapticCells::Square);
         let holes: Vec<_> = (0..grid.rows())
             .flat_map(|row| (0..grid.columns()).map(move |column| (column, row)))
             .filter(|&(column, row)| grid.height(column, row).is_nan())

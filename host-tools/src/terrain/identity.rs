@@ -5,7 +5,7 @@ use std::hash::{Hash, Hasher};
 use hapterra_core::scene::Scene;
 use twox_hash::XxHash64;
 
-use super::{FeltGrid, Scale};
+use super::{HapticGrid, Scale};
 use heightfield::Raster;
 
 /// Hash of all heights from south-west to north-east, after the numbers of columns and
@@ -41,7 +41,7 @@ pub(crate) fn fingerprint(raster: &Raster) -> u64 {
 }
 
 /// The epoch of a scene over a terrain; the scene's own epoch does not count.
-pub(super) fn epoch(fingerprint: u64, grid: &FeltGrid<'_>, scale: &Scale, scene: &Scene) -> u32 {
+pub(super) fn epoch(fingerprint: u64, grid: &HapticGrid<'_>, scale: &Scale, scene: &Scene) -> u32 {
     let mut hasher = XxHash64::with_seed(0);
     fingerprint.hash(&mut hasher);
     grid.hash_shape(&mut hasher);

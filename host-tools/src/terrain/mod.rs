@@ -1,7 +1,7 @@
 //! A raster as the device sees it: at a scale, counted in cells, cut
 //! into tiles.
 //!
-//! [`FeltGrid`] lays square cells over the raster; [`Scale`] turns the file's units into millimetres of the arm and into cells; [`Terrain`]
+//! [`HapticGrid`] lays square cells over the raster; [`Scale`] turns the file's units into millimetres of the arm and into cells; [`Terrain`]
 //! is a raster at that scale and one level of detail, with its tiles made one
 //! by one when they are asked for: nothing of the raster is copied or kept.
 
@@ -13,8 +13,8 @@ mod tiler;
 mod underlay;
 
 pub use distortion::Distortion;
-pub use felt_grid::{FeltCells, FeltGrid};
+pub use felt_grid::{HapticCells, HapticGrid};
 pub use hapterra_touch::tip::MAX_CELLS as MAX_TIP_CELLS;
-pub use hapterra_touch::{BadScale, Scale};
+pub use hapterra_touch::{Scale, ScaleError};
 pub(crate) use identity::fingerprint;
 pub use tiler::{INTERPOLATED_STEP, Terrain, TerrainError, TileBuffer};

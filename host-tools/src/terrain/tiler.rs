@@ -2,11 +2,11 @@
 
 use std::sync::OnceLock;
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::{GridPoint, MAX_CELL};
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
-use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, POSTS, TILE_CELLS, TileKey};
+use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, TILE_CELLS, TILE_SAMPLES, TileKey};
 use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
@@ -14,7 +14,7 @@ use hapterra_touch::tiles;
 use hapterra_touch::tip::{self, Ball, CENTRE_STEP, Nodes, Samples, TipError};
 
 use super::steps::{BinaryUnit, steps};
-use super::{BadScale, FeltCells, FeltGrid, Scale, identity};
+use super::{HapticCells, HapticGrid, Scale, ScaleError, identity};
 use crate::materials::MaterialBuffer;
 use heightfield::Raster;
 
@@ -24,12 +24,12 @@ use heightfield::Raster;
 pub const INTERPOLATED_STEP: f64 = 1.0 / (1 << 17) as f64;
 
 /// Bytes of a tile's samples.
-const TILE_BYTES: usize = 4 * POSTS * POSTS;
+const TILE_BYTES: usize = 4 * TILE_SAMPLES * TILE_SAMPLES;
 
 /// A raster at a scale and a level of detail.
 #[derive(Clone)]
 pub struct Terrain<'r> {
-    grid: FeltGrid<'r>,
+    grid: HapticGrid<'r>,
     /// Of level 0.
     scale_of_level_0: Scale,
     /// Of felt cells.
@@ -52,7 +52,7 @@ pub struct Terrain<'r> {
 pub enum TerrainError {
     /// The scale itself.
     #[error(transparent)]
-    Scale(#[from] BadScale),
+    Scale(#[from] ScaleError),
     /// Higher or lower than positions can be.
     #[error(
         "heights reach {cells:.4e} cells at {} mm a unit and {} mm a cell; at most ±{MAX_CELL} can be felt",
@@ -92,17 +92,17 @@ pub enum TerrainError {
 
 /// Room for one tile's samples, used again for each.
 pub struct TileBuffer {
-    pub(super) heights: Box<[f64; POSTS * POSTS]>,
+    pub(super) heights: Box<[f64; TILE_SAMPLES * TILE_SAMPLES]>,
     /// Above the tile's base.
-    singles: Box<[f32; POSTS * POSTS]>,
+    singles: Box<[f32; TILE_SAMPLES * TILE_SAMPLES]>,
     bytes: Box<[u8; TILE_BYTES]>,
 }
 
 impl Default for TileBuffer {
     fn default() -> Self {
         Self {
-            heights: Box::new([f64::NAN; POSTS * POSTS]),
-            singles: Box::new([f32::NAN; POSTS * POSTS]),
+            heights: Box::new([f64::NAN; TILE_SAMPLES * TILE_SAMPLES]),
+            singles: Box::new([f32::NAN; TILE_SAMPLES * TILE_SAMPLES]),
             bytes: Box::new([0; TILE_BYTES]),
         }
     }
@@ -137,13 +137,17 @@ impl TileBuffer {
 
 /// A sample that differs from its neighbour to the east or north by more than [`MAX_STEP_CELLS`],
 /// and by how much.
-fn steep_step(heights: &[f64; POSTS * POSTS]) -> Option<(usize, f64)> {
+fn steep_step(heights: &[f64; TILE_SAMPLES * TILE_SAMPLES]) -> Option<(usize, f64)> {
     let step = |at: usize, to: usize| {
         let step = heights.get(to)? - heights.get(at)?;
         (step.abs() > f64::from(MAX_STEP_CELLS)).then_some((at, step.abs()))
     };
-    let east = |at: usize| (at % POSTS + 1 < POSTS).then(|| step(at, at + 1)).flatten();
-    (0..heights.len()).find_map(|at| east(at).or_else(|| step(at, at + POSTS)))
+    let east = |at: usize| {
+        (at % TILE_SAMPLES + 1 < TILE_SAMPLES)
+            .then(|| step(at, at + 1))
+            .flatten()
+    };
+    (0..heights.len()).find_map(|at| east(at).or_else(|| step(at, at + TILE_SAMPLES)))
 }
 
 impl<'r> Terrain<'r> {
@@ -153,14 +157,18 @@ impl<'r> Terrain<'r> {
     /// [`TerrainError`] when its heights or its size leave what a position can
     /// say, or the level leaves no patch.
     pub fn new(raster: &'r Raster, scale: Scale, level: u8) -> Result<Self, TerrainError> {
-        Self::over(FeltGrid::new(raster, FeltCells::default()), scale, level)
+        Self::over(
+            HapticGrid::new(raster, HapticCells::default()),
+            scale,
+            level,
+        )
     }
 
     /// As [`Self::new`], over cells of the user's choice.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn over(grid: FeltGrid<'r>, scale: Scale, level: u8) -> Result<Self, TerrainError> {
+    pub fn over(grid: HapticGrid<'r>, scale: Scale, level: u8) -> Result<Self, TerrainError> {
         let (columns, rows) = (grid.columns(), grid.rows());
         let larger = columns.max(rows);
         if i64::from(larger) > i64::from(MAX_CELL) {
@@ -213,7 +221,7 @@ impl<'r> Terrain<'r> {
     /// As [`Self::new`].
     pub fn relaid(
         &self,
-        grid: FeltGrid<'r>,
+        grid: HapticGrid<'r>,
         scale: Scale,
         level: u8,
     ) -> Result<Self, TerrainError> {
@@ -244,7 +252,7 @@ impl<'r> Terrain<'r> {
 
     /// The grid of its level 0.
     #[must_use]
-    pub const fn grid(&self) -> &FeltGrid<'r> {
+    pub const fn grid(&self) -> &HapticGrid<'r> {
         &self.grid
     }
 
@@ -309,7 +317,7 @@ impl<'r> Terrain<'r> {
     /// The scene in which the device feels this terrain. Its epoch is a hash
     /// of the heights and of everything else in it.
     #[must_use]
-    pub fn scene(&self, law: ForceLaw, source: Source, home: GridPoint) -> Scene {
+    pub fn scene(&self, law: SurfaceParams, source: Source, home: GridPoint) -> Scene {
         let mut scene = Scene {
             epoch: 0,
             level: self.level,
@@ -427,8 +435,8 @@ impl<'r> Terrain<'r> {
         }
         let first = key.index.first_cell();
         let (column, row) = (
-            first.x as usize + sample % POSTS,
-            first.y as usize + sample / POSTS,
+            first.x as usize + sample % TILE_SAMPLES,
+            first.y as usize + sample / TILE_SAMPLES,
         );
         tracing::warn!(
             "sample {column}, {row} of level {}, from the south-west, differs from a neighbour by {cells:.3e} cells, at most {MAX_STEP_CELLS} can be rendered: \
@@ -520,18 +528,18 @@ impl<'r> Terrain<'r> {
 
     /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what the heights
     /// are multiples of in the file's vertical unit.
-    fn read(&self, key: TileKey, heights: &mut [f64; POSTS * POSTS]) -> BinaryUnit {
+    fn read(&self, key: TileKey, heights: &mut [f64; TILE_SAMPLES * TILE_SAMPLES]) -> BinaryUnit {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
         let (west, south) = (first(key.index.col), first(key.index.row));
         if let Some(ball) = &self.ball {
-            let (samples, nodes) = self.samples(ball, [west, south], POSTS);
+            let (samples, nodes) = self.samples(ball, [west, south], TILE_SAMPLES);
             for (height, centre) in heights.iter_mut().zip(ball.centres(&samples, nodes)) {
                 *height = self.rounded(self.within(centre));
             }
             return BinaryUnit::ANY;
         }
         let mut unit = BinaryUnit::ANY;
-        for (row, line) in (south..).zip(heights.chunks_exact_mut(POSTS)) {
+        for (row, line) in (south..).zip(heights.chunks_exact_mut(TILE_SAMPLES)) {
             self.grid.copy_row(self.level, row, west, line);
             for height in line {
                 unit = unit.with(*height);
@@ -579,7 +587,7 @@ impl<'r> Terrain<'r> {
     fn samples_in(&self, key: TileKey) -> usize {
         let inside = |index: i32, size: i32| {
             let first = index * TILE_CELLS as i32;
-            (size + 1 - first).min(POSTS as i32) as usize
+            (size + 1 - first).min(TILE_SAMPLES as i32) as usize
         };
         inside(key.index.col, self.size[0]) * inside(key.index.row, self.size[1])
     }

@@ -40,12 +40,12 @@ pub(in crate::terrain) fn sent(key: TileKey, heights: Heights<'_>) -> Vec<f64> {
 fn held(tile: &Tile) -> Vec<f32> {
     let sample = |i: usize| {
         // The last row and column are corners of the patches before them.
-        let (col, row) = (i % POSTS, i / POSTS);
+        let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
         let (u, v) = (col.min(TILE_CELLS - 1), row.min(TILE_CELLS - 1));
         let corners = tile.corners(Cell::new(u as i32, v as i32));
         corners[(col - u) + 2 * (row - v)]
     };
-    (0..POSTS * POSTS).map(sample).collect()
+    (0..TILE_SAMPLES * TILE_SAMPLES).map(sample).collect()
 }
 
 #[test]
@@ -61,8 +61,8 @@ fn tiles_hold_the_rasters_samples_at_every_level() {
             }
             let tile = samples(&terrain, key(level, col, row));
             for (i, got) in tile.into_iter().enumerate() {
-                let x = (col as u32 * 32 + (i % POSTS) as u32) << level;
-                let y = (row as u32 * 32 + (i / POSTS) as u32) << level;
+                let x = (col as u32 * 32 + (i % TILE_SAMPLES) as u32) << level;
+                let y = (row as u32 * 32 + (i / TILE_SAMPLES) as u32) << level;
                 let inside = x <= (terrain.size()[0] as u32) << level
                     && y <= (terrain.size()[1] as u32) << level;
                 if inside {
@@ -106,8 +106,8 @@ fn holes_stay_holes_and_an_empty_tile_says_so() {
     .expect("raster");
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     let tile = samples(&terrain, key(0, 0, 0));
-    assert!(tile[4 * POSTS + 3].is_nan() && tile[32].is_nan());
-    assert_eq!(tile[4 * POSTS + 4], 5.0);
+    assert!(tile[4 * TILE_SAMPLES + 3].is_nan() && tile[32].is_nan());
+    assert_eq!(tile[4 * TILE_SAMPLES + 4], 5.0);
     let mut buffer = TileBuffer::default();
     assert_eq!(terrain.tile(key(0, 2, 0), &mut buffer), Some(Heights::Hole));
     assert_eq!(terrain.height_mm(3.5, 4.5), None);
@@ -145,10 +145,10 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
         let raster = Raster::from_fn(9, 9, |x, y| if (x, y) == (4, 4) { bump } else { 0.0 });
         let raster = raster.expect("raster");
         let scale = Scale::new(cell_mm, 1.0).expect("valid");
-        let law = ForceLaw {
+        let law = SurfaceParams {
             stiffness_n_per_mm,
             max_force_n: 8.5,
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let home = GridPoint::default();

@@ -6,7 +6,7 @@
 
 use hapterra_core::grid::Cell;
 use hapterra_core::scene::Scene;
-use hapterra_core::terrain::{CoarseTile, POSTS, TILE_CELLS, TileKey, Underlay};
+use hapterra_core::terrain::{CoarseTile, TILE_CELLS, TILE_SAMPLES, TileKey, Underlay};
 use hapterra_core::wire::message::Heights;
 
 use super::tiler::range;
@@ -60,7 +60,7 @@ impl Terrain<'_> {
         let (east, north) = (along(0)?, along(1)?);
         let cells = (east[1] - east[0]).max(north[1] - north[0]);
         let spans = |shift: &u8| (TILE_CELLS as f64) * f64::from(*shift).exp2() >= cells;
-        let shift = (CoarseTile::LEAST_SHIFT..=CoarseTile::MOST_SHIFT).find(spans)?;
+        let shift = (CoarseTile::LEAST_SHIFT..=CoarseTile::MAX_SHIFT).find(spans)?;
         Some(CoarseTile {
             // Whole numbers of cells inside of the field.
             first: Cell::new(east[0] as i32, north[0] as i32),
@@ -164,7 +164,7 @@ fn near(wide: &CoarseTile, home: Cell) -> Option<CoarseTile> {
 /// The heights of a coarse tile, by those of its samples.
 fn coarse_tile(buffer: &mut TileBuffer, sample: impl Fn(usize, usize) -> f64) -> Heights<'_> {
     for (index, height) in buffer.heights.iter_mut().enumerate() {
-        *height = sample(index % POSTS, index / POSTS);
+        *height = sample(index % TILE_SAMPLES, index / TILE_SAMPLES);
     }
     match range(buffer.heights.as_slice()) {
         None => Heights::Hole,

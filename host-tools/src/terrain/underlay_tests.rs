@@ -1,6 +1,6 @@
 //! The tiles of an underlay as a device holds them.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 
@@ -23,7 +23,7 @@ fn hills() -> Raster {
 
 fn underlay(terrain: &Terrain<'_>, home: [i32; 2], reach_mm: [f64; 4]) -> (Scene, Underlay) {
     let home = GridPoint::new([home[0], home[1], 100], hapterra_core::Vec3::ZERO);
-    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
+    let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home);
     let scene = terrain.underlaid(scene, reach_mm);
     let underlay = scene.underlay.expect("an underlay");
     (scene, underlay)
@@ -48,7 +48,7 @@ impl Felt {
             (cell as usize, share)
         };
         let ((col, u), (row, v)) = (along(x, self.0.first.x), along(y, self.0.first.y));
-        let sample = |right: usize, up: usize| self.1[(row + up) * POSTS + col + right];
+        let sample = |right: usize, up: usize| self.1[(row + up) * TILE_SAMPLES + col + right];
         let south = sample(0, 0) * (1.0 - u) + sample(1, 0) * u;
         let north = sample(0, 1) * (1.0 - u) + sample(1, 1) * u;
         south * (1.0 - v) + north * v

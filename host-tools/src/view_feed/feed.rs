@@ -4,7 +4,7 @@ use std::io::Write;
 use std::process::Child;
 use std::time::Duration;
 
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_view_stream::{self as stream, Link, Message, Scene, TickCost};
 
@@ -14,7 +14,7 @@ use super::scene::{Picture, Prepared, home_cells, tick_cost};
 use super::standing::Standing;
 use super::surroundings::Surroundings;
 use super::tiles::Tiles;
-use crate::link::{Event, Tally};
+use crate::link::{Event, LinkStats};
 use crate::replay::Record;
 use crate::terrain::Terrain;
 
@@ -127,7 +127,7 @@ impl<'t> ViewFeed<'t> {
     }
 
     /// Takes a sample and its row.
-    pub fn take(&mut self, sample: &Sample, record: &Record) {
+    pub fn take(&mut self, sample: &TickRecord, record: &Record) {
         self.late = sample.late;
         self.tiles.lacks(sample.missing_tile);
         // The first tick knows of none before it.
@@ -232,7 +232,7 @@ impl<'t> ViewFeed<'t> {
 
     /// Tells what there is to tell of tiles and link; to be called after each look at the
     /// line.
-    pub fn look(&mut self, tally: &Tally) {
+    pub fn look(&mut self, tally: &LinkStats) {
         if !self.tell_scene() {
             return;
         }

@@ -1,6 +1,6 @@
 //! A terrain at coarse levels, for a picture of the whole.
 
-use hapterra_core::terrain::{POSTS, TileIndex};
+use hapterra_core::terrain::{TILE_SAMPLES, TileIndex};
 use hapterra_view_stream::{Layer, TILE_POSTS, Tile};
 
 use crate::terrain::Terrain;
@@ -147,7 +147,7 @@ pub(super) fn of(terrain: &Terrain<'_>, home: [f64; 2]) -> Vec<Layer> {
 
 /// A tile with the samples around it.
 pub(super) fn tile(terrain: &Terrain<'_>, index: TileIndex, slot: u32) -> Tile {
-    const AROUND: usize = TILE_POSTS - POSTS;
+    const AROUND: usize = TILE_POSTS - TILE_SAMPLES;
     let per_unit = terrain.scale().height_mm_per_unit();
     let first = index.first_cell();
     let mut heights_mm = Vec::with_capacity(TILE_POSTS * TILE_POSTS);

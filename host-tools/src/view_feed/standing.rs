@@ -55,7 +55,7 @@ impl<'t> Standing<'t> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terrain::{FeltCells, FeltGrid};
+    use crate::terrain::{HapticCells, HapticGrid};
     use heightfield::{CellSize, CellUnit, Raster};
 
     #[test]
@@ -71,7 +71,7 @@ mod tests {
         let [first, later] = [20.0, 8.0].map(|east| raster.clone().with_cell(cell(east)));
         let scale = |mm| Scale::new(mm, 0.1).expect("scale");
         let terrain = |raster, mm| {
-            let grid = FeltGrid::new(raster, FeltCells::Square);
+            let grid = HapticGrid::new(raster, HapticCells::Square);
             Terrain::over(grid, scale(mm), 0).expect("terrain")
         };
         // Cells of 10 m, and of 8 m.

@@ -13,9 +13,9 @@ use crate::link::Event;
 use crate::terrain::Terrain;
 
 /// Tiles that a device asks for before the first sample of a view, at most.
-const MOST_COMING: usize = 1024;
+const MAX_COMING: usize = 1024;
 /// Tiles of a recording in full detail: beyond so many, others stay coarse.
-const MOST_DETAILED: usize = 400;
+const MAX_DETAILED: usize = 400;
 /// Tiles that are told in one look, so that a look stays short: heights are read again for
 /// them.
 const AT_A_TIME: usize = 8;
@@ -53,7 +53,7 @@ impl Tiles {
         match (event, &mut self.coming) {
             (Event::Viewed { taken: true, .. }, _) => self.coming = Some(vec![]),
             // More than a window holds are not sent within some samples.
-            (Event::TileSent(key), Some(coming)) if coming.len() < MOST_COMING => coming.push(*key),
+            (Event::TileSent(key), Some(coming)) if coming.len() < MAX_COMING => coming.push(*key),
             (Event::TileSent(key), None) => self.sent(*key),
             (Event::Opened { resumed: false, .. }, _) => self.forget(),
             _ => {}
@@ -92,7 +92,7 @@ impl Tiles {
         let key = TileKey::new(terrain.level(), col, row);
         let felt = |index: i32| index.saturating_mul(terrain.parts() as i32);
         let is_there = terrain.has(TileKey::new(key.level, felt(col), felt(row)));
-        let has_room = self.detailed.len() < MOST_DETAILED;
+        let has_room = self.detailed.len() < MAX_DETAILED;
         if has_room && is_there && self.detailed.insert(key) {
             self.untold.push((self.detailed.len() as u32, key));
         }

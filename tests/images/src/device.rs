@@ -4,13 +4,13 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Ask, Bulk, BulkEndpoints, Event, Patience, Session, Transport};
+use hapterra::link::{Ask, Bulk, BulkEndpoints, Event, Session, Timeouts, Transport};
 use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{Mode, Report};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::status::Status;
 use hapterra_tests::usb::host::{Found, ScriptedPipes, enumerate};
@@ -56,7 +56,7 @@ pub fn on_each_board(
     let scale = Scale::new(1.0, 1.0).expect("scale");
     let terrain = Terrain::new(raster, scale, 0).expect("terrain");
     let home = scale.to_grid(home_mm).expect("addressable");
-    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
+    let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home);
     for machine in machines() {
         then(machine, &terrain, scene);
     }
@@ -78,7 +78,7 @@ pub struct Device<'t> {
     /// Where the encoders are.
     pub counts: [i32; 3],
     /// The latest sample.
-    pub latest: Option<Sample>,
+    pub latest: Option<TickRecord>,
     /// Where the guard stands, as last told.
     pub guard: Option<Report>,
     /// The latest status.
@@ -106,7 +106,7 @@ impl<'t> Device<'t> {
         let link = Box::new(Bulk(pipes));
         // No verdict depends on how fast this machine is.
         let (session, hello) =
-            Session::open(terrain, scene, None, link, Patience::EMULATED).expect("a session");
+            Session::open(terrain, scene, None, link, Timeouts::EMULATED).expect("a session");
         let mut device = Self {
             machine,
             session,
@@ -273,7 +273,7 @@ pub struct Plane {
     /// Height above the origin, mm.
     pub height_mm: f64,
     /// Spring and limit.
-    pub law: ForceLaw,
+    pub law: SurfaceParams,
 }
 
 impl Plane {
@@ -285,7 +285,7 @@ impl Plane {
             place: Placement { home_mm },
             slope: [0.0; 2],
             height_mm,
-            law: ForceLaw::PREMIUM,
+            law: SurfaceParams::PREMIUM,
         }
     }
 

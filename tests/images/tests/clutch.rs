@@ -2,7 +2,7 @@
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::guard::{Limits, Mode};
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::request::Request;
 use hapterra_image_tests::bench::Bench;
 use hapterra_image_tests::device::Device;
@@ -19,7 +19,7 @@ fn switch(device: &Device<'_>, closed: bool) {
     machine.set_input(pin, !closed);
 }
 
-fn latest(device: &Device<'_>) -> Sample {
+fn latest(device: &Device<'_>) -> TickRecord {
     let sample = device.latest.expect("samples");
     assert_eq!((sample.mode, sample.fault), (Mode::Armed, None));
     sample

@@ -3,7 +3,7 @@
 
 use hapterra::terrain::Terrain;
 use hapterra_core::Vec3;
-use hapterra_core::guard::Sense;
+use hapterra_core::guard::GuardInputs;
 use hapterra_core::guard::thermal::{CONTINUOUS_C, UNSEEN_K};
 use hapterra_core::scene::Scene;
 use hapterra_core::wire::status::{BootReport, ResetCause, Status};
@@ -23,7 +23,7 @@ fn cold() -> Copies {
     let (clock, boot) = (StoppedClock::<1>, BootReport::default());
     let mut device = NativeDevice::new(tiles, memory, clock, Stored::Missing, boot);
     for _ in 0..200 {
-        device.tick(Sense::default());
+        device.tick(GuardInputs::default());
     }
     *device.retained()
 }

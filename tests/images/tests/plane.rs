@@ -3,7 +3,7 @@
 
 use hapterra::phantom::{PhantomModel, Placement};
 use hapterra_core::contact::ContactState;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::device::{Device, Plane, on_each_board};
 use hapterra_image_tests::machine::Stop;
@@ -17,7 +17,7 @@ fn plane() -> Plane {
         },
         slope: [0.25, -0.125],
         height_mm: 55.0,
-        law: ForceLaw::PREMIUM,
+        law: SurfaceParams::PREMIUM,
     }
 }
 

@@ -109,7 +109,7 @@ fn request(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
 fn run(request: &Request) -> Result<Option<String>, Violation> {
     let seed = request.seed.unwrap_or(campaign::SEED);
     if let Some(number) = request.segment {
-        let mut tally = campaign::Tally::default();
+        let mut tally = campaign::LinkStats::default();
         campaign::segment::run(seed, number, request.ground, &mut tally)?;
         print!("{}", tally.table());
         println!("{:#?}", tally.extremes);
@@ -134,7 +134,7 @@ fn run(request: &Request) -> Result<Option<String>, Violation> {
 fn run_link(request: &Request) -> Result<Option<String>, Violation> {
     let seed = request.seed.unwrap_or(link_campaign::SEED);
     if let Some(number) = request.segment {
-        let mut tally = link_campaign::Tally::default();
+        let mut tally = link_campaign::LinkStats::default();
         link_campaign::segment(seed, number, &mut tally)?;
         print!("{}", tally.table());
         return Ok(None);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::supply::Buffers;
-use hapterra_tests::soak::{Found, Tally, Until, run, soak};
+use hapterra_tests::soak::{Found, LinkStats, Until, run, soak};
 
 /// Violations of each invariant that are told in full.
 const SHOWN: usize = 3;
@@ -128,7 +128,7 @@ fn all(wanted: &Wanted) -> ExitCode {
 }
 
 /// One line, written over again on a terminal, once a minute elsewhere.
-fn live(tally: &Tally, elapsed: Duration, time: Duration) {
+fn live(tally: &LinkStats, elapsed: Duration, time: Duration) {
     let terminal = stderr().is_terminal();
     if !terminal && !elapsed.as_secs().is_multiple_of(60) {
         return;

@@ -2,9 +2,9 @@
 
 use hapterra::phantom::AmplifierFault;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::Sense;
+use hapterra_core::guard::GuardInputs;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::Point;
+use hapterra_core::scene::HipCommand;
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::ResetCause;
@@ -66,7 +66,7 @@ impl Mishap {
     /// encoders are off by for good.
     pub fn meddle(
         &mut self,
-        sense: &mut Sense,
+        sense: &mut GuardInputs,
         lost: &mut [i32; 3],
         now: u64,
         chance: &mut Chance,
@@ -248,7 +248,7 @@ impl Mishap {
             1 => request(Request::Zero {
                 counts: [1_000, -2_000, 3_000],
             }),
-            2 => ToDevice::Point(Point {
+            2 => ToDevice::Hip(HipCommand {
                 seq: 1,
                 hip: GridPoint::default(),
             }),

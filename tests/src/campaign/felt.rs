@@ -5,11 +5,11 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::{Limits, Mode, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use super::ground::Felt;
 use super::share::{Share, Shares};
-use super::swing::{MOST_TURNS, Swing};
+use super::swing::{MAX_TURNS, Swing};
 
 /// From the beginning of a tick until its force acts, as a part of it
 /// ([`hapterra_firmware::amplifier::CURRENT_LOOP_US`]).
@@ -38,7 +38,7 @@ const NO_SPRING: Limits = Limits::SPEED_LIMITED
 pub struct FeltWatch {
     felt: Felt,
     cell_mm: f32,
-    last: Option<Sample>,
+    last: Option<TickRecord>,
     /// The force of the tick before that.
     before_n: Vec3,
     /// The contact under way, where all of it is known.
@@ -98,7 +98,7 @@ impl FeltWatch {
     ///
     /// # Errors
     /// What must not be.
-    pub fn look(&mut self, sample: &Sample, is_calm: bool) -> Result<(), String> {
+    pub fn look(&mut self, sample: &TickRecord, is_calm: bool) -> Result<(), String> {
         let last = self.last.replace(*sample);
         let last = last.filter(|last| last.tick.wrapping_add(1) == sample.tick);
         let before = self.let_through;
@@ -117,7 +117,7 @@ impl FeltWatch {
     }
 
     /// No force is larger than the stiffest material makes of the depth.
-    fn is_small(&self, sample: &Sample, way_mm: Vec3, share: f32) -> Result<(), String> {
+    fn is_small(&self, sample: &TickRecord, way_mm: Vec3, share: f32) -> Result<(), String> {
         let depth_mm = way_mm.length();
         let [high_mm, steep] = self.felt.relief();
         let stretch_mm = (depth_mm + high_mm.min(depth_mm)).hypot(steep * depth_mm);
@@ -135,7 +135,7 @@ impl FeltWatch {
 
     /// No force is against the way to the proxy: friction holds, and does not push. What shading
     /// turns is turned by 60° at most.
-    fn never_pulls(&self, sample: &Sample, way_mm: Vec3) -> Result<(), String> {
+    fn never_pulls(&self, sample: &TickRecord, way_mm: Vec3) -> Result<(), String> {
         let [high_mm, _] = self.felt.relief();
         if high_mm > 0.0 && self.felt.is_shaded() {
             return Ok(());
@@ -169,14 +169,14 @@ impl FeltWatch {
     /// this one.
     fn gives_nothing(
         &mut self,
-        last: Option<&Sample>,
-        sample: &Sample,
+        last: Option<&TickRecord>,
+        sample: &TickRecord,
         shares: Option<(Shares, Shares)>,
         is_calm: bool,
     ) -> Result<(), String> {
         let before_n =
             std::mem::replace(&mut self.before_n, last.map_or(Vec3::ZERO, |s| s.force_n));
-        let is_spring = |sample: &Sample| !sample.limits.intersects(NO_SPRING);
+        let is_spring = |sample: &TickRecord| !sample.limits.intersects(NO_SPRING);
         let is_told = self.felt.is_spring() && self.felt.is_controlled() && is_calm;
         let last = last.filter(|last| is_told && is_spring(last) && is_spring(sample));
         let Some((last, (before, now))) = last.zip(shares) else {
@@ -207,7 +207,7 @@ impl FeltWatch {
         let along = sample.force_n.normalize_or_zero();
         let turns = self.swing.turns(sample.tick, moved_mm, along);
         self.most_turns = self.most_turns.max(turns);
-        if turns > MOST_TURNS {
+        if turns > MAX_TURNS {
             return Err(format!(
                 "the tip swings, {turns} turns in 0.25 s: {sample:?}"
             ));
@@ -234,7 +234,7 @@ impl FeltWatch {
 
 /// The last force goes out on its own: it only becomes less, whatever the tip does. With an open
 /// clutch there is none but what the slew limit leaves.
-fn fades(last: &Sample, sample: &Sample) -> Result<(), String> {
+fn fades(last: &TickRecord, sample: &TickRecord) -> Result<(), String> {
     let (was, is) = (last.force_n, sample.force_n);
     if sample.mode == Mode::Fading && is.length() > was.length() * (1.0 + ROUNDING) {
         return Err(format!(

@@ -3,7 +3,7 @@
 use hapterra::materials::{ClassMaterial, Looks, Materials};
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{
-    Controller, Damping, ForceLaw, Material, MaterialTable, Pattern, Shading, Texture,
+    Controller, Damping, Material, MaterialTable, Pattern, Shading, SurfaceParams, Texture,
 };
 use heightfield::Raster;
 
@@ -34,7 +34,7 @@ impl Ground {
 /// The effects of a segment.
 #[derive(Clone, Debug)]
 pub struct Effects {
-    law: ForceLaw,
+    law: SurfaceParams,
     classes: Vec<Material>,
     /// Samples of the terrain to a pixel of the classes.
     pixel: u32,
@@ -52,15 +52,15 @@ impl Effects {
             _ => chance.between(1.0, 2.0),
         };
         let default = material(chance, stiffness_n_per_mm as f32);
-        let law = ForceLaw {
+        let law = SurfaceParams {
             max_force_n: [8.5, 8.5, 3.0][chance.below(3)],
             shading: [Shading::None, Shading::None, Shading::Smooth][chance.below(3)],
-            ..default.law(&ForceLaw {
+            ..default.law(&SurfaceParams {
                 damping: Damping {
                     controller,
                     ..Damping::NONE
                 },
-                ..ForceLaw::PREMIUM
+                ..SurfaceParams::PREMIUM
             })
         };
         let classes = match chance.below(2) {
@@ -115,8 +115,8 @@ impl Effects {
 
     /// The law of a scene that is so many times as stiff.
     #[must_use]
-    pub const fn law(&self, times: f32) -> ForceLaw {
-        ForceLaw {
+    pub const fn law(&self, times: f32) -> SurfaceParams {
+        SurfaceParams {
             stiffness_n_per_mm: self.law.stiffness_n_per_mm * times,
             ..self.law
         }
@@ -160,14 +160,14 @@ fn material(chance: &mut Chance, stiffness_n_per_mm: f32) -> Material {
 /// All that may be felt of a scene: a law of each of its materials.
 #[derive(Clone, Debug)]
 pub struct Felt {
-    laws: Vec<ForceLaw>,
-    hardest: ForceLaw,
+    laws: Vec<SurfaceParams>,
+    hardest: SurfaceParams,
 }
 
 impl Felt {
     /// Of a law, and of a table where there is one.
     #[must_use]
-    pub fn of(law: &ForceLaw, table: Option<&MaterialTable>) -> Self {
+    pub fn of(law: &SurfaceParams, table: Option<&MaterialTable>) -> Self {
         let Some(table) = table else {
             let (laws, hardest) = (vec![*law], *law);
             return Self { laws, hardest };
@@ -177,7 +177,7 @@ impl Felt {
             .first()
             .map_or(law.stiffness_n_per_mm, |default| default.stiffness_n_per_mm);
         let times = law.stiffness_n_per_mm / default;
-        let of = |one: &Material| ForceLaw {
+        let of = |one: &Material| SurfaceParams {
             stiffness_n_per_mm: one.stiffness_n_per_mm * times,
             ..one.law(law)
         };
@@ -222,7 +222,7 @@ impl Felt {
     /// Whether its force is that of one spring: no material follows a softer one.
     #[must_use]
     pub fn is_spring(&self) -> bool {
-        let stiff = |law: &ForceLaw| law.stiffness_n_per_mm;
+        let stiff = |law: &SurfaceParams| law.stiffness_n_per_mm;
         let mut pairs = self.laws.windows(2);
         pairs.all(|pair| stiff(&pair[0]) == stiff(&pair[1]))
     }
@@ -236,7 +236,7 @@ impl Felt {
     /// The highest texture, mm, and the steepest.
     #[must_use]
     pub fn relief(&self) -> [f32; 2] {
-        let relief = |most: [f32; 2], law: &ForceLaw| {
+        let relief = |most: [f32; 2], law: &SurfaceParams| {
             let texture = &law.texture;
             if texture.is_none() {
                 return most;

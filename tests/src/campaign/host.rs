@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use hapterra::link::{Ask, Client, Event, LinkError, Patience, State};
+use hapterra::link::{Ask, Client, Event, LinkError, State, Timeouts};
 use hapterra::terrain::Terrain;
 use hapterra_core::guard::Fault;
-use hapterra_core::scene::{Sample, Scene};
+use hapterra_core::scene::{Scene, TickRecord};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
-use hapterra_core::wire::materials::{MOST_TILE_BYTES, MaterialTile, TileMaterials};
+use hapterra_core::wire::materials::{MAX_TILE_BYTES, MaterialTile, TileMaterials};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{InSession, SessionNumber};
@@ -40,7 +40,7 @@ pub struct Host<'t> {
     to_device: Pipe,
     to_host: Pipe,
     /// Samples that came since they were last taken.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<TickRecord>,
     /// The last answer to a question for the status.
     pub status: Option<Status>,
     /// The fault that was last told.
@@ -55,7 +55,7 @@ impl<'t> Host<'t> {
     pub fn new(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Self {
         Self {
             terrain,
-            client: Client::numbered(terrain, scene, None, Patience::REAL_TIME, seed),
+            client: Client::numbered(terrain, scene, None, Timeouts::REAL_TIME, seed),
             reader: Box::default(),
             to_device: Pipe::default(),
             to_host: Pipe::default(),
@@ -69,7 +69,7 @@ impl<'t> Host<'t> {
     /// Forgets everything and begins anew with another scene.
     pub fn restart(&mut self, scene: Scene, now: u64, chance: &mut Chance) {
         let seed = chance.bits();
-        let patience = Patience::REAL_TIME;
+        let patience = Timeouts::REAL_TIME;
         self.client = Client::numbered(self.terrain, scene, None, patience, seed);
         *self.reader = FrameReader::new();
         self.greet(now, chance);
@@ -191,7 +191,7 @@ impl<'t> Host<'t> {
             else {
                 continue;
             };
-            if let ToHost::Need { epoch, key } = framed.message {
+            if let ToHost::TileRequest { epoch, key } = framed.message {
                 if poison {
                     let session = self.client.session();
                     let has_materials = self.terrain.grid().materials().is_some();
@@ -227,11 +227,11 @@ fn of_poisoned_materials(
     key: TileKey,
     chance: &mut Chance,
 ) -> Vec<u8> {
-    let bytes = [chance.bits() as u8; MOST_TILE_BYTES];
+    let bytes = [chance.bits() as u8; MAX_TILE_BYTES];
     let materials = match chance.below(4) {
         0 => TileMaterials::One(chance.bits() as u8),
         1 => TileMaterials::Runs(&bytes[..chance.below(12)]),
-        2 => TileMaterials::Each(&bytes[..MOST_TILE_BYTES - chance.below(2)]),
+        2 => TileMaterials::Each(&bytes[..MAX_TILE_BYTES - chance.below(2)]),
         // Of the table, whatever it is.
         _ => TileMaterials::One(0),
     };

@@ -32,7 +32,7 @@ pub mod watch;
 
 pub use ground::Ground;
 pub use segment::Violation;
-pub use tally::Tally;
+pub use tally::LinkStats;
 
 /// The seed that is used without being told another.
 pub const SEED: u64 = 4;
@@ -42,8 +42,12 @@ pub const SEED: u64 = 4;
 ///
 /// # Errors
 /// The first [`Violation`].
-pub fn run(seed: u64, seconds: u64, done: &mut dyn FnMut(u64, &Tally)) -> Result<Tally, Violation> {
-    let mut tally = Tally::default();
+pub fn run(
+    seed: u64,
+    seconds: u64,
+    done: &mut dyn FnMut(u64, &LinkStats),
+) -> Result<LinkStats, Violation> {
+    let mut tally = LinkStats::default();
     let mut number = 0;
     while tally.armed < seconds * 1_000 {
         for ground in [Ground::Ice, Ground::Drawn] {

@@ -1,14 +1,14 @@
 //! The report of a campaign: `log/campaign.md`.
 
-use super::Tally;
+use super::LinkStats;
 use super::extremes::OFF_COUNTS;
 use super::kind::{Kind, STALL_TICKS};
-use super::swing::MOST_TURNS;
+use super::swing::MAX_TURNS;
 use crate::rows;
 
 /// The page of a campaign that ran with the source at `commit`.
 #[must_use]
-pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &Tally) -> String {
+pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &LinkStats) -> String {
     let at = &tally.extremes;
     let commit = commit.map_or(String::new(), |commit| format!(" at commit {commit}"));
     format!(
@@ -41,7 +41,7 @@ effects has up to 16 materials, of up to 1.7 times that stiffness. The amplifier
   It is at most what the stiffest material, the highest texture and all of the damping make of the depth.
 - With the controller on and no fault yet, a contact on one stiffness gives the tip at most 0.05 mJ, 2 k A times its
   depth, and with shading 2 E ([effects](../docs/explanation/effects.md)). Energy of a stiffening spring is not counted.
-- With the controller on and no fault yet, the tip turns back by more than 0.3 mm at most {MOST_TURNS} times in 0.25 s.
+- With the controller on and no fault yet, the tip turns back by more than 0.3 mm at most {MAX_TURNS} times in 0.25 s.
   Tremor does so 6 times.
 - The device stores at most 2 mJ of energy to dissipate.
 - While the last force ramps down it only decreases. With an open clutch there is none.
@@ -63,7 +63,7 @@ The energy was observed in {:.0} s of contact: {:.1} s of them in the ramp, {:.1
 | change of the force in a tick | {:.4} N | 1 N |
 | temperature of a winding | {:.1} °C | 112 °C |
 | energy that a contact gave, controller on | {:.4} mJ | 0.05 mJ and 2 k A d, with shading 2 E |
-| turns of the tip in 0.25 s | {} | {MOST_TURNS} |
+| turns of the tip in 0.25 s | {} | {MAX_TURNS} |
 | stored energy to dissipate | {:.3} mJ | 2 mJ |
 
 **Not bounded.** The device cannot distinguish an encoder that creeps within the joint's limits from a moving hand.

@@ -4,13 +4,13 @@
 use hapterra::materials::Materials;
 use hapterra::phantom::PhantomModel;
 use hapterra::synth::{Kind as Look, Synth};
-use hapterra::terrain::{FeltCells, FeltGrid, Scale, Terrain};
+use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
 use hapterra_core::Vec3;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::{Drive, Mode, Sense};
+use hapterra_core::guard::{GuardInputs, GuardOutputs, Mode};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Point, Scene, Source};
+use hapterra_core::scene::{HipCommand, Scene, Source};
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::{ResetCause, Status};
@@ -26,7 +26,7 @@ use super::host::{Host, Tiles};
 use super::hostile;
 use super::kind::Kind;
 use super::pipe::Unkind;
-use super::tally::{Outcome, Tally};
+use super::tally::{LinkStats, Outcome};
 use super::watch::{Truth, Watch};
 use crate::chance::Chance;
 
@@ -64,7 +64,12 @@ pub struct Violation {
 ///
 /// # Errors
 /// The first [`Violation`].
-pub fn run(seed: u64, segment: u64, ground: Ground, tally: &mut Tally) -> Result<(), Violation> {
+pub fn run(
+    seed: u64,
+    segment: u64,
+    ground: Ground,
+    tally: &mut LinkStats,
+) -> Result<(), Violation> {
     let mut chance = Chance::new(seed ^ segment.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let raster = terrain(&mut chance);
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
@@ -73,7 +78,7 @@ pub fn run(seed: u64, segment: u64, ground: Ground, tally: &mut Tally) -> Result
     let materials = effects
         .as_ref()
         .and_then(|effects| effects.materials(&raster, SAMPLES));
-    let grid = FeltGrid::new(&raster, FeltCells::default()).with_materials(materials.as_ref());
+    let grid = HapticGrid::new(&raster, HapticCells::default()).with_materials(materials.as_ref());
     let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
     let mut stretch = Stretch::new(&terrain, effects, chance);
     let played = stretch.play(tally);
@@ -131,7 +136,7 @@ struct Stretch<'t> {
     dead_man: bool,
     /// What the current monitors read a tick ago, mA.
     measured_ma: [i16; 3],
-    drive: Drive,
+    drive: GuardOutputs,
     now: u64,
     /// Ticks with the amplifiers on.
     armed: u64,
@@ -163,13 +168,13 @@ impl<'t> Stretch<'t> {
             zero: [0; 3],
             dead_man: false,
             measured_ma: [0; 3],
-            drive: Drive::default(),
+            drive: GuardOutputs::default(),
             now: 0,
             armed: 0,
         }
     }
 
-    fn play(&mut self, tally: &mut Tally) -> Result<(), String> {
+    fn play(&mut self, tally: &mut LinkStats) -> Result<(), String> {
         let mut deck = Kind::ALL;
         for left in (1..deck.len()).rev() {
             deck.swap(left, self.chance.below(left + 1));
@@ -249,7 +254,7 @@ impl<'t> Stretch<'t> {
             Kind::ReplayThenRun if left > 1 && at.is_multiple_of(3) => {
                 let hip = GridPoint::new(self.scene.home.cell(), Vec3::splat(0.5));
                 let seq = at as u32;
-                self.say(&ToDevice::Point(Point { seq, hip }));
+                self.say(&ToDevice::Hip(HipCommand { seq, hip }));
             }
             Kind::HostileCalibration if at == 30 => self.host.request(Request::Disarm),
             // The force has gone out.
@@ -385,7 +390,7 @@ impl<'t> Stretch<'t> {
     fn tick_in(&mut self, mood: Mood, mishap: Option<&mut Mishap>) -> Result<(), String> {
         self.arm
             .break_amplifier(mishap.as_ref().and_then(|mishap| mishap.amplifier()));
-        let mut sense = Sense {
+        let mut sense = GuardInputs {
             counts: self.arm.counts(),
             dead_man: self.dead_man,
             emergency_stop: false,
@@ -433,7 +438,7 @@ impl<'t> Stretch<'t> {
     }
 
     /// Lets the core do what it does in a tick; returns the length of what it said.
-    fn run_core(&mut self, core: Core, sense: Sense, stalls: bool, said: &mut [u8]) -> usize {
+    fn run_core(&mut self, core: Core, sense: GuardInputs, stalls: bool, said: &mut [u8]) -> usize {
         match core {
             Core::Runs if stalls => self.drive = self.device.tick_alone(sense),
             Core::Runs => {
@@ -445,16 +450,16 @@ impl<'t> Stretch<'t> {
             }
             // The last command stays.
             Core::Halted => {}
-            Core::Down => self.drive = Drive::default(),
+            Core::Down => self.drive = GuardOutputs::default(),
             Core::Resets(cause) => {
                 self.reset(cause);
-                self.drive = Drive::default();
+                self.drive = GuardOutputs::default();
             }
         }
         0
     }
 
-    fn look(&mut self, core: Core, sense: &Sense) -> Result<(), String> {
+    fn look(&mut self, core: Core, sense: &GuardInputs) -> Result<(), String> {
         if let Some(error) = self.host.failed.take() {
             return Err(format!("the link broke: {error}"));
         }
@@ -501,10 +506,10 @@ fn scene(
     let law = match effects {
         // Another scene each time.
         Some(effects) => effects.law(0.5 + stiffness_n_per_mm),
-        None => ForceLaw {
+        None => SurfaceParams {
             stiffness_n_per_mm,
             max_force_n: 8.5,
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         },
     };
     let home = terrain.scale().to_grid(arm.home_mm()).expect("in range");

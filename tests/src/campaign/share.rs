@@ -1,7 +1,7 @@
 //! The share of a scene's force that is let through, by the modes and limits that the device reports.
 
 use hapterra_core::guard::{Limits, Mode};
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 /// What a ramp adds in a tick of a millisecond: 2 s after arming, 0.1 s and 0.5 s of the clutch.
 const RAMPS: f32 = 1.0 / 2_000.0;
@@ -50,7 +50,7 @@ impl Share {
 
     /// Takes the sample that follows on `last`; none where samples between are missing. Returns the
     /// shares of the force, where they are known and follow what is asked for.
-    pub fn of(&mut self, last: Option<&Sample>, sample: &Sample) -> Option<Shares> {
+    pub fn of(&mut self, last: Option<&TickRecord>, sample: &TickRecord) -> Option<Shares> {
         self.ramp = match (last.map(|last| last.mode), sample.mode) {
             (_, Mode::Armed) => Some(1.0),
             (Some(Mode::Confirming), Mode::Ramping) => Some(RAMPS),

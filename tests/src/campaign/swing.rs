@@ -5,7 +5,7 @@ use hapterra_core::Vec3;
 /// How far it goes, mm; what is less is an encoder's count or two, or the hand's tremor.
 const FAR_MM: f32 = 0.3;
 /// Most turns back in so many ticks. Tremor of 11.2 Hz turns six times in 0.25 s.
-pub const MOST_TURNS: usize = 10;
+pub const MAX_TURNS: usize = 10;
 const TICKS: u32 = 250;
 
 /// Watches the tip along the force.

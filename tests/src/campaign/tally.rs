@@ -34,7 +34,7 @@ struct Row {
 
 /// All of a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tally {
+pub struct LinkStats {
     rows: Rows<Kind, Row>,
     /// Ticks run.
     pub ticks: u64,
@@ -44,7 +44,7 @@ pub struct Tally {
     pub extremes: Extremes,
 }
 
-impl Tally {
+impl LinkStats {
     /// Counts a mishap.
     ///
     /// # Errors

@@ -9,9 +9,9 @@
 
 use hapterra::phantom::{Encoder, PhantomModel};
 use hapterra_core::Vec3;
-use hapterra_core::guard::{Drive, Mode, Sense, WORKING_SHARE};
+use hapterra_core::guard::{GuardInputs, GuardOutputs, Mode, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use super::extremes::{Extremes, Misled, OFF_COUNTS};
 use super::levers::{Levers, torques_nm};
@@ -25,7 +25,7 @@ const HOTTEST_C: f64 = 112.0;
 /// and the device's model are not the same formula.
 const COLDER_K: f64 = 1.0;
 /// What is created beyond this is forgotten, mJ (docs/explanation/effects.md).
-const MOST_CREATED_MJ: f32 = 2.0;
+const MAX_CREATED_MJ: f32 = 2.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
 
@@ -44,7 +44,7 @@ pub struct Truth {
 pub struct Watch {
     record: Calibration,
     model: PhantomModel,
-    last: Option<Sample>,
+    last: Option<TickRecord>,
     /// Whether the host has asked to hold outputs with the amplifiers off.
     pub may_hold: bool,
     /// The largest so far.
@@ -71,8 +71,8 @@ impl Watch {
     /// What must not be.
     pub fn drive(
         &mut self,
-        drive: &Drive,
-        sense: &Sense,
+        drive: &GuardOutputs,
+        sense: &GuardInputs,
         zero: [i32; 3],
         truth: &Truth,
     ) -> Result<(), String> {
@@ -97,7 +97,7 @@ impl Watch {
     ///
     /// # Errors
     /// What must not be.
-    pub fn held(&mut self, drive: &Drive, truth: &Truth) -> Result<(), String> {
+    pub fn held(&mut self, drive: &GuardOutputs, truth: &Truth) -> Result<(), String> {
         self.outputs(drive, truth)?;
         let currents = drive.currents_a.to_array().map(f64::from);
         let torque = torques_nm(&self.model, currents);
@@ -122,7 +122,7 @@ impl Watch {
     }
 
     /// What holds of the outputs whatever the inputs say.
-    fn outputs(&mut self, drive: &Drive, truth: &Truth) -> Result<(), String> {
+    fn outputs(&mut self, drive: &GuardOutputs, truth: &Truth) -> Result<(), String> {
         let currents = drive.currents_a;
         let largest = currents.abs().max_element();
         if !currents.is_finite() {
@@ -206,7 +206,7 @@ impl Watch {
     ///
     /// # Errors
     /// What must not be.
-    pub fn sample(&mut self, sample: &Sample, law_n: f32) -> Result<(), String> {
+    pub fn sample(&mut self, sample: &TickRecord, law_n: f32) -> Result<(), String> {
         let force = sample.force_n.length();
         if !force.is_finite() {
             return Err(format!("a force is not a number: {sample:?}"));
@@ -243,7 +243,7 @@ impl Watch {
     /// Where it is none, or more than is kept.
     pub fn created(&mut self, mj: f32) -> Result<(), String> {
         self.extremes.created_mj = self.extremes.created_mj.max(mj);
-        match (0.0..=MOST_CREATED_MJ).contains(&mj) {
+        match (0.0..=MAX_CREATED_MJ).contains(&mj) {
             true => Ok(()),
             false => Err(format!("{mj} mJ are to be taken back")),
         }

@@ -60,7 +60,7 @@ impl Account {
                 let ticks = telemetry.samples.iter().map(|sample| sample.tick);
                 self.ticks.entry(session).or_default().extend(ticks);
             }
-            ToHost::Alive { count, .. } | ToHost::Goodbye(count) => self.raise(session, count),
+            ToHost::Heartbeat { count, .. } | ToHost::Goodbye(count) => self.raise(session, count),
             ToHost::Hello(device) => {
                 self.raise(device.last.session, device.last.count);
                 self.greetings.push((session, device));

@@ -1,6 +1,6 @@
 //! Looks at every tick of a run, and at what the host is told.
 
-use hapterra::link::Tally;
+use hapterra::link::LinkStats;
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::account::{Account, asks_to_arm};
@@ -133,7 +133,7 @@ impl Judge {
     }
 
     /// The host's account of its sessions against the device's.
-    pub(super) fn count(&self, tally: &Tally, sessions: &[u32]) -> Result<(), Wrong> {
+    pub(super) fn count(&self, tally: &LinkStats, sessions: &[u32]) -> Result<(), Wrong> {
         let counted = (tally.samples + tally.lost, tally.dropped);
         let made = self.account.of(sessions);
         match counted == made || tally.uncertain > 0 {

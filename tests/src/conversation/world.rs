@@ -3,10 +3,10 @@
 
 use std::time::Duration;
 
-use hapterra::link::{Arming, Ask, Client, Event, LinkError, Patience, State};
+use hapterra::link::{Arming, Ask, Client, Event, LinkError, State, Timeouts};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::force::ForceLaw;
-use hapterra_core::guard::{Mode, Sense};
+use hapterra_core::force::SurfaceParams;
+use hapterra_core::guard::{GuardInputs, Mode};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Scene, Source, View};
 use hapterra_core::wire::request::Request;
@@ -121,7 +121,7 @@ pub fn check(plan: &Plan) -> Result<Report, Wrong> {
     let scene = Scene {
         hold_clock: false,
         materials: None,
-        ..terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home)
+        ..terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home)
     };
     World::new(&terrain, scene, plan).play(plan)
 }
@@ -296,9 +296,9 @@ impl<'t> World<'t> {
         }
         // Whoever holds the switch presses it until something is driven, and then on.
         let dead_man = self.enabled || self.now % 300 > 60;
-        let sense = Sense {
+        let sense = GuardInputs {
             dead_man,
-            ..Sense::default()
+            ..GuardInputs::default()
         };
         self.enabled = self.device.tick(sense).enabled;
         self.device_ticks += 1;
@@ -492,9 +492,9 @@ impl<'t> World<'t> {
 }
 
 fn host<'t>(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Client<'t> {
-    let patience = Patience {
+    let patience = Timeouts {
         silence_s: SILENCE_S,
-        ..Patience::REAL_TIME
+        ..Timeouts::REAL_TIME
     };
     let arming = Some(Arming::VIRTUAL);
     Client::numbered(terrain, scene, arming, patience, seed)

@@ -2,7 +2,7 @@
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Material, MaterialTable};
-use hapterra_core::terrain::{POSTS, Tile};
+use hapterra_core::terrain::{TILE_SAMPLES, Tile};
 
 use super::bytes::Bytes;
 use super::tick::texture;
@@ -32,7 +32,7 @@ fn material(bytes: &mut Bytes<'_>) -> Material {
             0 => Friction::NONE,
             _ => friction,
         },
-        damping_ns_per_m: share(bytes.byte()) * Damping::MOST_NS_PER_M,
+        damping_ns_per_m: share(bytes.byte()) * Damping::MAX_NS_PER_M,
         texture: texture(bytes),
     }
 }
@@ -45,12 +45,12 @@ pub(super) fn lay(tile: &mut Tile, table: &MaterialTable, bytes: &mut Bytes<'_>)
         0 => MaterialTable::MOST,
         _ => table.materials().len(),
     };
-    let samples = POSTS * POSTS - usize::from(kind & 12 == 12);
+    let samples = TILE_SAMPLES * TILE_SAMPLES - usize::from(kind & 12 == 12);
     let classes: Vec<u8> = (0..5).map(|_| bytes.byte()).collect();
     let most = match kind & 16 {
         0 => 16,
         _ => table.materials().len().clamp(1, 16) as u8,
     };
-    let class = |i: usize| classes[(i % POSTS / 4 + i / POSTS / 4) % 5] % most;
+    let class = |i: usize| classes[(i % TILE_SAMPLES / 4 + i / TILE_SAMPLES / 4) % 5] % most;
     let _ = tile.set_materials(count, (0..samples).map(class));
 }

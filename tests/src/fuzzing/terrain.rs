@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use heightfield::{BadRaster, OpenOptions, PngChannel, Raster, RawLayout, SampleType};
+use heightfield::{OpenOptions, PngChannel, Raster, RasterError, RawLayout, SampleType};
 
 use super::bytes::Bytes;
 
@@ -77,7 +77,9 @@ fn open(path: &Path, how: u8) -> bool {
             let told = error.to_string();
             assert!(!told.contains(char::is_control), "{told:?}");
             // A decoder of another's may panic; none of this project's may.
-            assert!(!matches!(error.fault(), BadRaster::DecoderFailed(name) if !is_anothers(name)));
+            assert!(
+                !matches!(error.fault(), RasterError::DecoderFailed(name) if !is_anothers(name))
+            );
             return false;
         }
     };

@@ -7,7 +7,7 @@ use std::path::Path;
 use hapterra::bringup::Log;
 use hapterra::calibrate;
 use hapterra::cli::options::surface::table::TableFile;
-use hapterra::replay::{FeltRows, RecordedColumns, Trajectory};
+use hapterra::replay::{RecordedColumns, RecordingRows, Trajectory};
 use hapterra::steering::command;
 
 /// Number of kinds.
@@ -50,7 +50,7 @@ fn read_recording(path: &Path) {
     if let Ok(rows) = Trajectory::open(path) {
         rows.take(MAX_ROWS).for_each(check);
     }
-    if let Ok(rows) = FeltRows::open(path) {
+    if let Ok(rows) = RecordingRows::open(path) {
         rows.take(MAX_ROWS).for_each(check);
     }
     if let Err(error) = RecordedColumns::read(path) {

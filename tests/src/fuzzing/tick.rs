@@ -4,13 +4,13 @@ use hapterra_core::Vec3;
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::{Friction, WORK_PER_TICK};
 use hapterra_core::force::{
-    Controller, Damping, ForceLaw, MaterialTable, Pattern, Shading, Texture,
+    Controller, Damping, MaterialTable, Pattern, Shading, SurfaceParams, Texture,
 };
 use hapterra_core::grid::{Cell, GridPoint, MAX_CELL};
-use hapterra_core::guard::{Fault, Sense};
-use hapterra_core::phantom::{Calibration, Mechanism};
+use hapterra_core::guard::{Fault, GuardInputs};
+use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Point, Scene, Source, View};
+use hapterra_core::scene::{HipCommand, Scene, Source, View};
 use hapterra_core::terrain::{CoarseTile, FieldSize, Tile, TileKey, Underlay};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
@@ -34,8 +34,8 @@ pub fn run(data: &[u8]) {
     let window = std::array::from_fn(|_| std::array::from_fn(|_| next()));
     let mut spare: Vec<&mut Tile> = (0..SPARES).map(|_| next()).collect();
     let mut haptics = Haptics::<SIDE>::new(window, TickRate::DEFAULT, None);
-    haptics.configure(Mechanism::new(&Calibration::PREMIUM_1_5).expect("a preset"));
-    let mut law = ForceLaw::PREMIUM;
+    haptics.configure(Kinematics::new(&Calibration::PREMIUM_1_5).expect("a preset"));
+    let mut law = SurfaceParams::PREMIUM;
     let mut table = MaterialTable::EMPTY;
     // Ticks since the scene was taken, where that is known.
     let mut ticks = Some(0);
@@ -116,7 +116,7 @@ pub fn run(data: &[u8]) {
                 let hip = position(&mut bytes);
                 spare.extend(
                     haptics
-                        .accept(Command::Point(Point { seq: 1, hip }))
+                        .accept(Command::Hip(HipCommand { seq: 1, hip }))
                         .ok()
                         .flatten(),
                 );
@@ -133,7 +133,7 @@ pub fn run(data: &[u8]) {
             i32::from(bytes.byte()),
             i32::from(bytes.byte()),
         ];
-        let sense = Sense {
+        let sense = GuardInputs {
             counts,
             dead_man: counts[2] % 2 == 0,
             emergency_stop: counts[1] == 255,
@@ -167,7 +167,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         underlay: None,
         cell_mm: 1.0,
         home: GridPoint::new([30, 30, 2], Vec3::ZERO),
-        law: ForceLaw::PREMIUM,
+        law: SurfaceParams::PREMIUM,
         source: if kind & 2 == 0 {
             Source::Points
         } else {
@@ -186,10 +186,10 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
     if kind & 8 != 0 {
         scene.cell_mm = bytes.float();
         scene.home = position(bytes);
-        scene.law = ForceLaw {
+        scene.law = SurfaceParams {
             stiffness_n_per_mm: bytes.float(),
             max_force_n: bytes.float(),
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
     }
     if kind & 16 != 0 {
@@ -203,7 +203,7 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
     }
     if kind & 32 != 0 {
         scene.law.damping = Damping {
-            ns_per_m: f32::from(bytes.byte()) / 255.0 * Damping::MOST_NS_PER_M,
+            ns_per_m: f32::from(bytes.byte()) / 255.0 * Damping::MAX_NS_PER_M,
             controller: Controller::On,
         };
     }
@@ -251,7 +251,7 @@ pub(super) fn texture(bytes: &mut Bytes<'_>) -> Texture {
     let wavelength_mm = [shortest, 1.0, 7.0, longest][usize::from(kind / 2 % 4)];
     Texture {
         pattern,
-        amplitude_mm: (share * wavelength_mm * Texture::STEEPEST).min(Texture::MOST_AMPLITUDE_MM),
+        amplitude_mm: (share * wavelength_mm * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM),
         wavelength_mm,
         direction_deg: f32::from(kind),
         seed: u32::from(kind),
@@ -287,7 +287,7 @@ fn position(bytes: &mut Bytes<'_>) -> GridPoint {
 ///
 /// # Panics
 /// When no tick may give that.
-pub fn look(outcome: &Outcome, law: &ForceLaw) {
+pub fn look(outcome: &Outcome, law: &SurfaceParams) {
     let (sample, drive) = (&outcome.sample, &outcome.drive);
     let force = sample.force_n.as_dvec3().length();
     // A limit smaller than any normal number is kept to no more than that.

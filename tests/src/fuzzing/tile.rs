@@ -2,7 +2,7 @@
 
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
-use hapterra_core::terrain::{BadTile, POSTS, Tile, TileKey};
+use hapterra_core::terrain::{TILE_SAMPLES, Tile, TileError, TileKey};
 
 use super::bytes::Bytes;
 
@@ -18,7 +18,7 @@ pub fn run(data: &[u8]) {
         Ok(()) => assert_eq!(tile.key(), Some(KEY)),
         Err(error) => {
             assert!(
-                matches!(error, BadTile::Packed | BadTile::Step),
+                matches!(error, TileError::Packed | TileError::Step),
                 "{error:?}"
             );
             assert_eq!(tile.key(), None);
@@ -62,7 +62,7 @@ fn packed(bytes: &mut Bytes<'_>, tile: &mut Tile) {
 
 /// All samples of a tile, some of them more than once.
 fn bits(tile: &Tile) -> Vec<[u32; 4]> {
-    let cells = POSTS as i32 - 1;
+    let cells = TILE_SAMPLES as i32 - 1;
     let corners = |i: i32| tile.corners(Cell::new(i % cells, i / cells));
     let all = (0..cells * cells).map(corners);
     all.map(|corners| corners.map(f32::to_bits)).collect()

@@ -1,8 +1,8 @@
 //! Arbitrary bytes into the frame decoder and the device's end of the link.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::{Fault, Sense};
+use hapterra_core::guard::{Fault, GuardInputs};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
@@ -69,10 +69,10 @@ impl Wire {
                 2 => self.hear(&framed(&in_session(chunk))),
                 _ => self.device.link.interrupted(),
             }
-            let sense = Sense {
+            let sense = GuardInputs {
                 counts: [i32::from(kind), 0, 0],
                 dead_man: kind % 2 == 0,
-                ..Sense::default()
+                ..GuardInputs::default()
             };
             let drive = self.device.tick(sense);
             assert!(drive.currents_a.is_finite(), "{drive:?}");
@@ -104,7 +104,7 @@ impl Wire {
             let request = Request::ClearFault { seen: Some(fault) };
             self.hear(&message(&ToDevice::Request { number, request }));
         }
-        let _ = self.device.tick(Sense::default());
+        let _ = self.device.tick(GuardInputs::default());
         self.listen();
     }
 
@@ -116,7 +116,7 @@ impl Wire {
             if bytes.is_empty() {
                 return;
             }
-            let _ = self.device.tick(Sense::default());
+            let _ = self.device.tick(GuardInputs::default());
             self.listen();
         }
         panic!("the device does not take {} bytes", bytes.len());
@@ -216,7 +216,7 @@ pub fn scene() -> Scene {
         underlay: None,
         cell_mm: 1.0,
         home: GridPoint::default(),
-        law: ForceLaw::PREMIUM,
+        law: SurfaceParams::PREMIUM,
         source: Source::Points,
         hold_clock: false,
         materials: None,

@@ -2,7 +2,7 @@
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactOutput, ContactState};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 
 use super::surface::{distance, patches_at};
@@ -14,7 +14,7 @@ pub const ERROR: f64 = 2e-6;
 /// Stretches shorter than this, in cells, tell nothing about a fade.
 const SHORT: f64 = 1e-3;
 /// The law that turns displacements into forces, and the sizes of a cell it does so for.
-pub const LAW: ForceLaw = ForceLaw::PREMIUM;
+pub const LAW: SurfaceParams = SurfaceParams::PREMIUM;
 /// Millimetres of a cell.
 pub const CELLS_MM: [f32; 3] = [1e-3, 1.0, 1e3];
 

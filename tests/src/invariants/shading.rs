@@ -19,7 +19,7 @@ const ANGLE: f64 = 1e-3;
 /// A proxy so near to its patch's border may be on it, where patches meet.
 const BORDER: f64 = 1e-5;
 /// Most that a force is turned.
-const MOST_TURN: f64 = 60.0 / 45.0 * FRAC_PI_4;
+const MAX_TURN: f64 = 60.0 / 45.0 * FRAC_PI_4;
 /// Bend up to which the direction changes along a whole edge, and from which along a fifth.
 const GENTLE: f64 = FRAC_PI_4;
 const SHARP: f64 = 75.0 / 45.0 * FRAC_PI_4;
@@ -55,7 +55,7 @@ impl Judge<'_> {
         let normal = DVec3::new(-east, -north, 1.0);
         // The force is off its normal by as much as it is without shading.
         let allowed = ANGLE + angle(plain, normal);
-        let wanted = angle(normal, smoothed).min(MOST_TURN);
+        let wanted = angle(normal, smoothed).min(MAX_TURN);
         let left = (angle(normal, smoothed) - wanted).max(0.0);
         let off = angle(shaded, smoothed);
         if (off - left).abs() > allowed || shaded.dot(normal) < 0.0 {

@@ -3,7 +3,7 @@
 
 use hapterra::phantom::PhantomModel;
 use hapterra::terrain::Terrain;
-use hapterra_core::guard::{Drive, Sense};
+use hapterra_core::guard::{GuardInputs, GuardOutputs};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
@@ -29,7 +29,7 @@ pub struct Board<'t> {
     /// What the hand is up to.
     pub mood: Mood,
     /// What the amplifiers got in the last tick.
-    pub drive: Drive,
+    pub drive: GuardOutputs,
     /// Whether the device's time stands still while it waits for the host.
     pub lock_step: bool,
     /// Ticks so far, and those with the amplifiers on.
@@ -46,7 +46,7 @@ impl<'t> Board<'t> {
             watch: Watch::new(record, PhantomModel::premium_1_5()),
             dead_man: false,
             mood: Mood::Lifted,
-            drive: Drive::default(),
+            drive: GuardOutputs::default(),
             lock_step: false,
             ticks: [0; 2],
         }
@@ -61,7 +61,7 @@ impl<'t> Board<'t> {
     /// Restarts the device; the arm stays where it is.
     pub fn restart(&mut self) {
         self.device = start();
-        self.drive = Drive::default();
+        self.drive = GuardOutputs::default();
         self.watch.forget();
     }
 
@@ -92,11 +92,11 @@ impl<'t> Board<'t> {
             self.device.receive(&[]);
             return Ok(());
         }
-        let sense = Sense {
+        let sense = GuardInputs {
             counts: self.arm.counts(),
             dead_man: self.dead_man,
             emergency_stop: false,
-            ..Sense::default()
+            ..GuardInputs::default()
         };
         self.drive = self.device.tick(sense);
         let plant = self.arm.plant();

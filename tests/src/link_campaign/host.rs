@@ -5,10 +5,10 @@
 
 use std::time::Duration;
 
-use hapterra::link::{Ask, Client, Event, LinkError, Patience, State, Tally};
+use hapterra::link::{Ask, Client, Event, LinkError, LinkStats, State, Timeouts};
 use hapterra::terrain::Terrain;
 use hapterra_core::guard::{Mode, Report};
-use hapterra_core::scene::{Sample, Scene};
+use hapterra_core::scene::{Scene, TickRecord};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{SessionEnd, SessionNumber};
 
@@ -17,9 +17,9 @@ use crate::chance::Chance;
 /// For how many seconds the device lets an armed arm be while the host is silent: the
 /// least that there is.
 pub const SILENCE_S: u16 = 5;
-const PATIENCE: Patience = Patience {
+const PATIENCE: Timeouts = Timeouts {
     silence_s: SILENCE_S,
-    ..Patience::REAL_TIME
+    ..Timeouts::REAL_TIME
 };
 
 /// How a host came to its end.
@@ -56,7 +56,7 @@ pub struct Host<'t> {
     /// Where the device's guard stands, as its user sees it.
     pub view: Option<Report>,
     /// Samples that came since they were last taken.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<TickRecord>,
     /// How it ended.
     pub end: Option<End>,
 }
@@ -87,7 +87,7 @@ impl<'t> Host<'t> {
 
     /// The counts that its user is shown.
     #[must_use]
-    pub fn tally(&self) -> &Tally {
+    pub fn tally(&self) -> &LinkStats {
         self.client.tally()
     }
 

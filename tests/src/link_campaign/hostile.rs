@@ -2,11 +2,11 @@
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::Friction;
-use hapterra_core::force::{Controller, Damping, ForceLaw, Pattern, Shading, Texture};
+use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams, Texture};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Point, Sample, Scene, Source, View};
+use hapterra_core::scene::{HipCommand, Scene, Source, TickRecord, View};
 use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
 use hapterra_core::wire::materials::{MaterialScene, MaterialTile, TileMaterials};
@@ -98,13 +98,13 @@ fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
                 height: f32::NAN,
             },
         }),
-        5 => ToDevice::Point(Point {
+        5 => ToDevice::Hip(HipCommand {
             seq: chance.bits() as u32,
             hip: GridPoint::default(),
         }),
         6 => ToDevice::Status { number: 0 },
         7 => match chance.below(2) {
-            0 => ToDevice::Alive,
+            0 => ToDevice::Heartbeat,
             _ => ToDevice::View(View {
                 number: chance.bits() as u8,
                 scene: host_scene(chance, epoch),
@@ -136,7 +136,7 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
         underlay: None,
         cell_mm: [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5][chance.below(6)],
         home: GridPoint::default(),
-        law: ForceLaw {
+        law: SurfaceParams {
             stiffness_n_per_mm: [f32::NAN, -1.0, 1e30, 0.5][chance.below(4)],
             max_force_n: [f32::INFINITY, -8.0, 8.5][chance.below(3)],
             friction: Friction::coulomb([0.0, -1.0, f32::NAN][chance.below(3)]),
@@ -235,7 +235,7 @@ impl Behaviour {
         let epoch = scene.epoch;
         if greets && often && self != Self::GreetsOnly {
             let accepted = self != Self::RefusesScenes;
-            tell(ToHost::SceneTaken { epoch, accepted });
+            tell(ToHost::SceneAck { epoch, accepted });
         }
         match self {
             Self::Noise => return noise(chance, A_MILLISECOND),
@@ -244,7 +244,7 @@ impl Behaviour {
                 for _ in 0..20 {
                     let (level, row) = (chance.bits() as u8, chance.bits() as i32);
                     let key = TileKey::new(level, i32::MAX, row);
-                    tell(ToHost::Need { epoch, key });
+                    tell(ToHost::TileRequest { epoch, key });
                 }
             }
             Self::RefusesLate if now.is_multiple_of(100) => {
@@ -255,9 +255,9 @@ impl Behaviour {
                 tell(ToHost::Telemetry(Telemetry {
                     first: chance.bits() as u32,
                     dropped: chance.bits() as u32,
-                    samples: [Sample::default(); 8].into_iter().collect(),
+                    samples: [TickRecord::default(); 8].into_iter().collect(),
                 }));
-                tell(ToHost::Alive {
+                tell(ToHost::Heartbeat {
                     epoch: Some(epoch),
                     count: count(chance),
                     report: Report::default(),

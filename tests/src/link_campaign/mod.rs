@@ -41,7 +41,7 @@ use crate::campaign::Violation;
 use crate::chance::Chance;
 use fault::Kind;
 use stretch::Stretch;
-pub use tally::Tally;
+pub use tally::LinkStats;
 
 /// The seed that is used without being told another.
 pub const SEED: u64 = 1;
@@ -54,8 +54,12 @@ const CELL_MM: f64 = 0.5;
 ///
 /// # Errors
 /// The first [`Violation`].
-pub fn run(seed: u64, seconds: u64, done: &mut dyn FnMut(u64, &Tally)) -> Result<Tally, Violation> {
-    let mut tally = Tally::default();
+pub fn run(
+    seed: u64,
+    seconds: u64,
+    done: &mut dyn FnMut(u64, &LinkStats),
+) -> Result<LinkStats, Violation> {
+    let mut tally = LinkStats::default();
     let mut number = 0;
     while tally.ticks[0] < seconds * 1_000 {
         segment(seed, number, &mut tally)?;
@@ -70,7 +74,7 @@ pub fn run(seed: u64, seconds: u64, done: &mut dyn FnMut(u64, &Tally)) -> Result
 ///
 /// # Errors
 /// The first [`Violation`].
-pub fn segment(seed: u64, number: u64, tally: &mut Tally) -> Result<(), Violation> {
+pub fn segment(seed: u64, number: u64, tally: &mut LinkStats) -> Result<(), Violation> {
     let mut chance = Chance::new(seed ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let raster = terrain(&mut chance);
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");

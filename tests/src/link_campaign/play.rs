@@ -5,7 +5,7 @@ use super::fault::{Fault, Kind};
 use super::host::{End, SILENCE_S, Told};
 use super::impostor;
 use super::stretch::Stretch;
-use super::tally::{Outcome, Tally};
+use super::tally::{LinkStats, Outcome};
 use crate::campaign::arm::Mood;
 use hapterra_core::guard::Mode;
 
@@ -52,7 +52,7 @@ struct Plan {
 ///
 /// # Errors
 /// What must not be.
-pub fn run(stretch: &mut Stretch<'_>, kind: Kind, tally: &mut Tally) -> Result<(), String> {
+pub fn run(stretch: &mut Stretch<'_>, kind: Kind, tally: &mut LinkStats) -> Result<(), String> {
     if kind == Kind::HostileDevice {
         let outcome = impostor::meet(stretch)?;
         tally.count(kind, outcome);

@@ -2,12 +2,12 @@
 
 use super::fault::Kind;
 use super::surface::OFF_SURFACE;
-use super::tally::Tally;
+use super::tally::LinkStats;
 use crate::rows;
 
 /// The page of a campaign that ran with the source at `commit`.
 #[must_use]
-pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &Tally) -> String {
+pub fn page(commit: Option<&str>, seed: u64, seconds: u64, tally: &LinkStats) -> String {
     let at = &tally.extremes;
     let commit = commit.map_or(String::new(), |commit| format!(" at commit {commit}"));
     let [ticks, armed] = tally.ticks.map(|ticks| ticks / 1_000);

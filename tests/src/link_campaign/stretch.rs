@@ -2,7 +2,7 @@
 //! other end, millisecond by millisecond.
 
 use hapterra::terrain::Terrain;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::wire::session::SessionEnd;
 
@@ -304,10 +304,10 @@ impl<'t> Stretch<'t> {
 
 /// A scene like no other before.
 fn scene(terrain: &Terrain<'_>, board: &Board<'_>, chance: &mut Chance) -> Scene {
-    let law = ForceLaw {
+    let law = SurfaceParams {
         stiffness_n_per_mm: chance.between(0.3, 0.8) as f32,
         max_force_n: 8.5,
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     };
     let home = terrain.scale().to_grid(board.home_mm()).expect("in range");
     Scene {

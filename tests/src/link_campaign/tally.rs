@@ -29,7 +29,7 @@ struct Row {
 
 /// All of a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tally {
+pub struct LinkStats {
     rows: Rows<Kind, Row>,
     /// Ticks of devices run, and those with the amplifiers on.
     pub ticks: [u64; 2],
@@ -41,7 +41,7 @@ pub struct Tally {
     pub extremes: Extremes,
 }
 
-impl Tally {
+impl LinkStats {
     /// Counts a run.
     pub fn count(&mut self, kind: Kind, outcome: Outcome) {
         let row = self.rows.of(kind);

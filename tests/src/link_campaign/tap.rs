@@ -100,12 +100,12 @@ impl Tap {
                 let ticks = telemetry.samples.iter().map(|sample| sample.tick);
                 ticks.for_each(|tick| self.on_sample(tick, when.ticks));
             }
-            ToHost::Need { key, .. } => {
+            ToHost::TileRequest { key, .. } => {
                 let before = self.requested.insert(*key, when.now);
                 let early = before.is_some_and(|before| when.now < before + EARLY);
                 self.early += u32::from(when.flows && early);
             }
-            ToHost::SceneTaken { accepted: true, .. } => {
+            ToHost::SceneAck { accepted: true, .. } => {
                 self.taken.get_or_insert(when.ticks);
             }
             _ => {}
@@ -137,7 +137,7 @@ fn length((first, last): (u32, u32)) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hapterra_core::scene::Sample;
+    use hapterra_core::scene::TickRecord;
     use hapterra_core::wire::message::Telemetry;
 
     #[test]
@@ -149,16 +149,16 @@ mod tests {
             tap.on_message(&message, &Moment { now, ticks, flows });
         };
         let samples = |from: u32| {
-            let sample = |tick| Sample {
+            let sample = |tick| TickRecord {
                 tick,
-                ..Sample::default()
+                ..TickRecord::default()
             };
             ToHost::Telemetry(Telemetry {
                 samples: (from..from + 8).map(sample).collect(),
                 ..Telemetry::default()
             })
         };
-        let taken = || ToHost::SceneTaken {
+        let taken = || ToHost::SceneAck {
             epoch: 7,
             accepted: true,
         };

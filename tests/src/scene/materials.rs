@@ -1,7 +1,7 @@
 //! Materials of a scene, drawn at random: a table, and the class of each sample.
 
 use hapterra_core::contact::Friction;
-use hapterra_core::force::{Damping, ForceLaw, Material, MaterialTable, Texture};
+use hapterra_core::force::{Damping, Material, MaterialTable, SurfaceParams, Texture};
 
 use super::run::{friction, texture};
 use super::symmetry::Symmetry;
@@ -46,7 +46,7 @@ pub struct Materials {
     /// How the classes lie.
     pub layout: Layout,
     /// The scene's own law: a limit, and a stiffness that is the default's or a multiple.
-    pub law: ForceLaw,
+    pub law: SurfaceParams,
     /// Millimetres a cell: a power of two, so that lengths in cells are exact.
     pub cell_mm: f32,
     /// Samples each way.
@@ -85,10 +85,10 @@ impl Materials {
         }
         let layout = LAYOUTS[chance.below(LAYOUTS.len())];
         let scale = [1.0, 1.0, 0.5, 3.0][chance.below(4)];
-        let law = ForceLaw {
+        let law = SurfaceParams {
             stiffness_n_per_mm: table[0].stiffness_n_per_mm * scale,
             max_force_n: [8.5, 8.5, 1.0, 1e4][chance.below(4)],
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
         let mut materials = Self {
             table,
@@ -110,9 +110,9 @@ impl Materials {
         let mut materials = Self {
             table: table.to_vec(),
             layout: Layout::Each,
-            law: ForceLaw {
+            law: SurfaceParams {
                 stiffness_n_per_mm: table[0].stiffness_n_per_mm,
-                ..ForceLaw::PREMIUM
+                ..SurfaceParams::PREMIUM
             },
             cell_mm: 1.0,
             size: size.map(|patches| patches + 1),
@@ -204,7 +204,7 @@ fn material(chance: &mut Chance, before: Option<&Material>) -> Material {
             _ => 10_f64.powf(chance.between(-2.0, 0.7)) as f32,
         },
         friction: Friction::NONE,
-        damping_ns_per_m: [0.0, 0.0, 0.0, 1.0, 5.0, Damping::MOST_NS_PER_M][chance.below(6)],
+        damping_ns_per_m: [0.0, 0.0, 0.0, 1.0, 5.0, Damping::MAX_NS_PER_M][chance.below(6)],
         texture: [own, own, own, shared][chance.below(4)],
     }
 }

@@ -5,7 +5,7 @@
 //! scene can be replayed: also those whose tiles are pulled, late and in parts.
 
 use crate::scene::run::Execution;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene as SceneMessage, Source};
 use hapterra_core::terrain::FieldSize;
@@ -80,11 +80,11 @@ impl Recorded {
             underlay: None,
             cell_mm: 1.0,
             home: GridPoint::default(),
-            law: ForceLaw {
+            law: SurfaceParams {
                 friction: scene.friction,
                 shading: scene.shading,
                 texture: scene.texture,
-                ..ForceLaw::PREMIUM
+                ..SurfaceParams::PREMIUM
             },
             source: Source::Points,
             hold_clock: false,

@@ -1,11 +1,11 @@
 //! A scene on materials, felt by the product's whole loop: points go in, samples come out.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::Sense;
+use hapterra_core::guard::GuardInputs;
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{Point, Sample, Scene as SceneMessage, Source};
-use hapterra_core::terrain::{FieldSize, POSTS, Tile, TileDemand, TileKey, TileRequester};
+use hapterra_core::scene::{HipCommand, Scene as SceneMessage, Source, TickRecord};
+use hapterra_core::terrain::{FieldSize, RequestHint, TILE_SAMPLES, Tile, TileKey, TileRequester};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
 use super::materials::Materials;
@@ -28,7 +28,7 @@ pub struct Replied {
     /// The proxy there.
     pub proxy: [f64; 3],
     /// What the loop told of the tick that answered it.
-    pub sample: Sample,
+    pub sample: TickRecord,
 }
 
 /// Where and how a scene is replayed.
@@ -174,10 +174,10 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
         })
         .expect("the base is in range");
         let class = |i: usize| {
-            let (col, row) = (i % POSTS, i / POSTS);
+            let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
             self.materials.class(x + col as i32, y + row as i32)
         };
-        let classes = (0..POSTS * POSTS).map(class);
+        let classes = (0..TILE_SAMPLES * TILE_SAMPLES).map(class);
         tile.set_materials(self.materials.table.len(), classes)
             .expect("of the table");
         self.events.push(Event::Tile(key));
@@ -188,19 +188,19 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
     }
 
     /// One point: ticks until it is answered, or `None`.
-    fn feel(&mut self, hip: GridPoint) -> Option<Sample> {
+    fn feel(&mut self, hip: GridPoint) -> Option<TickRecord> {
         let seq = self.seq;
         self.seq += 1;
-        let _ = self.haptics.accept(Command::Point(Point { seq, hip }));
+        let _ = self.haptics.accept(Command::Hip(HipCommand { seq, hip }));
         let mut work = 0;
         for _ in 0..PATIENCE {
-            let outcome = self.haptics.tick(&Sense::default(), true);
+            let outcome = self.haptics.tick(&GuardInputs::default(), true);
             self.note(hip, &outcome);
             work = outcome.sample.work.max(work);
             self.now += 1;
             self.supply(&outcome.sample);
             if outcome.answers == Some(seq) {
-                return Some(Sample {
+                return Some(TickRecord {
                     work,
                     ..outcome.sample
                 });
@@ -210,7 +210,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
     }
 
     fn note(&mut self, hip: GridPoint, outcome: &Outcome) {
-        let Sample {
+        let TickRecord {
             state,
             work,
             force_n,
@@ -230,11 +230,11 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
     }
 
     /// Asks for what the tick showed to be wanted, and takes what has come.
-    fn supply(&mut self, sample: &Sample) {
+    fn supply(&mut self, sample: &TickRecord) {
         let Supply::Pulled { latency } = self.replay.supply else {
             return;
         };
-        let demand = TileDemand {
+        let demand = RequestHint {
             missing_tile: sample.missing_tile,
             proxy: sample.proxy.column(),
             hip: sample.hip.column(),
@@ -267,7 +267,7 @@ fn message(scene: &Scene, materials: &Materials, shift: [i32; 3]) -> SceneMessag
         underlay: None,
         cell_mm: materials.cell_mm,
         home: GridPoint::default(),
-        law: ForceLaw {
+        law: SurfaceParams {
             shading: scene.shading,
             ..materials.law
         },

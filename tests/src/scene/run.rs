@@ -121,7 +121,7 @@ pub(super) fn texture(mixed: u64) -> Texture {
         return Texture::NONE;
     }
     let wavelength_mm = [0.25, 0.5, 1.0, 1.7, 8.0, 32.0, 100.0][chance.below(7)];
-    let most_mm = (wavelength_mm * Texture::STEEPEST).min(Texture::MOST_AMPLITUDE_MM);
+    let most_mm = (wavelength_mm * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
     Texture {
         pattern,
         amplitude_mm: most_mm * [0.02, 0.4, 1.0][chance.below(3)],

@@ -3,7 +3,7 @@
 use hapterra_core::contact::{Contact, ContactOutput};
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::{
-    FieldSize, IN_FLIGHT, TILE_CELLS, Tile, TileDemand, TileKey, TileRequester, Window,
+    FieldSize, IN_FLIGHT, RequestHint, TILE_CELLS, Tile, TileKey, TileRequester, Window,
 };
 
 use super::terrain::Terrain;
@@ -131,7 +131,7 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
         let Supply::Pulled { latency } = self.supply else {
             return;
         };
-        let focus = TileDemand {
+        let focus = RequestHint {
             missing_tile: felt.missing_tile,
             proxy: felt.proxy.column(),
             hip: hip.column(),

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use tally::{Broken, Found, MostWork, Tally};
+pub use tally::{Broken, Found, LinkStats, MostWork};
 
 use crate::scene::run::{Scene, Surface};
 use crate::scene::supply::Buffers;
@@ -36,11 +36,11 @@ pub fn soak(
     first: u64,
     until: Until,
     threads: usize,
-    mut live: impl FnMut(&Tally),
-) -> Tally {
+    mut live: impl FnMut(&LinkStats),
+) -> LinkStats {
     let began = Instant::now();
     let next = AtomicU64::new(first);
-    let tally = Mutex::new(Tally::default());
+    let tally = Mutex::new(LinkStats::default());
     let is_over = |number: u64| match until {
         Until::Time(time) => began.elapsed() >= time,
         Until::Scenes(scenes) => number >= first + scenes,

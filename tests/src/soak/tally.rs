@@ -42,7 +42,7 @@ pub struct MostWork {
 
 /// All scenes so far.
 #[derive(Clone, Debug, Default)]
-pub struct Tally {
+pub struct LinkStats {
     /// Scenes run.
     pub scenes: u64,
     /// Violations.
@@ -53,7 +53,7 @@ pub struct Tally {
     by_invariant: BTreeMap<String, u64>,
 }
 
-impl Tally {
+impl LinkStats {
     /// One more scene.
     pub fn add(&mut self, number: u64, found: Found) {
         self.scenes += 1;
@@ -96,7 +96,7 @@ impl Tally {
     }
 }
 
-impl fmt::Display for Tally {
+impl fmt::Display for LinkStats {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,

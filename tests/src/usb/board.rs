@@ -17,7 +17,7 @@ use hapterra_core::wire::hello::SerialNumber;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::amplifier::CURRENT_LOOP_US;
 use hapterra_firmware::app::{Application, Hardware, TileBuffers, WorkingMemory, assemble};
-use hapterra_firmware::board::Sense;
+use hapterra_firmware::board::GuardInputs;
 use hapterra_firmware::haptic_loop::HapticLoop;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
@@ -115,9 +115,9 @@ impl Board {
 
     /// Sets the encoders' counts.
     pub fn feed_encoders(&mut self, counts: [i32; 3]) {
-        *self.haptic_loop.encoders_mut() = VirtualEncoders(Sense {
+        *self.haptic_loop.encoders_mut() = VirtualEncoders(GuardInputs {
             counts,
-            ..Sense::default()
+            ..GuardInputs::default()
         });
     }
 

@@ -4,13 +4,13 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Arming, Event, Native, Patience, Session};
+use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
 use hapterra::terrain::{Scale, Terrain};
-use hapterra_core::force::ForceLaw;
-use hapterra_core::guard::{Drive, Report, Sense, WORKING_SHARE};
+use hapterra_core::force::SurfaceParams;
+use hapterra_core::guard::{GuardInputs, GuardOutputs, Report, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::native::StoppedClock;
@@ -26,9 +26,9 @@ pub(crate) const BEGIN: u64 = (1e3 * HeldPhantom::ARMED_S) as u64;
 pub(crate) const PRESSED: u64 = BEGIN + 1_500;
 
 /// What goes wrong, by tick.
-pub(crate) type Wrong = fn(u64, &mut Sense);
+pub(crate) type Wrong = fn(u64, &mut GuardInputs);
 /// What each tick was given and what it drove.
-pub(crate) type Log = Rc<RefCell<Vec<(Sense, Drive)>>>;
+pub(crate) type Log = Rc<RefCell<Vec<(GuardInputs, GuardOutputs)>>>;
 
 /// A device with an arm, a session with it, and all that was seen.
 pub(crate) struct Bed<'t> {
@@ -37,7 +37,7 @@ pub(crate) struct Bed<'t> {
     pub(crate) device: Rc<RefCell<Native>>,
     pub(crate) session: Option<Session<'t>>,
     pub(crate) log: Log,
-    pub(crate) samples: Vec<Sample>,
+    pub(crate) samples: Vec<TickRecord>,
     pub(crate) reports: Vec<Report>,
     pub(crate) answers: Vec<(Request, Result<(), Refusal>)>,
 }
@@ -67,11 +67,11 @@ impl<'t> Bed<'t> {
                     last.1 = *drive;
                 }
                 wrong(tick, sense);
-                seen.borrow_mut().push((*sense, Drive::default()));
+                seen.borrow_mut().push((*sense, GuardOutputs::default()));
             }),
         );
         let home = terrain.scale().to_grid(home_mm).expect("addressable");
-        let law = ForceLaw::PREMIUM;
+        let law = SurfaceParams::PREMIUM;
         Self {
             terrain,
             scene: terrain.scene(law, Source::Encoders, home),
@@ -86,7 +86,7 @@ impl<'t> Bed<'t> {
 
     pub(crate) fn open(&mut self, arming: Option<Arming>) {
         let link = Box::new(Shared(Rc::clone(&self.device)));
-        let (terrain, scene, patience) = (self.terrain, self.scene, Patience::EMULATED);
+        let (terrain, scene, patience) = (self.terrain, self.scene, Timeouts::EMULATED);
         let opened = Session::open(terrain, scene, arming, link, patience);
         self.session = Some(opened.expect("opened").0);
     }
@@ -119,7 +119,7 @@ impl<'t> Bed<'t> {
         self.session.as_mut().expect("open").request(request);
     }
 
-    pub(crate) fn sample(&self, tick: u64) -> &Sample {
+    pub(crate) fn sample(&self, tick: u64) -> &TickRecord {
         let index = usize::try_from(tick).expect("small") - 1;
         &self.samples[index]
     }
@@ -160,7 +160,7 @@ pub(crate) fn on_plane(raster: &Raster) -> Terrain<'_> {
 
 /// Comes down and presses for so many seconds.
 pub(crate) fn press_for(newtons: f64, seconds: f64) -> Touch<'static> {
-    let wall = f64::from(ForceLaw::PREMIUM.stiffness_n_per_mm);
+    let wall = f64::from(SurfaceParams::PREMIUM.stiffness_n_per_mm);
     let hand = HandModel::default();
     Touch::start(&|_, _| Some(PLANE_MM), &hand, wall, MIDDLE_MM, 10.0).press(newtons, seconds)
 }

@@ -3,13 +3,13 @@
 use hapterra::phantom::{HandModel, Touch};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::contact::ContactState;
-use hapterra_core::guard::{Drive, Limits, Mode, Sense};
+use hapterra_core::guard::{GuardInputs, GuardOutputs, Limits, Mode};
 use heightfield::Raster;
 
 use crate::bed::{Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, on_plane, plane, press};
 
 /// The largest change of the currents from one tick to the next, A.
-fn largest_step(log: &[(Sense, Drive)]) -> f32 {
+fn largest_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {
     let steps = log.windows(2).map(|pair| {
         let change = pair[1].1.currents_a - pair[0].1.currents_a;
         change.abs().max_element()

@@ -9,7 +9,7 @@ mod rates;
 use hapterra::phantom::Script;
 use hapterra_core::guard::{Blockers, Fault, Limits, Mode};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::status::{BootReport, ResetCause};
 use hapterra_firmware::store::Stored;
@@ -192,7 +192,7 @@ fn motors_that_work_hard_are_derated_and_stay_cool_enough() {
     let terrain = on_plane(&raster);
     let bed = Bed::new(&terrain, rub(5.0, 10), NOTHING).run(PRESSED + 40_000);
     bed.check_bounds();
-    let derated = |s: &&Sample| s.limits.contains(Limits::THERMAL_DERATED);
+    let derated = |s: &&TickRecord| s.limits.contains(Limits::THERMAL_DERATED);
     let first = bed.samples.iter().find(derated).expect("derated").tick;
     eprintln!("derated from {first} ms on");
     assert_eq!(bed.samples.last().and_then(|s| s.fault), None);
@@ -218,7 +218,7 @@ fn a_hurried_hand_gets_less_force_and_a_thrown_arm_none() {
     };
     let bed = Bed::new(&terrain, sweep(1_300.0), NOTHING).run(BEGIN + 3_000);
     bed.check_bounds();
-    let limited = |s: &&Sample| s.limits.contains(Limits::SPEED_LIMITED);
+    let limited = |s: &&TickRecord| s.limits.contains(Limits::SPEED_LIMITED);
     assert!(bed.samples.iter().filter(limited).count() > 20);
     assert_eq!(bed.samples.last().and_then(|s| s.fault), None);
     // An encoder that runs away evenly looks like an arm that was thrown.

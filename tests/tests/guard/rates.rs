@@ -1,10 +1,10 @@
 //! Other tick rates.
 
-use hapterra::link::{Arming, Event, Native, Patience, Session};
+use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{Fault, Mode};
-use hapterra_core::scene::{Sample, Source};
+use hapterra_core::scene::{Source, TickRecord};
 use hapterra_firmware::native::StoppedClock;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -33,12 +33,12 @@ fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {
         }),
     );
     let home = terrain.scale().to_grid(home_mm).expect("addressable");
-    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, home);
+    let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home);
     let (arming, link) = (Arming::VIRTUAL, Box::new(device));
-    let opened = Session::open(&terrain, scene, Some(arming), link, Patience::EMULATED);
+    let opened = Session::open(&terrain, scene, Some(arming), link, Timeouts::EMULATED);
     let (mut session, hello) = opened.expect("opened");
     assert_eq!(hello.tick_hz, 10_000);
-    let mut samples: Vec<Sample> = Vec::new();
+    let mut samples: Vec<TickRecord> = Vec::new();
     while samples.last().map_or(0, |last| u64::from(last.tick)) < released + 1_000 {
         let polled = session.poll(Duration::ZERO, &mut |event| {
             if let Event::Sample(sample) = event {

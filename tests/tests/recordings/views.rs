@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use hapterra::replay::settings::ViewSettings;
 use hapterra::replay::{Settings, Trajectory};
-use hapterra_core::contact::{LARGEST_PIECE, WORK_PER_TICK};
+use hapterra_core::contact::{MAX_PIECE, WORK_PER_TICK};
 use hapterra_tests::{UNCONTROLLED, hapterra_binary};
 
 use super::folder::{Folder, rows, said};
@@ -367,7 +367,7 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
                 (live.expect("a number") - again.expect("a number")).abs()
             };
             let work: u32 = live["work"].parse().expect("units");
-            assert!(work <= WORK_PER_TICK - LARGEST_PIECE, "{work} units");
+            assert!(work <= WORK_PER_TICK - MAX_PIECE, "{work} units");
             let proxy_mm = ["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"].map(apart);
             let off = proxy_mm.into_iter().fold(0.0, f64::max);
             assert!(off <= ROUNDING_MM, "{off} mm off at {} s", live["t_s"]);

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use hapterra::link::Native;
-use hapterra_core::guard::{Drive, Sense};
+use hapterra_core::guard::{GuardInputs, GuardOutputs};
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::served::{Served, command, command_over, signal};
 use hapterra_tests::stand_in;
@@ -143,7 +143,7 @@ impl Rest {
 
 /// An arm at rest over the terrain, whose user holds the dead-man switch once told to.
 fn device(is_on: Arc<AtomicBool>, is_pressed: Arc<AtomicBool>) -> Native {
-    let hand = move |_, sense: &mut Sense, drive: &Drive| {
+    let hand = move |_, sense: &mut GuardInputs, drive: &GuardOutputs| {
         is_on.store(drive.enabled, Ordering::Relaxed);
         sense.dead_man = is_pressed.load(Ordering::Relaxed);
     };

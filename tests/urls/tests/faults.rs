@@ -4,7 +4,7 @@ use hapterra_tests::timeouts::wait_for;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::has_gdal;
 use hapterra_url_tests::http::{Fault, Server};
-use heightfield::{BadRaster, OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, RasterError};
 
 const SIZE: [u32; 2] = [2500, 2100];
 
@@ -23,7 +23,7 @@ fn hills() -> (tempfile::TempDir, Server) {
 fn open(server: &Server, name: &str) -> Result<Raster, String> {
     let opened = Raster::open(server.url(name), &OpenOptions::default());
     opened.map_err(|error| match error.fault() {
-        BadRaster::Elsewhere(_) => error.to_string(),
+        RasterError::RemoteFetcher(_) => error.to_string(),
         other => panic!("{other:?}"),
     })
 }
@@ -58,7 +58,10 @@ fn what_it_never_answers_is_told_with_the_file_and_why() {
     drop(server);
     let nobody = "http://127.0.0.1:1/hills.tif";
     let error = Raster::open(nobody, &OpenOptions::default()).expect_err("nobody");
-    assert!(matches!(error.fault(), BadRaster::Elsewhere(_)), "{error}");
+    assert!(
+        matches!(error.fault(), RasterError::RemoteFetcher(_)),
+        "{error}"
+    );
     for (url, why) in [
         ("ftp://h/hills.tif", "ftp://"),
         ("https://h h/hills.tif", "cannot read what is there"),
@@ -151,7 +154,10 @@ fn what_did_not_come_is_told_before_anything_is_armed() {
         "{asked} requests to a server that does not answer"
     );
     let told = raster.check_came().expect_err("it did not come");
-    assert!(matches!(told.fault(), BadRaster::Elsewhere(_)), "{told}");
+    assert!(
+        matches!(told.fault(), RasterError::RemoteFetcher(_)),
+        "{told}"
+    );
     assert!(raster.check_came().is_ok(), "and nothing since");
 }
 

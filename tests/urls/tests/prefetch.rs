@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use hapterra::link::{Client, Patience};
+use hapterra::link::{Client, Timeouts};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::Vec3;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Source, View};
 use hapterra_core::terrain::TileKey;
@@ -90,8 +90,8 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let at = |east| GridPoint::new([east, 640, 100], Vec3::ZERO);
-    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Encoders, at(640));
-    let mut client = Client::numbered(&terrain, scene, None, Patience::REAL_TIME, 1);
+    let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, at(640));
+    let mut client = Client::numbered(&terrain, scene, None, Timeouts::REAL_TIME, 1);
     raster.stop_waiting();
     let before = requests(&server);
     server.hold(true);

@@ -12,7 +12,7 @@ use hapterra_tests::tiffs::{DATA, floats_in_a_strip, placed, tiff};
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::has_gdal;
 use hapterra_url_tests::http::{Fault, Server};
-use heightfield::{BadRaster, OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, RasterError};
 
 fn height(column: u32, row: u32) -> f32 {
     (column * 7 % 1000) as f32 + 0.25 * (row % 400) as f32
@@ -292,7 +292,7 @@ fn a_stac_at_a_url_is_refused_with_the_files_to_make_a_vrt_of() {
     let (_folder, _, server) = served("items.json", stac.as_bytes());
     let refused = Raster::open(server.url("items.json?key=a"), &OpenOptions::default());
     let error = refused.expect_err("a STAC");
-    let BadRaster::ToBuild { files, .. } = error.fault() else {
+    let RasterError::ToBuild { files, .. } = error.fault() else {
         panic!("{error}");
     };
     let west = format!("/vsicurl/{}", server.url("west.tif"));

@@ -5,10 +5,10 @@ use std::io;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Event, Native, Patience, Session, Transport};
+use hapterra::link::{Event, Native, Session, Timeouts, Transport};
 use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::Vec3;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::terrain::TileKey;
@@ -218,7 +218,7 @@ fn a_device_gets_its_tiles_when_they_have_come_and_no_holes_before() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let home = GridPoint::new([640, 640, 100], Vec3::ZERO);
-    let scene = terrain.scene(ForceLaw::PREMIUM, Source::Points, home);
+    let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Points, home);
     let mut device = Native::for_replay().restless();
     let is_mute = Rc::default();
     let line = Line {
@@ -228,7 +228,7 @@ fn a_device_gets_its_tiles_when_they_have_come_and_no_holes_before() {
     raster.stop_waiting();
     server.hold(true);
     let (mut session, _) =
-        Session::open(&terrain, scene, None, Box::new(line), Patience::REAL_TIME)
+        Session::open(&terrain, scene, None, Box::new(line), Timeouts::REAL_TIME)
             .expect("it does not wait for the server, either");
     let mut sent = 0;
     let mut look = |session: &mut Session<'_>| {

@@ -6,9 +6,9 @@ use super::{ON_TICK, Pace, Row, Tick, Ticks};
 
 /// The HIP may move on one straight line for so long, s: what is seen less often than every 2 s
 /// is not a hand's path.
-const LONGEST_MOVE_S: f64 = 2.0;
+const MAX_MOVE_S: f64 = 2.0;
 /// The HIP may rest between two rows for so long, s: beyond, another clock is likelier.
-const LONGEST_REST_S: f64 = 600.0;
+const MAX_REST_S: f64 = 600.0;
 
 /// A row with a time.
 #[derive(Clone, Copy, Debug)]
@@ -157,15 +157,15 @@ where
         let fault = match self.pace {
             _ if step < 0.0 => Some(TimeFault::Backwards { from, to }),
             Pace::Recorded => self.off_tick(from, to),
-            _ if step > LONGEST_REST_S => Some(TimeFault::Rest { from, to, step }),
-            _ if step > LONGEST_MOVE_S && !is_still => Some(TimeFault::Gap { from, to, step }),
+            _ if step > MAX_REST_S => Some(TimeFault::Rest { from, to, step }),
+            _ if step > MAX_MOVE_S && !is_still => Some(TimeFault::Gap { from, to, step }),
             _ => None,
         };
         if let Some(fault) = fault {
             return Err(self.mistimed(fault));
         }
         if self.pace == Pace::Recorded {
-            let is_gap = step > LONGEST_MOVE_S;
+            let is_gap = step > MAX_MOVE_S;
             self.counts.gaps += u64::from(is_gap);
             if is_gap || row.row.view != before.row.view {
                 return Ok(Next::Anew(row));

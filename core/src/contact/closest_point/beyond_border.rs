@@ -13,7 +13,7 @@ use crate::contact::tolerance::{
     BESIDE, COARSEST_RESOLUTION, EQUALLY_STEEP, LEAST_WAY, RESOLUTION, SLOPE_NOISE,
 };
 use crate::scalar::{larger, smaller};
-use crate::terrain::{Ground, Window};
+use crate::terrain::{CellContent, Window};
 
 /// Where downhill goes on from the closest point of a patch.
 pub(super) enum Onward {
@@ -210,13 +210,13 @@ impl Asking {
             budget.spend(SLOPE);
             let entry = start.at.across(side);
             let patch = match window.ground(entry.cell) {
-                Ground::Hole => continue,
+                CellContent::Hole => continue,
                 // It might be the better way: the proxy waits to know.
-                Ground::Missing => {
+                CellContent::Missing => {
                     budget.lacks(entry.cell);
                     return Err(Onward::Missing);
                 }
-                Ground::Patch(corners) => view.patch(&corners),
+                CellContent::Patch(corners) => view.patch(&corners),
             };
             let Some(steepness) = fall_into(&patch, view, &entry, side, start.here) else {
                 continue;
@@ -360,13 +360,13 @@ pub(super) fn to_steepest_patch<const D: usize>(
         }
         let point = before.0.across(side);
         let its_patch = match window.ground(point.cell) {
-            Ground::Hole => continue,
-            Ground::Missing => {
+            CellContent::Hole => continue,
+            CellContent::Missing => {
                 budget.lacks(point.cell);
                 (*at, *patch) = before;
                 return;
             }
-            Ground::Patch(corners) => view.patch(&corners),
+            CellContent::Patch(corners) => view.patch(&corners),
         };
         let steepness = {
             let hip = view.in_patch(point.cell);

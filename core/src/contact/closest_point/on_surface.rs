@@ -9,7 +9,7 @@ use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::HEIGHT_NOISE;
 use crate::grid::{Altitude, Cell, GridPoint};
-use crate::terrain::{Ground, Window};
+use crate::terrain::{CellContent, Window};
 
 /// Patches entered in a row without getting nearer to the HIP until the descent is
 /// taken to be at its end: up a wall rounding may send it to and fro.
@@ -166,9 +166,9 @@ impl Descent {
         // Not by `patch_at`: a call costs 20 instructions more.
         let cell = self.at.cell;
         let mut patch = match window.ground(cell) {
-            Ground::Patch(corners) => view.patch(&corners),
-            Ground::Hole => return Ended::Lost,
-            Ground::Missing => {
+            CellContent::Patch(corners) => view.patch(&corners),
+            CellContent::Hole => return Ended::Lost,
+            CellContent::Missing => {
                 budget.lacks(cell);
                 return Ended::Lost;
             }
@@ -309,8 +309,8 @@ fn patch_at<const D: usize>(
     point: &SurfacePoint,
 ) -> Option<Patch> {
     match window.ground(point.cell) {
-        Ground::Patch(corners) => Some(view.patch(&corners)),
-        Ground::Hole | Ground::Missing => None,
+        CellContent::Patch(corners) => Some(view.patch(&corners)),
+        CellContent::Hole | CellContent::Missing => None,
     }
 }
 
@@ -349,9 +349,9 @@ fn leads_off_beyond<const D: usize>(
     way: (f32, f32),
 ) -> bool {
     match window.ground(entered.cell) {
-        Ground::Patch(corners) => passes_over(&view.patch(&corners), entered, way),
+        CellContent::Patch(corners) => passes_over(&view.patch(&corners), entered, way),
         // At the border of the data the proxy is held; see `boundary_fade`.
-        Ground::Hole | Ground::Missing => false,
+        CellContent::Hole | CellContent::Missing => false,
     }
 }
 
@@ -373,13 +373,13 @@ pub(in crate::contact) fn position_on<const D: usize>(
     window: &Window<'_, D>,
     at: &SurfacePoint,
 ) -> Option<GridPoint> {
-    let Ground::Patch(corners) = window.ground(at.cell) else {
+    let CellContent::Patch(corners) = window.ground(at.cell) else {
         return None;
     };
     // Counted from a cell nearby: of a high place the fraction has no bits.
     let patch = Patch::new(corners.heights);
     let up = corners.base.saturating_add(patch.height(at.u, at.v) as i32);
-    let near = patch.seen_from(Altitude::new(up, 0.0), corners.base);
+    let near = patch.relative_to(Altitude::new(up, 0.0), corners.base);
     Some(at.position(up, near.height(at.u, at.v)))
 }
 

@@ -147,7 +147,7 @@ impl Excess {
 
 /// From a place to a point of the surface, eastward and northward, cells.
 fn view_from(from: &GridPoint, to: &SurfacePoint) -> (f32, f32) {
-    let from = from.seen_from([to.cell.x, to.cell.y, 0]);
+    let from = from.relative_to([to.cell.x, to.cell.y, 0]);
     (to.u - from.x, to.v - from.y)
 }
 

@@ -32,7 +32,7 @@ impl Friction {
     /// The largest coefficient there may be: tan 84°.
     pub const MOST: f32 = 10.0;
     /// The longest [`Self::viscous_s`] there may be.
-    pub const MOST_VISCOUS_S: f32 = 1.0;
+    pub const MAX_VISCOUS_S: f32 = 1.0;
     /// A surface like ice: the proxy is the surface's closest point.
     pub const NONE: Self = Self {
         static_mu: 0.0,
@@ -63,7 +63,7 @@ impl Friction {
         ordered
             && (0.0..=Self::MOST).contains(&self.dynamic_mu)
             && (0.0..=Self::MOST).contains(&self.static_mu)
-            && (0.0..=Self::MOST_VISCOUS_S).contains(&self.viscous_s)
+            && (0.0..=Self::MAX_VISCOUS_S).contains(&self.viscous_s)
     }
 }
 

@@ -16,7 +16,7 @@ use crate::contact::straight_way::StraightWay;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::scalar::smaller;
-use crate::terrain::{Ground, Window};
+use crate::terrain::{CellContent, Window};
 
 /// Looks at the cone on one straight way, at most.
 pub(in crate::contact) const LOOKS: u32 = 8;
@@ -271,7 +271,7 @@ impl Asked {
         if (side.east == 0 || side.north == 0)
             && leads_over
             && budget.has(SLOPE)
-            && let Ground::Patch(corners) = window.ground(beyond.cell)
+            && let CellContent::Patch(corners) = window.ground(beyond.cell)
         {
             budget.spend(SLOPE);
             let point = self.at;
@@ -302,9 +302,9 @@ impl Asked {
         budget.spend(SLOPE);
         self.is_open = false;
         self.patch = match window.ground(self.at.cell) {
-            Ground::Patch(corners) => view.patch(&corners),
-            Ground::Hole => return Some(Walked::Off),
-            Ground::Missing => {
+            CellContent::Patch(corners) => view.patch(&corners),
+            CellContent::Hole => return Some(Walked::Off),
+            CellContent::Missing => {
                 budget.lacks(self.at.cell);
                 return Some(Walked::Off);
             }
@@ -346,7 +346,7 @@ impl Asked {
             budget.spend(SLOPE);
             let at = point.across(side);
             match window.ground(at.cell) {
-                Ground::Patch(corners) => {
+                CellContent::Patch(corners) => {
                     let patch = view.patch(&corners);
                     let pull = Pull::in_patch(&patch, view, &at, border.across(side));
                     leads_off |= pull.is_above && side == into;
@@ -355,11 +355,11 @@ impl Asked {
                         (self.pull, self.at, self.patch) = (pull, at, patch);
                     }
                 }
-                Ground::Missing => {
+                CellContent::Missing => {
                     budget.lacks(at.cell);
                     self.is_open = true;
                 }
-                Ground::Hole => has_hole = true,
+                CellContent::Hole => has_hole = true,
             }
         }
         has_hole |= self.is_open;

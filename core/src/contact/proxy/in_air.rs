@@ -7,7 +7,7 @@ use crate::contact::output::{ContactOutput, ContactState};
 use crate::contact::surface::HipView;
 use crate::contact::sweep::{Path, Swept};
 use crate::grid::GridPoint;
-use crate::terrain::{Ground, Window};
+use crate::terrain::{CellContent, Window};
 
 impl Contact {
     /// Waiting ends when the HIP is above the patch it is over, or above everything.
@@ -25,12 +25,12 @@ impl Contact {
         let view = HipView::new(hip);
         let (cell, ground) = view.ground(window);
         let is_above = view.altitude().cell() >= window.top()
-            || matches!(&ground, Ground::Patch(corners) if view.is_above(cell, corners));
+            || matches!(&ground, CellContent::Patch(corners) if view.is_above(cell, corners));
         if is_above {
             return self.becomes_free(hip);
         }
         self.phase = Phase::Waiting;
-        let is_missing = ground == Ground::Missing;
+        let is_missing = ground == CellContent::Missing;
         if is_missing {
             budget.lacks(cell);
         }

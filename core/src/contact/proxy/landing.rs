@@ -10,7 +10,7 @@ use crate::contact::output::{ContactOutput, ContactState};
 use crate::contact::settings::ContactSettings;
 use crate::contact::surface::SurfacePoint;
 use crate::grid::GridPoint;
-use crate::terrain::{Ground, Window};
+use crate::terrain::{CellContent, Window};
 
 /// Where a contact is to begin.
 #[derive(Clone, Debug)]
@@ -63,9 +63,9 @@ impl Contact {
         let (u, v) = (frac.x, frac.y);
         let point = SurfacePoint { cell, u, v };
         match window.ground(cell) {
-            Ground::Missing => return None,
-            Ground::Hole => self.landing = None,
-            Ground::Patch(_) => {
+            CellContent::Missing => return None,
+            CellContent::Hole => self.landing = None,
+            CellContent::Patch(_) => {
                 let surface = position_on(window, &point)?;
                 let hip = GridPoint::new(surface.cell(), surface.frac() - *stretch);
                 self.landing = None;

@@ -6,7 +6,7 @@ use super::patch::Patch;
 use super::point::{Side, SurfacePoint};
 use crate::contact::tolerance::RESOLUTION;
 use crate::grid::{Altitude, Cell, GridPoint};
-use crate::terrain::{Corners, Ground, Window};
+use crate::terrain::{CellContent, Corners, Window};
 
 /// A point to see patches from, with its place in their coordinates and their
 /// heights counted from its own: the HIP, or where a path of the HIP begins.
@@ -34,19 +34,19 @@ impl HipView {
     /// The HIP in a patch's coordinates.
     #[inline]
     pub(crate) fn in_patch(&self, cell: Cell) -> (f32, f32) {
-        let local = self.hip.seen_from([cell.x, cell.y, 0]);
+        let local = self.hip.relative_to([cell.x, cell.y, 0]);
         (local.x, local.y)
     }
 
     /// The patch of these corners, with heights counted from the HIP.
     #[inline]
     pub(crate) fn patch(&self, corners: &Corners) -> Patch {
-        Patch::new(corners.heights).seen_from(self.altitude(), corners.base)
+        Patch::new(corners.heights).relative_to(self.altitude(), corners.base)
     }
 
     /// The cell that the HIP is over and what lies there: of cells that share the place,
     /// one that is no hole.
-    pub(crate) fn ground<const D: usize>(&self, window: &Window<'_, D>) -> (Cell, Ground) {
+    pub(crate) fn ground<const D: usize>(&self, window: &Window<'_, D>) -> (Cell, CellContent) {
         let (place, column) = (self.hip.frac(), self.column());
         let shared = Side::sharing(place.x, place.y);
         // A loop around one call: as an iterator it takes 240 bytes of an image more.
@@ -57,11 +57,11 @@ impl HipView {
             };
             let cell = column.offset(side.east, side.north);
             let ground = window.ground(cell);
-            if ground != Ground::Hole {
+            if ground != CellContent::Hole {
                 return (cell, ground);
             }
         }
-        (column, Ground::Hole)
+        (column, CellContent::Hole)
     }
 
     /// Whether the HIP is above the patch of these corners, which it is over.

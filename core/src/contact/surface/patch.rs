@@ -7,7 +7,7 @@ use crate::grid::Altitude;
 /// z(u, v) = `d + b·u + c·v + a·u·v` in cells, u (east) and v (north) in [0, 1].
 ///
 /// Most often the heights count from the haptic interface point's own height
-/// ([`Self::seen_from`]), so that no bit is spent on how high the terrain lies.
+/// ([`Self::relative_to`]), so that no bit is spent on how high the terrain lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
     /// Twist, eq. 2's A: how much the slope along u changes with v.
@@ -39,7 +39,7 @@ impl Patch {
     /// from the altitude `from`.
     #[must_use]
     #[inline]
-    pub fn seen_from(self, from: Altitude, base: i32) -> Self {
+    pub fn relative_to(self, from: Altitude, base: i32) -> Self {
         self.with_corners(|height| from.up_to(base, height))
     }
 

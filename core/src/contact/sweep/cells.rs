@@ -5,7 +5,7 @@ use crate::contact::surface::{Side, SurfacePoint};
 use crate::contact::tolerance::TINY_STEP;
 use crate::grid::{Cell, GridPoint};
 use crate::scalar::larger;
-use crate::terrain::{Ground, Window};
+use crate::terrain::{CellContent, Window};
 
 /// The part of a path over one cell.
 pub(super) struct Step {
@@ -81,7 +81,7 @@ impl Step {
 
 /// What a step over a hole meets: a patch on whose border it is, or the hole.
 #[inline(never)]
-pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, Ground) {
+pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, CellContent) {
     for place in 0..3 {
         let side = step.sharing().neighbour(place);
         if side == Side::NONE {
@@ -89,11 +89,11 @@ pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Ste
         }
         let other = step.on_border_of(side);
         let ground = window.ground(other.cell);
-        if ground != Ground::Hole {
+        if ground != CellContent::Hole {
             return (other, ground);
         }
     }
-    (step, Ground::Hole)
+    (step, CellContent::Hole)
 }
 
 /// The cells under a straight path, in order; each begins exactly where the one

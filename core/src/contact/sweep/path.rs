@@ -14,7 +14,7 @@ use super::intersect::{first_crossing, next_crossing};
 use crate::contact::budget::{BOX, Budget, INTERSECTION};
 use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::{Altitude, GridPoint};
-use crate::terrain::{CellBox, Ground, Window};
+use crate::terrain::{CellBox, CellContent, Window};
 
 /// Most columns, or rows, that a piece which is intersected cell by cell goes on
 /// from its first: it is over nine cells at most, which a tick's budget is enough
@@ -168,18 +168,18 @@ impl Path {
                 continue;
             }
             let mut ground = window.ground(step.cell);
-            if ground == Ground::Hole {
+            if ground == CellContent::Hole {
                 (step, ground) = beside(window, step);
                 over_hole |= step.is_point();
             }
             let patch = match ground {
-                Ground::Patch(corners) => view.patch(&corners),
-                Ground::Missing => {
+                CellContent::Patch(corners) => view.patch(&corners),
+                CellContent::Missing => {
                     self.is_missing = true;
                     budget.lacks(step.cell);
                     return Some(Swept::Missing);
                 }
-                Ground::Hole => {
+                CellContent::Hole => {
                     over_hole = true;
                     on_surface = false;
                     continue;

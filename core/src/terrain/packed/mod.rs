@@ -46,11 +46,11 @@
 //!
 //! ```
 //! use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
-//! use hapterra_core::terrain::{POSTS, Tile, TileKey};
+//! use hapterra_core::terrain::{TILE_SAMPLES, Tile, TileKey};
 //!
 //! // Whole metres, 30 of them to a cell, above a base of 12 cells.
-//! let metres = |i: usize| f64::from(400 + (i % POSTS) as i32 / 2);
-//! let heights: [f32; POSTS * POSTS] =
+//! let metres = |i: usize| f64::from(400 + (i % TILE_SAMPLES) as i32 / 2);
+//! let heights: [f32; TILE_SAMPLES * TILE_SAMPLES] =
 //!     core::array::from_fn(|i| (metres(i) / 30.0 - 12.0) as f32);
 //! let steps = [Step::Cells(1.0 / 30.0)];
 //! let mut buffer = [0; MAX_PACKED];

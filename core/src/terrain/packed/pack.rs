@@ -6,13 +6,13 @@ use super::prediction::Prediction;
 use super::rice::{MAX_PARAMETER, Rice, write_run};
 use super::{HEAD, HOLES, LINE, PARAMETER_SHIFT};
 use crate::grid::MAX_CELL;
-use crate::terrain::POSTS;
+use crate::terrain::TILE_SAMPLES;
 
 /// A height in cells above the base that single precision tells to 2⁻⁴⁴ of a cell, which
 /// is as exact as `f64` tells it above a base far up.
 const TINY: f64 = 1.0 / (1 << 20) as f64;
 /// Samples of a tile.
-const SAMPLES: usize = POSTS * POSTS;
+const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
 /// Longest packed form, bytes: one less than the samples take as they are.
 pub const MAX_PACKED: usize = 4 * SAMPLES - 1;
@@ -201,7 +201,7 @@ fn write<'b>(
             write_run(length as u32, &mut bits)?;
         }
         let mut difference = None;
-        prediction.next(i % POSTS, |predicted, west| {
+        prediction.next(i % TILE_SAMPLES, |predicted, west| {
             if hole {
                 return west;
             }
@@ -221,7 +221,7 @@ fn parameter(heights: &[f32; SAMPLES], numbers: &[i32; SAMPLES], predicted: i32)
     let known = heights.iter().zip(numbers);
     let known = known.filter(|(height, _)| !is_hole(**height));
     let (mut sum, mut count, mut last) = (0_u64, 0_u64, predicted);
-    for (_, number) in known.take(POSTS) {
+    for (_, number) in known.take(TILE_SAMPLES) {
         sum += 2 * u64::from(number.wrapping_sub(last).unsigned_abs());
         count += 1;
         last = *number;

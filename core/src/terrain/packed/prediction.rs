@@ -1,11 +1,11 @@
 //! What a sample's number should be by those before it.
 
-use crate::terrain::POSTS;
+use crate::terrain::TILE_SAMPLES;
 
 /// The numbers of the row before, and of the present one as far as it is known.
 pub(super) struct Prediction {
     /// West of the next sample: of its row; from there on, of the row before.
-    row: [i32; POSTS],
+    row: [i32; TILE_SAMPLES],
     west: i32,
     corner: i32,
 }
@@ -14,7 +14,7 @@ impl Prediction {
     /// With the number that the first sample is to have.
     pub(super) const fn new(first: i32) -> Self {
         Self {
-            row: [first; POSTS],
+            row: [first; TILE_SAMPLES],
             west: first,
             corner: first,
         }

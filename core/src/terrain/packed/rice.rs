@@ -3,7 +3,7 @@
 use super::bits::{BitReader, BitWriter};
 
 /// As many zeros announce a number of 32 bits.
-const MOST_ZEROS: u32 = 20;
+const MAX_ZEROS: u32 = 20;
 /// Longest parameter.
 pub(super) const MAX_PARAMETER: u32 = 27;
 /// Bits by which the mean is divided: it follows some sixteen numbers.
@@ -39,9 +39,9 @@ impl Rice {
     #[inline]
     pub(super) fn read(&mut self, bits: &mut BitReader<'_>) -> i32 {
         let parameter = self.parameter();
-        let zeros = bits.zeros(MOST_ZEROS);
+        let zeros = bits.zeros(MAX_ZEROS);
         let u = match zeros {
-            MOST_ZEROS => bits.number(32),
+            MAX_ZEROS => bits.number(32),
             _ => (zeros << parameter) | bits.number(parameter),
         };
         self.follow(u);
@@ -53,11 +53,11 @@ impl Rice {
         let u = ((difference << 1) ^ (difference >> 31)) as u32;
         let parameter = self.parameter();
         let zeros = u >> parameter;
-        if zeros < MOST_ZEROS {
+        if zeros < MAX_ZEROS {
             bits.number(1, zeros + 1)?;
             bits.number(u & ((1 << parameter) - 1), parameter)?;
         } else {
-            bits.number(0, MOST_ZEROS)?;
+            bits.number(0, MAX_ZEROS)?;
             bits.number(u, 32)?;
         }
         self.follow(u);

@@ -7,19 +7,19 @@ use std::vec::Vec;
 
 use super::*;
 use crate::grid::Cell;
-use crate::terrain::{BadTile, POSTS, Tile, TileKey};
+use crate::terrain::{TILE_SAMPLES, Tile, TileError, TileKey};
 
 mod by_the_book;
 
 const KEY: TileKey = TileKey::new(0, 2, 5);
-const SAMPLES: usize = POSTS * POSTS;
+const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
 /// The bits of all samples that a tile holds.
 fn held(tile: &Tile) -> Vec<u32> {
     let sample = |i: usize| {
-        let (col, row) = (i % POSTS, i / POSTS);
+        let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
         // The last row and column are corners of the patches before them.
-        let (u, v) = (col.min(POSTS - 2), row.min(POSTS - 2));
+        let (u, v) = (col.min(TILE_SAMPLES - 2), row.min(TILE_SAMPLES - 2));
         tile.corners(Cell::new(u as i32, v as i32))[(col - u) + 2 * (row - v)].to_bits()
     };
     (0..SAMPLES).map(sample).collect()
@@ -28,7 +28,7 @@ fn held(tile: &Tile) -> Vec<u32> {
 fn loaded(heights: &[f32; SAMPLES]) -> Vec<u32> {
     let mut tile = Box::new(Tile::VACANT);
     for (at, height) in heights.iter().enumerate() {
-        tile.set(at % POSTS, at / POSTS, *height);
+        tile.set(at % TILE_SAMPLES, at / TILE_SAMPLES, *height);
     }
     held(&tile)
 }
@@ -40,7 +40,7 @@ fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[Step]) -> Option<Vec<u8>
     let bytes = pack(heights, base, steps, &mut buffer)?.to_vec();
     let mut tile = Box::new(Tile::VACANT);
     let wanted = loaded(heights);
-    if tile.unpack(KEY, base, &bytes) != Err(BadTile::Step) {
+    if tile.unpack(KEY, base, &bytes) != Err(TileError::Step) {
         assert_eq!((tile.key(), tile.base()), (Some(KEY), base));
     }
     assert!(held(&tile) == wanted, "{} bytes", bytes.len());
@@ -65,7 +65,7 @@ impl Dice {
 }
 
 fn by_sample(mut height: impl FnMut(usize, usize) -> f32) -> [f32; SAMPLES] {
-    core::array::from_fn(|i| height(i % POSTS, i / POSTS))
+    core::array::from_fn(|i| height(i % TILE_SAMPLES, i / TILE_SAMPLES))
 }
 
 /// Hills in whole metres, in cells of some length above a base.
@@ -153,7 +153,7 @@ fn holes_stay_where_they_are() {
     for is_hole in holes {
         let heights = by_sample(|col, row| match is_hole(col, row) {
             true => f32::NAN,
-            false => hills[row * POSTS + col],
+            false => hills[row * TILE_SAMPLES + col],
         });
         let bytes = packed(&heights, base, &steps).unwrap();
         assert_eq!(bytes[0] & HOLES, HOLES);
@@ -258,15 +258,15 @@ fn part_of_a_tile_is_refused_and_so_is_more_than_a_tile() {
         for length in 0..whole.len() {
             tile.fill(KEY, 0, |_, _| 0.0).unwrap();
             let refused = tile.unpack(KEY, 0, &whole[..length]);
-            assert_eq!(refused, Err(BadTile::Packed), "{length}");
+            assert_eq!(refused, Err(TileError::Packed), "{length}");
             assert_eq!(tile.key(), None);
         }
         for more in [&[0][..], &[1], &[0x80], &[0; 9], &[1; 9]] {
             let longer = [&whole[..], more].concat();
-            assert_eq!(tile.unpack(KEY, 0, &longer), Err(BadTile::Packed));
+            assert_eq!(tile.unpack(KEY, 0, &longer), Err(TileError::Packed));
             assert_eq!(tile.key(), None);
         }
-        assert_eq!(tile.unpack(KEY, i32::MIN, &whole), Err(BadTile::Base));
+        assert_eq!(tile.unpack(KEY, i32::MIN, &whole), Err(TileError::Base));
         assert_eq!(tile.key(), None);
         assert_eq!(tile.unpack(KEY, 0, &whole), Ok(()));
     }
@@ -289,7 +289,7 @@ fn a_damaged_byte_gives_a_tile_or_a_refusal_as_the_book_says() {
                     Err(error) => {
                         refused += 1;
                         assert!(
-                            matches!(error, BadTile::Packed | BadTile::Step),
+                            matches!(error, TileError::Packed | TileError::Step),
                             "{error:?}"
                         );
                         assert_eq!(tile.key(), None);

@@ -1,11 +1,11 @@
 //! What lies in a window where the surface is not a tile of the scene's level: before it comes,
-//! and while it settles ([`Settling`](super::Settling)).
+//! and while it settles ([`TileBlend`](super::Settling)).
 
-use super::{Corners, Ground, Window};
+use super::{CellContent, Corners, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::scalar::larger;
 use crate::terrain::index::{TILE_CELLS, TileIndex};
-use crate::terrain::settling::{Allowance, Settling, within};
+use crate::terrain::settling::{Allowance, TileBlend, within};
 use crate::terrain::tile::Tile;
 use crate::terrain::underlay::Underlay;
 
@@ -22,7 +22,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// ([`Self::take_spare`]).
     pub fn lay(&mut self, underlay: Option<Underlay>) {
         self.underlay.lay(underlay);
-        self.settling = Settling::NOTHING;
+        self.settling = TileBlend::NOTHING;
         for row in 0..D {
             for col in 0..D {
                 self.slots[row][col].become_surface();
@@ -115,7 +115,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// A tile has come into the slot of `index`: it settles if it is to, and the underlay was felt
     /// there. One that was there before goes on as it was.
     pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
-        let (row, col) = Settling::<D>::slot(index);
+        let (row, col) = TileBlend::<D>::slot(index);
         self.settling.has_changed = self.underlay.is_wanted();
         if was_here && self.settling.allowed(index) < f32::INFINITY {
             return;
@@ -141,9 +141,9 @@ impl<'t, const D: usize> Window<'t, D> {
     /// What lies in a cell of the field whose tile is not the surface.
     #[cold]
     #[inline(never)]
-    pub(super) fn unsettled_ground(&self, cell: Cell) -> Ground {
+    pub(super) fn unsettled_ground(&self, cell: Cell) -> CellContent {
         let Some(under) = self.underlay.felt() else {
-            return Ground::Missing;
+            return CellContent::Missing;
         };
         let index = TileIndex::holding(cell);
         let own = self.tile_here(index);
@@ -164,10 +164,10 @@ impl<'t, const D: usize> Window<'t, D> {
         }
         let [sw, se, nw, ne] = heights;
         match (sw + se + nw + ne).is_nan() {
-            false => Ground::Patch(Corners { base, heights }),
-            true if are_of_tiles => Ground::Hole,
+            false => CellContent::Patch(Corners { base, heights }),
+            true if are_of_tiles => CellContent::Hole,
             // What the underlay does not know may yet come.
-            true => Ground::Missing,
+            true => CellContent::Missing,
         }
     }
 
@@ -235,7 +235,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// The tile of the field in its slot, whether it is the surface or not.
     #[inline(never)]
     fn tile_here(&self, index: TileIndex) -> Option<&Tile> {
-        let (row, col) = Settling::<D>::slot(index);
+        let (row, col) = TileBlend::<D>::slot(index);
         let tile = &*self.slots[row][col];
         tile.key()
             .is_some_and(|key| key.index == index)

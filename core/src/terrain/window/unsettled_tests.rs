@@ -178,7 +178,7 @@ impl<'t> Bed<'t> {
                 let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
                 let model = corners.map(|(i, j)| self.felt(x + i, y + j));
                 match self.window.ground(Cell::new(x, y)) {
-                    Ground::Patch(Corners { base, heights }) => {
+                    CellContent::Patch(Corners { base, heights }) => {
                         for (height, model) in heights.iter().zip(model) {
                             let height = f64::from(base) + f64::from(*height);
                             let model = model.expect("the model has it, too");
@@ -186,8 +186,8 @@ impl<'t> Bed<'t> {
                         }
                         patches += 1;
                     }
-                    Ground::Missing => assert!(model.contains(&None), "{x} {y}"),
-                    Ground::Hole => panic!("{x} {y}: there is none"),
+                    CellContent::Missing => assert!(model.contains(&None), "{x} {y}"),
+                    CellContent::Hole => panic!("{x} {y}: there is none"),
                 }
             }
         }
@@ -228,7 +228,7 @@ fn cells_that_share_samples_of_the_underlay_agree_to_the_bit() {
     let mut room = room();
     let bed = Bed::with_underlay(&mut room);
     let heights = |x: i32, y: i32| match bed.window.ground(Cell::new(x, y)) {
-        Ground::Patch(corners) => corners.heights.map(f32::to_bits),
+        CellContent::Patch(corners) => corners.heights.map(f32::to_bits),
         ground => panic!("{x} {y}: {ground:?}"),
     };
     for x in 64..319 {
@@ -249,7 +249,8 @@ fn no_sample_moves_faster_than_it_may_and_in_the_end_it_is_the_tile_s_to_the_bit
         let mut all = Vec::new();
         for x in 126..162 {
             for y in 126..162 {
-                let Ground::Patch(Corners { base, heights }) = bed.window.ground(Cell::new(x, y))
+                let CellContent::Patch(Corners { base, heights }) =
+                    bed.window.ground(Cell::new(x, y))
                 else {
                     panic!("{x} {y}: no patch");
                 };
@@ -279,7 +280,7 @@ fn no_sample_moves_faster_than_it_may_and_in_the_end_it_is_the_tile_s_to_the_bit
     for (now, last) in heights(&bed).iter().zip(&last) {
         assert!((now - last).abs() < 0.05 + 2e-5);
     }
-    let Ground::Patch(corners) = bed.window.ground(HERE) else {
+    let CellContent::Patch(corners) = bed.window.ground(HERE) else {
         panic!("a patch");
     };
     assert_eq!(corners.base, BASE);
@@ -318,7 +319,7 @@ fn a_tile_that_nobody_feels_is_the_surface_at_once_and_one_beside_bends_to_it() 
 fn without_its_underlay_a_tile_is_the_surface_at_once_and_stays_it() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
-    assert_eq!(bed.window.ground(HERE), Ground::Missing);
+    assert_eq!(bed.window.ground(HERE), CellContent::Missing);
     bed.comes(4, 4, HERE);
     assert!(bed.window.is_settled(HERE));
     let before = bed.window.ground(HERE);
@@ -339,17 +340,17 @@ fn holes_of_a_tile_are_holes_at_once_and_those_of_the_underlay_are_not_known() {
     let one = |x, y| if (x, y) == (144, 144) { f64::NAN } else { 1.0 };
     bed.lays_part(WIDE, 0, &one);
     let ground = |bed: &Bed<'_>, x, y| bed.window.ground(Cell::new(x, y));
-    assert_eq!(ground(&bed, 140, 140), Ground::Missing);
-    assert!(matches!(ground(&bed, 130, 140), Ground::Patch(_)));
+    assert_eq!(ground(&bed, 140, 140), CellContent::Missing);
+    assert!(matches!(ground(&bed, 130, 140), CellContent::Patch(_)));
     let tile = bed.spare.pop().expect("a buffer");
     let height = |x, y| if (x, y) == (131, 141) { f32::NAN } else { 2.0 };
     let key = TileKey::new(0, 4, 4);
     tile.fill_from(key, 0, SIZE, height).expect("in range");
     let _ = bed.window.take(tile, [HERE; 2]);
     bed.window.settle(0.25);
-    assert_eq!(ground(&bed, 130, 140), Ground::Hole);
+    assert_eq!(ground(&bed, 130, 140), CellContent::Hole);
     let patch = |height| {
-        Ground::Patch(Corners {
+        CellContent::Patch(Corners {
             base: 0,
             heights: [height; 4],
         })
@@ -368,8 +369,8 @@ fn it_is_felt_when_all_of_it_has_come() {
             false => bed.lays_part(WIDE, 3, &hills),
         };
         lays(&mut bed, near_first);
-        assert_eq!(bed.window.ground(HERE), Ground::Missing);
-        assert!(!bed.window.settle(0.0) || bed.window.ground(HERE) == Ground::Missing);
+        assert_eq!(bed.window.ground(HERE), CellContent::Missing);
+        assert!(!bed.window.settle(0.0) || bed.window.ground(HERE) == CellContent::Missing);
         lays(&mut bed, !near_first);
         assert!(bed.window.settle(0.0), "another surface");
         assert_eq!(bed.judge(2..9), 224 * 224);
@@ -386,13 +387,13 @@ fn a_hole_of_the_near_tile_is_not_known_where_the_wide_one_has_none() {
         false => near_sample(x, y),
     };
     bed.lays_part(NEAR, -2, &holed);
-    assert_eq!(bed.window.ground(Cell::new(141, 146)), Ground::Missing);
+    assert_eq!(bed.window.ground(Cell::new(141, 146)), CellContent::Missing);
     let low = Altitude::new(60, 0.0);
     let at = Cell::new(144, 144);
     assert!(!bed.window.box_is_clear(CellBox::around(at, at), low));
     assert!(matches!(
         bed.window.ground(Cell::new(100, 100)),
-        Ground::Patch(_)
+        CellContent::Patch(_)
     ));
 }
 
@@ -414,7 +415,7 @@ fn what_the_near_tile_alone_has_counts_for_what_is_clear_and_for_how_far_a_tile_
     for _ in 0..9 {
         bed.window.settle(1.0);
     }
-    let Ground::Patch(corners) = bed.window.ground(Cell::new(144, 144)) else {
+    let CellContent::Patch(corners) = bed.window.ground(Cell::new(144, 144)) else {
         panic!("a patch");
     };
     assert_eq!(
@@ -526,7 +527,7 @@ fn held_still(friction: Friction, up: bool, above: f64) -> Vec<(f64, ContactStat
 const STEP: f32 = 0.02;
 
 fn is_on_the_surface(window: &Window<'_, 4>, proxy: &GridPoint) {
-    let Ground::Patch(corners) = window.ground(proxy.column()) else {
+    let CellContent::Patch(corners) = window.ground(proxy.column()) else {
         panic!("no patch under {proxy:?}");
     };
     let [sw, se, nw, ne] = corners

@@ -25,7 +25,7 @@ use embassy_stm32::pac::timer::vals::{Ckd, FilterValue};
 use embassy_stm32::timer::GeneralInstance4Channel as Timer;
 use embassy_stm32::timer::qei::{Config, Qei};
 use embassy_stm32::timer::{Ch1, Ch2, TimerPin};
-use hapterra_firmware::board::{Encoders, Sense};
+use hapterra_firmware::board::{Encoders, GuardInputs};
 use hapterra_firmware::encoder::EndlessCount;
 
 use super::feedback::Feedback;
@@ -88,11 +88,11 @@ pub(crate) struct TimerEncoders<A: Timer, B: Timer, C: Timer, S> {
 }
 
 impl<A: Timer, B: Timer, C: Timer, S: Stop> Encoders for TimerEncoders<A, B, C, S> {
-    fn sense(&mut self) -> Sense {
+    fn sense(&mut self) -> GuardInputs {
         let (a, b, c) = &self.counters;
         let [x, y, z] = &mut self.counts;
         let measured = self.feedback.measure_ma();
-        Sense {
+        GuardInputs {
             counts: [
                 x.follow(a.count()),
                 y.follow(b.count()),

@@ -5,7 +5,7 @@
 //! included, then switches off, and the board's wiring page says how.
 
 use embassy_stm32::gpio::Output;
-use hapterra_core::guard::Drive;
+use hapterra_core::guard::GuardOutputs;
 
 use crate::chip;
 
@@ -15,7 +15,7 @@ pub(crate) fn set_up(pin: Output<'static>) {
 }
 
 /// Takes what a tick left the amplifiers with.
-pub(crate) fn beat(drive: &Drive) {
+pub(crate) fn beat(drive: &GuardOutputs) {
     if drive.enabled {
         chip::toggle_heartbeat();
     }

@@ -16,7 +16,7 @@ use super::rig::{D, HELLO, frame, scene, tile};
 use crate::app::{TileBuffers, WorkingMemory};
 use crate::link::{DeviceState, KnownArm, Link};
 use crate::native::{FULL_SCALE_A, StoppedClock};
-use crate::queues::{LoopEnds, SPARES, TickRecord};
+use crate::queues::{LoopEnds, QueuedTick, SPARES};
 
 /// A link in a session, and the loop's ends of its queues.
 pub(super) fn link() -> (Link<'static, D>, LoopEnds<'static>) {
@@ -57,7 +57,7 @@ fn asked(link: &mut Link<'static, D>) -> Vec<TileKey> {
         let (taken, frame) = reader.push(rest);
         let content = frame.map(|f| f.and_then(decode));
         if let Some(Ok(InSession {
-            message: ToHost::Need { key, .. },
+            message: ToHost::TileRequest { key, .. },
             ..
         })) = content
         {
@@ -84,8 +84,8 @@ fn tiles_handed_over(loop_ends: &mut LoopEnds<'static>) -> Vec<&'static mut Tile
 }
 
 /// What the loop says when the HIP is `column` tiles east of the first.
-fn at(column: i32) -> TickRecord {
-    let mut record = TickRecord::default();
+fn at(column: i32) -> QueuedTick {
+    let mut record = QueuedTick::default();
     let cell = [column * 32 + 16, 100, 5];
     record.sample.hip = hapterra_core::grid::GridPoint::new(cell, hapterra_core::Vec3::ZERO);
     record.sample.proxy = record.sample.hip;

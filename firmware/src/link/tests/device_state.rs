@@ -1,7 +1,7 @@
 //! Arming, calibration and status, as a host sees them.
 
 use hapterra_core::guard::{Blockers, Fault, Mode};
-use hapterra_core::phantom::{BadCalibration, Bound, Calibration, CalibrationField, Model};
+use hapterra_core::phantom::{Bound, Calibration, CalibrationError, CalibrationField, Model};
 use hapterra_core::scene::Source;
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::{Refusal, Request};
@@ -9,7 +9,7 @@ use hapterra_core::wire::session::{SampleCount, SessionEnd};
 use hapterra_core::wire::status::{BootReport, CalibrationSource, Crash, CrashKind, ResetCause};
 
 use super::rig::{Rig, scene};
-use crate::link::tx_queue::{LONGEST_URGENT, TxQueue};
+use crate::link::tx_queue::{MAX_URGENT, TxQueue};
 use crate::store::Stored;
 
 fn set(calibration: Calibration) -> Request {
@@ -158,7 +158,7 @@ fn nothing_is_stored_without_a_press_of_the_dead_man_switch() {
     rig.ask(Request::StoreCalibration);
     for _ in 0..9 {
         rig.run(1_100);
-        rig.say(&ToDevice::Alive);
+        rig.say(&ToDevice::Heartbeat);
     }
     assert_eq!(rig.answers(TO_STORE), [], "it may take its time");
     rig.run(400);
@@ -390,7 +390,7 @@ fn the_status_at_its_longest_fits_its_place() {
         file: "x".repeat(24).as_str().try_into().expect("fits"),
     });
     status.health.zero = Some([i32::MIN; 3]);
-    status.calibration = CalibrationSource::Refused(BadCalibration {
+    status.calibration = CalibrationSource::Refused(CalibrationError {
         field: CalibrationField::MaxSpeed,
         axis: Some(3),
         value: 1.0,
@@ -424,6 +424,6 @@ fn the_status_at_its_longest_fits_its_place() {
         assert!(queue.push(super::rig::FIRST, &message));
         let length = queue.take(&mut [0; 4096]);
         std::eprintln!("{length} bytes");
-        assert!(length <= LONGEST_URGENT, "{length}");
+        assert!(length <= MAX_URGENT, "{length}");
     }
 }

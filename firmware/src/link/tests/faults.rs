@@ -5,7 +5,7 @@ use std::vec;
 use std::vec::Vec;
 
 use hapterra_core::guard::Mode;
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_core::terrain::RETRY_TICKS;
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::message::{BATCH, Heights, TileMessage, ToDevice, ToHost};
@@ -16,7 +16,7 @@ use hapterra_core::wire::version::VersionCheck;
 use super::rig::{FIRST, HELLO, Rig, asked, frame, framed, point, scene, tile};
 
 /// What the points of a descent feel like; nothing about ticks and costs.
-fn forces(felt: &[(u32, Sample)]) -> Vec<(u32, hapterra_core::Vec3)> {
+fn forces(felt: &[(u32, TickRecord)]) -> Vec<(u32, hapterra_core::Vec3)> {
     felt.iter().map(|(seq, s)| (*seq, s.force_n)).collect()
 }
 
@@ -118,7 +118,7 @@ fn a_hello_of_the_session_before_is_stale_and_its_host_is_told() {
         ));
         // Of what else it says nothing is answered.
         for message in [
-            ToDevice::Alive,
+            ToDevice::Heartbeat,
             ToDevice::Status { number },
             ToDevice::Detach,
             ToDevice::Bye,
@@ -128,9 +128,9 @@ fn a_hello_of_the_session_before_is_stale_and_its_host_is_told() {
     }
     rig.run(300);
     let end = SessionEnd::Replaced;
-    let over = [7, 7, 8].map(|number| (first, ToHost::Over { number, end }));
+    let over = [7, 7, 8].map(|number| (first, ToHost::SessionClosed { number, end }));
     assert_eq!(rig.heard_before, over);
-    let telemetry = |m: &&ToHost| matches!(m, ToHost::Telemetry(_) | ToHost::Need { .. });
+    let telemetry = |m: &&ToHost| matches!(m, ToHost::Telemetry(_) | ToHost::TileRequest { .. });
     let of_the_present = &rig.heard[heard..];
     assert!(of_the_present.iter().all(|m| telemetry(&m)));
     assert_eq!(rig.status().foreign_frames, 15);
@@ -153,7 +153,7 @@ fn a_host_that_was_let_go_is_told_so_and_one_that_has_left_is_not() {
         rig.heard_before.clone()
     };
     let end = SessionEnd::HostSilent;
-    let told = (rig.session, ToHost::Over { number: 3, end });
+    let told = (rig.session, ToHost::SessionClosed { number: 3, end });
     assert_eq!(over(&mut rig, 3), [told]);
     // Goodbye is all that it wants to hear when it leaves.
     rig.say(&ToDevice::Bye);
@@ -216,7 +216,7 @@ fn a_host_that_vanishes_is_let_go_after_the_time_it_named() {
         assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
     }
     // A frame of this session, and it has its time again.
-    rig.say(&ToDevice::Alive);
+    rig.say(&ToDevice::Heartbeat);
     rig.run(1);
     let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
     let on = on.count();
@@ -254,7 +254,7 @@ fn who_only_looks_takes_no_arm_and_keeps_none_armed() {
         for message in [
             ToDevice::Status { number: 0 },
             ToDevice::GetCalibration { number: 0 },
-            ToDevice::Alive,
+            ToDevice::Heartbeat,
         ] {
             rig.send(&framed(looker, &message));
         }
@@ -304,7 +304,7 @@ fn a_host_that_speaks_is_not_let_go() {
         ..HELLO
     }));
     for _ in 0..40 {
-        rig.say(&ToDevice::Alive);
+        rig.say(&ToDevice::Heartbeat);
         rig.run(500);
     }
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
@@ -352,7 +352,10 @@ fn a_host_that_detaches_leaves_the_arm_as_it_was_and_hides_nothing() {
     rig.run(5);
     assert_eq!(rig.heard, []);
     let (number, end) = (HELLO.number, SessionEnd::Replaced);
-    assert_eq!(rig.heard_before, [(second, ToHost::Over { number, end })]);
+    assert_eq!(
+        rig.heard_before,
+        [(second, ToHost::SessionClosed { number, end })]
+    );
     let device = greeted(&mut rig);
     let (session, end) = (device.last.session, device.last.end);
     assert_eq!((session, end), (first.get(), SessionEnd::Replaced));
@@ -415,14 +418,14 @@ fn what_is_alive_is_answered_with_what_was_sent_before() {
     rig.run(100);
     for ticks in 1..40 {
         rig.run(ticks % 7);
-        rig.say(&ToDevice::Alive);
+        rig.say(&ToDevice::Heartbeat);
     }
     rig.run(20);
     let (mut sent, mut answers) = (0, 0);
     for message in &rig.heard {
         match message {
             ToHost::Telemetry(telemetry) => sent += telemetry.samples.len() as u32,
-            ToHost::Alive { count, report, .. } => {
+            ToHost::Heartbeat { count, report, .. } => {
                 answers += 1;
                 assert_eq!((count.sent, count.dropped), (sent, 0));
                 assert_eq!(report.mode, Mode::Disarmed);
@@ -732,11 +735,11 @@ fn where_time_stands_still_a_tile_that_does_not_come_is_asked_for_after_two_aliv
         asked,
         "damage alone is no reason to ask again"
     );
-    rig.say(&ToDevice::Alive);
+    rig.say(&ToDevice::Heartbeat);
     rig.run(20);
     assert_eq!(rig.needs().len(), asked, "it may be on its way");
     rig.answers_tiles = true;
-    rig.say(&ToDevice::Alive);
+    rig.say(&ToDevice::Heartbeat);
     rig.run(20);
     assert!(!rig.device.link.may_stand_still(), "time goes on");
 }
@@ -753,7 +756,7 @@ fn a_host_that_floods_is_held_back_not_obeyed() {
     rig.writer = usize::MAX;
     rig.run(600);
     assert!(rig.on_the_way.is_empty());
-    let taken = |m: &&ToHost| matches!(m, ToHost::SceneTaken { accepted: true, .. });
+    let taken = |m: &&ToHost| matches!(m, ToHost::SceneAck { accepted: true, .. });
     assert_eq!(rig.heard.iter().filter(taken).count(), 501);
 }
 
@@ -776,7 +779,7 @@ fn a_host_that_is_gone_has_no_arm_armed_and_no_record_stored() {
     rig.ask(Request::Arm);
     for _ in 0..10 {
         rig.run(1_000);
-        rig.say(&ToDevice::Alive);
+        rig.say(&ToDevice::Heartbeat);
     }
     rig.sense.dead_man = true;
     rig.run(300);

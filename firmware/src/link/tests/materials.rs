@@ -3,12 +3,12 @@
 use std::vec::Vec;
 
 use hapterra_core::Vec3;
-use hapterra_core::force::{ForceLaw, Material, MaterialTable};
+use hapterra_core::force::{Material, MaterialTable, SurfaceParams};
 use hapterra_core::grid::{Cell, GridPoint};
-use hapterra_core::scene::{Point, Scene, Source};
+use hapterra_core::scene::{HipCommand, Scene, Source};
 use hapterra_core::terrain::{CoarseTile, TileKey, Underlay};
 use hapterra_core::wire::materials::{
-    MOST_TABLE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
+    MAX_TABLE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
 };
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
 
@@ -18,7 +18,7 @@ use super::rig::{HELLO, Rig, scene};
 fn table(stiffnesses: &[f32]) -> MaterialTable {
     let material = |stiffness_n_per_mm: &f32| Material {
         stiffness_n_per_mm: *stiffness_n_per_mm,
-        ..Material::of(&ForceLaw::PREMIUM)
+        ..Material::of(&SurfaceParams::PREMIUM)
     };
     let materials: Vec<_> = stiffnesses.iter().map(material).collect();
     MaterialTable::new(&materials).expect("some")
@@ -34,7 +34,7 @@ fn scene_of(table: &MaterialTable, epoch: u32) -> Scene {
 
 /// Sends a scene with its table; whether that was taken.
 fn sends(rig: &mut Rig, scene: Scene, table: &MaterialTable) -> bool {
-    let mut room = [0; MOST_TABLE_BYTES];
+    let mut room = [0; MAX_TABLE_BYTES];
     let table = table_bytes(table, &mut room);
     rig.say(&ToDevice::MaterialScene(MaterialScene { scene, table }));
     rig.run(1);
@@ -44,7 +44,7 @@ fn sends(rig: &mut Rig, scene: Scene, table: &MaterialTable) -> bool {
 /// The last answer to a scene.
 fn is_taken(rig: &Rig, epoch: u32) -> bool {
     let answer = |message: &ToHost| match message {
-        ToHost::SceneTaken { epoch, accepted } => Some((*epoch, *accepted)),
+        ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),
         _ => None,
     };
     let answers: Vec<_> = rig.heard.iter().filter_map(answer).collect();
@@ -85,7 +85,7 @@ fn felt(rig: &mut Rig) -> f32 {
     let from = rig.felt().last().map_or(0, |(seq, _)| seq + 1);
     for (seq, z) in [(from, 2.0), (from + 1, 1.0)] {
         let hip = GridPoint::new([100, 100, 0], Vec3::new(0.5, 0.5, z));
-        rig.say(&ToDevice::Point(Point { seq, hip }));
+        rig.say(&ToDevice::Hip(HipCommand { seq, hip }));
         rig.run(4);
     }
     let felt = rig.felt();
@@ -175,12 +175,12 @@ fn a_scene_is_refused_whose_table_did_not_come_or_is_none() {
 fn scenes_that_follow_each_other_at_once_have_each_their_own_table() {
     let mut rig = greeted();
     let (soft, hard) = (table(&[0.5]), table(&[1.0]));
-    let mut room = [0; MOST_TABLE_BYTES];
+    let mut room = [0; MAX_TABLE_BYTES];
     for (epoch, table) in [(1, &soft), (2, &hard), (3, &soft), (4, &soft), (5, &hard)] {
         let scene = Scene {
-            law: ForceLaw {
+            law: SurfaceParams {
                 stiffness_n_per_mm: table.materials()[0].stiffness_n_per_mm,
-                ..ForceLaw::PREMIUM
+                ..SurfaceParams::PREMIUM
             },
             ..scene_of(table, epoch)
         };

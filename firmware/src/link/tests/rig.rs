@@ -5,11 +5,11 @@ use std::collections::VecDeque;
 use std::vec::Vec;
 
 use hapterra_core::Vec3;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::guard::{Mode, Report, Sense};
+use hapterra_core::guard::{GuardInputs, Mode, Report};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Point, Sample, Scene, Source};
+use hapterra_core::scene::{HipCommand, Scene, Source, TickRecord};
 use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
 use hapterra_core::wire::hello::{HostHello, PROTOCOL};
@@ -56,7 +56,7 @@ pub(super) fn scene(source: Source) -> Scene {
         underlay: None,
         cell_mm: 1.0,
         home: GridPoint::new([100, 100, 10], Vec3::ZERO),
-        law: ForceLaw::PREMIUM,
+        law: SurfaceParams::PREMIUM,
         source,
         hold_clock: false,
         materials: None,
@@ -106,7 +106,7 @@ pub(super) fn point(seq: u32, x: f32, z: f32) -> Vec<u8> {
 
 fn point_in(session: SessionNumber, seq: u32, x: f32, z: f32) -> Vec<u8> {
     let hip = GridPoint::new([100, 100, 0], Vec3::new(x, 0.5, z));
-    framed(session, &ToDevice::Point(Point { seq, hip }))
+    framed(session, &ToDevice::Hip(HipCommand { seq, hip }))
 }
 
 /// A host, its device, and what was said so far.
@@ -134,7 +134,7 @@ pub(super) struct Rig {
     pub(super) answers_tiles: bool,
     /// What the answer to a tile becomes on the way.
     pub(super) damage: fn(&mut Vec<u8>),
-    pub(super) sense: Sense,
+    pub(super) sense: GuardInputs,
 }
 
 impl Rig {
@@ -161,7 +161,7 @@ impl Rig {
             refused: Vec::new(),
             answers_tiles: true,
             damage: |_| {},
-            sense: Sense::default(),
+            sense: GuardInputs::default(),
         }
     }
 
@@ -295,13 +295,13 @@ impl Rig {
                 self.looked_at.push(framed.message);
                 continue;
             }
-            if let ToHost::Over { .. } = framed.message {
+            if let ToHost::SessionClosed { .. } = framed.message {
                 self.heard_before.push((framed.session, framed.message));
                 continue;
             }
             assert_eq!(framed.session, self.session, "{:?}", framed.message);
             let message = framed.message;
-            if let (ToHost::Need { epoch, key }, true) = (&message, self.answers_tiles) {
+            if let (ToHost::TileRequest { epoch, key }, true) = (&message, self.answers_tiles) {
                 let mut answer = tile_in(self.session, *epoch, *key);
                 (self.damage)(&mut answer);
                 self.on_the_way.extend(answer);
@@ -312,13 +312,13 @@ impl Rig {
 
     pub(super) fn needs(&self) -> Vec<TileKey> {
         let need = |m: &ToHost| match m {
-            ToHost::Need { key, .. } => Some(*key),
+            ToHost::TileRequest { key, .. } => Some(*key),
             _ => None,
         };
         self.heard.iter().filter_map(need).collect()
     }
 
-    pub(super) fn felt(&self) -> Vec<(u32, Sample)> {
+    pub(super) fn felt(&self) -> Vec<(u32, TickRecord)> {
         let felt = |m: &ToHost| match m {
             ToHost::PointAnswer { seq, sample } => Some((*seq, *sample)),
             _ => None,
@@ -367,7 +367,7 @@ impl Rig {
     }
 
     /// Points from above down into the plane, fed one by one, as felt.
-    pub(super) fn descend(&mut self, points: u32) -> Vec<(u32, Sample)> {
+    pub(super) fn descend(&mut self, points: u32) -> Vec<(u32, TickRecord)> {
         for seq in 0..points {
             let (x, z) = (seq as f32 * 0.9, 4.0 - seq as f32 * 0.1);
             self.send(&point_in(self.session, seq, x, z));

@@ -4,11 +4,11 @@ use std::vec::Vec;
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::{Fault, Limits};
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_core::wire::message::{Telemetry, ToDevice, ToHost};
 
 use super::rig::{D, FIRST, HELLO, Rig, frame, point, scene};
-use crate::link::tx_queue::{LONGEST_URGENT, TxQueue};
+use crate::link::tx_queue::{MAX_URGENT, TxQueue};
 use hapterra_core::terrain::TileIndex;
 
 #[test]
@@ -43,7 +43,7 @@ fn points_sent_ahead_are_felt_as_points_sent_singly() {
         ahead.send(&point(seq, seq as f32 * 0.9, 4.0 - seq as f32 * 0.1));
     }
     ahead.run(100);
-    let forces = |felt: Vec<(u32, Sample)>| -> Vec<_> {
+    let forces = |felt: Vec<(u32, TickRecord)>| -> Vec<_> {
         felt.iter().map(|(_, s)| (s.proxy, s.force_n)).collect()
     };
     assert_eq!(forces(ahead.felt()), forces(singly));
@@ -59,7 +59,7 @@ fn an_invalid_scene_is_refused_and_the_one_before_stays() {
     };
     rig.send(&frame(&ToDevice::Scene(bad)));
     rig.run(1);
-    let answer = ToHost::SceneTaken {
+    let answer = ToHost::SceneAck {
         epoch: 8,
         accepted: false,
     };
@@ -124,7 +124,7 @@ fn goodbye_comes_after_everything_was_said() {
 
 #[test]
 fn the_longest_messages_fit_their_places() {
-    let sample = Sample {
+    let sample = TickRecord {
         tick: u32::MAX,
         missing_tile: Some(TileIndex::new(i32::MIN, i32::MIN)),
         fault: Some(Fault::Hardware),
@@ -135,13 +135,13 @@ fn the_longest_messages_fit_their_places() {
         late: u32::MAX,
         hip: far(),
         proxy: far(),
-        ..Sample::default()
+        ..TickRecord::default()
     };
     let mut queue = TxQueue::new();
     let seq = u32::MAX;
     assert!(queue.push(FIRST, &ToHost::PointAnswer { seq, sample }));
     let length = queue.take(&mut [0; 4096]);
-    assert!(length <= LONGEST_URGENT, "{length}");
+    assert!(length <= MAX_URGENT, "{length}");
     let telemetry = ToHost::Telemetry(Telemetry {
         first: u32::MAX,
         dropped: u32::MAX,

@@ -5,7 +5,7 @@ use std::vec::Vec;
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
-use hapterra_core::scene::{Sample, Scene, Source, View};
+use hapterra_core::scene::{Scene, Source, TickRecord, View};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 
@@ -27,7 +27,7 @@ fn view(number: u8, hip: GridPoint) -> View {
 }
 
 /// The latest sample that was told.
-fn latest(rig: &Rig) -> Sample {
+fn latest(rig: &Rig) -> TickRecord {
     let told = rig.telemetry();
     let last = told.last().and_then(|telemetry| telemetry.samples.last());
     *last.expect("samples")
@@ -36,7 +36,7 @@ fn latest(rig: &Rig) -> Sample {
 /// Whether views were taken, in the order of the answers, from the first view on.
 fn taken(rig: &Rig) -> Vec<(u32, bool)> {
     let answer = |message: &ToHost| match message {
-        ToHost::SceneTaken { epoch, accepted } => Some((*epoch, *accepted)),
+        ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),
         _ => None,
     };
     rig.heard.iter().filter_map(answer).skip(1).collect()
@@ -58,7 +58,7 @@ fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
     let mut rig = with_an_open_clutch();
     let wanted = view(1, latest(&rig).hip);
     rig.heard
-        .retain(|message| !matches!(message, ToHost::Need { .. }));
+        .retain(|message| !matches!(message, ToHost::TileRequest { .. }));
     rig.say(&ToDevice::View(wanted));
     rig.run(40);
     assert_eq!(taken(&rig), [(1_001, true)]);

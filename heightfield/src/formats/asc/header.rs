@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::io::Read;
 
 use super::tokens::Tokens;
-use crate::BadRaster;
+use crate::RasterError;
 use crate::numbers::number;
 
 /// The key of the value that means no data.
@@ -50,7 +50,7 @@ pub(super) fn looks_like_header(head: &[u8]) -> bool {
 
 impl Header {
     /// Reads keys and numbers up to the first sample.
-    pub(super) fn read<R: Read>(tokens: &mut Tokens<R>) -> Result<Self, BadRaster> {
+    pub(super) fn read<R: Read>(tokens: &mut Tokens<R>) -> Result<Self, RasterError> {
         let mut header = Self::default();
         while let Some(word) = tokens.next()? {
             let key = word.trim_start_matches('\u{feff}').to_lowercase();
@@ -60,10 +60,10 @@ impl Header {
                 tokens.put_back();
                 break;
             }
-            let known =
-                known(&key).ok_or_else(|| BadRaster::Unfamiliar(format!("header key '{key}'")))?;
+            let known = known(&key)
+                .ok_or_else(|| RasterError::Unfamiliar(format!("header key '{key}'")))?;
             let value = tokens.next()?.ok_or_else(|| {
-                BadRaster::Truncated(format!("it ends after the header key '{key}'"))
+                RasterError::Truncated(format!("it ends after the header key '{key}'"))
             })?;
             match number(value) {
                 Some(value) => {
@@ -72,7 +72,7 @@ impl Header {
                 None if known == NO_DATA => header.no_data_word = Some(value.to_owned()),
                 None => {
                     let what = format!("header: {key} is '{value}', not a number");
-                    return Err(BadRaster::damaged(what));
+                    return Err(RasterError::damaged(what));
                 }
             }
         }
@@ -84,12 +84,12 @@ impl Header {
     }
 
     /// Columns and rows, as far as numbers of samples go.
-    pub(super) fn size(&self) -> Result<(u32, u32), BadRaster> {
+    pub(super) fn size(&self) -> Result<(u32, u32), RasterError> {
         Ok((self.count("ncols")?, self.count("nrows")?))
     }
 
     /// Size of a cell, west to east and south to north.
-    pub(super) fn cell(&self) -> Result<(f64, f64), BadRaster> {
+    pub(super) fn cell(&self) -> Result<(f64, f64), RasterError> {
         let east = self.side("dx")?;
         let north = self.side("dy")?;
         Ok((east, north))
@@ -116,18 +116,18 @@ impl Header {
         self.no_data_word.as_deref() == Some(word)
     }
 
-    fn count(&self, key: &str) -> Result<u32, BadRaster> {
+    fn count(&self, key: &str) -> Result<u32, RasterError> {
         match self.get(key).ok_or_else(|| missing(key))? {
             value if value.fract() != 0.0 || value < 1.0 => Err(wrong(key, value)),
             value if value > f64::from(i32::MAX) => {
-                Err(BadRaster::AbsurdSize(format!("{key} is {value}")))
+                Err(RasterError::AbsurdSize(format!("{key} is {value}")))
             }
             value => Ok(value as u32),
         }
     }
 
     /// A cell's side, under its own key or that of both sides.
-    fn side(&self, key: &str) -> Result<f64, BadRaster> {
+    fn side(&self, key: &str) -> Result<f64, RasterError> {
         let both = "cellsize";
         match self
             .get(key)
@@ -140,10 +140,10 @@ impl Header {
     }
 }
 
-fn missing(key: &str) -> BadRaster {
-    BadRaster::damaged(format!("the header has no {key}"))
+fn missing(key: &str) -> RasterError {
+    RasterError::damaged(format!("the header has no {key}"))
 }
 
-fn wrong(key: &str, value: f64) -> BadRaster {
-    BadRaster::damaged(format!("header: {key} is {value}"))
+fn wrong(key: &str, value: f64) -> RasterError {
+    RasterError::damaged(format!("header: {key} is {value}"))
 }

@@ -12,7 +12,7 @@ use crate::format::{Claim, Format, Parts};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
 use crate::numbers::beginning;
-use crate::{BadRaster, CellSize, SampleType, beside};
+use crate::{CellSize, RasterError, SampleType, beside};
 use header::{Header, looks_like_header};
 use tokens::Tokens;
 
@@ -27,7 +27,7 @@ pub(super) const FORMAT: Format = Format {
 
 /// Reads a grid. Every sample takes at least a digit and a separator, so the
 /// file's length bounds what is allocated whatever its header says.
-fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
+fn decode(input: &FileBytes) -> Result<Decoded, RasterError> {
     let mut tokens = Tokens::new(input.reader()?);
     let header = Header::read(&mut tokens)?;
     let (columns, rows) = header.size()?;
@@ -51,7 +51,7 @@ fn decode(input: &FileBytes) -> Result<Decoded, BadRaster> {
     match header.south_west((east, north)) {
         Some(corner) => {
             let map = GroundMap::from_south_west(corner, (east, north), rows);
-            let map = map.ok_or_else(|| BadRaster::damaged("its header places it nowhere"))?;
+            let map = map.ok_or_else(|| RasterError::damaged("its header places it nowhere"))?;
             decoded.lay_out(map, None);
         }
         None => {

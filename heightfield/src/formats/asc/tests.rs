@@ -2,9 +2,9 @@
 
 use super::decode;
 use crate::input::FileBytes;
-use crate::{BadRaster, CellUnit, Raster, Samples};
+use crate::{CellUnit, Raster, RasterError, Samples};
 
-fn open(text: &str) -> Result<Raster, BadRaster> {
+fn open(text: &str) -> Result<Raster, RasterError> {
     let input = FileBytes::unpacked("test.asc", text.as_bytes().to_vec());
     Raster::checked(decode(&input)?, None)
 }

@@ -2,10 +2,10 @@
 
 use std::io::{BufReader, Bytes, Read};
 
-use crate::BadRaster;
+use crate::RasterError;
 
 /// No number or key is longer; what is, is not text.
-const LONGEST_WORD: usize = 128;
+const MAX_WORD: usize = 128;
 
 /// Hands out one word at a time.
 pub(super) struct Tokens<R> {
@@ -26,7 +26,7 @@ impl<R: Read> Tokens<R> {
     }
 
     /// The next word, or `None` at the end of the file.
-    pub(super) fn next(&mut self) -> Result<Option<&str>, BadRaster> {
+    pub(super) fn next(&mut self) -> Result<Option<&str>, RasterError> {
         if !std::mem::take(&mut self.again) {
             self.read_word()?;
         }
@@ -35,7 +35,7 @@ impl<R: Read> Tokens<R> {
         }
         match std::str::from_utf8(&self.word) {
             Ok(word) => Ok(Some(word)),
-            Err(_) => Err(BadRaster::damaged("it is not text")),
+            Err(_) => Err(RasterError::damaged("it is not text")),
         }
     }
 
@@ -44,18 +44,18 @@ impl<R: Read> Tokens<R> {
         self.again = true;
     }
 
-    fn read_word(&mut self) -> Result<(), BadRaster> {
+    fn read_word(&mut self) -> Result<(), RasterError> {
         self.word.clear();
         for byte in self.bytes.by_ref() {
-            let byte = byte.map_err(BadRaster::Unreadable)?;
+            let byte = byte.map_err(RasterError::Unreadable)?;
             if !is_space(byte) {
                 self.word.push(byte);
             } else if !self.word.is_empty() {
                 break;
             }
-            if self.word.len() > LONGEST_WORD {
-                return Err(BadRaster::damaged(format!(
-                    "it has a word of more than {LONGEST_WORD} bytes: not a grid of numbers"
+            if self.word.len() > MAX_WORD {
+                return Err(RasterError::damaged(format!(
+                    "it has a word of more than {MAX_WORD} bytes: not a grid of numbers"
                 )));
             }
         }

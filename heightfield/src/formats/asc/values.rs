@@ -6,7 +6,7 @@ use super::header::Header;
 use super::tokens::Tokens;
 use crate::numbers::number;
 use crate::samples::{SampleValue, with_samples};
-use crate::{BadRaster, Samples};
+use crate::{RasterError, Samples};
 
 /// Integers up to this are exact in an `f32`.
 const EXACT_IN_F32: f64 = 16_777_216.0;
@@ -18,7 +18,7 @@ pub(super) fn read<R: Read>(
     columns: u32,
     rows: u32,
     file_bytes: u64,
-) -> Result<Samples, BadRaster> {
+) -> Result<Samples, RasterError> {
     // The cell size is checked first: a wrong header is a better message than
     // a sample that follows from it.
     header.cell()?;
@@ -35,18 +35,20 @@ pub(super) fn read<R: Read>(
             )
         };
         if held == promised {
-            return Err(BadRaster::damaged(format!(
+            return Err(RasterError::damaged(format!(
                 "more numbers than the {columns} × {rows} of its header: '{word}' follows the last"
             )));
         }
         let value = number(word)
             .or_else(|| header.means_none(word).then_some(f64::NAN))
-            .ok_or_else(|| BadRaster::damaged(format!("{}: '{word}' is not a number", place())))?;
+            .ok_or_else(|| {
+                RasterError::damaged(format!("{}: '{word}' is not a number", place()))
+            })?;
         growing.push(value);
         held += 1;
     }
     if held < promised {
-        return Err(BadRaster::Truncated(format!(
+        return Err(RasterError::Truncated(format!(
             "its header promises {columns} × {rows} = {promised} numbers, {held} follow"
         )));
     }

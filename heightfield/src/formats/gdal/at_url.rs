@@ -9,10 +9,10 @@ use std::sync::Arc;
 use heightfield_gdal::{FileSystem, ReadAt};
 use tempfile::TempDir;
 
-use crate::BadRaster;
+use crate::RasterError;
 use crate::beside;
 use crate::input::FileBytes;
-use crate::remote::{Elsewhere, RemoteFile, file_name, gdal_names, parts};
+use crate::remote::{RemoteFetcher, RemoteFile, file_name, gdal_names, parts};
 
 /// Beginnings of files that GDAL reads from a disk only (NetCDF, HDF5, HDF4), or from their first
 /// byte on (gzip): they are fetched as a whole.
@@ -30,7 +30,7 @@ const PARTS_OF_FREE: u64 = 2;
 /// The files at one host or in one bucket.
 #[derive(Clone)]
 pub(super) struct Served {
-    elsewhere: Elsewhere,
+    elsewhere: RemoteFetcher,
     /// As `https://host/`.
     root: String,
     /// What follows the path of each URL, which may be a key.
@@ -40,7 +40,7 @@ pub(super) struct Served {
 
 impl Served {
     /// The server of a URL, and the file's name there.
-    pub(super) fn of(url: &str, elsewhere: &Elsewhere) -> (Self, String) {
+    pub(super) fn of(url: &str, elsewhere: &RemoteFetcher) -> (Self, String) {
         let [root, name, rest] = parts(url);
         let served = Self {
             elsewhere: elsewhere.waiting(),
@@ -87,19 +87,19 @@ impl ReadAt for Remote {
     }
 }
 
-fn io_error(fault: BadRaster) -> io::Error {
+fn io_error(fault: RasterError) -> io::Error {
     match fault {
-        BadRaster::Elsewhere(error) | BadRaster::Unreadable(error) => error,
+        RasterError::RemoteFetcher(error) | RasterError::Unreadable(error) => error,
         fault => io::Error::other(fault.to_string()),
     }
 }
 
 /// What went wrong with a file that GDAL read through this program.
-pub(super) fn fault(error: io::Error) -> BadRaster {
+pub(super) fn fault(error: io::Error) -> RasterError {
     match error.kind() {
         // A refusal of its content, and not of its server.
-        io::ErrorKind::Other => BadRaster::Unreadable(error),
-        _ => BadRaster::elsewhere(error),
+        io::ErrorKind::Other => RasterError::Unreadable(error),
+        _ => RasterError::elsewhere(error),
     }
 }
 
@@ -111,14 +111,17 @@ pub(super) fn is_fetched(head: &[u8]) -> bool {
 /// A file, and what GDAL notes beside it, in a folder that goes when it is dropped.
 ///
 /// # Errors
-/// [`BadRaster::AbsurdSize`] where it is too large for that.
-pub(super) fn fetched(url: &str, elsewhere: &Elsewhere) -> Result<(TempDir, String), BadRaster> {
+/// [`RasterError::AbsurdSize`] where it is too large for that.
+pub(super) fn fetched(
+    url: &str,
+    elsewhere: &RemoteFetcher,
+) -> Result<(TempDir, String), RasterError> {
     let input = FileBytes::open(Path::new(url), elsewhere)?;
-    let folder = tempfile::tempdir().map_err(BadRaster::Unreadable)?;
+    let folder = tempfile::tempdir().map_err(RasterError::Unreadable)?;
     let free = fs4::available_space(folder.path()).unwrap_or(u64::MAX);
     let most = MAX_FETCHED_BYTES.min(free / PARTS_OF_FREE);
     if input.len() > most {
-        return Err(BadRaster::AbsurdSize(format!(
+        return Err(RasterError::AbsurdSize(format!(
             "{} MB, of which {} MB fit here: a file of this format at a URL is fetched as a whole",
             input.len() >> 20,
             most >> 20
@@ -128,9 +131,9 @@ pub(super) fn fetched(url: &str, elsewhere: &Elsewhere) -> Result<(TempDir, Stri
     let notes = beside::find_appended(&input, "aux.xml")?;
     let notes = notes.map(|notes| (notes, format!("{name}.aux.xml")));
     for (bytes, name) in [(input, name.clone())].into_iter().chain(notes) {
-        let mut file = File::create(folder.path().join(name)).map_err(BadRaster::Unreadable)?;
+        let mut file = File::create(folder.path().join(name)).map_err(RasterError::Unreadable)?;
         copy(&mut bytes.reader()?, &mut file)
-            .map_err(|error| BadRaster::from_io(error, "what is at the URL"))?;
+            .map_err(|error| RasterError::from_io(error, "what is at the URL"))?;
     }
     Ok((folder, name))
 }

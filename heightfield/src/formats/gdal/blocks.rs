@@ -8,13 +8,11 @@ use twox_hash::XxHash64;
 
 use super::place::Place;
 use super::{NAME, at_url, fault};
-use crate::blocks::{
-    Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, usual_block,
-};
+use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, usual_block};
 use crate::encoding::codes;
 use crate::plain::{transposed, turned};
 use crate::samples::{HoleMask, SampleType, with_samples};
-use crate::{BadRaster, thinned};
+use crate::{RasterError, thinned};
 
 /// When a file that stays on disk is opened, so many places each way are looked at.
 const PLACES: u32 = 6;
@@ -68,15 +66,15 @@ impl GdalBlocks {
         number: u32,
         stored: SampleType,
         has_codes: bool,
-    ) -> Result<Self, BadRaster> {
+    ) -> Result<Self, RasterError> {
         let held = if has_codes { SampleType::I32 } else { stored };
         let band = dataset.band(number).map_err(fault)?;
         let is_masked = band.mask() == Mask::Band;
         let full = image(&band);
         let samples = band.block_size().map(u64::from).iter().product::<u64>();
-        if samples.saturating_mul(held.bytes()) > LARGEST_BLOCK_BYTES {
+        if samples.saturating_mul(held.bytes()) > MAX_BLOCK_BYTES {
             let [columns, rows] = band.block_size();
-            return Err(BadRaster::Unsupported {
+            return Err(RasterError::Unsupported {
                 format: NAME,
                 feature: format!("a file that is read {columns} × {rows} samples at once"),
             });
@@ -117,7 +115,7 @@ impl GdalBlocks {
         })
     }
 
-    fn opened_again(&self) -> Result<Dataset, BadRaster> {
+    fn opened_again(&self) -> Result<Dataset, RasterError> {
         let Source {
             place,
             name,
@@ -127,14 +125,19 @@ impl GdalBlocks {
         place.open_again(name, &options)
     }
 
-    fn read_from(&self, dataset: &Dataset, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read_from(
+        &self,
+        dataset: &Dataset,
+        image: usize,
+        part: &Part,
+    ) -> Result<Block, RasterError> {
         let full = dataset.band(self.number).map_err(fault)?;
         let band = match image.checked_sub(1) {
             None => full,
             Some(coarser) => {
                 let overviews = full.overviews();
                 let overview = (self.overviews.get(coarser)).and_then(|at| overviews.get(*at));
-                *overview.ok_or_else(|| BadRaster::damaged("GDAL: an overview has gone"))?
+                *overview.ok_or_else(|| RasterError::damaged("GDAL: an overview has gone"))?
             }
         };
         let samples = match self.has_codes {
@@ -188,7 +191,7 @@ impl BlockReader for GdalBlocks {
         true
     }
 
-    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         // A panic in between has changed nothing of it.
         let mut open = self.dataset.lock().unwrap_or_else(PoisonError::into_inner);
         let dataset = match open.take() {
@@ -216,7 +219,7 @@ impl BlockReader for GdalBlocks {
     }
 }
 
-fn read<T: Sample>(band: &Band<'_>, part: &Part) -> Result<Vec<T>, BadRaster> {
+fn read<T: Sample>(band: &Band<'_>, part: &Part) -> Result<Vec<T>, RasterError> {
     let count = part.columns as usize * part.rows as usize;
     let mut samples = vec![T::default(); count];
     let window = Window {
@@ -230,7 +233,7 @@ fn read<T: Sample>(band: &Band<'_>, part: &Part) -> Result<Vec<T>, BadRaster> {
 }
 
 /// Samples that a mask or an alpha band calls none.
-fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, BadRaster> {
+fn holes(mask: &Band<'_>, part: &Part) -> Result<HoleMask, RasterError> {
     let valid = read::<u8>(mask, part)?;
     let mut holes = HoleMask::with_capacity(valid.len());
     for (at, valid) in valid.iter().enumerate() {
@@ -277,7 +280,7 @@ impl BlockReader for Turned {
         true
     }
 
-    fn read(&self, _: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read(&self, _: usize, part: &Part) -> Result<Block, RasterError> {
         let block = self.blocks.read(0, &turned(part))?;
         Ok(Block {
             samples: transposed(&block.samples, part.columns, part.rows),

@@ -29,7 +29,7 @@ use crate::file_layout::FileLayout;
 use crate::geometry::{metres_in, unknown_unit};
 use crate::ground_map::GroundMap;
 use crate::input::FileBytes;
-use crate::{BadRaster, OpenOptions, ReferenceSystem, gdal};
+use crate::{OpenOptions, RasterError, ReferenceSystem, gdal};
 use blocks::{GdalBlocks, Source, Turned, held};
 pub(crate) use names::by_beginning;
 use place::Place;
@@ -50,13 +50,13 @@ const UNKNOWN: [&str; 2] = ["not recognized as", "no driver knows"];
 /// Reads a file, folder or whatever else a driver opens.
 ///
 /// # Errors
-/// [`BadRaster::UnknownFormat`] where no driver does; [`BadRaster::WantsGdal`] where there is no
+/// [`RasterError::UnknownFormat`] where no driver does; [`RasterError::WantsGdal`] where there is no
 /// libgdal; else what is wrong with the file.
-pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let head = head(path, options)?;
     let library = gdal().map_err(|why| match names::of(path, &head) {
-        Some(format) => BadRaster::WantsGdal { format, why },
-        None => BadRaster::UnknownFormat,
+        Some(format) => RasterError::WantsGdal { format, why },
+        None => RasterError::UnknownFormat,
     })?;
     let place = Arc::new(Place::of(&library, path, &head, &options.elsewhere)?);
     let decoded = match packed::Packing::of(&head) {
@@ -76,7 +76,7 @@ fn of_archive(
     place: &Arc<Place>,
     head: &[u8],
     options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
+) -> Result<Decoded, RasterError> {
     let (entry, options) = packing.entry(library, place, options)?;
     let mut decoded = opened(library, place, &entry, head, &options)?;
     decoded.format = format!("{} in {}", decoded.format, packing.name());
@@ -104,7 +104,7 @@ pub(crate) fn system_of(input: &FileBytes) -> Option<ReferenceSystem> {
 }
 
 /// The first bytes; none of a folder.
-fn head(path: &Path, options: &OpenOptions) -> Result<Vec<u8>, BadRaster> {
+fn head(path: &Path, options: &OpenOptions) -> Result<Vec<u8>, RasterError> {
     match path.is_dir() {
         true => Ok(Vec::new()),
         false => FileBytes::open(path, &options.elsewhere)?.head(HEAD_BYTES),
@@ -117,7 +117,7 @@ fn opened(
     path: &Path,
     head: &[u8],
     options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
+) -> Result<Decoded, RasterError> {
     let of_stac = || stac::refused(place, options);
     if place.is_served()
         && let Some(refused) = of_stac()?
@@ -125,7 +125,7 @@ fn opened(
         return Err(refused);
     }
     let dataset = match open(library, path, options) {
-        Err(BadRaster::UnknownFormat) => match label_beside(path) {
+        Err(RasterError::UnknownFormat) => match label_beside(path) {
             Some(label) => {
                 let mut decoded = opened(library, place, &label, head, options)?;
                 let name = label.file_name().unwrap_or_default().display().to_string();
@@ -137,22 +137,22 @@ fn opened(
             None if path.is_dir() && names::of(path, head).is_some() => {
                 return Err(no_raster(&format!("version {}", library.version())));
             }
-            None => return Err(of_stac()?.unwrap_or(BadRaster::UnknownFormat)),
+            None => return Err(of_stac()?.unwrap_or(RasterError::UnknownFormat)),
         },
-        Err(fault @ BadRaster::ByGdal(_)) => return Err(of_stac()?.unwrap_or(fault)),
+        Err(fault @ RasterError::ByGdal(_)) => return Err(of_stac()?.unwrap_or(fault)),
         dataset => dataset?,
     };
     let driver = dataset.driver();
     if BY_HEADER.contains(&driver.as_str()) && headered::is_of_another_kind(head) {
-        return Err(BadRaster::UnknownFormat);
+        return Err(RasterError::UnknownFormat);
     }
     if driver == "GRASSASCIIGrid" && has_stars(place, options)? {
         let why =
             "it reads * as a height of 0: write a number for holes (r.out.ascii null_value=-9999)";
-        return Err(BadRaster::ByGdal(Error::Refused(why.into())));
+        return Err(RasterError::ByGdal(Error::Refused(why.into())));
     }
     let part = match chosen(&dataset, options) {
-        Err(fault @ (BadRaster::SeveralHeights { .. } | BadRaster::NoSuchPart { .. })) => {
+        Err(fault @ (RasterError::SeveralHeights { .. } | RasterError::NoSuchPart { .. })) => {
             return Err(of_stac()?.unwrap_or(fault));
         }
         part => part?,
@@ -172,16 +172,16 @@ fn open_options(options: &OpenOptions) -> Vec<&str> {
     options.open_options.iter().map(String::as_str).collect()
 }
 
-fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset, BadRaster> {
+fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset, RasterError> {
     library.open(path, &open_options(options)).map_err(fault)
 }
 
 /// Whether a text has a star, as GRASS writes where there is no height.
-fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, BadRaster> {
+fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> {
     let input = FileBytes::open(&place.source, &options.elsewhere)?;
     let mut reader = input.reader()?;
     loop {
-        let chunk = reader.fill_buf().map_err(BadRaster::Unreadable)?;
+        let chunk = reader.fill_buf().map_err(RasterError::Unreadable)?;
         if chunk.is_empty() || chunk.contains(&b'*') {
             return Ok(!chunk.is_empty());
         }
@@ -199,12 +199,12 @@ fn label_beside(path: &Path) -> Option<PathBuf> {
 }
 
 /// A refusal of a file whose kind is known, and in which this GDAL finds nothing.
-fn no_raster(who: &str) -> BadRaster {
-    BadRaster::ByGdal(Error::Refused(format!("{who} finds no raster in it")))
+fn no_raster(who: &str) -> RasterError {
+    RasterError::ByGdal(Error::Refused(format!("{who} finds no raster in it")))
 }
 
 /// The name of the raster to take, where the file holds several.
-fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, BadRaster> {
+fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, RasterError> {
     // As `depth` of `NETCDF:"ocean.nc":depth`.
     let short = |name: &str| {
         let last = name.rsplit([':', '/']).next().unwrap_or(name);
@@ -221,7 +221,7 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ba
     }
     if parts.is_empty() {
         return Err(match asked {
-            Some(asked) => BadRaster::NoSuchPart {
+            Some(asked) => RasterError::NoSuchPart {
                 asked: format!("variable {asked}"),
                 there: "the file holds one raster".into(),
             },
@@ -248,17 +248,18 @@ fn decoded(
     dataset: Dataset,
     name: String,
     options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
+) -> Result<Decoded, RasterError> {
     let bands = dataset.bands();
     let number = options.band.unwrap_or(1);
     let band = dataset.band(number).map_err(fault)?;
     let stored = band.sample_type();
-    let stored = stored.map_err(|name| BadRaster::NotAHeightField(format!("samples of {name}")))?;
+    let stored =
+        stored.map_err(|name| RasterError::NotAHeightField(format!("samples of {name}")))?;
     let has_codes = options.encoding.is_some();
     if has_codes {
         check_codes(stored, bands, options)?;
     } else if options.band.is_none() && stored == Stored::U8 && COLOURS.contains(&bands) {
-        return Err(BadRaster::ColourBands {
+        return Err(RasterError::ColourBands {
             what: format!("a picture of {bands} bands of bytes"),
             bands: bands as u16,
         });
@@ -323,9 +324,9 @@ fn decoded(
 }
 
 /// Checks that a file has colours that may be codes of heights.
-fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), BadRaster> {
+fn check_codes(stored: Stored, bands: u32, options: &OpenOptions) -> Result<(), RasterError> {
     match options.band {
-        Some(band) => Err(BadRaster::NoSuchPart {
+        Some(band) => Err(RasterError::NoSuchPart {
             asked: format!("band {band} with --input encoding=…"),
             there: "three bands together are one height".into(),
         }),
@@ -339,7 +340,7 @@ fn read(
     blocks: impl BlockReader + 'static,
     driver: &str,
     options: &OpenOptions,
-) -> Result<Decoded, BadRaster> {
+) -> Result<Decoded, RasterError> {
     let full = blocks.images()[0];
     let size = sides(full.columns.into(), full.rows.into())?;
     let held = blocks.sample_type();
@@ -356,13 +357,13 @@ fn read(
     Ok(decoded)
 }
 
-fn fault(error: Error) -> BadRaster {
+fn fault(error: Error) -> RasterError {
     match error {
-        Error::NoSuchPart { asked, there } => BadRaster::NoSuchPart { asked, there },
+        Error::NoSuchPart { asked, there } => RasterError::NoSuchPart { asked, there },
         Error::Refused(words) if UNKNOWN.iter().any(|unknown| words.contains(unknown)) => {
-            BadRaster::UnknownFormat
+            RasterError::UnknownFormat
         }
-        Error::NotOpened { .. } => BadRaster::Unreadable(std::io::Error::other(error)),
-        error => BadRaster::ByGdal(error),
+        Error::NotOpened { .. } => RasterError::Unreadable(std::io::Error::other(error)),
+        error => RasterError::ByGdal(error),
     }
 }

@@ -8,7 +8,7 @@ use super::fault;
 use crate::crs::Unit;
 use crate::decoded::Decoded;
 use crate::geometry::metres_in;
-use crate::{BadRaster, ReferenceSystem};
+use crate::{RasterError, ReferenceSystem};
 
 /// What people call the variable with the heights.
 pub(super) const HEIGHT_NAMES: &str = "z elevation elev topo topography height altitude dem relief \
@@ -41,7 +41,7 @@ impl Conventions {
         path: &Path,
         dataset: &Dataset,
         band: &Band<'_>,
-    ) -> Result<Self, BadRaster> {
+    ) -> Result<Self, RasterError> {
         let mut found = Self::default();
         if dataset.driver() != "netCDF" {
             return Ok(found);

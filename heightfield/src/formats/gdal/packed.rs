@@ -10,7 +10,7 @@ use super::fault;
 use super::place::Place;
 use crate::format::Claim;
 use crate::formats::claim_of;
-use crate::{BadRaster, OpenOptions};
+use crate::{OpenOptions, RasterError};
 
 /// No file that is larger is read inside of an archive: samples in it are found by unpacking what
 /// lies before them.
@@ -59,17 +59,17 @@ impl Packing {
     /// What GDAL calls the raster in an archive, and the options that are left for it.
     ///
     /// # Errors
-    /// [`BadRaster::SeveralHeights`] where none of several is chosen by `--input variable=NAME`.
+    /// [`RasterError::SeveralHeights`] where none of several is chosen by `--input variable=NAME`.
     pub(super) fn entry(
         self,
         library: &Library,
         place: &Place,
         options: &OpenOptions,
-    ) -> Result<(PathBuf, OpenOptions), BadRaster> {
+    ) -> Result<(PathBuf, OpenOptions), RasterError> {
         let path = &place.path;
         let absolute = match place.is_served() {
             true => path.clone(),
-            false => std::path::absolute(path).map_err(BadRaster::Unreadable)?,
+            false => std::path::absolute(path).map_err(RasterError::Unreadable)?,
         };
         let inside = absolute.display();
         let is_tar = match self {
@@ -86,7 +86,7 @@ impl Packing {
         };
         let mut entries = library.entries(Path::new(&folder)).map_err(fault)?;
         if entries.len() > MAX_ENTRIES {
-            return Err(BadRaster::AbsurdSize(format!(
+            return Err(RasterError::AbsurdSize(format!(
                 "an archive of {} files",
                 entries.len()
             )));
@@ -133,7 +133,7 @@ fn only(
     library: &Library,
     entries: &[String],
     full: &dyn Fn(&str) -> PathBuf,
-) -> Result<String, BadRaster> {
+) -> Result<String, RasterError> {
     let is_likely = |name: &&String| claim_of(name).is_some_and(|claim| claim != Claim::Suggests);
     let mut rasters: Vec<String> = entries.iter().filter(is_likely).cloned().collect();
     if rasters.is_empty() {
@@ -149,18 +149,18 @@ fn only(
     }
     match rasters.len() {
         1 => Ok(rasters.remove(0)),
-        0 => Err(BadRaster::NotAHeightField(
+        0 => Err(RasterError::NotAHeightField(
             "the archive holds no terrain file".into(),
         )),
-        _ => Err(BadRaster::SeveralHeights {
+        _ => Err(RasterError::SeveralHeights {
             kind: "file",
             names: rasters,
         }),
     }
 }
 
-fn too_large(name: &str) -> BadRaster {
-    BadRaster::Unsupported {
+fn too_large(name: &str) -> RasterError {
+    RasterError::Unsupported {
         format: "archive",
         feature: format!(
             "{name}, which has more than {} MB unpacked,",
@@ -170,18 +170,18 @@ fn too_large(name: &str) -> BadRaster {
 }
 
 /// Checks that a gzip file unpacks, to no more than [`MAX_BYTES`].
-fn check_unpacked(path: &Path) -> Result<(), BadRaster> {
-    let file = std::fs::File::open(path).map_err(BadRaster::Unreadable)?;
+fn check_unpacked(path: &Path) -> Result<(), RasterError> {
+    let file = std::fs::File::open(path).map_err(RasterError::Unreadable)?;
     let unpacked = MultiGzDecoder::new(std::io::BufReader::new(file));
     match copy(&mut unpacked.take(MAX_BYTES + 1), &mut sink()) {
         Ok(bytes) if bytes > MAX_BYTES => Err(too_large("a file")),
         Ok(_) => Ok(()),
-        Err(error) => Err(BadRaster::from_io(error, "the packed data")),
+        Err(error) => Err(RasterError::from_io(error, "the packed data")),
     }
 }
 
-fn unpacked_head(path: &Path) -> Result<Option<Vec<u8>>, BadRaster> {
-    let file = std::fs::File::open(path).map_err(BadRaster::Unreadable)?;
+fn unpacked_head(path: &Path) -> Result<Option<Vec<u8>>, RasterError> {
+    let file = std::fs::File::open(path).map_err(RasterError::Unreadable)?;
     let mut head = Vec::new();
     let read = MultiGzDecoder::new(file)
         .take(super::HEAD_BYTES)

@@ -7,8 +7,8 @@ use tempfile::TempDir;
 
 use super::at_url::{self, Served, fetched, is_fetched};
 use super::fault;
-use crate::BadRaster;
-use crate::remote::{Elsewhere, is_url, without_key};
+use crate::RasterError;
+use crate::remote::{RemoteFetcher, is_url, without_key};
 
 /// A file here or at a URL.
 pub(super) struct Place {
@@ -27,8 +27,8 @@ impl Place {
         library: &Library,
         source: &Path,
         head: &[u8],
-        elsewhere: &Elsewhere,
-    ) -> Result<Self, BadRaster> {
+        elsewhere: &RemoteFetcher,
+    ) -> Result<Self, RasterError> {
         let here = Self {
             library: library.clone(),
             source: source.to_owned(),
@@ -62,19 +62,19 @@ impl Place {
     }
 
     /// GDAL's refusal without the folder of the file, which the user has named or knows nothing of.
-    pub(super) fn in_words(&self, refusal: BadRaster) -> BadRaster {
+    pub(super) fn in_words(&self, refusal: RasterError) -> RasterError {
         let folder = self
             .path
             .parent()
             .map(|folder| folder.display().to_string());
         match (refusal, folder.filter(|folder| !folder.is_empty())) {
-            (BadRaster::ByGdal(Error::Refused(words)), Some(folder)) => {
+            (RasterError::ByGdal(Error::Refused(words)), Some(folder)) => {
                 let words = words.replace(&format!("{folder}/"), "");
-                BadRaster::ByGdal(Error::Refused(words))
+                RasterError::ByGdal(Error::Refused(words))
             }
-            (BadRaster::ByGdal(Error::Slow { seconds, .. }), _) => {
+            (RasterError::ByGdal(Error::Slow { seconds, .. }), _) => {
                 let path = without_key(&self.source).into();
-                BadRaster::ByGdal(Error::Slow { path, seconds })
+                RasterError::ByGdal(Error::Slow { path, seconds })
             }
             (refusal, _) => refusal,
         }
@@ -87,7 +87,7 @@ impl Place {
     }
 
     /// Opens a part of the file anew after something could not be read: GDAL remembers it.
-    pub(super) fn open_again(&self, name: &str, options: &[&str]) -> Result<Dataset, BadRaster> {
+    pub(super) fn open_again(&self, name: &str, options: &[&str]) -> Result<Dataset, RasterError> {
         let Some((served, mount)) = &self.served else {
             return self.library.open_part(name, options).map_err(fault);
         };

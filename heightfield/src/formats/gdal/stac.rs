@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::place::Place;
 use crate::input::FileBytes;
 use crate::remote::{is_url, without_rest};
-use crate::{BadRaster, OpenOptions, file_name};
+use crate::{OpenOptions, RasterError, file_name};
 
 /// A larger document is no list of items that can be opened. In memory it takes fifty times as much.
 const MAX_BYTES: u64 = 4 << 20;
@@ -34,7 +34,7 @@ struct Item {
 pub(super) fn refused(
     place: &Place,
     options: &OpenOptions,
-) -> Result<Option<BadRaster>, BadRaster> {
+) -> Result<Option<RasterError>, RasterError> {
     let items = items(&place.source, options)?;
     items
         .map(|items| to_build("GDAL does not open it as items of a STAC", &items))
@@ -44,13 +44,13 @@ pub(super) fn refused(
 /// Checks that files lie where their items say, and that GDAL has found the same files.
 ///
 /// # Errors
-/// [`BadRaster::ToBuild`] where one does not.
+/// [`RasterError::ToBuild`] where one does not.
 pub(super) fn check_places(
     library: &Library,
     opened: &Dataset,
     place: &Place,
     options: &OpenOptions,
-) -> Result<(), BadRaster> {
+) -> Result<(), RasterError> {
     let Some(items) = items(&place.source, options)? else {
         return Ok(());
     };
@@ -82,13 +82,13 @@ pub(super) fn check_places(
 }
 
 /// The refusal that names the files to make a VRT of.
-fn to_build(why: &str, items: &[Item]) -> Result<BadRaster, BadRaster> {
+fn to_build(why: &str, items: &[Item]) -> Result<RasterError, RasterError> {
     let mut files = Vec::new();
     for item in items {
         match &item.assets[..] {
             [(_, file)] => files.push(file.clone()),
             assets => {
-                return Err(BadRaster::WhichAsset {
+                return Err(RasterError::WhichAsset {
                     why: match assets {
                         [] => format!(
                             "the item {} has no asset of that name, or no raster",
@@ -101,14 +101,14 @@ fn to_build(why: &str, items: &[Item]) -> Result<BadRaster, BadRaster> {
             }
         }
     }
-    Ok(BadRaster::ToBuild {
+    Ok(RasterError::ToBuild {
         why: why.to_owned(),
         files,
     })
 }
 
 /// The items of a document; none where it is something else.
-fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, BadRaster> {
+fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, RasterError> {
     let url = path.to_str().filter(|path| is_url(path));
     let named = url.map_or(path, |url| Path::new(file_name(url)));
     let is_named = named
@@ -119,16 +119,16 @@ fn items(path: &Path, options: &OpenOptions) -> Result<Option<Vec<Item>>, BadRas
     }
     let input = FileBytes::open(path, &options.elsewhere)?;
     if input.len() > MAX_BYTES {
-        return Err(BadRaster::AbsurdSize(format!(
+        return Err(RasterError::AbsurdSize(format!(
             "a JSON document of {} bytes",
             input.len()
         )));
     }
     let text = input.head(MAX_BYTES)?;
     let document: Value = serde_json::from_slice(&text)
-        .map_err(|error| BadRaster::Damaged(format!("it is no JSON: {error}")))?;
+        .map_err(|error| RasterError::Damaged(format!("it is no JSON: {error}")))?;
     let asked = match &options.variable {
-        Some(name) => Some(Pattern::new(name).map_err(|error| BadRaster::NoSuchPart {
+        Some(name) => Some(Pattern::new(name).map_err(|error| RasterError::NoSuchPart {
             asked: format!("variable {name}"),
             there: format!("it is no pattern: {error}"),
         })?),

@@ -9,7 +9,7 @@ use crate::decoded::Decoded;
 use crate::ground_map::GroundMap;
 use crate::numbers::{self, NoDataText};
 use crate::read::Stored;
-use crate::{BadRaster, Endian, SampleType};
+use crate::{Endian, RasterError, SampleType};
 
 /// Whether a text is such a header: it says how many columns and rows there are.
 pub(super) fn is_header(text: &str) -> bool {
@@ -23,12 +23,12 @@ struct Keys(HashMap<String, String>);
 /// Reads a header for data with an extension, of so many bytes. Where it does not state the type,
 /// the length of the data tells the bytes of a sample: four and more are floats, as in GDAL, and
 /// integers have a sign when the no-data value has one.
-pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, BadRaster> {
+pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, RasterError> {
     let keys = Keys::read(text);
     let (columns, rows) = (keys.count("ncols")?, keys.count("nrows")?);
     let (columns, rows) = match (columns, rows) {
         (Some(columns), Some(rows)) if columns > 0 && rows > 0 => (columns, rows),
-        _ => return Err(BadRaster::damaged("it gives no columns or no rows")),
+        _ => return Err(RasterError::damaged("it gives no columns or no rows")),
     };
     let interleave = match keys.text("layout").or(match extension {
         "bip" => Some("bip"),
@@ -38,7 +38,7 @@ pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, Ba
         None | Some("bil") => Interleave::Line,
         Some("bip") => Interleave::Pixel,
         Some("bsq") => Interleave::Sequential,
-        Some(other) => return Err(BadRaster::Unfamiliar(format!("layout {other}"))),
+        Some(other) => return Err(RasterError::Unfamiliar(format!("layout {other}"))),
     };
     let bands = keys.count("nbands")?.unwrap_or(1).max(1);
     let skip = keys.bytes("skipbytes")?.unwrap_or(0);
@@ -102,29 +102,29 @@ impl Keys {
         self.0.get(key).map(String::as_str)
     }
 
-    fn number(&self, key: &str) -> Result<Option<f64>, BadRaster> {
+    fn number(&self, key: &str) -> Result<Option<f64>, RasterError> {
         let Some(text) = self.text(key) else {
             return Ok(None);
         };
-        let wrong = || BadRaster::damaged(format!("{key} is '{text}', not a number"));
+        let wrong = || RasterError::damaged(format!("{key} is '{text}', not a number"));
         numbers::number(text).ok_or_else(wrong).map(Some)
     }
 
-    fn bytes(&self, key: &str) -> Result<Option<u64>, BadRaster> {
+    fn bytes(&self, key: &str) -> Result<Option<u64>, RasterError> {
         let Some(number) = self.number(key)? else {
             return Ok(None);
         };
         match number.fract() == 0.0 && (0.0..9e15).contains(&number) {
             true => Ok(Some(number as u64)),
-            false => Err(BadRaster::damaged(format!("{key} is {number}"))),
+            false => Err(RasterError::damaged(format!("{key} is {number}"))),
         }
     }
 
-    fn count(&self, key: &str) -> Result<Option<u32>, BadRaster> {
+    fn count(&self, key: &str) -> Result<Option<u32>, RasterError> {
         let Some(number) = self.bytes(key)? else {
             return Ok(None);
         };
-        let absurd = |_| BadRaster::AbsurdSize(format!("{key} is {number}"));
+        let absurd = |_| RasterError::AbsurdSize(format!("{key} is {number}"));
         u32::try_from(number).map(Some).map_err(absurd)
     }
 
@@ -139,12 +139,12 @@ impl Keys {
         &self,
         extension: &str,
         by_length: Option<u64>,
-    ) -> Result<(Stored, Option<String>), BadRaster> {
+    ) -> Result<(Stored, Option<String>), RasterError> {
         let by_name = self.text("numbertype").map(number_type).transpose()?;
         let stated = self.count("nbits")?;
         let (bits, is_guess) = match (stated, by_name, by_length) {
             (Some(bits), Some((other, _)), _) if bits != other => {
-                return Err(BadRaster::damaged(format!(
+                return Err(RasterError::damaged(format!(
                     "nbits is {bits} and numbertype is {}",
                     self.text("numbertype").unwrap_or_default()
                 )));
@@ -176,16 +176,16 @@ impl Keys {
 
     /// By the centre of the north-western sample (images) or the south-western corner
     /// (grids).
-    fn map(&self, rows: u32) -> Result<Option<GroundMap>, BadRaster> {
+    fn map(&self, rows: u32) -> Result<Option<GroundMap>, RasterError> {
         let cell = self.number("cellsize")?;
-        let side = |key| Ok::<_, BadRaster>(self.number(key)?.or(cell));
+        let side = |key| Ok::<_, RasterError>(self.number(key)?.or(cell));
         let Some((east, north)) = side("xdim")?.zip(side("ydim")?) else {
             return Ok(None);
         };
         let north_west = self.number("ulxmap")?.zip(self.number("ulymap")?);
         let place = |corner, centre, step: f64| {
             let by_centre = self.number(centre)?.map(|at| at - step / 2.0);
-            Ok::<_, BadRaster>(self.number(corner)?.or(by_centre))
+            Ok::<_, RasterError>(self.number(corner)?.or(by_centre))
         };
         let west = place("xllcorner", "xllcenter", east)?;
         let south_west = west.zip(place("yllcorner", "yllcenter", north)?);
@@ -194,12 +194,12 @@ impl Keys {
             (None, Some(corner)) => GroundMap::from_south_west(corner, (east, north), rows),
             (None, None) => return Ok(None),
         };
-        let nowhere = || BadRaster::damaged("its cells have no size");
+        let nowhere = || RasterError::damaged("its cells have no size");
         map.ok_or_else(nowhere).map(Some)
     }
 }
 
-fn sample_type(kind: char, bits: u32) -> Result<SampleType, BadRaster> {
+fn sample_type(kind: char, bits: u32) -> Result<SampleType, RasterError> {
     use SampleType::{F32, F64, I8, I16, I32, U8, U16, U32};
     Ok(match (kind, bits) {
         ('u', 8) => U8,
@@ -211,7 +211,7 @@ fn sample_type(kind: char, bits: u32) -> Result<SampleType, BadRaster> {
         ('f', 32) => F32,
         ('f', 64) => F64,
         _ => {
-            return Err(BadRaster::Unsupported {
+            return Err(RasterError::Unsupported {
                 format: "Esri band image",
                 feature: format!("{bits} bits a sample"),
             });
@@ -220,7 +220,7 @@ fn sample_type(kind: char, bits: u32) -> Result<SampleType, BadRaster> {
 }
 
 /// Bits and kind of a type as NOAA names it: `2_BYTE_INTEGER`, `4_BYTE_FLOAT`.
-fn number_type(name: &str) -> Result<(u32, char), BadRaster> {
+fn number_type(name: &str) -> Result<(u32, char), RasterError> {
     let (bytes, kind) = name.split_once("_byte_").unwrap_or_default();
     let kind = match kind {
         "float" | "real" => Some('f'),
@@ -232,6 +232,6 @@ fn number_type(name: &str) -> Result<(u32, char), BadRaster> {
         .parse::<u32>()
         .ok()
         .and_then(|bytes| bytes.checked_mul(8));
-    let unknown = || BadRaster::damaged(format!("numbertype {name} is not known"));
+    let unknown = || RasterError::damaged(format!("numbertype {name} is not known"));
     bits.zip(kind).ok_or_else(unknown)
 }

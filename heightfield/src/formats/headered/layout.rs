@@ -2,7 +2,7 @@
 
 use crate::plain::Plain;
 use crate::read::Stored;
-use crate::{BadRaster, Endian};
+use crate::{Endian, RasterError};
 
 /// How the samples of several bands are interleaved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,23 +44,23 @@ struct Steps {
 
 impl Layout {
     /// Checks that the file holds what the header beside it, of a name, promises.
-    pub(super) fn check(&self, band: u32, bytes: u64, header: &str) -> Result<(), BadRaster> {
+    pub(super) fn check(&self, band: u32, bytes: u64, header: &str) -> Result<(), RasterError> {
         if band > self.bands {
             let there = match self.bands {
                 1 => "the file has one band".to_owned(),
                 bands => format!("the file has bands 1 to {bands}"),
             };
             let asked = format!("band {band}");
-            return Err(BadRaster::NoSuchPart { asked, there });
+            return Err(RasterError::NoSuchPart { asked, there });
         }
         let (columns, rows) = (self.columns, self.rows);
         let end = self.end(band).ok_or_else(|| {
-            BadRaster::AbsurdSize(format!(
+            RasterError::AbsurdSize(format!(
                 "{header} beside it promises {columns} × {rows} samples"
             ))
         })?;
         if end > bytes {
-            return Err(BadRaster::Truncated(format!(
+            return Err(RasterError::Truncated(format!(
                 "{header} beside it promises {columns} × {rows} samples of {} bytes, which end at \
                  byte {end}; the file has {bytes}",
                 self.stored.bytes()
@@ -71,14 +71,14 @@ impl Layout {
 
     /// Checks that no whole row lies behind what the header promises: it would be of another type
     /// or size of samples.
-    fn check_rest(&self, bytes: u64, header: &str) -> Result<(), BadRaster> {
+    fn check_rest(&self, bytes: u64, header: &str) -> Result<(), RasterError> {
         let (columns, rows, bands) = (self.columns, self.rows, self.bands);
         let row = u64::from(columns).saturating_mul(self.stored.bytes());
         let end = self.end(bands).unwrap_or(u64::MAX);
         // What pads rows or bands pads the last one, too.
         let padding = self.row_bytes.unwrap_or(0).saturating_add(self.band_gap);
         if bytes > end && bytes - end >= row.max(padding) {
-            return Err(BadRaster::damaged(format!(
+            return Err(RasterError::damaged(format!(
                 "{header} beside it promises {columns} × {rows} samples of {} bytes in {bands} \
                  bands, which end at byte {end}; the file has {bytes}: correct the type or size \
                  in the header",
@@ -147,8 +147,8 @@ impl Layout {
     }
 
     /// Where the samples of a band lie; the size has been checked.
-    pub(super) fn plain(&self, band: u32) -> Result<Plain, BadRaster> {
-        let uncounted = || BadRaster::AbsurdSize("its header's sizes".into());
+    pub(super) fn plain(&self, band: u32) -> Result<Plain, RasterError> {
+        let uncounted = || RasterError::AbsurdSize("its header's sizes".into());
         let steps = self.steps(band).ok_or_else(uncounted)?;
         Ok(Plain {
             columns: self.columns,

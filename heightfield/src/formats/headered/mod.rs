@@ -10,7 +10,7 @@ mod tests;
 use crate::decoded::Decoded;
 use crate::format::{Claim, Format, Parts};
 use crate::input::FileBytes;
-use crate::{BadRaster, OpenOptions, beside};
+use crate::{OpenOptions, RasterError, beside};
 use layout::Layout;
 
 /// Extensions of such data. The header decides where another file has one, too.
@@ -26,7 +26,7 @@ pub(super) const FORMAT: Format = Format {
     parts: Parts::Bands,
     decode: |input, options| {
         let decoded = decode_by_header(input, options)?;
-        decoded.ok_or_else(|| BadRaster::HeaderMissing(header_name(input)))
+        decoded.ok_or_else(|| RasterError::HeaderMissing(header_name(input)))
     },
 };
 
@@ -48,7 +48,7 @@ pub(crate) fn is_of_another_kind(head: &[u8]) -> bool {
 }
 
 /// Sets what a header says besides the layout of the samples.
-type Describe = Box<dyn FnOnce(&mut Decoded) -> Result<(), BadRaster>>;
+type Describe = Box<dyn FnOnce(&mut Decoded) -> Result<(), RasterError>>;
 
 /// What a header says.
 struct Header {
@@ -62,7 +62,7 @@ struct Header {
 pub(crate) fn decode_by_header(
     input: &FileBytes,
     options: &OpenOptions,
-) -> Result<Option<Decoded>, BadRaster> {
+) -> Result<Option<Decoded>, RasterError> {
     let Some((text, name)) = beside::text(input, "hdr")? else {
         return Ok(None);
     };
@@ -95,11 +95,15 @@ pub(crate) fn decode_by_header(
 }
 
 /// Damage of a header is not in the file that was named.
-fn in_header(fault: BadRaster, name: &str) -> BadRaster {
+fn in_header(fault: RasterError, name: &str) -> RasterError {
     match fault {
-        BadRaster::Damaged(what) => BadRaster::Damaged(format!("{name} beside it: {what}")),
-        BadRaster::Unfamiliar(what) => BadRaster::Unfamiliar(format!("{name} beside it: {what}")),
-        BadRaster::AbsurdSize(what) => BadRaster::AbsurdSize(format!("{name} beside it: {what}")),
+        RasterError::Damaged(what) => RasterError::Damaged(format!("{name} beside it: {what}")),
+        RasterError::Unfamiliar(what) => {
+            RasterError::Unfamiliar(format!("{name} beside it: {what}"))
+        }
+        RasterError::AbsurdSize(what) => {
+            RasterError::AbsurdSize(format!("{name} beside it: {what}"))
+        }
         other => other,
     }
 }

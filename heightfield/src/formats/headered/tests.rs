@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tempfile::TempDir;
 
-use crate::{BadRaster, CellUnit, Error, OpenOptions, Raster, ReferenceSystem};
+use crate::{CellUnit, Error, OpenOptions, Raster, RasterError, ReferenceSystem};
 
 /// A file and its header in a folder of their own.
 struct Pair {
@@ -108,7 +108,7 @@ fn bands_by_line_by_pixel_and_after_each_other() {
         );
         let error = pair.open(Some(3)).expect_err("two bands");
         assert!(
-            matches!(error.fault(), BadRaster::NoSuchPart { .. }),
+            matches!(error.fault(), RasterError::NoSuchPart { .. }),
             "{error}"
         );
         assert!(error.to_string().contains("bands 1 to 2"), "{error}");
@@ -225,14 +225,14 @@ fn a_missing_header_is_named() {
     fs::write(&path, [0; 24]).expect("written");
     let error = Raster::open(&path, &OpenOptions::default()).expect_err("no header");
     assert!(
-        matches!(error.fault(), BadRaster::HeaderMissing(name) if name == "dem.hdr"),
+        matches!(error.fault(), RasterError::HeaderMissing(name) if name == "dem.hdr"),
         "{error}"
     );
     // A picture's own header format has the same extension.
     fs::write(folder.path().join("dem.hdr"), "#?RADIANCE\n").expect("written");
     let error = Raster::open(&path, &OpenOptions::default()).expect_err("another header");
     assert!(
-        matches!(error.fault(), BadRaster::HeaderMissing(_)),
+        matches!(error.fault(), RasterError::HeaderMissing(_)),
         "{error}"
     );
 }

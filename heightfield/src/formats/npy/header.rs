@@ -3,7 +3,7 @@
 
 use std::io::Read;
 
-use crate::BadRaster;
+use crate::RasterError;
 
 /// Bytes a header may have; real ones have 128.
 const MAX_BYTES: u64 = 1 << 16;
@@ -26,9 +26,9 @@ impl Header {
     /// Reads it from the beginning of a file.
     ///
     /// # Errors
-    /// [`BadRaster::NoNumbers`] for records; what is not as NumPy writes it.
-    pub(super) fn read(reader: &mut dyn Read) -> Result<Self, BadRaster> {
-        let cut = |error| BadRaster::from_io(error, "the array's header");
+    /// [`RasterError::NoNumbers`] for records; what is not as NumPy writes it.
+    pub(super) fn read(reader: &mut dyn Read) -> Result<Self, RasterError> {
+        let cut = |error| RasterError::from_io(error, "the array's header");
         let mut head = [0; 8];
         reader.read_exact(&mut head).map_err(cut)?;
         let (begins, long) = match head[6] {
@@ -45,7 +45,7 @@ impl Header {
             version => return Err(unfamiliar(&format!("version {version}"))),
         };
         if long > MAX_BYTES {
-            return Err(BadRaster::AbsurdSize(format!(
+            return Err(RasterError::AbsurdSize(format!(
                 "an array header of {long} bytes"
             )));
         }
@@ -55,7 +55,7 @@ impl Header {
         Self::parse(&text, begins + long)
     }
 
-    fn parse(text: &str, bytes: u64) -> Result<Self, BadRaster> {
+    fn parse(text: &str, bytes: u64) -> Result<Self, RasterError> {
         let mut rest = Rest(text);
         let (mut descr, mut order, mut shape) = (None, None, None);
         rest.expect("{")?;
@@ -85,8 +85,8 @@ impl Header {
     }
 }
 
-fn unfamiliar(what: &str) -> BadRaster {
-    BadRaster::NotAHeightField(format!("an array whose header has {what}"))
+fn unfamiliar(what: &str) -> RasterError {
+    RasterError::NotAHeightField(format!("an array whose header has {what}"))
 }
 
 /// What is left of a header.
@@ -101,7 +101,7 @@ impl<'t> Rest<'t> {
         after.is_some()
     }
 
-    fn expect(&mut self, sign: &str) -> Result<(), BadRaster> {
+    fn expect(&mut self, sign: &str) -> Result<(), RasterError> {
         match self.takes(sign) {
             true => Ok(()),
             false => {
@@ -112,7 +112,7 @@ impl<'t> Rest<'t> {
     }
 
     /// A text in quotes.
-    fn text(&mut self) -> Result<&'t str, BadRaster> {
+    fn text(&mut self) -> Result<&'t str, RasterError> {
         let quote = if self.takes("\"") { '"' } else { '\'' };
         if quote == '\'' {
             self.expect("'")?;
@@ -126,14 +126,14 @@ impl<'t> Rest<'t> {
     }
 
     /// The type of a sample; that of a record is a list.
-    fn descr(&mut self) -> Result<&'t str, BadRaster> {
+    fn descr(&mut self) -> Result<&'t str, RasterError> {
         match self.takes("[") {
-            true => Err(BadRaster::NoNumbers("an array of records".into())),
+            true => Err(RasterError::NoNumbers("an array of records".into())),
             false => self.text(),
         }
     }
 
-    fn truth(&mut self) -> Result<bool, BadRaster> {
+    fn truth(&mut self) -> Result<bool, RasterError> {
         match self.takes("True") {
             true => Ok(true),
             false => self.expect("False").map(|()| false),
@@ -141,7 +141,7 @@ impl<'t> Rest<'t> {
     }
 
     /// Sides, as `(2, 3)`.
-    fn sides(&mut self) -> Result<Vec<u64>, BadRaster> {
+    fn sides(&mut self) -> Result<Vec<u64>, RasterError> {
         let mut sides = Vec::new();
         self.expect("(")?;
         while !self.takes(")") {
@@ -151,7 +151,7 @@ impl<'t> Rest<'t> {
                 .unwrap_or(rest.len());
             let (side, rest) = rest.split_at(end);
             let side = side.parse();
-            sides.push(side.map_err(|_| BadRaster::AbsurdSize("an array's side".into()))?);
+            sides.push(side.map_err(|_| RasterError::AbsurdSize("an array's side".into()))?);
             if sides.len() > MAX_SIDES {
                 return Err(unfamiliar(&format!("more than {MAX_SIDES} sides")));
             }
@@ -170,7 +170,7 @@ impl<'t> Rest<'t> {
 mod tests {
     use super::*;
 
-    fn parsed(text: &str) -> Result<Header, BadRaster> {
+    fn parsed(text: &str) -> Result<Header, RasterError> {
         Header::parse(text, 128)
     }
 
@@ -206,7 +206,7 @@ mod tests {
         }
         let records = parsed("{'descr': [('a', '<f4')], ");
         assert!(
-            matches!(records, Err(BadRaster::NoNumbers(_))),
+            matches!(records, Err(RasterError::NoNumbers(_))),
             "{records:?}"
         );
     }

@@ -7,7 +7,7 @@ use crate::format::{Claim, Format, Parts};
 use crate::input::FileBytes;
 use crate::plain::Plain;
 use crate::read::Stored;
-use crate::{BadRaster, Endian, OpenOptions, SampleType};
+use crate::{Endian, OpenOptions, RasterError, SampleType};
 use header::Header;
 
 /// A NumPy array in a file of its own.
@@ -30,7 +30,7 @@ struct Array {
 }
 
 /// The type and order of samples that NumPy describes, as `<f4`.
-fn sample_type(descr: &str) -> Result<(Stored, Endian), BadRaster> {
+fn sample_type(descr: &str) -> Result<(Stored, Endian), RasterError> {
     let what = || format!("an array of {descr}");
     let (order, kind) = match descr.split_at_checked(1) {
         Some((order @ ("<" | ">" | "|" | "="), kind)) => (order, kind),
@@ -52,15 +52,15 @@ fn sample_type(descr: &str) -> Result<(Stored, Endian), BadRaster> {
         "u4" => SampleType::U32,
         "f4" => SampleType::F32,
         "f8" => SampleType::F64,
-        _ if kind.starts_with(['O', 'S', 'U', 'a']) => return Err(BadRaster::NoNumbers(what())),
-        _ => return Err(BadRaster::NotAHeightField(what())),
+        _ if kind.starts_with(['O', 'S', 'U', 'a']) => return Err(RasterError::NoNumbers(what())),
+        _ => return Err(RasterError::NotAHeightField(what())),
     };
     Ok((Stored::Held(held), endian))
 }
 
 impl Array {
     /// Reads an array's header; the file holds its samples.
-    fn in_file(input: &FileBytes) -> Result<Self, BadRaster> {
+    fn in_file(input: &FileBytes) -> Result<Self, RasterError> {
         let Header {
             descr,
             column_major,
@@ -72,12 +72,12 @@ impl Array {
         let count = shape
             .iter()
             .try_fold(1_u64, |count, &side| count.checked_mul(side))
-            .ok_or_else(|| BadRaster::AbsurdSize(format!("an array of {shape:?} samples")))?;
+            .ok_or_else(|| RasterError::AbsurdSize(format!("an array of {shape:?} samples")))?;
         if count
             .checked_mul(stored.bytes())
             .is_none_or(|bytes| bytes > data)
         {
-            return Err(BadRaster::Truncated(format!(
+            return Err(RasterError::Truncated(format!(
                 "an array of {shape:?} samples of {} bytes does not fit into {data} bytes",
                 stored.bytes()
             )));
@@ -92,15 +92,15 @@ impl Array {
     }
 
     /// The array as heights, its first row the northernmost.
-    fn heights(&self, input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+    fn heights(&self, input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
         let &[rows, columns] = self.shape.as_slice() else {
             let what = format!(
                 "an array of {} dimensions; heights have two",
                 self.shape.len()
             );
             return Err(match self.shape.len() {
-                0 | 1 => BadRaster::NoNumbers(what),
-                _ => BadRaster::NotAHeightField(what),
+                0 | 1 => RasterError::NoNumbers(what),
+                _ => RasterError::NotAHeightField(what),
             });
         };
         let (columns, rows) = sides(columns, rows)?;
@@ -135,7 +135,7 @@ mod tests {
         FileBytes::unpacked("test.npy", bytes)
     }
 
-    fn samples(descr: &str, bytes: &[u8]) -> Result<Samples, BadRaster> {
+    fn samples(descr: &str, bytes: &[u8]) -> Result<Samples, RasterError> {
         let decoded = (FORMAT.decode)(&npy(descr, bytes), &crate::OpenOptions::default())?;
         Ok(decoded.storage.held().expect("in memory").clone())
     }
@@ -164,16 +164,16 @@ mod tests {
     #[test]
     fn an_array_that_the_file_does_not_hold_is_refused() {
         let fault = samples("<i8", &[0; 47]).expect_err("too short");
-        assert!(matches!(fault, BadRaster::Truncated(_)), "{fault}");
+        assert!(matches!(fault, RasterError::Truncated(_)), "{fault}");
         let fault = samples("<c8", &[0; 48]).expect_err("complex numbers");
-        assert!(matches!(fault, BadRaster::NotAHeightField(_)), "{fault}");
+        assert!(matches!(fault, RasterError::NotAHeightField(_)), "{fault}");
     }
 
     #[test]
     fn header_that_nests_deep_is_refused_at_once() {
         for deep in ["{".repeat(30), "{\"}\":".repeat(30)] {
             let fault = samples(&format!("', 'x': {deep}"), &[]).expect_err("deep");
-            assert!(matches!(fault, BadRaster::NotAHeightField(_)), "{fault}");
+            assert!(matches!(fault, RasterError::NotAHeightField(_)), "{fault}");
         }
     }
 }

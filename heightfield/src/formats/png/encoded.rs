@@ -7,10 +7,10 @@ use crate::decoded::Decoded;
 use crate::encoding::code;
 use crate::input::FileBytes;
 use crate::samples::HoleMask;
-use crate::{BadRaster, Encoding, Samples};
+use crate::{Encoding, RasterError, Samples};
 
 /// Reads a picture whose colours encode heights. An alpha of 0 is no data, too.
-pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, BadRaster> {
+pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, RasterError> {
     let codes = Codes::read(input)?;
     let mut decoded = Decoded::new("PNG".into(), codes.size, Samples::from(codes.codes));
     decoded.take_codes(encoding);
@@ -19,8 +19,8 @@ pub(super) fn decode(input: &FileBytes, encoding: Encoding) -> Result<Decoded, B
 }
 
 /// A fault of ambiguous channels, or that the picture looks like encoded heights.
-pub(super) fn suspected(fault: BadRaster, input: &FileBytes) -> BadRaster {
-    if !matches!(fault, BadRaster::AmbiguousChannels(_)) {
+pub(super) fn suspected(fault: RasterError, input: &FileBytes) -> RasterError {
+    if !matches!(fault, RasterError::AmbiguousChannels(_)) {
         return fault;
     }
     let Ok(codes) = Codes::read(input) else {
@@ -30,7 +30,7 @@ pub(super) fn suspected(fault: BadRaster, input: &FileBytes) -> BadRaster {
     let alike = encodings
         .into_iter()
         .find(|encoding| codes.look_like(*encoding));
-    alike.map_or(fault, BadRaster::EncodedPicture)
+    alike.map_or(fault, RasterError::EncodedPicture)
 }
 
 /// 65536 R + 256 G + B of every pixel.
@@ -42,12 +42,12 @@ struct Codes {
 }
 
 impl Codes {
-    fn read(input: &FileBytes) -> Result<Self, BadRaster> {
+    fn read(input: &FileBytes) -> Result<Self, RasterError> {
         let mut reader = reader(input)?;
         let info = reader.info();
         let (size, color, depth) = ((info.width, info.height), info.color_type, info.bit_depth);
         if !matches!(color, ColorType::Rgb | ColorType::Rgba) || depth != BitDepth::Eight {
-            return Err(BadRaster::NotAHeightField(
+            return Err(RasterError::NotAHeightField(
                 "heights are encoded in pictures of red, green and blue of 8 bits".into(),
             ));
         }
@@ -133,7 +133,7 @@ mod tests {
         [r, g, b, 255]
     }
 
-    fn open(input: &FileBytes, encoding: Option<Encoding>) -> Result<Raster, BadRaster> {
+    fn open(input: &FileBytes, encoding: Option<Encoding>) -> Result<Raster, RasterError> {
         let options = OpenOptions {
             encoding,
             ..OpenOptions::default()
@@ -179,7 +179,7 @@ mod tests {
                 );
                 let fault = open(&tile, None).expect_err("not without being told");
                 assert!(
-                    matches!(fault, BadRaster::EncodedPicture(found) if found == encoding),
+                    matches!(fault, RasterError::EncodedPicture(found) if found == encoding),
                     "{encoding:?}: {fault}"
                 );
             }
@@ -189,11 +189,14 @@ mod tests {
             false,
         );
         let fault = open(&photograph, None).expect_err("a photograph");
-        assert!(matches!(fault, BadRaster::AmbiguousChannels(_)), "{fault}");
+        assert!(
+            matches!(fault, RasterError::AmbiguousChannels(_)),
+            "{fault}"
+        );
         let flat = picture(|_, _| [128, 0, 0, 255], false);
         assert!(matches!(
             open(&flat, None),
-            Err(BadRaster::AmbiguousChannels(_))
+            Err(RasterError::AmbiguousChannels(_))
         ));
     }
 
@@ -207,6 +210,6 @@ mod tests {
         writer.finish().expect("the end");
         let grey = FileBytes::unpacked("grey.png", file);
         let fault = open(&grey, Some(Encoding::Terrarium)).expect_err("grey");
-        assert!(matches!(fault, BadRaster::NotAHeightField(_)), "{fault}");
+        assert!(matches!(fault, RasterError::NotAHeightField(_)), "{fault}");
     }
 }

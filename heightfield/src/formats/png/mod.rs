@@ -12,7 +12,7 @@ use crate::decoded::Decoded;
 use crate::format::{Claim, Format, Parts};
 use crate::input::{FileBytes, ReadSeek};
 use crate::samples::{HoleMask, SampleValue, with_samples};
-use crate::{BadRaster, Endian, PngChannel, Samples};
+use crate::{Endian, PngChannel, RasterError, Samples};
 
 /// Pictures whose pixels are heights.
 pub(super) const FORMAT: Format = Format {
@@ -47,7 +47,7 @@ const CHUNK_BYTES: usize = 64 << 20;
 /// - Colour without alpha, or a palette: not a height field.
 ///
 /// `channel` overrides this choice.
-fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, BadRaster> {
+fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, RasterError> {
     let mut reader = reader(input)?;
     let info = reader.info();
     let (size, color) = ((info.width, info.height), info.color_type);
@@ -55,7 +55,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
         BitDepth::Eight => 1,
         BitDepth::Sixteen => 2,
         few => {
-            return Err(BadRaster::Unsupported {
+            return Err(RasterError::Unsupported {
                 format: "PNG",
                 feature: format!("{} bits a sample", few as u8),
             });
@@ -93,7 +93,7 @@ fn decode(input: &FileBytes, channel: Option<PngChannel>) -> Result<Decoded, Bad
 }
 
 /// A decoder of the picture, its header read.
-fn reader(input: &FileBytes) -> Result<Reader<Box<dyn ReadSeek + '_>>, BadRaster> {
+fn reader(input: &FileBytes) -> Result<Reader<Box<dyn ReadSeek + '_>>, RasterError> {
     let limits = Limits { bytes: CHUNK_BYTES };
     let mut decoder = Decoder::new_with_limits(input.reader()?, limits);
     decoder.set_transformations(Transformations::IDENTITY);
@@ -119,7 +119,7 @@ struct Choice {
 }
 
 impl Choice {
-    fn new(color: ColorType, asked: Option<PngChannel>) -> Result<Self, BadRaster> {
+    fn new(color: ColorType, asked: Option<PngChannel>) -> Result<Self, RasterError> {
         use PngChannel::{Alpha, Blue, Green, Grey, Red};
         let (present, usual): (&[PngChannel], _) = match color {
             ColorType::Grayscale => (&[Grey], Some(Grey)),
@@ -127,12 +127,12 @@ impl Choice {
             ColorType::Rgb => (&[Red, Green, Blue], None),
             ColorType::Rgba => (&[Red, Green, Blue, Alpha], Some(Alpha)),
             ColorType::Indexed => {
-                return Err(BadRaster::NotAHeightField(
+                return Err(RasterError::NotAHeightField(
                     "a picture with a palette".into(),
                 ));
             }
         };
-        let ambiguous = |what: String| BadRaster::AmbiguousChannels(what);
+        let ambiguous = |what: String| RasterError::AmbiguousChannels(what);
         let height = asked
             .or(usual)
             .ok_or_else(|| ambiguous("a colour picture".into()))?;
@@ -166,7 +166,7 @@ struct Pixels {
 
 impl Pixels {
     /// An interlaced picture has to be put together before it has rows.
-    fn read<R: BufRead + Seek>(&mut self, reader: &mut Reader<R>) -> Result<(), BadRaster> {
+    fn read<R: BufRead + Seek>(&mut self, reader: &mut Reader<R>) -> Result<(), RasterError> {
         if reader.info().interlaced {
             let mut frame = vec![0; reader.output_buffer_size().unwrap_or(0)];
             reader.next_frame(&mut frame).map_err(fault)?;
@@ -204,24 +204,24 @@ impl Pixels {
 }
 
 /// A photograph's alpha is opaque everywhere: that is no relief.
-fn refuse_opaque(alpha: &Samples) -> Result<(), BadRaster> {
+fn refuse_opaque(alpha: &Samples) -> Result<(), RasterError> {
     let opaque = f64::from(match alpha {
         Samples::U8(_) => u16::from(u8::MAX),
         _ => u16::MAX,
     });
     if with_samples!(alpha, values => values.iter().all(|value| value.widen() == opaque)) {
-        return Err(BadRaster::AmbiguousChannels(
+        return Err(RasterError::AmbiguousChannels(
             "a colour picture whose alpha is opaque everywhere".into(),
         ));
     }
     Ok(())
 }
 
-fn fault(error: DecodingError) -> BadRaster {
+fn fault(error: DecodingError) -> RasterError {
     match error {
-        DecodingError::IoError(error) => BadRaster::from_io(error, "the picture"),
-        DecodingError::LimitsExceeded => BadRaster::AbsurdSize("the picture's chunks".into()),
-        error => BadRaster::Unfamiliar(format!("PNG: {error}")),
+        DecodingError::IoError(error) => RasterError::from_io(error, "the picture"),
+        DecodingError::LimitsExceeded => RasterError::AbsurdSize("the picture's chunks".into()),
+        error => RasterError::Unfamiliar(format!("PNG: {error}")),
     }
 }
 

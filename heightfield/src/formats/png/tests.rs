@@ -2,7 +2,7 @@
 
 use super::decode;
 use crate::input::FileBytes;
-use crate::{BadRaster, PngChannel, Raster};
+use crate::{PngChannel, Raster, RasterError};
 
 /// A 2 × 2 picture from its samples, row by row from the north.
 fn picture(color: ::png::ColorType, depth: ::png::BitDepth, bytes: &[u8]) -> FileBytes {
@@ -16,7 +16,7 @@ fn picture(color: ::png::ColorType, depth: ::png::BitDepth, bytes: &[u8]) -> Fil
     FileBytes::unpacked("test.png", file)
 }
 
-fn open(input: &FileBytes, channel: Option<PngChannel>) -> Result<[f64; 4], BadRaster> {
+fn open(input: &FileBytes, channel: Option<PngChannel>) -> Result<[f64; 4], RasterError> {
     let raster = Raster::checked(decode(input, channel)?, None)?;
     Ok([(0, 1), (1, 1), (0, 0), (1, 0)].map(|(column, row)| raster.height(column, row)))
 }
@@ -46,7 +46,7 @@ fn an_opaque_colour_picture_is_not_a_height_field() {
     let opaque = picture(ColorType::Rgba, BitDepth::Eight, &[255; 16]);
     assert!(matches!(
         open(&opaque, None),
-        Err(BadRaster::AmbiguousChannels(_))
+        Err(RasterError::AmbiguousChannels(_))
     ));
     // Unless the user says so.
     assert_eq!(
@@ -56,7 +56,7 @@ fn an_opaque_colour_picture_is_not_a_height_field() {
     let colours = picture(ColorType::Rgb, BitDepth::Eight, &[3; 12]);
     assert!(matches!(
         open(&colours, None),
-        Err(BadRaster::AmbiguousChannels(_))
+        Err(RasterError::AmbiguousChannels(_))
     ));
     assert_eq!(
         open(&colours, Some(PngChannel::Red)).expect("heights"),

@@ -1,13 +1,13 @@
 //! Overviews in which heights were averaged with no-data values: made before these were declared,
 //! they have pits or peaks along the rim of each hole that the full image has not.
 
-use crate::BadRaster;
+use crate::RasterError;
 use crate::blocks::{BlockImage, BlockReader, Part, stored_parts};
 
 /// Of the coarsest overview so many blocks are looked at.
 const LOOKS: usize = 16;
 /// No more samples of the full image are read to compare them with one of an overview.
-const MOST_COMPARED: u64 = 1 << 22;
+const MAX_COMPARED: u64 = 1 << 22;
 /// A lossy packing may change stored values by so much ...
 const SLACK: f64 = 1.0;
 /// ... or by this share.
@@ -21,7 +21,7 @@ const SLACK_SHARE: f64 = 1e-3;
 pub(super) fn blended(
     blocks: &impl BlockReader,
     no_data: f64,
-) -> Result<Option<String>, BadRaster> {
+) -> Result<Option<String>, RasterError> {
     let images = blocks.images();
     let (Some(full), Some(coarsest)) = (images.first(), images.len().checked_sub(1)) else {
         return Ok(None);
@@ -31,7 +31,7 @@ pub(super) fn blended(
     }
     for (value, place) in outermost(blocks, coarsest, no_data)? {
         let around = around(&images[coarsest], full, place);
-        if u64::from(around.columns) * u64::from(around.rows) > MOST_COMPARED {
+        if u64::from(around.columns) * u64::from(around.rows) > MAX_COMPARED {
             continue;
         }
         let [lowest, highest] = range(blocks, 0, &around, no_data)?;
@@ -56,7 +56,7 @@ fn outermost(
     blocks: &impl BlockReader,
     image: usize,
     no_data: f64,
-) -> Result<Vec<(f64, [u32; 2])>, BadRaster> {
+) -> Result<Vec<(f64, [u32; 2])>, RasterError> {
     let parts = stored_parts(&blocks.images()[image], |part| {
         blocks.is_stored(image, part)
     });
@@ -104,7 +104,7 @@ fn range(
     image: usize,
     part: &Part,
     no_data: f64,
-) -> Result<[f64; 2], BadRaster> {
+) -> Result<[f64; 2], RasterError> {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for_each(blocks, image, part, no_data, |value, _| {
         range = [range[0].min(value), range[1].max(value)];
@@ -119,7 +119,7 @@ fn for_each(
     part: &Part,
     no_data: f64,
     mut visit: impl FnMut(f64, [u32; 2]),
-) -> Result<(), BadRaster> {
+) -> Result<(), RasterError> {
     let block = blocks.read(image, part)?;
     for index in 0..part.columns * part.rows {
         let value = block.stored(index as usize);

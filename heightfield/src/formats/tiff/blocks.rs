@@ -14,21 +14,19 @@ use super::masks::Mask;
 use super::samples::{heights, holes};
 use super::uncompressed::rows;
 use super::{budget, images};
-use crate::blocks::{
-    Block, BlockImage, BlockReader, LARGEST_BLOCK_BYTES, Looks, Part, stored_parts,
-};
+use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, stored_parts};
 use crate::disk_cache::{DiskCache, FileStamp};
 use crate::guard::guarded;
 use crate::input::FileBytes;
 use crate::remote::RemoteFile;
 use crate::samples::{HoleMask, SampleValue, with_samples};
 use crate::unread::Unread;
-use crate::{BadRaster, SampleType};
+use crate::{RasterError, SampleType};
 
 /// Small strips and tiles are read several at once, samples each way.
 const USUAL_BLOCK: u32 = 256;
 /// Of longer rows of plain samples parts are read.
-const LONGEST_ROW: u32 = 32_768;
+const MAX_ROW: u32 = 32_768;
 
 /// Whether single blocks of an image can be read: its rows can, or a strip or tile is not too
 /// large.
@@ -40,7 +38,7 @@ fn suit(layout: &Layout) -> bool {
 fn is_small(layout: &Layout, block: [u32; 2]) -> bool {
     let [columns, rows] = block.map(u64::from);
     let samples = columns.saturating_mul(rows);
-    samples.saturating_mul(layout.texel_bytes().max(8)) <= LARGEST_BLOCK_BYTES
+    samples.saturating_mul(layout.texel_bytes().max(8)) <= MAX_BLOCK_BYTES
 }
 
 /// Columns and rows of a block. Of plain samples it is a square, or of a file elsewhere a wide one,
@@ -49,12 +47,8 @@ fn block(layout: &Layout, is_elsewhere: bool) -> [u32; 2] {
     if !layout.is_read_by_rows() {
         return chunks(layout);
     }
-    let usual = if is_elsewhere {
-        LONGEST_ROW
-    } else {
-        USUAL_BLOCK
-    };
-    let texels = (LARGEST_BLOCK_BYTES / layout.texel_bytes()).min(u32::MAX.into()) as u32;
+    let usual = if is_elsewhere { MAX_ROW } else { USUAL_BLOCK };
+    let texels = (MAX_BLOCK_BYTES / layout.texel_bytes()).min(u32::MAX.into()) as u32;
     let columns = layout.chunk.0.min(usual).min(texels).max(1);
     let rows = USUAL_BLOCK * USUAL_BLOCK / columns;
     [columns, rows.min(texels / columns).max(1)]
@@ -135,7 +129,7 @@ pub(super) struct Image {
 
 impl Image {
     /// An image of the main file.
-    pub(super) fn of(directory: &Directory, known: &Known<'_>) -> Result<Self, BadRaster> {
+    pub(super) fn of(directory: &Directory, known: &Known<'_>) -> Result<Self, RasterError> {
         Ok(Self {
             file: MAIN,
             layout: Layout::read(directory, known.wanted)?,
@@ -188,7 +182,7 @@ impl TiffBlocks {
         overviews: Option<Opened>,
         known: &Known<'_>,
         inputs: &[&FileBytes],
-    ) -> Result<Self, BadRaster> {
+    ) -> Result<Self, RasterError> {
         let (also, also_remote) = overviews.unzip();
         let files: Vec<_> = [file].into_iter().chain(also).collect();
         let remote: Vec<_> = [remote].into_iter().chain(also_remote).collect();
@@ -244,7 +238,7 @@ impl TiffBlocks {
     }
 
     /// A part of an image.
-    fn block(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn block(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let Image { layout, masks, .. } = &self.images[image];
         Ok(Block {
             samples: heights(layout, part)?,
@@ -255,7 +249,7 @@ impl TiffBlocks {
 
     /// A part of an image of which something cannot be read: strips and tiles that cannot are
     /// holes, with a warning, and the others are not.
-    fn by_chunks(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn by_chunks(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let mut all = self.nothing_of(part);
         let stored = self.images[image].layout.chunks_in(part);
         for chunk in stored.filter(|chunk| chunk.bytes > 0) {
@@ -270,7 +264,7 @@ impl TiffBlocks {
 
     /// The same of samples that are read by rows, of which any row may be read without the others. What masks
     /// them is decoded once.
-    fn by_rows(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn by_rows(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         let Image { layout, masks, .. } = &self.images[image];
         let mut all = self.nothing_of(part);
         let masked = || holes(layout, masks, part);
@@ -309,8 +303,8 @@ impl TiffBlocks {
         &self,
         image: usize,
         piece: &Part,
-        read: impl FnOnce() -> Result<T, BadRaster>,
-    ) -> Result<Option<T>, BadRaster> {
+        read: impl FnOnce() -> Result<T, RasterError>,
+    ) -> Result<Option<T>, RasterError> {
         let first = [piece.column, piece.row];
         if self.unread.has(image, first) {
             return Ok(None);
@@ -357,7 +351,7 @@ fn copy(block: &Block, piece: &Part, to: &mut Block, part: &Part) {
 }
 
 /// Files that were opened, to be asked for their state again.
-fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>, BadRaster> {
+fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>, RasterError> {
     let mut all = vec![];
     for input in inputs {
         // The decoder has opened the file at the path by itself.
@@ -464,7 +458,7 @@ impl BlockReader for TiffBlocks {
         }
     }
 
-    fn read(&self, image: usize, part: &Part) -> Result<Block, BadRaster> {
+    fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
         // The decoder asks for one chunk after the other.
         self.want(image, std::slice::from_ref(part));
         match self.block(image, part) {

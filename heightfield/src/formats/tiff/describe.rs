@@ -10,7 +10,7 @@ use super::{georef, images};
 use crate::beside::{find_appended, lay_out_by_world_file, remark_other_place};
 use crate::decoded::Decoded;
 use crate::input::{Data, FileBytes};
-use crate::{BadRaster, OpenOptions};
+use crate::{OpenOptions, RasterError};
 
 /// Extensions of a TIFF's world files.
 const WORLD_FILES: [&str; 4] = ["tfw", "tifw", "tiffw", "tfwx"];
@@ -22,7 +22,7 @@ pub(super) fn describe(
     metadata: Metadata,
     input: &FileBytes,
     options: &OpenOptions,
-) -> Result<(), BadRaster> {
+) -> Result<(), RasterError> {
     decoded.no_data = metadata.no_data;
     decoded.scale = metadata.scale.unwrap_or(1.0);
     decoded.offset = metadata.offset.unwrap_or(0.0);
@@ -46,7 +46,7 @@ pub(super) fn describe(
 pub(super) fn overview_sizes(
     file: &Arc<TiffFile>,
     input: &FileBytes,
-) -> Result<Vec<[u32; 2]>, BadRaster> {
+) -> Result<Vec<[u32; 2]>, RasterError> {
     let mut found = images::overviews(file);
     if let (Data::File(..), false) = (input.data(), input.is_outline())
         && let Some(beside) = find_appended(input, "ovr")?
@@ -60,9 +60,9 @@ pub(super) fn overview_sizes(
 }
 
 /// Returns the user's choice of numbers.
-pub(super) fn wanted(options: &OpenOptions) -> Result<Wanted, BadRaster> {
+pub(super) fn wanted(options: &OpenOptions) -> Result<Wanted, RasterError> {
     match (options.encoding, options.band) {
-        (Some(_), Some(band)) => Err(BadRaster::NoSuchPart {
+        (Some(_), Some(band)) => Err(RasterError::NoSuchPart {
             asked: format!("band {band} with --input encoding=…"),
             there: "three bands together are one height".into(),
         }),

@@ -2,21 +2,21 @@
 
 use tiff_reader::TiffError;
 
-use crate::BadRaster;
+use crate::RasterError;
 
 /// The same error in this program's terms.
-pub(super) fn fault(error: TiffError) -> BadRaster {
+pub(super) fn fault(error: TiffError) -> RasterError {
     use TiffError as E;
     match error {
-        E::Io(error, _) => BadRaster::from_io(error, "the image"),
+        E::Io(error, _) => RasterError::from_io(error, "the image"),
         E::Truncated { .. } | E::OffsetOutOfBounds { .. } => {
-            BadRaster::Truncated(format!("TIFF: {error}"))
+            RasterError::Truncated(format!("TIFF: {error}"))
         }
         E::DecodeOutputTooLarge { .. } | E::DecodeOutputAllocationFailed { .. } => {
-            BadRaster::AbsurdSize(format!("TIFF: {error}"))
+            RasterError::AbsurdSize(format!("TIFF: {error}"))
         }
         E::InvalidTagValue { ref reason, .. } if reason.contains("budget") => {
-            BadRaster::AbsurdSize(format!("TIFF: {error}"))
+            RasterError::AbsurdSize(format!("TIFF: {error}"))
         }
         E::UnsupportedPredictor(_)
         | E::UnsupportedPlanarConfiguration(_)
@@ -26,13 +26,13 @@ pub(super) fn fault(error: TiffError) -> BadRaster {
         E::InvalidImageLayout(ref what) if what.contains("not supported") => {
             unsupported(format!("this variant ({error})"))
         }
-        error => BadRaster::Unfamiliar(format!("TIFF: {error}")),
+        error => RasterError::Unfamiliar(format!("TIFF: {error}")),
     }
 }
 
 /// A variant of TIFF that is not read.
-pub(super) fn unsupported(feature: String) -> BadRaster {
-    BadRaster::Unsupported {
+pub(super) fn unsupported(feature: String) -> RasterError {
+    RasterError::Unsupported {
         format: "TIFF",
         feature,
     }

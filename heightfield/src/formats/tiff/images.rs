@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tiff_reader::{Ifd, TiffFile};
 
-use crate::BadRaster;
+use crate::RasterError;
 
 /// The tag that says what an image is, and two of its bits.
 const NEW_SUBFILE_TYPE: u16 = 254;
@@ -31,12 +31,12 @@ impl Directory {
 }
 
 /// The first image that is neither an overview nor a mask; else the last.
-pub(super) fn full(file: &Arc<TiffFile>) -> Result<Directory, BadRaster> {
+pub(super) fn full(file: &Arc<TiffFile>) -> Result<Directory, RasterError> {
     let images = file.ifds();
     let full = images.iter().position(|image| kind(image) == 0);
     let number = full
         .or(images.len().checked_sub(1))
-        .ok_or_else(|| BadRaster::damaged("TIFF: it has no image"))?;
+        .ok_or_else(|| RasterError::damaged("TIFF: it has no image"))?;
     Ok(Directory {
         file: file.clone(),
         number,

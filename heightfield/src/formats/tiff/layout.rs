@@ -15,10 +15,10 @@ use crate::blocks::Part;
 use crate::disk_cache::DiskCache;
 use crate::encoding::no_codes;
 use crate::read::Stored;
-use crate::{BadRaster, SampleType};
+use crate::{RasterError, SampleType};
 
 /// Larger chunks are not decoded as a whole where that can be helped, bytes.
-pub(super) const LARGEST_DECODED: u64 = 1 << 20;
+pub(super) const MAX_DECODED: u64 = 1 << 20;
 
 /// How an image's samples are stored.
 pub(super) struct Layout {
@@ -92,7 +92,7 @@ pub(super) enum SampleFormat {
 }
 
 /// Name of a compression, and how many bytes one stored byte may hold.
-fn compression(code: u16) -> Result<(&'static str, u64), BadRaster> {
+fn compression(code: u16) -> Result<(&'static str, u64), RasterError> {
     let refused = match code {
         1 => return Ok(("uncompressed", 1)),
         5 => return Ok(("lzw", 2048)),
@@ -114,7 +114,7 @@ fn compression(code: u16) -> Result<(&'static str, u64), BadRaster> {
 
 impl Layout {
     /// Reads and checks the layout of an image for what is wanted of it.
-    pub(super) fn read(directory: &Directory, wanted: Wanted) -> Result<Self, BadRaster> {
+    pub(super) fn read(directory: &Directory, wanted: Wanted) -> Result<Self, RasterError> {
         let image = directory.ifd();
         let bands = image.samples_per_pixel();
         match wanted {
@@ -138,7 +138,7 @@ impl Layout {
     }
 
     /// The layout of a mask, of as few bits a sample as it has.
-    pub(super) fn of_mask(directory: &Directory) -> Result<Self, BadRaster> {
+    pub(super) fn of_mask(directory: &Directory) -> Result<Self, RasterError> {
         let image = directory.ifd();
         let bits = image.bits_per_sample().map_err(fault)?;
         let bits = bits.first().copied().unwrap_or(1);
@@ -151,11 +151,11 @@ impl Layout {
     }
 
     /// Reads how the samples of the first band are laid out.
-    fn of(directory: &Directory, stored: (SampleFormat, u16)) -> Result<Self, BadRaster> {
+    fn of(directory: &Directory, stored: (SampleFormat, u16)) -> Result<Self, RasterError> {
         let image = directory.ifd();
         let (columns, rows) = (image.width(), image.height());
         if columns == 0 || rows == 0 {
-            return Err(BadRaster::damaged(format!(
+            return Err(RasterError::damaged(format!(
                 "TIFF: an image of {columns} × {rows}"
             )));
         }
@@ -164,11 +164,13 @@ impl Layout {
             _ => (false, (columns, image.rows_per_strip().min(rows))),
         };
         if chunk.0 == 0 || chunk.1 == 0 {
-            return Err(BadRaster::damaged("TIFF: strips or tiles without samples"));
+            return Err(RasterError::damaged(
+                "TIFF: strips or tiles without samples",
+            ));
         }
         if Index::of(image, tiled).is_none() {
             let what = "TIFF: it does not say where its samples are";
-            return Err(BadRaster::damaged(what));
+            return Err(RasterError::damaged(what));
         }
         let layout = Self {
             directory: directory.clone(),
@@ -187,7 +189,7 @@ impl Layout {
             unpacked: None,
         };
         Ok(Self {
-            is_plain: layout.chunk_size() > LARGEST_DECODED && has_plain_samples(image),
+            is_plain: layout.chunk_size() > MAX_DECODED && has_plain_samples(image),
             ..layout
         })
     }
@@ -409,10 +411,10 @@ impl Layout {
 }
 
 /// Checks that differences are taken of samples that can have such: of floats only in predictor 3.
-fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), BadRaster> {
+fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), RasterError> {
     const OF_FLOATS: u16 = 3;
     match (image.predictor(), format) {
-        (OF_FLOATS, SampleFormat::Signed | SampleFormat::Unsigned) => Err(BadRaster::damaged(
+        (OF_FLOATS, SampleFormat::Signed | SampleFormat::Unsigned) => Err(RasterError::damaged(
             "TIFF: its samples are whole numbers and its predictor is 3, which is for floats",
         )),
         _ => Ok(()),
@@ -435,7 +437,7 @@ fn alpha(image: &Ifd, bands: u16) -> Option<usize> {
 }
 
 /// The band that the user chose, or the first, which is 0.
-fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, BadRaster> {
+fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, RasterError> {
     let band = asked.unwrap_or(1).max(1);
     if band > u32::from(bands) {
         let there = match bands {
@@ -443,13 +445,13 @@ fn chosen_band(asked: Option<u32>, bands: u16) -> Result<usize, BadRaster> {
             bands => format!("the file has bands 1 to {bands}"),
         };
         let asked = format!("band {band}");
-        return Err(BadRaster::NoSuchPart { asked, there });
+        return Err(RasterError::NoSuchPart { asked, there });
     }
     Ok(band as usize - 1)
 }
 
 /// Checks that an image has colours that may be codes of heights.
-fn check_codes(image: &Ifd, bands: u16) -> Result<(), BadRaster> {
+fn check_codes(image: &Ifd, bands: u16) -> Result<(), RasterError> {
     use PhotometricInterpretation::{MinIsBlack, Rgb};
     let meaning = image.photometric_interpretation_enum();
     let is_rgb = matches!(meaning, Some(Rgb | MinIsBlack));
@@ -466,14 +468,14 @@ fn is_palette(image: &Ifd) -> bool {
 
 /// Colours are no heights, however many bands they have, unless the user has `chosen`
 /// one of them.
-fn refuse_colour(image: &Ifd, bands: u16, chosen: bool) -> Result<(), BadRaster> {
+fn refuse_colour(image: &Ifd, bands: u16, chosen: bool) -> Result<(), RasterError> {
     use PhotometricInterpretation as Meaning;
     let what = match image.photometric_interpretation_enum() {
         Some(Meaning::MinIsBlack | Meaning::MinIsWhite) => return Ok(()),
         Some(Meaning::Rgb | Meaning::Separated) if chosen => return Ok(()),
         Some(Meaning::Rgb) => {
             let what = format!("a colour image of {bands} bands");
-            return Err(BadRaster::ColourBands { what, bands });
+            return Err(RasterError::ColourBands { what, bands });
         }
         Some(Meaning::Palette) => "an image with a palette".into(),
         Some(Meaning::YCbCr) => "a colour image (YCbCr)".into(),
@@ -481,10 +483,10 @@ fn refuse_colour(image: &Ifd, bands: u16, chosen: bool) -> Result<(), BadRaster>
         Some(Meaning::Mask) => "a transparency mask".into(),
         _ => "an image of unknown interpretation".into(),
     };
-    Err(BadRaster::NotAHeightField(what))
+    Err(RasterError::NotAHeightField(what))
 }
 
-fn stored_type(image: &Ifd) -> Result<(SampleFormat, u16), BadRaster> {
+fn stored_type(image: &Ifd) -> Result<(SampleFormat, u16), RasterError> {
     let first = |values: Vec<u16>| values.first().copied().unwrap_or(1);
     let bits = first(image.bits_per_sample().map_err(fault)?);
     let format = match first(image.sample_format().map_err(fault)?) {
@@ -493,12 +495,12 @@ fn stored_type(image: &Ifd) -> Result<(SampleFormat, u16), BadRaster> {
         3 => SampleFormat::Float,
         _ => {
             let what = "samples that are no real numbers".into();
-            return Err(BadRaster::NotAHeightField(what));
+            return Err(RasterError::NotAHeightField(what));
         }
     };
     match bits {
         1 if format != SampleFormat::Float => {
-            Err(BadRaster::NotAHeightField("one bit a sample".into()))
+            Err(RasterError::NotAHeightField("one bit a sample".into()))
         }
         8 if format == SampleFormat::Float => Err(unsupported("8 bits a sample".into())),
         8 | 16 | 32 | 64 => Ok((format, bits)),

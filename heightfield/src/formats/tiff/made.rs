@@ -4,7 +4,7 @@ use half::f16;
 
 use super::decode;
 use crate::input::FileBytes;
-use crate::{BadRaster, OpenOptions, Raster};
+use crate::{OpenOptions, Raster, RasterError};
 
 pub(super) const SIZE: [u32; 2] = [1201, 1103];
 /// Bands of images that have several, and the one that is asked for, the first being 1.
@@ -240,7 +240,7 @@ impl Made {
     }
 }
 
-pub(super) fn open(made: &Made, most_in_memory_bytes: u64) -> Result<Raster, BadRaster> {
+pub(super) fn open(made: &Made, most_in_memory_bytes: u64) -> Result<Raster, RasterError> {
     let options = OpenOptions {
         band: (made.bands > 1).then_some(BAND),
         most_in_memory_bytes,

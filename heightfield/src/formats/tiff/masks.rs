@@ -5,12 +5,12 @@ use std::sync::Arc;
 use tiff_reader::TiffFile;
 
 use super::images::{self, Directory};
-use super::layout::{Chunk, LARGEST_DECODED, Layout};
+use super::layout::{Chunk, Layout, MAX_DECODED};
 use super::samples::Band;
 use super::uncompressed;
 use super::unpack::{self, Rows};
-use crate::BadRaster;
-use crate::blocks::{LARGEST_BLOCK_BYTES, Part};
+use crate::RasterError;
+use crate::blocks::{MAX_BLOCK_BYTES, Part};
 use crate::disk_cache::DiskCache;
 
 /// A mask. 0 is no data.
@@ -46,7 +46,7 @@ impl Mask {
     /// Why that cannot be.
     pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
         let samples = self.chunk_samples();
-        let is_large = samples > LARGEST_DECODED;
+        let is_large = samples > MAX_DECODED;
         let unpacked = match (&mut self.layout, disk) {
             (Some(layout), _) if layout.is_plain => return Ok(()),
             (Some(layout), Ok(disk)) if is_large => {
@@ -57,7 +57,7 @@ impl Mask {
         };
         match unpacked {
             // It is decoded with each block.
-            Err(_) if samples <= LARGEST_BLOCK_BYTES => Ok(()),
+            Err(_) if samples <= MAX_BLOCK_BYTES => Ok(()),
             unpacked => unpacked,
         }
     }
@@ -69,7 +69,11 @@ impl Mask {
     }
 
     /// Hands over each sample of a part that has no data, counted from the part's first.
-    pub(super) fn missing(&self, part: &Part, mut set: impl FnMut(usize)) -> Result<(), BadRaster> {
+    pub(super) fn missing(
+        &self,
+        part: &Part,
+        mut set: impl FnMut(usize),
+    ) -> Result<(), RasterError> {
         match &self.layout {
             Some(mask) if mask.is_read_by_rows() => by_rows(mask, part, set),
             Some(mask) if unpack::suits_whole(mask, part) => whole(mask, part, set),
@@ -84,7 +88,7 @@ impl Mask {
     }
 }
 
-fn by_rows(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), BadRaster> {
+fn by_rows(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), RasterError> {
     let mut found = 0;
     for row in part.row..part.row + part.rows {
         let row = Part {
@@ -104,7 +108,7 @@ fn by_rows(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(),
 }
 
 /// All of a mask whose strips are unpacked one after the other.
-fn whole(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), BadRaster> {
+fn whole(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), RasterError> {
     let mut found = 0;
     for chunk in mask.chunks_in(part) {
         let covers = chunk.covers;
@@ -130,10 +134,10 @@ fn whole(mask: &Layout, part: &Part, mut set: impl FnMut(usize)) -> Result<(), B
     all_there(found, part)
 }
 
-fn all_there(found: u64, part: &Part) -> Result<(), BadRaster> {
+fn all_there(found: u64, part: &Part) -> Result<(), RasterError> {
     match found == u64::from(part.columns) * u64::from(part.rows) {
         true => Ok(()),
-        false => Err(BadRaster::damaged(
+        false => Err(RasterError::damaged(
             "TIFF: its mask's index has too few strips or tiles",
         )),
     }

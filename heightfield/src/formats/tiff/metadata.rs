@@ -9,7 +9,7 @@ use crate::xml;
 const GDAL_METADATA: u16 = 42112;
 const GDAL_NODATA: u16 = 42113;
 /// The file's own notes are short; what is not, is no such note.
-const LONGEST_NOTE: usize = 1 << 20;
+const MAX_NOTE: usize = 1 << 20;
 
 /// What GDAL notes beside a band's samples.
 #[derive(Debug, Default, PartialEq)]
@@ -76,7 +76,7 @@ impl Metadata {
 fn text(image: &Ifd, tag: u16) -> Option<&str> {
     let text = image.tag(tag)?.value.as_str()?;
     let text = text.trim_matches(|c: char| c == '\0' || c.is_whitespace());
-    (!text.is_empty() && text.len() <= LONGEST_NOTE).then_some(text)
+    (!text.is_empty() && text.len() <= MAX_NOTE).then_some(text)
 }
 
 #[cfg(test)]

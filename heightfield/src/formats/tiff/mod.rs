@@ -34,7 +34,7 @@ use crate::file_layout::FileLayout;
 use crate::format::{Claim, Format, Parts, starts_with_any};
 use crate::input::{Data, FileBytes};
 use crate::storage::Storage;
-use crate::{BadRaster, OpenOptions};
+use crate::{OpenOptions, RasterError};
 use blended::blended;
 use blocks::{Image, Known, TiffBlocks};
 use describe::{describe, overview_sizes, wanted};
@@ -57,12 +57,12 @@ const FEW_BYTES: u64 = 1 << 20;
 
 /// The longest list of a directory, and all lists of all of them, bytes: a whole earth of cells of
 /// a second in tiles of 256 × 256 samples has an index of 100 MB.
-const LONGEST_LIST: usize = 72 << 20;
+const MAX_LIST: usize = 72 << 20;
 const ALL_LISTS: usize = 128 << 20;
 
 /// Reads the heights, or lets them stay in the file: of several bands the chosen one or
 /// the first, of several images the first that is neither an overview nor a mask.
-fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, BadRaster> {
+fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let file = Arc::new(open(input)?);
     let full = images::full(&file)?;
     let mask_file = find_appended(input, "msk")?;
@@ -131,7 +131,7 @@ fn stored(
     mut image: Image,
     known: &Known<'_>,
     no_data: Option<f64>,
-) -> Result<(Storage, Vec<Told>), BadRaster> {
+) -> Result<(Storage, Vec<Told>), RasterError> {
     let input = files[0];
     let most = match input.remote() {
         // What is not touched is not fetched, either.
@@ -216,14 +216,14 @@ fn unpacked_told(image: &Image) -> Option<Told> {
 }
 
 /// Opens the file. No list in its directories may be longer than the file is.
-fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
+fn open(input: &FileBytes) -> Result<TiffFile, RasterError> {
     let bytes = usize::try_from(input.len()).unwrap_or(usize::MAX);
     let options = tiff_reader::OpenOptions {
         // Blocks are kept where all formats keep theirs.
         block_cache_bytes: 0,
         parse_budgets: ParseBudgets {
             max_ifds: 64,
-            max_tag_value_bytes: bytes.min(LONGEST_LIST),
+            max_tag_value_bytes: bytes.min(MAX_LIST),
             max_metadata_value_bytes: ALL_LISTS,
             ..ParseBudgets::default()
         },
@@ -239,7 +239,7 @@ fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
         TiffError::InvalidTagValue { reason, .. } if is_long(reason) => {
             fault::unsupported(format!(
                 "an index of more than {} MB, as of very many small tiles,",
-                LONGEST_LIST >> 20
+                MAX_LIST >> 20
             ))
         }
         _ => fault(error),
@@ -248,7 +248,7 @@ fn open(input: &FileBytes) -> Result<TiffFile, BadRaster> {
 
 /// Whether a list is not read because it is too long, however long the file is.
 fn is_long(reason: &str) -> bool {
-    [LONGEST_LIST, ALL_LISTS]
+    [MAX_LIST, ALL_LISTS]
         .iter()
         .any(|most| reason.ends_with(&format!("parse budget {most}")))
 }

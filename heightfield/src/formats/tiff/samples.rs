@@ -12,22 +12,22 @@ use super::{uncompressed, unpack};
 use crate::blocks::Part;
 use crate::encoding::codes;
 use crate::samples::{HoleMask, SampleValue, with_samples};
-use crate::{BadRaster, Samples};
+use crate::{RasterError, Samples};
 
 /// Reads a part of the band that is the height, or of the codes of heights.
-pub(super) fn heights(layout: &Layout, part: &Part) -> Result<Samples, BadRaster> {
+pub(super) fn heights(layout: &Layout, part: &Part) -> Result<Samples, RasterError> {
     if !layout.has_codes {
         return read(layout, layout.band, part);
     }
     let colour = |band| match read(layout, band, part)? {
         Samples::U8(values) => Ok(values),
-        _ => Err(BadRaster::damaged("TIFF: its bands are of several types")),
+        _ => Err(RasterError::damaged("TIFF: its bands are of several types")),
     };
     Ok(codes([colour(0)?, colour(1)?, colour(2)?]))
 }
 
 /// Reads a part of a band, the first being 0.
-fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
+fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterError> {
     use SampleFormat::{Float, Signed, Unsigned};
     if layout.is_read_by_rows() {
         return uncompressed::read(layout, band, part);
@@ -77,7 +77,7 @@ impl<'f> Band<'f> {
         &self,
         part: &Part,
         convert: impl Fn(T) -> U,
-    ) -> Result<Vec<U>, BadRaster> {
+    ) -> Result<Vec<U>, RasterError> {
         let height = self
             .image
             .tile_height()
@@ -87,7 +87,7 @@ impl<'f> Band<'f> {
         let samples = columns * rows;
         let mut values = Vec::new();
         values.try_reserve_exact(samples).map_err(|_| {
-            BadRaster::AbsurdSize(format!(
+            RasterError::AbsurdSize(format!(
                 "{samples} samples are more than this machine can hold"
             ))
         })?;
@@ -113,7 +113,7 @@ pub(super) fn holes(
     layout: &Layout,
     masks: &[Mask],
     part: &Part,
-) -> Result<Option<HoleMask>, BadRaster> {
+) -> Result<Option<HoleMask>, RasterError> {
     let columns = part.columns as usize;
     let mut holes = None;
     let mut set = |index| {

@@ -7,7 +7,7 @@ use tiff::tags::Tag;
 
 use super::decode;
 use crate::input::FileBytes;
-use crate::{BadRaster, Certainty, OpenOptions, Raster};
+use crate::{Certainty, OpenOptions, Raster, RasterError};
 
 /// One image of a file: its kind (`NewSubfileType`), size and samples.
 struct Part<'a> {
@@ -43,7 +43,7 @@ fn of_band(band: u32) -> OpenOptions {
     }
 }
 
-fn open(bytes: Vec<u8>) -> Result<Raster, BadRaster> {
+fn open(bytes: Vec<u8>) -> Result<Raster, RasterError> {
     Raster::checked(
         decode(
             &FileBytes::unpacked("test.tif", bytes),
@@ -112,7 +112,7 @@ fn with_palette() -> Vec<u8> {
 fn the_numbers_of_a_palette_are_classes_and_no_heights() {
     assert!(matches!(
         open(with_palette()),
-        Err(BadRaster::NotAHeightField(what)) if what.contains("palette")
+        Err(RasterError::NotAHeightField(what)) if what.contains("palette")
     ));
     for most_in_memory_bytes in [0, 1 << 20] {
         let options = OpenOptions {
@@ -239,13 +239,13 @@ fn with_tag(mut bytes: Vec<u8>, tag: u16, count: u32, value: u32) -> Vec<u8> {
 fn a_size_that_the_file_cannot_hold_is_refused_before_room_is_made() {
     let wide = with_tag(file(&[FULL]), 256, 1, 4_000_000_000);
     let fault = open(wide).expect_err("refused");
-    assert!(matches!(fault, BadRaster::AbsurdSize(_)), "{fault}");
+    assert!(matches!(fault, RasterError::AbsurdSize(_)), "{fault}");
     let long = with_tag(file(&[FULL]), 273, 3_000_000_000, 8);
     let fault = open(long).expect_err("refused");
-    assert!(matches!(fault, BadRaster::AbsurdSize(_)), "{fault}");
+    assert!(matches!(fault, RasterError::AbsurdSize(_)), "{fault}");
     let outside = with_tag(file(&[FULL]), 273, 1, 1_000_000);
     let fault = open(outside).expect_err("refused");
-    assert!(matches!(fault, BadRaster::Truncated(_)), "{fault}");
+    assert!(matches!(fault, RasterError::Truncated(_)), "{fault}");
 }
 
 /// A little-endian file of one strip from tags with their type, count and bytes.
@@ -404,7 +404,7 @@ fn a_band_of_a_colour_image_is_a_height_when_it_is_named() {
     let bytes = by_hand(&tags, &[1, 20, 3, 4, 50, 6, 7, 80, 9, 10, 110, 12]);
     let fault = open(bytes.clone()).expect_err("colours");
     assert!(
-        matches!(fault, BadRaster::ColourBands { bands: 3, .. }),
+        matches!(fault, RasterError::ColourBands { bands: 3, .. }),
         "{fault}"
     );
     let input = FileBytes::unpacked("test.tif", bytes);
@@ -463,7 +463,7 @@ fn what_memory_cannot_hold_is_no_damage() {
     tags[3] = shorts(259, &[8]);
     let fault = open(by_hand(&tags, &[1; 64])).expect_err("too large");
     assert!(
-        matches!(fault, BadRaster::TooLarge { gigabytes: 40, .. }),
+        matches!(fault, RasterError::TooLarge { gigabytes: 40, .. }),
         "{fault}"
     );
 }

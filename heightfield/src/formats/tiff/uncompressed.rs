@@ -12,10 +12,10 @@ use super::layout::{Chunk, Layout};
 use super::unpack;
 use crate::blocks::Part;
 use crate::samples::{Endian, with_samples};
-use crate::{BadRaster, Samples};
+use crate::{RasterError, Samples};
 
 /// Reads a part of a band, the first being 0, of a layout that [is read so](Layout::is_read_by_rows).
-pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, BadRaster> {
+pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterError> {
     let stored = layout.sample();
     let endian = match layout.directory.file().byte_order() {
         _ if layout.unpacked.is_some() => unpack::ENDIAN,
@@ -42,7 +42,7 @@ pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples,
     let has_all = with_samples!(&samples, values => values.len() as u64 == count);
     match has_all {
         true => Ok(samples),
-        false => Err(BadRaster::damaged(
+        false => Err(RasterError::damaged(
             "TIFF: its index has too few strips or tiles",
         )),
     }
@@ -69,8 +69,8 @@ pub(super) fn bytes(
     layout: &Layout,
     chunk: &Chunk,
     range: Range<u64>,
-) -> Result<Vec<u8>, BadRaster> {
-    let too_long = || BadRaster::AbsurdSize("TIFF: a row of more bytes than memory holds".into());
+) -> Result<Vec<u8>, RasterError> {
+    let too_long = || RasterError::AbsurdSize("TIFF: a row of more bytes than memory holds".into());
     let count = usize::try_from(range.end - range.start).map_err(|_| too_long())?;
     if chunk.bytes == 0 {
         return Ok(vec![0; count]);
@@ -79,7 +79,7 @@ pub(super) fn bytes(
         return unpacked.read(layout, chunk, range);
     }
     if range.end > chunk.bytes {
-        return Err(BadRaster::damaged(
+        return Err(RasterError::damaged(
             "TIFF: a strip or tile of fewer bytes than its samples take",
         ));
     }

@@ -1,7 +1,7 @@
 //! Large strips and tiles without compression, in all types, orders and arrangements.
 
 use super::super::made::{BANDS, KINDS, Made, ONE_STRIP, SIZE, check, open, value};
-use crate::BadRaster;
+use crate::RasterError;
 
 #[test]
 fn all_types_of_either_order_are_what_was_written() {
@@ -73,7 +73,7 @@ fn rows_that_a_strip_does_not_have_are_holes_and_the_others_are_felt() {
         ..ONE_STRIP
     };
     let fault = open(&made, 0).expect_err("fewer bytes than samples");
-    assert!(matches!(fault, BadRaster::AbsurdSize(_)), "{fault}");
+    assert!(matches!(fault, RasterError::AbsurdSize(_)), "{fault}");
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn bands_of_several_types_and_orders_that_nobody_knows_are_refused() {
             ..ONE_STRIP
         };
         let fault = open(&made, 0).expect_err(why);
-        let is_told = matches!(&fault, BadRaster::Unsupported { .. });
+        let is_told = matches!(&fault, RasterError::Unsupported { .. });
         assert!(is_told && fault.to_string().contains(why), "{fault}");
     }
 }
@@ -123,5 +123,5 @@ fn a_strip_behind_the_end_is_told_before_anything_is_read() {
         ..ONE_STRIP
     };
     let fault = open(&made, 0).expect_err("nothing is there");
-    assert!(matches!(fault, BadRaster::Truncated(_)), "{fault}");
+    assert!(matches!(fault, RasterError::Truncated(_)), "{fault}");
 }

@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::layout::{Chunk, Layout};
 use super::unpack::Rows;
-use crate::BadRaster;
+use crate::RasterError;
 use crate::blocks::Part;
 use crate::disk_cache::{DiskCache, Unnamed};
 use crate::guard::guarded;
@@ -84,7 +84,7 @@ impl Unpacked {
         layout: &Layout,
         chunk: &Chunk,
         range: Range<u64>,
-    ) -> Result<Vec<u8>, BadRaster> {
+    ) -> Result<Vec<u8>, RasterError> {
         if let Some(read) = self.read_kept(chunk, &range) {
             return read;
         }
@@ -99,7 +99,7 @@ impl Unpacked {
         let slot = self.unpack(layout, chunk, self.each * index as u64);
         self.kept().slots[index] = Some(slot);
         let read = self.read_kept(chunk, &range);
-        read.unwrap_or_else(|| Err(BadRaster::damaged("TIFF: nothing was unpacked")))
+        read.unwrap_or_else(|| Err(RasterError::damaged("TIFF: nothing was unpacked")))
     }
 
     /// Whether a strip or tile is unpacked already.
@@ -109,7 +109,7 @@ impl Unpacked {
     }
 
     /// The same bytes of what is unpacked already.
-    fn read_kept(&self, chunk: &Chunk, range: &Range<u64>) -> Option<Result<Vec<u8>, BadRaster>> {
+    fn read_kept(&self, chunk: &Chunk, range: &Range<u64>) -> Option<Result<Vec<u8>, RasterError>> {
         // Is held until the bytes are read: another may want the place for something else.
         let mut kept = self.kept();
         let index = kept.find(chunk)?;
@@ -119,12 +119,12 @@ impl Unpacked {
         slot.used = asked;
         if range.end > slot.bytes {
             let why = slot.fault.as_deref().unwrap_or("TIFF: a row too many");
-            return Some(Err(BadRaster::damaged(why)));
+            return Some(Err(RasterError::damaged(why)));
         }
         let mut bytes = vec![0; (range.end - range.start) as usize];
         let place = self.each * index as u64 + range.start;
         let read = read_exact_at(&self.unnamed.file, &mut bytes, place);
-        let read = read.map_err(|error| BadRaster::from_io(error, "what was unpacked"));
+        let read = read.map_err(|error| RasterError::from_io(error, "what was unpacked"));
         Some(read.map(|()| bytes))
     }
 
@@ -139,7 +139,7 @@ impl Unpacked {
             is_of: (chunk.place, chunk.covers.rows),
             bytes,
             fault: done.err().map(|fault| match fault {
-                BadRaster::Damaged(what) => what,
+                RasterError::Damaged(what) => what,
                 fault => fault.to_string(),
             }),
             used: 0,
@@ -152,10 +152,10 @@ impl Unpacked {
         chunk: &Chunk,
         place: u64,
         written: &mut u64,
-    ) -> Result<(), BadRaster> {
+    ) -> Result<(), RasterError> {
         let no_room = |error: io::Error| {
             let megabytes = self.each.div_ceil(1_000_000);
-            BadRaster::Damaged(format!(
+            RasterError::Damaged(format!(
                 "TIFF: {megabytes} MB could not be unpacked into the folder of --cache: {error}"
             ))
         };
@@ -231,7 +231,7 @@ fn write_at(file: &File, bytes: &[u8], place: u64) -> io::Result<usize> {
 }
 
 /// Checks that of an image in one strip or tile, which is to be unpacked, the first row is there.
-pub(super) fn check_first(layout: &Layout) -> Result<(), BadRaster> {
+pub(super) fn check_first(layout: &Layout) -> Result<(), RasterError> {
     let all = Part::whole(layout.columns, layout.rows);
     if layout.unpacked.is_some() && layout.chunks_of_band() == 1 {
         for chunk in layout.chunks_in(&all) {

@@ -256,7 +256,7 @@ fn of_a_strip_that_is_cut_the_rows_before_are_there_and_it_is_told_why_the_other
     let is_told = fault.contains("packbits") && fault.contains("from row 551 on");
     assert!(is_told && fault.contains("ends too early"), "{fault}");
     let fault = open(&made, 1 << 30).expect_err("all of it is read");
-    assert!(matches!(fault, BadRaster::Damaged(_)), "{fault}");
+    assert!(matches!(fault, RasterError::Damaged(_)), "{fault}");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use super::error::UpdateError;
 
 /// Most pages that are believed: the largest STM32 has fewer.
-const MOST_PAGES: u64 = 4096;
+const MAX_PAGES: u64 = 4096;
 
 /// The flash of a loader: pages of one size, one after the other.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,7 +43,7 @@ impl Layout {
         let (_, page_bytes) = *runs.first()?;
         let pages = runs.iter().map(|(pages, _)| pages).sum();
         let even = runs.iter().all(|(_, bytes)| *bytes == page_bytes);
-        let believed = even && page_bytes > 0 && (1..=MOST_PAGES).contains(&pages);
+        let believed = even && page_bytes > 0 && (1..=MAX_PAGES).contains(&pages);
         believed.then(|| Self {
             said: said.to_owned(),
             start,
@@ -65,7 +65,7 @@ fn run(text: &str) -> Option<(u64, u64)> {
         " g" | "Bg" => 1,
         _ => return None,
     };
-    let pages: u64 = pages.trim().parse().ok().filter(|n| *n <= MOST_PAGES)?;
+    let pages: u64 = pages.trim().parse().ok().filter(|n| *n <= MAX_PAGES)?;
     let bytes: u64 = number.parse().ok().filter(|n| *n <= 1024 * 1024)?;
     Some((pages, bytes * scale))
 }

@@ -46,7 +46,7 @@ const CAN_UPLOAD: u8 = 1 << 1;
 /// The descriptor's type.
 const FUNCTIONAL: u8 = 0x21;
 /// Longest transfer that is used; an STM32's loaders say 1,024 or 2,048.
-const MOST_TRANSFERRED: u16 = 4096;
+const MAX_TRANSFERRED: u16 = 4096;
 
 /// Longest that one thing may take: an H743's sector takes 4 s at most (its data sheet).
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -109,7 +109,7 @@ impl<P: ControlPipe> Loader<P> {
             return Err(UpdateError::Cannot("read back what was written"));
         }
         // Whole words of flash.
-        let transfer = transfer.min(MOST_TRANSFERRED) / 32 * 32;
+        let transfer = transfer.min(MAX_TRANSFERRED) / 32 * 32;
         if transfer == 0 {
             return Err(UpdateError::Cannot("take whole words of flash"));
         }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use glam::DVec3;
 use hapterra_core::guard::Fault;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::request::Request;
 
 use super::{Board, Halt, plane};
@@ -43,7 +43,7 @@ impl TipMotion {
     }
 
     /// Takes the next sample. Returns whether the tip is too fast.
-    fn take(&mut self, sample: &Sample) -> bool {
+    fn take(&mut self, sample: &TickRecord) -> bool {
         let now = (sample.tick, plane::hip_mm(sample));
         let since = |then: &(u32, DVec3)| now.0.wrapping_sub(then.0) / self.ticks_per_ms;
         // The oldest that is old enough; what comes before it is not needed any more.

@@ -1,10 +1,10 @@
 //! A flat plane under the arm, without a terrain file.
 
 use glam::{DVec3, Vec3};
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::phantom::{Calibration, to_terrain_frame};
-use hapterra_core::scene::{Sample, Scene, Source};
+use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_core::terrain::FieldSize;
 use hapterra_core::wire::status::Status;
 
@@ -16,10 +16,10 @@ const CELL_MM: f32 = 8.0;
 const CELLS: i32 = 64;
 
 /// Softest stiffness that can be felt, N/mm, and the most that the plane may push, N.
-pub(super) const SOFT: ForceLaw = ForceLaw {
+pub(super) const SOFT: SurfaceParams = SurfaceParams {
     stiffness_n_per_mm: 0.05,
     max_force_n: 0.5,
-    ..ForceLaw::PREMIUM
+    ..SurfaceParams::PREMIUM
 };
 
 /// A plane that lies `below_mm` under the tip as it is now.
@@ -52,13 +52,13 @@ pub(super) fn tip_mm(record: &Calibration, status: &Status) -> DVec3 {
 }
 
 /// Where the HIP is over the plane, mm, terrain frame.
-pub(super) fn hip_mm(sample: &Sample) -> DVec3 {
+pub(super) fn hip_mm(sample: &TickRecord) -> DVec3 {
     let (cell, fraction) = (sample.hip.cell(), sample.hip.frac());
     (DVec3::from(cell.map(f64::from)) + fraction.as_dvec3()) * f64::from(CELL_MM)
 }
 
 /// How deep the HIP is below the proxy, mm.
-pub(super) fn depth_mm(sample: &Sample) -> f32 {
+pub(super) fn depth_mm(sample: &TickRecord) -> f32 {
     let up = |point: GridPoint| point.cell()[2] as f32 + point.frac().z;
     (up(sample.proxy) - up(sample.hip)) * CELL_MM
 }

@@ -1,7 +1,7 @@
 //! The first touch: a soft plane that pushes with half a newton at most.
 
 use hapterra_core::guard::Fault;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::request::Request;
 
 use super::{Board, Halt, plane};
@@ -31,7 +31,7 @@ struct Felt {
 }
 
 impl Felt {
-    fn take(&mut self, sample: &Sample) {
+    fn take(&mut self, sample: &TickRecord) {
         self.now_n = sample.force_n.length();
         self.most_n = self.most_n.max(self.now_n);
         let depth_mm = plane::depth_mm(sample);

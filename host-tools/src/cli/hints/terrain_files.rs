@@ -10,7 +10,7 @@ use heightfield_gdal::Error as GdalError;
 
 use crate::cli::failure::Hint;
 use heightfield::is_url;
-use heightfield::{BadRaster, Error, gdal};
+use heightfield::{Error, RasterError, gdal};
 
 impl Hint for Error {
     fn hint(&self) -> String {
@@ -18,16 +18,16 @@ impl Hint for Error {
     }
 }
 
-fn hint(path: &Path, fault: &BadRaster) -> String {
+fn hint(path: &Path, fault: &RasterError) -> String {
     let hint = match fault {
-        BadRaster::UnknownFormat => {
+        RasterError::UnknownFormat => {
             return format!(
                 "{}{}; or say how raw samples lie with --input raw=WxH:i16:le",
                 with_gdal(path),
                 converted(path, "")
             );
         }
-        BadRaster::WantsGdal { .. } => {
+        RasterError::WantsGdal { .. } => {
             return format!(
                 "{}; then this works: hapterra info {}; or {}",
                 GdalError::how_to_install(),
@@ -35,108 +35,108 @@ fn hint(path: &Path, fault: &BadRaster) -> String {
                 converted(path, "")
             );
         }
-        BadRaster::ByGdal(GdalError::OpenOption { .. }) => {
+        RasterError::ByGdal(GdalError::OpenOption { .. }) => {
             "leave that option out, or name one that the driver has"
         }
-        BadRaster::ByGdal(_) => {
+        RasterError::ByGdal(_) => {
             return format!(
                 "see whether GDAL's own program reads it: gdalinfo {}; a newer GDAL may",
                 names(path).0
             );
         }
-        BadRaster::ToBuild { files, .. } => return built(path, files),
-        BadRaster::Unsupported { .. } => return with_gdal(path) + &converted(path, PLAIN),
-        BadRaster::InTile { file, fault } => return hint(file, fault),
-        BadRaster::TilesDiffer { file, other, .. } => {
+        RasterError::ToBuild { files, .. } => return built(path, files),
+        RasterError::Unsupported { .. } => return with_gdal(path) + &converted(path, PLAIN),
+        RasterError::InTile { file, fault } => return hint(file, fault),
+        RasterError::TilesDiffer { file, other, .. } => {
             return brought_together(path, file, other);
         }
-        BadRaster::SamePlace { .. } => {
+        RasterError::SamePlace { .. } => {
             "name the file with the heights, or a pattern of names in quotes that leaves the other out, as '*_dem.tif'"
         }
-        BadRaster::NoPlace(_) => {
+        RasterError::NoPlace(_) => {
             return format!(
                 "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or bring it onto rows and columns of its map: gdalwarp -r bilinear {} {}",
                 names(path).0,
                 names(path).1
             );
         }
-        BadRaster::NoTiles(_) => {
+        RasterError::NoTiles(_) => {
             "name a folder with terrain files, or a pattern in quotes, as 'tiles/*.tif' or 'tiles/**/*.tif'"
         }
-        BadRaster::WhichAsset { names, .. } if names.is_empty() => {
+        RasterError::WhichAsset { names, .. } if names.is_empty() => {
             "take a STAC whose items have assets with heights"
         }
-        BadRaster::WhichAsset { names, .. } => {
+        RasterError::WhichAsset { names, .. } => {
             return format!(
                 "name the one with the heights, or a pattern in quotes for one of each item: --input variable={}",
                 names.join("|")
             );
         }
         // Palettes and single bits do not outlive another type of samples.
-        BadRaster::NotAHeightField(_) => {
+        RasterError::NotAHeightField(_) => {
             let one_band = format!("-b 1 {PLAIN}");
             return format!(
                 "take a file with heights; or {}",
                 converted(path, &one_band)
             );
         }
-        BadRaster::NoNumbers(_) => "take a file with heights",
-        BadRaster::ColourBands { bands, .. } => {
+        RasterError::NoNumbers(_) => "take a file with heights",
+        RasterError::ColourBands { bands, .. } => {
             return format!(
                 "if one of its bands holds heights, name it: --input band=1 to {bands}; if its colours encode heights: --input encoding=terrain-rgb or terrarium"
             );
         }
-        BadRaster::SeveralHeights { names, .. } => {
+        RasterError::SeveralHeights { names, .. } => {
             return format!(
                 "name the one with the heights: --input variable={}",
                 names.join("|")
             );
         }
-        BadRaster::NoSuchPart { .. } => "name one that is there, or leave that option out",
-        BadRaster::CellKnown(_) => {
+        RasterError::NoSuchPart { .. } => "name one that is there, or leave that option out",
+        RasterError::CellKnown(_) => {
             "leave --input cell=… out: it is for files that do not state a cell size"
         }
-        BadRaster::EncodedPicture(encoding) => {
+        RasterError::EncodedPicture(encoding) => {
             let name = encoding.name();
             return format!(
                 "if its colours are heights, say so: --input encoding={name} (with --input cell=30m for its scale)"
             );
         }
-        BadRaster::HeaderMissing(name) => {
+        RasterError::HeaderMissing(name) => {
             return format!(
                 "put {name} beside it; or say how the samples lie: --input raw=WxH:f32"
             );
         }
-        BadRaster::TooLarge { columns, rows, .. } => {
+        RasterError::TooLarge { columns, rows, .. } => {
             let (width, height) = (columns.min(&20_000), rows.min(&20_000));
             return cut(path, (*width, *height));
         }
-        BadRaster::DecoderFailed(_) => {
+        RasterError::DecoderFailed(_) => {
             return format!("get the file again; or {}", converted(path, ""));
         }
-        BadRaster::Unfamiliar(_) if is_known_to_gdal(path) => {
+        RasterError::Unfamiliar(_) if is_known_to_gdal(path) => {
             return format!(
                 "see whether GDAL reads it whole: gdalinfo -checksum {}; or {}",
                 names(path).0,
                 converted(path, "")
             );
         }
-        BadRaster::Unfamiliar(_) => {
+        RasterError::Unfamiliar(_) => {
             return format!("get the file again; or {}", converted(path, ""));
         }
-        BadRaster::Unreadable(_) => "check the path and that you may read the file",
-        BadRaster::Elsewhere(error) => elsewhere(path, error),
-        BadRaster::NotYet => "try again",
-        BadRaster::RawSizeMissing => "say how the samples lie: --input raw=WxH:i16:le",
-        BadRaster::AmbiguousChannels(_) => {
+        RasterError::Unreadable(_) => "check the path and that you may read the file",
+        RasterError::RemoteFetcher(error) => elsewhere(path, error),
+        RasterError::NotYet => "try again",
+        RasterError::RawSizeMissing => "say how the samples lie: --input raw=WxH:i16:le",
+        RasterError::AmbiguousChannels(_) => {
             "say which channel holds the height: --input channel=red|green|blue|alpha|grey"
         }
-        BadRaster::TooSmall { .. } => "take a larger part of the terrain",
-        BadRaster::AllNoData { .. } => {
+        RasterError::TooSmall { .. } => "take a larger part of the terrain",
+        RasterError::AllNoData { .. } => {
             "check that the file covers your area, or name another no-data value with --input no-data=VALUE"
         }
         // What is not an image of GDAL's has no checksum there.
-        BadRaster::AbsurdSize(_) | BadRaster::Damaged(_) | BadRaster::Truncated(_)
+        RasterError::AbsurdSize(_) | RasterError::Damaged(_) | RasterError::Truncated(_)
             if !is_known_to_gdal(path) =>
         {
             "get the file again"

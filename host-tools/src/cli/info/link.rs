@@ -2,15 +2,15 @@
 
 use serde::Serialize;
 
-use hapterra_core::terrain::{MARGIN_CELLS, POSTS, TILE_CELLS, TileKey};
+use hapterra_core::terrain::{MARGIN_CELLS, TILE_CELLS, TILE_SAMPLES, TileKey};
 use hapterra_core::wire::frame::{MAX_FRAME, encode};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::session::{InSession, SessionNumber};
 
-use crate::terrain::{FeltGrid, Terrain, TerrainError, TileBuffer};
+use crate::terrain::{HapticGrid, Terrain, TerrainError, TileBuffer};
 
 /// Tiles that are looked at, at most: of more, evenly spread ones.
-const MOST_TILES: u64 = 8192;
+const MAX_TILES: u64 = 8192;
 
 /// Figures of the tiles of level 0, true to scale with cells of 1 mm. Tiles without a
 /// surface and level ones, of a few bytes, do not count.
@@ -43,13 +43,13 @@ struct Form {
 impl LinkFigures {
     /// # Errors
     /// Where the file cannot be felt true to scale.
-    pub(super) fn of(grid: &FeltGrid<'_>, mb_per_s: f64) -> Result<Self, TerrainError> {
+    pub(super) fn of(grid: &HapticGrid<'_>, mb_per_s: f64) -> Result<Self, TerrainError> {
         let scale = grid.true_scale(1.0)?;
         let terrain = Terrain::over(*grid, scale, 0)?;
         let [columns, rows] = terrain
             .size()
             .map(|cells| (cells.unsigned_abs() as usize).div_ceil(TILE_CELLS) as u64);
-        let stride = (columns * rows).div_ceil(MOST_TILES) as usize;
+        let stride = (columns * rows).div_ceil(MAX_TILES) as usize;
         let mut buffer = TileBuffer::default();
         let (mut tiles, mut others, mut sum, mut worst) = (0, 0, 0, 0);
         for at in (0..columns * rows).step_by(stride) {
@@ -62,7 +62,7 @@ impl LinkFigures {
                 }
             }
         }
-        let bytes = [1; 4 * POSTS * POSTS];
+        let bytes = [1; 4 * TILE_SAMPLES * TILE_SAMPLES];
         let floats = frame_bytes(
             TileKey::new(0, 0, 0),
             Heights::Samples {
@@ -139,14 +139,14 @@ fn frame_bytes(key: TileKey, heights: Heights<'_>) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terrain::FeltCells;
+    use crate::terrain::HapticCells;
     use heightfield::Raster;
 
     #[test]
     fn a_hip_along_an_axis_needs_two_tiles_every_32_cells() {
         assert_eq!(tiles_across(), 2);
         let metres = Raster::from_fn(100, 70, |x, y| (x * y % 50) as f32).expect("raster");
-        let grid = FeltGrid::new(&metres, FeltCells::Square);
+        let grid = HapticGrid::new(&metres, HapticCells::Square);
         let figures = LinkFigures::of(&grid, 2.0).expect("figures");
         assert_eq!((figures.tiles, figures.others), (12, 0));
         let floats = &figures.floats;
@@ -161,7 +161,7 @@ mod tests {
     fn level_ground_and_holes_take_nothing_worth_counting() {
         let level = Raster::from_fn(70, 70, |x, _| if x > 40 { f32::NAN } else { 3.0 });
         let level = level.expect("raster");
-        let figures = LinkFigures::of(&FeltGrid::new(&level, FeltCells::Square), 1.0);
+        let figures = LinkFigures::of(&HapticGrid::new(&level, HapticCells::Square), 1.0);
         let figures = figures.expect("figures");
         assert_eq!((figures.tiles, figures.others), (3, 6));
     }

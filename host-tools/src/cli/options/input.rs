@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use super::quantity::{GROUND, MEMORY};
 use crate::cli::failure::{Failure, OrHint};
-use crate::terrain::FeltCells;
+use crate::terrain::HapticCells;
 use heightfield::{Encoding, Endian, OpenOptions, PngChannel, RawLayout, SampleType, metres_in};
 
 /// The keys, each with an example.
@@ -49,7 +49,7 @@ enum InputValue {
     /// The channel of a PNG that holds the height.
     Channel(PngChannel),
     /// Which cells are rendered.
-    Cells(FeltCells),
+    Cells(HapticCells),
     /// Megabytes of samples that are kept in memory.
     InMemoryMb(u32),
     /// An option of the GDAL driver.
@@ -84,7 +84,7 @@ impl FromStr for InputSetting {
             "height-unit" => height_unit(value).map(InputValue::HeightUnitM),
             "encoding" => one_of(Encoding::ALL, Encoding::name, value).map(InputValue::Encoding),
             "channel" => one_of(PngChannel::ALL, PngChannel::name, value).map(InputValue::Channel),
-            "cells" => <FeltCells as clap::ValueEnum>::from_str(value, false)
+            "cells" => <HapticCells as clap::ValueEnum>::from_str(value, false)
                 .map(InputValue::Cells)
                 .map_err(|_| "square or stored".to_owned()),
             "in-memory" => MEMORY
@@ -103,7 +103,7 @@ impl FromStr for InputSetting {
 
 impl InputSetting {
     /// The cells that are asked for, if this setting is about them.
-    pub(in crate::cli) const fn cells(&self) -> Option<FeltCells> {
+    pub(in crate::cli) const fn cells(&self) -> Option<HapticCells> {
         match self.value {
             InputValue::Cells(cells) => Some(cells),
             _ => None,

@@ -9,7 +9,7 @@ use crate::cli::failure::Failure;
 use crate::place::{
     Coordinates, FELT_MM, Reach, Target, View, ViewOptions, coordinates_in_words, place_in_words,
 };
-use crate::terrain::{Distortion, FeltCells, FeltGrid, Terrain};
+use crate::terrain::{Distortion, HapticCells, HapticGrid, Terrain};
 use heightfield::{Georeference, Raster};
 
 /// Relief in the hand below which an exaggeration is suggested, mm.
@@ -42,7 +42,7 @@ pub struct Placing {
 
 /// A grid, and what is asked for of it.
 pub(in crate::cli) struct Asked<'r> {
-    pub(in crate::cli) grid: FeltGrid<'r>,
+    pub(in crate::cli) grid: HapticGrid<'r>,
     options: ViewOptions,
 }
 
@@ -54,7 +54,7 @@ impl Placing {
     /// No such place.
     pub(in crate::cli) fn of<'r>(
         &self,
-        (rendering, cells): (&Rendering, FeltCells),
+        (rendering, cells): (&Rendering, HapticCells),
         raster: &'r Raster,
     ) -> Result<Asked<'r>, Failure> {
         let options = self.options(rendering);

@@ -6,7 +6,7 @@ use super::scale::MapScale;
 use super::surface::SurfaceOptions;
 use crate::cli::failure::{Failure, OrHint};
 use crate::place::suited_height;
-use crate::terrain::{FeltCells, FeltGrid, MAX_TIP_CELLS, Scale, Terrain};
+use crate::terrain::{HapticCells, HapticGrid, MAX_TIP_CELLS, Scale, Terrain};
 use heightfield::Raster;
 
 /// Radius of the ball at the tip of an arm unless another is stated, mm: with a friction of 0.4 no
@@ -58,7 +58,7 @@ impl Rendering {
     ///
     /// # Errors
     /// Numbers that no terrain can be scaled with.
-    pub fn scale(&self, grid: &FeltGrid<'_>) -> Result<Scale, Failure> {
+    pub fn scale(&self, grid: &HapticGrid<'_>) -> Result<Scale, Failure> {
         let cell_mm = match self.scale {
             None => 1.0,
             Some(scale) => scale
@@ -85,12 +85,12 @@ impl Rendering {
     #[must_use]
     pub fn grid<'r>(
         &self,
-        (raster, cells): (&'r Raster, FeltCells),
+        (raster, cells): (&'r Raster, HapticCells),
         measured_at: Option<[f64; 2]>,
-    ) -> FeltGrid<'r> {
+    ) -> HapticGrid<'r> {
         let grid = match measured_at {
-            Some(ground) => FeltGrid::at(raster, cells, ground),
-            None => FeltGrid::new(raster, cells),
+            Some(ground) => HapticGrid::at(raster, cells, ground),
+            None => HapticGrid::new(raster, cells),
         };
         grid.with_tip(self.tip.unwrap_or(0.0))
     }
@@ -108,7 +108,7 @@ impl Rendering {
     ///
     /// # Errors
     /// Heights or a size that positions cannot say, or a level too high.
-    pub fn terrain<'r>(&self, grid: FeltGrid<'r>, scale: Scale) -> Result<Terrain<'r>, Failure> {
+    pub fn terrain<'r>(&self, grid: HapticGrid<'r>, scale: Scale) -> Result<Terrain<'r>, Failure> {
         let holds = |level: &u8| grid.tip_mm() / scale.at_level(*level).cell_mm() <= MAX_TIP_CELLS;
         let level = self.level.or_else(|| (0..31).find(holds));
         Ok(Terrain::over(grid, scale, level.unwrap_or(0))?)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::phantom::Calibration;
 
 use super::placing::{self, scale_in_words, short};
@@ -259,7 +259,7 @@ impl<'t> ViewControl<'t> {
 }
 
 /// What a surface feels like, without what it has not.
-fn surface_in_words(law: &ForceLaw) -> String {
+fn surface_in_words(law: &SurfaceParams) -> String {
     let number = |number: f32| placing::short(f64::from(number));
     let (friction, texture) = (&law.friction, &law.texture);
     let mut words = vec![format!("{} N/mm", number(law.stiffness_n_per_mm))];

@@ -8,7 +8,7 @@ use clap::ValueHint;
 use super::input::{self, InputSetting};
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::terminal::waiting::shown_meanwhile;
-use crate::terrain::FeltCells;
+use crate::terrain::HapticCells;
 use heightfield::disk_cache::DiskCache;
 use heightfield::shown::shown;
 use heightfield::{CellUnit, Certainty, OpenOptions, Raster, files_read_with};
@@ -109,7 +109,7 @@ impl TerrainFile {
 impl ReadingOptions {
     /// The cells of the file that are rendered.
     #[must_use]
-    pub fn cells(&self) -> FeltCells {
+    pub fn cells(&self) -> HapticCells {
         let mut stated = self.input.iter().filter_map(InputSetting::cells);
         stated.next().unwrap_or_default()
     }
@@ -123,7 +123,7 @@ impl ReadingOptions {
             .as_deref()
             .map(|limit| limit.to_str().map(str::parse::<u32>))
         {
-            None => DiskCache::MOST_MB,
+            None => DiskCache::MAX_MB,
             Some(Some(Ok(limit_mb))) => limit_mb,
             Some(_) => {
                 return Err(format!("{LIMIT_VARIABLE} is no number of megabytes")).or_hint(

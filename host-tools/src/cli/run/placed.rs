@@ -1,6 +1,6 @@
 //! A terrain as it lies in the reach of a device's arm.
 
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::Scene;
 
@@ -49,7 +49,7 @@ impl<'t> Placed<'t> {
     pub(super) fn new(
         device: &OneDevice,
         (name, laid): (&str, &'t InReach<'t>),
-        law: ForceLaw,
+        law: SurfaceParams,
     ) -> Result<Self, Failure> {
         let (view, terrain) = (laid.view, &laid.terrain);
         let tour = match device.is_scripted() {

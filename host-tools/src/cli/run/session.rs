@@ -21,7 +21,7 @@ use crate::cli::terminal::interrupt;
 use crate::cli::viewing::ToBeShown;
 use crate::events::Watcher;
 use crate::link::{
-    Arming, DeviceAddress, HostClock, LinkError, Native, Patience, Tcp, Transport, serve_plant,
+    Arming, DeviceAddress, HostClock, LinkError, Native, Tcp, Timeouts, Transport, serve_plant,
 };
 use crate::materials::Materials;
 use crate::output::{Output, folder_of};
@@ -40,7 +40,7 @@ const RETRY: Duration = Duration::from_millis(500);
 const LINGER: Duration = Duration::from_secs(2);
 
 /// Bytes that a recording may have on any disk: a day of CSV at 1 kHz.
-const MOST_RECORDED: u64 = 16 << 30;
+const MAX_RECORDED: u64 = 16 << 30;
 
 /// A device that is to be served, and all that it is given.
 pub(super) struct Serving<'p, 't> {
@@ -220,9 +220,9 @@ fn service<'s, 't: 's>(
             true => Arming::VIRTUAL,
             false => Arming::default(),
         },
-        patience: Patience {
+        patience: Timeouts {
             silence_s: args.silence,
-            ..Patience::REAL_TIME
+            ..Timeouts::REAL_TIME
         },
         connect: Box::new(move || connect(args, device, placed)),
         device: device.address.to_string(),
@@ -269,7 +269,7 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
 /// fills the disk, however fast its samples come.
 fn most_recorded(path: &Path) -> u64 {
     let free = fs4::available_space(folder_of(path));
-    free.map_or(MOST_RECORDED, |free| MOST_RECORDED.min(free / 2))
+    free.map_or(MAX_RECORDED, |free| MAX_RECORDED.min(free / 2))
 }
 
 /// The recording, with the settings in which the device feels the terrain.

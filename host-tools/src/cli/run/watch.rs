@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use hapterra_core::scene::{Sample, View};
+use hapterra_core::scene::{TickRecord, View};
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::Args;
@@ -15,7 +15,7 @@ use crate::cli::terminal::desk::Seat;
 use crate::cli::terminal::speaker::Speaker;
 use crate::cli::viewing::Shown;
 use crate::events::{Event as Told, Watcher};
-use crate::link::{Ask, Event, Tally};
+use crate::link::{Ask, Event, LinkStats};
 use crate::output::OutputError;
 use crate::replay::settings::ViewSettings;
 use crate::replay::{LoopColumns, Record, Recording, Value, is_below_ground, state_name};
@@ -36,7 +36,7 @@ pub(super) struct Watch<'t> {
     /// When the last tick of a virtual arm was told of.
     ticked: Option<Instant>,
     /// The latest sample and its row.
-    latest: Option<(Sample, Record)>,
+    latest: Option<(TickRecord, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
     /// How many views the recording has been told of.
@@ -147,7 +147,7 @@ impl<'t> Watch<'t> {
         }
     }
 
-    fn record(&mut self, sample: &Sample) -> Record {
+    fn record(&mut self, sample: &TickRecord) -> Record {
         let record = self.log.take(sample);
         let (view, felt) = self.log.view();
         if let Some(shown) = &mut self.shown {
@@ -234,7 +234,7 @@ impl<'t> Onlooker<'t> for Watch<'t> {
     }
 
     /// One line that is written over, or a line now and then.
-    fn show(&mut self, tally: &Tally) {
+    fn show(&mut self, tally: &LinkStats) {
         if let Some(shown) = &mut self.shown {
             shown.look(tally);
         }
@@ -259,7 +259,12 @@ impl<'t> Onlooker<'t> for Watch<'t> {
     }
 }
 
-fn in_words(sample: &Sample, record: &Record, terrain: &Terrain<'_>, tally: &Tally) -> String {
+fn in_words(
+    sample: &TickRecord,
+    record: &Record,
+    terrain: &Terrain<'_>,
+    tally: &LinkStats,
+) -> String {
     let force = glam::DVec3::from(record.force_n).length();
     let ([x, y, z], t_s) = (record.hip_mm, record.t_s);
     let state = match is_below_ground(sample, record, terrain) {

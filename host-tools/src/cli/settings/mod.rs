@@ -19,7 +19,7 @@ use super::failure::{Failure, OrHint};
 use super::options::input::InputSetting;
 use super::options::scale::MapScale;
 use crate::replay::{ReplayError, Settings, Trajectory};
-use crate::terrain::FeltCells;
+use crate::terrain::HapticCells;
 pub(super) use recorded::differences;
 
 /// The settings file that is read if it exists.
@@ -167,7 +167,7 @@ fn settings_of(path: &Path) -> Result<Option<Settings>, Failure> {
 }
 
 /// The scale and the kind of cells that the user states.
-fn stated_in(matches: &ArgMatches) -> (Option<MapScale>, Option<FeltCells>) {
+fn stated_in(matches: &ArgMatches) -> (Option<MapScale>, Option<HapticCells>) {
     let scale = matches.try_get_one::<MapScale>("scale");
     let input = matches.try_get_many::<InputSetting>("input").ok().flatten();
     let cells = input.into_iter().flatten().find_map(InputSetting::cells);

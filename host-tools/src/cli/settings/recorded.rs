@@ -11,14 +11,14 @@ use crate::cli::options::scale::MapScale;
 use crate::cli::options::surface::SurfaceChoice;
 use crate::replay::Settings;
 use crate::replay::settings::Felt;
-use crate::terrain::FeltCells;
+use crate::terrain::HapticCells;
 
 /// The options that a recording was made with. The user may state a scale and cells of another kind:
 /// the recorded proportions stay.
 pub(super) fn settings(
     path: &Path,
     recorded: &Settings,
-    (scale, stated_cells): (Option<MapScale>, Option<FeltCells>),
+    (scale, stated_cells): (Option<MapScale>, Option<HapticCells>),
 ) -> Vec<Setting> {
     let Felt {
         cells,
@@ -55,7 +55,7 @@ pub(super) fn settings(
 
 /// The recorded height, at the scale that the user states. Cells of another kind have another size on
 /// the ground: there the factor keeps the proportions.
-fn height(felt: &Felt, scale: Option<MapScale>, cells: FeltCells) -> Exaggeration {
+fn height(felt: &Felt, scale: Option<MapScale>, cells: HapticCells) -> Exaggeration {
     let cell_mm = match scale {
         None => Some(felt.cell_mm),
         Some(scale) => scale.cell_mm(felt.cell_m),
@@ -78,7 +78,7 @@ fn surface_file(path: &Path) -> PathBuf {
 /// Lines on the options that differ from a recording, whose settings stand for all the others.
 pub(in crate::cli) fn differences(
     rendering: &Rendering,
-    cells: FeltCells,
+    cells: HapticCells,
     (path, recorded): (&Path, &Settings),
 ) -> Vec<String> {
     let (felt, force, surface) = (&recorded.felt, &recorded.force, &rendering.surface);
@@ -155,10 +155,10 @@ pub(in crate::cli) fn differences(
     lines.map(line).collect()
 }
 
-fn in_words(cells: FeltCells) -> &'static str {
+fn in_words(cells: HapticCells) -> &'static str {
     match cells {
-        FeltCells::Stored => "cells=stored",
-        FeltCells::Square => "cells=square",
+        HapticCells::Stored => "cells=stored",
+        HapticCells::Square => "cells=square",
     }
 }
 

@@ -2,7 +2,7 @@ use std::fs;
 
 use clap::Parser as _;
 use hapterra_core::contact::Friction;
-use hapterra_core::force::{ForceLaw, Shading};
+use hapterra_core::force::{Shading, SurfaceParams};
 
 use super::*;
 use crate::cli::options::exaggeration::Exaggeration;
@@ -143,12 +143,12 @@ fn recording(folder: &Path) -> (PathBuf, Settings) {
     let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
     let scale = Scale::new(2.0, 6.0).expect("valid");
     let terrain = Terrain::new(&raster, scale, 1).expect("terrain");
-    let law = ForceLaw {
+    let law = SurfaceParams {
         stiffness_n_per_mm: 0.3,
         max_force_n: 4.0,
         friction: Friction::coulomb(0.25),
         shading: Shading::Smooth,
-        ..ForceLaw::PREMIUM
+        ..SurfaceParams::PREMIUM
     };
     let device = Device {
         board: "native".into(),
@@ -247,7 +247,7 @@ fn recorded_surface_has_all_bits_of_its_law() {
     let friction = Friction::coulomb(0.7);
     assert_eq!(
         law,
-        Ok(ForceLaw {
+        Ok(SurfaceParams {
             friction,
             ..settings.law()
         })

@@ -10,7 +10,7 @@ use std::fmt;
 use std::path::Path;
 
 use hapterra_core::contact::ContactState;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use super::marks::Mark;
 use super::settings::{Settings, ViewSettings};
@@ -55,14 +55,14 @@ pub struct Record {
 impl Record {
     /// What was felt in a tick of a device with `tick_hz` ticks a second.
     #[must_use]
-    pub fn of_tick(sample: &Sample, tick_hz: u32, scale: &Scale) -> Self {
+    pub fn of_tick(sample: &TickRecord, tick_hz: u32, scale: &Scale) -> Self {
         let t_s = f64::from(sample.tick) / f64::from(tick_hz.max(1));
         Self::new(t_s, scale.to_mm(&sample.hip), sample, scale)
     }
 
     /// What was felt at a time, s, with the HIP at a place, mm.
     #[must_use]
-    pub fn new(t_s: f64, hip_mm: [f64; 3], sample: &Sample, scale: &Scale) -> Self {
+    pub fn new(t_s: f64, hip_mm: [f64; 3], sample: &TickRecord, scale: &Scale) -> Self {
         let contact = sample.state == ContactState::Touching;
         Self {
             t_s,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::record::RowAccessor;
-use hapterra_core::force::ForceLaw;
+use hapterra_core::force::SurfaceParams;
 
 use super::*;
 use crate::replay::settings::{Device, KEY};
@@ -26,7 +26,7 @@ fn settings() -> Settings {
         firmware: "0.1.0".into(),
         tick_hz: 1000,
     };
-    let law = (ForceLaw::PREMIUM, crate::replay::Rule::Swept);
+    let law = (SurfaceParams::PREMIUM, crate::replay::Rule::Swept);
     Settings::new("flat.tif", &terrain.expect("terrain"), law, None, device)
 }
 

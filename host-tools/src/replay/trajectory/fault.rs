@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hapterra_touch::ticks::TimeFault;
 
-use crate::replay::settings::BadSettings;
+use crate::replay::settings::SettingsError;
 
 /// What is wrong with which trajectory.
 #[derive(Debug, thiserror::Error)]
@@ -62,5 +62,5 @@ pub(super) enum TrajectoryFault {
     #[error("{at}, column t_s: {what}")]
     Time { at: String, what: TimeFault },
     #[error("{0}")]
-    Settings(BadSettings),
+    Settings(SettingsError),
 }

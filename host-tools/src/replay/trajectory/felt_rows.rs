@@ -32,7 +32,7 @@ type Values = [Option<f64>; NAMES.len()];
 
 /// What was felt in a row.
 #[derive(Clone, Copy, Debug)]
-pub struct FeltRow {
+pub struct RecordingRow {
     /// The view that it was felt in: [`super::Row::view`].
     pub view: u32,
     /// What was felt. A trajectory tells a place alone: no contact, and the proxy at the HIP.
@@ -40,7 +40,7 @@ pub struct FeltRow {
 }
 
 /// Rows of a recording or a trajectory, in the order of the file.
-pub struct FeltRows {
+pub struct RecordingRows {
     path: PathBuf,
     /// The same rows as a replay reads them: it knows what is wrong with them, where a
     /// recording was cut, and the view.
@@ -60,7 +60,7 @@ enum Form {
     Parquet(Box<RowIter<'static>>),
 }
 
-impl FeltRows {
+impl RecordingRows {
     /// Opens a recording and checks it as [`Trajectory::open`] does.
     ///
     /// # Errors
@@ -88,7 +88,7 @@ impl FeltRows {
         self.trajectory.was_cut()
     }
 
-    fn next_row(&mut self) -> Result<Option<FeltRow>, TrajectoryError> {
+    fn next_row(&mut self) -> Result<Option<RecordingRow>, TrajectoryError> {
         let Some(row) = self.trajectory.next_row()? else {
             return Ok(None);
         };
@@ -106,15 +106,15 @@ impl FeltRows {
             record.t_s = self.untimed as f64 / f64::from(TickRate::DEFAULT.hz());
             self.untimed += 1;
         }
-        Ok(record.map(|record| FeltRow {
+        Ok(record.map(|record| RecordingRow {
             view: row.view,
             record,
         }))
     }
 }
 
-impl Iterator for FeltRows {
-    type Item = Result<FeltRow, TrajectoryError>;
+impl Iterator for RecordingRows {
+    type Item = Result<RecordingRow, TrajectoryError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.next_row().transpose()

@@ -22,7 +22,7 @@ use hapterra_touch::ticks::TimeFault;
 
 pub use columns::{ColumnValues, RecordedColumns};
 pub use fault::TrajectoryError;
-pub use felt_rows::{FeltRow, FeltRows};
+pub use felt_rows::{RecordingRow, RecordingRows};
 
 use super::settings::Settings;
 use crate::terrain::Scale;

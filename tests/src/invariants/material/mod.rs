@@ -14,7 +14,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::Shading;
 use hapterra_core::guard::Limits;
-use hapterra_core::scene::Sample;
+use hapterra_core::scene::TickRecord;
 
 use super::judge::{Judge, Verdict};
 use super::seen::Seen;
@@ -152,7 +152,7 @@ impl<'g> MaterialJudge<'g> {
 
     /// The force is that of a course which is possible.
     fn force_is_right(&mut self, replied: &Replied, seen: &Seen) -> Verdict {
-        let Sample { state, proxy, .. } = replied.sample;
+        let TickRecord { state, proxy, .. } = replied.sample;
         let touches = state == ContactState::Touching;
         // A place has one class, whichever of two that are equally near it is.
         let stays = self
@@ -292,7 +292,7 @@ impl<'g> MaterialJudge<'g> {
 /// The contact of a point, as other judges see it. Where all of the spring is felt, the
 /// displacement is the way to the proxy.
 fn seen(replied: &Replied, shift: [i32; 3]) -> Seen {
-    let Sample {
+    let TickRecord {
         state, proxy, work, ..
     } = replied.sample;
     let way = DVec3::from_array(replied.proxy) - DVec3::from_array(replied.hip);

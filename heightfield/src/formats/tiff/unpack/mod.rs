@@ -12,10 +12,10 @@ use std::io::{ErrorKind, Read};
 use tiff_reader::filters::fix_endianness_and_predict;
 
 use super::fault::fault;
-use super::layout::{Chunk, LARGEST_DECODED, Layout};
-use crate::blocks::{LARGEST_BLOCK_BYTES, Part};
+use super::layout::{Chunk, Layout, MAX_DECODED};
+use crate::blocks::{MAX_BLOCK_BYTES, Part};
 use crate::samples::{Endian, SampleValue, with_samples};
-use crate::{BadRaster, Samples};
+use crate::{RasterError, Samples};
 use stored::StoredBytes;
 
 /// Byte order of unpacked rows: this machine's.
@@ -27,7 +27,7 @@ pub(super) const ENDIAN: Endian = match cfg!(target_endian = "big") {
 /// Whether the strips or tiles of a layout can be unpacked row by row. A row is held in memory.
 pub(super) fn suits(layout: &Layout) -> bool {
     codec::is_known(layout.directory.ifd().compression())
-        && (1..=LARGEST_BLOCK_BYTES).contains(&layout.row_bytes())
+        && (1..=MAX_BLOCK_BYTES).contains(&layout.row_bytes())
 }
 
 /// The rows of a strip or tile.
@@ -42,7 +42,7 @@ pub(super) struct Rows<'f> {
 
 impl<'f> Rows<'f> {
     /// Nothing is unpacked yet. The layout [suits].
-    pub(super) fn of(layout: &'f Layout, chunk: &Chunk) -> Result<Self, BadRaster> {
+    pub(super) fn of(layout: &'f Layout, chunk: &Chunk) -> Result<Self, RasterError> {
         let image = layout.directory.ifd();
         let source = layout.directory.file().source();
         let is_reversed = image.fill_order() == 2;
@@ -58,7 +58,7 @@ impl<'f> Rows<'f> {
     }
 
     /// The bytes of the next row, its numbers in this machine's byte order.
-    pub(super) fn next(&mut self) -> Result<&[u8], BadRaster> {
+    pub(super) fn next(&mut self) -> Result<&[u8], RasterError> {
         let layout = self.layout;
         let read = self.unpacked.read_exact(&mut self.row);
         read.map_err(|error| cannot(layout, &self.chunk, self.count, &error))?;
@@ -75,12 +75,12 @@ impl<'f> Rows<'f> {
     }
 }
 
-fn cannot(layout: &Layout, chunk: &Chunk, row: u32, error: &std::io::Error) -> BadRaster {
+fn cannot(layout: &Layout, chunk: &Chunk, row: u32, error: &std::io::Error) -> RasterError {
     let why = match error.kind() {
         ErrorKind::UnexpectedEof => "it ends too early".into(),
         _ => error.to_string(),
     };
-    BadRaster::Damaged(format!(
+    RasterError::Damaged(format!(
         "TIFF: the {} data at byte {} cannot be unpacked from row {} on: {why}",
         layout.compression.0,
         chunk.place,
@@ -91,12 +91,12 @@ fn cannot(layout: &Layout, chunk: &Chunk, row: u32, error: &std::io::Error) -> B
 /// Whether all of a band is best read so: its strips are large.
 pub(super) fn suits_whole(layout: &Layout, part: &Part) -> bool {
     let is_whole = *part == Part::whole(layout.columns, layout.rows);
-    is_whole && layout.has_strips() && layout.chunk_size() > LARGEST_DECODED && suits(layout)
+    is_whole && layout.has_strips() && layout.chunk_size() > MAX_DECODED && suits(layout)
 }
 
 /// Reads all of a band, the first being 0, of a layout that [suits](suits_whole): the samples are
 /// held once.
-pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, BadRaster> {
+pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, RasterError> {
     let all = Part::whole(layout.columns, layout.rows);
     let stored = layout.sample();
     let apart = layout.texel_bytes() as usize;
@@ -119,6 +119,6 @@ pub(super) fn read_whole(layout: &Layout, band: usize) -> Result<Samples, BadRas
     }
     match samples.len() as u64 == count {
         true => Ok(samples),
-        false => Err(BadRaster::damaged("TIFF: its index has too few strips")),
+        false => Err(RasterError::damaged("TIFF: its index has too few strips")),
     }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueHint;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use hapterra_core::contact::Friction;
-use hapterra_core::force::{Controller, Damping, ForceLaw, Material, Shading};
+use hapterra_core::force::{Controller, Damping, Material, Shading, SurfaceParams};
 
 use super::quantity::{FORCE, STIFFNESS};
 use super::terrain_file::ReadingOptions;
@@ -86,7 +86,7 @@ pub fn choice() -> impl TypedValueParser<Value = SurfaceChoice> {
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// The law of the scene: that of the default where the ground has classes.
-    pub law: ForceLaw,
+    pub law: SurfaceParams,
     /// The classes of the ground, where the surface has some.
     looks: Option<Looks>,
 }
@@ -107,9 +107,9 @@ impl SurfaceOptions {
     /// A file that has no surface, and numbers that no surface has.
     pub fn load(&self) -> Result<Surface, Failure> {
         let mut surface = match &self.surface {
-            None => Surface::of(&ForceLaw::PREMIUM),
+            None => Surface::of(&SurfaceParams::PREMIUM),
             Some(SurfaceChoice::Named(named)) => {
-                Surface::of(&named.material.law(&ForceLaw::PREMIUM))
+                Surface::of(&named.material.law(&SurfaceParams::PREMIUM))
             }
             Some(SurfaceChoice::File(file)) if file.extension().is_some_and(|it| it == "toml") => {
                 self.of_table(file)?
@@ -159,7 +159,7 @@ impl SurfaceOptions {
         for (line, look) in std::iter::once((*line, look)).chain(of_classes) {
             self.check_stiffness(look, (file, line))?;
         }
-        let usual = Material::of(&ForceLaw::PREMIUM);
+        let usual = Material::of(&SurfaceParams::PREMIUM);
         let mut default = over(&usual, look, (file, *line, "the default"))?;
         if let Some(stiffness) = self.stiffness {
             default.stiffness_n_per_mm = stiffness;
@@ -182,7 +182,7 @@ impl SurfaceOptions {
             })
         });
         let class = classes.collect::<Result<_, Failure>>()?;
-        let scene = ForceLaw {
+        let scene = SurfaceParams {
             shading: match table.shading {
                 ShadingName::None => Shading::None,
                 ShadingName::Smooth => Shading::Smooth,
@@ -194,7 +194,7 @@ impl SurfaceOptions {
                 },
                 ..Damping::NONE
             },
-            ..ForceLaw::PREMIUM
+            ..SurfaceParams::PREMIUM
         };
         Ok(Surface {
             law: default.law(&scene),
@@ -222,7 +222,7 @@ impl SurfaceOptions {
 
 impl Surface {
     /// A surface that is the same everywhere.
-    const fn of(law: &ForceLaw) -> Self {
+    const fn of(law: &SurfaceParams) -> Self {
         Self {
             law: *law,
             looks: None,
@@ -317,7 +317,7 @@ fn check(material: &Material) -> Result<(), String> {
         return Err(format!(
             "a friction of {dynamic_mu}, {static_mu} at rest, trailing by {viscous_s} s: friction from 0 to {}, static_friction not below it, viscous_friction from 0 to {} s",
             Friction::MOST,
-            Friction::MOST_VISCOUS_S
+            Friction::MAX_VISCOUS_S
         ));
     }
     let damping = Damping {
@@ -325,7 +325,7 @@ fn check(material: &Material) -> Result<(), String> {
         ..Damping::NONE
     };
     if !damping.is_valid() {
-        let (damping, most) = (material.damping_ns_per_m, Damping::MOST_NS_PER_M);
+        let (damping, most) = (material.damping_ns_per_m, Damping::MAX_NS_PER_M);
         return Err(format!(
             "a damping of {damping} N·s/m: damping from 0 to {most} N·s/m"
         ));

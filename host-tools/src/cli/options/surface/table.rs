@@ -28,7 +28,7 @@ use heightfield::shown::shown;
 
 /// Most classes that a table names: with the default, as many materials as a device has room
 /// for.
-pub const MOST_CLASSES: usize = 15;
+pub const MAX_CLASSES: usize = 15;
 /// A longer file is no table, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
@@ -159,7 +159,7 @@ pub struct TableFile {
 
 /// What is wrong with a table.
 #[derive(Debug, thiserror::Error)]
-pub enum BadTable {
+pub enum TableError {
     /// It cannot be read.
     #[error("{}: {why}", file.display())]
     Unreadable {
@@ -230,9 +230,9 @@ impl TableFile {
     /// Reads a table.
     ///
     /// # Errors
-    /// [`BadTable`], with the line.
-    pub fn open(file: &Path) -> Result<Self, BadTable> {
-        let unreadable = |why| BadTable::Unreadable {
+    /// [`TableError`], with the line.
+    pub fn open(file: &Path) -> Result<Self, TableError> {
+        let unreadable = |why| TableError::Unreadable {
             file: file.to_owned(),
             why,
         };
@@ -243,14 +243,14 @@ impl TableFile {
     /// Reads the text of a table; `file` names it in errors.
     ///
     /// # Errors
-    /// [`BadTable`], with the line.
-    pub fn read(file: &Path, text: &str) -> Result<Self, BadTable> {
+    /// [`TableError`], with the line.
+    pub fn read(file: &Path, text: &str) -> Result<Self, TableError> {
         let line_of = |at: usize| 1 + text.bytes().take(at).filter(|byte| *byte == b'\n').count();
-        let written = Written::read(text).map_err(|why| BadTable::NoTable {
+        let written = Written::read(text).map_err(|why| TableError::NoTable {
             file: file.to_owned(),
             why: explained(&why),
         })?;
-        let bad = |line: usize, why: String| BadTable::Class {
+        let bad = |line: usize, why: String| TableError::Class {
             file: file.to_owned(),
             line,
             why,
@@ -270,12 +270,12 @@ impl TableFile {
             classes.push((class, line, look.into_inner()));
         }
         classes.sort_by_key(|(class, ..)| *class);
-        if let Some((class, line, _)) = classes.get(MOST_CLASSES) {
+        if let Some((class, line, _)) = classes.get(MAX_CLASSES) {
             let count = classes.len();
             return Err(bad(
                 *line,
                 format!(
-                    "class {class} is one too many: {count} classes, and at most {MOST_CLASSES} can be told apart; leave those out that may feel as the default"
+                    "class {class} is one too many: {count} classes, and at most {MAX_CLASSES} can be told apart; leave those out that may feel as the default"
                 ),
             ));
         }

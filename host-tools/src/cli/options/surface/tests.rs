@@ -45,7 +45,7 @@ fn scene_has_shading_and_passivity() {
     assert_eq!(law.damping.controller, Controller::Off);
     assert_eq!(law.damping.ns_per_m, 2.0);
     let law = load(SurfaceOptions::default(), "").expect("nothing").law;
-    assert_eq!(law, ForceLaw::PREMIUM);
+    assert_eq!(law, SurfaceParams::PREMIUM);
 }
 
 #[test]

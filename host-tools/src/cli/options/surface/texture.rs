@@ -80,11 +80,11 @@ fn checked(texture: Texture) -> Result<Texture, String> {
             "a texture with a wavelength of {wavelength} mm: texture_wavelength from {shortest}, a few encoder counts, to {longest} mm"
         ));
     }
-    let most = (wavelength * Texture::STEEPEST).min(Texture::MOST_AMPLITUDE_MM);
+    let most = (wavelength * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
     if !(amplitude > 0.0 && amplitude <= most) {
         return Err(format!(
             "a texture of {amplitude} mm with a wavelength of {wavelength} mm: texture_amplitude above 0 and up to {most} mm, which is an eighth of the wavelength, and {} mm at most",
-            Texture::MOST_AMPLITUDE_MM
+            Texture::MAX_AMPLITUDE_MM
         ));
     }
     texture.is_valid().then_some(texture).ok_or_else(|| {
