@@ -1,6 +1,7 @@
 //! The pages of the reference that the code writes: `cargo xtask docs` compares them, and
 //! `cargo xtask docs --write` writes them anew.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use clap::builder::StyledStr;
@@ -59,7 +60,9 @@ fn shown(text: Option<&StyledStr>) -> String {
 
 /// What `-h` says of an option or argument.
 fn about(arg: &Arg) -> String {
-    let mut text = format!("`{arg}`: {}", sentence(&shown(arg.get_help())));
+    let short = arg.get_short().map(|short| format!("-{short}, "));
+    let short = short.unwrap_or_default();
+    let mut text = format!("`{short}{arg}`: {}", sentence(&shown(arg.get_help())));
     let takes_value = arg.get_action().takes_values();
     let values = arg.get_possible_values();
     let values = values
@@ -95,20 +98,37 @@ fn own(command: &Command) -> Vec<&Arg> {
     arguments.filter(is_own).collect()
 }
 
-fn subcommand(page: &mut String, program: &str, command: &mut Command) {
+/// A command's arguments and options. Those of several commands are named, and explained elsewhere.
+fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTreeSet<String>) {
     let _ = write!(
         page,
         "\n## {program} {}\n\n{}\n\n",
         command.get_name(),
         sentence(&shown(command.get_about()))
     );
-    let is_positional = |arg: &&&Arg| arg.is_positional();
     let arguments = own(command);
-    let first = arguments.iter().filter(is_positional);
-    let then = arguments.iter().filter(|arg| !arg.is_positional());
-    for arg in first.chain(then) {
+    let (mut first, mut then): (Vec<&Arg>, Vec<&Arg>) =
+        arguments.into_iter().partition(|arg| arg.is_positional());
+    first.append(&mut then);
+    let (elsewhere, here): (Vec<&Arg>, Vec<&Arg>) =
+        { first.into_iter() }.partition(|arg| shared.contains(&about(arg)));
+    for arg in here {
         item(page, &about(arg));
     }
+    if !elsewhere.is_empty() {
+        let names: Vec<_> = elsewhere.iter().map(|arg| format!("`{arg}`")).collect();
+        let link = "[Of several commands](#options-of-several-commands)";
+        item(page, &format!("{link}: {}.", names.join(", ")));
+    }
+}
+
+/// What is said of each argument, by how many of these commands say it.
+fn texts<'c>(commands: impl Iterator<Item = &'c Command>) -> BTreeMap<String, usize> {
+    let mut texts = BTreeMap::new();
+    for arg in commands.flat_map(own) {
+        *texts.entry(about(arg)).or_default() += 1;
+    }
+    texts
 }
 
 /// The command of a program, as it is parsed.
@@ -118,47 +138,45 @@ fn built(mut command: Command) -> Command {
     command
 }
 
-/// Every option of every subcommand, and those of all, which are defined once.
-fn definitions(program: &Command) -> usize {
-    let options = |command: &Command| {
-        let options = own(command).into_iter().filter(|arg| !arg.is_positional());
-        options.map(|arg| arg.get_id().clone()).collect::<Vec<_>>()
-    };
-    let mut all: Vec<_> = program.get_subcommands().flat_map(options).collect();
-    all.sort();
-    all.dedup();
-    // --verbose, --help, --version.
-    all.len() + 3
-}
-
 #[test]
 fn command_line_is_that_of_the_programs() {
-    let mut programs = [
+    let programs = [
         built(hapterra::cli::Cli::command()),
         built(hapterra_lab::cli::Cli::command()),
     ];
-    let all = definitions(&programs[0]);
-    let run = programs[0].find_subcommand_mut("run").expect("a command");
+    let is_option = |text: &&String| text.starts_with("`-");
+    // Beside them --verbose, --help and --version.
+    let all = 3 + texts(programs[0].get_subcommands())
+        .keys()
+        .filter(is_option)
+        .count();
+    let mut run = programs[0]
+        .find_subcommand("run")
+        .expect("a command")
+        .clone();
     let help = run.render_help().to_string();
     let lines = help.trim_end().lines().count();
-    let options = help
-        .lines()
-        .filter(|line| line.trim_start().starts_with('-'))
-        .count();
+    let is_listed = |line: &&str| line.trim_start().starts_with('-');
+    let listed = help.lines().filter(is_listed).count();
     let mut page = format!(
         "# Command line\n\n{MARK}\n\n\
          This page lists what `hapterra` and `hapterra-lab` take, as `-h` prints it. `--help` of a command explains\n\
          more. All commands take `-v` (up to `-vvv`) for more messages, `-h` and `--help`.\n\n\
          | size | |\n| --- | ---: |\n\
          | options of `hapterra` | {all} |\n\
-         | options in `hapterra run -h` | {options} |\n\
+         | options in `hapterra run -h` | {listed} |\n\
          | lines of `hapterra run -h` | {lines} |\n"
     );
-    for program in &mut programs {
-        let name = program.get_name().to_owned();
-        let commands = program.get_subcommands_mut();
+    let known = texts(programs.iter().flat_map(Command::get_subcommands));
+    let shared: BTreeSet<String> = { known.into_iter() }
+        .filter_map(|(text, times)| (times > 1).then_some(text))
+        .collect();
+    page += "\n## Options of several commands\n\n";
+    shared.iter().for_each(|text| item(&mut page, text));
+    for program in &programs {
+        let commands = program.get_subcommands();
         for command in commands.filter(|command| command.get_name() != "help") {
-            subcommand(&mut page, &name, command);
+            subcommand(&mut page, program.get_name(), command, &shared);
         }
     }
     check("command-line.md", &page);

@@ -9,6 +9,7 @@ mod census;
 mod counts;
 mod demo;
 mod deny;
+mod docs;
 mod flash;
 mod fuzz;
 mod image;
@@ -52,8 +53,10 @@ cargo xtask COMMAND
                          emulated board only, no dependencies, page and Python; ARGS go to
                          `cargo test` and select programs, as `--test usb`
   lint                   formatting, clippy and documentation, warnings as errors
-  census                 words of the pages and lines of code by room; fails where a page is too
-                         long for its bounds
+  census [--write]       words, options, public items, circles of files and lines of code, beside
+                         the kept table and the bounds; --write: keep these
+  docs [--write]         the reference, figures, links and command lines of the book, and the book
+                         itself where mdBook is installed; --write: write the reference anew
   setup                  only find or install what the commands need
   size [BOARD]           build the images and hold them to their flash and RAM budgets
   panics [BOARD]         build the images and prove that no interrupt can panic
@@ -118,6 +121,8 @@ fn command() -> Result<ExitCode> {
         "test" => test::test(&test_words(&mut words)?)?,
         "soak" => soak::soak(words.raw_args()?.collect())?,
         "counts" => counts::counts(flag(&mut words, &["write"])?.is_some())?,
+        "census" => census::census(flag(&mut words, &["write"])?.is_some())?,
+        "docs" => docs::docs(flag(&mut words, &["write"])?.is_some())?,
         "cycles" => counts::cycles(flag(&mut words, &["write", "all"])?)?,
         "size" => test::check_sizes(&test::images(boards(&mut words)?)?)?,
         "panics" => test::check_panics(&test::images(boards(&mut words)?)?)?,
@@ -161,7 +166,6 @@ fn command() -> Result<ExitCode> {
             }
             match plain {
                 "lint" => lint::lint()?,
-                "census" => census::census()?,
                 "miri" => miri::miri()?,
                 "setup" => setup()?,
                 "deny" => deny::check_all()?,

@@ -1,0 +1,309 @@
+//! Every command line of README.md and the book: it is one that the programs take, and where it needs
+//! neither a board nor a server, it is run.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use clap::CommandFactory as _;
+use clap::error::ErrorKind;
+use hapterra_tests::timeouts::end_of;
+use hapterra_tests::{hapterra_binary, repository};
+
+/// Programs whose lines are checked.
+const PROGRAMS: [&str; 3] = ["hapterra", "hapterra-lab", "cargo"];
+/// Words of lines that need what a test does not have.
+const ELSEWHERE: [&str; 7] = [
+    "usb",
+    "tcp:",
+    "://",
+    "--view",
+    ".vrt",
+    "SERIAL",
+    "worldcover",
+];
+/// Commands that are run: the others ask for a board or a viewer, or take minutes.
+const RUN: [&str; 10] = [
+    "info",
+    "run",
+    "demo",
+    "replay",
+    "list",
+    "status",
+    "synth",
+    "completions",
+    "man",
+    "help",
+];
+
+/// A command line of a page.
+struct Line {
+    page: PathBuf,
+    text: String,
+    /// In a block: whole, and to be typed as it is.
+    is_block: bool,
+}
+
+fn pages() -> Vec<PathBuf> {
+    let (mut pages, mut folders) = (vec![repository().join("README.md")], vec![]);
+    folders.push(repository().join("docs"));
+    while let Some(folder) = folders.pop() {
+        for entry in folder.read_dir().expect("a folder") {
+            let path = entry.expect("readable").path();
+            match path.extension() {
+                None if path.is_dir() => folders.push(path),
+                Some(kind) if kind == "md" => pages.push(path),
+                _ => {}
+            }
+        }
+    }
+    pages.sort();
+    pages
+}
+
+/// The command lines of a page: lines of blocks, and code inside of text.
+fn lines(page: &Path, text: &str) -> Vec<Line> {
+    let line = |text: &str, is_block| Line {
+        page: page.to_owned(),
+        text: text.trim().trim_start_matches("$ ").to_owned(),
+        is_block,
+    };
+    let (mut found, mut is_code) = (vec![], false);
+    for written in text.replace("\\\n", " ").lines() {
+        if written.starts_with("```") {
+            is_code = !is_code;
+        } else if is_code || written.starts_with("    ") {
+            found.push(line(written, true));
+        } else {
+            found.extend(
+                written
+                    .split('`')
+                    .skip(1)
+                    .step_by(2)
+                    .map(|code| line(code, false)),
+            );
+        }
+    }
+    let of_program = |line: &Line| {
+        let mut words = line.text.split(' ');
+        words.next().is_some_and(|first| PROGRAMS.contains(&first)) && words.next().is_some()
+    };
+    found.retain(of_program);
+    found
+}
+
+/// Words of a line, up to a comment or a second command; `[FILE]` is as FILE.
+fn words(text: &str) -> Vec<String> {
+    let words = shlex::split(text).unwrap_or_default();
+    let ends = |word: &String| ["|", "&&", ">", "<"].contains(&word.as_str());
+    let words = words.into_iter().take_while(|word| !ends(word));
+    words.map(|word| word.replace(['[', ']'], "")).collect()
+}
+
+/// Where a word of the pages is a name for what the user has.
+fn is_placeholder(word: &str) -> bool {
+    let is_upper = |c: char| c.is_ascii_uppercase() || "_.…,|=".contains(c);
+    word.contains(char::is_uppercase) && word.chars().all(is_upper) || word.contains('…')
+}
+
+/// What is wrong with a line of `hapterra` or `hapterra-lab`, as the program says it.
+fn parsed(command: clap::Command, words: &[String], is_block: bool) -> Result<(), String> {
+    // The list is printed while this is parsed, and the program ends.
+    if words.iter().any(|word| word == "--formats") {
+        return Ok(());
+    }
+    let error = match command.try_get_matches_from(words) {
+        Ok(_) => return Ok(()),
+        Err(error) => error,
+    };
+    let is_name = words.iter().any(|word| is_placeholder(word));
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => Ok(()),
+        ErrorKind::MissingRequiredArgument
+        | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+            if !is_block =>
+        {
+            Ok(())
+        }
+        ErrorKind::ValueValidation | ErrorKind::InvalidValue if is_name => Ok(()),
+        _ => Err(error.to_string()),
+    }
+}
+
+/// What is wrong with a line of cargo: a command of xtask that does not exist, or a package or folder.
+fn cargo(words: &[String]) -> Result<(), String> {
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    if let ["cargo", "xtask", command, ref more @ ..] = words[..] {
+        let help = include_str!("../../xtask/src/main.rs");
+        let lines: Vec<&str> = help.lines().collect();
+        let starts = |line: &&str| line.split_whitespace().next() == Some(command);
+        if !lines
+            .iter()
+            .any(|line| line.starts_with("  ") && starts(line))
+            && command != "help"
+        {
+            return Err(format!("cargo xtask has no command {command}"));
+        }
+        let own = more.iter().take_while(|word| **word != "--");
+        let mut options = own.filter(|word| word.starts_with("--"));
+        return match options.find(|option| !help.contains(**option)) {
+            Some(option) => Err(format!("cargo xtask {command} has no option {option}")),
+            None => Ok(()),
+        };
+    }
+    for (option, value) in words.iter().zip(words.iter().skip(1)) {
+        let manifest = match *option {
+            "--path" => repository().join(value).join("Cargo.toml"),
+            "-p" | "--package" => continue_if_package(value)?,
+            _ => continue,
+        };
+        if !manifest.is_file() && !value.starts_with("..") {
+            return Err(format!("there is no {}", manifest.display()));
+        }
+    }
+    Ok(())
+}
+
+/// The manifest of the workspace, if it has the package.
+fn continue_if_package(name: &str) -> Result<PathBuf, String> {
+    let locked = include_str!("../../Cargo.lock");
+    let manifest = repository().join("Cargo.toml");
+    let known = locked.contains(&format!("name = \"{name}\"\nversion = \"0.1.0\"\ndep"));
+    known
+        .then_some(manifest)
+        .ok_or_else(|| format!("there is no package {name}"))
+}
+
+fn check(line: &Line) -> Result<(), String> {
+    let mut words = words(&line.text);
+    let lab = ["cargo", "run", "-r", "-p", "hapterra-lab", "--"];
+    if words.starts_with(&lab.map(str::to_owned)) {
+        words.splice(..lab.len(), ["hapterra-lab".to_owned()]);
+    }
+    match words.first().map(String::as_str) {
+        Some("hapterra") => parsed(hapterra::cli::Cli::command(), &words, line.is_block),
+        Some("hapterra-lab") => parsed(hapterra_lab::cli::Cli::command(), &words, line.is_block),
+        _ => cargo(&words),
+    }
+}
+
+#[test]
+fn programs_take_every_command_line_of_the_pages() {
+    let (mut count, mut wrong) = (0, String::new());
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).expect("readable");
+        for line in lines(&page, &text) {
+            count += 1;
+            if let Err(why) = check(&line) {
+                let (page, text) = (line.page.display(), &line.text);
+                // Writing to a String cannot fail.
+                let _ = writeln!(wrong, "{page}: {text}\n{why}");
+            }
+        }
+    }
+    println!("{count} command lines");
+    assert!(count > 80, "only {count} command lines");
+    assert!(wrong.is_empty(), "{wrong}");
+}
+
+#[test]
+fn wrong_lines_are_found() {
+    let page = "```sh\nhapterra info FILE --fell  # a comment\nhapterra info\ncargo xtask sing\n\
+                cargo xtask view --tset\ncargo install --path no/where\n```\n\
+                Text with `hapterra stability` and `cargo run -p nothing`.\n";
+    let right = "```sh\nhapterra info FILE --json  # a comment\nhapterra run FILE --device \\\n  native\n\
+                 cargo xtask test -- --test usb\ncargo install --path host-tools\n```\n\
+                 Text with `hapterra run`, `hapterra.read()` and `cargo run -r -p hapterra-lab -- synth`.\n";
+    let found = |text: &str| {
+        let lines = lines(Path::new("page.md"), text);
+        (
+            lines.len(),
+            lines.iter().filter(|line| check(line).is_err()).count(),
+        )
+    };
+    assert_eq!(found(page), (7, 7));
+    assert_eq!(found(right), (6, 0));
+}
+
+/// Files by the names that the pages have: a terrain at 7.5 to 7.9° east and 45.8 to 46.2° north, and
+/// a path over it.
+fn files(folder: &Path) {
+    let mut terrain =
+        "ncols 100\nnrows 100\nxllcorner 7.5\nyllcorner 45.8\ncellsize 0.004\n".to_owned();
+    for row in 0..100 {
+        for column in 0..100 {
+            let (x, y) = (f64::from(column), f64::from(row));
+            let height = 2000.0 + 800.0 * (x / 9.0).sin() * (y / 11.0).cos();
+            let _ = write!(terrain, "{height:.1} ");
+        }
+        terrain.push('\n');
+    }
+    let place = "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],\
+                 PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"4326\"]]";
+    std::fs::create_dir(folder.join("tiles")).expect("made");
+    for name in ["file", "tiles/one"] {
+        std::fs::write(folder.join(name).with_extension("asc"), &terrain).expect("written");
+        std::fs::write(folder.join(name).with_extension("prj"), place).expect("written");
+    }
+    let path = "t_s,x_mm,y_mm,z_mm\n0,20,20,600\n0.5,22,21,600\n";
+    std::fs::write(folder.join("path.csv"), path).expect("written");
+}
+
+/// The words to run a line with; none where it needs what a test does not have.
+fn runnable(line: &Line) -> Option<Vec<String>> {
+    let mut words = words(&line.text);
+    let is_elsewhere = |word: &String| ELSEWHERE.iter().any(|part| word.contains(part));
+    let command = words
+        .get(1)
+        .filter(|word| RUN.contains(&word.as_str()))?
+        .clone();
+    if !line.is_block || words[0] == "cargo" || words.iter().any(is_elsewhere) {
+        return None;
+    }
+    for word in &mut words[2..] {
+        *word = match word.as_str() {
+            "FILE" | "TERRAIN" | "mountain.tif" => "file.asc".into(),
+            "PATH.csv" => "path.csv".into(),
+            "FELT.csv" => "felt.csv".into(),
+            "tiles/**/*.tif" => "tiles/**/*.asc".into(),
+            word => word.to_owned(),
+        };
+    }
+    if command == "run" && !words.iter().any(|word| word == "--device") {
+        words.extend(["--device", "native"].map(str::to_owned));
+    }
+    if command == "run" && !words.iter().any(|word| word == "--duration") {
+        words.extend(["--duration", "1s"].map(str::to_owned));
+    }
+    Some(words)
+}
+
+#[test]
+fn command_lines_without_a_board_run() {
+    let (mut count, mut wrong) = (0, String::new());
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).expect("readable");
+        let folder = tempfile::tempdir().expect("a folder");
+        files(folder.path());
+        for words in lines(&page, &text).iter().filter_map(runnable) {
+            let program = match words[0].as_str() {
+                "hapterra" => hapterra_binary(),
+                _ => Path::new(env!("CARGO_BIN_EXE_hapterra-lab")),
+            };
+            let mut command = Command::new(program);
+            command.current_dir(folder.path()).args(&words[1..]);
+            command.env("HAPTERRA_CACHE_DIR", folder.path().join("cache"));
+            command.stdin(Stdio::null()).stdout(Stdio::piped());
+            let child = command.stderr(Stdio::piped()).spawn();
+            let output = end_of(child.expect("it starts"));
+            count += 1;
+            if !output.status.success() {
+                let said = String::from_utf8_lossy(&output.stderr);
+                let _ = writeln!(wrong, "{}: {}\n{said}", page.display(), words.join(" "));
+            }
+        }
+    }
+    println!("{count} command lines were run");
+    assert!(count > 20, "only {count} command lines were run");
+    assert!(wrong.is_empty(), "{wrong}");
+}

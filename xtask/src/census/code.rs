@@ -1,0 +1,202 @@
+//! Lines of code, public items, and circles of modules.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use super::files;
+
+/// Endings of files of code.
+const CODE: [&str; 5] = ["rs", "py", "js", "c", "h"];
+/// What a public item begins with.
+const ITEMS: [&str; 10] = [
+    "fn ", "const ", "struct ", "enum ", "union ", "trait ", "type ", "static ", "mod ", "use ",
+];
+
+/// What the code of a folder comes to.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Code {
+    /// Lines that are neither empty nor comments, outside of files of tests.
+    pub(super) lines: usize,
+    /// The same in files of tests.
+    pub(super) tests: usize,
+    /// Lines in `src/` that make an item public.
+    pub(super) public: usize,
+}
+
+/// Counts the code in a folder.
+pub(super) fn code(folder: &Path) -> Result<Code> {
+    let mut all = Code::default();
+    for path in files(folder)? {
+        let kind = path.extension().unwrap_or_default().to_string_lossy();
+        if !CODE.contains(&&*kind) {
+            continue;
+        }
+        let text = fs::read(&path).with_context(|| path.display().to_string())?;
+        let text = String::from_utf8_lossy(&text);
+        let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy();
+        let is_test = folder.ends_with("tests") || name.contains("test");
+        let lines = lines_of_code(&text, &kind);
+        match is_test {
+            true => all.tests += lines,
+            false => all.lines += lines,
+        }
+        if name.starts_with("src") && !is_test {
+            all.public += text.lines().filter(|line| is_public(line)).count();
+        }
+    }
+    Ok(all)
+}
+
+/// Lines that are neither empty nor comments.
+fn lines_of_code(text: &str, kind: &str) -> usize {
+    let comment = if kind == "py" { "#" } else { "//" };
+    let lines = text.lines().map(str::trim);
+    lines
+        .filter(|line| !line.is_empty() && !line.starts_with(comment))
+        .count()
+}
+
+fn is_public(line: &str) -> bool {
+    let item = line.trim_start().strip_prefix("pub ");
+    item.is_some_and(|item| ITEMS.iter().any(|kind| item.starts_with(kind)))
+}
+
+/// Circles of modules in a crate's `src/`: files of which each uses the next, and the last the first.
+/// A module and those inside it count as one direction: they are one thing.
+pub(super) fn circles(source: &Path) -> Result<Vec<Vec<String>>> {
+    let mut texts = BTreeMap::new();
+    for path in files(source)? {
+        let name = path.strip_prefix(source).unwrap_or(&path);
+        let mut parts: Vec<_> = { name.iter() }
+            .map(|part| part.to_string_lossy().into_owned())
+            .collect();
+        let file = parts.pop().unwrap_or_default();
+        match file.strip_suffix(".rs") {
+            None => continue,
+            Some("mod" | "lib" | "main") => {}
+            Some(file) => parts.push(file.to_owned()),
+        }
+        if !name.to_string_lossy().contains("test") {
+            texts.insert(parts.join("::"), fs::read_to_string(&path)?);
+        }
+    }
+    let edges: BTreeMap<&str, Vec<&str>> = { texts.iter() }
+        .map(|(name, text)| (name.as_str(), used(name, text, &texts)))
+        .collect();
+    let reaches = |from: &str, to: &str| {
+        let (mut seen, mut open) = (vec![], edges[from].clone());
+        while let Some(name) = open.pop() {
+            if !seen.contains(&name) {
+                seen.push(name);
+                open.extend(&edges[name]);
+            }
+        }
+        seen.contains(&to)
+    };
+    let mut circles: Vec<Vec<String>> = vec![];
+    for name in edges.keys().copied().filter(|name| reaches(name, name)) {
+        let together =
+            |circle: &&mut Vec<String>| reaches(name, &circle[0]) && reaches(&circle[0], name);
+        match circles.iter_mut().find(together) {
+            Some(circle) => circle.push(name.to_owned()),
+            None => circles.push(vec![name.to_owned()]),
+        }
+    }
+    Ok(circles)
+}
+
+/// The modules beside `name` that its `use` lines name, before its tests.
+fn used<'t>(name: &str, text: &str, all: &'t BTreeMap<String, String>) -> Vec<&'t str> {
+    let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
+    let mut found = vec![];
+    for line in text.lines().map(str::trim_start) {
+        let line = line.strip_prefix("pub ").unwrap_or(line);
+        let Some(path) = line.strip_prefix("use ") else {
+            continue;
+        };
+        let path = absolute(name, path.trim_end_matches(';'));
+        let Some(module) = path.and_then(|path| longest(&path, all)) else {
+            continue;
+        };
+        let inside = |a: &str, b: &str| b.is_empty() || a == b || a.starts_with(&format!("{b}::"));
+        if !inside(name, module) && !inside(module, name) {
+            found.push(module);
+        }
+    }
+    found
+}
+
+/// A path of a `use` from the crate's root; none of other crates.
+fn absolute(name: &str, path: &str) -> Option<String> {
+    if let Some(path) = path.strip_prefix("crate::") {
+        return Some(path.to_owned());
+    }
+    let mut module: Vec<&str> = name.split("::").collect();
+    let mut rest = path.strip_prefix("super::")?;
+    module.pop();
+    while let Some(path) = rest.strip_prefix("super::") {
+        module.pop();
+        rest = path;
+    }
+    module.push(rest);
+    Some(module.join("::"))
+}
+
+/// The innermost module that a path leads through.
+fn longest<'t>(path: &str, all: &'t BTreeMap<String, String>) -> Option<&'t str> {
+    let path = path.split(['{', ' ']).next()?.trim_end_matches("::");
+    let ends = path.match_indices("::").map(|(end, _)| end);
+    let mut prefixes: Vec<&str> = ends.map(|end| &path[..end]).collect();
+    prefixes.push(path);
+    let known = prefixes
+        .into_iter()
+        .rev()
+        .find_map(|prefix| all.get_key_value(prefix));
+    known.map(|(module, _)| module.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_and_empty_lines_are_no_code() {
+        let text = "//! Doc\n\nfn a() {\n    // why\n}\n";
+        assert_eq!(lines_of_code(text, "rs"), 2);
+        assert_eq!(lines_of_code("# why\nx = 1\n", "py"), 1);
+    }
+
+    #[test]
+    fn items_for_everybody_are_public() {
+        assert!(is_public("    pub fn a() {") && is_public("pub const A: u8 = 1;"));
+        assert!(!is_public("pub(crate) fn a() {") && !is_public("    pub width: u32,"));
+    }
+
+    #[test]
+    fn circle_of_three_files_is_found_and_a_folder_with_its_files_is_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            fs::write(path, text).expect("written");
+        };
+        write("lib.rs", "pub mod a;\npub use a::A;\n");
+        write("a.rs", "use crate::b::{B, C};\nuse std::fmt;\n");
+        write("b/mod.rs", "mod inner;\npub use inner::B;\n");
+        write("b/inner.rs", "use super::C;\nuse super::super::c::D;\n");
+        write("c.rs", "use crate::d::deep;\n");
+        assert_eq!(circles(folder.path()).expect("read"), [[""; 0]; 0]);
+        write(
+            "b/mod.rs",
+            "use crate::c::D;\n#[cfg(test)]\nmod tests {\n    use crate::a::A;\n}\n",
+        );
+        write("d.rs", "use crate::a::A;\n");
+        assert_eq!(
+            circles(folder.path()).expect("read"),
+            [["a", "b", "c", "d"]]
+        );
+    }
+}
