@@ -142,5 +142,8 @@ fn plain_name(url: &str) -> String {
         false => '_',
     };
     let name: String = file_name(url).chars().map(plain).collect();
-    format!("_{name}").replacen("_.", "_", 1)
+    match name.trim_start_matches('.') {
+        "" => "terrain".to_owned(),
+        name => name.to_owned(),
+    }
 }
