@@ -22,6 +22,9 @@ pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
 /// No neighbour that is text is longer; what is longer is something else.
 const LONGEST_TEXT: u64 = 1 << 20;
 
+/// How GDAL's notes begin.
+const NOTES: &[u8] = b"<PAMDataset";
+
 /// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so
 /// that no output comes to lie over one that [`files_read_with`] does not know.
 const NEIGHBOURS: [&str; 13] = [
@@ -122,11 +125,12 @@ fn elsewhere(
 }
 
 /// Whether a file is a page of a web site, or empty: some servers have one for every name.
-/// No neighbour begins like one.
+/// Of the neighbours, GDAL's notes alone begin like one.
 fn is_page(found: &FileBytes) -> Result<bool, BadRaster> {
-    let head = found.head(64)?;
+    let head = found.head(256)?;
     let first = head.iter().find(|byte| !byte.is_ascii_whitespace());
-    Ok(first.is_none_or(|first| *first == b'<'))
+    let is_note = || head.windows(NOTES.len()).any(|part| part == NOTES);
+    Ok(first.is_none_or(|first| *first == b'<' && !is_note()))
 }
 
 /// The names that a file beside `path` may have.
