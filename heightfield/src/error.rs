@@ -42,7 +42,7 @@ pub enum RasterError {
     Unreadable(std::io::Error),
     /// What is at a URL cannot be read, or not at present.
     #[error("cannot read what is there: {0}")]
-    RemoteFetcher(std::io::Error),
+    Remote(std::io::Error),
     /// It is on its way from elsewhere, and nobody may wait for it.
     #[error("it has not come yet")]
     NotYet,
@@ -229,14 +229,14 @@ impl RasterError {
     pub(super) fn elsewhere(error: std::io::Error) -> Self {
         match is_on_its_way(&error) {
             true => Self::NotYet,
-            false => Self::RemoteFetcher(error),
+            false => Self::Remote(error),
         }
     }
 
     /// Whether another try may find more: nothing is known of the file's samples.
     pub(super) fn is_of_the_line(&self) -> bool {
         match self {
-            Self::RemoteFetcher(error) => !is_missing(error),
+            Self::Remote(error) => !is_missing(error),
             Self::InTile { fault, .. } => fault.is_of_the_line(),
             Self::NotYet => true,
             _ => false,

@@ -305,7 +305,7 @@ fn unread(error: Error) -> PyErr {
         RasterError::Unreadable(io) if io.kind() == std::io::ErrorKind::NotFound => {
             PyFileNotFoundError::new_err
         }
-        RasterError::Unreadable(_) | RasterError::RemoteFetcher(_) | RasterError::NotYet => {
+        RasterError::Unreadable(_) | RasterError::Remote(_) | RasterError::NotYet => {
             PyOSError::new_err
         }
         _ => pyo3::exceptions::PyValueError::new_err,

@@ -22,6 +22,9 @@ pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
 /// No neighbour that is text is longer; what is longer is something else.
 const MAX_TEXT: u64 = 1 << 20;
 
+/// How GDAL's notes begin.
+const NOTES: &[u8] = b"<PAMDataset";
+
 /// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so
 /// that no output comes to lie over one that [`files_read_with`] does not know.
 const NEIGHBOURS: [&str; 13] = [
@@ -113,7 +116,7 @@ fn elsewhere(
 ) -> Result<Option<FileBytes>, RasterError> {
     for url in urls.iter().filter(|url| *url != own) {
         match FileBytes::open(Path::new(url), input.elsewhere()) {
-            Err(RasterError::RemoteFetcher(error)) if is_missing(&error) => {}
+            Err(RasterError::Remote(error)) if is_missing(&error) => {}
             Ok(found) if is_page(&found)? => {}
             other => return other.map(Some),
         }
@@ -122,11 +125,12 @@ fn elsewhere(
 }
 
 /// Whether a file is a page of a web site, or empty: some servers have one for every name.
-/// No neighbour begins like one.
+/// Of the neighbours, GDAL's notes alone begin like one.
 fn is_page(found: &FileBytes) -> Result<bool, RasterError> {
-    let head = found.head(64)?;
+    let head = found.head(256)?;
     let first = head.iter().find(|byte| !byte.is_ascii_whitespace());
-    Ok(first.is_none_or(|first| *first == b'<'))
+    let is_note = || head.windows(NOTES.len()).any(|part| part == NOTES);
+    Ok(first.is_none_or(|first| *first == b'<' && !is_note()))
 }
 
 /// The names that a file beside `path` may have.

@@ -23,7 +23,7 @@ fn hills() -> (tempfile::TempDir, Server) {
 fn open(server: &Server, name: &str) -> Result<Raster, String> {
     let opened = Raster::open(server.url(name), &OpenOptions::default());
     opened.map_err(|error| match error.fault() {
-        RasterError::RemoteFetcher(_) => error.to_string(),
+        RasterError::Remote(_) => error.to_string(),
         other => panic!("{other:?}"),
     })
 }
@@ -58,10 +58,7 @@ fn what_it_never_answers_is_told_with_the_file_and_why() {
     drop(server);
     let nobody = "http://127.0.0.1:1/hills.tif";
     let error = Raster::open(nobody, &OpenOptions::default()).expect_err("nobody");
-    assert!(
-        matches!(error.fault(), RasterError::RemoteFetcher(_)),
-        "{error}"
-    );
+    assert!(matches!(error.fault(), RasterError::Remote(_)), "{error}");
     for (url, why) in [
         ("ftp://h/hills.tif", "ftp://"),
         ("https://h h/hills.tif", "cannot read what is there"),
@@ -154,10 +151,7 @@ fn what_did_not_come_is_told_before_anything_is_armed() {
         "{asked} requests to a server that does not answer"
     );
     let told = raster.check_came().expect_err("it did not come");
-    assert!(
-        matches!(told.fault(), RasterError::RemoteFetcher(_)),
-        "{told}"
-    );
+    assert!(matches!(told.fault(), RasterError::Remote(_)), "{told}");
     assert!(raster.check_came().is_ok(), "and nothing since");
 }
 

@@ -89,7 +89,7 @@ impl ReadAt for Remote {
 
 fn io_error(fault: RasterError) -> io::Error {
     match fault {
-        RasterError::RemoteFetcher(error) | RasterError::Unreadable(error) => error,
+        RasterError::Remote(error) | RasterError::Unreadable(error) => error,
         fault => io::Error::other(fault.to_string()),
     }
 }
@@ -145,5 +145,8 @@ fn plain_name(url: &str) -> String {
         false => '_',
     };
     let name: String = file_name(url).chars().map(plain).collect();
-    format!("_{name}").replacen("_.", "_", 1)
+    match name.trim_start_matches('.') {
+        "" => "terrain".to_owned(),
+        name => name.to_owned(),
+    }
 }

@@ -125,7 +125,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
             return format!("get the file again; or {}", converted(path, ""));
         }
         RasterError::Unreadable(_) => "check the path and that you may read the file",
-        RasterError::RemoteFetcher(error) => elsewhere(path, error),
+        RasterError::Remote(error) => elsewhere(path, error),
         RasterError::NotYet => "try again",
         RasterError::RawSizeMissing => "say how the samples lie: --input raw=WxH:i16:le",
         RasterError::AmbiguousChannels(_) => {
