@@ -56,7 +56,7 @@ fn what_cannot_be_tried_or_written_is_said_at_once() {
         (["--stiffness", "nan"], 2, "N/mm"),
         (["--delay-us", "20000"], 2, "10000"),
         (["--damping", "21"], 2, "0 to 20 N·s/m"),
-        (["--damping", "nan"], 2, "0 to 20 N·s/m"),
+        (["--damping", "nan"], 2, "a damping"),
         (["--passivity", "auto"], 2, "off, on"),
         (
             ["-o", "/nowhere/at/all.csv"],

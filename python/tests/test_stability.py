@@ -27,7 +27,7 @@ def test_trials_are_those_that_were_asked_for():
 
 @needs_lab
 def test_bad_numbers_have_the_text_of_the_command():
-    with pytest.raises(CommandError, match="expected 0.001 to 100 N/mm"):
+    with pytest.raises(CommandError, match="a stiffness from 0.001 to 100 N/mm"):
         stability(stiffness=[0.5, -1])
     with pytest.raises(CommandError, match="unexpected argument '--stifness'"):
         stability(stifness=1)

@@ -320,7 +320,7 @@ fn sensible_text(chance: &mut Chance) -> Vec<u8> {
     let text = [
         "# hapterra-recording = 1\n# level = 0\nt_s,x_mm,y_mm,z_mm,contact\n0,1,2,3,0\n0.001,1,2,2.5,1\n",
         "format = 1\nmodel = \"premium-1.5\"\n[limits]\nmax_force_n = 8.5\nmax_speed_mm_s = 1000\n",
-        "[default]\nstiffness_n_per_mm = 0.5\n[class.80]\nname = \"water\"\nstiffness_n_per_mm = 0.1\n",
+        "[default]\nstiffness = 0.5\n[class.80]\nname = \"water\"\nstiffness = 0.1\n",
         "[board]\nname = \"nucleo-g474re\"\n[[step]]\nnumber = 1\n",
         "at 2.5 zoom 2\npan 5 0\nmark a #1\non 2 texture grain 0.1 1\nat 3 stiffness 0.5 # soft\n",
     ];

@@ -44,7 +44,7 @@ impl Folder {
         folder.classes("classes.asc", 8.99);
         folder.write(
             "table.toml",
-            "[class.10]\nname = \"meadow\"\nstiffness_n_per_mm = 0.4\n\n[class.80]\nname = \"rock\"\nstiffness_n_per_mm = 1.0\n",
+            "[class.10]\nname = \"meadow\"\nstiffness = 0.4\n\n[class.80]\nname = \"rock\"\nstiffness = 1.0\n",
         );
         let mut way = "t_s,x_mm,y_mm,z_mm\n0,45,40.3,2\n".to_owned();
         for row in 0..10 * ROWS_PER_MM {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueHint;
+use hapterra::cli::options::quantity::{DAMPING, STIFFNESS};
 use hapterra::cli::options::surface::{SurfaceChoice, SurfaceOptions, choice};
 use hapterra::cli::terminal::{interrupt, left_behind, progress};
 use hapterra::cli::{Failure, OrHint as _, report};
@@ -171,9 +172,7 @@ fn parse_rate(text: &str) -> Result<TickRate, String> {
 }
 
 fn parse_stiffness(text: &str) -> Result<f64, String> {
-    let number = text.trim().parse::<f64>().ok();
-    let number = number.filter(|number| (0.001..=100.0).contains(number));
-    number.ok_or_else(|| "expected 0.001 to 100 N/mm".to_owned())
+    STIFFNESS.read_within(text, [0.001, 100.0])
 }
 
 fn parse_part(text: &str) -> Result<f64, String> {
@@ -183,11 +182,11 @@ fn parse_part(text: &str) -> Result<f64, String> {
 }
 
 fn parse_damping(text: &str) -> Result<Damping, String> {
-    let number = text.trim().parse::<f32>().ok();
-    let damping = number.map(|ns_per_m| Damping {
+    let damping = DAMPING.read_single(text).map(|ns_per_m| Damping {
         ns_per_m,
         ..Damping::NONE
-    });
+    })?;
     let most = Damping::MAX_NS_PER_M;
-    { damping.filter(Damping::is_valid) }.ok_or_else(|| format!("expected 0 to {most} N·s/m"))
+    let valid = damping.is_valid().then_some(damping);
+    valid.ok_or_else(|| format!("expected 0 to {most} N·s/m"))
 }

@@ -168,6 +168,7 @@ impl Outputs {
         let mut inputs = args.file.as_deref().map_or(vec![], files_read_with);
         inputs.extend(args.commands.file());
         inputs.extend(args.rendering.surface.inputs());
+        inputs.extend(args.settings.file());
         keep_apart(&[&self.recording, &self.picture], &inputs).or_hint(OTHER_FOLDER)
     }
 }

@@ -95,6 +95,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     inputs.push(args.trajectory.clone());
     let of_surface = args.rendering.surface.inputs();
     inputs.extend(of_surface);
+    inputs.extend(args.settings.file());
     keep_apart(&[&args.out], &inputs).or_hint("name another file with -o")?;
     left_behind::tell([args.out.as_path()]);
     let viewer = args.viewing.program()?;

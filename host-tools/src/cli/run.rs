@@ -153,6 +153,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut inputs = args.terrain.inputs();
     inputs.extend(args.commands.file());
     inputs.extend(args.rendering.surface.inputs());
+    inputs.extend(args.settings.file());
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
     left_behind::tell(outputs.iter().map(PathBuf::as_path));
     let events = args.events.listen()?;

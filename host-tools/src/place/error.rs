@@ -129,7 +129,7 @@ pub enum PlaceError {
     #[error("the file does not know how large its cells are on the ground")]
     NoGroundSize,
     /// A scale that is none.
-    #[error("{0} ground metres a hand millimetre: it must be above zero, and finite")]
+    #[error("{0} ground metres a device millimetre: it must be above zero, and finite")]
     GroundScale(f64),
     /// An exaggeration that is none.
     #[error("heights × {0}: it must be finite and not zero")]

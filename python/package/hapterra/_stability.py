@@ -23,7 +23,7 @@ def stability(
     passivity: str | Iterable[str] | None = None,
     delay_us: int | None = None,
     arm_friction: _Numbers | None = None,
-    **texture: Any,
+    **more: Any,
 ) -> pandas.DataFrame:
     """Tries on a virtual arm, by ``hapterra-lab stability``, how stiff a surface may be before it is
     unstable; docs/explanation/stability.md describes the trials. The program ``hapterra-lab`` is not
@@ -37,7 +37,7 @@ def stability(
     passivity : "off", "on", or both; both.
     delay_us : µs from reading the encoders to the amplifiers, 0 to 10000; 200.
     arm_friction : friction of the joints as parts of the model's, 0 to 10; 0.1 and 1.
-    **texture : the micro-relief by the command's options, as ``texture="grain"``.
+    **more : options of the command, as ``surface="sand"``, whose texture is tried.
 
     All combinations are tried: one number, or several, of each.
 
@@ -69,7 +69,7 @@ def stability(
         passivity=passivity,
         delay_us=delay_us,
         arm_friction=arm_friction,
-        **texture,
+        **more,
     )
     with tempfile.TemporaryDirectory(prefix="hapterra-") as folder:
         trials = os.path.join(folder, "trials.csv")

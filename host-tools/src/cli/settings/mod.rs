@@ -41,6 +41,16 @@ pub struct SettingsOption {
     pub settings: Option<PathBuf>,
 }
 
+impl SettingsOption {
+    /// The file that is read, if any: no output may be it.
+    pub(in crate::cli) fn file(&self) -> Option<PathBuf> {
+        match &self.settings {
+            Some(path) => Some(path.clone()).filter(|path| path.as_os_str() != "none"),
+            None => Some(PathBuf::from(USUAL_FILE)).filter(|path| path.exists()),
+        }
+    }
+}
+
 /// One setting.
 struct Setting {
     /// The name of its option.
@@ -179,11 +189,9 @@ fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Sett
     if !COMMANDS.contains(&name) {
         return Ok(None);
     }
-    let path = match matches.get_one::<PathBuf>("settings") {
-        Some(path) if path.as_os_str() == "none" => return Ok(None),
-        Some(path) => path.clone(),
-        None if Path::new(USUAL_FILE).exists() => USUAL_FILE.into(),
-        None => return Ok(None),
+    let settings = matches.get_one::<PathBuf>("settings").cloned();
+    let Some(path) = (SettingsOption { settings }).file() else {
+        return Ok(None);
     };
     if path
         .extension()
