@@ -20,6 +20,7 @@ const ELSEWHERE: [&str; 7] = [
     "--view",
     ".vrt",
     "SERIAL",
+    "band=2",
     "worldcover",
 ];
 /// Commands that are run: the others ask for a board or a viewer, or take minutes.
@@ -92,21 +93,27 @@ fn lines(page: &Path, text: &str) -> Vec<Line> {
     found
 }
 
-/// Words of a line, up to a comment or a second command; `[FILE]` is as FILE.
+/// Words of a line, up to a comment or a second command; `[FILE]` is as FILE, and cargo that runs
+/// `hapterra-lab` is as that program.
 fn words(text: &str) -> Vec<String> {
     let words = shlex::split(text).unwrap_or_default();
     let ends = |word: &String| ["|", "&&", ">", "<"].contains(&word.as_str());
     let words = words.into_iter().take_while(|word| !ends(word));
-    words.map(|word| word.replace(['[', ']'], "")).collect()
+    let mut words: Vec<_> = words.map(|word| word.replace(['[', ']'], "")).collect();
+    let lab = ["cargo", "run", "-r", "-p", "hapterra-lab", "--"];
+    if words.starts_with(&lab.map(str::to_owned)) {
+        words.splice(..lab.len(), ["hapterra-lab".to_owned()]);
+    }
+    words
 }
 
-/// Where a word of the pages is a name for what the user has.
+/// Returns true if a word stands for one of the user's, as FILE.
 fn is_placeholder(word: &str) -> bool {
     let is_upper = |c: char| c.is_ascii_uppercase() || "_.…,|=".contains(c);
     word.contains(char::is_uppercase) && word.chars().all(is_upper) || word.contains('…')
 }
 
-/// What is wrong with a line of `hapterra` or `hapterra-lab`, as the program says it.
+/// Parses a line of `hapterra` or `hapterra-lab`; the error is the program's text.
 fn parsed(command: clap::Command, words: &[String], is_block: bool) -> Result<(), String> {
     // The list is printed while this is parsed, and the program ends.
     if words.iter().any(|word| word == "--formats") {
@@ -130,7 +137,7 @@ fn parsed(command: clap::Command, words: &[String], is_block: bool) -> Result<()
     }
 }
 
-/// What is wrong with a line of cargo: a command of xtask that does not exist, or a package or folder.
+/// Checks that a line of cargo names commands and options of xtask, packages and folders that exist.
 fn cargo(words: &[String]) -> Result<(), String> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     if let ["cargo", "xtask", command, ref more @ ..] = words[..] {
@@ -154,7 +161,7 @@ fn cargo(words: &[String]) -> Result<(), String> {
     for (option, value) in words.iter().zip(words.iter().skip(1)) {
         let manifest = match *option {
             "--path" => repository().join(value).join("Cargo.toml"),
-            "-p" | "--package" => continue_if_package(value)?,
+            "-p" | "--package" => manifest_of(value)?,
             _ => continue,
         };
         if !manifest.is_file() && !value.starts_with("..") {
@@ -164,8 +171,11 @@ fn cargo(words: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// The manifest of the workspace, if it has the package.
-fn continue_if_package(name: &str) -> Result<PathBuf, String> {
+/// The manifest of the workspace.
+///
+/// # Errors
+/// It has no such package.
+fn manifest_of(name: &str) -> Result<PathBuf, String> {
     let locked = include_str!("../../Cargo.lock");
     let manifest = repository().join("Cargo.toml");
     let known = locked.contains(&format!("name = \"{name}\"\nversion = \"0.1.0\"\ndep"));
@@ -175,11 +185,7 @@ fn continue_if_package(name: &str) -> Result<PathBuf, String> {
 }
 
 fn check(line: &Line) -> Result<(), String> {
-    let mut words = words(&line.text);
-    let lab = ["cargo", "run", "-r", "-p", "hapterra-lab", "--"];
-    if words.starts_with(&lab.map(str::to_owned)) {
-        words.splice(..lab.len(), ["hapterra-lab".to_owned()]);
-    }
+    let words = words(&line.text);
     match words.first().map(String::as_str) {
         Some("hapterra") => parsed(hapterra::cli::Cli::command(), &words, line.is_block),
         Some("hapterra-lab") => parsed(hapterra_lab::cli::Cli::command(), &words, line.is_block),
@@ -229,11 +235,11 @@ fn wrong_lines_are_found() {
 /// a path over it.
 fn files(folder: &Path) {
     let mut terrain =
-        "ncols 100\nnrows 100\nxllcorner 7.5\nyllcorner 45.8\ncellsize 0.004\n".to_owned();
-    for row in 0..100 {
-        for column in 0..100 {
+        "ncols 40\nnrows 40\nxllcorner 7.5\nyllcorner 45.8\ncellsize 0.01\n".to_owned();
+    for row in 0..40 {
+        for column in 0..40 {
             let (x, y) = (f64::from(column), f64::from(row));
-            let height = 2000.0 + 800.0 * (x / 9.0).sin() * (y / 11.0).cos();
+            let height = 2000.0 + 800.0 * (x / 4.0).sin() * (y / 5.0).cos();
             let _ = write!(terrain, "{height:.1} ");
         }
         terrain.push('\n');
@@ -247,6 +253,28 @@ fn files(folder: &Path) {
     }
     let path = "t_s,x_mm,y_mm,z_mm\n0,20,20,600\n0.5,22,21,600\n";
     std::fs::write(folder.join("path.csv"), path).expect("written");
+    std::fs::write(folder.join("mine.toml"), "[default]\nfriction = 0.3\n").expect("written");
+    std::fs::write(folder.join("scan.raw"), vec![0; 2 * 512 * 400]).expect("written");
+    let felt = [
+        "hapterra", "replay", "file.asc", "path.csv", "-o", "felt.csv",
+    ];
+    run(folder, &felt.map(str::to_owned)).expect("a recording");
+}
+
+/// Runs the words of a line; the error is what it writes on standard error.
+fn run(folder: &Path, words: &[String]) -> Result<(), String> {
+    let program = match words[0].as_str() {
+        "hapterra" => hapterra_binary(),
+        _ => Path::new(env!("CARGO_BIN_EXE_hapterra-lab")),
+    };
+    let mut command = Command::new(program);
+    command.current_dir(folder).args(&words[1..]);
+    command.env("HAPTERRA_CACHE_DIR", folder.join("cache"));
+    command.stdin(Stdio::null()).stdout(Stdio::piped());
+    let child = command.stderr(Stdio::piped()).spawn();
+    let output = end_of(child.expect("it starts"));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    output.status.success().then_some(()).ok_or(said)
 }
 
 /// The words to run a line with; none where it needs what a test does not have.
@@ -257,12 +285,13 @@ fn runnable(line: &Line) -> Option<Vec<String>> {
         .get(1)
         .filter(|word| RUN.contains(&word.as_str()))?
         .clone();
-    if !line.is_block || words[0] == "cargo" || words.iter().any(is_elsewhere) {
+    let is_of_board = command == "status" && !words.iter().any(|word| word == "native");
+    if !line.is_block || is_of_board || words[0] == "cargo" || words.iter().any(is_elsewhere) {
         return None;
     }
     for word in &mut words[2..] {
         *word = match word.as_str() {
-            "FILE" | "TERRAIN" | "mountain.tif" => "file.asc".into(),
+            "FILE" | "TERRAIN" | "mountain.tif" | "dem.tif" => "file.asc".into(),
             "PATH.csv" => "path.csv".into(),
             "FELT.csv" => "felt.csv".into(),
             "tiles/**/*.tif" => "tiles/**/*.asc".into(),
@@ -272,7 +301,8 @@ fn runnable(line: &Line) -> Option<Vec<String>> {
     if command == "run" && !words.iter().any(|word| word == "--device") {
         words.extend(["--device", "native"].map(str::to_owned));
     }
-    if command == "run" && !words.iter().any(|word| word == "--duration") {
+    let is_live = command == "run" || command == "demo";
+    if is_live && !words.iter().any(|word| word == "--duration") {
         words.extend(["--duration", "1s"].map(str::to_owned));
     }
     Some(words)
@@ -283,22 +313,17 @@ fn command_lines_without_a_board_run() {
     let (mut count, mut wrong) = (0, String::new());
     for page in pages() {
         let text = std::fs::read_to_string(&page).expect("readable");
+        let lines = lines(&page, &text);
+        let lines: Vec<_> = lines.iter().filter_map(runnable).collect();
+        if lines.is_empty() {
+            continue;
+        }
         let folder = tempfile::tempdir().expect("a folder");
         files(folder.path());
-        for words in lines(&page, &text).iter().filter_map(runnable) {
-            let program = match words[0].as_str() {
-                "hapterra" => hapterra_binary(),
-                _ => Path::new(env!("CARGO_BIN_EXE_hapterra-lab")),
-            };
-            let mut command = Command::new(program);
-            command.current_dir(folder.path()).args(&words[1..]);
-            command.env("HAPTERRA_CACHE_DIR", folder.path().join("cache"));
-            command.stdin(Stdio::null()).stdout(Stdio::piped());
-            let child = command.stderr(Stdio::piped()).spawn();
-            let output = end_of(child.expect("it starts"));
+        for words in lines {
+            println!("{}", words.join(" "));
             count += 1;
-            if !output.status.success() {
-                let said = String::from_utf8_lossy(&output.stderr);
+            if let Err(said) = run(folder.path(), &words) {
                 let _ = writeln!(wrong, "{}: {}\n{said}", page.display(), words.join(" "));
             }
         }

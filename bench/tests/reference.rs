@@ -14,7 +14,7 @@ use hapterra_tests::repository;
 const MAX_LINE: usize = 120;
 const MARK: &str = "<!-- Written by `cargo xtask docs --write`: change the texts in the code. -->";
 
-/// Compares a page with what the code says, or writes it.
+/// Compares a page with the text that the code gives, or writes it.
 fn check(page: &str, text: &str) {
     let path = repository().join("docs/reference").join(page);
     if std::env::var_os("HAPTERRA_DOCS").is_some_and(|wanted| wanted == "write") {
@@ -58,7 +58,7 @@ fn shown(text: Option<&StyledStr>) -> String {
     text.map(ToString::to_string).unwrap_or_default()
 }
 
-/// What `-h` says of an option or argument.
+/// The text of `-h` on an option or argument.
 fn about(arg: &Arg) -> String {
     let short = arg.get_short().map(|short| format!("-{short}, "));
     let short = short.unwrap_or_default();
@@ -122,7 +122,7 @@ fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTre
     }
 }
 
-/// What is said of each argument, by how many of these commands say it.
+/// The texts of all arguments, each with the number of commands that have it.
 fn texts<'c>(commands: impl Iterator<Item = &'c Command>) -> BTreeMap<String, usize> {
     let mut texts = BTreeMap::new();
     for arg in commands.flat_map(own) {

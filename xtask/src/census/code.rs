@@ -10,12 +10,12 @@ use super::files;
 
 /// Endings of files of code.
 const CODE: [&str; 5] = ["rs", "py", "js", "c", "h"];
-/// What a public item begins with.
+/// Beginnings of public items.
 const ITEMS: [&str; 10] = [
     "fn ", "const ", "struct ", "enum ", "union ", "trait ", "type ", "static ", "mod ", "use ",
 ];
 
-/// What the code of a folder comes to.
+/// Sizes of the code in a folder.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Code {
     /// Lines that are neither empty nor comments, outside of files of tests.

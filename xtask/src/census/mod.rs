@@ -1,4 +1,4 @@
-//! `cargo xtask census`: how much there is to read, beside what there was, and the bounds that it keeps.
+//! `cargo xtask census`: sizes of pages, command line and code, beside their bounds and the sizes before.
 
 mod code;
 mod prose;
@@ -98,7 +98,7 @@ pub(crate) fn census(write: bool) -> Result<()> {
     }
 }
 
-/// What is above its bound.
+/// Sentences on the measures above their bounds.
 fn broken(measures: &Measures) -> Vec<String> {
     let above = measures.iter().filter_map(|(name, now)| {
         let (_, bound) = BOUNDS.iter().find(|(bounded, _)| bounded == name)?;

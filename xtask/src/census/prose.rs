@@ -11,7 +11,7 @@ use super::files;
 pub(super) const MAX_SENTENCE: usize = 40;
 pub(super) const MAX_LINE: usize = 120;
 
-/// What a page comes to.
+/// Sizes of a page.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Page {
     pub(super) words: usize,
@@ -34,7 +34,7 @@ pub(super) fn total(pages: &[(PathBuf, Page)]) -> Page {
     })
 }
 
-/// What is too long, page by page.
+/// Sentences and lines that are too long, page by page.
 pub(super) fn faults(pages: &[(PathBuf, Page)]) -> Vec<String> {
     let too_long = pages.iter().flat_map(|(path, page)| {
         [
