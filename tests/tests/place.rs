@@ -60,7 +60,10 @@ fn nothing_said_lays_all_of_it_into_the_reach_and_says_the_scale() {
             .expect("a number");
         // 390 m in 150 to 450 mm.
         assert!((0.8..2.7).contains(&metres), "{scale}");
-        assert!(scale.contains("at level 0 a haptic cell is 10 m"), "{scale}");
+        assert!(
+            scale.contains("at level 0 a haptic cell is 10 m"),
+            "{scale}"
+        );
     }
 }
 
