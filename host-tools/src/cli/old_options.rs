@@ -187,7 +187,7 @@ pub(super) fn hint(words: &[OsString], error: &clap::Error) -> Option<String> {
     };
     let name = argument.split('=').next()?;
     let is_typed = |command: &&str| words.iter().skip(1).any(|word| word == *command);
-    let of_command = |old: &&Old| old.name == name && old.commands.iter().any(|it| is_typed(it));
+    let of_command = |old: &&Old| old.name == name && old.commands.iter().any(is_typed);
     let old = OLD.iter().find(of_command)?;
     let within = match old.within {
         "" => String::new(),
