@@ -1,41 +1,17 @@
 //! Every command line of README.md and the book: it is one that the programs take, and where it needs
 //! neither a board nor a server, it is run.
 
+mod run;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 use clap::CommandFactory as _;
 use clap::error::ErrorKind;
-use hapterra_tests::timeouts::end_of;
-use hapterra_tests::{hapterra_binary, repository};
+use hapterra_tests::repository;
 
 /// Programs whose lines are checked.
 const PROGRAMS: [&str; 3] = ["hapterra", "hapterra-lab", "cargo"];
-/// Words of lines that need what a test does not have.
-const ELSEWHERE: [&str; 8] = [
-    "usb",
-    "tcp:",
-    "://",
-    "--view",
-    ".vrt",
-    "SERIAL",
-    "band=2",
-    "worldcover",
-];
-/// Commands that are run: the others ask for a board or a viewer, or take minutes.
-const RUN: [&str; 10] = [
-    "info",
-    "run",
-    "demo",
-    "replay",
-    "list",
-    "status",
-    "synth",
-    "completions",
-    "man",
-    "help",
-];
 
 /// A command line of a page.
 struct Line {
@@ -141,7 +117,7 @@ fn parsed(command: clap::Command, words: &[String], is_block: bool) -> Result<()
 fn cargo(words: &[String]) -> Result<(), String> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     if let ["cargo", "xtask", command, ref more @ ..] = words[..] {
-        let help = include_str!("../../xtask/src/main.rs");
+        let help = include_str!("../../../xtask/src/main.rs");
         let lines: Vec<&str> = help.lines().collect();
         let starts = |line: &&str| line.split_whitespace().next() == Some(command);
         if !lines
@@ -176,7 +152,7 @@ fn cargo(words: &[String]) -> Result<(), String> {
 /// # Errors
 /// It has no such package.
 fn manifest_of(name: &str) -> Result<PathBuf, String> {
-    let locked = include_str!("../../Cargo.lock");
+    let locked = include_str!("../../../Cargo.lock");
     let manifest = repository().join("Cargo.toml");
     let known = locked.contains(&format!("name = \"{name}\"\nversion = \"0.1.0\"\ndep"));
     known
@@ -229,106 +205,4 @@ fn wrong_lines_are_found() {
     };
     assert_eq!(found(page), (7, 7));
     assert_eq!(found(right), (6, 0));
-}
-
-/// Files by the names that the pages have: a terrain at 7.5 to 7.9° east and 45.8 to 46.2° north, and
-/// a path over it.
-fn files(folder: &Path) {
-    let mut terrain =
-        "ncols 40\nnrows 40\nxllcorner 7.5\nyllcorner 45.8\ncellsize 0.01\n".to_owned();
-    for row in 0..40 {
-        for column in 0..40 {
-            let (x, y) = (f64::from(column), f64::from(row));
-            let height = 2000.0 + 800.0 * (x / 4.0).sin() * (y / 5.0).cos();
-            let _ = write!(terrain, "{height:.1} ");
-        }
-        terrain.push('\n');
-    }
-    let place = "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],\
-                 PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"4326\"]]";
-    std::fs::create_dir(folder.join("tiles")).expect("made");
-    for name in ["file", "tiles/one"] {
-        std::fs::write(folder.join(name).with_extension("asc"), &terrain).expect("written");
-        std::fs::write(folder.join(name).with_extension("prj"), place).expect("written");
-    }
-    let path = "t_s,x_mm,y_mm,z_mm\n0,20,20,600\n0.5,22,21,600\n";
-    std::fs::write(folder.join("path.csv"), path).expect("written");
-    std::fs::write(folder.join("mine.toml"), "[default]\nfriction = 0.3\n").expect("written");
-    std::fs::write(folder.join("scan.raw"), vec![0; 2 * 512 * 400]).expect("written");
-    let felt = [
-        "hapterra", "replay", "file.asc", "path.csv", "-o", "felt.csv",
-    ];
-    run(folder, &felt.map(str::to_owned)).expect("a recording");
-}
-
-/// Runs the words of a line; the error is what it writes on standard error.
-fn run(folder: &Path, words: &[String]) -> Result<(), String> {
-    let program = match words[0].as_str() {
-        "hapterra" => hapterra_binary(),
-        _ => Path::new(env!("CARGO_BIN_EXE_hapterra-lab")),
-    };
-    let mut command = Command::new(program);
-    command.current_dir(folder).args(&words[1..]);
-    command.env("HAPTERRA_CACHE_DIR", folder.join("cache"));
-    command.stdin(Stdio::null()).stdout(Stdio::piped());
-    let child = command.stderr(Stdio::piped()).spawn();
-    let output = end_of(child.expect("it starts"));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    output.status.success().then_some(()).ok_or(said)
-}
-
-/// The words to run a line with; none where it needs what a test does not have.
-fn runnable(line: &Line) -> Option<Vec<String>> {
-    let mut words = words(&line.text);
-    let is_elsewhere = |word: &String| ELSEWHERE.iter().any(|part| word.contains(part));
-    let command = words
-        .get(1)
-        .filter(|word| RUN.contains(&word.as_str()))?
-        .clone();
-    let is_of_board = command == "status" && !words.iter().any(|word| word == "native");
-    if !line.is_block || is_of_board || words[0] == "cargo" || words.iter().any(is_elsewhere) {
-        return None;
-    }
-    for word in &mut words[2..] {
-        *word = match word.as_str() {
-            "FILE" | "TERRAIN" | "mountain.tif" | "dem.tif" => "file.asc".into(),
-            "PATH.csv" => "path.csv".into(),
-            "FELT.csv" => "felt.csv".into(),
-            "tiles/**/*.tif" => "tiles/**/*.asc".into(),
-            word => word.to_owned(),
-        };
-    }
-    if command == "run" && !words.iter().any(|word| word == "--device") {
-        words.extend(["--device", "native"].map(str::to_owned));
-    }
-    let is_live = command == "run" || command == "demo";
-    if is_live && !words.iter().any(|word| word == "--duration") {
-        words.extend(["--duration", "1s"].map(str::to_owned));
-    }
-    Some(words)
-}
-
-#[test]
-fn command_lines_without_a_board_run() {
-    let (mut count, mut wrong) = (0, String::new());
-    for page in pages() {
-        let text = std::fs::read_to_string(&page).expect("readable");
-        let lines = lines(&page, &text);
-        let lines: Vec<_> = lines.iter().filter_map(runnable).collect();
-        if lines.is_empty() {
-            continue;
-        }
-        let folder = tempfile::tempdir().expect("a folder");
-        files(folder.path());
-        for words in lines {
-            println!("{}", words.join(" "));
-            count += 1;
-            if let Err(said) = run(folder.path(), &words) {
-                let _ = writeln!(wrong, "{}: {}\n{said}", page.display(), words.join(" "));
-            }
-        }
-    }
-    println!("{count} command lines were run");
-    assert!(count > 20, "only {count} command lines were run");
-    assert!(wrong.is_empty(), "{wrong}");
 }
