@@ -11,8 +11,8 @@ use super::files;
 /// Endings of files of code.
 const CODE: [&str; 5] = ["rs", "py", "js", "c", "h"];
 /// Beginnings of public items.
-const ITEMS: [&str; 10] = [
-    "fn ", "const ", "struct ", "enum ", "union ", "trait ", "type ", "static ", "mod ", "use ",
+const ITEMS: [&str; 9] = [
+    "fn ", "const ", "struct ", "enum ", "union ", "trait ", "type ", "static ", "mod ",
 ];
 
 /// Sizes of the code in a folder.
