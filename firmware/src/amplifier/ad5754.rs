@@ -46,14 +46,14 @@ pub trait FrameBus {
     /// so a frame has 10 MHz at most.
     ///
     /// A failure is not told here: the bus reports it through
-    /// [`GuardInputs::hardware_failed`](crate::board::Sense), which switches off.
+    /// [`GuardInputs::hardware_failed`](crate::board::GuardInputs), which switches off.
     fn send(&mut self, frame: [u8; 3]) -> [u8; 3];
 
     /// Waits for so many microseconds at least, a few tens. Only at start-up.
     fn pause_us(&mut self, us: u32);
 
     /// Takes whether all registers read back as they were written, for
-    /// [`GuardInputs::outputs_not_as_set`](crate::board::Sense).
+    /// [`GuardInputs::outputs_not_as_set`](crate::board::GuardInputs).
     fn tell(&mut self, as_set: bool);
 }
 

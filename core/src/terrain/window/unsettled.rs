@@ -1,5 +1,5 @@
 //! What lies in a window where the surface is not a tile of the scene's level: before it comes,
-//! and while it settles ([`TileBlend`](super::Settling)).
+//! and while it settles ([`TileBlend`](super::TileBlend)).
 
 use super::{CellContent, Corners, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
