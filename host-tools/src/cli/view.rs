@@ -6,6 +6,7 @@ use clap::ValueHint;
 
 use super::demo::{OWN_TERRAIN, own_terrain};
 use super::failure::{Failure, OrHint};
+use super::options::recording::check_file;
 use super::options::rendering::Rendering;
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::terminal::interrupt;
@@ -52,6 +53,7 @@ pub struct Args {
 /// # Errors
 /// What is wrong with the recording or the terrain; no viewer.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    check_file(&args.recording)?;
     let rows = RecordingRows::open(&args.recording).map_err(ReplayError::from)?;
     let recorded = rows.settings().filter(|_| !args.ignore_settings).cloned();
     let path = path_of(args, recorded.as_ref())?;

@@ -7,6 +7,7 @@ pub mod exaggeration;
 pub mod input;
 pub mod placing;
 pub mod quantity;
+pub mod recording;
 pub mod rendering;
 pub mod scale;
 pub mod steering;

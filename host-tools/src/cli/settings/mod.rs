@@ -9,7 +9,7 @@ mod recorded;
 
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, ValueHint};
@@ -17,8 +17,8 @@ use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, ValueHint};
 use super::Cli;
 use super::failure::{Failure, OrHint};
 use super::options::input::InputSetting;
+use super::options::recording::settings_of;
 use super::options::scale::MapScale;
-use crate::replay::{ReplayError, Settings, Trajectory};
 use crate::terrain::HapticCells;
 pub(super) use recorded::differences;
 
@@ -168,12 +168,6 @@ fn of_recording(name: &str, matches: &ArgMatches) -> Result<Option<Vec<Setting>>
         }
         None => Ok(None),
     }
-}
-
-/// The settings of a file that is a recording.
-fn settings_of(path: &Path) -> Result<Option<Settings>, Failure> {
-    let trajectory = Trajectory::open(path).map_err(ReplayError::from)?;
-    Ok(trajectory.settings().cloned())
 }
 
 /// The scale and the kind of cells that the user states.

@@ -7,8 +7,8 @@ use hapterra_core::force::{Shading, SurfaceParams};
 use super::*;
 use crate::cli::options::exaggeration::Exaggeration;
 use crate::cli::options::surface::{SurfaceChoice, SurfaceOptions};
-use crate::replay::Rule;
 use crate::replay::settings::Device;
+use crate::replay::{Rule, Settings};
 use crate::terrain::{Scale, Terrain};
 use heightfield::Raster;
 

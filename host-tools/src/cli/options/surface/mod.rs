@@ -1,5 +1,7 @@
 //! Options that say what a terrain feels like; shared by `replay`, `run`, `demo` and `view`.
 
+mod look;
+mod numbers;
 pub mod table;
 mod texture;
 
@@ -7,17 +9,17 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueHint;
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Damping, Material, Shading, SurfaceParams};
 
 use super::quantity::{FORCE, STIFFNESS};
+use super::recording::settings_of;
 use super::terrain_file::ReadingOptions;
 use crate::cli::failure::{Failure, Hint, OrHint};
 use crate::materials::{ClassMaterial, Looks, Materials};
 use crate::place::STIFFEST_N_PER_MM;
-use crate::replay::{ReplayError, Settings, Trajectory};
 use crate::surface::{NAMED_SURFACES, NamedSurface};
 use heightfield::{Raster, files_read_with};
+use numbers::{check, over, rubbed, told};
 use table::{Look, PassivityName, ShadingName, TableFile};
 
 /// What a terrain feels like.
@@ -30,7 +32,7 @@ pub struct SurfaceOptions {
     /// every 1.5 mm. rock: 0.8 N/mm, friction 0.4 and 0.6 at rest, grain of 0.05 mm every 0.8 mm.
     /// FILE.toml: stiffness, friction, static_friction, viscous_friction, damping, texture ("grain" or
     /// "grating") and its texture_amplitude, texture_wavelength, texture_direction and texture_seed
-    /// under [default], and under [class.N] for each class of --materials; shading = "smooth" and
+    /// under `[default]`, and under `[class.N]` for each class of --materials; shading = "smooth" and
     /// passivity = "off" at its top. A recording: the surface that was recorded.
     #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, value_parser = choice())]
     pub surface: Option<SurfaceChoice>,
@@ -137,8 +139,7 @@ impl SurfaceOptions {
 
     /// The surface of a recording, with its classes as they were.
     fn of_recording(&self, file: &Path) -> Result<Surface, Failure> {
-        let trajectory = Trajectory::open(file).map_err(ReplayError::from)?;
-        let Some(settings) = trajectory.settings() else {
+        let Some(settings) = settings_of(file)? else {
             return Err(format!("{} is no recording, and no .toml", file.display()))
                 .or_hint("name a recording, or a surface in a FILE.toml, with --surface");
         };
@@ -147,7 +148,7 @@ impl SurfaceOptions {
             return Err("--friction: each of the recorded materials has its own")
                 .or_hint("leave it out, or name a table that states it with --surface");
         }
-        let law = Settings::law(settings);
+        let law = settings.law();
         Ok(Surface { law, looks })
     }
 
@@ -258,14 +259,6 @@ impl Surface {
     }
 }
 
-/// A friction with another coefficient, which also holds until the tip slides.
-fn rubbed(friction: &Friction, mu: f32) -> Friction {
-    Friction {
-        viscous_s: friction.viscous_s,
-        ..Friction::coulomb(mu)
-    }
-}
-
 /// What went wrong with a file of classes: hints for heights work out numbers between those of the
 /// file, and between classes there are none.
 fn of_classes(error: heightfield::Error) -> Failure {
@@ -273,78 +266,6 @@ fn of_classes(error: heightfield::Error) -> Failure {
     let hint = hint.replace("-r average", "-r mode");
     let hint = hint.replace(" -ot Float32", "");
     Failure::new(error).hint(hint)
-}
-
-/// A material with what a table states in place of its numbers. A friction brings its own static
-/// part.
-fn over(
-    material: &Material,
-    look: &Look,
-    (file, line, what): (&Path, usize, &str),
-) -> Result<Material, Failure> {
-    let before = &material.friction;
-    let friction = Friction {
-        dynamic_mu: look.friction.unwrap_or(before.dynamic_mu),
-        static_mu: look
-            .static_friction
-            .or(look.friction)
-            .unwrap_or(before.static_mu),
-        viscous_s: look.viscous_friction.unwrap_or(before.viscous_s),
-    };
-    let made = texture::texture(look, &material.texture).and_then(|texture| {
-        let material = Material {
-            stiffness_n_per_mm: look.stiffness.unwrap_or(material.stiffness_n_per_mm),
-            friction,
-            damping_ns_per_m: look.damping.unwrap_or(material.damping_ns_per_m),
-            texture,
-        };
-        check(&material).map(|()| material)
-    });
-    made.map_err(|why| {
-        let place = format!("{}, line {line}, {what}:", file.display());
-        told(&why).about(Some(&place))
-    })
-}
-
-/// Checks that a surface can have these numbers; the message says which it can.
-fn check(material: &Material) -> Result<(), String> {
-    let Friction {
-        static_mu,
-        dynamic_mu,
-        viscous_s,
-    } = material.friction;
-    if !material.friction.is_valid() {
-        return Err(format!(
-            "a friction of {dynamic_mu}, {static_mu} at rest, trailing by {viscous_s} s: friction from 0 to {}, static_friction not below it, viscous_friction from 0 to {} s",
-            Friction::MOST,
-            Friction::MAX_VISCOUS_S
-        ));
-    }
-    let damping = Damping {
-        ns_per_m: material.damping_ns_per_m,
-        ..Damping::NONE
-    };
-    if !damping.is_valid() {
-        let (damping, most) = (material.damping_ns_per_m, Damping::MAX_NS_PER_M);
-        return Err(format!(
-            "a damping of {damping} N·s/m: damping from 0 to {most} N·s/m"
-        ));
-    }
-    let stiffness = material.stiffness_n_per_mm;
-    let is_valid = material.is_valid();
-    is_valid.then_some(()).ok_or_else(|| {
-        format!(
-            "a stiffness of {stiffness} N/mm: stiffness finite and not below 0, usually 0.5 N/mm"
-        )
-    })
-}
-
-/// What is wrong, and what to do, as a failure.
-fn told(why: &str) -> Failure {
-    let (what, next_step) = why
-        .split_once(": ")
-        .unwrap_or((why, "choose another number"));
-    Failure::new(what.to_owned()).hint(next_step)
 }
 
 #[cfg(test)]

@@ -1,3 +1,4 @@
+use hapterra_core::contact::Friction;
 use hapterra_core::force::Pattern;
 
 use super::*;

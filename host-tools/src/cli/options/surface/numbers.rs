@@ -1,0 +1,90 @@
+//! The numbers of a surface: which it can have, and how a table changes them.
+
+use std::path::Path;
+
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{Damping, Material};
+
+use super::table::Look;
+use super::texture;
+use crate::cli::failure::Failure;
+
+/// A friction with another coefficient, which also holds until the tip slides.
+pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
+    Friction {
+        viscous_s: friction.viscous_s,
+        ..Friction::coulomb(mu)
+    }
+}
+
+/// A material with what a table states in place of its numbers. A friction brings its own static
+/// part.
+pub(super) fn over(
+    material: &Material,
+    look: &Look,
+    (file, line, what): (&Path, usize, &str),
+) -> Result<Material, Failure> {
+    let before = &material.friction;
+    let friction = Friction {
+        dynamic_mu: look.friction.unwrap_or(before.dynamic_mu),
+        static_mu: look
+            .static_friction
+            .or(look.friction)
+            .unwrap_or(before.static_mu),
+        viscous_s: look.viscous_friction.unwrap_or(before.viscous_s),
+    };
+    let made = texture::texture(look, &material.texture).and_then(|texture| {
+        let material = Material {
+            stiffness_n_per_mm: look.stiffness.unwrap_or(material.stiffness_n_per_mm),
+            friction,
+            damping_ns_per_m: look.damping.unwrap_or(material.damping_ns_per_m),
+            texture,
+        };
+        check(&material).map(|()| material)
+    });
+    made.map_err(|why| {
+        let place = format!("{}, line {line}, {what}:", file.display());
+        told(&why).about(Some(&place))
+    })
+}
+
+/// Checks that a surface can have these numbers; the message says which it can.
+pub(super) fn check(material: &Material) -> Result<(), String> {
+    let Friction {
+        static_mu,
+        dynamic_mu,
+        viscous_s,
+    } = material.friction;
+    if !material.friction.is_valid() {
+        return Err(format!(
+            "a friction of {dynamic_mu}, {static_mu} at rest, trailing by {viscous_s} s: friction from 0 to {}, static_friction not below it, viscous_friction from 0 to {} s",
+            Friction::MOST,
+            Friction::MAX_VISCOUS_S
+        ));
+    }
+    let damping = Damping {
+        ns_per_m: material.damping_ns_per_m,
+        ..Damping::NONE
+    };
+    if !damping.is_valid() {
+        let (damping, most) = (material.damping_ns_per_m, Damping::MAX_NS_PER_M);
+        return Err(format!(
+            "a damping of {damping} N·s/m: damping from 0 to {most} N·s/m"
+        ));
+    }
+    let stiffness = material.stiffness_n_per_mm;
+    let is_valid = material.is_valid();
+    is_valid.then_some(()).ok_or_else(|| {
+        format!(
+            "a stiffness of {stiffness} N/mm: stiffness finite and not below 0, usually 0.5 N/mm"
+        )
+    })
+}
+
+/// What is wrong, and what to do, as a failure.
+pub(super) fn told(why: &str) -> Failure {
+    let (what, next_step) = why
+        .split_once(": ")
+        .unwrap_or((why, "choose another number"));
+    Failure::new(what.to_owned()).hint(next_step)
+}
