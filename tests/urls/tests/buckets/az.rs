@@ -219,15 +219,18 @@ fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
     );
 }
 
-/// The names in a mosaic are GDAL's, which are keys as they are.
+/// A file on disk leads to no server.
 #[test]
-fn the_files_of_a_mosaic_lie_in_containers() {
+fn a_mosaic_here_that_names_a_container_is_refused() {
     let microsoft = Microsoft::start(SURVEYORS);
     let files = [
         "/vsiaz/hills/north ridge/hills-1.tif",
         "/vsiaz/open/50% #2.tif",
     ];
     let mosaic = mosaic(microsoft.hills.folder.path(), files);
-    let felt = microsoft.said_with_key(&mosaic, SURVEYORS.key);
-    assert!(felt.contains("4000 x 1200"), "{felt}");
+    let told = microsoft.said_with_key(&mosaic, SURVEYORS.key);
+    assert!(
+        told.contains("it names /vsiaz/hills/north ridge/hills-1.tif"),
+        "{told}"
+    );
 }

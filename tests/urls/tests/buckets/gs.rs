@@ -134,13 +134,16 @@ fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
     );
 }
 
-/// The names in a mosaic are GDAL's, which are keys as they are.
+/// A file on disk leads to no server.
 #[test]
-fn the_files_of_a_mosaic_lie_in_buckets() {
+fn a_mosaic_here_that_names_a_bucket_is_refused() {
     let google = Google::start();
     let public = format!("/vsigs/{PUBLIC}/50% #2.tif");
     let files = ["/vsigs/hills/north ridge/hills-1.tif", &public];
     let mosaic = mosaic(google.hills.folder.path(), files);
-    let felt = google.said_with_key(&mosaic, &SURVEYOR.file());
-    assert!(felt.contains("4000 x 1200"), "{felt}");
+    let told = google.said_with_key(&mosaic, &SURVEYOR.file());
+    assert!(
+        told.contains("it names /vsigs/hills/north ridge/hills-1.tif"),
+        "{told}"
+    );
 }
