@@ -1,4 +1,5 @@
 use std::fs;
+use std::path::Path;
 
 use clap::Parser as _;
 use hapterra_core::contact::Friction;
