@@ -7,6 +7,7 @@ use tempfile::TempDir;
 
 use super::at_url::{self, Served, fetched, is_fetched};
 use super::fault;
+use super::packed::Packing;
 use crate::RasterError;
 use crate::remote::{RemoteFetcher, is_url, without_key};
 
@@ -18,7 +19,8 @@ pub(super) struct Place {
     /// What GDAL calls it.
     pub(super) path: PathBuf,
     served: Option<(Served, Mount)>,
-    _fetched: Option<TempDir>,
+    /// A copy of what is at a URL, or another name of an archive.
+    _folder: Option<TempDir>,
 }
 
 impl Place {
@@ -34,16 +36,19 @@ impl Place {
             source: source.to_owned(),
             path: source.to_owned(),
             served: None,
-            _fetched: None,
+            _folder: None,
         };
         let Some(url) = source.to_str().filter(|source| is_url(source)) else {
-            return Ok(here);
+            return match Packing::of(head) {
+                Some(_) => here.under_a_new_name(),
+                None => Ok(here),
+            };
         };
         if is_fetched(head) {
             let (folder, name) = fetched(url, elsewhere)?;
             return Ok(Self {
                 path: folder.path().join(name),
-                _fetched: Some(folder),
+                _folder: Some(folder),
                 ..here
             });
         }
@@ -54,6 +59,30 @@ impl Place {
             served: Some((served, mount)),
             ..here
         })
+    }
+
+    /// An archive under a name that GDAL has not seen: it remembers the files of an archive by name,
+    /// and reads past their end where another one has come to lie there (3.6 crashes).
+    #[cfg(unix)]
+    fn under_a_new_name(self) -> Result<Self, RasterError> {
+        let unreadable = RasterError::Unreadable;
+        let folder = tempfile::tempdir().map_err(unreadable)?;
+        let target = std::path::absolute(&self.path).map_err(unreadable)?;
+        let path = folder
+            .path()
+            .join(self.path.file_name().unwrap_or_default());
+        std::os::unix::fs::symlink(target, &path).map_err(unreadable)?;
+        Ok(Self {
+            path,
+            _folder: Some(folder),
+            ..self
+        })
+    }
+
+    /// The archive by its own name: who makes a link needs a privilege here.
+    #[cfg(not(unix))]
+    fn under_a_new_name(self) -> Result<Self, RasterError> {
+        Ok(self)
     }
 
     /// Whether GDAL reads it through this program.
