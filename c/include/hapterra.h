@@ -31,7 +31,7 @@ enum HapterraStatus
   /**
    * A pointer is not aligned, or a count is larger than memory.
    */
-  HAPTERRA_STATUS_BAD_POINTER = 2,
+  HAPTERRA_STATUS_POINTER_ERROR = 2,
   /**
    * The terrain has no heights yet, or the contact was not begun.
    */
@@ -512,8 +512,7 @@ void *hapterra_alloc(size_t bytes);
  * # Safety
  * `pointer` is null, or came from `hapterra_alloc(bytes)` and was not freed.
  */
-void hapterra_free(void *pointer,
-                   size_t bytes);
+void hapterra_free(void *pointer, size_t bytes);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -236,7 +236,7 @@ fn telemetry_alone_is_no_answer() {
         };
         assert!(matches!(error, LinkError::Silent(_)), "{error}");
         let said = bench.said();
-        assert_eq!(count_of(&said, "Alive"), 8);
+        assert_eq!(count_of(&said, "Heartbeat"), 8);
         assert_eq!(count_of(&said, "Hello"), 9, "from 0.75 s on");
     });
 }
