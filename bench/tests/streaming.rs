@@ -111,7 +111,7 @@ fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
     let names = [&hills, &small, &png].map(|path| path.to_str().expect("text"));
     let (done, said, csv) = streamed(
         "files.csv",
-        &["--files-only", names[0], names[1], "--png", names[2]],
+        &["--files-only", names[0], names[1], "--picture", names[2]],
     );
     assert!(done, "{said}");
     assert!(
