@@ -97,8 +97,9 @@ struct Telling {
 }
 
 impl Telling {
-    fn start(words: &[&str]) -> Self {
-        let mut child = hapterra(&[words, &["--events", "0"]].concat())
+    /// With what `--events` takes.
+    fn start(words: &[&str], events: &str) -> Self {
+        let mut child = hapterra(&[words, &["--events", events]].concat())
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -164,7 +165,7 @@ fn a_run_tells_what_is_felt_and_examples_speak_and_sound_it() {
         "6s",
     ];
     let more = ["--out", text(&record), "--commands", text(&commands)];
-    let events = Telling::start(&[&words[..], &more, &["--events", "0,10"]].concat()).end();
+    let events = Telling::start(&[&words[..], &more].concat(), "0,10").end();
     judge(&events, &record);
     if let Some(example) = example("speak_heights.py") {
         let heights = said(example, &events);
@@ -343,7 +344,7 @@ fn demo_tells_samples_marks_and_refusals() {
         text(&out),
     ];
     let more = ["--duration", "2.5s", "--commands", "-"];
-    let mut demo = Telling::start(&[&words[..], &more].concat());
+    let mut demo = Telling::start(&[&words[..], &more].concat(), "0,100");
     demo.wait_for("sample");
     let mut stdin = demo.stdin.take().expect("piped");
     stdin
@@ -383,7 +384,10 @@ fn run_ends_disarmed_when_its_input_ends() {
         "--out",
         text(&record),
     ];
-    let mut run = Telling::start(&[&words[..], &["--commands", "-", "--end-with-input"]].concat());
+    let mut run = Telling::start(
+        &[&words[..], &["--commands", "-", "--end-with-input"]].concat(),
+        "0",
+    );
     run.wait_for("contact");
     let mut stdin = run.stdin.take().expect("piped");
     stdin
@@ -419,7 +423,10 @@ fn enter_answers_the_question_of_its_number() {
     let served = Served::start();
     let device = format!("tcp:{}", served.address);
     let words = ["run", text(&hills), "--device", &device, "--unchecked"];
-    let mut run = Telling::start(&[&words[..], &["--commands", "-", "--end-with-input"]].concat());
+    let mut run = Telling::start(
+        &[&words[..], &["--commands", "-", "--end-with-input"]].concat(),
+        "0",
+    );
     let asks = run.wait_for("arming")["asks"].as_u64().expect("a question");
     let mut stdin = run.stdin.take().expect("piped");
     writeln!(stdin, "enter {}", asks + 1).expect("taken");
