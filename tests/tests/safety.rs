@@ -35,6 +35,7 @@ fn safety_table_names_tests_that_exist() {
         "heightfield/src",
         "firmware/src",
         "host-tools/src",
+        "bench/src",
         "host-tools/tests",
         "tests",
     ] {
