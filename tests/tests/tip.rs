@@ -383,7 +383,7 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
             ],
         );
         assert!(
-            said.contains("--tip 0.0, where the recording has 6.0"),
+            said.contains("--tip 0mm, where the recording has 6mm"),
             "{said}"
         );
         assert!(!read("point.csv").contains("tip_mm") && felt(&read("point.csv")) != live);
@@ -415,8 +415,11 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
             ["--tip=20", "--level=0"],
             "a tip of 20 mm: 20.0 cells of level 0, where 0 to 8 can be felt",
         ),
-        (["--tip=-1", "--level=0"], "a radius from 0 to 100 mm"),
-        (["--tip=two", "--level=0"], "a radius from 0 to 100 mm"),
+        (
+            ["--tip=-1", "--level=0"],
+            "a length at the device from 0 to 100 mm",
+        ),
+        (["--tip=two", "--level=0"], "a number in mm"),
     ] {
         let mut command = Command::new(hapterra_binary());
         let command =
