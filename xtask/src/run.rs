@@ -27,6 +27,20 @@ pub(crate) fn target_dir() -> PathBuf {
     }
 }
 
+/// What cargo sets for this program. Build scripts of packages that read it would run again, and what
+/// depends on them would be built again, with each program that calls cargo.
+const OF_THIS_PROGRAM: [&str; 9] = [
+    "CARGO_MANIFEST_DIR",
+    "CARGO_MANIFEST_LINKS",
+    "CARGO_MANIFEST_PATH",
+    "CARGO_PKG_NAME",
+    "CARGO_PKG_VERSION",
+    "CARGO_PKG_VERSION_MAJOR",
+    "CARGO_PKG_VERSION_MINOR",
+    "CARGO_PKG_VERSION_PATCH",
+    "CARGO_PKG_VERSION_PRE",
+];
+
 /// The cargo that runs this program, in the workspace root, building for the host.
 pub(crate) fn cargo() -> Command {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -35,6 +49,9 @@ pub(crate) fn cargo() -> Command {
         .current_dir(root())
         .env("CARGO_TARGET_DIR", target_dir())
         .env_remove("CARGO_BUILD_TARGET");
+    for variable in OF_THIS_PROGRAM {
+        command.env_remove(variable);
+    }
     command
 }
 
