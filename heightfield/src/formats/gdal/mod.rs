@@ -58,8 +58,13 @@ pub(crate) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, Rast
         Some(format) => RasterError::WantsGdal { format, why },
         None => RasterError::UnknownFormat,
     })?;
-    let place = Arc::new(Place::of(&library, path, &head, &options.elsewhere)?);
-    let decoded = match packed::Packing::of(&head) {
+    let place = Place::of(&library, path, &head, &options.elsewhere)?;
+    let packing = packed::Packing::of(&head);
+    let place = Arc::new(match packing {
+        Some(_) => place.under_a_new_name()?,
+        None => place,
+    });
+    let decoded = match packing {
         Some(packing) => of_archive(packing, &library, &place, &head, options),
         None => opened(&library, &place, &place.path, &head, options),
     };

@@ -7,7 +7,6 @@ use tempfile::TempDir;
 
 use super::at_url::{self, Served, fetched, is_fetched};
 use super::fault;
-use super::packed::Packing;
 use crate::RasterError;
 use crate::remote::{RemoteFetcher, is_url, without_key};
 
@@ -39,10 +38,7 @@ impl Place {
             _folder: None,
         };
         let Some(url) = source.to_str().filter(|source| is_url(source)) else {
-            return match Packing::of(head) {
-                Some(_) => here.under_a_new_name(),
-                None => Ok(here),
-            };
+            return Ok(here);
         };
         if is_fetched(head) {
             let (folder, name) = fetched(url, elsewhere)?;
@@ -64,7 +60,10 @@ impl Place {
     /// An archive under a name that GDAL has not seen: it remembers the files of an archive by name,
     /// and reads past their end where another one has come to lie there (3.6 crashes).
     #[cfg(unix)]
-    fn under_a_new_name(self) -> Result<Self, RasterError> {
+    pub(super) fn under_a_new_name(self) -> Result<Self, RasterError> {
+        if self.served.is_some() || self._folder.is_some() {
+            return Ok(self);
+        }
         let unreadable = RasterError::Unreadable;
         let folder = tempfile::tempdir().map_err(unreadable)?;
         let target = std::path::absolute(&self.path).map_err(unreadable)?;
@@ -81,7 +80,7 @@ impl Place {
 
     /// The archive by its own name: who makes a link needs a privilege here.
     #[cfg(not(unix))]
-    fn under_a_new_name(self) -> Result<Self, RasterError> {
+    pub(super) fn under_a_new_name(self) -> Result<Self, RasterError> {
         Ok(self)
     }
 
