@@ -97,11 +97,7 @@ fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
     let tries: [(&str, &[u8], &str); 9] = [
         ("empty.tif", b"", "empty"),
         ("notes.txt", b"ncols of cabbage", "unknown file format"),
-        (
-            "photo.jpg",
-            b"\xff\xd8\xff\xe0 no terrain",
-            "unknown file format",
-        ),
+        ("song.mp3", b"ID3\x03 no terrain", "unknown file format"),
         ("named.tif", b"hello, world", "its name says TIFF"),
         ("samples.raw", &[0; 32], "no size was stated"),
         ("odd.hgt", &[0; 31], "no square"),
@@ -109,7 +105,7 @@ fn what_is_no_terrain_file_at_all_is_said_to_be_that() {
         (
             "nothing.zip",
             b"PK\x05\x06\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0",
-            "no terrain",
+            "no archive",
         ),
         ("cut.hgt.gz", b"\x1f\x8b\x08\0\0\0\0\0\0\x03", "truncated"),
     ];
