@@ -14,7 +14,7 @@ use crate::text::{from_c, to_c};
 
 /// [`PREFIX`] for GDAL, which keeps the pointer.
 const PREFIX_FOR_C: &CStr = c"/vsiheightfield/";
-/// What `stat`, `seek` and others give where they fail.
+/// The value that `stat`, `seek` and `close` return on failure.
 const FAILED: c_int = -1;
 
 /// A file that GDAL has open, and where it reads.
@@ -56,7 +56,7 @@ pub(crate) fn install(loaded: &Loaded) -> Result<(), Error> {
     is_installed.then_some(()).ok_or_else(refused)
 }
 
-/// What a function of Rust's gives, or else where it has nothing or panics.
+/// Returns the value of `call`, or `otherwise` if it has none or panics.
 fn caught<T>(otherwise: T, call: impl FnOnce() -> Option<T>) -> T {
     let called = catch_unwind(AssertUnwindSafe(call));
     called.ok().flatten().unwrap_or(otherwise)

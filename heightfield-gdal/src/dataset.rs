@@ -28,7 +28,7 @@ const OF_ALL: [&str; 1] = ["OVERVIEW_LEVEL"];
 pub struct Dataset {
     pub(crate) loaded: Arc<Loaded>,
     handle: Handle,
-    /// Where its files are, if GDAL reads them through its caller.
+    /// The file system of its files, if GDAL reads them through its caller.
     files: Option<Arc<Mounted>>,
 }
 
@@ -138,7 +138,7 @@ impl Dataset {
         }
     }
 
-    /// Why a file that GDAL reads through its caller could not be read, since this was called last.
+    /// Returns why a file that GDAL reads through its caller could not be read, since the last call.
     /// What GDAL gives then may lack it, also where it says nothing.
     #[must_use]
     pub fn take_fault(&self) -> Option<std::io::Error> {
