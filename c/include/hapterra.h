@@ -31,7 +31,7 @@ enum HapterraStatus
   /**
    * A pointer is not aligned, or a count is larger than memory.
    */
-  HAPTERRA_STATUS_POINTER_ERROR = 2,
+  HAPTERRA_STATUS_POINTER = 2,
   /**
    * The terrain has no heights yet, or the contact was not begun.
    */

@@ -11,9 +11,9 @@ fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
     let bytes = count.checked_mul(size_of::<T>());
     match pointer {
         pointer if pointer.is_null() => Err(HapterraStatus::NullPointer),
-        pointer if !pointer.is_aligned() => Err(HapterraStatus::PointerError),
+        pointer if !pointer.is_aligned() => Err(HapterraStatus::Pointer),
         _ if bytes.is_none_or(|bytes| bytes > isize::MAX as usize) => {
-            Err(HapterraStatus::PointerError)
+            Err(HapterraStatus::Pointer)
         }
         _ => Ok(()),
     }

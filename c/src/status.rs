@@ -13,7 +13,7 @@ pub enum HapterraStatus {
     /// A pointer is null.
     NullPointer = 1,
     /// A pointer is not aligned, or a count is larger than memory.
-    PointerError = 2,
+    Pointer = 2,
     /// The terrain has no heights yet, or the contact was not begun.
     NotBegun = 3,
     /// The size or the number of samples is not possible.

@@ -98,7 +98,7 @@ def test_bad_words_have_the_text_of_the_command(tmp_path):
     for error, text, path, words in [
         (FileNotFoundError, "none.tif.*\nhint: check the path", tmp_path / "none.tif", {}),
         (ValueError, "there is no band 7.*\nhint: name one that is there", file, {"band": 7}),
-        (ValueError, "unexpected argument '--bnd'", file, {"bnd": 1}),
+        (ValueError, "invalid value 'bnd=1' .*known are raw=", file, {"bnd": 1}),
         (ValueError, "m, ft, us-ft", file, {"height_unit": "furlong"}),
         (ValueError, "cannot be used with", file, {"cell_mm": 1, "scale": 2}),
         (ValueError, 'give ground a millimetre, as "100 m/mm"', file, {"scale": "100"}),

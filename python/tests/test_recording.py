@@ -71,7 +71,7 @@ def test_replay_without_changes_is_the_recording(recorded, tmp_path):
 
 def test_replay_with_changes_is_another(recorded):
     recording = read_recording(recorded[0])
-    smooth = recording.replay(friction=0.1, texture="none")
+    smooth = recording.replay(friction=0.1, surface="ice")
     assert smooth.settings["force"]["friction"]["dynamic_mu"] == pytest.approx(0.1)
     assert "texture" not in smooth.settings["force"]
     assert not np.array_equal(smooth.steps["force_x_n"], recording.steps["force_x_n"])
