@@ -1,12 +1,10 @@
 //! A band of a raster: its samples, and what they mean.
 
 use std::ffi::{c_int, c_void};
-use std::marker::PhantomData;
 
-use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::functions::Handle;
-use crate::library::Loaded;
+use crate::loaded::Loaded;
 use crate::text::from_c;
 
 /// `GF_Read`.
@@ -22,7 +20,6 @@ const NO_DATA: c_int = 8;
 pub struct Band<'d> {
     loaded: &'d Loaded,
     handle: Handle,
-    dataset: PhantomData<&'d Dataset>,
 }
 
 /// A rectangle of samples; column 0, row 0 is the file's first.
@@ -129,16 +126,8 @@ impl SampleType {
 
 impl<'d> Band<'d> {
     /// A band by its handle; none for a null one.
-    pub(crate) fn of(
-        loaded: &'d Loaded,
-        handle: Handle,
-        dataset: PhantomData<&'d Dataset>,
-    ) -> Option<Self> {
-        (!handle.is_null()).then_some(Self {
-            loaded,
-            handle,
-            dataset,
-        })
+    pub(crate) fn of(loaded: &'d Loaded, handle: Handle) -> Option<Self> {
+        (!handle.is_null()).then_some(Self { loaded, handle })
     }
 
     /// Columns and rows.
@@ -239,7 +228,7 @@ impl<'d> Band<'d> {
             let count = (functions.GDALGetOverviewCount)(self.handle);
             let overviews =
                 (0..count).map(|number| (functions.GDALGetOverview)(self.handle, number));
-            let bands = overviews.filter_map(|handle| Self::of(self.loaded, handle, self.dataset));
+            let bands = overviews.filter_map(|handle| Self::of(self.loaded, handle));
             bands.collect()
         }
     }
@@ -260,7 +249,7 @@ impl<'d> Band<'d> {
     pub fn mask_band(&self) -> Option<Self> {
         // SAFETY: the band's dataset is open, and the mask is its.
         let handle = unsafe { (self.loaded.functions.GDALGetMaskBand)(self.handle) };
-        Self::of(self.loaded, handle, self.dataset)
+        Self::of(self.loaded, handle)
     }
 
     /// Reads a window, row after row, each `samples` of it once.

@@ -7,14 +7,15 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
-use crate::library::Library;
-use crate::vrt::{self, Named};
+use crate::loaded::Loaded;
+use crate::vrt;
+use crate::xml::Text;
 
 /// Checks that a file, what lies beside it and what it names as a VRT are regular files.
 ///
 /// # Errors
 /// [`Error::NotOpened`].
-pub(crate) fn check(library: &Library, path: &Path) -> Result<(), Error> {
+pub(crate) fn check(library: &Loaded, path: &Path) -> Result<(), Error> {
     let names = Names {
         library,
         seen: HashSet::new(),
@@ -26,7 +27,7 @@ pub(crate) fn check(library: &Library, path: &Path) -> Result<(), Error> {
 
 /// A walk through the files that VRTs name.
 struct Names<'l> {
-    library: &'l Library,
+    library: &'l Loaded,
     seen: HashSet<PathBuf>,
 }
 
@@ -53,7 +54,7 @@ impl Names<'_> {
     }
 
     /// The files that a text names, which were not looked at before.
-    fn files_of(&mut self, named: &Named, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    fn files_of(&mut self, named: &Text, folder: &Path) -> Result<Vec<PathBuf>, Error> {
         let mut found = Vec::new();
         for part in named.parts() {
             for name in [part, part.trim_start_matches('/')] {

@@ -7,9 +7,10 @@ use std::ptr;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::Error;
-use crate::file_system::{Mounted, PREFIX, ReadAt, at};
+use crate::file_system::{PREFIX, ReadAt};
 use crate::functions::Stat;
-use crate::library::Loaded;
+use crate::loaded::Loaded;
+use crate::mount::{Mounted, at};
 use crate::text::{from_c, to_c};
 
 /// [`PREFIX`] for GDAL, which keeps the pointer.
@@ -135,8 +136,7 @@ unsafe extern "C" fn sibling_files(_: *mut c_void, name: *const c_char) -> *mut 
         for name in own.into_iter().chain(beside) {
             let name = to_c(&name).ok()?;
             // SAFETY: the text stays for the call, in which it is copied.
-            list =
-                unsafe { (mounted.library().loaded.functions.CSLAddString)(list, name.as_ptr()) };
+            list = unsafe { (mounted.library().functions.CSLAddString)(list, name.as_ptr()) };
         }
         Some(list)
     })

@@ -2,16 +2,15 @@
 
 use std::ffi::{CStr, CString, c_char};
 use std::fmt;
-use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::ptr;
 use std::sync::Arc;
 
 use crate::band::Band;
 use crate::error::Error;
-use crate::file_system::{self, Mounted};
 use crate::functions::Handle;
-use crate::library::Loaded;
+use crate::loaded::Loaded;
+use crate::mount::{self, Mounted};
 use crate::text::{from_c, list_from_c, path_to_c, to_c};
 
 /// `GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR`, for reading.
@@ -192,7 +191,7 @@ impl Dataset {
         // SAFETY: the number is one of the open dataset's.
         let handle =
             unsafe { (self.loaded.functions.GDALGetRasterBand)(self.handle, number as i32) };
-        Band::of(&self.loaded, handle, PhantomData).ok_or_else(no_such)
+        Band::of(&self.loaded, handle).ok_or_else(no_such)
     }
 
     /// What columns and rows are for coordinates: x = `[0]` + column · `[1]` + row · `[2]`,
@@ -261,7 +260,7 @@ impl Dataset {
 }
 
 fn mounted_in(path: &Path) -> Option<Arc<Mounted>> {
-    file_system::at(&path.to_string_lossy()).map(|(mounted, _)| mounted)
+    mount::at(&path.to_string_lossy()).map(|(mounted, _)| mounted)
 }
 
 impl Drop for Dataset {

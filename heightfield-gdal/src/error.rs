@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::library::Version;
+use crate::version::Version;
 
 /// Why a raster cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

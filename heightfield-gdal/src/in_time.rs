@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::file_system;
-use crate::library::Loaded;
+use crate::loaded::Loaded;
+use crate::mount;
 
 /// A VRT of 26,000 files opens within a second. The time in which GDAL waits for its caller to read
 /// a file is not counted.
@@ -65,7 +65,7 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
     let thread = Builder::new().name("GDAL opens a file".into());
     thread.spawn(open).map_err(|_| slow())?;
     let name = path.to_string_lossy();
-    let files = file_system::at(&name).map(|(files, _)| files);
+    let files = mount::at(&name).map(|(files, _)| files);
     loop {
         let waited = files
             .as_ref()

@@ -5,7 +5,7 @@ use std::ptr;
 
 use crate::error::Error;
 use crate::functions::Handle;
-use crate::library::Loaded;
+use crate::loaded::Loaded;
 use crate::text::{from_c, to_c};
 
 /// `OGRERR_NONE`.

@@ -3,7 +3,7 @@
 use std::ffi::{CStr, CString, c_char};
 use std::path::Path;
 
-use crate::Error;
+use crate::error::Error;
 
 /// A text for C.
 pub(crate) fn to_c(text: &str) -> Result<CString, Error> {

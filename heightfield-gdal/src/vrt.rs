@@ -5,8 +5,9 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::file_system::PREFIX;
-use crate::library::Library;
+use crate::loaded::Loaded;
 use crate::settings;
+use crate::xml::{self, Text};
 
 /// VRTs inside VRTs.
 pub(crate) const MAX_NESTING: u32 = 16;
@@ -37,16 +38,6 @@ const SERVERS: [&str; 9] = [
 /// File systems that no file may name: standard input, and those of another file.
 const REFUSED: [&str; 2] = ["/vsistdin", PREFIX];
 
-/// A text of a VRT, which may name a file.
-#[derive(Debug)]
-pub(crate) struct Named {
-    /// The element or attribute that it is in.
-    pub(crate) node: String,
-    pub(crate) value: String,
-    /// Whether it is a name beside the VRT.
-    pub(crate) is_relative: bool,
-}
-
 /// Whether a file is a VRT, by its beginning.
 pub(crate) fn begins(head: &[u8]) -> bool {
     head.windows(SIGN.len()).any(|part| part == SIGN.as_bytes())
@@ -64,12 +55,12 @@ pub(crate) fn too_deep(depth: u32) -> String {
 ///
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`].
-pub(crate) fn names(library: &Library, text: &str) -> Result<Vec<Named>, Error> {
+pub(crate) fn names(library: &Loaded, text: &str) -> Result<Vec<Text>, Error> {
     // GDAL stops at a zero byte, too.
     let mut texts = vec![text.replace('\0', " ")];
     let mut names = Vec::new();
     while let Some(text) = texts.pop() {
-        for named in library.xml_texts(&text)? {
+        for named in xml::texts(library, &text)? {
             if named.value.trim_start().starts_with(SIGN) {
                 texts.push(named.value);
             } else if named.may_be_name() {
@@ -80,7 +71,7 @@ pub(crate) fn names(library: &Library, text: &str) -> Result<Vec<Named>, Error> 
     Ok(names)
 }
 
-impl Named {
+impl Text {
     fn is_file_name(&self) -> bool {
         let node = self.node.to_ascii_lowercase();
         ["filename", "dataset", "dem"]

@@ -13,6 +13,7 @@ mod projection;
 mod shift;
 mod system;
 mod transform;
+mod unit;
 mod wkt;
 
 use super::globe::Globe;
@@ -20,7 +21,7 @@ pub(super) use datum::Datum;
 pub use datum::LonLat;
 pub(crate) use definition::{vertical, vertical_beside};
 pub use system::ReferenceSystem;
-pub(super) use system::Unit;
+pub(super) use unit::Unit;
 use wkt::Node;
 
 /// A vertical reference system.

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use super::blocks::Survey;
 use super::crs::{ReferenceSystem, Vertical};
-use super::doubtful::Outermost;
+use super::doubtful::{MAX_HEIGHT, Outermost};
 use super::file_layout::FileLayout;
 use super::geometry::{CellSize, metres_in, unknown_unit};
 use super::height_summary::HeightSummary;
@@ -12,10 +12,6 @@ use super::place::Place;
 use super::samples::{SampleValue, with_samples};
 use super::storage::Storage;
 use super::{Certainty, RasterError, VerticalDatum};
-
-/// No height is larger than this (in the file's vertical unit), whatever the
-/// planet: such a sample is a no-data value that the file forgot to declare.
-pub const MAX_HEIGHT: f64 = 1e30;
 
 /// What a decoder hands over: samples in file order and all that the file says
 /// about them.

@@ -1,6 +1,8 @@
 //! Stored values that are no heights, or may be none, though the file does not declare them.
 
-use super::decoded::MAX_HEIGHT;
+/// No height is larger than this (in the file's vertical unit), whatever the
+/// planet: such a sample is a no-data value that the file forgot to declare.
+pub const MAX_HEIGHT: f64 = 1e30;
 
 /// Values that programs write where there is no data.
 const LOW: [f64; 5] = [-32_768.0, -32_767.0, -9999.0, -99_999.0, -999.0];

@@ -74,7 +74,7 @@ mod timeouts;
 use std::path::{Path, PathBuf};
 
 pub use crs::{LonLat, ReferenceSystem};
-pub use decoded::MAX_HEIGHT;
+pub use doubtful::MAX_HEIGHT;
 pub use error::{Error, RasterError};
 pub use file_layout::{FileLayout, SamplesAre};
 pub use geometry::metres_in;

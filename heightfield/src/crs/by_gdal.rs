@@ -6,7 +6,8 @@ use heightfield_gdal::{AxisUnit, SpatialReference};
 
 use super::datum::Datum;
 use super::shift::Shift;
-use super::system::{ReferenceSystem, Unit};
+use super::system::ReferenceSystem;
+use super::unit::Unit;
 use crate::gdal;
 use crate::globe::Globe;
 

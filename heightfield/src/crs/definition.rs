@@ -3,7 +3,8 @@
 
 use super::datum::Datum;
 use super::shift::Shift;
-use super::system::{ReferenceSystem, Unit};
+use super::system::ReferenceSystem;
+use super::unit::Unit;
 use super::wkt::Node;
 use super::{Vertical, by_gdal};
 use crate::globe::Globe;

@@ -3,6 +3,7 @@
 
 use super::datum::{Datum, LonLat};
 use super::projection::Projection;
+use super::unit::Unit;
 use super::wkt::Node;
 use super::{Globe, Vertical, by_gdal, definition};
 use crate::tangents::Tangents;
@@ -30,15 +31,6 @@ pub struct ReferenceSystem {
     projection: Option<Projection>,
     /// `None` where the file does not tell it.
     datum: Option<Datum>,
-}
-
-/// What a coordinate counts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Unit {
-    /// Degrees in a unit.
-    Angle(f64),
-    /// Metres in a unit, where known.
-    Length(Option<f64>),
 }
 
 impl ReferenceSystem {
@@ -265,14 +257,5 @@ impl ReferenceSystem {
             x: between(place(x - step, y)?, place(x + step, y)?)?,
             y: between(place(x, y - step)?, place(x, y + step)?)?,
         })
-    }
-}
-
-impl Unit {
-    /// An angle of radians; of a degree or a grad, where rounding is all that is between.
-    pub(super) fn of_radians(radians: f64) -> Self {
-        let degrees = radians.to_degrees();
-        let whole = |part: &f64| (degrees / part - 1.0).abs() < 1e-9;
-        Self::Angle([1.0, 0.9].into_iter().find(whole).unwrap_or(degrees))
     }
 }

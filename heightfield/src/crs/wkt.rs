@@ -1,6 +1,6 @@
 //! Reference systems as text (WKT 1 of OGC, GDAL and Esri, WKT 2), as a tree.
 
-use super::system::Unit;
+use super::unit::Unit;
 
 /// Longer texts describe no reference system, bytes.
 const MAX_BYTES: usize = 1 << 16;

@@ -13,7 +13,7 @@ use super::layout::{Layout, Wanted};
 use super::masks::Mask;
 use super::samples::{heights, holes};
 use super::uncompressed::rows;
-use super::{budget, images};
+use super::{budget, images, unpack};
 use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, stored_parts};
 use crate::disk_cache::{DiskCache, FileStamp};
 use crate::guard::guarded;
@@ -150,7 +150,9 @@ impl Image {
         let chunks = self.layout.chunks_name();
         if !suit(&self.layout) {
             let unpacked = match disk {
-                Ok(disk) => (self.layout.unpack_into(disk)).map_err(|error| error.to_string()),
+                Ok(disk) => {
+                    unpack::into_file(&mut self.layout, disk).map_err(|error| error.to_string())
+                }
                 Err(why) => Err(why.to_owned()),
             };
             unpacked.map_err(|why| {

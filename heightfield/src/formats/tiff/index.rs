@@ -2,10 +2,23 @@
 
 use tiff_reader::{Ifd, TagValue};
 
+use crate::blocks::Part;
+
 const STRIP_OFFSETS: u16 = 273;
 const STRIP_BYTE_COUNTS: u16 = 279;
 const TILE_OFFSETS: u16 = 324;
 const TILE_BYTE_COUNTS: u16 = 325;
+
+/// A strip or tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Chunk {
+    /// Where it lies in the file.
+    pub(super) place: u64,
+    /// Bytes stored for it; 0 for one that a sparse file leaves out.
+    pub(super) bytes: u64,
+    /// Its samples.
+    pub(super) covers: Part,
+}
 
 /// The places and sizes of strips or tiles.
 pub(super) struct Index<'f> {

@@ -1,6 +1,5 @@
 //! How an image's samples are stored, and whether they can be heights.
 
-use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -8,11 +7,9 @@ use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
 
 use super::fault::{fault, unsupported};
 use super::images::Directory;
-use super::index::Index;
-use super::unpack;
+use super::index::{Chunk, Index};
 use super::unpacked::Unpacked;
 use crate::blocks::Part;
-use crate::disk_cache::DiskCache;
 use crate::encoding::no_codes;
 use crate::read::Stored;
 use crate::{RasterError, SampleType};
@@ -47,17 +44,6 @@ pub(super) struct Layout {
     pub(super) is_plain: bool,
     /// Chunks that are too large to be decoded where they are touched, once they are.
     pub(super) unpacked: Option<Arc<Unpacked>>,
-}
-
-/// A strip or tile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Chunk {
-    /// Where it lies in the file.
-    pub(super) place: u64,
-    /// Bytes stored for it; 0 for one that a sparse file leaves out.
-    pub(super) bytes: u64,
-    /// Its samples.
-    pub(super) covers: Part,
 }
 
 /// Bands of a code.
@@ -192,19 +178,6 @@ impl Layout {
             is_plain: layout.chunk_size() > MAX_DECODED && has_plain_samples(image),
             ..layout
         })
-    }
-
-    /// Has strips or tiles unpacked into a file on disk when they are touched.
-    ///
-    /// # Errors
-    /// Why that cannot be.
-    pub(super) fn unpack_into(&mut self, disk: &DiskCache) -> io::Result<()> {
-        if !unpack::suits(self) {
-            let what = format!("what {} has packed comes as a whole", self.compression.0);
-            return Err(io::Error::other(what));
-        }
-        self.unpacked = Some(Arc::new(Unpacked::new(self, disk)?));
-        Ok(())
     }
 
     /// Whether rows are read without the others of their strip or tile.

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use tiff_reader::TiffFile;
 
+use super::band::Band;
 use super::images::{self, Directory};
-use super::layout::{Chunk, Layout, MAX_DECODED};
-use super::samples::Band;
+use super::index::Chunk;
+use super::layout::{Layout, MAX_DECODED};
 use super::uncompressed;
 use super::unpack::{self, Rows};
 use crate::RasterError;
@@ -50,7 +51,7 @@ impl Mask {
         let unpacked = match (&mut self.layout, disk) {
             (Some(layout), _) if layout.is_plain => return Ok(()),
             (Some(layout), Ok(disk)) if is_large => {
-                layout.unpack_into(disk).map_err(|error| error.to_string())
+                unpack::into_file(layout, disk).map_err(|error| error.to_string())
             }
             (_, Err(why)) => Err(why.to_owned()),
             _ => Err("its samples are packed in an unusual way".into()),
@@ -78,7 +79,7 @@ impl Mask {
             Some(mask) if mask.is_read_by_rows() => by_rows(mask, part, set),
             Some(mask) if unpack::suits_whole(mask, part) => whole(mask, part, set),
             _ => {
-                let band = Band::first_of(&self.directory);
+                let band = Band::new(&self.directory, 0);
                 let has_data = band.read(part, |value: u8| value != 0)?;
                 let missing = has_data.iter().enumerate().filter(|(_, has)| !**has);
                 missing.for_each(|(index, _)| set(index));

@@ -113,7 +113,7 @@ fn a_mask_of_few_bits_is_the_same_in_each_way_of_reading_it() {
                     assert!(found(&packed, &part) == expected, "{bits} {chunk:?}");
                 }
                 let layout = packed.layout.as_mut().expect("laid out");
-                layout.unpack_into(&disk).expect("a file");
+                unpack::into_file(layout, &disk).expect("a file");
                 assert!(found(&packed, &part) == expected, "{bits} {chunk:?}");
             }
         }

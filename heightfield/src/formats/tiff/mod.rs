@@ -3,11 +3,13 @@
 //!
 //! `tiff-reader` decodes; it is named in this folder only.
 
+mod band;
 mod blended;
 mod blocks;
 mod budget;
 mod describe;
 mod fault;
+mod geo_keys;
 mod georef;
 mod images;
 mod index;
@@ -149,7 +151,7 @@ fn stored(
         match image.leave_in_file(known.disk) {
             Ok(()) => {
                 if !input.is_outline() {
-                    unpacked::check_first(&image.layout)?;
+                    unpack::check_first(&image.layout)?;
                 }
                 told = unpacked_told(&image);
                 let overviews = match find_appended(input, "ovr")? {

@@ -2,10 +2,8 @@
 //! left out of a sparse file, masked, transparent.
 
 use half::f16;
-use tiff_reader::{Ifd, TiffFile, TiffSample};
 
-use super::fault::fault;
-use super::images::Directory;
+use super::band::Band;
 use super::layout::{Layout, SampleFormat};
 use super::masks::Mask;
 use super::{uncompressed, unpack};
@@ -35,10 +33,7 @@ fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterErro
     if unpack::suits_whole(layout, part) {
         return unpack::read_whole(layout, band);
     }
-    let band = Band {
-        band,
-        ..Band::first_of(&layout.directory)
-    };
+    let band = Band::new(&layout.directory, band);
     Ok(match layout.stored {
         (Unsigned, 8) => band.read(part, |value: u8| value)?.into(),
         (Signed, 8) => band.read(part, |value: i8| value)?.into(),
@@ -52,59 +47,6 @@ fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples, RasterErro
         (Signed, _) => band.read(part, |value: i64| value as f64)?.into(),
         (Float, _) => band.read(part, |value: f64| value)?.into(),
     })
-}
-
-/// A band of an image.
-pub(super) struct Band<'f> {
-    file: &'f TiffFile,
-    image: &'f Ifd,
-    band: usize,
-}
-
-impl<'f> Band<'f> {
-    /// The first band of an image.
-    pub(super) fn first_of(directory: &'f Directory) -> Self {
-        Self {
-            file: directory.file(),
-            image: directory.ifd(),
-            band: 0,
-        }
-    }
-
-    /// Reads the samples of a part, each converted. They are held once: a row of chunks is
-    /// decoded, copied to its place and let go.
-    pub(super) fn read<T: TiffSample, U>(
-        &self,
-        part: &Part,
-        convert: impl Fn(T) -> U,
-    ) -> Result<Vec<U>, RasterError> {
-        let height = self
-            .image
-            .tile_height()
-            .unwrap_or(self.image.rows_per_strip());
-        let [column, row, columns, rows] =
-            [part.column, part.row, part.columns, part.rows].map(|count| count as usize);
-        let samples = columns * rows;
-        let mut values = Vec::new();
-        values.try_reserve_exact(samples).map_err(|_| {
-            RasterError::AbsurdSize(format!(
-                "{samples} samples are more than this machine can hold"
-            ))
-        })?;
-        let rows_at_once = height.clamp(1, part.rows.max(1)) as usize;
-        for first in (row..row + rows).step_by(rows_at_once) {
-            let count = rows_at_once.min(row + rows - first);
-            let window = self
-                .file
-                .read_band_window_from_ifd::<T>(
-                    self.image, self.band, first, column, count, columns,
-                )
-                .map_err(fault)?;
-            let (window, _) = window.into_raw_vec_and_offset();
-            values.extend(window.into_iter().map(&convert));
-        }
-        Ok(values)
-    }
 }
 
 /// The samples of a part in chunks that a sparse file leaves out, those that a mask calls no data,

@@ -8,7 +8,8 @@ use std::ops::Range;
 use tiff_reader::ByteOrder;
 
 use super::fault::fault;
-use super::layout::{Chunk, Layout};
+use super::index::Chunk;
+use super::layout::Layout;
 use super::unpack;
 use crate::blocks::Part;
 use crate::samples::{Endian, with_samples};
@@ -76,7 +77,7 @@ pub(super) fn bytes(
         return Ok(vec![0; count]);
     }
     if let Some(unpacked) = &layout.unpacked {
-        return unpacked.read(layout, chunk, range);
+        return unpacked.read(chunk, range, |rows| unpack::each_row(layout, chunk, rows));
     }
     if range.end > chunk.bytes {
         return Err(RasterError::damaged(

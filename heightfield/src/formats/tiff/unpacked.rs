@@ -3,19 +3,20 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::layout::{Chunk, Layout};
-use super::unpack::Rows;
+use super::index::Chunk;
 use crate::RasterError;
-use crate::blocks::Part;
 use crate::disk_cache::{DiskCache, Unnamed};
 use crate::guard::guarded;
 use crate::input::read_exact_at;
 
 /// Bytes that are written at once.
 const AT_ONCE: usize = 1 << 20;
+
+/// Takes the rows of a strip or tile, one after the other.
+pub(super) type RowSink<'s> = dyn FnMut(&[u8]) -> Result<(), RasterError> + 's;
 
 /// Unpacked strips or tiles of an image.
 pub(super) struct Unpacked {
@@ -49,19 +50,17 @@ struct Slot {
 }
 
 impl Unpacked {
-    /// Nothing is unpacked yet. Two strips, or rows of tiles, are kept whatever their size, and as
-    /// many of what is transparent where that lies apart: a row of blocks may lie in two, and
-    /// nothing is to be unpacked again for each of its blocks. More of them are kept within the
-    /// bound of what is kept on disk.
+    /// An empty file for strips or tiles of `each` bytes: as many as the bound of the cache allows,
+    /// within `counts`.
     ///
     /// # Errors
     /// Why there is no place for them.
-    pub(super) fn new(layout: &Layout, disk: &DiskCache) -> io::Result<Self> {
-        let each = layout.chunk_size();
-        let bands = layout.bands_read().count() as u64;
-        let most = layout.chunks_of_band().saturating_mul(bands).max(1);
-        let least = most.min(2 * u64::from(layout.chunks_across()) * bands);
-        let count = (disk.most_bytes() / each.max(1)).clamp(least, most);
+    pub(super) fn new(
+        each: u64,
+        counts: RangeInclusive<u64>,
+        disk: &DiskCache,
+    ) -> io::Result<Self> {
+        let count = (disk.most_bytes() / each.max(1)).clamp(*counts.start(), *counts.end());
         let unnamed = disk.file_without_name(each.saturating_mul(count))?;
         let slots = (0..count).map(|_| None).collect();
         Ok(Self {
@@ -78,12 +77,12 @@ impl Unpacked {
         self.each.saturating_mul(self.count)
     }
 
-    /// Bytes of a strip or tile, counted from its first one.
+    /// Bytes of a strip or tile, counted from its first one. `unpack` hands over its rows.
     pub(super) fn read(
         &self,
-        layout: &Layout,
         chunk: &Chunk,
         range: Range<u64>,
+        unpack: impl FnOnce(&mut RowSink<'_>) -> Result<(), RasterError>,
     ) -> Result<Vec<u8>, RasterError> {
         if let Some(read) = self.read_kept(chunk, &range) {
             return read;
@@ -96,7 +95,7 @@ impl Unpacked {
             return read;
         }
         let index = self.kept().leave_oldest();
-        let slot = self.unpack(layout, chunk, self.each * index as u64);
+        let slot = self.unpack(chunk, self.each * index as u64, unpack);
         self.kept().slots[index] = Some(slot);
         let read = self.read_kept(chunk, &range);
         read.unwrap_or_else(|| Err(RasterError::damaged("TIFF: nothing was unpacked")))
@@ -130,11 +129,14 @@ impl Unpacked {
 
     /// Writes the rows of a strip or tile to a place. What is wrong with it is known from then
     /// on, and not tried again.
-    fn unpack(&self, layout: &Layout, chunk: &Chunk, place: u64) -> Slot {
+    fn unpack(
+        &self,
+        chunk: &Chunk,
+        place: u64,
+        unpack: impl FnOnce(&mut RowSink<'_>) -> Result<(), RasterError>,
+    ) -> Slot {
         let mut bytes = 0;
-        let done = guarded(super::FORMAT.name, || {
-            self.write(layout, chunk, place, &mut bytes)
-        });
+        let done = guarded(super::FORMAT.name, || self.write(place, &mut bytes, unpack));
         Slot {
             is_of: (chunk.place, chunk.covers.rows),
             bytes,
@@ -146,12 +148,12 @@ impl Unpacked {
         }
     }
 
+    /// Writes rows to a place; after an error those before it.
     fn write(
         &self,
-        layout: &Layout,
-        chunk: &Chunk,
         place: u64,
         written: &mut u64,
+        unpack: impl FnOnce(&mut RowSink<'_>) -> Result<(), RasterError>,
     ) -> Result<(), RasterError> {
         let no_room = |error: io::Error| {
             let megabytes = self.each.div_ceil(1_000_000);
@@ -161,22 +163,15 @@ impl Unpacked {
         };
         let file = &self.unnamed.file;
         let mut to = BufWriter::with_capacity(AT_ONCE, Placed { file, place });
-        let mut rows = Rows::of(layout, chunk)?;
-        let mut came = 0;
-        let mut fault = None;
-        for _ in 0..chunk.covers.rows {
-            match rows.next() {
-                Ok(row) => to.write_all(row).map_err(no_room)?,
-                Err(error) => {
-                    fault = Some(error);
-                    break;
-                }
-            }
-            came += layout.row_bytes();
-        }
+        let mut count = 0;
+        let unpacked = unpack(&mut |row| {
+            to.write_all(row).map_err(no_room)?;
+            count += row.len() as u64;
+            Ok(())
+        });
         to.flush().map_err(no_room)?;
-        *written = came;
-        fault.map_or(Ok(()), Err)
+        *written = count;
+        unpacked
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {
@@ -228,17 +223,6 @@ fn write_at(file: &File, bytes: &[u8], place: u64) -> io::Result<usize> {
 #[cfg(windows)]
 fn write_at(file: &File, bytes: &[u8], place: u64) -> io::Result<usize> {
     std::os::windows::fs::FileExt::seek_write(file, bytes, place)
-}
-
-/// Checks that of an image in one strip or tile, which is to be unpacked, the first row is there.
-pub(super) fn check_first(layout: &Layout) -> Result<(), RasterError> {
-    let all = Part::whole(layout.columns, layout.rows);
-    if layout.unpacked.is_some() && layout.chunks_of_band() == 1 {
-        for chunk in layout.chunks_in(&all) {
-            Rows::of(layout, &chunk)?.next()?;
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -7,10 +7,11 @@ use flate2::write::ZlibEncoder;
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 
 use super::super::images;
-use super::super::layout::Wanted;
+use super::super::layout::{Layout, Wanted};
 use super::super::made::{BAND, BANDS, KINDS, Made, ONE_STRIP, Packing, SIZE, check, open, value};
-use super::super::{open as open_file, uncompressed};
+use super::super::{open as open_file, uncompressed, unpack};
 use super::*;
+use crate::blocks::Part;
 use crate::input::FileBytes;
 use crate::samples::{SampleValue, with_samples};
 
@@ -54,7 +55,7 @@ fn layout(made: &Made, bytes: Vec<u8>, most_bytes: u64) -> (tempfile::TempDir, L
     let full = images::full(&file).expect("an image");
     let asked = (made.bands > 1).then_some(BAND);
     let mut layout = Layout::read(&full, Wanted::Heights(asked)).expect("a layout");
-    layout.unpack_into(&disk).expect("a file");
+    unpack::into_file(&mut layout, &disk).expect("a file");
     (folder, layout)
 }
 
@@ -177,7 +178,7 @@ fn what_a_row_of_blocks_lies_in_is_at_hand_after_its_first_block() {
             // Its third band tells what is transparent.
             layout.alpha = Some(2);
             let disk = DiskCache::at(folder.path(), 1);
-            layout.unpack_into(&disk).expect("unpacked");
+            unpack::into_file(&mut layout, &disk).expect("unpacked");
         }
         let bands: Vec<_> = layout.bands_read().collect();
         for column in [0, 1100] {
@@ -271,6 +272,6 @@ fn what_lerc_has_packed_is_not_unpacked_by_rows() {
     let mut layout = Layout::read(&full, Wanted::Heights(None)).expect("a layout");
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1);
-    let error = layout.unpack_into(&disk).expect_err("it comes as a whole");
+    let error = unpack::into_file(&mut layout, &disk).expect_err("it comes as a whole");
     assert!(error.to_string().contains("lerc"), "{error}");
 }

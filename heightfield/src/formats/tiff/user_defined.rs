@@ -3,7 +3,7 @@
 
 use geotiff_core::geokeys::{GEODETIC_CRS_TYPE, GEOG_CITATION};
 
-use super::georef::GeoKeys;
+use super::geo_keys::GeoKeys;
 use crate::Globe;
 use crate::crs::{Datum, ReferenceSystem, Unit};
 use crate::formats::gdal;

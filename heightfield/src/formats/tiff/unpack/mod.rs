@@ -7,13 +7,17 @@
 mod codec;
 mod stored;
 
-use std::io::{ErrorKind, Read};
+use std::io::{self, ErrorKind, Read};
+use std::sync::Arc;
 
 use tiff_reader::filters::fix_endianness_and_predict;
 
 use super::fault::fault;
-use super::layout::{Chunk, Layout, MAX_DECODED};
+use super::index::Chunk;
+use super::layout::{Layout, MAX_DECODED};
+use super::unpacked::{RowSink, Unpacked};
 use crate::blocks::{MAX_BLOCK_BYTES, Part};
+use crate::disk_cache::DiskCache;
 use crate::samples::{Endian, SampleValue, with_samples};
 use crate::{RasterError, Samples};
 use stored::StoredBytes;
@@ -28,6 +32,47 @@ pub(super) const ENDIAN: Endian = match cfg!(target_endian = "big") {
 pub(super) fn suits(layout: &Layout) -> bool {
     codec::is_known(layout.directory.ifd().compression())
         && (1..=MAX_BLOCK_BYTES).contains(&layout.row_bytes())
+}
+
+/// Has strips or tiles unpacked into a file on disk when they are touched. Two strips, or rows of
+/// tiles, are kept whatever their size, and as many of the alpha band where that lies apart: a row of
+/// blocks may lie in two, and none is unpacked again for each of its blocks. More of them are kept
+/// within the bound of the cache.
+///
+/// # Errors
+/// Why that cannot be.
+pub(super) fn into_file(layout: &mut Layout, disk: &DiskCache) -> io::Result<()> {
+    if !suits(layout) {
+        let what = format!("what {} has packed comes as a whole", layout.compression.0);
+        return Err(io::Error::other(what));
+    }
+    let bands = layout.bands_read().count() as u64;
+    let all = layout.chunks_of_band().saturating_mul(bands).max(1);
+    let least = all.min(2 * u64::from(layout.chunks_across()) * bands);
+    let file = Unpacked::new(layout.chunk_size(), least..=all, disk)?;
+    layout.unpacked = Some(Arc::new(file));
+    Ok(())
+}
+
+/// Checks that of an image in one strip or tile, which is unpacked on disk, the first row is there.
+pub(super) fn check_first(layout: &Layout) -> Result<(), RasterError> {
+    let all = Part::whole(layout.columns, layout.rows);
+    if layout.unpacked.is_some() && layout.chunks_of_band() == 1 {
+        for chunk in layout.chunks_in(&all) {
+            Rows::of(layout, &chunk)?.next()?;
+        }
+    }
+    Ok(())
+}
+
+/// Hands over the rows of a strip or tile.
+pub(super) fn each_row(
+    layout: &Layout,
+    chunk: &Chunk,
+    take: &mut RowSink<'_>,
+) -> Result<(), RasterError> {
+    let mut rows = Rows::of(layout, chunk)?;
+    (0..chunk.covers.rows).try_for_each(|_| take(rows.next()?))
 }
 
 /// The rows of a strip or tile.

@@ -1,0 +1,78 @@
+//! The texts of XML, by GDAL's own reader.
+
+use crate::error::Error;
+use crate::functions::XmlNode;
+use crate::loaded::Loaded;
+use crate::text::{from_c, to_c};
+
+/// `CXT_Text` and `CXT_Attribute`.
+const TEXT: i32 = 1;
+const ATTRIBUTE: i32 = 2;
+const RELATIVE: &str = "relativeToVRT";
+
+/// A text of a VRT, which may name a file.
+#[derive(Debug)]
+pub(crate) struct Text {
+    /// The element or attribute that it is in.
+    pub(crate) node: String,
+    pub(crate) value: String,
+    /// Whether it is a name beside the VRT.
+    pub(crate) is_relative: bool,
+}
+
+/// The texts of XML, each with the name of the element or attribute that it is in.
+///
+/// # Errors
+/// [`Error::Refused`], [`Error::ZeroByte`].
+pub(crate) fn texts(library: &Loaded, xml: &str) -> Result<Vec<Text>, Error> {
+    let xml = to_c(xml)?;
+    let functions = &library.functions;
+    let mut texts = Vec::new();
+    // SAFETY: the nodes are GDAL's until they are given back, once; none is changed.
+    unsafe {
+        (functions.CPLErrorReset)();
+        let root = (functions.CPLParseXMLString)(xml.as_ptr());
+        if root.is_null() {
+            return Err(library.refused("it is no XML"));
+        }
+        let mut open: Vec<(*const XmlNode, String, bool)> = vec![(root, String::new(), false)];
+        while let Some((node, inside, is_relative)) = open.pop() {
+            let Some(node) = node.as_ref() else {
+                continue;
+            };
+            let value = from_c(node.value).unwrap_or_default();
+            open.push((node.next, inside.clone(), is_relative));
+            match node.kind {
+                TEXT => texts.push(Text {
+                    node: inside,
+                    value,
+                    is_relative,
+                }),
+                _ => open.push((node.child, value, is_relative_to_vrt(node))),
+            }
+        }
+        (functions.CPLDestroyXMLNode)(root);
+    }
+    Ok(texts)
+}
+
+/// Whether an element has the attribute with which a VRT says that a name is one beside it.
+///
+/// # Safety
+/// The node is GDAL's.
+unsafe fn is_relative_to_vrt(element: &XmlNode) -> bool {
+    // SAFETY: by the caller.
+    unsafe {
+        let mut child = element.child.as_ref();
+        while let Some(node) = child {
+            let is_it = node.kind == ATTRIBUTE
+                && from_c(node.value).is_some_and(|name| name.eq_ignore_ascii_case(RELATIVE));
+            if is_it {
+                let text = node.child.as_ref().and_then(|text| from_c(text.value));
+                return text.is_some_and(|text| text.trim().parse().unwrap_or(0) != 0);
+            }
+            child = node.next.as_ref();
+        }
+    }
+    false
+}

@@ -1,0 +1,19 @@
+//! The unit of a reference system's coordinates.
+
+/// Unit of a coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Unit {
+    /// Degrees in a unit.
+    Angle(f64),
+    /// Metres in a unit, where known.
+    Length(Option<f64>),
+}
+
+impl Unit {
+    /// An angle of radians; of a degree or a grad, where rounding is all that is between.
+    pub(super) fn of_radians(radians: f64) -> Self {
+        let degrees = radians.to_degrees();
+        let whole = |part: &f64| (degrees / part - 1.0).abs() < 1e-9;
+        Self::Angle([1.0, 0.9].into_iter().find(whole).unwrap_or(degrees))
+    }
+}
