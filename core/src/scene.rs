@@ -71,11 +71,11 @@ impl Scene {
 /// Another view of the terrain for an arm that stays armed: another place, scale, height
 /// or stiffness. It is put in while the clutch is open, and felt when that has closed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct View {
+pub struct SceneChange {
     /// Counts the views of a scene from 1 on, wrapping; samples carry it.
     pub number: u8,
     /// The field, its scale and the law. Its home is where the device would begin if it
-    /// were restarted; while it runs the home follows from [`View::hip`].
+    /// were restarted; while it runs the home follows from [`SceneChange::hip`].
     pub scene: Scene,
     /// The haptic interface point in the view, cells, for the tip where it was when the clutch
     /// opened, or where it is when that closes ([`ClutchHold`](crate::clutch::ClutchHold)). In contact
@@ -112,7 +112,7 @@ pub struct TickRecord {
     /// Force commanded, newtons: east, north, up. Zero unless the amplifiers
     /// are on; in a replay, what the scene's law makes.
     pub force_n: Vec3,
-    /// The view in which this was felt ([`View::number`]); 0 for the scene as it was taken.
+    /// The view in which this was felt ([`SceneChange::number`]); 0 for the scene as it was taken.
     pub view: u8,
     /// What the proxy is doing.
     pub state: ContactState,

@@ -251,7 +251,7 @@ pub fn folder_of(path: &Path) -> &Path {
 
 /// What a process that was killed had written of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LeftBehind {
+pub struct PartialFile {
     /// Where it is.
     pub path: PathBuf,
     /// How long it is, bytes.
@@ -261,7 +261,7 @@ pub struct LeftBehind {
 /// What killed processes left of the file at `path`, by name. Nothing here touches
 /// it.
 #[must_use]
-pub fn left_behind(path: &Path) -> Vec<LeftBehind> {
+pub fn partial_files(path: &Path) -> Vec<PartialFile> {
     let beginning = beginning_of_partial(path);
     let beside = folder_of(path).read_dir().into_iter().flatten().flatten();
     let partial = beside.filter(|entry| is_partial(&beginning, &entry.file_name()));
@@ -270,7 +270,7 @@ pub fn left_behind(path: &Path) -> Vec<LeftBehind> {
         .filter(|path| is_nobodys(path))
         .filter_map(|path| {
             let bytes = path.metadata().ok()?.len();
-            Some(LeftBehind { path, bytes })
+            Some(PartialFile { path, bytes })
         })
         .collect();
     found.sort_by(|a, b| a.path.cmp(&b.path));
@@ -349,12 +349,12 @@ mod tests {
         let mut output = begin();
         output.write_all(b"eight by").expect("written");
         drop(output);
-        assert_eq!(left_behind(&path), [], "it was not wanted");
+        assert_eq!(partial_files(&path), [], "it was not wanted");
         let mut output = begin();
         output.write_all(b"eight by").expect("written");
         assert!(output.write_all(b"eight by").is_err(), "too many");
         drop(output);
-        let [left] = &left_behind(&path)[..] else {
+        let [left] = &partial_files(&path)[..] else {
             panic!("none, or several");
         };
         assert_eq!(left.bytes, 8);
@@ -367,7 +367,7 @@ mod tests {
         let mut alive = Output::create(&path).expect("created");
         alive.write_all(b"half").expect("written");
         alive.flush().expect("written");
-        assert_eq!(left_behind(&path), []);
+        assert_eq!(partial_files(&path), []);
         let dead = folder.path().join("out.csv.a1B2c3.partial");
         std::fs::write(&dead, "t_s,x_mm").expect("written");
         // Of other files, or of another name.
@@ -379,11 +379,11 @@ mod tests {
         ] {
             std::fs::write(folder.path().join(other), "x").expect("written");
         }
-        let found = LeftBehind {
+        let found = PartialFile {
             path: dead.clone(),
             bytes: 8,
         };
-        assert_eq!(left_behind(&path), [found]);
+        assert_eq!(partial_files(&path), [found]);
         alive.finish().expect("finished");
         assert_eq!(std::fs::read(&dead).expect("kept"), b"t_s,x_mm");
     }

@@ -8,7 +8,7 @@ use clap::Parser;
 use hapterra::cli::Failure;
 use hapterra::cli::options::exaggeration::Exaggeration;
 use hapterra::cli::options::terrain_file::{ReadingOptions, assumed_unit};
-use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, View, ViewOptions};
+use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, Placement, PlacementOptions};
 use hapterra::terrain::{HapticCells, INTERPOLATED_STEP, Terrain as Laid};
 use hapterra_core::phantom::Calibration;
 use hapterra_touch::{Block, Heights, Terrain as Touched, Unread};
@@ -119,14 +119,14 @@ impl Opened {
         let read = Arc::clone(&raster);
         let over = Over::try_new(raster, |raster| {
             let grid = target.grid(raster, HapticCells::Square)?;
-            let options = ViewOptions {
+            let options = PlacementOptions {
                 target,
                 sizing: size.sizing(),
                 heights: size.heights(),
                 level: Some(0),
             };
             // What lies where in the reach of an arm does not matter here.
-            let view = View::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options)?;
+            let view = Placement::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options)?;
             Ok::<_, Failure>(view.terrain(grid)?)
         });
         // What has not come is no hole.

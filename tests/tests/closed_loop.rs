@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::PlacedTerrain;
-use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
+use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script, Touch};
 use hapterra::replay::Record;
 use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Figures;
@@ -61,7 +61,7 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
     let home_mm = [100.0, 100.0, 24.0];
     // With all its weight, which the device holds.
     let model = PhantomModel::premium_1_5();
-    let rig = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
+    let rig = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
     let law = SurfaceParams {
         stiffness_n_per_mm,
         max_force_n: 8.5,

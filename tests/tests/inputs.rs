@@ -97,7 +97,7 @@ fn all_that_is_promised_is_felt_and_judged() {
     for number in 0..SCENES {
         let scene = Scene::random(SEED, number);
         let mut judge = Judge::new(&scene.terrain);
-        let Ok(seen) = scene.feel(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
+        let Ok(seen) = scene.step(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
             panic!("scene {number} does not settle");
         };
         for (i, now) in seen.iter().enumerate() {

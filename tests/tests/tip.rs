@@ -70,9 +70,9 @@ fn ground<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     }
 }
 
-fn feel(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
+fn step(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     let hip = replayer.terrain().scale().to_grid(hip_mm);
-    replayer.feel(hip.expect("addressable")).expect("felt")
+    replayer.step(hip.expect("addressable")).expect("felt")
 }
 
 /// The terrain that a ball of a radius in cells feels, and a point.
@@ -103,7 +103,7 @@ fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
     for seed in 0..3 {
         let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
         for hip_mm in raised(wander(point, seed, rows, 0.5), &terrains) {
-            let sample = feel(&mut replayer, hip_mm);
+            let sample = step(&mut replayer, hip_mm);
             if sample.state == ContactState::Touching {
                 let proxy = terrain.scale().to_mm(&sample.proxy);
                 let proxy = proxy.map(|mm| mm / scale.cell_mm());
@@ -191,10 +191,10 @@ fn felt_passes(radius: f64, speed: f64, (most_beside, friction): (f64, f32)) -> 
         let share = (f64::from(*pass) + 0.5) / 20.0;
         let beside = radius.max(0.5) * most_beside * (2.0 * share - 1.0);
         let mut x = 15.0 + share * speed;
-        feel(&mut replayer, [x, 30.0 + beside, 40.0]);
+        step(&mut replayer, [x, 30.0 + beside, 40.0]);
         let mut felt = 0.0f32;
         while x < 105.0 {
-            let sample = feel(&mut replayer, [x, 30.0 + beside, 10.0]);
+            let sample = step(&mut replayer, [x, 30.0 + beside, 10.0]);
             felt = felt.max(sample.force_n.length());
             x += speed;
         }
@@ -240,7 +240,7 @@ fn friction_holds_a_ball_at_a_pole_at_any_speed() {
 /// Steps of the force of more than 0.05 N over a path, by what feels it.
 fn steps_of_force(terrain: &Terrain<'_>, path: &[[f64; 3]]) -> usize {
     let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
-    let forces = path.iter().map(|hip| feel(&mut replayer, *hip).force_n);
+    let forces = path.iter().map(|hip| step(&mut replayer, *hip).force_n);
     let forces: Vec<_> = forces.collect();
     let is_step = |pair: &&[Vec3]| (pair[1] - pair[0]).length() > 0.05;
     forces.windows(2).filter(is_step).count()

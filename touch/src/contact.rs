@@ -60,7 +60,7 @@ pub enum State {
     /// The proxy is on the surface, and the HIP below it.
     Touching,
     /// The surface that the proxy was on has come to an end, and the last force fades away.
-    Fading,
+    Releasing,
     /// The HIP is below the surface and has not been above it, so that the side it came from is
     /// unknown: no force until it has been above `surface_mm`. A path may begin here, or go on here
     /// from a hole or from outside.
@@ -252,8 +252,8 @@ impl Contact {
         match sample.state {
             ContactState::Free => State::Free,
             ContactState::Touching => State::Touching,
-            ContactState::Fading => State::Fading,
-            ContactState::Waiting => match self.terrain.height_mm(east, north) {
+            ContactState::Releasing => State::Releasing,
+            ContactState::Unseeded => match self.terrain.height_mm(east, north) {
                 Some(surface_mm) if up < surface_mm => State::BelowGround { surface_mm },
                 _ => State::Outside,
             },

@@ -233,7 +233,7 @@ impl Terrain {
     ///
     /// Felt cells are a 32nd of the radius, and the window of a contact has 512 of them. A proxy that
     /// stays more than 15 radii behind its HIP, east or north, is let go
-    /// ([`State::Fading`](crate::State::Fading)), where a replay may begin anew beside the HIP.
+    /// ([`State::Releasing`](crate::State::Releasing)), where a replay may begin anew beside the HIP.
     ///
     /// ```
     /// use hapterra_touch::Terrain;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::ValueHint;
 use hapterra::cli::options::quantity::{DAMPING, STIFFNESS};
 use hapterra::cli::options::surface::{SurfaceChoice, SurfaceOptions, choice};
-use hapterra::cli::terminal::{interrupt, left_behind, progress};
+use hapterra::cli::terminal::{interrupt, partial_files, progress};
 use hapterra::cli::{Failure, OrHint as _, report};
 use hapterra::output::{Output, OutputError};
 use hapterra_core::force::{Controller, Damping};
@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.out.is_some() && args.out == args.picture {
         return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
     }
-    left_behind::tell(
+    partial_files::tell(
         { args.out.iter() }
             .chain(&args.picture)
             .map(PathBuf::as_path),

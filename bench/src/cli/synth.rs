@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueHint;
 use hapterra::cli::options::input::parse_size;
-use hapterra::cli::terminal::{interrupt, left_behind, progress};
+use hapterra::cli::terminal::{interrupt, partial_files, progress};
 use hapterra::cli::{Failure, report};
 use hapterra::synth::{Grid, Kind, Synth, write};
 
@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rows,
         cell_m: args.cell_m,
     };
-    left_behind::tell([args.out.as_path()]);
+    partial_files::tell([args.out.as_path()]);
     let progress = progress::bar(Some(rows.into()), "{bar:30} {pos}/{len} rows, {eta} left");
     interrupt::listen();
     let written = write(&args.out, &synth, &grid, &mut || {

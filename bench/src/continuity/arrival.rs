@@ -92,13 +92,13 @@ fn felt(due: u32, underlay: Option<Underlay>) -> Vec<Answer> {
             converged: felt.converged,
             displacement: felt.displacement.to_array(),
         });
-        let focus = RequestHint {
+        let hint = RequestHint {
             missing_tile: felt.missing_tile,
             proxy: felt.proxy.column(),
             hip: hip.grid.column(),
             velocity: [STEP as f32, 0.0],
         };
-        coming.extend(std::iter::from_fn(|| requester.next_request(tick, &focus)));
+        coming.extend(std::iter::from_fn(|| requester.next_request(tick, &hint)));
         // The tile that the HIP begins over comes at once.
         let is_here = |key: &TileKey| key.index.col == 0 || tick >= approach + due;
         for key in coming.extract_if(.., |key| is_here(key)) {

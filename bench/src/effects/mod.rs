@@ -11,8 +11,8 @@
 
 mod arm;
 mod damping;
+mod effect_tick;
 mod energy;
-mod felt;
 mod foaw;
 mod friction;
 mod law;

@@ -4,7 +4,7 @@ use hapterra_core::force::{Damping, Texture};
 use hapterra_core::guard::Fault;
 use hapterra_core::rate::TickRate;
 
-use super::contact_loop::{self, Felt, HOME, PLANE_MM};
+use super::contact_loop::{self, HOME, LoopSettings, PLANE_MM};
 use super::entry::{Entered, Entry};
 use super::grasp::Grasp;
 use super::map::Column;
@@ -171,7 +171,7 @@ impl Setting {
         clutch_s: Option<[f64; 2]>,
         look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
     ) {
-        let felt = Felt {
+        let felt = LoopSettings {
             rate: self.rate,
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             damping: self.damping,

@@ -13,7 +13,6 @@
 mod case;
 mod chain;
 mod cog;
-mod felt;
 mod hand;
 mod line;
 mod meter;
@@ -23,6 +22,7 @@ mod row;
 mod run;
 #[cfg(feature = "remote")]
 mod server;
+mod tick_counts;
 mod way;
 
 pub use crate::effects::NotMeasured;

@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::passivity::{MAX_MJ, Moment, Motion, Passivity, Takes};
-use super::{FeltWith, SurfaceParams, clamp_length};
+use super::{EffectContext, SurfaceParams, clamp_length};
 use crate::scalar::{larger, smaller};
 
 /// What a shaded force may give on the way to an edge, and take beyond it, before it is turned
@@ -77,7 +77,7 @@ impl Damper {
     /// Of a scene. Points have no hand that energy could be given to.
     // A call: it is made by two, once for a scene.
     #[inline(never)]
-    pub(crate) fn of(law: &SurfaceParams, felt: &FeltWith) -> Option<Self> {
+    pub(crate) fn of(law: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
         let is_controlled = felt.arm && law.is_controlled();
         let controller = is_controlled.then(|| Passivity::new(felt));
         (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {

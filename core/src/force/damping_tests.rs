@@ -16,8 +16,8 @@ fn damper(law: &SurfaceParams, hz: u32) -> Option<Damper> {
 }
 
 /// With an arm.
-fn felt(hz: u32, latency_s: f32) -> FeltWith {
-    FeltWith {
+fn felt(hz: u32, latency_s: f32) -> EffectContext {
+    EffectContext {
         cell_mm: 1.0,
         rate: TickRate::new(hz).expect("a rate"),
         latency_s,
@@ -69,7 +69,7 @@ fn the_controller_acts_on_every_arm_unless_it_is_off() {
     }
     assert_eq!(SurfaceParams::PREMIUM.damping.controller, Controller::On);
     // Points have no hand.
-    let points = FeltWith {
+    let points = EffectContext {
         arm: false,
         ..felt(1000, 0.1e-3)
     };

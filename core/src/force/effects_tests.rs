@@ -16,8 +16,8 @@ const LAW: SurfaceParams = SurfaceParams {
     ..SurfaceParams::PREMIUM
 };
 
-fn felt() -> FeltWith {
-    FeltWith {
+fn felt() -> EffectContext {
+    EffectContext {
         cell_mm: 1.0,
         rate: TickRate::DEFAULT,
         latency_s: 0.0,

@@ -2,7 +2,7 @@
 //!
 //! The host sorts the ground into classes, and tells the device which material of the table
 //! each sample has; so the device knows nothing of a file's own classes.
-//! `in_force.rs` beside this file has how one material follows another.
+//! `active_material.rs` beside this file has how one material follows another.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,10 @@
 //! From proxy and haptic interface point to newtons.
 
+mod active_material;
 mod damping;
 mod depth;
+mod effect_context;
 mod effects;
-mod felt_with;
-mod in_force;
 mod material;
 mod passivity;
 mod relief;
@@ -22,8 +22,8 @@ pub use crate::scalar::clamp_length;
 use crate::scalar::smaller;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
+pub(crate) use effect_context::EffectContext;
 pub(crate) use effects::Effects;
-pub(crate) use felt_with::FeltWith;
 pub use material::{MATERIAL_CHANGE_S, Material, MaterialTable};
 pub(crate) use passivity::{Moment, Shares};
 pub use shading::{Shader, Shading};

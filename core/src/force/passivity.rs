@@ -15,7 +15,7 @@ use glam::Vec3;
 
 use super::depth::Depth;
 use super::yielding::RateLimitSoftening;
-use super::{FeltWith, Spring, SurfaceParams};
+use super::{EffectContext, Spring, SurfaceParams};
 use crate::scalar::{larger, smaller};
 
 /// More than this is forgotten, mJ.
@@ -122,7 +122,7 @@ impl Shares {
 }
 
 impl Passivity {
-    pub(super) fn new(felt: &FeltWith) -> Self {
+    pub(super) fn new(felt: &EffectContext) -> Self {
         let tick_s = felt.rate.tick_s();
         let latency_s = felt.latency_s.max(0.0).min(MAX_LATE as f32 * tick_s);
         let late = latency_s / tick_s;

@@ -117,7 +117,7 @@ pub struct Link<'t, const D: usize> {
     /// nothing has changed since. Its search is long, so it does not run at every
     /// tick.
     nothing_to_request_at: Option<u32>,
-    focus: Option<RequestHint>,
+    request_hint: Option<RequestHint>,
     last_record: QueuedTick,
     spare: Vec<&'t mut Tile, SPARES>,
     points: Deque<HipCommand, POINTS_AHEAD>,
@@ -154,7 +154,7 @@ impl<'t, const D: usize> Link<'t, D> {
             clutch: ClutchOfHost::default(),
             requester: TileRequester::new(),
             nothing_to_request_at: None,
-            focus: None,
+            request_hint: None,
             last_record: QueuedTick::default(),
             spare: spare.into_iter().collect(),
             points: Deque::new(),

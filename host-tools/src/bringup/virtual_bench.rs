@@ -217,7 +217,7 @@ impl VirtualBench {
     }
 
     /// Feels the way to a point, from now on.
-    pub(super) fn feel(&mut self, to_m: DVec3) {
+    pub(super) fn step(&mut self, to_m: DVec3) {
         (self.goal_m, self.speed_m_s) = (to_m, SLOW_M_S);
     }
 

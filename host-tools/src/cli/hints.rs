@@ -149,7 +149,7 @@ impl Hint for ReplayError {
                 "a trajectory is CSV: the header t_s,x_mm,y_mm,z_mm, then four numbers a line"
             }
             Self::Output(_) => "name a file in a folder that you may write to with -o",
-            Self::View { .. } => {
+            Self::Placement { .. } => {
                 "replay it on the terrain that it was recorded on; --ignore-settings takes its path alone"
             }
             Self::Interrupted => "nothing was written",

@@ -8,7 +8,7 @@ use super::failure::{Failure, OrHint};
 use super::options::placing;
 use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT, LinkStats};
 use crate::picture::{GroundFacts, SessionPicture, Surface};
-use crate::place::{View, coordinates_in_words};
+use crate::place::{Placement, coordinates_in_words};
 use crate::replay::Record;
 use crate::telemetry::Figures;
 use crate::terrain::Terrain;
@@ -109,7 +109,7 @@ impl SessionSummary {
     pub(super) fn draw(
         &self,
         path: &Path,
-        (terrain, view): (&Terrain<'_>, &View),
+        (terrain, view): (&Terrain<'_>, &Placement),
         title: &str,
         records: &[Record],
     ) -> Result<(), Failure> {

@@ -10,7 +10,7 @@ use super::failure::Failure;
 use super::options::device::Device;
 use super::report::put;
 use super::session_summary;
-use super::terminal::voice::{say, show};
+use super::terminal::writer::{say, show};
 use crate::link::EMULATED;
 use heightfield::shown::shown;
 

@@ -111,7 +111,7 @@ impl Bench<'_> {
             epoch: 5_000 + u32::from(number),
             ..*self.client.scene()
         };
-        let view = View {
+        let view = SceneChange {
             number,
             scene,
             hip: GridPoint::default(),
@@ -676,7 +676,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
         bench.pass(ms(500)).expect("in time");
         let said = bench.said();
         assert_eq!(
-            (count_of(&said, "View"), count_of(&said, "Scene")),
+            (count_of(&said, "SceneChange"), count_of(&said, "Scene")),
             (1, 0),
             "{said:?}"
         );
@@ -694,7 +694,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
         bench.pass(ms(600)).expect("in time");
         let said = bench.said();
         assert_eq!(
-            (count_of(&said, "View"), count_of(&said, "Scene")),
+            (count_of(&said, "SceneChange"), count_of(&said, "Scene")),
             (0, 0),
             "{said:?}"
         );

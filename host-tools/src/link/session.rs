@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hapterra_core::scene::{HipCommand, Scene, View};
+use hapterra_core::scene::{HipCommand, Scene, SceneChange};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::request::Request;
 
@@ -144,7 +144,7 @@ impl<'t> Session<'t> {
     ///
     /// # Errors
     /// [`LinkError::Gone`].
-    pub fn put_view(&mut self, view: View, terrain: Terrain<'t>) -> Result<(), LinkError> {
+    pub fn put_view(&mut self, view: SceneChange, terrain: Terrain<'t>) -> Result<(), LinkError> {
         let line = &mut self.line;
         self.client
             .put_view(line.now(), view, terrain, &mut line.out);
@@ -155,8 +155,8 @@ impl<'t> Session<'t> {
     ///
     /// # Errors
     /// [`LinkError::Gone`].
-    pub fn feel(&mut self, point: HipCommand) -> Result<(), LinkError> {
-        self.client.feel(self.line.now(), point, &mut self.line.out);
+    pub fn step(&mut self, point: HipCommand) -> Result<(), LinkError> {
+        self.client.step(self.line.now(), point, &mut self.line.out);
         self.flush()
     }
 

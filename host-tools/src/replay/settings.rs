@@ -38,7 +38,7 @@ pub struct Settings {
     /// The terrain file.
     pub terrain: TerrainFile,
     /// What of it was felt, where and how large.
-    pub felt: Felt,
+    pub felt: RenderedTerrain,
     /// The force law and the contact rule.
     pub force: Force,
     /// What the ground was made of, where that was not the same everywhere; the law is then
@@ -50,7 +50,7 @@ pub struct Settings {
     /// The views that were put in while it was felt, in their order; the one of the
     /// beginning is [`Self::felt`] and [`Self::force`].
     #[serde(rename = "view", default, skip_serializing_if = "Vec::is_empty")]
-    pub views: Vec<ViewSettings>,
+    pub views: Vec<PlacementSettings>,
     /// The marks that were made while it was felt, in their order.
     #[serde(rename = "mark", default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<Mark>,
@@ -58,7 +58,7 @@ pub struct Settings {
 
 /// A view that was put in while a terrain was felt.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ViewSettings {
+pub struct PlacementSettings {
     /// What the rows of this view have in the column `view`, from 1 on.
     pub number: u32,
     /// Side of a felt cell of level 0 on the ground, m, where the file knows it; none also in
@@ -102,10 +102,10 @@ pub struct ViewSettings {
 /// The views alone, as TOML has them.
 #[derive(Serialize)]
 struct Views<'v> {
-    view: [&'v ViewSettings; 1],
+    view: [&'v PlacementSettings; 1],
 }
 
-impl ViewSettings {
+impl PlacementSettings {
     /// A view by its number and terrain.
     #[must_use]
     pub fn new(number: u32, terrain: &Terrain<'_>, laid: &Laid) -> Self {
@@ -172,7 +172,7 @@ pub struct TerrainFile {
 
 /// What was felt of a terrain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Felt {
+pub struct RenderedTerrain {
     /// Which cells of the file.
     pub cells: HapticCells,
     /// Felt samples of level 0, west to east and south to north.
@@ -329,7 +329,7 @@ impl Settings {
                     .and_then(ReferenceSystem::code)
                     .map(|code| format!("EPSG:{code}")),
             },
-            felt: Felt {
+            felt: RenderedTerrain {
                 cells: grid.cells(),
                 samples: [grid.columns(), grid.rows()],
                 cell_m: grid.side_m(),
@@ -465,7 +465,7 @@ impl Device {
     }
 }
 
-impl Felt {
+impl RenderedTerrain {
     /// In what the cells of the same heights differ, where the same kind is felt.
     fn difference(&self, grid: &HapticGrid<'_>) -> Option<String> {
         if grid.cells() != self.cells {
@@ -506,7 +506,7 @@ mod tests {
     use hapterra_core::force::Pattern;
 
     use super::*;
-    use crate::place::View;
+    use crate::place::Placement;
     use heightfield::Raster;
 
     fn raster(height: f32) -> Raster {
@@ -569,7 +569,7 @@ mod tests {
         settings = Settings::new("t.tif", &terrain, (law, Rule::Swept), None, settings.device);
         assert_eq!(settings.law(), law);
         let (grid, scale) = (terrain.grid(), terrain.scale_of_level_0());
-        let view = View {
+        let view = Placement {
             home_mm: [1.0; 3],
             home_ground: [0.0; 2],
             scale,
@@ -580,7 +580,7 @@ mod tests {
             heights_mm: [0.0; 2],
             reach_mm: [0.0; 4],
         };
-        let view = ViewSettings::new(1, &terrain, &Laid { view, law });
+        let view = PlacementSettings::new(1, &terrain, &Laid { view, law });
         assert_eq!(view.law(), law);
         settings.views = vec![view];
         let text = settings.to_toml();

@@ -1,6 +1,6 @@
 //! Who looks on while a terrain is served.
 
-use hapterra_core::scene::View;
+use hapterra_core::scene::SceneChange;
 
 use crate::link::{Ask, Event, LinkStats};
 use crate::terrain::Terrain;
@@ -19,7 +19,7 @@ pub trait Onlooker<'t> {
 
     /// Another view that is to be put in now, with its terrain; taken after each look at
     /// the line. An [`Event::Viewed`] tells what came of it.
-    fn view(&mut self) -> Option<(View, Terrain<'t>)> {
+    fn view(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
         None
     }
 

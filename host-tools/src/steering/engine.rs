@@ -5,12 +5,12 @@ use std::time::{Duration, Instant};
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
-use hapterra_core::scene::{Source, TickRecord, View};
+use hapterra_core::scene::{SceneChange, Source, TickRecord};
 use hapterra_core::wire::request::Request;
 
 use super::Steer;
 use crate::link::{Ask, Event};
-use crate::place::{Bounds, Changed, Hand, Laid, ViewChange};
+use crate::place::{Bounds, Changed, Hand, Laid, PlacementChange};
 use crate::terrain::Terrain;
 
 /// Changes that wait for the clutch to open; they are done at once.
@@ -25,7 +25,7 @@ const GROUND_WITHIN: Duration = Duration::from_secs(2);
 /// A view that is to be put in.
 pub struct Put<'r> {
     /// What the device is told.
-    pub view: View,
+    pub view: SceneChange,
     /// The terrain that it is felt on.
     pub terrain: Terrain<'r>,
     /// Place, scale and law.
@@ -55,7 +55,7 @@ pub struct Steering<'r> {
     terrain: Terrain<'r>,
     /// Number of the view in force on the device.
     number: u8,
-    waiting: Vec<ViewChange>,
+    waiting: Vec<PlacementChange>,
     /// The user holds the clutch.
     held: bool,
     /// The board's clutch input holds it open.
@@ -283,7 +283,7 @@ impl<'r> Steering<'r> {
     /// waited for.
     fn next_view(
         &self,
-        changes: &[ViewChange],
+        changes: &[PlacementChange],
         sample: &TickRecord,
         waits: bool,
     ) -> Result<Option<Put<'r>>, String> {
@@ -304,7 +304,7 @@ impl<'r> Steering<'r> {
         };
         let (hip, home) = (on_grid(hip_mm)?, on_grid(laid.view.home_mm)?);
         let scene = terrain.scene(laid.law, Source::Encoders, home);
-        let view = View {
+        let view = SceneChange {
             number: self.number.wrapping_add(1),
             scene: terrain.underlaid(scene, laid.view.reach_mm),
             hip,
@@ -317,7 +317,7 @@ impl<'r> Steering<'r> {
         }))
     }
 
-    fn on_viewed(&mut self, view: &View, taken: bool) {
+    fn on_viewed(&mut self, view: &SceneChange, taken: bool) {
         let Stage::Putting(put) = &self.stage else {
             return;
         };

@@ -2,13 +2,13 @@
 
 use super::*;
 use crate::link::hello;
-use crate::place::{Reach, Sizing, View as PlacedView, ViewOptions};
+use crate::place::{Placement, PlacementOptions, Reach, Sizing};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::terrain::TileIndex;
 use heightfield::Raster;
 
-const ZOOM: Steer = Steer::Change(ViewChange::Zoom(2.0));
+const ZOOM: Steer = Steer::Change(PlacementChange::Zoom(2.0));
 
 /// An engine over a plane, at 1 mm a cell.
 fn with<T>(look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
@@ -19,14 +19,14 @@ fn with<T>(look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
 }
 
 fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
-    let options = ViewOptions {
+    let options = PlacementOptions {
         sizing: Sizing::CellMm(1.0),
-        ..ViewOptions::default()
+        ..PlacementOptions::default()
     };
     let grid = options.target.grid(raster, Default::default());
     let grid = grid.expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
-    let view = PlacedView::new(&grid, &reach, &options).expect("a view");
+    let view = Placement::new(&grid, &reach, &options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
     let law = SurfaceParams::PREMIUM;
     let bounds = Bounds {
@@ -74,13 +74,13 @@ fn open(steering: &mut Steering<'_>) {
 }
 
 /// Opens the clutch, and takes the view that is put in.
-fn put(steering: &mut Steering<'_>) -> View {
+fn put(steering: &mut Steering<'_>) -> SceneChange {
     open(steering);
     samples(steering, Limits::CLUTCH_OPEN, 1);
     steering.take_put().expect("a view").view
 }
 
-fn viewed(steering: &mut Steering<'_>, view: &View, taken: bool) {
+fn viewed(steering: &mut Steering<'_>, view: &SceneChange, taken: bool) {
     steering.on_event(&Event::Viewed { view, taken });
 }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::Steer;
-use crate::place::ViewChange;
+use crate::place::PlacementChange;
 
 /// The keys, for the screen.
 pub const KEYS: &str = "arrows pan, + - zoom, ] [ heights, . , stiffness, space held or c: clutch, 0 reset, Enter goes on";
@@ -39,17 +39,17 @@ impl Keys {
     pub fn press(&mut self, key: Key, now: Duration) -> Option<Steer> {
         let change = |change| Some(Steer::Change(change));
         match key {
-            Key::Arrow(east, north) => change(ViewChange::Pan {
+            Key::Arrow(east, north) => change(PlacementChange::Pan {
                 east_mm: PAN_MM * f64::from(east),
                 north_mm: PAN_MM * f64::from(north),
             }),
-            Key::Char('+' | '=') => change(ViewChange::Zoom(ZOOM)),
-            Key::Char('-' | '_') => change(ViewChange::Zoom(1.0 / ZOOM)),
-            Key::Char(']') => change(ViewChange::Exaggerate(MORE)),
-            Key::Char('[') => change(ViewChange::Exaggerate(1.0 / MORE)),
-            Key::Char('.') => change(ViewChange::Stiffness(MORE)),
-            Key::Char(',') => change(ViewChange::Stiffness(1.0 / MORE)),
-            Key::Char('0') => change(ViewChange::Reset),
+            Key::Char('+' | '=') => change(PlacementChange::Zoom(ZOOM)),
+            Key::Char('-' | '_') => change(PlacementChange::Zoom(1.0 / ZOOM)),
+            Key::Char(']') => change(PlacementChange::Exaggerate(MORE)),
+            Key::Char('[') => change(PlacementChange::Exaggerate(1.0 / MORE)),
+            Key::Char('.') => change(PlacementChange::Stiffness(MORE)),
+            Key::Char(',') => change(PlacementChange::Stiffness(1.0 / MORE)),
+            Key::Char('0') => change(PlacementChange::Reset),
             Key::Char(' ') => {
                 let was_held = self.held.replace(now).is_some() || self.toggled;
                 (!was_held).then_some(Steer::Clutch(true))
@@ -84,9 +84,9 @@ mod tests {
         let mut keys = Keys::default();
         let mut factor = |key| match keys.press(Key::Char(key), ms(0)) {
             Some(Steer::Change(
-                ViewChange::Zoom(factor)
-                | ViewChange::Exaggerate(factor)
-                | ViewChange::Stiffness(factor),
+                PlacementChange::Zoom(factor)
+                | PlacementChange::Exaggerate(factor)
+                | PlacementChange::Stiffness(factor),
             )) => factor,
             other => panic!("{key}: {other:?}"),
         };
@@ -95,7 +95,7 @@ mod tests {
             assert!(factor(more) > 1.0);
         }
         let north = keys.press(Key::Arrow(0, 1), ms(0));
-        let pan = ViewChange::Pan {
+        let pan = PlacementChange::Pan {
             east_mm: 0.0,
             north_mm: PAN_MM,
         };

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! keys ─────┐
-//!           ├─ Steer ─ Steering ─ clutch held ─ View put in ─ clutch let go
+//!           ├─ Steer ─ Steering ─ clutch held ─ placement changed ─ clutch let go
 //! commands ─┘             ▲                                        │
 //!                         └──────────── samples ───────────────────┘
 //! ```
@@ -19,7 +19,7 @@ pub mod keys;
 mod marks;
 mod queue;
 
-use crate::place::ViewChange;
+use crate::place::PlacementChange;
 
 pub use engine::{Put, Steering};
 pub use marks::{Made, Marks};
@@ -40,7 +40,7 @@ pub enum Wanted {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steer {
     /// Another view.
-    Change(ViewChange),
+    Change(PlacementChange),
     /// Hold the clutch, or let it go: while it is held the terrain goes with the hand.
     Clutch(bool),
 }

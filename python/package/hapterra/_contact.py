@@ -38,7 +38,7 @@ class State(enum.IntEnum):
     #: The proxy is on the surface, and the HIP below it.
     TOUCHING = 1
     #: The surface that the proxy was on has come to an end, and the last force fades away.
-    FADING = 2
+    RELEASING = 2
     #: The HIP is below the surface and has not been above it: no force until it has.
     BELOW_GROUND = 3
     #: The HIP is in a hole or outside and has not been above the surface: no force.

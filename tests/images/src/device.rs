@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Ask, Bulk, BulkEndpoints, Event, Session, Timeouts, Transport};
-use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
+use hapterra::phantom::{ArmFrame, Encoder, PhantomModel, kinematics};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{Mode, Report};
@@ -267,7 +267,7 @@ pub struct Plane {
     /// The arm.
     pub model: PhantomModel,
     /// Where the terrain lies.
-    pub place: Placement,
+    pub place: ArmFrame,
     /// Rise east and north, millimetres a millimetre.
     pub slope: [f64; 2],
     /// Height above the origin, mm.
@@ -282,7 +282,7 @@ impl Plane {
     pub fn level(home_mm: [f64; 3], height_mm: f64) -> Self {
         Self {
             model: PhantomModel::premium_1_5(),
-            place: Placement { home_mm },
+            place: ArmFrame { home_mm },
             slope: [0.0; 2],
             height_mm,
             law: SurfaceParams::PREMIUM,
@@ -327,7 +327,7 @@ impl Plane {
         let depth_mm = -self.above_mm(self.place.to_terrain_mm(&self.model, tip));
         let newtons = (f64::from(self.law.stiffness_n_per_mm) * depth_mm)
             .clamp(0.0, self.law.max_force_n.into());
-        let force = Placement::turn_to_device(self.normal().map(|n| n * newtons));
+        let force = ArmFrame::turn_to_device(self.normal().map(|n| n * newtons));
         let jacobian = kinematics::jacobian(&self.model, q);
         // What holds the links, by the record: -g2·cos q2 and -g3·sin q3 pull.
         let record = Calibration::PREMIUM_1_5;

@@ -1,7 +1,7 @@
 //! A plane pressed by a millimetre, from encoder counts to what is at the
 //! amplifiers' inputs, in the boards' own images.
 
-use hapterra::phantom::{PhantomModel, Placement};
+use hapterra::phantom::{ArmFrame, PhantomModel};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::SurfaceParams;
 use hapterra_image_tests::bus::Effect;
@@ -12,7 +12,7 @@ use heightfield::Raster;
 fn plane() -> Plane {
     Plane {
         model: PhantomModel::premium_1_5(),
-        place: Placement {
+        place: ArmFrame {
             home_mm: [100.0, 100.0, 75.0],
         },
         slope: [0.25, -0.125],

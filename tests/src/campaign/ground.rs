@@ -159,12 +159,12 @@ fn material(chance: &mut Chance, stiffness_n_per_mm: f32) -> Material {
 
 /// All that may be felt of a scene: a law of each of its materials.
 #[derive(Clone, Debug)]
-pub struct Felt {
+pub struct SceneSurfaces {
     laws: Vec<SurfaceParams>,
     hardest: SurfaceParams,
 }
 
-impl Felt {
+impl SceneSurfaces {
     /// Of a law, and of a table where there is one.
     #[must_use]
     pub fn of(law: &SurfaceParams, table: Option<&MaterialTable>) -> Self {

@@ -8,7 +8,7 @@ use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{GuardInputs, Mode};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Scene, Source, View};
+use hapterra_core::scene::{Scene, SceneChange, Source};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
@@ -445,7 +445,7 @@ impl<'t> World<'t> {
             epoch: 5_000 + u32::from(number),
             ..*self.client.scene()
         };
-        let view = View {
+        let view = SceneChange {
             number,
             scene,
             hip: scene.home,

@@ -37,7 +37,7 @@ impl Judge<'_> {
         let felt = &seen.felt;
         let none = felt.displacement.to_array() == [0.0; 3];
         let free_at_hip = !seen.is_free() || seen.proxy == seen.hip;
-        let may_press = seen.is_touching() || felt.state == ContactState::Fading;
+        let may_press = seen.is_touching() || felt.state == ContactState::Releasing;
         let is_part = !seen.is_touching() || is_part_of_the_way(seen);
         if (!may_press && !none) || !free_at_hip || !is_part {
             return self.fail(Invariant::Consistent, format!("{seen:?}"));

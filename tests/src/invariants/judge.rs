@@ -16,7 +16,7 @@ use crate::scene::terrain::Terrain;
 /// What the judge learned that is no yes or no.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// Ticks waiting, free, touching and letting go.
+    /// Ticks unseeded, free, touching and releasing.
     pub states: [u64; 4],
     /// Ticks that left work over.
     pub unconverged: u64,

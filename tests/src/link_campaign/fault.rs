@@ -84,8 +84,8 @@ impl Fault {
     pub fn of(kind: Kind, now: u64, chance: &mut Chance) -> Self {
         let (shortest, longest) = kind.duration();
         // As many short ones as long ones.
-        let stretch = chance.between(0.0, 1.0);
-        let length = (longest - shortest) as f64 * stretch * stretch;
+        let segment = chance.between(0.0, 1.0);
+        let length = (longest - shortest) as f64 * segment * segment;
         Self {
             kind,
             end: now + shortest as u64 + length as u64,

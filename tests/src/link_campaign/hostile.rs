@@ -6,7 +6,7 @@ use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams,
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{HipCommand, Scene, Source, TickRecord, View};
+use hapterra_core::scene::{HipCommand, Scene, SceneChange, Source, TickRecord};
 use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
 use hapterra_core::wire::materials::{MaterialScene, MaterialTile, TileMaterials};
@@ -105,7 +105,7 @@ fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
         6 => ToDevice::Status { number: 0 },
         7 => match chance.below(2) {
             0 => ToDevice::Heartbeat,
-            _ => ToDevice::View(View {
+            _ => ToDevice::SceneChange(SceneChange {
                 number: chance.bits() as u8,
                 scene: host_scene(chance, epoch),
                 hip: GridPoint::default(),

@@ -75,7 +75,7 @@ pub fn replay<const D: usize>(
     let mut all = Vec::with_capacity(scene.path.len());
     for (tick, hip) in scene.path.iter().enumerate() {
         let sample = device
-            .feel(shifted(*hip, replay.shift))
+            .step(shifted(*hip, replay.shift))
             .ok_or_else(|| Violation {
                 invariant: Invariant::Settles,
                 tick,
@@ -107,7 +107,7 @@ pub fn noted(scene: &Scene, materials: &Materials) -> (SceneMessage, Vec<Event>,
     };
     let mut device = Device::<WINDOW>::new(scene, materials, &mut buffers, how);
     for hip in &scene.path {
-        let answer = device.feel(shifted(*hip, how.shift));
+        let answer = device.step(shifted(*hip, how.shift));
         assert!(answer.is_some(), "{hip:?} is never answered");
     }
     let message = message(scene, materials, how.shift);
@@ -188,7 +188,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
     }
 
     /// One point: ticks until it is answered, or `None`.
-    fn feel(&mut self, hip: GridPoint) -> Option<TickRecord> {
+    fn step(&mut self, hip: GridPoint) -> Option<TickRecord> {
         let seq = self.seq;
         self.seq += 1;
         let _ = self.haptics.accept(Command::Hip(HipCommand { seq, hip }));

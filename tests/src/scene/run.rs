@@ -242,7 +242,7 @@ impl Scene {
     ///
     /// # Errors
     /// What `look` says, or that a tick does not settle.
-    pub fn feel(
+    pub fn step(
         &self,
         buffers: &mut Buffers,
         shift: [i32; 3],
@@ -255,7 +255,7 @@ impl Scene {
     /// The same with a window of `D × D` tiles.
     ///
     /// # Errors
-    /// As [`Self::feel`].
+    /// As [`Self::step`].
     pub fn feel_in<const D: usize>(
         &self,
         buffers: &mut Buffers,
@@ -266,7 +266,7 @@ impl Scene {
         let mut player = Player::<D>::new(self, buffers, shift, supply);
         let mut all = Vec::with_capacity(self.path.len());
         for (tick, hip) in self.path.iter().enumerate() {
-            let felt = player.feel(*hip).ok_or_else(|| Violation {
+            let felt = player.step(*hip).ok_or_else(|| Violation {
                 invariant: Invariant::Settles,
                 tick,
                 detail: format!("never settles for {hip:?}"),
@@ -345,7 +345,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
 
     /// One HIP: one tick, or in lock-step as many as it takes. `None` when those do
     /// not end. The work is that of the tick which spent most.
-    pub fn feel(&mut self, hip: [f64; 3]) -> Option<ContactOutput> {
+    pub fn step(&mut self, hip: [f64; 3]) -> Option<ContactOutput> {
         let hip = shifted(hip, self.shift);
         let mut work = 0;
         let in_real_time = self.execution == Execution::RealTime;

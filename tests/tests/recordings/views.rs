@@ -3,7 +3,7 @@
 
 use std::process::{Command, Stdio};
 
-use hapterra::replay::settings::ViewSettings;
+use hapterra::replay::settings::PlacementSettings;
 use hapterra::replay::{Settings, Trajectory};
 use hapterra_core::contact::{MAX_PIECE, WORK_PER_TICK};
 use hapterra_tests::{UNCONTROLLED, hapterra_binary};
@@ -268,7 +268,7 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
         panic!("{:?}", settings.views);
     };
     let first_m = settings.felt.cell_m.expect("known");
-    let latitude = |view: ViewSettings| view.measured_at.expect("a place")[1];
+    let latitude = |view: PlacementSettings| view.measured_at.expect("a place")[1];
     let [up, down] = [latitude(north) - 56.0, latitude(softer) - latitude(south)];
     // The hand goes on meanwhile.
     assert!(

@@ -7,7 +7,7 @@ use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::Vec3;
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::{Source, View};
+use hapterra_core::scene::{SceneChange, Source};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::timeouts::{pass, wait_until};
 use hapterra_url_tests::cog::cog;
@@ -95,7 +95,7 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     raster.stop_waiting();
     let before = requests(&server);
     server.hold(true);
-    let view = View {
+    let view = SceneChange {
         number: 1,
         scene,
         hip: at(3500),

@@ -11,7 +11,7 @@ use crate::terrain::underlay::Underlay;
 
 /// A height that is felt at a sample, and whether it is a tile's.
 #[derive(Clone, Copy)]
-struct Felt {
+struct BlendedHeight {
     height: f32,
     is_of_tile: bool,
 }
@@ -188,7 +188,7 @@ impl<'t, const D: usize> Window<'t, D> {
             let sample = cell.offset(corner & 1, corner >> 1);
             let felt = match is_on_border(sample.x) || is_on_border(sample.y) {
                 true => self.felt(sample, coarse[corner as usize], base),
-                false => Felt {
+                false => BlendedHeight {
                     height: *height,
                     is_of_tile,
                 },
@@ -202,8 +202,8 @@ impl<'t, const D: usize> Window<'t, D> {
     /// The height felt at a sample that several tiles may share, in cells above `base`.
     // A call: four copies of it would be a kilobyte.
     #[inline(never)]
-    fn felt(&self, sample: Cell, coarse: f32, base: i32) -> Felt {
-        let mut felt = Felt {
+    fn felt(&self, sample: Cell, coarse: f32, base: i32) -> BlendedHeight {
+        let mut felt = BlendedHeight {
             height: coarse,
             is_of_tile: false,
         };
@@ -223,7 +223,7 @@ impl<'t, const D: usize> Window<'t, D> {
                 let (col, row) = (sample.x - first.x, sample.y - first.y);
                 let own =
                     tile.post(col as usize, row as usize) + tile.base().wrapping_sub(base) as f32;
-                felt = Felt {
+                felt = BlendedHeight {
                     height: within(own, coarse, allowed),
                     is_of_tile: true,
                 };

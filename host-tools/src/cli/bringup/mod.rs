@@ -11,7 +11,7 @@ use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, Hint};
 use super::terminal::interrupt;
-use super::terminal::voice::{say, tell};
+use super::terminal::writer::{say, tell};
 use crate::bringup::{
     Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, Walked, walk,
 };

@@ -14,7 +14,7 @@ use crate::cli::failure::{Failure, OrHint};
 use crate::cli::session_summary;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::questions::ask;
-use crate::cli::terminal::voice::{self, say};
+use crate::cli::terminal::writer::{self, say};
 use crate::link::{DeviceAddress, Dialogue, Usb};
 
 /// How long the board may take to answer.
@@ -118,7 +118,7 @@ fn wait_for<T>(
 }
 
 fn write(args: &Args, image: &Image, loader: &mut Loader<SystemPipe>) -> Result<usize, Failure> {
-    voice::finish();
+    writer::finish();
     let bar = progress::bar(Some(0), "{msg:10} {bar:30} {pos} of {len}");
     let written = update(loader, args.board, image, &mut |step| {
         let (what, done, of) = match step {

@@ -10,7 +10,7 @@ use crate::link::{
     DeviceAddress, Dialogue, Emulator, EmulatorError, HostClock, IMAGE_VARIABLE, Lines, LinkError,
     Native, QEMU, QEMU_VARIABLE, Transport, move_arm_while,
 };
-use crate::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script};
+use crate::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script};
 
 /// How long a real device may take to answer.
 const PATIENCE: Duration = Duration::from_secs(4);
@@ -189,7 +189,7 @@ fn resting() -> Result<HeldPhantom, Failure> {
     let home_mm = [0.0; 3];
     let script = Script::start(home_mm);
     let model = PhantomModel::premium_1_5();
-    HeldPhantom::new(model, HandModel::default(), Placement { home_mm }, script)
+    HeldPhantom::new(model, HandModel::default(), ArmFrame { home_mm }, script)
         .map_err(Failure::new)
 }
 

@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 
 use crate::cli::failure::{Failure, OrHint};
-use crate::cli::terminal::voice::tell;
+use crate::cli::terminal::writer::tell;
 use crate::events::{Server, Watcher};
 
 /// Whether events are sent to other programs.

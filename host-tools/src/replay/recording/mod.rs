@@ -13,7 +13,7 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::scene::TickRecord;
 
 use super::marks::Mark;
-use super::settings::{Settings, ViewSettings};
+use super::settings::{PlacementSettings, Settings};
 use crate::output::{Output, OutputError};
 use crate::terrain::Scale;
 
@@ -157,7 +157,7 @@ impl Recording {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn view(&mut self, view: &ViewSettings) -> Result<(), OutputError> {
+    pub fn view(&mut self, view: &PlacementSettings) -> Result<(), OutputError> {
         match &mut self.0 {
             Form::Csv(csv) => csv.view(view),
             Form::Parquet(parquet) => {

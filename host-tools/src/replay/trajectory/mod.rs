@@ -9,8 +9,8 @@ mod columns;
 mod comments;
 mod csv;
 mod fault;
-mod felt_rows;
 mod parquet;
+mod recording_rows;
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -22,7 +22,7 @@ use hapterra_touch::ticks::TimeFault;
 
 pub use columns::{ColumnValues, RecordedColumns};
 pub use fault::TrajectoryError;
-pub use felt_rows::{RecordingRow, RecordingRows};
+pub use recording_rows::{RecordingRow, RecordingRows};
 
 use super::settings::Settings;
 use crate::terrain::Scale;

@@ -14,7 +14,7 @@ use crate::terrain::Window;
 
 /// The material that is felt.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MaterialInForce {
+pub(crate) struct ActiveMaterial {
     /// The one that is wanted.
     index: u8,
     /// What was felt when it began to be wanted, and which part of the change is done.
@@ -34,7 +34,7 @@ pub(crate) struct MaterialInForce {
     was_felt: bool,
 }
 
-impl MaterialInForce {
+impl ActiveMaterial {
     /// Before anything is felt: the default.
     pub(crate) fn of(
         table: &MaterialTable,
@@ -94,8 +94,8 @@ impl MaterialInForce {
         match contact.output().state {
             ContactState::Touching => {}
             // What fades out does so as it was.
-            ContactState::Fading => return false,
-            ContactState::Waiting | ContactState::Free => {
+            ContactState::Releasing => return false,
+            ContactState::Unseeded | ContactState::Free => {
                 self.was_felt = false;
                 return false;
             }

@@ -23,7 +23,7 @@ type Numbers = [f64; 5];
 
 /// What may be in force.
 #[derive(Clone, Debug)]
-pub(super) struct InForce {
+pub(super) struct ActiveMaterial {
     /// The class of the wanted one.
     wanted: u8,
     from: Numbers,
@@ -42,7 +42,7 @@ pub(super) struct InForce {
     was_felt: bool,
 }
 
-impl InForce {
+impl ActiveMaterial {
     /// Before anything is felt: the default.
     pub(super) fn default(materials: &Materials) -> Self {
         let numbers = numbers(materials, 0);
@@ -162,8 +162,8 @@ impl InForce {
                 each.collect()
             }
             // What fades out does so as it was.
-            ContactState::Fading => vec![self.clone()],
-            ContactState::Waiting | ContactState::Free => vec![Self {
+            ContactState::Releasing => vec![self.clone()],
+            ContactState::Unseeded | ContactState::Free => vec![Self {
                 was_felt: false,
                 ..self.clone()
             }],

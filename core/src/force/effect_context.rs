@@ -4,7 +4,7 @@ use crate::rate::TickRate;
 
 /// What a scene is felt with, besides its law.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FeltWith {
+pub(crate) struct EffectContext {
     pub(crate) cell_mm: f32,
     pub(crate) rate: TickRate,
     /// From the beginning of a tick until its force acts, s.

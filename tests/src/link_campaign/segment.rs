@@ -26,7 +26,7 @@ const DRAINS: u64 = 50;
 const LATE_ARM: u64 = 500;
 
 /// One device and what is around it.
-pub struct Stretch<'t> {
+pub struct Segment<'t> {
     /// The terrain that honest hosts serve.
     pub terrain: &'t Terrain<'t>,
     /// The scene that they put in force.
@@ -67,7 +67,7 @@ pub struct Stretch<'t> {
     pub touching: u64,
 }
 
-impl<'t> Stretch<'t> {
+impl<'t> Segment<'t> {
     /// A device that was just switched on, and nobody at the other end.
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, mut chance: Chance) -> Self {

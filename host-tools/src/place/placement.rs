@@ -63,7 +63,7 @@ pub fn suited_height(plain: f64, relief: f64) -> f64 {
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ViewOptions {
+pub struct PlacementOptions {
     /// Which part of the terrain.
     pub target: Target,
     /// How large.
@@ -76,7 +76,7 @@ pub struct ViewOptions {
 
 /// What of a terrain lies where in front of the arm, and how large.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct Placement {
     /// The point of the terrain under the tip in its home pose, hand millimetres east,
     /// north and up from the south-west sample at height zero.
     pub home_mm: [f64; 3],
@@ -100,7 +100,7 @@ pub struct View {
     pub reach_mm: [f64; 4],
 }
 
-impl View {
+impl Placement {
     /// Lays a terrain in front of an arm.
     ///
     /// The grid is the target's own ([`Target::grid`]): its cells are square at the place.
@@ -111,7 +111,7 @@ impl View {
     pub fn new(
         grid: &HapticGrid<'_>,
         reach: &Reach,
-        options: &ViewOptions,
+        options: &PlacementOptions,
     ) -> Result<Self, PlaceError> {
         let wanted = Wanted::new(grid, options)?;
         match (options.target, options.sizing) {
@@ -244,11 +244,11 @@ impl View {
 /// What is asked for of a grid, its numbers checked.
 struct Wanted<'g> {
     grid: &'g HapticGrid<'g>,
-    options: ViewOptions,
+    options: PlacementOptions,
 }
 
 impl<'g> Wanted<'g> {
-    fn new(grid: &'g HapticGrid<'g>, options: &ViewOptions) -> Result<Self, PlaceError> {
+    fn new(grid: &'g HapticGrid<'g>, options: &PlacementOptions) -> Result<Self, PlaceError> {
         match options.sizing {
             Sizing::GroundMPerMm(scale) if !(scale.is_finite() && scale > 0.0) => {
                 return Err(PlaceError::GroundScale(scale));
@@ -315,7 +315,7 @@ impl<'g> Wanted<'g> {
         scale: Scale,
         felt: [f64; 2],
         height: f64,
-    ) -> Result<View, PlaceError> {
+    ) -> Result<Placement, PlaceError> {
         let [east, north] = felt.map(|cells| cells * scale.cell_mm());
         // In the home pose the tip hangs in the air over its place.
         let up = height * scale.height_mm_per_unit() + ABOVE_MM;
@@ -330,7 +330,7 @@ impl<'g> Wanted<'g> {
         reach: &Reach,
         cells: [f64; 4],
         heights: [f64; 2],
-    ) -> Result<View, PlaceError> {
+    ) -> Result<Placement, PlaceError> {
         let [west, south, east, north] = cells;
         let relief = heights[1] - heights[0];
         let mm_per_unit = |cell_mm: f64| self.height_mm_per_unit(cell_mm, Some(relief));
@@ -359,10 +359,10 @@ impl<'g> Wanted<'g> {
         home_mm: [f64; 3],
         cells: [f64; 4],
         heights: [f64; 2],
-    ) -> View {
+    ) -> Placement {
         let felt = [home_mm[0], home_mm[1]].map(|mm| mm / scale.cell_mm());
         let true_height = self.grid.cells_per_vertical_unit();
-        View {
+        Placement {
             home_mm,
             home_ground: self.grid.to_ground(felt),
             scale,
@@ -409,5 +409,5 @@ fn rounded_down(x: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[path = "view_tests.rs"]
+#[path = "placement_tests.rs"]
 mod tests;
