@@ -5,14 +5,16 @@ mod link;
 mod place;
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
+use clap::ValueHint;
 use serde::Serialize;
 
 use hapterra_core::terrain::{TILE_CELLS, TILE_SAMPLES};
 
 use super::failure::Failure;
 use super::options::placing::off_in_words;
-use super::options::terrain_file::TerrainFile;
+use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::report::put;
 use crate::place::place_in_words;
 use crate::terrain::{Distortion, HapticGrid};
@@ -25,13 +27,17 @@ use place::{Rectangle, Vertical, from, told};
 /// Arguments of `hapterra info`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The terrain file.
+    /// Terrain: a file, a folder, a quoted pattern ('tiles/*.tif') or a URL
+    #[arg(value_hint = ValueHint::FilePath, required_unless_present = "formats")]
+    pub file: Option<PathBuf>,
+
+    /// Statements about the file that it does not make itself.
     #[command(flatten)]
-    pub terrain: TerrainFile,
+    pub reading: ReadingOptions,
 
     /// List the formats of terrain files that are read on this machine
-    #[arg(long, num_args = 0, default_missing_value = "", value_parser = formats::Printed)]
-    pub formats: Option<formats::Printed>,
+    #[arg(long, conflicts_with_all = ["file", "link", "json"])]
+    pub formats: bool,
 
     /// Show the tiles on a link of this many megabytes a second [1 without a number]
     ///
@@ -55,14 +61,22 @@ fn rate(text: &str) -> Result<f64, String> {
 /// Shows what the file holds.
 ///
 /// # Errors
-/// When the file cannot be opened as a height field.
+/// When the file cannot be opened as a height field, or the output cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let raster = args.terrain.open_without_remarks()?;
-    let grid = HapticGrid::new(&raster, args.terrain.reading.cells());
+    // Clap wants a file where the list is not asked for.
+    let (false, Some(file)) = (args.formats, &args.file) else {
+        return put(&formats::text());
+    };
+    let terrain = TerrainFile {
+        file: file.clone(),
+        reading: args.reading.clone(),
+    };
+    let raster = terrain.open_without_remarks()?;
+    let grid = HapticGrid::new(&raster, terrain.reading.cells());
     let link = args.link.map(|rate| LinkFigures::of(&grid, rate));
     let report = FileReport {
         link: link.transpose().map_err(Failure::new)?,
-        ..FileReport::new(&args.terrain, &grid)
+        ..FileReport::new(&terrain, &grid)
     };
     if args.json {
         let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
