@@ -82,7 +82,7 @@ impl Grid {
         });
         if filled > 0 {
             grid.remarks.push(format!(
-                "{filled} samples without data lie at the lowest height: not every opponent knows holes"
+                "{filled} samples without data lie at the lowest height: not every opponent supports no data"
             ));
         }
         if width < raster.columns() || height < raster.rows() {

@@ -60,7 +60,7 @@ pub enum Error {
         known: String,
     },
     /// A text for GDAL has a zero byte in it.
-    #[error("{0:?} has a zero byte: GDAL cannot be told that")]
+    #[error("{0:?} contains a zero byte, which GDAL's interface cannot carry")]
     ZeroByte(String),
     /// A part of a raster that is not there.
     #[error("there is no {asked}: {there}")]

@@ -190,7 +190,7 @@ impl Decoded {
         self.scale = -self.scale;
         self.offset = -self.offset;
         self.remarks.push(format!(
-            "depths ({why}): they are felt as heights below zero"
+            "depths ({why}): they are rendered as heights below zero"
         ));
     }
 }

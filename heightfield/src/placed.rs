@@ -71,7 +71,7 @@ fn turned(map: &GroundMap) -> Vec<String> {
     }
     if leaning.abs() >= STRAIGHT_DEGREES {
         words.push(format!(
-            "the grid is sheared: its columns lean by {leaning:.1}° from the perpendicular of its rows; square cells are felt in their true shape, stored ones (--input cells=stored) as if they were rectangular"
+            "the grid is sheared: its columns lean by {leaning:.1}° from the perpendicular of its rows; square cells are rendered in their true shape, stored ones (--input cells=stored) as if they were rectangular"
         ));
     }
     words

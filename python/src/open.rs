@@ -99,7 +99,7 @@ impl Opened {
             let (size, last) = (size_mm[axis], f64::from(whole.samples[axis] - 1));
             if !(size.is_finite() && size >= cell_mm) {
                 return Err(refused(format!(
-                    "size_mm is {size_mm:?}: give millimetres of the hand, a cell of {cell_mm} at least"
+                    "size_mm is {size_mm:?}: give device millimetres, a cell of {cell_mm} at least"
                 )));
             }
             let begin = ((middle[axis] - 0.5 * size) / cell_mm + 0.5).floor();

@@ -350,7 +350,7 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
         folder,
         &[&["run", "hills.tif", "--out", "run.csv"][..], &native].concat(),
     );
-    assert!(said.contains("felt by a ball of 6 mm"), "{said}");
+    assert!(said.contains("rendered with a ball of 6 mm"), "{said}");
     runs(
         folder,
         &[&["demo", "hills.tif", "--out", "demo"][..], &native].concat(),
@@ -413,7 +413,7 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
     for (words, expected) in [
         (
             ["--tip=20", "--level=0"],
-            "a tip of 20 mm: 20.0 cells of level 0, where 0 to 8 can be felt",
+            "a tip of 20 mm: 20.0 cells of level 0, where 0 to 8 can be rendered",
         ),
         (
             ["--tip=-1", "--level=0"],
@@ -449,7 +449,7 @@ fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
         "1s",
     ];
     let replay = ["replay", "hills.tif", "in.csv", "-o", "out.csv"];
-    let line = "felt by a ball of 7 mm over level";
+    let line = "rendered with a ball of 7 mm over level";
     for (words, more, is_ball) in [
         (&run[..], &[][..], true),
         (&run[..], &["--tip", "0"][..], false),

@@ -123,7 +123,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     });
     progress.finish_and_clear();
     let map = map.map_err(|error| Failure::new(error.to_string()))?;
-    let map = map.ok_or_else(|| Failure::new("interrupted: no limits are said"))?;
+    let map = map.ok_or_else(|| Failure::new("interrupted: no limits are printed"))?;
     report::put(&map.summary())?;
     if let Some(csv) = csv {
         write(csv, &map).or_hint(OTHER_FILE)?;

@@ -32,9 +32,9 @@ pub(super) fn measure() -> Vec<Row> {
         ("tile 0.2 cell late", late(0.2), None),
         ("tile 0.45 cell late", late(0.45), None),
         ("tile 1 cell late", late(1.0), None),
-        ("0.2 cell late over an underlay", late(0.2), under),
-        ("0.45 cell late over an underlay", late(0.45), under),
-        ("1 cell late over an underlay", late(1.0), under),
+        ("0.2 cell late over a coarse fallback", late(0.2), under),
+        ("0.45 cell late over a coarse fallback", late(0.45), under),
+        ("1 cell late over a coarse fallback", late(1.0), under),
     ]
     .map(|(name, due, underlay)| Row::of(name, SWEPT, &[&felt(due, underlay)]))
     .to_vec()

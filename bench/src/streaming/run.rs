@@ -38,7 +38,7 @@ pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &Way) -> Result<(),
             is_touching |= sample.state == ContactState::Touching;
         })?;
         if chain.now() > LONGEST {
-            let why = format!("nothing was felt for {LONGEST} ticks");
+            let why = format!("no contact for {LONGEST} ticks");
             return Err(NotMeasured(why));
         }
     }
@@ -86,7 +86,7 @@ pub(super) fn travel(
     let tally = chain.tally();
     if tally.lost + tally.dropped > 0 {
         let lost = tally.lost + tally.dropped;
-        let why = format!("{lost} samples were lost, so holes cannot be counted");
+        let why = format!("{lost} samples were lost, so gaps cannot be counted");
         return Err(NotMeasured(why));
     }
     Ok((felt, [began, ended]))

@@ -64,7 +64,7 @@ impl Way {
             let height = terrain.height_mm(east * CELL_MM, north * CELL_MM);
             let why = || {
                 let place = format!("at column {east} and row {north} from the south-west");
-                NotMeasured(format!("it has a hole {place}, where the HIP would go"))
+                NotMeasured(format!("it has no data {place}, where the HIP would move"))
             };
             Ok([east, north, height.ok_or_else(why)? / CELL_MM])
         };
@@ -86,7 +86,7 @@ impl Ways {
         if room < LEAST {
             let least = LEAST + 2 * FROM_BORDER;
             let [columns, rows] = size;
-            let has = format!("{columns} × {rows} samples; the ways need {least} each way");
+            let has = format!("{columns} × {rows} samples; the paths need {least} along each side");
             return Err(NotMeasured(has));
         }
         let (long, side) = (STRAIGHT.min(room), TURNING.min(room));
@@ -150,7 +150,7 @@ impl Ways {
             places.map(|places| Way { places })
         });
         let [Some(straight), Some(turning)] = ways else {
-            return Err(wrong("it holds no two ways".into()));
+            return Err(wrong("it has no room for two paths".into()));
         };
         Ok(Self { straight, turning })
     }

@@ -93,7 +93,7 @@ pub enum Refusal {
     /// Nobody pressed the dead-man switch within [`PRESS_MS`].
     ///
     /// [`PRESS_MS`]: super::status::PRESS_MS
-    #[error("nobody pressed the dead-man switch: the calibration is in force but not stored")]
+    #[error("the dead-man switch was not pressed: the calibration is in use but not stored")]
     NotPressed,
     /// The device's memory has no room left; it makes room when it starts.
     #[error(

@@ -20,7 +20,7 @@ pub enum FitError {
         off_mm: f64,
     },
     /// Poses that say nothing about a joint's gravity.
-    #[error("none of the poses tells the weight on joint {joint}")]
+    #[error("no pose shows the weight on joint {joint}")]
     NoWeight {
         /// The joint, 2 or 3.
         joint: usize,

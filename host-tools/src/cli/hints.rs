@@ -62,7 +62,7 @@ impl Hint for GroundError {
                 "name the classes of this ground with --materials".into()
             }
             Self::TooMany(_) => {
-                "leave those out of the table that may feel as the default".into()
+                "leave the classes out of the table that may use the default".into()
             }
         }
     }
@@ -81,7 +81,7 @@ impl Hint for PlaceError {
                 "say the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
             }
             Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } | Self::NoProjection { .. } => {
-                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as holes: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
+                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as no data: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
             }
             Self::Outside { .. } | Self::Hole { .. } => {
                 "choose a place inside: longitude (or x) comes first"
@@ -264,7 +264,7 @@ impl Hint for UpdateError {
                 "plug the board's own USB in; `hapterra list` shows what is seen; a board without working firmware shows its loader when BOOT0 is high at a reset"
             }
             Self::Several(_) => {
-                "name one: --device usb:SERIAL; two that cannot be told apart are unplugged but for one"
+                "name one: --device usb:SERIAL; if two have the same serial number, unplug one"
             }
             Self::OtherBoard { .. } => {
                 "nothing was touched: name the image of that board, or plug in the other one"

@@ -365,7 +365,7 @@ impl Cell {
                 match grid.is_distorted() {
                     true => format!("{off}, at {place}"),
                     false => format!(
-                        "true in the middle; felt from there, {off}, at {place}: --at and --bbox measure the cells at a place"
+                        "true in the middle; rendered from there, {off}, at {place}: --at and --bbox measure the cells at a place"
                     ),
                 }
             }),
@@ -387,7 +387,7 @@ impl Cell {
         };
         match self.resampled || self.distorted {
             false => stored,
-            true => format!("{stored}, felt as {felt_m:.3} m squares{hint}"),
+            true => format!("{stored}, rendered as {felt_m:.3} m squares{hint}"),
         }
     }
 }

@@ -163,7 +163,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     }
     if summary.below_ground > 0 {
         eprintln!(
-            "{} rows are below ground and not felt: the HIP had not been above the surface before them",
+            "{} rows are below ground and not rendered: the HIP had not been above the surface before them",
             summary.below_ground
         );
     }
@@ -214,7 +214,7 @@ impl<'t> Inputs<'t> {
         };
         let device = replayer.device();
         let mut picture = self.picture(self.terrain, self.home_mm);
-        picture.facts = vec![("felt by".to_owned(), device.board.to_string())];
+        picture.facts = vec![("rendered by".to_owned(), device.board.to_string())];
         Ok(Some(ViewFeed::start(
             program,
             picture.prepare(),
@@ -254,7 +254,7 @@ fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
     if let (Some(line), false) = (lines.first(), recorded.views.is_empty()) {
         let views = 1 + recorded.views.len();
         return Err(format!(
-            "{line}: a recording of {views} views is felt in its own"
+            "{line}: a recording of {views} placements is rendered in its own"
         ))
         .or_hint("leave that option out, or take the path alone with --ignore-settings");
     }
@@ -288,7 +288,7 @@ fn rate_of(recorded: &Settings) -> Result<TickRate, Failure> {
     let why = format!("the recording has tick_hz = {tick_hz}, and no device has that rate");
     TickRate::new(tick_hz)
         .ok_or(why)
-        .or_hint("mend tick_hz in its settings (whole kilohertz from 1000 to 10000), or take its path alone with --ignore-settings")
+        .or_hint("correct tick_hz in its settings (whole kilohertz from 1000 to 10000), or take its path alone with --ignore-settings")
 }
 
 fn native(

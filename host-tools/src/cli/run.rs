@@ -221,7 +221,7 @@ fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::new(format!(
-        "a stiffness of {n_per_mm} N/mm: no arm feels more than {STIFFEST_TRIED_N_PER_MM} N/mm"
+        "a stiffness of {n_per_mm} N/mm: no arm renders more than {STIFFEST_TRIED_N_PER_MM} N/mm"
     ))
     .hint("people hold 0.4 to 0.8 N/mm: hapterra-lab stability tries what an arm holds still"))
 }

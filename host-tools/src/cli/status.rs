@@ -103,7 +103,7 @@ fn calibration(status: &Status) -> String {
 
 fn boot(boot: &BootReport) -> String {
     let cause = match boot.cause {
-        ResetCause::Unknown => "for a reason that it does not tell",
+        ResetCause::Unknown => "for an unknown reason",
         ResetCause::PowerOn => "when power came up",
         ResetCause::Pin => "by the reset button or a debug probe",
         ResetCause::Software => "by its own program",

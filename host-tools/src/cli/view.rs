@@ -166,7 +166,7 @@ fn facts(path: &Path, recorded: Option<&Settings>) -> Vec<(String, String)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut facts = vec![("recording".to_owned(), name.into_owned())];
     if let Some(recorded) = recorded {
-        facts.push(("felt by".to_owned(), recorded.device.board.clone()));
+        facts.push(("rendered by".to_owned(), recorded.device.board.clone()));
     }
     facts
 }

@@ -599,7 +599,7 @@ impl<'t> Client<'t> {
             tracing::warn!(
                 ?key,
                 so_far,
-                "the device asked for a tile that there is not"
+                "the device requested a tile that does not exist"
             );
         }
     }

@@ -341,7 +341,7 @@ impl Exchange<'_> {
         while self.talk.state() != State::Closed {
             let polled = self.poll(LOOK, &mut |_| {});
             polled.map_err(|error| {
-                tracing::debug!(%error, "on the way to the end");
+                tracing::debug!(%error, "while closing the session");
                 match error {
                     LinkError::Taken => error,
                     _ if self.drives => LinkError::NotConfirmed,

@@ -188,7 +188,7 @@ impl<'t> Session<'t> {
         self.leaves_by = Some(self.line.now() + self.client.patience().goodbye);
         while self.client.state() != State::Closed {
             self.poll(LOOK, on).map_err(|error| {
-                tracing::debug!(%error, "on the way to goodbye");
+                tracing::debug!(%error, "while closing the session");
                 match error {
                     LinkError::Taken => error,
                     _ => LinkError::NotConfirmed,

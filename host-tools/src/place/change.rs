@@ -54,7 +54,7 @@ pub enum ChangeError {
     Outside,
     /// Ground metres, of a file that knows none.
     #[error(
-        "the file does not know how large its cells are on the ground: pan by hand millimetres"
+        "the file does not know how large its cells are on the ground: pan by device millimetres"
     )]
     NoGroundSize,
     /// A factor that is none.

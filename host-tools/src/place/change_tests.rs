@@ -186,7 +186,7 @@ fn what_cannot_be_had_is_said_and_names_the_bound() {
             (PlacementChange::Zoom(-1.0), "no factor"),
             (PlacementChange::Zoom(f64::NAN), "no factor"),
             (PlacementChange::Exaggerate(0.0), "no factor"),
-            (PlacementChange::Exaggerate(1e12), "can be felt"),
+            (PlacementChange::Exaggerate(1e12), "can be rendered"),
             (PlacementChange::Stiffness(3.0), "1 N/mm"),
             (PlacementChange::Stiffness(1e-4), "0.005"),
         ] {

@@ -68,7 +68,7 @@ pub enum PlaceError {
         bounds: String,
     },
     /// A place without a height.
-    #[error("there is no data at {place}: it is a hole; the terrain covers {bounds}")]
+    #[error("there is no data at {place}; the terrain covers {bounds}")]
     Hole {
         /// As asked for.
         place: String,

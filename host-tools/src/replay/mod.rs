@@ -51,7 +51,7 @@ pub enum ReplayError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// A view of the recording that its terrain cannot be felt in.
-    #[error("view {number} of the recording cannot be felt: {why}")]
+    #[error("placement {number} of the recording cannot be rendered: {why}")]
     Placement {
         /// The view.
         number: u32,

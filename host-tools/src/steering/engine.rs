@@ -325,7 +325,7 @@ impl<'r> Steering<'r> {
             self.number = view.number;
             (self.now, self.terrain) = (**put).clone();
         } else {
-            let line = "the device did not take the view: it stays as it was";
+            let line = "the device refused the placement: it stays as it was";
             self.lines.push(line.to_owned());
         }
         self.stage = Stage::Open;

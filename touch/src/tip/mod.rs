@@ -46,7 +46,7 @@ const SAG: f64 = 5e-3;
 /// A radius that no ball over cells of a size has.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "a tip of {tip_mm} mm: {cells:.1} cells of {cell_mm} mm, where 0 to {MAX_CELLS} can be felt"
+    "a tip of {tip_mm} mm: {cells:.1} cells of {cell_mm} mm, where 0 to {MAX_CELLS} can be rendered"
 )]
 pub struct TipError {
     /// The radius, mm.

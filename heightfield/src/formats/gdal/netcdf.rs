@@ -105,7 +105,7 @@ impl Conventions {
             .collect();
         if !felt.is_empty() {
             decoded.remarks.push(format!(
-                "its missing_value {} is felt as a height: GDAL knows one no-data value (--input no-data=VALUE)",
+                "its missing_value {} is read as a height: GDAL knows one no-data value (--input no-data=VALUE)",
                 felt.join(", ")
             ));
         }

@@ -30,7 +30,7 @@ pub enum UpdateError {
     #[error("the loader describes its flash in a way that is not understood: {0:?}")]
     Layout(String),
     /// The loader's flash is not that of the board's chip.
-    #[error("the loader is not that of {board}: it says its flash is {said:?}")]
+    #[error("the loader is not that of {board}: it reports the flash {said:?}")]
     OtherChip {
         /// The board that the image is for.
         board: &'static str,

@@ -69,11 +69,11 @@ fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
     say(format!(
         "loader         {serial} at {place}, as it was found"
     ));
-    let question = format!("is that the {board} that is to be written? [y/N]");
+    let question = format!("is this the {board} to write? [y/N]");
     match ask(&question).as_deref() {
         Some("y" | "Y" | "yes") => Ok(()),
         _ => Err(Failure::new(format!(
-            "nobody said that the loader {serial} at {place} is the board that is meant"
+            "the loader {serial} at {place} was not confirmed as the board to write"
         ))
         .hint(format!(
             "nothing was touched; name it: --device usb:{serial}"

@@ -28,7 +28,7 @@ pub(super) fn begin() -> bool {
     });
     if let Err(error) = connected {
         // The guardian still sees the end of this process, and passes signals on.
-        eprintln!("warning: the guardian is not told which arm may be armed: {error}");
+        eprintln!("warning: the guardian does not know which arm may be armed: {error}");
     }
     true
 }

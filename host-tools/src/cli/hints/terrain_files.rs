@@ -143,7 +143,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         }
         _ => {
             return format!(
-                "get the file again; where it came from, this tells whether it is whole: gdalinfo -checksum {}",
+                "get the file again; at its source, this shows whether it is complete: gdalinfo -checksum {}",
                 names(path).0
             );
         }

@@ -154,11 +154,11 @@ pub(in crate::cli) fn picture_lines(
     let cell_mm = short(view.felt_cell_mm());
     lines.push(match view.felt_cell_m() {
         Some(metres) => (
-            format!("felt cell, level {}", view.level),
+            format!("haptic cell, level {}", view.level),
             format!("{} m, {cell_mm} mm", short(metres)),
         ),
         None => (
-            format!("felt cell, level {}", view.level),
+            format!("haptic cell, level {}", view.level),
             format!("{cell_mm} mm"),
         ),
     });

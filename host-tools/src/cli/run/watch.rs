@@ -269,7 +269,7 @@ fn in_words(
     let force = glam::DVec3::from(record.force_n).length();
     let ([x, y, z], t_s) = (record.hip_mm, record.t_s);
     let state = match is_below_ground(sample, record, terrain) {
-        true => "below ground: raise the tip above the surface, then it can be felt",
+        true => "below ground: raise the tip above the surface to touch it",
         false => state_name(sample.state),
     };
     let (tiles, lost) = (tally.tiles, tally.lost + tally.dropped);

@@ -248,7 +248,7 @@ impl Surface {
             }
             (None, _) => return Ok(None),
             (Some(_), None) => {
-                return Err("--materials without what its classes feel like")
+                return Err("--materials without surfaces for its classes")
                     .or_hint("name a table with --surface FILE.toml; docs/worldcover.toml is one");
             }
             (Some(file), Some(looks)) => (file, looks.clone()),

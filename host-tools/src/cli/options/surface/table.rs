@@ -169,7 +169,7 @@ impl TableFile {
             return Err(bad(
                 *line,
                 format!(
-                    "class {class} is one too many: {count} classes, and at most {MAX_CLASSES} can be told apart; leave those out that may feel as the default"
+                    "class {class} is one too many: {count} classes, and at most {MAX_CLASSES} are possible; leave those out that may use the default"
                 ),
             ));
         }
