@@ -1,4 +1,4 @@
-//! What `--streaming` finds, where it does not depend on a clock, and the kept figures.
+//! Results of `streaming` that do not depend on a clock, and the kept figures.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -4,7 +4,7 @@ use std::ffi::{CStr, CString, c_char};
 
 use hapterra_touch::{ContactError, StepError, TerrainError};
 
-/// What a function returns: 0, or which error.
+/// Result of a function: 0, or an error.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraStatus {

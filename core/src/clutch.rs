@@ -35,13 +35,13 @@ use crate::rate::TickRate;
 use crate::scene::Scene;
 use crate::terrain::Window;
 
-/// How long all of it takes to come in again, ms.
+/// Time that all of it takes to come in again, ms.
 const IN_MS: u32 = 500;
 /// Most that a hand may have moved while the terrain stayed in its place, mm. What it moved
 /// beyond that the terrain goes with it: a hand that gives way under 1.2 N moves some 5 mm.
 const GIVE_MM: f32 = 10.0;
 
-/// How the host holds the clutch. In either way the HIP stays where it is over the terrain,
+/// The host's use of the clutch. In either way the HIP stays where it is over the terrain,
 /// and nothing is felt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ClutchHold {
@@ -109,13 +109,13 @@ impl Clutch {
         }
     }
 
-    /// Whether it takes no part in a tick.
+    /// Returns true if it takes no part in a tick.
     #[inline]
     pub(crate) const fn is_closed(&self) -> bool {
         matches!(self.state, State::Closed)
     }
 
-    /// Whether there is no force, and the HIP stays where it is over the terrain.
+    /// Returns true if there is no force, and the HIP stays where it is over the terrain.
     pub(crate) const fn is_open(&self) -> bool {
         matches!(self.state, State::Open { .. })
     }
@@ -143,7 +143,7 @@ impl Clutch {
         self.open_if_held();
     }
 
-    /// Whether anybody holds it.
+    /// Returns true if anybody holds it.
     const fn is_held(&self) -> bool {
         self.input || !matches!(self.host, ClutchHold::LetGo)
     }

@@ -14,7 +14,7 @@ use crate::terrain::{Tile, TileKey, Window};
 /// From the beginning of a tick until its force acts, s, where a board says nothing else.
 pub const LATENCY_S: f32 = 0.1e-3;
 
-/// What is handed to the loop between ticks.
+/// Command to the loop between ticks.
 pub enum Command<'t> {
     /// A scene. The arm is disarmed, and force that was there goes out gently.
     Scene(Scene),
@@ -58,7 +58,7 @@ pub enum Command<'t> {
 #[error("the scene is not valid, or its materials are not those that came")]
 pub struct RefusedScene;
 
-/// What the next tick renders.
+/// Source of the next tick's HIP.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HipSource {
     /// There is no scene: nothing is rendered. The guard still looks at the arm.
@@ -67,7 +67,7 @@ pub enum HipSource {
     Encoders,
     /// Points.
     Points {
-        /// Whether one is being rendered.
+        /// True if one is being rendered.
         pending: bool,
     },
 }
@@ -80,7 +80,7 @@ pub struct Board {
     /// From the beginning of a tick until its force acts, s: what the board and its amplifiers
     /// take.
     pub latency_s: f32,
-    /// How warm the motors are; as cold as the air where there is nothing known.
+    /// Temperatures of the motors; those of the air where nothing is known.
     pub motors: Option<Temperatures>,
     /// A fault that was found at boot.
     pub fault: Option<Fault>,
@@ -191,7 +191,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// How warm the motors are: what a board keeps over a reset.
+    /// Returns the temperatures of the motors, which a board keeps over a reset.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {
         self.guard.motors().temperatures()
@@ -247,7 +247,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.renderer.take_materials(table);
     }
 
-    /// What the next tick renders, by the scene in force.
+    /// Returns the source of the next tick's HIP, by the scene in force.
     #[must_use]
     pub fn source(&self) -> HipSource {
         match self.scene.as_ref().map(|scene| scene.source) {

@@ -97,7 +97,7 @@ struct RenderState {
 struct BegunPoint {
     /// The state before it.
     before: RenderState,
-    /// How often it lacked another tile.
+    /// Number of times that it lacked another tile.
     lacked: u32,
     /// The last tile that it lacked.
     tile: Option<TileIndex>,

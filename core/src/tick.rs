@@ -193,7 +193,7 @@ impl<const D: usize> Haptics<'_, D> {
         (sample.mode, sample.limits, sample.fault) = (mode, limits, fault);
     }
 
-    /// Whether the proxy is over the underlay, over a tile that has not settled, or over nothing
+    /// Returns true if the proxy is over the underlay, over a tile that has not settled, or over nothing
     /// where an underlay is on its way.
     fn is_over_coarse_ground(&self, sample: &TickRecord) -> bool {
         let cell = sample.proxy.column();
@@ -225,7 +225,7 @@ pub(crate) fn write_nothing(sample: &mut TickRecord) {
     write_contact(GridPoint::default(), &ContactOutput::default(), sample);
 }
 
-/// Where the tip is over the terrain.
+/// Returns the place where the tip is over the terrain.
 fn place(mechanism: &Kinematics, scene: &Scene, pose: &Pose) -> GridPoint {
     let moved_mm = to_terrain_frame(pose.tip_mm() - mechanism.home_mm());
     GridPoint::new(

@@ -129,7 +129,7 @@ impl Library {
         })
     }
 
-    /// Where it was found: a path, or the name that the system knows it by.
+    /// Returns its path, or its name in the system.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.loaded.path
@@ -222,7 +222,7 @@ impl fmt::Debug for Library {
 }
 
 thread_local! {
-    /// Whether HDF5 is silent on this thread.
+    /// True if HDF5 is silent on this thread.
     static IS_SILENT: Cell<bool> = const { Cell::new(false) };
 }
 

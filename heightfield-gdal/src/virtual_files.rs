@@ -1,4 +1,4 @@
-//! What is in archives, as files of GDAL's own file systems, and the texts of XML.
+//! Content of archives, as files of GDAL's own file systems, and the texts of XML.
 
 use std::path::Path;
 
@@ -93,7 +93,7 @@ impl Library {
     }
 }
 
-/// Whether an element has the attribute with which a VRT says that a name is one beside it.
+/// Returns true if an element has the attribute with which a VRT says that a name is one beside it.
 ///
 /// # Safety
 /// The node is GDAL's.

@@ -1,4 +1,4 @@
-//! What a VRT names.
+//! Names in a VRT.
 
 use std::fs;
 use std::path::Path;
@@ -43,11 +43,11 @@ pub(crate) struct Named {
     /// The element or attribute that it is in.
     pub(crate) node: String,
     pub(crate) value: String,
-    /// Whether it is a name beside the VRT.
+    /// True if it is a name beside the VRT.
     pub(crate) is_relative: bool,
 }
 
-/// Whether a file is a VRT, by its beginning.
+/// Returns true if a file is a VRT, by its beginning.
 pub(crate) fn begins(head: &[u8]) -> bool {
     head.windows(SIGN.len()).any(|part| part == SIGN.as_bytes())
 }
@@ -142,7 +142,7 @@ impl Named {
         Ok(Some(value).filter(|_| self.is_file_name()))
     }
 
-    /// Whether it names what a driver would ask a server for.
+    /// Returns true if it names what a driver would ask a server for.
     fn is_address(&self) -> bool {
         let is_of_gdal = ["/vsi", "vrt://"]
             .iter()

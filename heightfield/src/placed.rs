@@ -1,4 +1,4 @@
-//! Where decoded samples lie: what follows from a file's map from columns and rows to
+//! Place of decoded samples, from a file's map from columns and rows to
 //! coordinates, whatever its format.
 
 use super::crs::{ReferenceSystem, Unit};

@@ -29,7 +29,7 @@ impl Unread {
         }
     }
 
-    /// Whether what begins at a column and row of an image could not be read before.
+    /// Returns true if what begins at a column and row of an image could not be read before.
     pub(super) fn has(&self, image: usize, first: [u32; 2]) -> bool {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.contains(&(image, first))

@@ -20,7 +20,7 @@ use tempfile::TempPath;
 pub struct OutputError {
     /// The file.
     pub path: PathBuf,
-    /// Why.
+    /// Its reason.
     #[source]
     pub source: io::Error,
 }
@@ -117,7 +117,7 @@ impl Output {
         &self.path
     }
 
-    /// Where it grows until it is complete; none for a pipe, a device and standard output.
+    /// Returns the path of its partial file; none for a pipe, a device and standard output.
     #[must_use]
     pub fn partial(&self) -> Option<&Path> {
         self.beside.as_deref()
@@ -166,7 +166,7 @@ impl Seek for Output {
     }
 }
 
-/// Whether a path is `-`.
+/// Returns true if a path is `-`.
 fn is_standard_output(path: &Path) -> bool {
     path == Path::new("-")
 }
@@ -249,16 +249,16 @@ pub fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// What a process that was killed had written of a file.
+/// Partial file of a killed process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartialFile {
-    /// Where it is.
+    /// Its path.
     pub path: PathBuf,
-    /// How long it is, bytes.
+    /// Its length, bytes.
     pub bytes: u64,
 }
 
-/// What killed processes left of the file at `path`, by name. Nothing here touches
+/// Returns the partial files that killed processes left beside `path`, by name. Nothing here touches
 /// it.
 #[must_use]
 pub fn partial_files(path: &Path) -> Vec<PartialFile> {
@@ -292,7 +292,7 @@ fn beginning_of_partial(path: &Path) -> String {
     format!("{}.", name.get(..cut).unwrap_or_default())
 }
 
-/// Whether a name that begins so is that of a partial file.
+/// Returns true if a name that begins so is that of a partial file.
 fn is_partial(beginning: &str, name: &OsStr) -> bool {
     let random = name
         .to_str()
@@ -300,7 +300,7 @@ fn is_partial(beginning: &str, name: &OsStr) -> bool {
     random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
 }
 
-/// Whether no process is writing a partial file.
+/// Returns true if no process is writing a partial file.
 fn is_nobodys(path: &Path) -> bool {
     let file = regular_file::open(path);
     file.is_ok_and(|file| !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))

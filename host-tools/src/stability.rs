@@ -42,7 +42,7 @@ pub const SHORT_US: u16 = 310;
 /// See [`SHORT_US`].
 pub const LONG_US: u16 = 1_240;
 
-/// What is left of that on a textured surface, whose steepest slopes rock a light grasp, too; and
+/// Share of that on a textured surface, whose steepest slopes rock a light grasp, too; and
 /// what is left at [`LONG_US`].
 pub const LEFT_WITH_TEXTURE: f32 = 0.5;
 /// See [`LEFT_WITH_TEXTURE`].

@@ -29,7 +29,7 @@ struct Words {
     size: Size,
 }
 
-/// How large it is in the hand.
+/// Its size in the hand.
 #[derive(Clone, clap::Args)]
 pub(crate) struct Size {
     #[arg(long)]
@@ -58,7 +58,7 @@ pub(crate) struct Opened {
     first: [u32; 2],
     /// Samples from west to east, and from south to north.
     samples: [u32; 2],
-    /// How often something was not read, and why last.
+    /// Number of times that something was not read, and why last.
     unread: Mutex<(u64, String)>,
 }
 

@@ -1,4 +1,4 @@
-//! What is kept on disk of a terrain that stays in its file: another run reads next to
+//! Disk cache of a terrain that stays in its file: another run reads next to
 //! nothing, and no state of the folder or of the file ever changes a height.
 
 use std::fs;

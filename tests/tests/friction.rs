@@ -68,7 +68,7 @@ fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
     Some(distance(along, [0.0; 3]) / pressed)
 }
 
-/// Whether the straight way to a HIP leads through the air, or over a hole, from a place on a
+/// Returns true if the straight way to a HIP leads through the air, or over a hole, from a place on a
 /// proxy's way: there it leaves the surface and comes down elsewhere, and may be held where it does.
 fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
     let [from, to] = way;

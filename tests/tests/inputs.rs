@@ -1,4 +1,4 @@
-//! What the quick soak's scenes are made of, counted: each kind of ground, habit
+//! Content of the quick stress test's scenes, counted: each kind of ground, habit
 //! of the HIP and twin that is promised is there, felt, and judged.
 
 use std::collections::BTreeMap;

@@ -1,4 +1,4 @@
-//! What random scenes found, as small as it gets, each by the name of its cause.
+//! Regressions that random scenes found, as small as possible, each by the name of its cause.
 
 use hapterra_core::contact::ContactState;
 use hapterra_tests::invariants::Violation;

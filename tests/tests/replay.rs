@@ -1,4 +1,4 @@
-//! What a replay feels, against a dense search in `f64` that shares no code
+//! Replays against a dense search in `f64` that shares no code
 //! with the loop.
 
 use hapterra::replay::{OfflineDevice, Rule, on_native};

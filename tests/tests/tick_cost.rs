@@ -1,4 +1,4 @@
-//! What the whole chain from count to current costs on the emulated
+//! Cost of the whole chain from count to current on the emulated
 //! Cortex-M4F, by count of instructions, and how deep its stack goes.
 
 use std::time::Duration;

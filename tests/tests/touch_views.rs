@@ -55,7 +55,7 @@ struct Touching<'t> {
     steering: Steering<'t>,
     samples: Vec<TickRecord>,
     said: Vec<String>,
-    /// Whether the board's clutch input is held.
+    /// True if the board's clutch input is held.
     pedal: Rc<Cell<bool>>,
 }
 

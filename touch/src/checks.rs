@@ -1,4 +1,4 @@
-//! What can be a terrain, and why other things cannot.
+//! Checks of terrains.
 
 use alloc::vec::Vec;
 

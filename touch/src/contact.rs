@@ -37,7 +37,7 @@ pub struct Contact {
     tick_loop: TickLoop,
     scene: Scene,
     materials: usize,
-    /// Where the HIP was.
+    /// Place where the HIP was.
     last: Option<GridPoint>,
 }
 
@@ -48,11 +48,11 @@ pub struct Step {
     pub force_n: [f32; 3],
     /// The proxy: on the surface while it touches, at the HIP while it is free, mm.
     pub proxy_mm: [f64; 3],
-    /// What the proxy is doing.
+    /// State of the proxy.
     pub state: State,
 }
 
-/// What a proxy is doing.
+/// State of a proxy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum State {
     /// The HIP is in the air, and so is the proxy: no force.
@@ -137,7 +137,7 @@ pub enum StepError {
 pub struct RunError {
     /// The steps before it.
     pub done: Vec<Step>,
-    /// Why it has not happened.
+    /// Its reason.
     pub why: StepError,
 }
 

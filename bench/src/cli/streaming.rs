@@ -10,7 +10,7 @@ use crate::streaming::{self, Plan};
 /// Arguments of `hapterra-lab streaming`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// What is measured, and written.
+    /// Files to measure and to write.
     #[command(flatten)]
     pub files: Files,
 

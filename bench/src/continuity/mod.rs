@@ -1,4 +1,4 @@
-//! How much the force changes when the HIP moves a hundredth of a cell along the
+//! Change of the force when the HIP moves a hundredth of a cell along the
 //! ground: on smooth ground, over ridges, in valleys, across the edges of
 //! patches, and while a tile arrives.
 //!

@@ -17,7 +17,7 @@ use crate::grid::Grid;
 use crate::haptics::Hip;
 use crate::path::Dice;
 
-/// Why nothing can be measured on a terrain: it is too small, or the arm does not reach it.
+/// Reason for which nothing can be measured on a terrain: it is too small, or the arm does not reach it.
 #[derive(Clone, Debug)]
 pub struct NotMeasured(pub(crate) String);
 

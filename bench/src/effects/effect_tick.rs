@@ -1,4 +1,4 @@
-//! What was felt in one tick, as the tick itself reports it.
+//! Record of one tick, as the tick itself reports it.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::grid::GridPoint;

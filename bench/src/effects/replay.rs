@@ -1,4 +1,4 @@
-//! What is felt along a path of points, in lock-step.
+//! Forces along a path of points, in lock-step.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;

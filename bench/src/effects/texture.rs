@@ -85,7 +85,7 @@ fn wanted(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vecto
     plus(high, across, -share * depth.min(deepest(texture)))
 }
 
-/// How much of a texture is felt, by the proxy's way over the map.
+/// Share of a texture that is felt, by the proxy's way over the map.
 struct Fade {
     wavelength: f64,
     /// Wavelengths a tick.

@@ -1,4 +1,4 @@
-//! How a hand holds the tip.
+//! Grasps of the tip.
 
 use hapterra::phantom::HandModel;
 
@@ -31,7 +31,7 @@ impl Grasp {
         }
     }
 
-    /// What the hand is made of.
+    /// Returns the masses, springs and dampers of the hand.
     #[must_use]
     pub fn hand(self) -> HandModel {
         match self {

@@ -20,10 +20,10 @@ const REST_S: f64 = 1.0;
 /// Taps of each speed.
 const TAPS: usize = 3;
 
-/// What a few taps of one speed showed.
+/// Outcome of a few taps of one speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Taps {
-    /// What the surface gave to the arm in one tap at most, mJ. A passive surface gives
+    /// Largest energy that the surface gave to the arm in one tap, mJ. A passive surface gives
     /// nothing.
     pub given_mj: f64,
     /// Slowest and fastest that the tip was when a tap first touched the surface, m/s.

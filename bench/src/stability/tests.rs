@@ -1,4 +1,4 @@
-//! What is known of a spring that is felt in ticks, beside what the trials say.
+//! Theory of a sampled spring, beside the trials.
 
 use hapterra_core::force::{Controller, Damping, Pattern, Texture};
 use hapterra_core::rate::TickRate;

@@ -24,7 +24,7 @@ pub(super) struct Case {
     pub(super) terrain: String,
     /// The file: a path, or a URL.
     pub(super) source: String,
-    /// Where the ways of the HIP are written down.
+    /// Place where the ways of the HIP are written down.
     pub(super) ways: String,
     /// How the file is read.
     pub(super) reading: Reading,
@@ -32,7 +32,7 @@ pub(super) struct Case {
     pub(super) latency_ms: u32,
     /// Halvings in the search for the fastest speed.
     pub(super) halvings: u32,
-    /// Whether virtual time stands still while a block is read.
+    /// True if virtual time stands still while a block is read.
     pub(super) stands_while_reading: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What a process takes: memory, and bytes that it reads.
+//! Use of memory by a process, and bytes that it reads.
 
 use std::io::{self, BufRead as _, Write as _};
 

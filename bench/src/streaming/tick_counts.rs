@@ -1,4 +1,4 @@
-//! What the samples of a run say of the ground under the hand.
+//! Counts of a run's ticks by the ground under the hand.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
@@ -29,7 +29,7 @@ impl TickCounts {
     }
 }
 
-/// Whether terrain that might be felt was not on the device: a hole in what is felt.
+/// Returns true if terrain that might be felt was not on the device: a hole in what is felt.
 pub(super) fn lacks_terrain(sample: &TickRecord) -> bool {
     sample.limits.contains(Limits::TERRAIN_MISSING)
 }

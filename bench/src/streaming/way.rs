@@ -1,4 +1,4 @@
-//! Where the HIP goes over a terrain: a way at one height below the surface.
+//! Path of the HIP over a terrain, at one depth below the surface.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What one tick of the contact answers.
+//! The result of one tick of the contact.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -25,9 +25,9 @@ pub enum ContactState {
 /// One tick's answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactOutput {
-    /// What the proxy is doing.
+    /// State of the proxy.
     pub state: ContactState,
-    /// Where the proxy is.
+    /// Position of the proxy.
     pub proxy: GridPoint,
     /// From the HIP to the proxy in cells, times the boundary fade: what the spring
     /// stretches by. Zero unless touching or fading.

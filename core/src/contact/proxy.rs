@@ -80,7 +80,7 @@ struct Sweeping {
 struct OnSurface {
     descent: Descent,
     leave: Leave,
-    /// How much of the force is felt: less than 1 at the boundary of the surface, and
+    /// Share of the force that is felt: less than 1 at the boundary of the surface, and
     /// while a contact comes in after a wait.
     fade: f32,
     departures: Departures,
@@ -180,7 +180,7 @@ impl Contact {
         &self.hip
     }
 
-    /// How much of the force is felt: less than 1 where it fades at the boundary of
+    /// Share of the force: less than 1 where it fades at the edge of
     /// the surface, or comes in after a wait.
     #[must_use]
     pub const fn boundary_fade(&self) -> f32 {

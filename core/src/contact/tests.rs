@@ -1,4 +1,4 @@
-//! What every tick must keep, on terrain from flat to absurd.
+//! Invariants of every tick, on terrain from flat to absurd.
 
 use std::vec::Vec;
 

@@ -26,7 +26,7 @@ pub(crate) struct ActiveMaterial {
     scale: f32,
     /// The law as it is felt. Its texture is the one whose share is felt.
     law: SurfaceParams,
-    /// How much of that texture is felt.
+    /// Share of that texture that is felt.
     texture_share: f32,
     cell_mm: f32,
     rate: TickRate,
@@ -71,7 +71,7 @@ impl ActiveMaterial {
         self.law.friction
     }
 
-    /// How much of the texture is felt.
+    /// Returns the share of the texture that is felt.
     pub(crate) const fn texture_share(&self) -> f32 {
         self.texture_share
     }

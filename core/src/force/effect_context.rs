@@ -1,4 +1,4 @@
-//! What every effect of a scene depends on besides its law.
+//! Conditions of the effects of a scene besides its surface parameters.
 
 use crate::rate::TickRate;
 

@@ -1,4 +1,4 @@
-//! What a scene adds to the force of the spring.
+//! Effects that a scene adds to the force of the spring.
 
 use glam::Vec3;
 

@@ -39,9 +39,9 @@ pub struct SurfaceParams {
     pub stiffness_n_per_mm: f32,
     /// Largest force in newtons; the direction is kept.
     pub max_force_n: f32,
-    /// How rough the surface is.
+    /// Friction of the surface.
     pub friction: Friction,
-    /// What takes energy out of a motion against it.
+    /// Damping of a motion against it.
     pub damping: Damping,
     /// Which normals the force follows.
     pub shading: Shading,
@@ -60,7 +60,7 @@ impl SurfaceParams {
         texture: Texture::NONE,
     };
 
-    /// Whether stiffness and limit are finite and not negative, and friction, damping and texture
+    /// Returns true if stiffness and limit are finite and not negative, and friction, damping and texture
     /// are such.
     #[must_use]
     pub fn is_valid(&self) -> bool {

@@ -1,4 +1,4 @@
-//! How much energy the ticks have created at the tip, and the damping that takes it back
+//! The energy leak of the sampled wall at the tip, and the damping that dissipates it
 //! (Hannaford and Ryu 2002).
 //!
 //! A spring gives no more than it was given. One that is felt in ticks does: its force is that of

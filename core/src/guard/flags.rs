@@ -1,11 +1,11 @@
-//! What keeps the arm from being armed, and why output is reduced: two sets of
+//! Blockers of arming and reasons for reduced output: two sets of
 //! named bits. Neither is a fault.
 
 use bitflags::bitflags;
 use serde::{Deserialize, Serialize};
 
 bitflags! {
-    /// What keeps the amplifiers off. The bits are stable.
+    /// Reasons for which the amplifiers are off. The bits are stable.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     pub struct Blockers: u16 {
         /// There is no calibration record.
@@ -43,7 +43,7 @@ bitflags! {
 }
 
 bitflags! {
-    /// Why the force is not what the scene asked for. The bits are stable.
+    /// Reasons for a force below that of the scene. The bits are stable.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     pub struct Limits: u16 {
         /// The force was longer than the device may make.
@@ -78,7 +78,7 @@ bitflags! {
 }
 
 impl Blockers {
-    /// What only the user or the host can change: an arm command waits for it.
+    /// Blockers that only the user or the host can clear: an arm command waits for them.
     pub const BY_HAND: Self = Self::HOST_DISARMED
         .union(Self::DEAD_MAN_STILL_HELD)
         .union(Self::DEAD_MAN_RELEASED)
@@ -89,7 +89,7 @@ impl Blockers {
         self.iter_names().map(|(name, bit)| (name, bit.meaning()))
     }
 
-    /// What one bit means and what to do; of the lowest where there are more.
+    /// Returns the meaning of one bit and its remedy; of the lowest where there are more.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());
@@ -126,7 +126,7 @@ impl Limits {
         self.iter_names().map(|(name, bit)| (name, bit.meaning()))
     }
 
-    /// What one bit means; of the lowest where there are more.
+    /// Returns the meaning of one bit; of the lowest where there are more.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());

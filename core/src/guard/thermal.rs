@@ -1,4 +1,4 @@
-//! How warm the motors are, and what current they may still be given.
+//! Temperatures of the motors, and the currents that they still allow.
 //!
 //! A winding heats in seconds, the housing around it in minutes, so two nodes
 //! a motor. The winding's resistance is taken hot, which errs on the warm side.
@@ -34,7 +34,7 @@ pub const UNSEEN_K: f32 = 5.0;
 /// no farther, either: monitors without supply may tell of currents for hours that never flowed.
 const MAX_K: Vec3 = Vec3::splat(200.0);
 
-/// What the two nodes of each motor are above the air, K: all that the model has to
+/// Excess of the two nodes of each motor over the air, K: all that the model has to
 /// know of what was before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Temperatures {
@@ -106,7 +106,7 @@ pub struct Motors {
     ticks: u32,
     /// The most that each axis may be given now, A.
     pub(super) allowed_a: Vec3,
-    /// Whether a winding is too hot to go on.
+    /// True if a winding is too hot to go on.
     pub(super) too_hot: bool,
 }
 
@@ -141,7 +141,7 @@ impl Motors {
         self.update_limits();
     }
 
-    /// What a board has to keep over a reset.
+    /// Returns the state that a board keeps over a reset.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {
         self.at

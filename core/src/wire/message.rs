@@ -85,7 +85,7 @@ pub enum ToHost {
     SceneAck {
         /// The scene's epoch.
         epoch: u32,
-        /// Whether the scene was valid and is now in force.
+        /// True if the scene was valid and is now in force.
         accepted: bool,
     },
     /// Asks for a tile.

@@ -1,4 +1,4 @@
-//! What travels between the device and the host: one link, one table of
+//! The link between device and host: one table of
 //! messages, one framing. This page is the specification of the conversation.
 //!
 //! # Frames

@@ -1,4 +1,4 @@
-//! What the link does with each message of the host.
+//! Handling of each message of the host.
 
 use hapterra_core::scene::{HipCommand, Scene};
 use hapterra_core::terrain::RETRY_TICKS;

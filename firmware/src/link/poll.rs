@@ -1,4 +1,4 @@
-//! What the link does when it is polled: it reads what the loop did, hands on what
+//! Polling of the link: it reads what the loop did, hands on what
 //! the loop needs, and fills the queue to the host.
 
 use hapterra_core::guard::Mode;

@@ -1,4 +1,4 @@
-//! What a step finds wrong, by name, with what to do about it.
+//! Findings of the steps, by name, with their remedies.
 
 use hapterra_core::guard::{Blockers, Fault};
 use hapterra_core::wire::request::Refusal;
@@ -6,7 +6,7 @@ use hapterra_core::wire::request::Refusal;
 use super::attendant::Task;
 use crate::calibrate::FitError;
 
-/// Why a step is not passed. Axes and joints are counted from 1.
+/// Reason for which a step is not passed. Axes and joints are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Finding {
     /// The board has a fault.
@@ -170,7 +170,7 @@ pub enum Finding {
 }
 
 impl Finding {
-    /// What to do, in the imperative.
+    /// Returns the remedy, in the imperative.
     #[must_use]
     pub fn what_to_do(&self) -> String {
         match self {

@@ -130,7 +130,7 @@ impl VirtualUser {
     }
 }
 
-/// Where an axis pushes the tip in the zero pose as its angle grows.
+/// Returns the direction in which an axis pushes the tip in the zero pose as its angle grows.
 fn pushed_along(axis: usize) -> DVec3 {
     let direction = Direction::ALL.get(axis).copied();
     direction.unwrap_or(Direction::Up).unit()

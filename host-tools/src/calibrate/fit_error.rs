@@ -1,6 +1,6 @@
-//! Why measurements do not make a record.
+//! Reason for which measurements make no record.
 
-/// Why measurements do not make a record.
+/// Reason for which measurements make no record.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// A joint hardly moved in any of the checks.

@@ -49,7 +49,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: Option<PathBuf>,
 
-    /// What the file does not say itself.
+    /// Statements about the file that it does not make itself.
     #[command(flatten)]
     pub reading: ReadingOptions,
 
@@ -77,23 +77,23 @@ pub struct Args {
     #[command(flatten)]
     pub placing: Placing,
 
-    /// How it is rendered.
+    /// Rendering.
     #[command(flatten)]
     pub rendering: Rendering,
 
-    /// Where settings are from.
+    /// Source of the settings.
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// How the view may be changed meanwhile.
+    /// Commands that change the placement meanwhile.
     #[command(flatten)]
     pub commands: Commands,
 
-    /// Whether other programs are told what happens.
+    /// Events to other programs.
     #[command(flatten)]
     pub events: EventOptions,
 
-    /// Whether it is shown.
+    /// The viewer.
     #[command(flatten)]
     pub viewing: Viewing,
 }

@@ -1,4 +1,4 @@
-//! What a device tells of its arm before it is given a terrain.
+//! Calibration of a device before it has a terrain.
 
 use hapterra_core::phantom::{Calibration, Model};
 

@@ -1,4 +1,4 @@
-//! How a subcommand fails: what went wrong, and the one thing to do next.
+//! Failures of subcommands: what went wrong, and the one thing to do next.
 
 use std::error::Error;
 use std::fmt::Write as _;

@@ -1,4 +1,4 @@
-//! How much the command line asks of its readers.
+//! Size of the command line's help.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! What to do next about each error of the library: one table an error type.
+//! Hints for each error of the library: one table an error type.
 //!
 //! A hint that depends on the command's own options stands in that command.
 

@@ -98,7 +98,7 @@ struct FileReport {
     /// The horizontal reference system, as `EPSG:26911`, where the file states it.
     crs: Option<String>,
     crs_name: Option<String>,
-    /// Where the reference system comes from.
+    /// Source of the reference system.
     crs_from: Option<&'static str>,
     /// Outer edges of the cells around all samples, in the file's units.
     bounds: Option<Rectangle>,
@@ -131,7 +131,7 @@ struct FileReport {
     /// Samples that range and number of holes are from: all, or fewer where the raster
     /// stays in its file.
     looked_at: u64,
-    /// Whether that is all of them.
+    /// True if that is all of them.
     known_whole: bool,
     /// Bytes the samples take on the host, at most.
     bytes: usize,
@@ -146,7 +146,7 @@ struct Cell {
     east: f64,
     north: f64,
     unit: &'static str,
-    /// Whether the file states the unit; metres or degrees are assumed if not.
+    /// True if the file states the unit; metres or degrees are assumed if not.
     unit_stated: bool,
     /// Where the unit comes from: the `file`, the `code` of its reference system, an
     /// `option` of this command, or it is `assumed`.
@@ -156,14 +156,14 @@ struct Cell {
     north_m: f64,
     /// Side of the square cell that is felt, m on the ground.
     felt_m: f64,
-    /// Whether heights are interpolated for that, as the stored cells are not square.
+    /// True if heights are interpolated for that, as the stored cells are not square.
     resampled: bool,
-    /// Whether stored cells that are not square are felt as squares.
+    /// True if stored cells that are not square are felt as squares.
     distorted: bool,
     /// How far slopes and lengths are off at worst somewhere in the field, as a share, where
     /// cells are felt as they are in its middle.
     worst_share: Option<f64>,
-    /// Where that is, in the file's coordinates.
+    /// Its place, in the file's coordinates.
     worst_at: Option<[f64; 2]>,
     #[serde(skip)]
     worst: Option<String>,

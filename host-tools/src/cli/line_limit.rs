@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-/// How long lines are counted together.
+/// Time for which lines are counted together.
 const WINDOW: Duration = Duration::from_secs(1);
 
 /// Lets so many lines through in a second, and counts the others.

@@ -18,7 +18,7 @@ use super::line_limit::LineLimit;
 use super::terminal::writer;
 use heightfield::shown::shown;
 
-/// Where the lines come from that a device can cause.
+/// Place where the lines come from that a device can cause.
 const BY_DEVICE: &str = "hapterra::link";
 
 /// Starts the log. `RUST_LOG` overrides the `-v` count.

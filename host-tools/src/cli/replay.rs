@@ -65,15 +65,15 @@ pub struct Args {
     #[arg(long, default_value = "native")]
     pub device: VirtualDevice,
 
-    /// How the terrain is rendered.
+    /// Rendering of the terrain.
     #[command(flatten)]
     pub rendering: Rendering,
 
-    /// Where settings are from.
+    /// Source of the settings.
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// Whether it is shown.
+    /// The viewer.
     #[command(flatten)]
     pub viewing: Viewing,
 }

@@ -93,23 +93,23 @@ pub struct Args {
     #[command(flatten)]
     pub placing: Placing,
 
-    /// How the terrain is rendered.
+    /// Rendering of the terrain.
     #[command(flatten)]
     pub rendering: Rendering,
 
-    /// Where settings are from.
+    /// Source of the settings.
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// How the placement may be changed meanwhile.
+    /// Commands that change the placement meanwhile.
     #[command(flatten)]
     pub commands: Commands,
 
-    /// Whether other programs are told what happens.
+    /// Events to other programs.
     #[command(flatten)]
     pub events: EventOptions,
 
-    /// Whether it is shown.
+    /// The viewer.
     #[command(flatten)]
     pub viewing: Viewing,
 }

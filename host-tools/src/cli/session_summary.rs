@@ -1,4 +1,4 @@
-//! What `demo` and `run` say about a session at its end.
+//! Summary of `demo` and `run` at the end of a session.
 
 use std::path::Path;
 

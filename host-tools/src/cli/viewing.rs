@@ -18,7 +18,7 @@ use crate::view_feed::{Picture, Prepared, Program, ProgramError, VARIABLE, ViewF
 /// Between two looks at whether the viewer has ended.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether it is shown.
+/// The viewer.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "While it is touched")]
 pub struct Viewing {

@@ -31,9 +31,9 @@ pub enum Event<'e> {
     /// The scene is in force. `resumed` tells whether the device held it
     /// already and goes on where it was.
     Opened {
-        /// How the device introduced itself.
+        /// Returns the device's introduction.
         device: &'e DeviceHello,
-        /// Whether it goes on with the scene it held.
+        /// True if it goes on with the scene it held.
         resumed: bool,
     },
     /// The sample of one tick of a scene whose HIP comes from the encoders.
@@ -53,7 +53,7 @@ pub enum Event<'e> {
     Viewed {
         /// The view.
         view: &'e SceneChange,
-        /// Whether it is in force.
+        /// True if it is in force.
         taken: bool,
     },
     /// The answer to a question for the status.
@@ -79,11 +79,11 @@ pub enum Event<'e> {
     Unanswered(&'e Ask),
 }
 
-/// How a session arms the device, as soon as the scene is in force. A device that comes
+/// Arming of the device in a session, as soon as the scene is in force. A device that comes
 /// back after it was lost is armed again by itself only where the arm is virtual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arming {
-    /// What the encoders read in the zero pose, where the host knows.
+    /// Encoder readings in the zero pose, where the host knows them.
     pub zero: Option<[i32; 3]>,
 }
 
@@ -222,7 +222,7 @@ impl<'t> Client<'t> {
         &self.tally
     }
 
-    /// Where the conversation stands.
+    /// State of the conversation.
     #[must_use]
     pub const fn state(&self) -> State {
         self.talk.state()
@@ -234,7 +234,7 @@ impl<'t> Client<'t> {
         self.talk.session()
     }
 
-    /// How long it waits for what.
+    /// Time-outs.
     #[must_use]
     pub const fn patience(&self) -> &Timeouts {
         self.talk.patience()

@@ -18,7 +18,7 @@ use super::error::LinkError;
 use super::messages::append;
 use super::patience::Timeouts;
 
-/// Where the conversation stands.
+/// State of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     /// Nothing was said yet, or goodbye or detach was answered.
@@ -183,7 +183,7 @@ impl Conversation {
         self.say_state(now, out);
     }
 
-    /// Whether its end was said and is not answered.
+    /// Returns true if its end was said and is not answered.
     pub(super) const fn is_ending(&self) -> bool {
         matches!(self.state, State::Leaving | State::Detaching)
     }
@@ -472,7 +472,7 @@ impl Conversation {
         }
     }
 
-    /// Whether a message answers the last hello and is the first that does. What answers
+    /// Returns true if a message answers the last hello and is the first that does. What answers
     /// an earlier one, and a double, tells what was.
     fn answers_hello(&mut self, number: u8) -> bool {
         number == self.hello && !std::mem::replace(&mut self.hello_answered, true)
@@ -540,7 +540,7 @@ impl Conversation {
         Ok(Some(News::Greeted { device, restarted }))
     }
 
-    /// Whether there is a scene to be felt and this is not its epoch.
+    /// Returns true if there is a scene to be felt and this is not its epoch.
     fn lacks_scene(&self, epoch: Option<u32>) -> bool {
         self.scene.is_some_and(|scene| epoch != Some(scene.epoch))
     }

@@ -85,7 +85,7 @@ impl<'t> Dialogue<'t> {
         Ok(Self { exchange, device })
     }
 
-    /// How the device introduced itself.
+    /// Returns the device's introduction.
     #[must_use]
     pub const fn device(&self) -> &DeviceHello {
         &self.device
@@ -353,7 +353,7 @@ impl Exchange<'_> {
     }
 }
 
-/// Whether a request may lead to something being driven.
+/// Returns true if a request may lead to something being driven.
 const fn drives(request: &Request) -> bool {
     matches!(
         request,

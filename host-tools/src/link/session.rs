@@ -20,7 +20,7 @@ use crate::terrain::Terrain;
 pub struct Session<'t> {
     client: Client<'t>,
     line: Line<'t>,
-    /// Whether it is to go on; what a device does not read is not waited for else.
+    /// True if it is to go on; what a device does not read is not waited for else.
     goes_on: &'t dyn Fn() -> bool,
     /// Until then goodbye is to be said and answered.
     leaves_by: Option<Duration>,
@@ -104,7 +104,7 @@ impl<'t> Session<'t> {
         self.line.hang_up();
     }
 
-    /// Whether it has a line.
+    /// Returns true if it has a line.
     #[must_use]
     pub const fn has_line(&self) -> bool {
         self.line.is_open()
@@ -122,7 +122,7 @@ impl<'t> Session<'t> {
         self.client.tally()
     }
 
-    /// How long it waits for what.
+    /// Time-outs.
     #[must_use]
     pub const fn patience(&self) -> &Timeouts {
         self.client.patience()

@@ -1,4 +1,4 @@
-//! Where the terrain lies in front of the arm.
+//! Frame of the arm in the terrain.
 //!
 //! The user faces the device, so east is the device's +y, north is −x and up
 //! is +z.
@@ -75,7 +75,7 @@ impl ArmFrame {
             })
     }
 
-    /// Whether the arm gets to every point of a script.
+    /// Checks that the arm reaches every point of a script.
     ///
     /// # Errors
     /// [`OutOfReach`] names the first corner that it does not get to.

@@ -88,13 +88,13 @@ impl HeldPhantom {
     /// device has confirmed and force has come in.
     pub const ARMED_S: f64 = 3.0;
 
-    /// How long the script takes, s.
+    /// Returns the duration of the script, s.
     #[must_use]
     pub fn script_s(&self) -> f64 {
         self.script.duration_s()
     }
 
-    /// What encoders, switches and amplifiers say now.
+    /// Returns the present readings of encoders, switches and amplifiers.
     #[must_use]
     pub fn sense(&self) -> GuardInputs {
         GuardInputs {

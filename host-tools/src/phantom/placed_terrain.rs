@@ -22,7 +22,7 @@ pub struct PlacedTerrain<'t> {
     duration_s: f64,
 }
 
-/// Why a terrain cannot be put in front of the arm.
+/// Reason for which a terrain cannot be placed in front of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlacingError {
     /// No part of it is within the arm's reach.
@@ -126,7 +126,7 @@ impl<'t> PlacedTerrain<'t> {
         self.arm.clone()
     }
 
-    /// How long the tour takes with arming before it and a rest at its end, s.
+    /// Returns the duration of the tour with arming before it and a rest at its end, s.
     #[must_use]
     pub const fn duration_s(&self) -> f64 {
         self.duration_s

@@ -41,7 +41,7 @@ pub struct Tour {
     pub placement: ArmFrame,
 }
 
-/// What a tour is planned for.
+/// Conditions of a tour.
 #[derive(Clone, Copy)]
 pub struct TourPlan<'a> {
     /// The terrain, mm.

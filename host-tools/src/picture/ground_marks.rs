@@ -1,4 +1,4 @@
-//! What a map says of the ground: a scale bar, and the coordinates of two corners.
+//! Marks of the ground on a map: a scale bar, and the coordinates of two corners.
 
 use plotters::element::Rectangle;
 use plotters::style::{Color, WHITE};
@@ -9,7 +9,7 @@ use super::canvas::PictureError;
 use super::map_view::MapView;
 use super::style::{self, INK, px};
 
-/// What a picture says of the ground.
+/// Facts about the ground for a picture.
 #[derive(Clone, Copy)]
 pub struct GroundFacts<'a> {
     /// Ground metres a hand millimetre, where the terrain knows its size.

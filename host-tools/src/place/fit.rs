@@ -1,4 +1,4 @@
-//! How large a terrain may be for all of it to lie in an arm's reach.
+//! Largest size of a terrain within an arm's workspace.
 
 use super::error::PlaceError;
 use super::reach::Reach;

@@ -188,7 +188,7 @@ fn in_turn_of(file: &Georeference<'_>, other: [f64; 2], east: f64, [x, y]: [f64;
     [x + ((expected - x) / turn).round() * turn, y]
 }
 
-/// Whether neighbours on an outline are too far apart for one piece of a map.
+/// Returns true if neighbours on an outline are too far apart for one piece of a map.
 fn is_torn(points: &[[f64; 2]]) -> bool {
     let [west, south, east, north] = around(points.iter().copied());
     let whole = (east - west).hypot(north - south);

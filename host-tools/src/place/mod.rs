@@ -1,4 +1,4 @@
-//! Where a terrain lies in front of the arm and how large it is there.
+//! Placement of a terrain in front of the arm.
 //!
 //! [`Target`] and [`PlacementOptions`] are what the user asks for. [`Reach`] is what an arm can
 //! get to, by its calibration. [`Placement::new`] makes of both and of a grid the one answer: the

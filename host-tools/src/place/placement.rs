@@ -1,4 +1,4 @@
-//! What of a terrain lies where in front of the arm, and how large.
+//! Placement of a terrain in front of the arm: place, scale, level and heights.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::{Scene, Source};
@@ -20,7 +20,7 @@ pub(crate) const FELT_MM: f64 = 15.0;
 /// Hand millimetres a felt cell at a place whose scale nobody states.
 const CELL_MM: f64 = 1.0;
 
-/// How large the terrain is asked to be.
+/// Requested size of the terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Sizing {
     /// The target fills the arm's reach; of a place, 1 mm is a felt cell.
@@ -32,7 +32,7 @@ pub enum Sizing {
     GroundMPerMm(f64),
 }
 
-/// How high the terrain is asked to be.
+/// Requested height of the terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Heights {
     /// So many times its true proportions. A file that does not know how large its cells are has
@@ -61,20 +61,20 @@ pub fn suited_height(plain: f64, relief: f64) -> f64 {
     }
 }
 
-/// What is asked for.
+/// Requested placement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlacementOptions {
     /// Which part of the terrain.
     pub target: Target,
-    /// How large.
+    /// Its size.
     pub sizing: Sizing,
-    /// How high.
+    /// Its height.
     pub heights: Heights,
     /// Level of detail; chosen by what the encoders tell where nobody states it.
     pub level: Option<u8>,
 }
 
-/// What of a terrain lies where in front of the arm, and how large.
+/// Placement of a terrain in front of the arm: place, scale, level and heights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// The point of the terrain under the tip in its home pose, hand millimetres east,
@@ -88,15 +88,15 @@ pub struct Placement {
     pub level: u8,
     /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
     pub side_m: Option<f64>,
-    /// How many times higher than at its true proportions the terrain is, where the file
+    /// Height of the terrain, in its true proportions' height, where the file
     /// knows them.
     pub exaggeration: Option<f64>,
-    /// What is laid in front of the arm, from west, south to east, north, hand millimetres;
+    /// The part in front of the arm, from west, south to east, north, device millimetres;
     /// the whole terrain where only place and scale are stated.
     pub laid_mm: [f64; 4],
     /// Lowest and highest point of that in the hand, mm.
     pub heights_mm: [f64; 2],
-    /// What the arm gets to ([`Reach::sides_mm`]).
+    /// The arm's workspace ([`Reach::sides_mm`]).
     pub reach_mm: [f64; 4],
 }
 

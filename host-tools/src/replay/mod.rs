@@ -38,7 +38,7 @@ use crate::output::{Output, OutputError};
 use crate::terrain::{HapticGrid, Terrain, TerrainError};
 use settings::PlacementSettings;
 
-/// Why a replay did not come to its end. Nothing is left at the output's path.
+/// Reason for which a replay ended early. Nothing is left at the output's path.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The trajectory.
@@ -55,7 +55,7 @@ pub enum ReplayError {
     Placement {
         /// The view.
         number: u32,
-        /// Why not.
+        /// Reason for the refusal.
         why: TerrainError,
     },
     /// The user.
@@ -63,7 +63,7 @@ pub enum ReplayError {
     Interrupted,
 }
 
-/// What a replay did.
+/// Summary of a replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// Ticks felt, a row of the output each.
@@ -186,7 +186,7 @@ fn go_over<'t>(
     Ok(recording.view(view)?)
 }
 
-/// Whether nothing is felt because the HIP is below ground and came there from below, from
+/// Returns true if nothing is felt because the HIP is below ground and came there from below, from
 /// a hole or from outside.
 #[must_use]
 pub fn is_below_ground(sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) -> bool {

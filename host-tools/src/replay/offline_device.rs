@@ -132,13 +132,13 @@ impl<'t> OfflineDevice<'t> {
         })
     }
 
-    /// What went over the link so far.
+    /// Returns the link's statistics so far.
     #[must_use]
     pub const fn tally(&self) -> &LinkStats {
         self.session.tally()
     }
 
-    /// What the loop feels with the HIP at `hip` next.
+    /// Steps the loop with the HIP at `hip` and returns its record.
     ///
     /// # Errors
     /// [`LinkError`]; the replay cannot go on after one.

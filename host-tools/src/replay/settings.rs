@@ -1,4 +1,4 @@
-//! What a recording says of itself: on which terrain, at which place and scale, under
+//! Settings of a recording: on which terrain, at which place and scale, under
 //! which law and by which device it was felt.
 //!
 //! The text is TOML. In a CSV recording each of its lines stands behind `# ` before the
@@ -16,7 +16,7 @@ use crate::terrain::{HapticCells, HapticGrid, Scale, ScaleError, Terrain};
 use heightfield::ReferenceSystem;
 use heightfield::shown::shown;
 
-/// What the first line of the settings begins with; its value is [`FORMAT`].
+/// Key of the first line of the settings; its value is [`FORMAT`].
 pub const KEY: &str = "hapterra-recording";
 /// Version of the settings' format that this program writes and reads.
 pub const FORMAT: u32 = 1;
@@ -37,11 +37,11 @@ pub struct Settings {
     pub protocol: u16,
     /// The terrain file.
     pub terrain: TerrainFile,
-    /// What of it was felt, where and how large.
+    /// The rendered part, its place and scale.
     pub felt: RenderedTerrain,
     /// The force law and the contact rule.
     pub force: Force,
-    /// What the ground was made of, where that was not the same everywhere; the law is then
+    /// Materials of the ground, where there were several; the law is then
     /// that of the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub materials: Option<MaterialSettings>,
@@ -59,13 +59,13 @@ pub struct Settings {
 /// A view that was put in while a terrain was felt.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlacementSettings {
-    /// What the rows of this view have in the column `view`, from 1 on.
+    /// Number of this placement in the column `view`, from 1 on.
     pub number: u32,
     /// Side of a felt cell of level 0 on the ground, m, where the file knows it; none also in
     /// recordings of earlier versions, whose cells are those of the beginning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
-    /// Where a cell of the file is as large as that, in the file's coordinates, x and y;
+    /// Place where a cell of the file is that large, in the file's coordinates, x and y;
     /// none where the cells are those of the beginning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured_at: Option<[f64; 2]>,
@@ -88,10 +88,10 @@ pub struct PlacementSettings {
     /// Which normals the force follows; left out where they are those of the patches.
     #[serde(default, skip_serializing_if = "Shading::is_none")]
     pub shading: Shading,
-    /// How rough the surface is; left out where it is like ice.
+    /// Friction of the surface; left out where there is none.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
-    /// What takes energy out of a motion against it; left out where nothing is asked for.
+    /// Damping of a motion against it; left out where there is none.
     #[serde(default, skip_serializing_if = "Damping::is_none")]
     pub damping: Damping,
     /// Its micro-relief; left out where it is even.
@@ -170,7 +170,7 @@ pub struct TerrainFile {
     pub crs: Option<String>,
 }
 
-/// What was felt of a terrain.
+/// The rendered terrain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenderedTerrain {
     /// Which cells of the file.
@@ -180,7 +180,7 @@ pub struct RenderedTerrain {
     /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
-    /// Where a cell of the file is as large as that, in the file's coordinates, x and y;
+    /// Place where a cell of the file is that large, in the file's coordinates, x and y;
     /// none where it is in the middle of the field.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured_at: Option<[f64; 2]>,
@@ -213,7 +213,7 @@ pub enum Rule {
     Paper,
 }
 
-/// How force was made.
+/// Rendering of the force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Force {
     /// Newtons for a millimetre between the HIP and the proxy.
@@ -225,10 +225,10 @@ pub struct Force {
     /// Which normals the force follows; left out where they are those of the patches.
     #[serde(default, skip_serializing_if = "Shading::is_none")]
     pub shading: Shading,
-    /// How rough the surface is; left out where it is like ice.
+    /// Friction of the surface; left out where there is none.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
-    /// What takes energy out of a motion against it; left out where nothing is asked for.
+    /// Damping of a motion against it; left out where there is none.
     #[serde(default, skip_serializing_if = "Damping::is_none")]
     pub damping: Damping,
     /// Its micro-relief; left out where it is even.
@@ -242,14 +242,14 @@ fn is_point(tip_mm: &f64) -> bool {
     *tip_mm == 0.0
 }
 
-/// What the ground was made of.
+/// Materials of the ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialSettings {
     /// The file of classes, as it was named.
     pub file: String,
     /// Hash of its classes and of where they lie.
     pub fingerprint: String,
-    /// What the classes feel like.
+    /// Surfaces of the classes.
     #[serde(flatten)]
     pub looks: Looks,
 }
@@ -304,7 +304,7 @@ pub struct OtherTerrain {
 }
 
 impl Settings {
-    /// What is felt of a terrain under a law and a rule; `file` names the terrain.
+    /// Makes the settings of a terrain under surface parameters and a rule; `file` names the terrain.
     /// `home_mm` is the place in the arm's home pose, where there is an arm.
     #[must_use]
     pub fn new(
@@ -445,7 +445,7 @@ impl Settings {
 }
 
 impl Settings {
-    /// Whether a terrain has other classes than those of the recording.
+    /// Returns true if a terrain has other classes than those of the recording.
     fn has_other_classes(&self, grid: &HapticGrid<'_>) -> bool {
         let now = grid.materials().map(MaterialSettings::of);
         let print = |settings: &MaterialSettings| settings.fingerprint.clone();

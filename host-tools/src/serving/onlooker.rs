@@ -26,6 +26,6 @@ pub trait Onlooker<'t> {
     /// May show how it goes; called after each look at the line.
     fn show(&mut self, tally: &LinkStats);
 
-    /// Whether it has seen enough.
+    /// Returns true if it has seen enough.
     fn is_over(&self) -> bool;
 }

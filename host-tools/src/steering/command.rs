@@ -8,7 +8,7 @@ use crate::place::{PlacementChange, SurfaceChange};
 use crate::surface::NamedSurface;
 use heightfield::shown::shown;
 
-/// What is understood, for messages.
+/// The known commands, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
      exaggerate TIMES, surface ice|sand|rock, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
      shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
@@ -21,7 +21,7 @@ pub struct Command {
     /// Seconds of the device's time since the beginning; as soon as what came before is
     /// done, where nothing is said.
     pub at_s: Option<f64>,
-    /// What is to be done.
+    /// Action of the command.
     pub wanted: Wanted,
 }
 

@@ -1,4 +1,4 @@
-//! What the user wants of the view, done with a device.
+//! Changes of the placement by the user, done with a device.
 
 use std::time::{Duration, Instant};
 
@@ -24,7 +24,7 @@ const GROUND_WITHIN: Duration = Duration::from_secs(2);
 
 /// A view that is to be put in.
 pub struct Put<'r> {
-    /// What the device is told.
+    /// Message to the device.
     pub view: SceneChange,
     /// The terrain that it is felt on.
     pub terrain: Terrain<'r>,
@@ -106,7 +106,7 @@ impl<'r> Steering<'r> {
         &self.terrain
     }
 
-    /// Whether nothing that was wanted is under way.
+    /// Returns true if nothing that was wanted is under way.
     #[must_use]
     pub const fn is_settled(&self) -> bool {
         let rests = match self.stage {
@@ -135,7 +135,7 @@ impl<'r> Steering<'r> {
         std::mem::take(&mut self.lines)
     }
 
-    /// What is to be asked of the device now.
+    /// Returns the requests to the device now.
     pub fn asks(&mut self) -> Vec<Ask> {
         std::mem::take(&mut self.asks)
     }

@@ -26,7 +26,7 @@ pub enum Key {
     Arrow(i8, i8),
 }
 
-/// What keys come to: most are one change, and the clutch has a state.
+/// Commands from keys: most are one change, and the clutch has a state.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Keys {
     /// The clutch is held by a key that repeats: when it was heard last.
@@ -35,7 +35,7 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// What a key means at a time since any fixed moment; none where it has no meaning.
+    /// Returns the meaning of a key at a time since any fixed moment; none where it has no meaning.
     pub fn press(&mut self, key: Key, now: Duration) -> Option<Steer> {
         let change = |change| Some(Steer::Change(change));
         match key {
@@ -63,7 +63,7 @@ impl Keys {
         }
     }
 
-    /// Whether the key that holds the clutch was let go by now, once.
+    /// Returns the release of the key that holds the clutch, once.
     pub fn released(&mut self, now: Duration) -> Option<Steer> {
         let is_over = |heard: &mut Duration| now.saturating_sub(*heard) >= LET_GO;
         let over = self.held.take_if(is_over).is_some();

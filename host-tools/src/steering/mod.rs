@@ -25,7 +25,7 @@ pub use engine::{Put, Steering};
 pub use marks::{Made, Marks};
 pub use queue::{CommandQueue, Origin};
 
-/// What a command asks for.
+/// Request of a command.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Wanted {
     /// Another view.
@@ -36,7 +36,7 @@ pub enum Wanted {
     Enter(u32),
 }
 
-/// What the user wants of the view.
+/// Request of the user for the placement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steer {
     /// Another view.

@@ -22,7 +22,7 @@ const WAITING_EACH: usize = 1 << 16;
 /// is the last.
 const LONGEST: u64 = 1 << 16;
 
-/// Where commands come from.
+/// Source of commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// Standard input, line by line as it comes.

@@ -1,4 +1,4 @@
-//! Whether a file will fit, before the disk is full of its first half.
+//! Check that a file fits on the disk before it is written.
 
 use std::path::Path;
 

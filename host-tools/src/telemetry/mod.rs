@@ -1,4 +1,4 @@
-//! What a device reports while it is touched: times over restarts
+//! Reports of a device during a session: times over restarts
 //! ([`Timeline`]), rows in hand millimetres of their views ([`SampleLog`], [`Placements`]), figures of the
 //! whole session ([`Figures`]).
 

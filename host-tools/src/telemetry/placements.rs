@@ -54,7 +54,7 @@ impl<'t> Placements<'t> {
         }
     }
 
-    /// How many there are.
+    /// Returns their number.
     #[must_use]
     pub fn count(&self) -> usize {
         self.views.len()

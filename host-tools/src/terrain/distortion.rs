@@ -1,4 +1,4 @@
-//! How far felt cells are from their true shape where they were not measured.
+//! Distortion of haptic cells away from the place where they were measured.
 //!
 //! Felt cells are all alike, as large as the file's are at one place. The file's own cells are
 //! not: those of degrees get narrower towards the poles, and a map's scale changes.
@@ -13,18 +13,18 @@ const PLACES: u32 = 17;
 /// The worst of the felt cells of a rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distortion {
-    /// How far lengths, and so slopes, are off there in the direction in which they are off
+    /// Error of lengths, and so of slopes, there in the direction in which they are off
     /// most: 0.01 is one hundredth of the true ones.
     pub share: f64,
-    /// Where that is, in the file's coordinates.
+    /// Its place, in the file's coordinates.
     pub ground: [f64; 2],
 }
 
 impl Distortion {
-    /// What a surface counts as true to, as a share.
+    /// Tolerance of a true surface, as a share.
     pub const TRUE: f64 = 1e-3;
 
-    /// Whether the surface is not true to 0.1 % all over the rectangle.
+    /// Returns true if the surface is not true to 0.1 % all over the rectangle.
     #[must_use]
     pub fn is_felt(&self) -> bool {
         self.share > Self::TRUE

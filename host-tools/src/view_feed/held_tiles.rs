@@ -62,7 +62,7 @@ impl HeldTiles {
         self.has_changed = true;
     }
 
-    /// Where a tile is held.
+    /// Returns the place where a tile is held.
     fn slot(&self, index: TileIndex) -> u32 {
         let [col, row] = [index.col, index.row].map(|i| i.rem_euclid(self.side.max(1)));
         (row * self.side + col) as u32

@@ -75,17 +75,17 @@ pub struct Device<'t> {
     pub machine: Rc<RefCell<Machine>>,
     session: Session<'t>,
     endpoints: BulkEndpoints,
-    /// Where the encoders are.
+    /// Place where the encoders are.
     pub counts: [i32; 3],
     /// The latest sample.
     pub latest: Option<TickRecord>,
-    /// Where the guard stands, as last told.
+    /// State of the guard, as last reported.
     pub guard: Option<Report>,
     /// The latest status.
     pub status: Option<Status>,
     /// The latency that the board states, µs.
     pub latency_us: u16,
-    /// What came of the latest request that was answered.
+    /// Outcome of the latest request that was answered.
     pub answer: Option<(Request, Result<(), Refusal>)>,
     /// The ticks that were marked.
     pub marked: Vec<u32>,
@@ -246,7 +246,7 @@ impl<'t> Device<'t> {
         }
     }
 
-    /// What is commanded on axes 1 to 3: converter codes or compare counts.
+    /// Returns the commands of axes 1 to 3: converter codes or compare counts.
     #[must_use]
     pub fn commands(&self) -> [i32; 3] {
         self.machine.borrow().bus().commands()
@@ -266,7 +266,7 @@ fn endpoints(found: &Found) -> BulkEndpoints {
 pub struct Plane {
     /// The arm.
     pub model: PhantomModel,
-    /// Where the terrain lies.
+    /// Place where the terrain lies.
     pub place: ArmFrame,
     /// Rise east and north, millimetres a millimetre.
     pub slope: [f64; 2],
@@ -289,7 +289,7 @@ impl Plane {
         }
     }
 
-    /// How far (mm) a terrain point is above the plane, along its normal.
+    /// Returns the height (mm) of a terrain point above the plane, along its normal.
     #[must_use]
     pub fn above_mm(&self, [east, north, up]: [f64; 3]) -> f64 {
         let surface = self.height_mm + self.slope[0] * east + self.slope[1] * north;

@@ -1,4 +1,4 @@
-//! What a board knows of itself after it was reset: why, how the program before
+//! A board's report after a reset: why, how the program before
 //! ended, and its calibration. And how much of its stack it needs.
 
 use hapterra::terrain::Terrain;

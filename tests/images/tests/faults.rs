@@ -1,4 +1,4 @@
-//! What goes wrong in the boards' own images: each ends in no current and
+//! Faults in the boards' own images: each ends in no current and
 //! amplifiers off, in a number of ticks that is stated here.
 
 use hapterra_core::guard::Fault;

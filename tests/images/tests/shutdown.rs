@@ -1,4 +1,4 @@
-//! What switches the arm off when the program cannot, and what the chip itself does when
+//! Shutdown without the program, and the chip's reaction when
 //! its supply, its stack or its core fails.
 
 use std::cell::Cell;

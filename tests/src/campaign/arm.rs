@@ -20,7 +20,7 @@ const TREMOR_HZ: [f64; 3] = [8.3, 9.7, 11.2];
 /// Length of a tick, s.
 const TICK_S: f64 = 1e-3;
 
-/// What the hand is up to.
+/// Mood of the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mood {
     /// Held off the terrain.
@@ -82,7 +82,7 @@ impl<'t> Arm<'t> {
         self.placement.home_mm
     }
 
-    /// What the encoders read.
+    /// Returns the encoders' counts.
     #[must_use]
     pub fn counts(&self) -> [i32; 3] {
         self.plant.counts()

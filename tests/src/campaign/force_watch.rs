@@ -1,4 +1,4 @@
-//! What has to hold of the force that is told, whatever effects it is made with, in each mode in which
+//! Invariants of the reported force under all effects, in each mode in which
 //! a current may flow.
 
 use hapterra_core::Vec3;

@@ -47,16 +47,16 @@ const TRIES: u64 = 40;
 const ASK: u64 = 60;
 const PRESS: u64 = 200;
 
-/// What must not happen happened.
+/// Violation of an invariant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation {
     /// The segment.
     pub segment: u64,
-    /// What its ground feels like.
+    /// Surface of its ground.
     pub ground: Ground,
     /// The tick in it.
     pub tick: u64,
-    /// What.
+    /// Its description.
     pub what: String,
 }
 

@@ -151,7 +151,7 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// Whether the loop takes a scene, with the table that it has.
+/// Returns true if the loop takes a scene, with the table that it has.
 fn is_taken(scene: &Scene, table: &MaterialTable) -> bool {
     let is_here = |sum: u32| sum == table.check_sum() && table.is_valid();
     scene.is_valid() && scene.materials.is_none_or(is_here)

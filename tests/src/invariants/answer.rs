@@ -1,4 +1,4 @@
-//! What a tick says, by itself.
+//! Invariants of a single tick.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::grid::MAX_CELL;
@@ -71,7 +71,7 @@ fn length(v: [f64; 3]) -> f64 {
     distance(v, [0.0; 3])
 }
 
-/// Whether the displacement is the way from the HIP to the proxy, times a boundary fade
+/// Returns true if the displacement is the way from the HIP to the proxy, times a boundary fade
 /// in `[0, 1]`.
 fn is_part_of_the_way(seen: &Seen) -> bool {
     let way = [0, 1, 2].map(|i| seen.proxy[i] - seen.hip[i]);

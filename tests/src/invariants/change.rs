@@ -1,4 +1,4 @@
-//! How a tick goes on from the one before.
+//! Invariants from one tick to the next.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::contact::boundary_fade::RATE;
@@ -87,7 +87,7 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// Whether a proxy is farther from the HIP than it was before.
+    /// Returns true if a proxy is farther from the HIP than it was before.
     pub(super) fn is_farther(&self, before: &Seen, seen: &Seen) -> bool {
         let [was, is] = [before, seen].map(|at| distance(at.proxy, seen.hip));
         let allowed = |seen: &Seen| seen.allowed_in_space(self.terrain);

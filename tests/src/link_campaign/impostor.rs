@@ -10,11 +10,11 @@ use super::segment::Segment;
 use super::tally::Outcome;
 use super::wire;
 
-/// How long the host puts up with it, ms.
+/// Time for which the host puts up with it, ms.
 const MEETS: u64 = 12_000;
-/// How long a session may take to open or to fail, ms.
+/// Time that a session may take to open or to fail, ms.
 const OPENS: u64 = 8_500;
-/// How long leaving may take, ms.
+/// Time that leaving may take, ms.
 const LEAVES: u64 = 3_500;
 /// Bytes that a host may say in a second to whatever it is.
 const A_SECOND: usize = 1 << 20;

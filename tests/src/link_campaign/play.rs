@@ -9,21 +9,21 @@ use super::tally::{LinkStats, Outcome};
 use crate::campaign::arm::Mood;
 use hapterra_core::guard::Mode;
 
-/// How long a session may take to open or to fail, ms.
+/// Time that a session may take to open or to fail, ms.
 const OPENS: u64 = 8_500;
-/// How long the answer to arming, or the word that there is none, may take, ms.
+/// Time that the answer to arming, or the word that there is none, may take, ms.
 const ANSWERS: u64 = 6_000;
-/// How long leaving may take, ms.
+/// Time that leaving may take, ms.
 const LEAVES: u64 = 3_500;
-/// How long the arm takes from the press of the switch until all force is in, ms.
+/// Time that the arm takes from the press of the switch until all force is in, ms.
 const ARMS: u64 = 2_600;
-/// How long the user's hand takes to the switch, ms.
+/// Time that the user's hand takes to the switch, ms.
 const REACTION: u64 = 150;
 /// For how long a host may be silent, as hosts here tell the device, ms.
 const SILENCE: u64 = 1_000 * SILENCE_S as u64;
-/// How long after that the force may take to be out, ms.
+/// Time that after that the force may take to be out, ms.
 const LETS_GO: u64 = 300;
-/// How long before a host vanished the device may have heard it last, ms: a sign of life
+/// Time for which before a host vanished the device may have heard it last, ms: a sign of life
 /// comes twice a second, and a line that was harmed may have lost some.
 const AGO: u64 = 700;
 /// Requests for a tile that a device may repeat early in a session: those that were under
@@ -95,7 +95,7 @@ fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, Str
 struct Run<'s, 't> {
     segment: &'s mut Segment<'t>,
     plan: Plan,
-    /// Whether one host has talked to one device all the time, so that counts can be
+    /// True if one host has talked to one device all the time, so that counts can be
     /// exact.
     is_whole: bool,
 }
@@ -167,7 +167,7 @@ impl Run<'_, '_> {
         self.plan.done || self.plan.step != step
     }
 
-    /// Whether arming has come to its end: the user was told that it does not come to
+    /// Returns true if arming has come to its end: the user was told that it does not come to
     /// that, or sees that the arm is disarmed, or the force is in. Presses the switch
     /// where the user sees that it is waited for.
     fn is_armed(&mut self, pressed: &mut Option<u64>) -> bool {

@@ -20,23 +20,23 @@ use crate::invariants::{Invariant, Violation};
 /// Ticks that one point may be repeated for.
 const PATIENCE: usize = 20_000;
 
-/// What was felt of a point.
+/// Answer to a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Replied {
     /// The HIP, where the terrain was made.
     pub hip: [f64; 3],
     /// The proxy there.
     pub proxy: [f64; 3],
-    /// What the loop told of the tick that answered it.
+    /// Record of the tick that answered it.
     pub sample: TickRecord,
 }
 
-/// Where and how a scene is replayed.
+/// Conditions of a scene's replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Replay {
     /// By so many cells the terrain lies elsewhere.
     pub shift: [i32; 3],
-    /// How the tiles come.
+    /// Supply of the tiles.
     pub supply: Supply,
 }
 

@@ -290,12 +290,12 @@ fn is_near(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
     distance(proxy, b.proxy) <= 1e-4 * distance(a.proxy, a.hip).max(1.0)
 }
 
-/// Whether a proxy that was moved by a hair's breadth, cells, is elsewhere by far more.
+/// Returns true if a proxy that was moved by a hair's breadth, cells, is elsewhere by far more.
 fn is_elsewhere(there: &Seen, here: &Seen, hair: f64) -> bool {
     distance(there.proxy, here.proxy) > JUMP * hair * distance(here.proxy, here.hip).max(1.0)
 }
 
-/// Whether a hair's breadth makes the difference in the mirrored or turned twin, as it is felt
+/// Returns true if a hair's breadth makes the difference in the mirrored or turned twin, as it is felt
 /// once more.
 fn is_twin_undecided(
     scene: &Scene,
@@ -311,7 +311,7 @@ fn is_twin_undecided(
     })
 }
 
-/// Whether a hair's breadth on the way to this tick, or in this tick alone, cells, makes the
+/// Returns true if a hair's breadth on the way to this tick, or in this tick alone, cells, makes the
 /// difference, too.
 fn is_undecided(
     scene: &Scene,

@@ -1,4 +1,4 @@
-//! What becomes of the terminal, or of the pipe in its place, does not end the session.
+//! A lost terminal, or a lost pipe in its place, does not end the session.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};

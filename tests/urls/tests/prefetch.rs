@@ -1,4 +1,4 @@
-//! What lies before the hand is asked for before its tiles are.
+//! Blocks ahead of the hand are requested before its tiles.
 
 use std::time::Duration;
 
@@ -32,7 +32,7 @@ fn hills() -> (tempfile::TempDir, Raster, Server) {
     (folder, raster.expect("opens"), server)
 }
 
-/// Whether all of a tile is here.
+/// Returns true if all of a tile is here.
 fn is_here(terrain: &Terrain<'_>, key: TileKey) -> bool {
     let before = terrain.raster().not_yet();
     let mut buffer = TileBuffer::default();

@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use super::*;
 
-/// Where the bilinear surface of a block is at a place; none where a corner has no data.
+/// Returns the height of the bilinear surface of a block at a place; none where a corner has no data.
 fn surface(block: &Samples, [u, v]: [f64; 2]) -> Option<f64> {
     let cell = |at: f64, samples: usize| {
         let inside = (0.0..=(samples - 1) as f64).contains(&at);

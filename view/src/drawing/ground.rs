@@ -78,7 +78,7 @@ impl Ground {
         Self { up_per_mm, ..self }
     }
 
-    /// Whether the terrain of another view is as high in the picture.
+    /// Returns true if the terrain of another view is as high in the picture.
     pub(super) fn is_as_high_as(&self, other: &Self) -> bool {
         (self.relief - other.relief).abs() <= SAME * self.relief.abs()
     }

@@ -206,7 +206,7 @@ pub fn check(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>) {
     }
 }
 
-/// What was felt in several views lies where it lies on the ground: places and heights of
+/// Checks that records of several placements lie at their places on the ground: places and heights of
 /// all of them in one scale, in `stretched` views as high as in the first.
 pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: bool) {
     let drawn = places(&shown["/hand/hip"]);

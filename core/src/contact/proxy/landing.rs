@@ -33,7 +33,7 @@ impl Contact {
         }
     }
 
-    /// Whether the contact waits to begin on the surface.
+    /// Returns true if the contact waits to begin on the surface.
     #[must_use]
     pub const fn is_landing(&self) -> bool {
         self.landing.is_some()

@@ -28,7 +28,7 @@ pub(super) enum Came {
 /// A point of the surface that is felt.
 pub(super) struct SurfaceContact {
     pub(super) point: SurfacePoint,
-    /// Where it is.
+    /// Its place.
     pub(super) proxy: GridPoint,
     /// From the HIP to it, cells.
     pub(super) displacement: Vec3,

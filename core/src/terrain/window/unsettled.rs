@@ -1,4 +1,4 @@
-//! What lies in a window where the surface is not a tile of the scene's level: before it comes,
+//! Content of a window where the surface is not a tile of the scene's level: before it arrives,
 //! and while it settles ([`TileBlend`](super::TileBlend)).
 
 use super::{CellContent, Corners, Window};
@@ -68,7 +68,7 @@ impl<'t, const D: usize> Window<'t, D> {
         Some(self.put(tile, settles))
     }
 
-    /// Whether a patch is that of its tile, and not of the underlay, nor between the two.
+    /// Returns true if a patch is that of its tile, and not of the underlay, nor between the two.
     #[must_use]
     #[inline]
     pub fn is_settled(&self, cell: Cell) -> bool {
@@ -256,7 +256,7 @@ impl<'t, const D: usize> Window<'t, D> {
             .material(patch, far)
     }
 
-    /// Whether what is felt in place of a tile is known to lie below `low`, all over the tile.
+    /// Returns true if what is felt in place of a tile is known to lie below `low`, all over the tile.
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_is_below(&self, index: TileIndex, low: Altitude) -> bool {
@@ -276,12 +276,12 @@ impl<'t, const D: usize> Window<'t, D> {
     }
 }
 
-/// Whether a column or row of samples is the border of two tiles.
+/// Returns true if a column or row of samples is the border of two tiles.
 const fn is_on_border(at: i32) -> bool {
     at & (TILE_CELLS as i32 - 1) == 0
 }
 
-/// Whether no corner of a cell is on the border of its tile.
+/// Returns true if no corner of a cell is on the border of its tile.
 fn is_inside(cell: Cell) -> bool {
     let on_border = |at: i32| is_on_border(at) || is_on_border(at + 1);
     !(on_border(cell.x) || on_border(cell.y))

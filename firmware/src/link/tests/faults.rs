@@ -1,4 +1,4 @@
-//! What a session does when things go wrong.
+//! Sessions with injected faults.
 
 use std::collections::HashSet;
 use std::vec;

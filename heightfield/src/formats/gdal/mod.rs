@@ -180,7 +180,7 @@ fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset
     library.open(path, &open_options(options)).map_err(fault)
 }
 
-/// Whether a text has a star, as GRASS writes where there is no height.
+/// Checks that a text has a star, as GRASS writes where there is no height.
 fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> {
     let input = FileBytes::open(&place.source, &options.elsewhere)?;
     let mut reader = input.reader()?;

@@ -1,4 +1,4 @@
-//! Where the image lies: reference system, map to the ground, units.
+//! Georeference of the image: reference system, map to the ground, units.
 
 use geotiff_core::geokeys::{
     GEODETIC_CRS_TYPE, GEOG_ANGULAR_UNITS, GEOG_CITATION, GT_CITATION, GT_MODEL_TYPE,

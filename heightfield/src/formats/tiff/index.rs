@@ -1,4 +1,4 @@
-//! Where the strips or tiles of an image lie: the lists of its directory, as the decoder has them.
+//! Index of an image's strips or tiles: the lists of its directory, as the decoder has them.
 
 use tiff_reader::{Ifd, TagValue};
 

@@ -15,11 +15,11 @@ const ERASED: u8 = 0xFF;
 pub struct FlashRange {
     /// The first address.
     pub address: u64,
-    /// What will be there.
+    /// Its new content.
     pub bytes: Vec<u8>,
 }
 
-/// What an update erases and writes.
+/// Erasures and writes of an update.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// First addresses of the pages to erase; first that with the vectors.

@@ -6,7 +6,7 @@ use super::plan::{FlashRange, Plan};
 use crate::board::boards::Board;
 use crate::board::image::Image;
 
-/// How far an update is.
+/// Progress of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// So many pages of so many are erased.

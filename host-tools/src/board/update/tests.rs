@@ -93,7 +93,7 @@ impl ControlPipe for &mut Scripted {
     }
 }
 
-/// Whether all of the image is in flash.
+/// Returns true if all of the image is in flash.
 fn is_whole(device: &Scripted, image: &Image) -> bool {
     image.parts.iter().all(|part| {
         let at = (part.address - FLASH) as usize;

@@ -27,7 +27,7 @@ use set::Setting;
 
 /// What to do where the record cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
-/// How long a device in this program may take to answer.
+/// Time that a device in this program may take to answer.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Arguments of `hapterra calibrate`.

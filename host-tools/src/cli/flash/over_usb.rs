@@ -17,9 +17,9 @@ use crate::cli::terminal::questions::ask;
 use crate::cli::terminal::writer::{self, say};
 use crate::link::{DeviceAddress, Dialogue, Usb};
 
-/// How long the board may take to answer.
+/// Time that the board may take to answer.
 const PATIENCE: Duration = Duration::from_secs(4);
-/// How long a device may take to show up again as another: on Windows, a driver's first
+/// Time that a device may take to show up again as another: on Windows, a driver's first
 /// start takes seconds.
 const REAPPEARS: Duration = Duration::from_secs(15);
 /// Between two looks at what is plugged in.

@@ -13,7 +13,7 @@ use crate::cli::terminal::interrupt;
 /// Programs that the worker starts have other parents, so it is nothing to them.
 pub(super) const VARIABLE: &str = "HAPTERRA_GUARDIAN";
 
-/// Where news goes; none where this is no worker.
+/// Destination of news; none where this is no worker.
 static NEWS: OnceLock<Mutex<File>> = OnceLock::new();
 
 /// Connects to the guardian. Returns false if no guardian has started this process.

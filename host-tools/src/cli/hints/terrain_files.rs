@@ -1,4 +1,4 @@
-//! What to do about a terrain file that does not open.
+//! Hints for a terrain file that does not open.
 //!
 //! Commands of other programs are tried by `tests/tests/converters.rs` where these
 //! programs are installed.

@@ -21,7 +21,7 @@ use crate::steering::{CommandQueue, Made, Marks, Origin, Put, Steer, Steering, W
 use crate::telemetry::{Placements, SampleLog};
 use crate::terrain::Terrain;
 
-/// How the placement and the surface may be changed while they are touched.
+/// Commands that change placement and surface during a session.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "While it is touched")]
 pub struct Commands {
@@ -97,7 +97,7 @@ impl Commands {
             .or_hint("name another file with --commands, or `-` for standard input")
     }
 
-    /// Whether they come from standard input.
+    /// Returns true if they come from standard input.
     pub(in crate::cli) fn are_typed(&self) -> bool {
         self.commands == Some(Origin::StandardInput)
     }
@@ -213,7 +213,7 @@ impl<'t> PlacementControl<'t> {
         }
     }
 
-    /// What is to be asked of the device now.
+    /// Returns the requests to the device now.
     pub(in crate::cli) fn asks(&mut self) -> Vec<Ask> {
         let mut asks = self.steering.asks();
         asks.extend(self.marks.asks());

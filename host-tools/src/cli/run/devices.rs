@@ -60,7 +60,7 @@ pub(super) struct OneDevice {
 }
 
 impl OneDevice {
-    /// Whether the arm is virtual, held by a hand that follows a script.
+    /// Returns true if the arm is virtual, held by a hand that follows a script.
     pub(super) fn is_scripted(&self) -> bool {
         self.plant.is_some() || self.address == DeviceAddress::Native
     }
@@ -158,7 +158,7 @@ fn apart(addresses: &[DeviceAddress]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Whether both name a board on USB, and one does not say which.
+/// Returns true if both name a board on USB, and one does not say which.
 fn may_be_same_board(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     match (first, second) {
         (DeviceAddress::Usb(first), DeviceAddress::Usb(second)) => {
@@ -168,7 +168,7 @@ fn may_be_same_board(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     }
 }
 
-/// Whether both are known to be the same device. Each device in this program's memory is
+/// Returns true if both are known to be the same device. Each device in this program's memory is
 /// another one.
 fn is_same(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     match (first, second) {
@@ -178,7 +178,7 @@ fn is_same(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     }
 }
 
-/// Whether two `HOST:PORT` are the same socket, also by two names of a host.
+/// Returns true if two `HOST:PORT` are the same socket, also by two names of a host.
 fn is_same_socket(first: &str, second: &str) -> bool {
     if first == second {
         return true;

@@ -1,4 +1,4 @@
-//! What may be said of several devices.
+//! Messages about several devices.
 
 use clap::Parser;
 

@@ -193,7 +193,7 @@ fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
     }
 }
 
-/// Whether a device may be served: a real board was brought up, and one that is given a
+/// Checks that a device may be served: a real board was brought up, and one that is given a
 /// virtual arm drives no real one.
 fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Result<(), Failure> {
     match (&device.plant, &device.address) {

@@ -1,4 +1,4 @@
-//! What is seen, shown and recorded of a session while it goes on.
+//! Display and recording of a running session.
 
 use std::io::IsTerminal;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ pub(super) struct Watch<'t> {
     latest: Option<(TickRecord, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
-    /// How many views the recording has been told of.
+    /// Number of views that the recording has been told of.
     described: usize,
     control: PlacementControl<'t>,
     prompts: ArmingPrompts,

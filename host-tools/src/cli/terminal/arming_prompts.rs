@@ -42,7 +42,7 @@ trait Enter {
     /// Forgets what was pressed so far.
     fn forget(&mut self);
 
-    /// Whether Enter was pressed since the last look.
+    /// Returns true if Enter was pressed since the last look.
     fn was_pressed(&mut self) -> bool;
 }
 
@@ -96,7 +96,7 @@ pub(in crate::cli) struct ArmingPrompts {
     /// Enter was pressed with the arm in its zero pose: its counts are asked for.
     zeroing: bool,
     say: Vec<Ask>,
-    /// Whether there is a user who arms; a virtual hand follows its script.
+    /// True if there is a user who arms; a virtual hand follows its script.
     leads: bool,
     /// Lines for the user, in order.
     lines: Vec<Line>,

@@ -174,7 +174,7 @@ fn may_be_armed() -> MutexGuard<'static, BTreeSet<String>> {
     MAY_BE_ARMED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Whether an end was asked for.
+/// Returns true if an end was asked for.
 #[must_use]
 pub fn requested() -> bool {
     let requested = REQUESTED.load(Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! What happens at the terminal while a command runs: what is written and typed there,
+//! The terminal while a command runs: output and input,
 //! progress, Ctrl-C, what killed commands left, and the prompts that lead to an armed arm. Where several
 //! devices are served, `shared_keyboard` shares the keyboard out and `device_console` names who speaks.
 

@@ -1,4 +1,4 @@
-//! What killed commands left of a file that is about to be written.
+//! Partial files of killed commands.
 
 use std::path::Path;
 

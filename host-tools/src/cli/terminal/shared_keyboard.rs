@@ -135,7 +135,7 @@ impl SharedKeyboard {
 }
 
 impl DeviceKeys {
-    /// Whether keys come one by one.
+    /// Returns true if keys come one by one.
     pub(in crate::cli) fn has_keys(&self) -> bool {
         self.shared_keyboard.raw.is_some()
     }
@@ -169,7 +169,7 @@ impl DeviceKeys {
         }
     }
 
-    /// How often Enter was pressed for this device since the last look.
+    /// Returns the number of times that Enter was pressed for this device since the last look.
     pub(in crate::cli) fn enters(&self) -> usize {
         let mut state = self.shared_keyboard.sort();
         let inbox = state.inboxes.get_mut(self.index);

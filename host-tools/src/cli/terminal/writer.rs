@@ -1,4 +1,4 @@
-//! What is written to the terminal while a board may be armed, and the log. Commands that
+//! Output to the terminal while a board may be armed, and the log. Commands that
 //! hold no device print (`say.rs`).
 //!
 //! One thread writes, and whoever speaks does not wait for it. A window that was closed,

@@ -1,4 +1,4 @@
-//! What rows were for ticks, in words.
+//! Relation of rows to ticks, in words.
 
 use hapterra_touch::ticks::{Counts, ODD_MOVE_S, Untimed};
 

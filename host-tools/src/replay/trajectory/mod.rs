@@ -158,7 +158,7 @@ impl Trajectory {
         }
     }
 
-    /// Whether the last row of the recording was cut in its middle, and is left out: the
+    /// Returns true if the last row of the recording was cut in its middle, and is left out: the
     /// command that wrote it was killed. Known after the last row.
     #[must_use]
     pub fn was_cut(&self) -> bool {
@@ -209,7 +209,7 @@ fn later_remarks(file: &mut File) -> Result<String, TrajectoryFault> {
     later.map_err(TrajectoryFault::Unreadable)
 }
 
-/// Whether a file begins as Parquet does; what cannot be wound back is CSV.
+/// Checks that a file begins as Parquet does; what cannot be wound back is CSV.
 fn is_parquet(file: &mut File) -> Result<bool, TrajectoryFault> {
     if file.stream_position().is_err() {
         return Ok(false);

@@ -85,7 +85,7 @@ impl ActiveMaterial {
         }
     }
 
-    /// Whether friction may hold the proxy in the next tick: it does as long as something is left of
+    /// Returns true if friction may hold the proxy in the next tick: it does as long as something is left of
     /// a change from it.
     pub(super) fn may_rub(&self) -> bool {
         let [_, was_static, was_dynamic, was_viscous, _] = self.from;
@@ -129,12 +129,12 @@ impl ActiveMaterial {
         self.judge.as_ref().map(|judge| (judge, share))
     }
 
-    /// Whether nothing more will change on this material.
+    /// Returns true if nothing more will change on this material.
     pub(super) fn is_settled(&self) -> bool {
         self.done >= OVER && self.parts == FADE
     }
 
-    /// Whether it cannot be told from another one from now on.
+    /// Returns true if it cannot be told from another one from now on.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let told = |one: &Self| (one.wanted, one.done, one.parts, one.was_felt);
         let speed = |one: &Self| one.judge.as_ref().map_or(0.0, TextureJudge::speed);

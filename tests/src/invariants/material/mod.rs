@@ -1,4 +1,4 @@
-//! What a loop feels of a scene with materials, judged by docs/how-to/materials.md and
+//! Oracle of scenes with materials, by docs/how-to/materials.md and
 //! docs/explanation/effects.md.
 //!
 //! The judge knows the class of each sample itself, and follows in f64 what may be in force. Where
@@ -33,7 +33,7 @@ const FOLLOWED: usize = 256;
 /// Points a second: ticks.
 const RATE_HZ: f64 = 1e3;
 
-/// What a judge learned.
+/// Measurements of an oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Judged {
     /// Points in contact whose force was judged: in whole, and by its size.
@@ -73,7 +73,7 @@ pub struct MaterialJudge<'g> {
     courses: Vec<ActiveMaterial>,
     before: Option<Replied>,
     point: usize,
-    /// What was learned.
+    /// Its measurements.
     pub judged: Judged,
 }
 

@@ -22,7 +22,7 @@ use heightfield::{Raster, files_read_with};
 use numbers::{check, over, rubbed, told};
 use table::{Look, PassivityName, ShadingName, TableFile};
 
-/// What a terrain feels like.
+/// Surface of a terrain.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Surface")]
 pub struct SurfaceOptions {
