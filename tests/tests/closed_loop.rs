@@ -78,7 +78,7 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
 }
 
 #[test]
-fn pressed_on_a_plane_with_two_newtons_it_rests_at_the_depth_the_stiffness_says() {
+fn tip_rests_at_the_depth_of_two_newtons() {
     for stiffness in [0.5f32, 0.25, 1.0] {
         let (samples, lift, scale) = press(stiffness);
         let expected_mm = 2.0 / f64::from(stiffness);
@@ -111,7 +111,7 @@ fn lifted_there_is_no_force() {
 const HEIGHT_ERROR_MM: f64 = 1e-5;
 
 #[test]
-fn slid_across_terrain_the_proxy_stays_on_the_surface_and_the_force_in_bounds() {
+fn sliding_proxy_stays_on_surface_and_force_in_bounds() {
     for kind in [Kind::Fractal, Kind::Crater] {
         let raster = Synth::new(kind, 2, 30.0).raster(400, 400).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");

@@ -150,7 +150,7 @@ fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
 /// other, and what was felt until then is kept.
 #[cfg(unix)]
 #[test]
-fn an_interrupted_demonstration_on_the_emulated_board_ends_in_an_orderly_manner() {
+fn interrupted_emulated_demo_ends_in_order() {
     use std::io::BufRead;
     use std::os::unix::process::CommandExt;
 

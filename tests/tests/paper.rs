@@ -91,7 +91,7 @@ fn eq_8_to_11_at_the_local_closest_point_the_partial_derivatives_vanish() {
 }
 
 #[test]
-fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_vertex() {
+fn section_4_3_2_bounded_closest_point_is_on_edge_or_vertex() {
     let patch = Patch::new(CORNERS.map(|h| h - 0.4));
     for hip in [
         (-0.5, 0.4),
@@ -123,7 +123,7 @@ fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_v
 }
 
 #[test]
-fn step_1_no_patch_higher_than_the_segment_means_free_space_and_the_proxy_is_the_hip() {
+fn step_1_segment_above_all_patches_is_free_space() {
     for mut rule in rules(rolling) {
         for i in 0..100 {
             let hip = [5.0 + 0.5 * f64::from(i), 20.0, 2.25];

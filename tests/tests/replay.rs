@@ -119,7 +119,7 @@ fn synthetic(kind: Kind) -> Raster {
 }
 
 #[test]
-fn on_made_terrains_the_proxy_is_the_local_closest_point_and_the_force_its_spring() {
+fn proxy_is_local_closest_point_on_synthetic_terrains() {
     let scale = Scale::new(1.0, 1.0).expect("scale");
     for kind in [
         Kind::Fractal,

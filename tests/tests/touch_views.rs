@@ -242,7 +242,7 @@ fn all_the_way() -> f32 {
 }
 
 #[test]
-fn zoomed_through_eight_levels_and_back_while_it_is_pressed_the_force_makes_no_step() {
+fn force_makes_no_step_while_zooming_through_eight_levels() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let before = touching.last();
@@ -267,7 +267,7 @@ fn zoomed_through_eight_levels_and_back_while_it_is_pressed_the_force_makes_no_s
 }
 
 #[test]
-fn panned_made_steeper_and_softer_while_it_is_pressed_the_force_makes_no_step() {
+fn force_makes_no_step_while_panning_and_scaling() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let began = touching.samples.len();
@@ -376,7 +376,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
 }
 
 #[test]
-fn with_the_clutch_the_terrain_goes_with_the_hand_and_is_felt_again_where_it_was() {
+fn clutch_carries_the_terrain_with_the_hand() {
     let raster = hills();
     pressed(&raster, 30.0, |touching| {
         let began = touching.samples.len();
@@ -577,11 +577,11 @@ fn most_times(samples: &[TickRecord]) -> f32 {
 }
 
 #[test]
-fn a_slope_to_the_east_is_true_at_both_ends_of_degrees_and_the_force_makes_no_step() {
+fn slope_to_the_east_is_true_at_both_ends_of_degrees() {
     a_far_pan(0);
 }
 
 #[test]
-fn a_slope_to_the_north_is_true_at_both_ends_of_degrees_and_the_force_makes_no_step() {
+fn slope_to_the_north_is_true_at_both_ends_of_degrees() {
     a_far_pan(1);
 }

@@ -106,7 +106,7 @@ fn the_arm_at_its_tip_is_what_its_data_say() {
 }
 
 #[test]
-fn a_soft_surface_is_still_in_every_hand_and_a_stiff_one_shakes_a_limp_one_until_it_ticks_faster() {
+fn stiff_surface_is_unstable_in_light_grasp_until_rate_rises() {
     for grasp in Grasp::ALL {
         let soft = tried(1000, 0.5, grasp);
         assert_eq!(verdict(&soft), Verdict::Still, "{soft:?}");

@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_terrain_without_room_or_with_a_hole_on_the_way_is_refused_with_the_place() {
+    fn terrain_without_room_for_the_path_is_refused_by_place() {
         let why = ways(700, 300, false).expect_err("too narrow").to_string();
         assert!(why.contains("700 × 300 samples"), "{why}");
         let raster = Raster::from_fn(640, 640, |x, y| if x + y == 700 { f32::NAN } else { 1.0 });

@@ -334,7 +334,7 @@ fn across_a_shaded_or_textured_force_nothing_is_taken() {
 }
 
 #[test]
-fn what_a_force_gives_that_comes_later_than_it_is_said_to_is_not_all_taken_back() {
+fn energy_of_unstated_latency_is_not_all_dissipated() {
     // So it matters that a board states how long it and its amplifiers take.
     let on = law(1.0, 0.0, Controller::On);
     let known = Taps::new(1000, 1.1e-3);

@@ -58,7 +58,7 @@ impl Temperatures {
     ///
     /// A motor that begins here may have its continuous current at once, and its peak
     /// again after 70 s without load
-    /// (`from_hot_the_continuous_current_is_there_at_once_and_the_peak_after_a_minute`).
+    /// (`hot_motor_has_continuous_current_at_once_and_peak_later`).
     pub const HOT: Self = Self {
         winding_k: Vec3::splat((CONTINUOUS_C - AIR_C) * 3.1 / 17.1),
         housing_k: Vec3::splat((CONTINUOUS_C - AIR_C) * 14.0 / 17.1),
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn from_hot_the_continuous_current_is_there_at_once_and_the_peak_after_a_minute() {
+    fn hot_motor_has_continuous_current_at_once_and_peak_later() {
         let mut motors = Motors::new(khz(1));
         motors.begin_at(Temperatures::HOT);
         motors.configure(&Calibration::PREMIUM_1_5);

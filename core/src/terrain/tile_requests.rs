@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn over_an_underlay_what_the_hip_has_left_before_it_can_come_is_not_asked_for() {
+    fn tiles_left_behind_are_not_requested_over_a_fallback() {
         for has_underlay in [false, true] {
             let mut requester = requester();
             if has_underlay {

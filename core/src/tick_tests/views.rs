@@ -105,7 +105,7 @@ fn halved(point: GridPoint) -> GridPoint {
 }
 
 #[test]
-fn while_the_clutch_is_held_there_is_no_force_and_the_terrain_goes_with_the_hand() {
+fn held_clutch_has_no_force_and_carries_the_terrain() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
     let felt = arm.tick();
@@ -148,7 +148,7 @@ fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
 }
 
 #[test]
-fn held_for_another_view_the_terrain_stays_in_its_place_and_the_press_comes_back() {
+fn terrain_stays_while_held_for_another_placement() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
     let felt = arm.tick();
@@ -253,7 +253,7 @@ fn the_boards_input_opens_the_clutch_and_all_who_hold_it_have_to_let_go() {
 }
 
 #[test]
-fn an_input_that_is_held_opens_the_clutch_of_the_next_scene_too_but_of_no_replay() {
+fn held_clutch_input_opens_next_scene_but_no_replay() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, plane);
     device.say(Command::ClutchInput(true));
@@ -410,7 +410,7 @@ fn a_view_that_comes_while_force_is_felt_disarms_as_another_scene_does() {
 }
 
 #[test]
-fn whatever_a_host_says_the_force_makes_no_step_and_little_energy_is_given() {
+fn no_host_makes_the_force_step() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
     let mut rng = 12_345_u32;

@@ -148,7 +148,7 @@ fn store<const W: usize, const E: usize>(
 
 /// An older firmware may have let it through.
 #[test]
-fn a_whole_record_above_a_ceiling_is_refused_by_name_and_no_older_one_is_taken() {
+fn record_above_a_limit_is_refused_without_falling_back() {
     let mut store = store(Flash::<8, 2048>::new(4096), 2048);
     let mut hostile = Calibration::PREMIUM_1_5;
     hostile.peak_current_a.y = 20.0;

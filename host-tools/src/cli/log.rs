@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_floods_the_log_gets_a_line_a_second_and_the_rest_is_counted() {
+    fn flooding_device_gets_one_log_line_a_second() {
         let text = written(|| {
             for tile in 0..100_000 {
                 tracing::warn!(target: "hapterra::link::client", tile, "no such tile");

@@ -308,7 +308,7 @@ fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
 }
 
 #[test]
-fn a_question_that_is_repeated_keeps_its_number_and_takes_none_of_a_request() {
+fn repeated_query_keeps_its_number() {
     on_bench(None, |bench| {
         bench.open();
         bench.said();
@@ -558,7 +558,7 @@ fn goodbye_is_repeated_until_it_is_answered_or_told_that_it_is_not() {
 }
 
 #[test]
-fn over_a_new_line_a_new_session_is_drawn_unless_the_last_was_never_answered() {
+fn new_line_draws_a_new_session_number() {
     on_bench(None, |bench| {
         let first = bench.client.session();
         bench.client.greet(bench.now, &mut bench.out);

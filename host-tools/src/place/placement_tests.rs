@@ -292,7 +292,7 @@ fn cells_are_square_at_the_place_that_is_felt() {
 }
 
 #[test]
-fn a_box_lies_in_the_middle_and_its_cells_are_not_finer_than_the_encoders_tell() {
+fn box_is_centred_and_no_finer_than_the_encoders() {
     let raster = Raster::from_fn(30_000, 60, |column, _| (column % 100) as f32).expect("raster");
     let ground = GroundTransform::new([5e5, 4e6], [1.0, 0.0], [0.0, 1.0]).expect("a plane");
     let raster = raster.with_ground(ground, Some(32612));

@@ -41,7 +41,7 @@ class State(enum.IntEnum):
     RELEASING = 2
     #: The HIP is below the surface and has not been above it: no force until it has.
     BELOW_GROUND = 3
-    #: The HIP is in a hole or outside and has not been above the surface: no force.
+    #: The HIP is in a no-data area or outside, and was not above the surface yet: no force.
     OUTSIDE = 4
 
 

@@ -22,7 +22,7 @@ fn plane() -> Plane {
 }
 
 #[test]
-fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
+fn plane_at_a_millimetre_has_the_currents_of_f64() {
     let plane = plane();
     let height = |x: u32, y: u32| 55.0 + 0.25 * x as f32 - 0.125 * y as f32;
     let raster = Raster::from_fn(201, 201, height).expect("raster");

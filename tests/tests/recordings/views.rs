@@ -378,7 +378,7 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
 
 /// Before cells were measured anew, views did not say where: theirs are those of the beginning.
 #[test]
-fn a_recording_whose_views_do_not_say_where_they_were_measured_is_felt_as_it_was() {
+fn recording_without_measured_places_replays_unchanged() {
     let folder = Folder::of(SIZE);
     demo(&folder);
     folder.replays("demo/hills.csv", "again.csv", &[]);

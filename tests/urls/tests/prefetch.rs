@@ -57,7 +57,7 @@ fn requests_later(server: &Server) -> usize {
 }
 
 #[test]
-fn a_tile_that_was_read_ahead_takes_no_request_and_too_many_are_not_asked_for() {
+fn tiles_read_ahead_need_no_request() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let keys = [TileKey::new(0, 60, 20), TileKey::new(0, 61, 20)];

@@ -129,7 +129,7 @@ mod tests {
     const G474: &str = "@Internal Flash   /0x08000000/256*02Kg";
 
     #[test]
-    fn an_image_takes_the_pages_that_it_lies_in_and_no_other_and_its_first_word_apart() {
+    fn image_erases_its_own_pages_only() {
         let plan = plan(&[(FLASH, 2049), (FLASH + 0x3010, 3)], G474).expect("fits");
         assert_eq!(plan.erased, [FLASH, FLASH + 0x800, FLASH + 0x3000]);
         assert_eq!((plan.vectors.address, plan.vectors.bytes.len()), (FLASH, 8));

@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn enter_goes_to_the_device_whose_number_was_pressed_right_before_it_and_else_to_none() {
+    fn enter_reaches_only_the_device_named_right_before() {
         let device_keys = two();
         let no_device = |told: Vec<String>| {
             let [.., line] = &told[..] else {
