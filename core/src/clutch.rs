@@ -62,7 +62,7 @@ enum State {
     /// The force goes out.
     Opening,
     /// The HIP stays at its place over the terrain, wherever the tip goes. `tip_mm` is
-    /// where the tip was when it opened, from its home pose: hand millimetres east,
+    /// where the tip was when it opened, from its home pose: device millimetres east,
     /// north and up, which are the same in every view.
     Open { hip: GridPoint, tip_mm: Vec3 },
     /// The force comes in again.

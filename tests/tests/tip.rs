@@ -226,7 +226,7 @@ fn a_pole_is_felt_at_steps_of_one_and_a_half_radii() {
 fn friction_holds_a_ball_at_a_pole_at_any_speed() {
     for radius in [1.0, 2.0, 4.0, 8.0] {
         for speed in [5.0, 12.0, 30.0] {
-            // A tick longer than the window begins the contact anew; 32 felt cells are a radius.
+            // A tick longer than the window begins the contact anew; 32 haptic cells are a radius.
             if speed / radius * 32.0 > 512.0 {
                 continue;
             }

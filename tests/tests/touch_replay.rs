@@ -134,7 +134,7 @@ fn forces_over_an_array_are_those_of_a_replay() {
     }
 }
 
-/// From less than a cell to 8 of them; the smallest has felt cells of half an encoder's count.
+/// From less than a cell to 8 of them; the smallest has haptic cells of half an encoder's count.
 #[test]
 fn forces_under_a_tip_are_those_of_a_replay() {
     let heights = heights();

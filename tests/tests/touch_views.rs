@@ -505,7 +505,7 @@ fn felt_slope(sample: &TickRecord) -> [f64; 2] {
     [-x / z, -y / z]
 }
 
-/// At the southern end 1 mm is a felt cell; commands bring the northern one under the hand,
+/// At the southern end 1 mm is a haptic cell; commands bring the northern one under the hand,
 /// where a degree of longitude is 4.7 % shorter, and back.
 fn a_far_pan(axis: usize) {
     let raster = slope_of_degrees(axis);

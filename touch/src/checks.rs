@@ -62,7 +62,7 @@ pub enum TerrainError {
     TipCells {
         /// The radius, mm.
         tip_mm: f64,
-        /// Felt cells a cell.
+        /// Haptic cells a cell.
         parts: u32,
         /// Samples from west to east.
         columns: u32,

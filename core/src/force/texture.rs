@@ -30,7 +30,7 @@ pub struct Texture {
     pub pattern: Pattern,
     /// Largest height above and below the surface, device millimetres.
     pub amplitude_mm: f32,
-    /// From ridge to ridge on the map, hand millimetres; the shortest wavelength of grain,
+    /// From ridge to ridge on the map, device millimetres; the shortest wavelength of grain,
     /// which is made of rises and falls of half of that.
     pub wavelength_mm: f32,
     /// In which direction the ridges of a grating follow each other, degrees from east to north.

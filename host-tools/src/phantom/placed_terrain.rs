@@ -44,7 +44,7 @@ impl<'t> PlacedTerrain<'t> {
     }
 
     /// Leaves the terrain where a view has it, with this point of it at the tip in the home pose
-    /// (hand millimetres), and tours what the arm gets to of it.
+    /// (device millimetres), and tours what the arm gets to of it.
     ///
     /// # Errors
     /// [`PlacingError`].

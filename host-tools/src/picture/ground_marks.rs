@@ -12,9 +12,9 @@ use super::style::{self, INK, px};
 /// Facts about the ground for a picture.
 #[derive(Clone, Copy)]
 pub struct GroundFacts<'a> {
-    /// Ground metres a hand millimetre, where the terrain knows its size.
+    /// Ground metres a device millimetre, where the terrain knows its size.
     pub metres_per_mm: Option<f64>,
-    /// Coordinates of a place in hand millimetres east and north, short.
+    /// Coordinates of a place in device millimetres east and north, short.
     pub place_of: &'a dyn Fn(f64, f64) -> String,
     /// Scale and place for the panel: name and value with its unit, short.
     pub lines: &'a [(String, String)],

@@ -17,18 +17,18 @@ use crate::terrain::{
 const RELIEF_MM: f64 = 25.0;
 /// Relief that can be felt well, mm.
 pub(crate) const FELT_MM: f64 = 15.0;
-/// Hand millimetres a felt cell at a place whose scale nobody states.
+/// Device millimetres a haptic cell at a place whose scale nobody states.
 const CELL_MM: f64 = 1.0;
 
 /// Requested size of the terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Sizing {
-    /// The target fills the arm's reach; of a place, 1 mm is a felt cell.
+    /// The target fills the arm's reach; of a place, 1 mm is a haptic cell.
     #[default]
     Fit,
-    /// Hand millimetres a felt cell of level 0.
+    /// Device millimetres a haptic cell of level 0.
     CellMm(f64),
-    /// Ground metres a hand millimetre.
+    /// Ground metres a device millimetre.
     GroundMPerMm(f64),
 }
 
@@ -41,7 +41,7 @@ pub enum Heights {
     Exaggerated(f64),
     /// [`suited_height`].
     Suited,
-    /// Hand millimetres a vertical unit of the file.
+    /// Device millimetres a vertical unit of the file.
     MmPerUnit(f64),
 }
 
@@ -51,7 +51,7 @@ impl Default for Heights {
     }
 }
 
-/// Hand millimetres a vertical unit for a terrain that may be too flat to be felt: `plain`,
+/// Device millimetres a vertical unit for a terrain that may be too flat to be felt: `plain`,
 /// which is true to scale, or as much more as makes a `relief` (vertical units) 15 mm high.
 #[must_use]
 pub fn suited_height(plain: f64, relief: f64) -> f64 {
@@ -77,16 +77,16 @@ pub struct PlacementOptions {
 /// Placement of a terrain in front of the arm: place, scale, level and heights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// The point of the terrain under the tip in its home pose, hand millimetres east,
+    /// The point of the terrain under the tip in its home pose, device millimetres east,
     /// north and up from the south-west sample at height zero.
     pub home_mm: [f64; 3],
     /// The same place in the file's coordinates.
     pub home_ground: [f64; 2],
     /// Of level 0.
     pub scale: Scale,
-    /// Every 2ᴸ-th felt sample is felt.
+    /// Every 2ᴸ-th rendered sample is felt.
     pub level: u8,
-    /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
+    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it.
     pub side_m: Option<f64>,
     /// Height of the terrain, in its true proportions' height, where the file
     /// knows them.
@@ -139,25 +139,25 @@ impl Placement {
         }
     }
 
-    /// Ground metres a hand millimetre, where the file knows its size.
+    /// Ground metres a device millimetre, where the file knows its size.
     #[must_use]
     pub fn ground_m_per_mm(&self) -> Option<f64> {
         self.side_m.map(|side| side / self.scale.cell_mm())
     }
 
-    /// Ground metres a felt cell of the view's level, where the file knows its size.
+    /// Ground metres a haptic cell of the view's level, where the file knows its size.
     #[must_use]
     pub fn felt_cell_m(&self) -> Option<f64> {
         self.side_m.map(|side| side * f64::from(self.level).exp2())
     }
 
-    /// Hand millimetres a felt cell of the view's level.
+    /// Device millimetres a haptic cell of the view's level.
     #[must_use]
     pub fn felt_cell_mm(&self) -> f64 {
         self.scale.at_level(self.level).cell_mm()
     }
 
-    /// The felt cell within the arm's reach that is farthest from its true shape; of the
+    /// The haptic cell within the arm's reach that is farthest from its true shape; of the
     /// view's own grid. `None` where the file does not know how large its cells are.
     #[must_use]
     pub fn worst_reached(&self, grid: &HapticGrid<'_>) -> Option<Distortion> {
@@ -166,7 +166,7 @@ impl Placement {
         grid.worst_in([0, 1, 2, 3].map(cells))
     }
 
-    /// The same at another scale: hand millimetres a felt cell of level 0, and a vertical
+    /// The same at another scale: device millimetres a haptic cell of level 0, and a vertical
     /// unit. The place has yet to be [`Self::moved_to`].
     pub(super) fn scaled(self, cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, ScaleError> {
         let scale = Scale::new(cell_mm, height_mm_per_unit)?;
@@ -197,7 +197,7 @@ impl Placement {
         sides.map_or(1.0, |(there, here)| there / here)
     }
 
-    /// The same with another point under the tip in its home pose, hand millimetres, after
+    /// The same with another point under the tip in its home pose, device millimetres, after
     /// a view at another scale and of another grid.
     pub(super) fn moved_to(
         self,
@@ -270,7 +270,7 @@ impl<'g> Wanted<'g> {
         })
     }
 
-    /// Columns and rows of the last felt sample.
+    /// Columns and rows of the last rendered sample.
     fn last(&self) -> [f64; 2] {
         [self.grid.columns(), self.grid.rows()].map(|count| f64::from(count) - 1.0)
     }
@@ -290,7 +290,7 @@ impl<'g> Wanted<'g> {
         Ok(Scale::new(cell_mm, self.height_mm_per_unit(cell_mm, None))?)
     }
 
-    /// Hand millimetres a vertical unit with cells of a size in the hand; `relief` is that
+    /// Device millimetres a vertical unit with cells of a size in the hand; `relief` is that
     /// of what is fitted, in vertical units.
     fn height_mm_per_unit(&self, cell_mm: f64, relief: Option<f64>) -> f64 {
         let plain = match (self.grid.cells_per_vertical_unit(), relief) {

@@ -61,7 +61,7 @@ pub struct Settings {
 pub struct PlacementSettings {
     /// Number of this placement in the column `view`, from 1 on.
     pub number: u32,
-    /// Side of a felt cell of level 0 on the ground, m, where the file knows it; none also in
+    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it; none also in
     /// recordings of earlier versions, whose cells are those of the beginning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
@@ -71,14 +71,14 @@ pub struct PlacementSettings {
     pub measured_at: Option<[f64; 2]>,
     /// Level of detail.
     pub level: u8,
-    /// Hand millimetres a felt cell of level 0.
+    /// Device millimetres a haptic cell of level 0.
     pub cell_mm: f64,
-    /// Hand millimetres a vertical unit of the file.
+    /// Device millimetres a vertical unit of the file.
     pub height_mm_per_unit: f64,
     /// Times that heights are higher than true to scale, where the file knows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
-    /// The point of the terrain at the tip in the arm's home pose, hand millimetres, as far as
+    /// The point of the terrain at the tip in the arm's home pose, device millimetres, as far as
     /// the host knows: a clutch that the user holds moves it.
     pub home_mm: [f64; 3],
     /// Newtons for a millimetre between the HIP and the proxy.
@@ -175,9 +175,9 @@ pub struct TerrainFile {
 pub struct RenderedTerrain {
     /// Which cells of the file.
     pub cells: HapticCells,
-    /// Felt samples of level 0, west to east and south to north.
+    /// Rendered samples of level 0, west to east and south to north.
     pub samples: [u32; 2],
-    /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
+    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
     /// Place where a cell of the file is that large, in the file's coordinates, x and y;
@@ -186,11 +186,11 @@ pub struct RenderedTerrain {
     pub measured_at: Option<[f64; 2]>,
     /// Level of detail: every 2^level-th sample.
     pub level: u8,
-    /// Hand millimetres a felt cell of level 0.
+    /// Device millimetres a haptic cell of level 0.
     pub cell_mm: f64,
-    /// Hand millimetres a vertical unit of the file.
+    /// Device millimetres a vertical unit of the file.
     pub height_mm_per_unit: f64,
-    /// Radius of the ball that felt it, hand millimetres; left out where it was a point. The HIP
+    /// Radius of the ball that felt it, device millimetres; left out where it was a point. The HIP
     /// and the proxy are the ball's centre.
     #[serde(default, skip_serializing_if = "is_point")]
     pub tip_mm: f64,
@@ -486,7 +486,7 @@ impl RenderedTerrain {
         })
     }
 
-    /// Hand millimetres a vertical unit at another size in the hand and the recorded
+    /// Device millimetres a vertical unit at another size in the hand and the recorded
     /// proportions.
     #[must_use]
     pub fn height_at_cell_mm(&self, cell_mm: f64) -> f64 {

@@ -7,7 +7,7 @@ use crate::place::PlacementChange;
 
 /// The keys, for the screen.
 pub const KEYS: &str = "arrows pan, + - zoom, ] [ heights, . , stiffness, space held or c: clutch, 0 reset, Enter goes on";
-/// Hand millimetres of a pan by a key.
+/// Device millimetres of a pan by a key.
 const PAN_MM: f64 = 5.0;
 /// Times larger by a key.
 const ZOOM: f64 = 1.5;

@@ -1,5 +1,5 @@
 //! Reports of a device during a session: times over restarts
-//! ([`Timeline`]), rows in hand millimetres of their views ([`SampleLog`], [`Placements`]), figures of the
+//! ([`Timeline`]), rows in device millimetres of their views ([`SampleLog`], [`Placements`]), figures of the
 //! whole session ([`Figures`]).
 
 mod figures;

@@ -91,7 +91,7 @@ fn centre(block: &Samples, [u, v]: [f64; 2], radius: f64) -> f64 {
 
 /// A ball over heights by column and row, which is felt from the node on the sample at zero on.
 struct Rest {
-    /// Felt cells a cell.
+    /// Haptic cells a cell.
     parts: usize,
     /// Samples around that node.
     halo: usize,

@@ -50,7 +50,7 @@ pub struct Scene {
     pub is_live: bool,
     /// True if the device keeps the tiles of the view before.
     pub keeps_tiles: bool,
-    /// Level of detail of the tiles: every 2ᴸ-th sample, and felt cells as much larger.
+    /// Level of detail of the tiles: every 2ᴸ-th sample, and haptic cells as much larger.
     pub level: u8,
     /// Side of a cell of level 0, mm.
     pub cell_mm: f64,
@@ -84,7 +84,7 @@ pub struct Coordinates {
     pub east: [f64; 2],
     /// A millimetre to the north.
     pub north: [f64; 2],
-    /// Decimals that tell a felt cell from the next.
+    /// Decimals that tell a haptic cell from the next.
     pub decimals: u8,
 }
 

@@ -63,7 +63,7 @@ pub fn places(chunks: &[Chunk]) -> Vec<(i64, Vec<[f32; 3]>)> {
 pub struct Csv {
     names: Vec<String>,
     pub rows: Vec<Vec<String>>,
-    /// Hand millimetres of a cell of level 0 and of a vertical unit, by view.
+    /// Device millimetres of a cell of level 0 and of a vertical unit, by view.
     pub scales: Vec<[f64; 2]>,
     /// The picture's units in a cell of level 0: metres, or millimetres in the first view.
     pub units: f64,

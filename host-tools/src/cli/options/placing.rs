@@ -123,13 +123,13 @@ pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     text
 }
 
-/// How far the shape of felt cells is off at worst.
+/// How far the shape of haptic cells is off at worst.
 pub(in crate::cli) fn off_in_words(worst: &Distortion) -> String {
     let percent = 100.0 * worst.share;
     format!("slopes and lengths are off by up to {percent:.2} %")
 }
 
-/// A view's scale, and what a felt cell of its level is.
+/// A view's scale, and what a haptic cell of its level is.
 pub(in crate::cli) fn scale_in_words(view: &Placement) -> String {
     let (level, cell_mm) = (view.level, short(view.felt_cell_mm()));
     match (view.ground_m_per_mm(), view.felt_cell_m()) {
