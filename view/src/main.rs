@@ -50,7 +50,7 @@ fn show(options: &Options) -> Result<()> {
     let server = Server::start(options.bind, &ports, kept, options.page_bytes)?;
     if server.is_open() {
         tell(
-            "hapterra-view: warning: other machines can reach the page: whoever does sees the terrain and the hand",
+            "hapterra-view: warning: other machines can open the page, and see the terrain and the hand",
         );
     }
     let url = server.url();

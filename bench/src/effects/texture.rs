@@ -34,7 +34,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
             let off = off_percent(&law, &render(grid, law, &slide.hips));
             let place = Place(&grid.name, name, effect.name());
             let [high, along] = [0, 1].map(|i| off.iter().map(|off| off[i]).collect());
-            errors.extend(place.error(("felt height off", "% of A"), MAX_HIGH, high));
+            errors.extend(place.error(("rendered height off", "% of A"), MAX_HIGH, high));
             let what = ("force along the surface off", "% of the steepest");
             errors.extend(place.error(what, MAX_ALONG, along));
         }

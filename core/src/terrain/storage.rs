@@ -58,7 +58,7 @@ impl<const D: usize> TileArena<D> {
     pub const MAX_CELLS: i32 = {
         assert!(
             D <= MAX_CELL as usize / TILE_CELLS,
-            "that many cells cannot be told apart"
+            "that many cells cannot be addressed"
         );
         (D * TILE_CELLS) as i32
     };
