@@ -10,7 +10,7 @@ use crate::product::{self, Copy, Product, SIDE};
 use crate::stats::{interleave, part, quantiles, timing};
 use crate::truth::{self, Verdict};
 
-/// How much is measured.
+/// Effort of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Ticks along a path.
@@ -49,7 +49,7 @@ pub enum Family {
     Bound,
 }
 
-/// What a variant is called, and how much it keeps.
+/// Name of a variant, and the size of its state.
 #[derive(Clone, Copy, Debug)]
 pub struct Label {
     /// In tables and pictures.

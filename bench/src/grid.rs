@@ -12,7 +12,7 @@ pub const MAX_SIDE: u32 = 4097;
 /// Heights in cells, row by row from the south, with no hole.
 #[derive(Clone, Debug)]
 pub struct Grid {
-    /// What to call it in tables.
+    /// Its name in tables.
     pub name: String,
     /// Patches eastward.
     pub columns: usize,
@@ -20,7 +20,7 @@ pub struct Grid {
     pub rows: usize,
     /// `(columns + 1) × (rows + 1)` samples.
     pub posts: Vec<f32>,
-    /// What was done to it for the comparison, one sentence each.
+    /// Changes for the comparison, one sentence each.
     pub remarks: Vec<String>,
 }
 
@@ -82,7 +82,7 @@ impl Grid {
         });
         if filled > 0 {
             grid.remarks.push(format!(
-                "{filled} samples without data lie at the lowest height: not every opponent knows holes"
+                "{filled} samples without data lie at the lowest height: not every opponent supports no data"
             ));
         }
         if width < raster.columns() || height < raster.rows() {
@@ -110,7 +110,7 @@ impl Grid {
         self.posts[row * (self.columns + 1) + column]
     }
 
-    /// Whether there is such a patch.
+    /// Returns true if there is such a patch.
     #[inline]
     #[must_use]
     pub fn has(&self, [x, y]: [i32; 2]) -> bool {

@@ -1,4 +1,4 @@
-//! What every variant is asked, and what it answers.
+//! Interface of every variant.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -36,12 +36,12 @@ impl Hip {
     }
 }
 
-/// What is felt.
+/// Answer of a variant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Answer {
-    /// Whether there is a force.
+    /// True if there is a force.
     pub touching: bool,
-    /// Whether all there was to do for this HIP was done.
+    /// True if all there was to do for this HIP was done.
     pub converged: bool,
     /// From the HIP to the proxy, cells.
     pub displacement: [f32; 3],

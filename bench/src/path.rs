@@ -6,11 +6,11 @@ use crate::haptics::Hip;
 /// A HIP's way over one terrain.
 #[derive(Clone, Debug)]
 pub struct Path {
-    /// What it is called in tables.
+    /// Its name in tables.
     pub name: &'static str,
     /// One haptic interface point a tick; the first is above the surface.
     pub hips: Vec<Hip>,
-    /// How many of them, at the beginning, come down from above the surface.
+    /// Number of them, at the beginning, that descend from above the surface.
     pub approach: usize,
 }
 
@@ -106,7 +106,7 @@ pub fn resting(grid: &Grid, ticks: usize) -> Path {
     Path::new("unmoved", hips, approach)
 }
 
-/// How high a HIP flies.
+/// Height of the HIP's path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flight {
     /// One cell above the surface under it.

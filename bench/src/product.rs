@@ -106,7 +106,7 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
     /// To be judged: the proxy itself, before any fading.
     fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
         self.forget();
-        let feel = |hip: &Hip| {
+        let step = |hip: &Hip| {
             let felt = self.contact.step(self.window, &hip.grid);
             let touching = felt.state == ContactState::Touching;
             let displacement = if touching {
@@ -120,7 +120,7 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
                 displacement: displacement.to_array(),
             }
         };
-        path.iter().map(feel).collect()
+        path.iter().map(step).collect()
     }
 }
 

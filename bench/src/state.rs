@@ -1,4 +1,4 @@
-//! What a tick can be doing: one path of the HIP for each state, in which the
+//! States of a tick: one path of the HIP for each state, in which the
 //! ticks of that state are marked.
 
 use crate::grid::Grid;
@@ -14,9 +14,9 @@ pub type Make = fn(&Grid) -> Vec<Step>;
 /// One tick: the HIP, and whether the tick is one of the state's own.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Where the HIP is.
+    /// Place where the HIP is.
     pub hip: Hip,
-    /// Whether it counts.
+    /// True if it counts.
     pub counts: bool,
 }
 

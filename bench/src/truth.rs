@@ -8,7 +8,7 @@ use hapterra_tests::invariants::surface::{Corners, Patch};
 use crate::grid::Grid;
 use crate::haptics::{Answer, Hip};
 
-/// What an answer was worth.
+/// Verdict on an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
     /// Distance from the answer's proxy to the exact closest point, cells.

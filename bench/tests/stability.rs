@@ -22,10 +22,10 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
     let output = stability(&[&words[..], &["--picture", to_png]].concat());
     assert!(output.status.success(), "{}", told(&output));
     for part in [
-        "  1000 Hz, no damping:                0.1 of the arm's friction: limp 0.5 / 0.5 / none",
-        "  1000 Hz, no damping:                1 of the arm's friction: limp 0.5 / 0.5 / none",
-        "  1000 Hz, controller:                0.1 of the arm's friction: limp 0.5 / 0.5 / 0.5",
-        "  1000 Hz, controller:                1 of the arm's friction: limp 0.5 / 0.5 / 0.5",
+        "  1000 Hz, no damping:                0.1 of the arm's friction: light 0.5 / 0.5 / none",
+        "  1000 Hz, no damping:                1 of the arm's friction: light 0.5 / 0.5 / none",
+        "  1000 Hz, controller:                0.1 of the arm's friction: light 0.5 / 0.5 / 0.5",
+        "  1000 Hz, controller:                1 of the arm's friction: light 0.5 / 0.5 / 0.5",
         "  2000 Hz, no damping:",
         "Colgate",
     ] {
@@ -36,7 +36,7 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
     assert!(
         rows.lines()
             .nth(1)
-            .is_some_and(|row| row.starts_with("1000,0.0,false,limp,0.5,200,0.1,none,0,0,still,"))
+            .is_some_and(|row| row.starts_with("1000,0.0,false,light,0.5,200,0.1,none,0,0,still,"))
     );
     let picture = std::fs::read(png).expect("a picture");
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
@@ -54,7 +54,8 @@ fn what_cannot_be_tried_or_written_is_said_at_once() {
         (["--rate", "1500"], 2, "whole kilohertz"),
         (["--stiffness", "0"], 2, "N/mm"),
         (["--stiffness", "nan"], 2, "N/mm"),
-        (["--delay-us", "20000"], 2, "10000"),
+        (["--delay", "20ms"], 2, "from 0 to 0.01 s"),
+        (["--delay-us", "200"], 2, "is now --delay 200us"),
         (["--damping", "21"], 2, "0 to 20 N·s/m"),
         (["--damping", "nan"], 2, "a damping"),
         (["--passivity", "auto"], 2, "off, on"),

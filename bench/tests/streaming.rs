@@ -1,4 +1,4 @@
-//! What `--streaming` finds, where it does not depend on a clock, and the kept figures.
+//! Results of `streaming` that do not depend on a clock, and the kept figures.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -24,7 +24,7 @@ fn kept() -> Vec<Row> {
 fn streamed(name: &str, arguments: &[&str]) -> (bool, String, PathBuf) {
     let csv = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let output = Command::new(env!("CARGO_BIN_EXE_hapterra-lab"))
-        .args(["streaming", "--quick", "--latencies", "0", "--out"])
+        .args(["streaming", "--quick", "--latency", "0ms", "--out"])
         .arg(&csv)
         .args(arguments)
         .output()
@@ -135,7 +135,7 @@ fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
 #[cfg(not(feature = "remote"))]
 fn latencies_without_a_server_are_refused_with_the_build_that_has_one() {
     let output = Command::new(env!("CARGO_BIN_EXE_hapterra-lab"))
-        .args(["streaming", "--latencies", "0,50"])
+        .args(["streaming", "--latency", "0ms,50ms"])
         .output()
         .expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr);

@@ -195,7 +195,7 @@ enum HapterraState
   /**
    * The surface has ended, and the last force ramps down.
    */
-  HAPTERRA_STATE_FADING = 2,
+  HAPTERRA_STATE_RELEASING = 2,
   /**
    * The HIP is below the surface and was not above it yet: no force until it was.
    */

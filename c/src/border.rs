@@ -1,4 +1,4 @@
-//! What crosses the border: arrays that a caller owns, and calls that must not panic.
+//! The border to C: arrays that a caller owns, and calls that must not panic.
 
 use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -19,7 +19,7 @@ pub enum HapterraState {
     /// The proxy is on the surface and the HIP below it.
     Touching = 1,
     /// The surface has ended, and the last force ramps down.
-    Fading = 2,
+    Releasing = 2,
     /// The HIP is below the surface and was not above it yet: no force until it was.
     BelowGround = 3,
     /// The HIP is in a no-data area or outside, and was not above the surface yet: no force.
@@ -47,7 +47,7 @@ impl From<Step> for HapterraStep {
         let (state, surface_mm) = match step.state {
             State::Free => (HapterraState::Free, f64::NAN),
             State::Touching => (HapterraState::Touching, f64::NAN),
-            State::Fading => (HapterraState::Fading, f64::NAN),
+            State::Releasing => (HapterraState::Releasing, f64::NAN),
             State::BelowGround { surface_mm } => (HapterraState::BelowGround, surface_mm),
             State::Outside => (HapterraState::Outside, f64::NAN),
         };

@@ -4,7 +4,7 @@ use std::ffi::{CStr, CString, c_char};
 
 use hapterra_touch::{ContactError, StepError, TerrainError};
 
-/// What a function returns: 0, or which error.
+/// Result of a function: 0, or an error.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HapterraStatus {
@@ -50,7 +50,7 @@ const TEXTS: [&CStr; 17] = [
     c"a pointer is null: give one",
     c"a pointer is not aligned or a count larger than memory",
     c"the terrain has no heights yet, or the contact has not begun",
-    c"a terrain of such a size, or with so many samples, cannot be",
+    c"no terrain can have this size or number of samples",
     c"the millimetres of a cell or of a vertical unit are no scale",
     c"heights are too tall or too steep: scale them down, or make no-data NaN",
     c"a parameter of a surface is out of its bounds",

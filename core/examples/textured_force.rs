@@ -81,12 +81,12 @@ fn felt(texture: &Texture, step_mm: f32, ticks: usize) -> Result<Vec<Vec3>, &'st
     let texturer = Texturer::of(texture, 1.0, TickRate::DEFAULT);
     let mut texturer = texturer.ok_or("no texture")?;
     let at = |i: usize| GridPoint::new([0, 7, 0], Vec3::new(i as f32 * step_mm, 0.3, 0.0));
-    let mut feel = |i| texturer.add(Vec3::Z * DEPTH, &at(i)) * STIFFNESS;
+    let mut step = |i| texturer.add(Vec3::Z * DEPTH, &at(i)) * STIFFNESS;
     for _ in 0..100 {
-        feel(0);
+        step(0);
     }
-    let before: Vec<Vec3> = (0..100).map(&mut feel).collect();
-    let after = (100..ticks + 100).map(&mut feel);
+    let before: Vec<Vec3> = (0..100).map(&mut step).collect();
+    let after = (100..ticks + 100).map(&mut step);
     // Slow ways are drawn from their beginning; at speed the share has to settle.
     match step_mm <= STEP {
         true => Ok(before.into_iter().chain(after).take(ticks).collect()),

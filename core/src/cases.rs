@@ -1,4 +1,4 @@
-//! How many cases a test goes through.
+//! Number of cases in a test.
 
 /// `all`, or so many where Miri runs them, a thousand times as slowly.
 pub(crate) const fn cases(all: u32, under_miri: u32) -> u32 {

@@ -35,13 +35,13 @@ use crate::rate::TickRate;
 use crate::scene::Scene;
 use crate::terrain::Window;
 
-/// How long all of it takes to come in again, ms.
+/// Time that all of it takes to come in again, ms.
 const IN_MS: u32 = 500;
 /// Most that a hand may have moved while the terrain stayed in its place, mm. What it moved
 /// beyond that the terrain goes with it: a hand that gives way under 1.2 N moves some 5 mm.
 const GIVE_MM: f32 = 10.0;
 
-/// How the host holds the clutch. In either way the HIP stays where it is over the terrain,
+/// The host's use of the clutch. In either way the HIP stays where it is over the terrain,
 /// and nothing is felt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ClutchHold {
@@ -62,7 +62,7 @@ enum State {
     /// The force goes out.
     Opening,
     /// The HIP stays at its place over the terrain, wherever the tip goes. `tip_mm` is
-    /// where the tip was when it opened, from its home pose: hand millimetres east,
+    /// where the tip was when it opened, from its home pose: device millimetres east,
     /// north and up, which are the same in every view.
     Open { hip: GridPoint, tip_mm: Vec3 },
     /// The force comes in again.
@@ -109,13 +109,13 @@ impl Clutch {
         }
     }
 
-    /// Whether it takes no part in a tick.
+    /// Returns true if it takes no part in a tick.
     #[inline]
     pub(crate) const fn is_closed(&self) -> bool {
         matches!(self.state, State::Closed)
     }
 
-    /// Whether there is no force, and the HIP stays where it is over the terrain.
+    /// Returns true if there is no force, and the HIP stays where it is over the terrain.
     pub(crate) const fn is_open(&self) -> bool {
         matches!(self.state, State::Open { .. })
     }
@@ -143,7 +143,7 @@ impl Clutch {
         self.open_if_held();
     }
 
-    /// Whether anybody holds it.
+    /// Returns true if anybody holds it.
     const fn is_held(&self) -> bool {
         self.input || !matches!(self.host, ClutchHold::LetGo)
     }

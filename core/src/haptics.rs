@@ -2,19 +2,19 @@
 
 use crate::clutch::{Clutch, ClutchHold};
 use crate::contact::Contact;
-use crate::feel::Feel;
 use crate::force::MaterialTable;
 use crate::guard::thermal::Temperatures;
 use crate::guard::{Fault, Guard, GuardInputs, GuardOutputs, Jog, Report};
 use crate::phantom::{Calibration, Kinematics};
 use crate::rate::TickRate;
-use crate::scene::{Health, HipCommand, Scene, Source, View};
+use crate::renderer::Renderer;
+use crate::scene::{Health, HipCommand, Scene, SceneChange, Source};
 use crate::terrain::{Tile, TileKey, Window};
 
 /// From the beginning of a tick until its force acts, s, where a board says nothing else.
 pub const LATENCY_S: f32 = 0.1e-3;
 
-/// What is handed to the loop between ticks.
+/// Command to the loop between ticks.
 pub enum Command<'t> {
     /// A scene. The arm is disarmed, and force that was there goes out gently.
     Scene(Scene),
@@ -22,7 +22,7 @@ pub enum Command<'t> {
     DropScene,
     /// Another view of the scene, already checked. The arm stays armed where the clutch is
     /// open; else it is as another scene.
-    View(View),
+    SceneChange(SceneChange),
     /// Hold the clutch, or let it go.
     Clutch(ClutchHold),
     /// The board's clutch input is held from now on, or no longer.
@@ -58,7 +58,7 @@ pub enum Command<'t> {
 #[error("the scene is not valid, or its materials are not those that came")]
 pub struct RefusedScene;
 
-/// What the next tick renders.
+/// Source of the next tick's HIP.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HipSource {
     /// There is no scene: nothing is rendered. The guard still looks at the arm.
@@ -67,7 +67,7 @@ pub enum HipSource {
     Encoders,
     /// Points.
     Points {
-        /// Whether one is being rendered.
+        /// True if one is being rendered.
         pending: bool,
     },
 }
@@ -80,7 +80,7 @@ pub struct Board {
     /// From the beginning of a tick until its force acts, s: what the board and its amplifiers
     /// take.
     pub latency_s: f32,
-    /// How warm the motors are; as cold as the air where there is nothing known.
+    /// Temperatures of the motors; those of the air where nothing is known.
     pub motors: Option<Temperatures>,
     /// A fault that was found at boot.
     pub fault: Option<Fault>,
@@ -147,7 +147,7 @@ pub struct Haptics<'t, const D: usize> {
     /// Number of the view that is felt.
     pub(crate) view: u8,
     pub(crate) point: Option<HipCommand>,
-    pub(crate) feel: Feel,
+    pub(crate) renderer: Renderer,
     pub(crate) window: Window<'t, D>,
 }
 
@@ -177,7 +177,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             guard.begin_at(motors);
         }
         Self {
-            feel: Feel::new(board.rate, board.latency_s),
+            renderer: Renderer::new(board.rate, board.latency_s),
             guard,
             scene: None,
             clutch: Clutch::new(board.rate),
@@ -191,7 +191,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// How warm the motors are: what a board keeps over a reset.
+    /// Returns the temperatures of the motors, which a board keeps over a reset.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {
         self.guard.motors().temperatures()
@@ -208,7 +208,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         match command {
             Command::Scene(scene) => self.take_scene(Some(scene))?,
             Command::DropScene => self.take_scene(None)?,
-            Command::View(view) => self.take_view(&view)?,
+            Command::SceneChange(view) => self.take_view(&view)?,
             Command::Clutch(hold) => self.clutch.hold(hold),
             Command::ClutchInput(held) => self.clutch.press(held),
             Command::Mark(_) => {}
@@ -238,16 +238,16 @@ impl<'t, const D: usize> Haptics<'t, D> {
         self.guard.stop();
         self.guard.configure(&mechanism);
         self.mechanism = Some(mechanism);
-        self.feel.restart(self.scene.as_ref());
+        self.renderer.restart(self.scene.as_ref());
     }
 
     /// Takes a table of materials: that of the scene which follows with [`Haptics::accept`] before
     /// another tick. One that is not valid has its scene refused.
     pub fn take_materials(&mut self, table: &MaterialTable) {
-        self.feel.take_materials(table);
+        self.renderer.take_materials(table);
     }
 
-    /// What the next tick renders, by the scene in force.
+    /// Returns the source of the next tick's HIP, by the scene in force.
     #[must_use]
     pub fn source(&self) -> HipSource {
         match self.scene.as_ref().map(|scene| scene.source) {
@@ -263,7 +263,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// it cannot take, too: whoever sent that believes in it.
     fn take_scene(&mut self, scene: Option<Scene>) -> Result<(), RefusedScene> {
         let asked = scene.is_some();
-        let scene = scene.filter(|scene| self.feel.can_take(scene));
+        let scene = scene.filter(|scene| self.renderer.can_take(scene));
         match &scene {
             Some(scene) if scene.source == Source::Points => self.guard.stop(),
             _ => self.guard.disarm(),
@@ -273,7 +273,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             self.window.lay(scene.underlay);
             self.tick = 0;
         }
-        self.feel.take(scene.as_ref(), None);
+        self.renderer.take(scene.as_ref(), None);
         self.scene = scene;
         self.point = None;
         let of_arm = scene.is_some_and(|scene| scene.source == Source::Encoders);
@@ -288,17 +288,17 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// Puts another view in. Nothing is felt of the change: the clutch of an arm is open,
     /// and in a replay no arm is driven. A proxy that touched begins on the surface
     /// where it was in the hand, as deep as before.
-    fn take_view(&mut self, view: &View) -> Result<(), RefusedScene> {
-        let &View { scene, hip, .. } = view;
+    fn take_view(&mut self, view: &SceneChange) -> Result<(), RefusedScene> {
+        let &SceneChange { scene, hip, .. } = view;
         let before = self.scene.as_ref();
         let may_change = before.is_some_and(|before| {
             before.source == scene.source
                 && (scene.source == Source::Points || self.clutch.is_open())
         });
-        let stretch = before
-            .zip(self.feel.contact().stretch())
-            .map(|(before, stretch)| stretch * (before.cell_mm / scene.cell_mm));
-        if !may_change || !self.feel.can_take(&scene) {
+        let displacement = before
+            .zip(self.renderer.contact().displacement())
+            .map(|(before, displacement)| displacement * (before.cell_mm / scene.cell_mm));
+        if !may_change || !self.renderer.can_take(&scene) {
             return self.take_scene(Some(scene));
         }
         if !view.keeps_tiles {
@@ -310,8 +310,10 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
         // Whatever bits came over the wire.
         let hip = hip.normalised();
-        self.feel
-            .take(Some(&scene), stretch.map(|stretch| (hip, stretch)));
+        self.renderer.take(
+            Some(&scene),
+            displacement.map(|displacement| (hip, displacement)),
+        );
         self.clutch.put(hip);
         self.scene = Some(scene);
         self.point = None;
@@ -323,7 +325,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     fn take_zero(&mut self, counts: [i32; 3]) {
         self.guard.stop();
         self.guard.restart_counts();
-        self.feel.restart(self.scene.as_ref());
+        self.renderer.restart(self.scene.as_ref());
         self.zero = Some(counts);
     }
 
@@ -335,7 +337,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             .scene
             .as_ref()
             .is_some_and(|it| it.source == Source::Encoders);
-        let under_proxy = self.feel.contact().patch().filter(|_| of_arm);
+        let under_proxy = self.renderer.contact().patch().filter(|_| of_arm);
         let under_proxy = under_proxy.map(|cell| TileKey::holding(level, cell));
         if let (Some(under_proxy), Some(key)) = (under_proxy, tile.key())
             && key != under_proxy
@@ -347,7 +349,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         {
             return Some(tile);
         }
-        let contact = self.feel.contact();
+        let contact = self.renderer.contact();
         let felt = [contact.output().proxy, *contact.hip()];
         self.window.take(tile, felt.map(|point| point.column()))
     }
@@ -361,7 +363,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     /// The contact of the last tick.
     #[must_use]
     pub const fn contact(&self) -> &Contact {
-        self.feel.contact()
+        self.renderer.contact()
     }
 
     /// The calibration in force.
@@ -381,7 +383,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             angles_rad: self.mechanism.as_ref().map(angles).unwrap_or_default(),
             currents_a: drive.currents_a,
             winding_c: self.guard.motors().winding_c(),
-            created_mj: self.feel.created_mj(),
+            created_mj: self.renderer.created_mj(),
         }
     }
 

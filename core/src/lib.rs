@@ -52,7 +52,7 @@
 //!    [`clutch`] lets another view in without a step in force.
 //! 8. [`tick`] is all of it as one pure function, called 1,000 to 10,000 times a
 //!    second ([`rate::TickRate`]): counts, pose, HIP, feel, guard, currents. Contact and
-//!    effects are put together in `feel.rs`, which `replay.rs` uses, too; commands and scene
+//!    effects are put together in `renderer.rs`, which `replay.rs` uses, too; commands and scene
 //!    changes between ticks are in `haptics.rs`.
 //! 9. [`wire`] is what travels between the device and the host.
 //!
@@ -74,13 +74,13 @@ struct Readme;
 pub mod clutch;
 pub mod contact;
 pub mod crc;
-mod feel;
 pub mod force;
 pub mod grid;
 pub mod guard;
 mod haptics;
 pub mod phantom;
 pub mod rate;
+mod renderer;
 mod replay;
 mod scalar;
 pub mod scene;

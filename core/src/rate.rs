@@ -1,4 +1,4 @@
-//! How often the loop ticks, and what follows from it.
+//! The tick rate, and what follows from it.
 
 /// Most that the force may change, newtons a second. A hand at 2 m/s against
 /// 0.5 N/mm makes 1 N/ms; what is faster is no hand.

@@ -15,9 +15,9 @@ impl<const D: usize> Haptics<'_, D> {
         let sample = &mut outcome.sample;
         let mut force_n = Vec3::ZERO;
         if let (Some(scene), Some(point)) = (&self.scene, self.point) {
-            force_n = self.feel.step_to_point(&self.window, scene, point.hip);
-            write_output(point.hip, &self.feel, sample);
-            if self.feel.is_done() {
+            force_n = self.renderer.step_to_point(&self.window, scene, point.hip);
+            write_output(point.hip, &self.renderer, sample);
+            if self.renderer.is_done() {
                 outcome.answers = Some(point.seq);
                 self.point = None;
             }

@@ -71,7 +71,7 @@ fn shortened(v: Vec3, limit: f32) -> Vec3 {
     if largest <= part { v } else { unit * part }
 }
 
-/// Whether all of it is a number and finite: nothing else times zero is zero. A third of
+/// Returns true if all of it is a number and finite: nothing else times zero is zero. A third of
 /// the instructions of `Vec3::is_finite`, in every tick.
 #[inline]
 pub(crate) fn is_finite(v: Vec3) -> bool {

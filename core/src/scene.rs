@@ -1,4 +1,4 @@
-//! What a tick is given (scene, points) and what it reports (samples, health).
+//! Input of a tick (scene, points) and its report (records, health).
 //!
 //! These types go into the tick and come out of it, and they travel on the wire
 //! as they are: any change to one of them is a new version of the wire's protocol.
@@ -12,7 +12,7 @@ use crate::grid::{GridPoint, MAX_CELL};
 use crate::guard::{Fault, GuardInputs, Limits, Mode, Report};
 use crate::terrain::{FieldSize, TileIndex, Underlay};
 
-/// Where the haptic interface point comes from.
+/// Source of the haptic interface point (HIP).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Source {
     /// The Phantom's encoders.
@@ -34,7 +34,7 @@ pub struct Scene {
     pub size: FieldSize,
     /// A whole height in cells that no sample exceeds.
     pub top: i32,
-    /// What is felt where a tile has not come; none where ticks wait for their tiles.
+    /// Coarse fallback where a tile has not arrived; none where ticks wait for their tiles.
     pub underlay: Option<Underlay>,
     /// Millimetres of the arm's tip a cell.
     pub cell_mm: f32,
@@ -42,7 +42,7 @@ pub struct Scene {
     pub home: GridPoint,
     /// Spring and limit.
     pub law: SurfaceParams,
-    /// Where the haptic interface point comes from.
+    /// Source of the haptic interface point (HIP).
     pub source: Source,
     /// On an emulated board: let its clock stand still while the host owes a
     /// tile, so that a slow host machine makes no difference to the contact.
@@ -55,7 +55,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Whether every number is one that the loop can work with.
+    /// Returns true if every number is one that the loop can work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let top_ok = self.top.unsigned_abs() <= MAX_CELL.unsigned_abs() + 1;
@@ -71,17 +71,17 @@ impl Scene {
 /// Another view of the terrain for an arm that stays armed: another place, scale, height
 /// or stiffness. It is put in while the clutch is open, and felt when that has closed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct View {
+pub struct SceneChange {
     /// Counts the views of a scene from 1 on, wrapping; samples carry it.
     pub number: u8,
     /// The field, its scale and the law. Its home is where the device would begin if it
-    /// were restarted; while it runs the home follows from [`View::hip`].
+    /// were restarted; while it runs the home follows from [`SceneChange::hip`].
     pub scene: Scene,
     /// The haptic interface point in the view, cells, for the tip where it was when the clutch
     /// opened, or where it is when that closes ([`ClutchHold`](crate::clutch::ClutchHold)). In contact
     /// its height is the device's: as deep as before.
     pub hip: GridPoint,
-    /// Whether the tiles that the device holds are those of this scene: only place and law
+    /// True if the tiles that the device holds are those of this scene: only place and surface
     /// differ.
     pub keeps_tiles: bool,
 }
@@ -112,21 +112,21 @@ pub struct TickRecord {
     /// Force commanded, newtons: east, north, up. Zero unless the amplifiers
     /// are on; in a replay, what the scene's law makes.
     pub force_n: Vec3,
-    /// The view in which this was felt ([`View::number`]); 0 for the scene as it was taken.
+    /// The view in which this was felt ([`SceneChange::number`]); 0 for the scene as it was taken.
     pub view: u8,
-    /// What the proxy is doing.
+    /// State of the proxy.
     pub state: ContactState,
     /// The tile without which the tick could not be completed.
     pub missing_tile: Option<TileIndex>,
-    /// How far arming has come.
+    /// Progress of arming.
     pub mode: Mode,
-    /// Why the force is less than the scene asked for.
+    /// Reasons for a force below that of the scene.
     pub limits: Limits,
     /// Latched fault.
     pub fault: Option<Fault>,
     /// Units of contact work spent.
     pub work: u32,
-    /// What the tick before this one cost, in clock ticks.
+    /// Cost of the tick before this one, clock ticks.
     pub cost: u32,
     /// The costliest tick so far, in clock ticks.
     pub worst_cost: u32,

@@ -12,11 +12,11 @@
 use glam::Vec3;
 
 use crate::contact::ContactOutput;
-use crate::feel::{Feel, Mover};
 use crate::grid::GridPoint;
 use crate::guard::{GuardInputs, GuardOutputs, Limits, Report, SceneKind, Surroundings};
 pub use crate::haptics::{Board, Command, Haptics, HipSource, LATENCY_S, RefusedScene};
 use crate::phantom::{Kinematics, Pose, to_device_frame, to_terrain_frame};
+use crate::renderer::{Mover, Renderer};
 use crate::scalar::smaller;
 use crate::scene::{Scene, Source, TickRecord};
 use crate::terrain::SETTLING_MM_S;
@@ -108,7 +108,7 @@ impl<const D: usize> Haptics<'_, D> {
         };
         let mut hip = place(mechanism, scene, pose);
         if !self.clutch.is_closed() {
-            let felt = (self.feel.contact_mut(), &self.window);
+            let felt = (self.renderer.contact_mut(), &self.window);
             let drives = self.guard.mode().drives();
             hip = self.clutch.tick(hip, scene, felt, drives);
         }
@@ -118,9 +118,9 @@ impl<const D: usize> Haptics<'_, D> {
             pose,
             clutch: self.clutch.share(),
         };
-        let wanted_n = self.feel.step(&self.window, scene, hip, &arm);
-        write_output(hip, &self.feel, sample);
-        if self.feel.has_effects() && self.feel.created_mj() > 0.0 {
+        let wanted_n = self.renderer.step(&self.window, scene, hip, &arm);
+        write_output(hip, &self.renderer, sample);
+        if self.renderer.has_effects() && self.renderer.created_mj() > 0.0 {
             self.guard.says(Limits::ENERGY_TAKEN_BACK);
         }
         wanted_n
@@ -166,7 +166,7 @@ impl<const D: usize> Haptics<'_, D> {
         // An infinite step would leave no trace of which tiles settle.
         let step = smaller(SETTLING_MM_S * self.rate.tick_s() / cell_mm, f32::MAX);
         if self.window.settle(step) {
-            self.feel.contact_mut().surface_moved(&self.window);
+            self.renderer.contact_mut().surface_moved(&self.window);
         }
     }
 
@@ -182,7 +182,7 @@ impl<const D: usize> Haptics<'_, D> {
         limits.set(Limits::TERRAIN_MISSING, sample.missing_tile.is_some());
         limits.set(
             Limits::BOUNDARY_FADING,
-            self.feel.contact().boundary_fade() < 1.0,
+            self.renderer.contact().boundary_fade() < 1.0,
         );
         limits |= self.clutch.limits();
         let is_coarse = self.is_over_coarse_ground(sample);
@@ -193,7 +193,7 @@ impl<const D: usize> Haptics<'_, D> {
         (sample.mode, sample.limits, sample.fault) = (mode, limits, fault);
     }
 
-    /// Whether the proxy is over the underlay, over a tile that has not settled, or over nothing
+    /// Returns true if the proxy is over the underlay, over a tile that has not settled, or over nothing
     /// where an underlay is on its way.
     fn is_over_coarse_ground(&self, sample: &TickRecord) -> bool {
         let cell = sample.proxy.column();
@@ -204,9 +204,9 @@ impl<const D: usize> Haptics<'_, D> {
 }
 
 /// Writes the contact's output into the sample.
-pub(crate) fn write_output(hip: GridPoint, feel: &Feel, sample: &mut TickRecord) {
-    write_contact(hip, feel.contact().output(), sample);
-    sample.missing_tile = feel.missing_tile();
+pub(crate) fn write_output(hip: GridPoint, renderer: &Renderer, sample: &mut TickRecord) {
+    write_contact(hip, renderer.contact().output(), sample);
+    sample.missing_tile = renderer.missing_tile();
 }
 
 // A call: it is needed in several places.
@@ -225,7 +225,7 @@ pub(crate) fn write_nothing(sample: &mut TickRecord) {
     write_contact(GridPoint::default(), &ContactOutput::default(), sample);
 }
 
-/// Where the tip is over the terrain.
+/// Returns the place where the tip is over the terrain.
 fn place(mechanism: &Kinematics, scene: &Scene, pose: &Pose) -> GridPoint {
     let moved_mm = to_terrain_frame(pose.tip_mm() - mechanism.home_mm());
     GridPoint::new(

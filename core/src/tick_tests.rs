@@ -163,7 +163,7 @@ impl<'t, const D: usize> Device<'t, D> {
     }
 
     /// Feels one point, however many ticks that takes.
-    fn feel(&mut self, seq: u32, hip: GridPoint) -> TickRecord {
+    fn step(&mut self, seq: u32, hip: GridPoint) -> TickRecord {
         assert!(
             self.haptics
                 .accept(Command::Hip(HipCommand { seq, hip }))
@@ -337,7 +337,7 @@ fn begun_inside_the_terrain_there_is_no_force() {
     let mut device = Device::<4>::armed(&mut tiles, plane);
     for _ in 0..50 {
         let outcome = device.tick([0; 3]);
-        assert_eq!(outcome.sample.state, ContactState::Waiting);
+        assert_eq!(outcome.sample.state, ContactState::Unseeded);
         assert_eq!(outcome.sample.force_n, Vec3::ZERO);
     }
 }
@@ -530,7 +530,7 @@ fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
         let outcome = device.tick([0; 3]);
         assert_eq!(
             (outcome.drive, outcome.sample.state),
-            (GuardOutputs::default(), ContactState::Waiting)
+            (GuardOutputs::default(), ContactState::Unseeded)
         );
     }
     let report = device.haptics.report();
@@ -591,7 +591,7 @@ fn a_small_window_feels_what_a_whole_one_feels() {
         at = at.map(|x| (x + random(2 * jump) as i32 - jump as i32).clamp(20, 620));
         let cell = [at[0], at[1], random(24) as i32 - 12];
         let hip = GridPoint::new(cell, Vec3::splat(random(1000) as f32 / 1000.0));
-        let (a, b) = (small.feel(seq, hip), large.feel(seq, hip));
+        let (a, b) = (small.step(seq, hip), large.step(seq, hip));
         let same = TickRecord {
             tick: a.tick,
             work: a.work,
@@ -648,7 +648,7 @@ fn a_point_of_any_bits_is_a_valid_one_before_it_is_felt() {
     }
     let hip: GridPoint = postcard::from_bytes(&bytes).expect("nine numbers");
     assert!(!hip.frac().is_finite());
-    let sample = device.feel(1, hip);
+    let sample = device.step(1, hip);
     assert_eq!(sample.hip.cell(), [-MAX_CELL, 92, MAX_CELL]);
     assert_eq!(sample.hip.frac(), Vec3::new(0.0, 0.5, 0.0));
     assert_eq!(sample.force_n, Vec3::ZERO);

@@ -1,4 +1,4 @@
-//! What the modules of core and firmware import: no circle of files or folders, and in core
+//! Imports of the modules of core and firmware: no circle of files or folders, and in core
 //! nothing against the order that `lib.rs` states.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -205,7 +205,7 @@ fn words(code: &str) -> Vec<String> {
     words
 }
 
-/// Whether a file or folder of this name has tests, or what they share.
+/// Returns true if a file or folder of this name has tests, or what they share.
 fn is_of_tests(name: &str) -> bool {
     let shared = ["tests", "testing", "cases", "dice"];
     shared.contains(&name) || name.ends_with("_tests")

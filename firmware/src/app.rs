@@ -60,7 +60,7 @@ impl Default for WorkingMemory<'_> {
     }
 }
 
-/// What a board brings to the application.
+/// A board's parts for the application.
 pub struct Hardware<E, A, C> {
     /// The encoders.
     pub encoders: E,
@@ -77,12 +77,12 @@ pub struct Hardware<E, A, C> {
     pub latency_us: u16,
     /// The Phantom's calibration record, as the board's memory has it.
     pub calibration: Stored,
-    /// What the motors are to be taken for: [`crate::motor_memory::begin`] says, and
+    /// Assumed temperatures of the motors: [`crate::motor_memory::begin`] returns them, and
     /// [`Temperatures::HOT`] where nothing is known.
     pub motors: Temperatures,
-    /// What tells the board from others of its kind.
+    /// Serial number among boards of its kind.
     pub serial: SerialNumber,
-    /// What the board found when it started.
+    /// Findings of the board at its start.
     pub boot: BootReport,
 }
 

@@ -71,6 +71,6 @@ pub trait TickClock {
     /// Acknowledges the timer event that this tick answers.
     fn begin_tick(&mut self);
 
-    /// Whether the next tick's event has already come: this tick ran over.
+    /// Returns true if the next tick's event has already come: this tick ran over.
     fn next_is_due(&self) -> bool;
 }

@@ -1,4 +1,4 @@
-//! How a program ended, as bytes in a RAM that survives the reset.
+//! End of a program, as bytes in a RAM that survives the reset.
 //!
 //! A board's panic and fault handlers write a [`CrashRecord`] where start-up
 //! does not clear the memory, and reset. The next start reads it
@@ -34,10 +34,10 @@ const KINDS: [CrashKind; 5] = [
 pub struct CrashRecord([u8; CRASH_BYTES]);
 
 impl CrashRecord {
-    /// What the memory holds when there is nothing to tell.
+    /// Content of the memory without a crash.
     pub const NONE: Self = Self([0; CRASH_BYTES]);
 
-    /// What is written first: the kind of end alone, made without a serialiser, a check sum
+    /// Returns the first bytes to write: the kind of end alone, made without a serialiser, a check sum
     /// or a call. It stays where making the whole record fails.
     #[must_use]
     pub const fn bare(kind: CrashKind) -> Self {

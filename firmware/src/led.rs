@@ -1,4 +1,4 @@
-//! What the status LED shows.
+//! Patterns of the status LED.
 
 use hapterra_core::guard::{Fault, Mode, Report};
 
@@ -60,7 +60,7 @@ impl LedPattern {
         }
     }
 
-    /// Whether the LED is lit at the time `ms`, in milliseconds from any origin.
+    /// Returns true if the LED is lit at the time `ms`, in milliseconds from any origin.
     #[must_use]
     pub const fn is_lit(self, ms: u32) -> bool {
         match self {

@@ -1,4 +1,4 @@
-//! What the application's parts tell about themselves: that they run, and what they
+//! Liveness and measurements of the application's parts: that they run, and what they
 //! count. It decides whether the watchdog is fed; the tick and the status message read it.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
@@ -55,7 +55,7 @@ impl Monitor {
         self.checked_in.fetch_or(part.bit(), Relaxed);
     }
 
-    /// Whether the watchdog is to be fed now: all of `parts` have checked in since this
+    /// Returns true if the watchdog is to be fed now: all of `parts` have checked in since this
     /// was last true. Asked a few times within the watchdog's time.
     ///
     /// A named part that never checks in leads to a reset; a part that is not named is

@@ -178,7 +178,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         &self.stored
     }
 
-    /// What the device's RAM keeps over a reset: the motors' temperatures, twice.
+    /// Returns the RAM that survives a reset: the motors' temperatures, twice.
     #[must_use]
     pub const fn retained(&self) -> &Copies {
         &self.retained
@@ -190,7 +190,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         self.haptic_loop.calibration()
     }
 
-    /// How warm the device takes its motors to be.
+    /// Returns the device's temperatures of its motors.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {
         self.haptic_loop.temperatures()

@@ -53,7 +53,7 @@ pub enum Stored {
     Damaged,
 }
 
-/// Why a record could not be stored. The one before is still there.
+/// Reason for which a record was not stored. The one before is still there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
     /// The flash does not erase.

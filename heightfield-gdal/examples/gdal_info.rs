@@ -1,4 +1,4 @@
-//! What GDAL says of a raster: `cargo run --example gdal_info FILE`.
+//! GDAL's description of a raster: `cargo run --example gdal_info FILE`.
 
 use heightfield_gdal::{Library, Settings, Window};
 

@@ -62,7 +62,7 @@ pub enum SampleType {
     F64,
 }
 
-/// What marks samples as none, beside a no-data value.
+/// Mark of no-data samples, beside a no-data value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mask {
     /// Nothing, or the no-data value alone.
@@ -177,13 +177,13 @@ impl<'d> Band<'d> {
         self.number(self.loaded.functions.GDALGetRasterNoDataValue)
     }
 
-    /// What samples are multiplied by, before the [offset](Self::offset) is added.
+    /// Returns the factor of samples, before the [offset](Self::offset) is added.
     #[must_use]
     pub fn scale(&self) -> Option<f64> {
         self.number(self.loaded.functions.GDALGetRasterScale)
     }
 
-    /// What is added to samples.
+    /// Returns the summand of samples.
     #[must_use]
     pub fn offset(&self) -> Option<f64> {
         self.number(self.loaded.functions.GDALGetRasterOffset)
@@ -203,7 +203,7 @@ impl<'d> Band<'d> {
         unsafe { from_c((self.loaded.functions.GDALGetRasterUnitType)(self.handle)) }
     }
 
-    /// What the file calls the band.
+    /// Returns the band's name in the file.
     #[must_use]
     pub fn description(&self) -> Option<String> {
         // SAFETY: as above.
@@ -233,7 +233,7 @@ impl<'d> Band<'d> {
         }
     }
 
-    /// What marks samples as none, beside the no-data value.
+    /// Returns the mark of no-data samples, beside the no-data value.
     #[must_use]
     pub fn mask(&self) -> Mask {
         // SAFETY: the band's dataset is open.

@@ -1,4 +1,4 @@
-//! What is looked at before GDAL opens a file: GDAL would wait for a pipe without end, start a
+//! Checks before GDAL opens a file: GDAL would wait for a pipe without end, start a
 //! device, and follow a VRT to whatever that names.
 
 use std::collections::HashSet;

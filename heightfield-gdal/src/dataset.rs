@@ -38,7 +38,7 @@ unsafe impl Send for Dataset {}
 /// One of several rasters in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Subdataset {
-    /// What opens it, as `NETCDF:"ocean.nc":depth`.
+    /// Its name for opening, as `NETCDF:"ocean.nc":depth`.
     pub name: String,
     /// As `[180x360] depth (32-bit floating-point)`.
     pub title: String,
@@ -194,7 +194,7 @@ impl Dataset {
         Band::of(&self.loaded, handle).ok_or_else(no_such)
     }
 
-    /// What columns and rows are for coordinates: x = `[0]` + column · `[1]` + row · `[2]`,
+    /// Returns the map from columns and rows to coordinates: x = `[0]` + column · `[1]` + row · `[2]`,
     /// y = `[3]` + column · `[4]` + row · `[5]`, from the outer corner of the first sample's cell.
     #[must_use]
     pub fn geo_transform(&self) -> Option<[f64; 6]> {

@@ -1,10 +1,10 @@
-//! What can go wrong.
+//! Errors.
 
 use std::path::PathBuf;
 
 use crate::version::Version;
 
-/// Why a raster cannot be read.
+/// Reason for which a raster cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -38,7 +38,7 @@ pub enum Error {
     NotOpened {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Returns its fault.
         why: String,
     },
     /// GDAL takes too long to open a file.
@@ -46,7 +46,7 @@ pub enum Error {
     Slow {
         /// The file.
         path: PathBuf,
-        /// How long it had.
+        /// Time for which it had.
         seconds: u64,
     },
     /// The driver does not know an open option.
@@ -60,7 +60,7 @@ pub enum Error {
         known: String,
     },
     /// A text for GDAL has a zero byte in it.
-    #[error("{0:?} has a zero byte: GDAL cannot be told that")]
+    #[error("{0:?} contains a zero byte, which GDAL's interface cannot carry")]
     ZeroByte(String),
     /// A part of a raster that is not there.
     #[error("there is no {asked}: {there}")]
@@ -81,7 +81,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// What to type so that libgdal is there, one line a system.
+    /// Returns the commands that install libgdal, one line a system.
     #[must_use]
     pub const fn how_to_install() -> &'static str {
         "install GDAL: apt install gdal-bin (Debian, Ubuntu), dnf install gdal-libs (Fedora), \

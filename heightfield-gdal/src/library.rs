@@ -42,7 +42,7 @@ impl Library {
         Ok(Self { loaded })
     }
 
-    /// Where it was found: a path, or the name that the system knows it by.
+    /// Returns its path, or its name in the system.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.loaded.path

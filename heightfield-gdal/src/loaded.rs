@@ -27,7 +27,7 @@ pub(crate) struct Loaded {
 }
 
 thread_local! {
-    /// Whether HDF5 is silent on this thread.
+    /// True if HDF5 is silent on this thread.
     static IS_SILENT: Cell<bool> = const { Cell::new(false) };
 }
 

@@ -33,7 +33,7 @@ struct State {
     /// Threads that wait for a file now, and the time of the first of them.
     waiting: u32,
     begun: Option<Instant>,
-    /// How long GDAL has waited for files.
+    /// Time for which GDAL has waited for files.
     waited: Duration,
 }
 
@@ -54,13 +54,13 @@ pub(crate) fn at(name: &str) -> Option<(Arc<Mounted>, &str)> {
 }
 
 impl Mount {
-    /// What GDAL calls a file.
+    /// Returns GDAL's name of a file.
     #[must_use]
     pub fn path(&self, name: &str) -> String {
         format!("{}{name}", self.0.root())
     }
 
-    /// Why a file could not be read, since this was called last.
+    /// Takes the reason for which a file could not be read since the last call.
     #[must_use]
     pub fn take_fault(&self) -> Option<io::Error> {
         self.0.take_fault()
@@ -104,7 +104,7 @@ impl Mounted {
         self.state().fault.take()
     }
 
-    /// How long GDAL has waited for files, until now.
+    /// Returns the time for which GDAL has waited for files, until now.
     pub(crate) fn waited(&self) -> Duration {
         let state = self.state();
         state.waited + state.begun.map_or(Duration::ZERO, |begun| begun.elapsed())
@@ -216,7 +216,7 @@ impl ReadAt for Text {
     }
 }
 
-/// Whether an error says that there is no such file.
+/// Returns true if an error says that there is no such file.
 fn is_missing(error: &io::Error) -> bool {
     use io::ErrorKind::{NotFound, PermissionDenied};
     matches!(error.kind(), NotFound | PermissionDenied)

@@ -14,7 +14,7 @@ const SKIPPED: &str = "HTTP WMS WMTS WCS EEDA EEDAI PLMOSAIC PLScenes NGW OGCAPI
 /// Which addresses GDAL may fetch, by how they end.
 const FETCHED: &str = "CPL_VSIL_CURL_ALLOWED_EXTENSIONS";
 
-/// How GDAL is to work. It is one for the process: the settings of the first that loads it hold.
+/// Settings of GDAL. They are one for the process: those of the first that loads it hold.
 ///
 /// | of GDAL | set to | so that |
 /// |---|---|---|
@@ -40,7 +40,7 @@ impl Default for Settings {
     }
 }
 
-/// Whether the user's environment says what may be fetched.
+/// Returns true if the user's environment says what may be fetched.
 pub(crate) fn is_fetching_allowed() -> bool {
     std::env::var_os(FETCHED).is_some()
 }

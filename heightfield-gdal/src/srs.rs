@@ -26,7 +26,7 @@ pub struct SpatialReference {
     pub method: Option<String>,
     /// Name of its datum.
     pub datum: Option<String>,
-    /// What its coordinates count.
+    /// Unit of its coordinates.
     pub unit: AxisUnit,
     /// The projection as PROJ writes it; none where PROJ has no short form of it.
     pub proj: Option<String>,
@@ -39,7 +39,7 @@ pub struct SpatialReference {
     pub to_wgs84: Option<[f64; 7]>,
 }
 
-/// What a coordinate counts.
+/// Unit of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisUnit {
     /// An angle of so many radians.

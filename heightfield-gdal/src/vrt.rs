@@ -1,4 +1,4 @@
-//! What a VRT names.
+//! Names in a VRT.
 
 use std::fs;
 use std::path::Path;
@@ -38,7 +38,7 @@ const SERVERS: [&str; 9] = [
 /// File systems that no file may name: standard input, and those of another file.
 const REFUSED: [&str; 2] = ["/vsistdin", PREFIX];
 
-/// Whether a file is a VRT, by its beginning.
+/// Returns true if a file is a VRT, by its beginning.
 pub(crate) fn begins(head: &[u8]) -> bool {
     head.windows(SIGN.len()).any(|part| part == SIGN.as_bytes())
 }
@@ -133,7 +133,7 @@ impl Text {
         Ok(Some(value).filter(|_| self.is_file_name()))
     }
 
-    /// Whether it names what a driver would ask a server for.
+    /// Returns true if it names what a driver would ask a server for.
     fn is_address(&self) -> bool {
         let is_of_gdal = ["/vsi", "vrt://"]
             .iter()

@@ -16,7 +16,7 @@ pub(crate) struct Text {
     /// The element or attribute that it is in.
     pub(crate) node: String,
     pub(crate) value: String,
-    /// Whether it is a name beside the VRT.
+    /// True if it is a name beside the VRT.
     pub(crate) is_relative: bool,
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn texts(library: &Loaded, xml: &str) -> Result<Vec<Text>, Error> {
     Ok(texts)
 }
 
-/// Whether an element has the attribute with which a VRT says that a name is one beside it.
+/// Returns true if an element has the attribute with which a VRT says that a name is one beside it.
 ///
 /// # Safety
 /// The node is GDAL's.

@@ -33,7 +33,7 @@ pub(super) struct Vertical {
     pub(super) name: String,
     /// Metres in its unit.
     pub(super) metres: f64,
-    /// Whether its numbers grow downwards.
+    /// True if its numbers grow downwards.
     pub(super) is_depth: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What a decoder hands over, and what every format's result must satisfy.
+//! Result of a decoder, and the conditions on it.
 
 use std::cell::RefCell;
 
@@ -25,9 +25,9 @@ pub(super) struct Decoded {
     pub(super) rows: u32,
     /// Its samples, the file's first row first.
     pub(super) storage: Storage,
-    /// Whether the file's first row is the southernmost.
+    /// True if the file's first row is the southernmost.
     pub(super) south_up: bool,
-    /// Whether the file's first column is the easternmost.
+    /// True if the file's first column is the easternmost.
     pub(super) east_first: bool,
     /// Stored value that means no data.
     pub(super) no_data: Option<f64>,
@@ -37,7 +37,7 @@ pub(super) struct Decoded {
     pub(super) offset: f64,
     /// The reference system, where the file states it.
     pub(super) system: Option<ReferenceSystem>,
-    /// Where that comes from.
+    /// Source of that.
     pub(super) system_from: Certainty,
     /// Where the samples lie, where the file knows it.
     pub(super) place: Option<Place>,
@@ -47,11 +47,11 @@ pub(super) struct Decoded {
     pub(super) are_depths: bool,
     /// Metres per vertical unit, where the file says so.
     pub(super) metres_per_vertical_unit: Option<f64>,
-    /// Where that comes from.
+    /// Source of that.
     pub(super) vertical_unit_from: Certainty,
     /// What the heights count from, where the file says so.
     pub(super) vertical_datum: Option<VerticalDatum>,
-    /// Why all samples are in memory, where the format could have left them in the file.
+    /// Reason for which all samples are in memory, where the format could have left them in the file.
     pub(super) why_whole: Option<String>,
     /// Their layout in the file.
     pub(super) file_layout: FileLayout,
@@ -186,7 +186,7 @@ impl Decoded {
         self.scale = -self.scale;
         self.offset = -self.offset;
         self.remarks.push(format!(
-            "depths ({why}): they are felt as heights below zero"
+            "depths ({why}): they are rendered as heights below zero"
         ));
     }
 }

@@ -1,4 +1,4 @@
-//! Why a file is not a terrain: what is wrong, and where.
+//! Errors of terrain files: what is wrong, and where.
 
 use std::path::{Path, PathBuf};
 
@@ -27,13 +27,13 @@ impl Error {
         &self.path
     }
 
-    /// What is wrong with it.
+    /// Returns its fault.
     pub fn fault(&self) -> &RasterError {
         &self.fault
     }
 }
 
-/// What is wrong with a file.
+/// Fault of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RasterError {
@@ -54,7 +54,7 @@ pub enum RasterError {
     WantsGdal {
         /// Name of the format.
         format: &'static str,
-        /// Why GDAL cannot be asked.
+        /// Reason for which GDAL cannot be asked.
         why: heightfield_gdal::Error,
     },
     /// GDAL knows the format, and refuses the file.
@@ -164,7 +164,7 @@ pub enum RasterError {
     InTile {
         /// The file.
         file: PathBuf,
-        /// What is wrong with it.
+        /// Returns its fault.
         fault: Box<RasterError>,
     },
     /// A file among many that is on no grid.
@@ -233,7 +233,7 @@ impl RasterError {
         }
     }
 
-    /// Whether another try may find more: nothing is known of the file's samples.
+    /// Returns true if another try may find more: nothing is known of the file's samples.
     pub(super) fn is_of_the_line(&self) -> bool {
         match self {
             Self::Remote(error) => !is_missing(error),

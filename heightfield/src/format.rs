@@ -1,4 +1,4 @@
-//! What every terrain format tells about itself.
+//! Interface of every terrain format.
 
 use super::input::FileBytes;
 use super::{Decoded, OpenOptions, RasterError};
@@ -7,7 +7,7 @@ use super::{Decoded, OpenOptions, RasterError};
 pub(super) struct Format {
     /// Name in messages.
     pub(super) name: &'static str,
-    /// Whether a file that begins with these bytes (its first kibibyte, or all of a
+    /// True if a file that begins with these bytes (its first kibibyte, or all of a
     /// shorter one) is of this format.
     pub(super) begins: fn(head: &[u8]) -> bool,
     /// Extensions in lower case. Inside an archive, a file with one of them is a terrain.
@@ -74,7 +74,7 @@ impl Format {
     }
 }
 
-/// Whether a file begins with one of some signatures.
+/// Returns true if a file begins with one of some signatures.
 pub(super) fn starts_with_any(head: &[u8], signatures: &[&[u8]]) -> bool {
     signatures
         .iter()

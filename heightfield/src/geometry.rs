@@ -1,4 +1,4 @@
-//! What a cell measures on the ground, and a vertical unit in metres.
+//! Size of a cell on the ground, and of a vertical unit in metres.
 
 use super::globe::Globe;
 use super::numbers::beginning;
@@ -15,7 +15,7 @@ pub enum CellUnit {
     Degree,
 }
 
-/// Where a unit, a reference system or a datum comes from.
+/// Source of a unit, a reference system or a datum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Certainty {
     /// The file states it, or its format has no other.
@@ -47,9 +47,9 @@ pub struct CellSize {
     pub map_scale: (f64, f64),
     /// Latitude of the middle of the field in degrees, where known.
     pub latitude: Option<f64>,
-    /// What degrees are degrees of.
+    /// Globe of the degrees.
     pub globe: Globe,
-    /// Where the unit comes from.
+    /// Source of the unit.
     pub certainty: Certainty,
 }
 
@@ -130,7 +130,7 @@ impl CellSize {
         }
     }
 
-    /// Whether both sides are usable numbers.
+    /// Returns true if both sides are usable numbers.
     pub(super) fn is_valid(&self) -> bool {
         let (east, north) = self.metres();
         let usable = |side: f64| side.is_finite() && side > 1e-12 && side < 1e12;
@@ -138,7 +138,7 @@ impl CellSize {
     }
 }
 
-/// What heights count from.
+/// Zero of heights.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VerticalDatum {
     /// Name of the vertical reference system, as `NAVD88 height`.

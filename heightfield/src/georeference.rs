@@ -1,4 +1,4 @@
-//! Where samples lie in the coordinates of the file's reference system, and what those
+//! Georeference of samples in the file's reference system, and what its coordinates
 //! coordinates mean.
 //!
 //! Coordinates are always (x, y), which is (east, north) or (longitude, latitude),
@@ -92,7 +92,7 @@ impl GroundTransform {
         }
     }
 
-    /// Whether columns are along x and rows along y.
+    /// Returns true if columns are along x and rows along y.
     fn is_straight(&self) -> bool {
         self.column_step[1] == 0.0 && self.row_step[0] == 0.0
     }
@@ -106,7 +106,7 @@ fn length([x, y]: [f64; 2]) -> f64 {
     x.hypot(y)
 }
 
-/// What a file's coordinates are.
+/// Kind of a file's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum System {
     /// The file knows no place: coordinates are the columns and rows of its samples,
@@ -124,7 +124,7 @@ pub enum System {
     Projected,
 }
 
-/// Where a raster's samples lie: column 0 the westernmost, row 0 the southernmost.
+/// Georeference of a raster's samples: column 0 the westernmost, row 0 the southernmost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Georeference<'r> {
     transform: GroundTransform,
@@ -156,7 +156,7 @@ impl<'r> Georeference<'r> {
         }
     }
 
-    /// What the coordinates are.
+    /// Returns the kind of the coordinates.
     #[must_use]
     pub const fn system(&self) -> System {
         self.system
@@ -185,14 +185,14 @@ impl<'r> Georeference<'r> {
         )
     }
 
-    /// What the longitudes and latitudes of this file are.
+    /// Returns the meaning of this file's longitudes and latitudes.
     #[must_use]
     pub fn lonlat(&self) -> LonLat<'r> {
         self.reference
             .map_or(LonLat::Unstated, ReferenceSystem::lonlat)
     }
 
-    /// Whether the coordinates themselves are these longitudes and latitudes, to 4 m.
+    /// Returns true if the coordinates themselves are these longitudes and latitudes, to 4 m.
     #[must_use]
     pub fn counts_lonlat(&self) -> bool {
         let System::Geographic { degrees } = self.system else {

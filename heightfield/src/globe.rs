@@ -45,13 +45,13 @@ impl Globe {
         self.radius_m
     }
 
-    /// Whether it stands for the Earth, and not for another body.
+    /// Returns true if it stands for the Earth, and not for another body.
     #[must_use]
     pub fn is_earth(&self) -> bool {
         EARTHS.contains(&self.radius_m)
     }
 
-    /// Whether it is the ellipsoid of WGS 84 or GRS 80, which differ by 0.1 mm.
+    /// Returns true if it is the ellipsoid of WGS 84 or GRS 80, which differ by 0.1 mm.
     pub(super) fn is_wgs84(&self) -> bool {
         let same_size = (self.radius_m - Self::EARTH.radius_m).abs() < 1e-3;
         same_size && (self.e2 - Self::EARTH.e2).abs() < 1e-9

@@ -127,13 +127,13 @@ impl GroundMap {
         )
     }
 
-    /// Whether rows run along x and columns along y.
+    /// Returns true if rows run along x and columns along y.
     pub(super) fn is_straight(&self) -> bool {
         let (east, south) = self.steps();
         self.0.skew_y.abs() <= STRAIGHT * east && self.0.skew_x.abs() <= STRAIGHT * south
     }
 
-    /// Whether the first row is the southernmost; of a rotated grid, whether it is
+    /// Returns true if the first row is the southernmost; of a rotated grid, whether it is
     /// mirrored.
     pub(super) fn is_south_up(&self) -> bool {
         let map = &self.0;
@@ -143,7 +143,7 @@ impl GroundMap {
         }
     }
 
-    /// Whether the first column is the easternmost.
+    /// Returns true if the first column is the easternmost.
     pub(super) fn is_east_first(&self) -> bool {
         self.is_straight() && self.0.pixel_width < 0.0
     }

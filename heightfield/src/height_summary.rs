@@ -34,7 +34,7 @@ impl HeightSummary {
         }
     }
 
-    /// Whether no sample has a height.
+    /// Returns true if no sample has a height.
     pub(super) const fn has_none(&self) -> bool {
         self.lowest > self.highest
     }

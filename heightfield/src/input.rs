@@ -24,7 +24,7 @@ pub(super) struct FileBytes {
     len: u64,
     data: Data,
     outline: bool,
-    /// Where neighbours that have URLs are.
+    /// Place where neighbours that have URLs are.
     elsewhere: RemoteFetcher,
 }
 
@@ -90,7 +90,7 @@ impl FileBytes {
         Self { outline, ..self }
     }
 
-    /// Whether only what the header says is wanted: size, type of samples and place. A
+    /// Returns true if only what the header says is wanted: size, type of samples and place. A
     /// format that can tells these without reading the samples, and hands over none.
     pub(super) const fn is_outline(&self) -> bool {
         self.outline
@@ -187,7 +187,7 @@ impl FileBytes {
         }
     }
 
-    /// Whether the file at its path is still this one, in its present state.
+    /// Returns true if the file at its path is still this one, in its present state.
     pub(super) fn is_at_its_path(&self) -> bool {
         match &self.data {
             Data::File(_, path) => FileStamp::at(path) == self.stamp(),

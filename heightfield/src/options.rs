@@ -1,10 +1,10 @@
-//! What the user may say about a file that the file does not say itself.
+//! Options of the user for a file.
 
 use super::samples::{Endian, SampleType};
 use crate::disk_cache::DiskCache;
 use crate::remote::RemoteFetcher;
 
-/// How to open a file. The default believes the file.
+/// Options for opening a file. The default believes the file.
 #[derive(Clone, Debug)]
 pub struct OpenOptions {
     /// The file is raw samples of this layout, whatever its content looks like.
@@ -25,24 +25,24 @@ pub struct OpenOptions {
     pub ground_cell_m: Option<f64>,
     /// Metres in a unit of the heights; replaces what the file says.
     pub vertical_unit_m: Option<f64>,
-    /// How a picture's colours encode heights, if they do.
+    /// Encoding of heights in a picture's colours, if any.
     pub encoding: Option<Encoding>,
     /// The numbers are classes and no heights: those of a palette are taken as they are.
     pub classes: bool,
-    /// What nothing here reads is given to GDAL, where there is a libgdal.
+    /// True if other formats are read by GDAL, where there is a libgdal.
     pub gdal: bool,
     /// Samples that take more bytes than this stay in the file, where its format allows it,
     /// and are read in blocks when they are touched.
     pub most_in_memory_bytes: u64,
     /// The files at URLs that are read with these options.
     pub elsewhere: RemoteFetcher,
-    /// Where coarse samples are kept that are made of a terrain in its file. The default
+    /// Folder for coarse samples of a terrain in its file. The default
     /// keeps nothing.
     pub disk_cache: DiskCache,
 }
 
 impl OpenOptions {
-    /// What [`OpenOptions::most_in_memory_bytes`] is unless somebody states it, in units of
+    /// Default of [`OpenOptions::most_in_memory_bytes`], in units of
     /// 2²⁰ bytes.
     pub const IN_MEMORY_MB: u32 = 128;
 }
@@ -82,7 +82,7 @@ pub struct RawLayout {
     pub endian: Endian,
 }
 
-/// How the red, green and blue of a picture encode a height in metres.
+/// Encoding of heights in metres as red, green and blue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// Mapbox Terrain-RGB: −10000 + 0.1 · (65536 R + 256 G + B)

@@ -1,4 +1,4 @@
-//! Where a field lies: what a file's map and the unit of its coordinates come to.
+//! Place of a field, from a file's map and the unit of its coordinates.
 
 use super::ground_map::GroundMap;
 

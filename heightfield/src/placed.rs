@@ -1,4 +1,4 @@
-//! Where decoded samples lie: what follows from a file's map from columns and rows to
+//! Place of decoded samples, from a file's map from columns and rows to
 //! coordinates, whatever its format.
 
 use super::crs::{ReferenceSystem, Unit};
@@ -71,7 +71,7 @@ fn turned(map: &GroundMap) -> Vec<String> {
     }
     if leaning.abs() >= STRAIGHT_DEGREES {
         words.push(format!(
-            "the grid is sheared: its columns lean by {leaning:.1}° from the perpendicular of its rows; square cells are felt in their true shape, stored ones (--input cells=stored) as if they were rectangular"
+            "the grid is sheared: its columns lean by {leaning:.1}° from the perpendicular of its rows; square cells are rendered in their true shape, stored ones (--input cells=stored) as if they were rectangular"
         ));
     }
     words

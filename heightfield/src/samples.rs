@@ -165,7 +165,7 @@ impl Samples {
         with_samples!(self, values => values.len())
     }
 
-    /// Whether there are none.
+    /// Returns true if there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -1,4 +1,4 @@
-//! Where a raster's samples are: in memory, or in its file until they are touched.
+//! Storage of a raster's samples: in memory, or in its file until they are touched.
 
 use std::path::Path;
 use std::sync::Arc;

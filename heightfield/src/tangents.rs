@@ -1,4 +1,4 @@
-//! How far a step in coordinates leads on the ground, and where to.
+//! Length and direction on the ground of a step in coordinates.
 
 use super::geometry::CellSize;
 use super::globe::Globe;

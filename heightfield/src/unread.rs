@@ -29,7 +29,7 @@ impl Unread {
         }
     }
 
-    /// Whether what begins at a column and row of an image could not be read before.
+    /// Returns true if what begins at a column and row of an image could not be read before.
     pub(super) fn has(&self, image: usize, first: [u32; 2]) -> bool {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.contains(&(image, first))
@@ -43,7 +43,7 @@ impl Unread {
         }
         if known.len() <= WARNINGS {
             tracing::warn!(
-                "columns {} to {}, rows {} to {} of {}{} cannot be read and are a hole: {fault}",
+                "columns {} to {}, rows {} to {} of {}{} cannot be read and count as no data: {fault}",
                 part.column,
                 part.column + part.columns - 1,
                 part.row,
@@ -52,7 +52,7 @@ impl Unread {
                 self.name
             );
         } else if known.len() == WARNINGS + 1 {
-            tracing::warn!("more of {} cannot be read and are holes", self.name);
+            tracing::warn!("more of {} cannot be read and count as no data", self.name);
         }
     }
 }

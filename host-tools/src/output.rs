@@ -20,7 +20,7 @@ use tempfile::TempPath;
 pub struct OutputError {
     /// The file.
     pub path: PathBuf,
-    /// Why.
+    /// Its reason.
     #[source]
     pub source: io::Error,
 }
@@ -117,7 +117,7 @@ impl Output {
         &self.path
     }
 
-    /// Where it grows until it is complete; none for a pipe, a device and standard output.
+    /// Returns the path of its partial file; none for a pipe, a device and standard output.
     #[must_use]
     pub fn partial(&self) -> Option<&Path> {
         self.beside.as_deref()
@@ -166,7 +166,7 @@ impl Seek for Output {
     }
 }
 
-/// Whether a path is `-`.
+/// Returns true if a path is `-`.
 fn is_standard_output(path: &Path) -> bool {
     path == Path::new("-")
 }
@@ -249,19 +249,19 @@ pub fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// What a process that was killed had written of a file.
+/// Partial file of a killed process.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LeftBehind {
-    /// Where it is.
+pub struct PartialFile {
+    /// Its path.
     pub path: PathBuf,
-    /// How long it is, bytes.
+    /// Its length, bytes.
     pub bytes: u64,
 }
 
-/// What killed processes left of the file at `path`, by name. Nothing here touches
+/// Returns the partial files that killed processes left beside `path`, by name. Nothing here touches
 /// it.
 #[must_use]
-pub fn left_behind(path: &Path) -> Vec<LeftBehind> {
+pub fn partial_files(path: &Path) -> Vec<PartialFile> {
     let beginning = beginning_of_partial(path);
     let beside = folder_of(path).read_dir().into_iter().flatten().flatten();
     let partial = beside.filter(|entry| is_partial(&beginning, &entry.file_name()));
@@ -270,7 +270,7 @@ pub fn left_behind(path: &Path) -> Vec<LeftBehind> {
         .filter(|path| is_nobodys(path))
         .filter_map(|path| {
             let bytes = path.metadata().ok()?.len();
-            Some(LeftBehind { path, bytes })
+            Some(PartialFile { path, bytes })
         })
         .collect();
     found.sort_by(|a, b| a.path.cmp(&b.path));
@@ -292,7 +292,7 @@ fn beginning_of_partial(path: &Path) -> String {
     format!("{}.", name.get(..cut).unwrap_or_default())
 }
 
-/// Whether a name that begins so is that of a partial file.
+/// Returns true if a name that begins so is that of a partial file.
 fn is_partial(beginning: &str, name: &OsStr) -> bool {
     let random = name
         .to_str()
@@ -300,7 +300,7 @@ fn is_partial(beginning: &str, name: &OsStr) -> bool {
     random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
 }
 
-/// Whether no process is writing a partial file.
+/// Returns true if no process is writing a partial file.
 fn is_nobodys(path: &Path) -> bool {
     let file = regular_file::open(path);
     file.is_ok_and(|file| !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
@@ -349,12 +349,12 @@ mod tests {
         let mut output = begin();
         output.write_all(b"eight by").expect("written");
         drop(output);
-        assert_eq!(left_behind(&path), [], "it was not wanted");
+        assert_eq!(partial_files(&path), [], "it was not wanted");
         let mut output = begin();
         output.write_all(b"eight by").expect("written");
         assert!(output.write_all(b"eight by").is_err(), "too many");
         drop(output);
-        let [left] = &left_behind(&path)[..] else {
+        let [left] = &partial_files(&path)[..] else {
             panic!("none, or several");
         };
         assert_eq!(left.bytes, 8);
@@ -367,7 +367,7 @@ mod tests {
         let mut alive = Output::create(&path).expect("created");
         alive.write_all(b"half").expect("written");
         alive.flush().expect("written");
-        assert_eq!(left_behind(&path), []);
+        assert_eq!(partial_files(&path), []);
         let dead = folder.path().join("out.csv.a1B2c3.partial");
         std::fs::write(&dead, "t_s,x_mm").expect("written");
         // Of other files, or of another name.
@@ -379,11 +379,11 @@ mod tests {
         ] {
             std::fs::write(folder.path().join(other), "x").expect("written");
         }
-        let found = LeftBehind {
+        let found = PartialFile {
             path: dead.clone(),
             bytes: 8,
         };
-        assert_eq!(left_behind(&path), [found]);
+        assert_eq!(partial_files(&path), [found]);
         alive.finish().expect("finished");
         assert_eq!(std::fs::read(&dead).expect("kept"), b"t_s,x_mm");
     }

@@ -3,7 +3,7 @@
 //! -1` would end in a crash, and `hapterra run FILE | head -1` without letting go of the
 //! arm. These go on in silence.
 //!
-//! For commands that hold no device. Where an arm may be armed, `cli::terminal::voice`
+//! For commands that hold no device. Where an arm may be armed, `cli::terminal::writer`
 //! writes, for whom nobody waits.
 //!
 //! What a command was asked to write (files, `replay -o -`) and the one report that a command

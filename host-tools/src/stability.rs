@@ -6,7 +6,7 @@ use hapterra_core::force::{MaterialTable, SurfaceParams, Texture};
 use hapterra_core::rate::TickRate;
 use hapterra_core::wire::hello::DeviceHello;
 
-/// Stiffness up to which a press is still in a limp hand, N/mm: ticks a second, without and
+/// Stiffness up to which a press is still in a light grasp, N/mm: ticks a second, without and
 /// with the passivity controller.
 pub type StillUpTo = [(u32, f32, f32); 4];
 
@@ -42,7 +42,7 @@ pub const SHORT_US: u16 = 310;
 /// See [`SHORT_US`].
 pub const LONG_US: u16 = 1_240;
 
-/// What is left of that on a textured surface, whose steepest slopes rock a limp hand, too; and
+/// Share of that on a textured surface, whose steepest slopes rock a light grasp, too; and
 /// what is left at [`LONG_US`].
 pub const LEFT_WITH_TEXTURE: f32 = 0.5;
 /// See [`LEFT_WITH_TEXTURE`].
@@ -100,7 +100,7 @@ fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
     let whole_mm_s = wavelength * hz as f32 / 8.0;
     (!texture.is_none() && wavelength < shortest).then(|| {
         format!(
-            "a texture with a wavelength of {wavelength} mm: at {hz} ticks a second it fades from {whole_mm_s:.0} mm/s on, and is gone at twice that; from {shortest} mm on a slow hand feels it in whole"
+            "a texture with a wavelength of {wavelength} mm: at {hz} ticks a second it fades from {whole_mm_s:.0} mm/s on, and is gone at twice that; from {shortest} mm on it is rendered in full for a slow hand"
         )
     })
 }
@@ -120,17 +120,17 @@ fn warning(law: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<Strin
     };
     if stiffness > still {
         let shakes = match law.texture.is_none() {
-            true => "shakes",
-            false => "may shake on a texture",
+            true => "is unstable",
+            false => "may be unstable on a texture",
         };
         return Some(format!(
-            "a stiffness of {stiffness} N/mm: on the virtual arm a limp hand {shakes} above {still} N/mm at {hz} ticks a second{late}, {with} the passivity controller (hapterra-lab stability)"
+            "a stiffness of {stiffness} N/mm: on the virtual arm a light grasp {shakes} above {still} N/mm at {hz} ticks a second{late}, {with} the passivity controller (hapterra-lab stability)"
         ));
     }
     let enters = enters_n_per_mm(rate, latency_us);
     (stiffness > enters).then(|| {
         format!(
-            "a stiffness of {stiffness} N/mm: on a virtual arm with a tenth of a Premium 1.5's friction the tip trembles above {enters} N/mm at {hz} ticks a second{late}, in the ramp or after the clutch (hapterra-lab stability)"
+            "a stiffness of {stiffness} N/mm: on a virtual arm with a tenth of a Premium 1.5's friction the tip vibrates above {enters} N/mm at {hz} ticks a second{late}, in the ramp or after the clutch (hapterra-lab stability)"
         )
     })
 }
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(told(1.0), "");
         let shakes = told(3.1);
         assert!(
-            shakes.contains("may shake on a texture above 3 N/mm"),
+            shakes.contains("may be unstable on a texture above 3 N/mm"),
             "{shakes}"
         );
         assert!(!told(3.0).contains("shake"));
@@ -275,11 +275,11 @@ mod tests {
         }
         let trembles = told(1.5, 1000, Controller::On);
         assert!(
-            trembles.contains("the tip trembles above 1 N/mm"),
+            trembles.contains("the tip vibrates above 1 N/mm"),
             "{trembles}"
         );
         let shakes = |stiffness, hz, controller| {
-            told(stiffness, hz, controller).contains("a limp hand shakes above")
+            told(stiffness, hz, controller).contains("a light grasp is unstable above")
         };
         assert!(shakes(3.5, 1000, Controller::Off) && !shakes(3.5, 1000, Controller::On));
         assert!(shakes(6.5, 1000, Controller::On) && !shakes(6.5, 3000, Controller::On));
@@ -294,7 +294,7 @@ mod tests {
             "{trembles}"
         );
         let shakes = |stiffness, controller| {
-            told_late(stiffness, 1000, 1231, controller).contains("a limp hand shakes above")
+            told_late(stiffness, 1000, 1231, controller).contains("a light grasp is unstable above")
         };
         assert!(shakes(1.5, Controller::Off) && !shakes(1.5, Controller::On));
         assert!(shakes(4.0, Controller::On) && !shakes(3.0, Controller::On));

@@ -8,7 +8,7 @@ use hapterra_core::force::{Material, Pattern, Texture};
 pub struct NamedSurface {
     /// Its name.
     pub name: &'static str,
-    /// What it feels like.
+    /// Its surface.
     pub material: Material,
 }
 

@@ -10,7 +10,7 @@ const STEP_BYTES = 64;
 const STATE_AT = 56;
 const SOUTH_FIRST = 1;
 const GRAIN = 1;
-const STATES = ["free", "touching", "letting go", "waiting", "waiting"];
+const STATES = ["free", "touching", "releasing", "unseeded", "unseeded"];
 
 /** Loads it from an address, or from bytes. */
 export async function load(from) {

@@ -67,7 +67,7 @@ export function surfaceFile({ texture, wavelength }) {
   return `[default]\ntexture = "grain"\ntexture_amplitude = ${texture}\ntexture_wavelength = ${wavelength}\n`;
 }
 
-/** What to type to feel the path again, beside the saved files. */
+/** The command that renders the path again, beside the saved files. */
 export function command(terrain, { friction, stiffness, texture }, tipMm) {
   const words = ["hapterra replay terrain.npy path.csv -o felt.csv"];
   words.push(`--scale ${terrain.cellMm}mm/cell --exaggeration 1mm/unit`);

@@ -93,6 +93,6 @@ export class Touch {
     this.state = felt.state;
     this.path.add(this.arm.at, felt.force);
     // The ground let go: of a ball's proxy that stays behind by more than 15 radii, or at a hole.
-    if (felt.state === "waiting") this.#lift();
+    if (felt.state === "unseeded") this.#lift();
   }
 }

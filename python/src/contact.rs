@@ -158,7 +158,7 @@ pub(crate) const fn number(state: State) -> (u8, Option<f64>) {
     match state {
         State::Free => (0, None),
         State::Touching => (1, None),
-        State::Fading => (2, None),
+        State::Releasing => (2, None),
         State::BelowGround { surface_mm } => (3, Some(surface_mm)),
         State::Outside => (4, None),
     }

@@ -8,7 +8,7 @@ use clap::Parser;
 use hapterra::cli::Failure;
 use hapterra::cli::options::exaggeration::Exaggeration;
 use hapterra::cli::options::terrain_file::{ReadingOptions, assumed_unit};
-use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, View, ViewOptions};
+use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, Placement, PlacementOptions};
 use hapterra::terrain::{HapticCells, INTERPOLATED_STEP, Terrain as Laid};
 use hapterra_core::phantom::Calibration;
 use hapterra_touch::{Block, Heights, Terrain as Touched, Unread};
@@ -29,7 +29,7 @@ struct Words {
     size: Size,
 }
 
-/// How large it is in the hand.
+/// Its size in the hand.
 #[derive(Clone, clap::Args)]
 pub(crate) struct Size {
     #[arg(long)]
@@ -58,7 +58,7 @@ pub(crate) struct Opened {
     first: [u32; 2],
     /// Samples from west to east, and from south to north.
     samples: [u32; 2],
-    /// How often something was not read, and why last.
+    /// Number of times that something was not read, and why last.
     unread: Mutex<(u64, String)>,
 }
 
@@ -99,7 +99,7 @@ impl Opened {
             let (size, last) = (size_mm[axis], f64::from(whole.samples[axis] - 1));
             if !(size.is_finite() && size >= cell_mm) {
                 return Err(refused(format!(
-                    "size_mm is {size_mm:?}: give millimetres of the hand, a cell of {cell_mm} at least"
+                    "size_mm is {size_mm:?}: give device millimetres, a cell of {cell_mm} at least"
                 )));
             }
             let begin = ((middle[axis] - 0.5 * size) / cell_mm + 0.5).floor();
@@ -119,14 +119,14 @@ impl Opened {
         let read = Arc::clone(&raster);
         let over = Over::try_new(raster, |raster| {
             let grid = target.grid(raster, HapticCells::Square)?;
-            let options = ViewOptions {
+            let options = PlacementOptions {
                 target,
                 sizing: size.sizing(),
                 heights: size.heights(),
                 level: Some(0),
             };
             // What lies where in the reach of an arm does not matter here.
-            let view = View::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options)?;
+            let view = Placement::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options)?;
             Ok::<_, Failure>(view.terrain(grid)?)
         });
         // What has not come is no hole.

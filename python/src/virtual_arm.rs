@@ -1,6 +1,6 @@
 //! A virtual arm in a hand, in a closed loop with a contact.
 
-use hapterra::phantom::{HandModel, PhantomModel, Placement, Plant};
+use hapterra::phantom::{HandModel, PhantomModel, ArmFrame, Plant};
 use hapterra_core::Vec3;
 use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_touch::{Contact as Touched, StepError};
@@ -18,7 +18,7 @@ const ROW: usize = 104;
 #[pyclass(frozen, module = "hapterra._native")]
 pub(crate) struct VirtualArm {
     hand: HandModel,
-    placement: Placement,
+    placement: ArmFrame,
     mechanism: Kinematics,
 }
 
@@ -43,7 +43,7 @@ impl VirtualArm {
                 grip_n_per_m,
                 grip_ns_per_m,
             },
-            placement: Placement { home_mm },
+            placement: ArmFrame { home_mm },
             mechanism: Kinematics::new(&Calibration::PREMIUM_1_5).map_err(refused)?,
         })
     }
@@ -125,7 +125,7 @@ impl VirtualArm {
             let target_m = self.placement.to_device_m(plant.model(), *target_mm);
             plant.aim(
                 target_m,
-                Placement::turn_to_device(speed).map(|mm_s| 1e-3 * mm_s),
+                ArmFrame::turn_to_device(speed).map(|mm_s| 1e-3 * mm_s),
             );
             plant.step(currents.to_array().map(f64::from), tick_s);
 

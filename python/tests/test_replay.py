@@ -13,8 +13,8 @@ CELL_MM = 0.7
 NAMES = {
     "free": {State.FREE},
     "touching": {State.TOUCHING},
-    "letting go": {State.FADING},
-    "waiting": {State.BELOW_GROUND, State.OUTSIDE},
+    "releasing": {State.RELEASING},
+    "unseeded": {State.BELOW_GROUND, State.OUTSIDE},
 }
 ROUGH = dict(
     stiffness=0.4,

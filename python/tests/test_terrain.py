@@ -127,5 +127,5 @@ def test_tip_is_a_ball_by_its_centre():
     steps = Contact(ball).run([[4, 4, 5], [4, 4, 2]])
     assert steps["proxy_mm"][1, 2] == 2.5 and steps["force_n"][1, 2] == 0.25
     for radius in (-1, 8.1, np.nan):
-        with pytest.raises(ValueError, match="where 0 to 8 can be felt"):
+        with pytest.raises(ValueError, match="where 0 to 8 can be rendered"):
             point.with_tip(radius)

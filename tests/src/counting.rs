@@ -50,7 +50,7 @@ pub struct CountingBoard {
 /// Runs an image in a folder to its end, and returns what each tick took.
 pub type Follow = fn(image: &Path, folder: &Path) -> Vec<Cycles>;
 
-/// What happens in a replay.
+/// Event of a replay.
 #[derive(Clone, Copy, Debug)]
 pub enum Event {
     /// A tile arrives.
@@ -81,15 +81,15 @@ pub trait Samples {
 pub struct Replay<'a> {
     /// As the device is told of it.
     pub scene: &'a Scene,
-    /// Where the tiles are cut from.
+    /// Source of the tiles.
     pub field: &'a dyn Samples,
-    /// What happens.
+    /// Its events.
     pub events: &'a [Event],
-    /// What the ground is made of: then each HIP is a tick of the whole loop.
+    /// Materials of the ground: then each HIP is a tick of the whole loop.
     pub materials: Option<&'a Materials>,
 }
 
-/// What one tick cost and answered.
+/// Cost and answer of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
     /// Instructions, the call and the return included.
@@ -98,7 +98,7 @@ pub struct Counted {
     pub cycles: Cycles,
     /// The number of its [`hapterra_core::contact::ContactState`].
     pub state: u32,
-    /// Whether all there was to do was done; on materials, whether the point is answered; fed by
+    /// True if all there was to do was done; on materials, whether the point is answered; fed by
     /// encoders, whether the amplifiers are on.
     pub converged: bool,
     /// Units of work.

@@ -1,4 +1,4 @@
-//! Where the emulated board is, for tests that need it.
+//! Path of the emulated board, for tests that need it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

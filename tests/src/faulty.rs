@@ -10,7 +10,7 @@ use hapterra::link::Transport;
 
 use crate::chance::Chance;
 
-/// What a link does to what it carries.
+/// Fault of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// A bit changes.

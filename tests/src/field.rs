@@ -52,7 +52,7 @@ impl FieldContact {
     ///
     /// # Panics
     /// When that takes more than 10,000 ticks.
-    pub fn feel(&mut self, hip: [f64; 3]) -> ContactOutput {
+    pub fn step(&mut self, hip: [f64; 3]) -> ContactOutput {
         let hip = point(hip);
         for _ in 0..10_000 {
             let felt = *self.contact.step(&self.window, &hip);

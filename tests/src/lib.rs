@@ -1,4 +1,4 @@
-//! What the tests that cross crates share: where the shared data is, and the
+//! Common parts of the tests across crates: where the shared data is, and the
 //! real `hapterra` binary.
 
 #![forbid(unsafe_code)]
@@ -112,7 +112,7 @@ pub fn hapterra_binary() -> &'static Path {
     })
 }
 
-/// What `hapterra info --json` says of a terrain.
+/// Returns the output of `hapterra info --json` for a terrain.
 ///
 /// # Panics
 /// When it fails.

@@ -86,7 +86,7 @@ struct Ruled<'p> {
 }
 
 impl Ruled<'_> {
-    /// Where along its ruling the nearest point is.
+    /// Returns the place where along its ruling the nearest point is.
     fn best(&self, t: f64) -> f64 {
         let [x, y] = self.at(0.0, t);
         let slope = self.patch.slopes(x, y)[self.axis];
@@ -158,7 +158,7 @@ impl Ruled<'_> {
     }
 }
 
-/// Whether no patch that shares the place leads on downhill from it.
+/// Returns true if no patch that shares the place leads on downhill from it.
 fn is_lowest_around(terrain: &Terrain, hip: [f64; 3], own: &Patch, at: [f64; 2]) -> bool {
     let side = |axis: usize| {
         let local = at[axis] - f64::from(own.cell[axis]);
@@ -176,7 +176,7 @@ fn is_lowest_around(terrain: &Terrain, hip: [f64; 3], own: &Patch, at: [f64; 2])
         .all(|(way, patch)| !leads_down(&patch, hip, at, way))
 }
 
-/// Whether the distance falls from a place on a patch's border into it.
+/// Returns true if the distance falls from a place on a patch's border into it.
 fn leads_down(patch: &Patch, hip: [f64; 3], [x, y]: [f64; 2], way: [i32; 2]) -> bool {
     let rise = patch.height(x, y) - hip[2];
     let [east, north] = patch.slopes(x, y);

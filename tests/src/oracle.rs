@@ -39,7 +39,7 @@ impl<'h> Oracle<'h> {
         (!height.is_nan()).then_some(height)
     }
 
-    /// Whether all surface within `reach` of a place is known.
+    /// Returns true if all surface within `reach` of a place is known.
     #[must_use]
     pub fn is_known_around(&self, x: f64, y: f64, reach: f64) -> bool {
         let steps = (2.0 * reach).ceil() as i32 + 1;

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-/// What was counted, by kind.
+/// Counts by kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows<K, R>(Vec<(K, R)>);
 

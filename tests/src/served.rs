@@ -22,9 +22,9 @@ use hapterra_core::wire::status::Status;
 /// A device behind a socket, one host after the other. While it is deaf nothing reaches
 /// it, and what it says still comes.
 pub struct Served {
-    /// Where it is.
+    /// Its place.
     pub address: SocketAddr,
-    /// Whether nothing reaches it.
+    /// True if nothing reaches it.
     pub deaf: Arc<AtomicBool>,
     seen: Arc<Seen>,
 }
@@ -98,12 +98,12 @@ impl Served {
         wait_until("an end", || count(unheard_hellos) + count(unheard_byes) > 0);
     }
 
-    /// How the last session ended, as the next host hears it.
+    /// Returns the end of the last session, as the next host hears it.
     pub fn last_end(&self) -> SessionEnd {
         self.dialogue().device().last.end
     }
 
-    /// How the device is.
+    /// Returns the status of the device.
     pub fn status(&self) -> Status {
         self.dialogue().fresh_status().expect("it answers")
     }
@@ -217,7 +217,7 @@ pub fn signal(child: &Child, name: &str) {
     assert!(sent.expect("kill runs").success());
 }
 
-/// What it has written, to both.
+/// Returns its output and error output.
 pub fn told(output: &Output) -> String {
     let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
     String::from_utf8_lossy(&both).into_owned()

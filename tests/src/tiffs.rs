@@ -14,7 +14,7 @@ pub enum Values {
 /// Tags of an image, in rising order of their numbers.
 pub type Directory = Vec<(u16, Values)>;
 
-/// Where the data of a file begins.
+/// Place where the data of a file begins.
 pub const DATA: u32 = 8;
 
 /// A file of some data and of images.

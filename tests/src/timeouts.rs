@@ -17,7 +17,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
-/// How long a test waits for what comes at once, before it fails.
+/// Time for which a test waits for what comes at once, before it fails.
 pub const HANG: Duration = Duration::from_secs(600);
 /// Between two looks at a condition.
 const LOOK: Duration = Duration::from_millis(5);

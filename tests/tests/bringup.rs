@@ -440,7 +440,7 @@ fn an_output_that_is_off_is_named_where_the_amplifier_gets_it() {
 }
 
 #[test]
-fn an_amplifier_that_is_not_there_is_named_before_any_motor_and_if_it_goes_later() {
+fn missing_amplifier_is_named_before_any_motor() {
     for axis in 0..3 {
         let mut mistakes = BenchMistakes::default();
         mistakes.amplifier_missing[axis] = true;

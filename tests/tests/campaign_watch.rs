@@ -156,7 +156,7 @@ fn more_than_the_clamp_by_the_encoders_is_told_whatever_is_true() {
 }
 
 #[test]
-fn more_than_the_records_force_at_the_tip_is_told_unless_an_encoder_is_far_off() {
+fn excess_tip_force_is_reported_unless_an_encoder_is_far_off() {
     let mut tick = Tick::pushing(up(7.6));
     let record = Calibration::PREMIUM_1_5;
     // Nearer to the axis than the device believes: the same torque is more force.

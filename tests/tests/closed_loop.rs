@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Session, Timeouts};
 use hapterra::phantom::PlacedTerrain;
-use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
+use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script, Touch};
 use hapterra::replay::Record;
 use hapterra::synth::{Kind, Synth};
 use hapterra::telemetry::Figures;
@@ -61,7 +61,7 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
     let home_mm = [100.0, 100.0, 24.0];
     // With all its weight, which the device holds.
     let model = PhantomModel::premium_1_5();
-    let rig = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
+    let rig = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
     let law = SurfaceParams {
         stiffness_n_per_mm,
         max_force_n: 8.5,
@@ -78,7 +78,7 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
 }
 
 #[test]
-fn pressed_on_a_plane_with_two_newtons_it_rests_at_the_depth_the_stiffness_says() {
+fn tip_rests_at_the_depth_of_two_newtons() {
     for stiffness in [0.5f32, 0.25, 1.0] {
         let (samples, lift, scale) = press(stiffness);
         let expected_mm = 2.0 / f64::from(stiffness);
@@ -111,7 +111,7 @@ fn lifted_there_is_no_force() {
 const HEIGHT_ERROR_MM: f64 = 1e-5;
 
 #[test]
-fn slid_across_terrain_the_proxy_stays_on_the_surface_and_the_force_in_bounds() {
+fn sliding_proxy_stays_on_surface_and_force_in_bounds() {
     for kind in [Kind::Fractal, Kind::Crater] {
         let raster = Synth::new(kind, 2, 30.0).raster(400, 400).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");

@@ -280,7 +280,7 @@ fn with_errands(harms: Vec<(Direction, usize, Harm)>) -> Plan {
 }
 
 #[test]
-fn every_request_and_view_is_done_or_refused_once_whichever_frame_is_lost_or_late() {
+fn every_request_is_done_or_refused_once_under_lost_frames() {
     let whole = agree(&with_errands(vec![]));
     eprintln!("{whole:?}");
     assert_eq!(whole.came_of, [10, 0, 0], "all are done");

@@ -17,7 +17,7 @@ fn has_gdal() -> bool {
     runs
 }
 
-/// Whether Python has these packages.
+/// Returns true if Python has these packages.
 fn has_python(packages: &str) -> bool {
     let output = shell(Path::new("."), &format!("python3 -c 'import {packages}'"));
     if !output.status.success() {

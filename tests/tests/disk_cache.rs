@@ -1,4 +1,4 @@
-//! What is kept on disk of a terrain that stays in its file: another run reads next to
+//! Disk cache of a terrain that stays in its file: another run reads next to
 //! nothing, and no state of the folder or of the file ever changes a height.
 
 use std::fs;
@@ -353,7 +353,7 @@ fn blocks_of_run(file: &Path, cache: &Path, megabytes: &str) -> u64 {
 }
 
 #[test]
-fn the_command_keeps_what_is_coarse_where_it_is_told_to_and_not_where_it_is_told_not_to() {
+fn coarse_samples_are_kept_in_the_stated_folder_or_not_at_all() {
     let bed = bed();
     let opening = open(&bed.file, &DiskCache::off()).blocks_read();
     let there = bed.folder.path().join("there");

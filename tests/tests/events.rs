@@ -71,7 +71,7 @@ fn numbers(value: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// Whether numbers are the same but for their last digit, which the reader of JSON here rounds.
+/// Returns true if numbers are the same but for their last digit, which the reader of JSON here rounds.
 fn near(told: &[f64], recorded: &[f64]) -> bool {
     let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-12 * b.abs();
     told.len() == recorded.len() && told.iter().zip(recorded).all(is_near)

@@ -1,4 +1,4 @@
-//! What an image that is not ours can do to the machine that emulates it: nothing to its
+//! Foreign images in the emulator: they do nothing to its
 //! files, and nothing to its terminal.
 //!
 //! The images are a few instructions each, put together here.

@@ -43,7 +43,7 @@ fn slide(terrain: &Terrain<'_>, law: SurfaceParams, depth: f64, speed: f64) -> V
         let is_caught = felt.last().is_none_or(|last| behind(last) > CAUGHT_MM);
         let above = if is_caught { 1.0 } else { -depth };
         let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
-        felt.push(replayer.feel(hip.expect("addressable")).expect("felt"));
+        felt.push(replayer.step(hip.expect("addressable")).expect("felt"));
     }
     felt
 }
@@ -68,7 +68,7 @@ fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
     Some(distance(along, [0.0; 3]) / pressed)
 }
 
-/// Whether the straight way to a HIP leads through the air, or over a hole, from a place on a
+/// Returns true if the straight way to a HIP leads through the air, or over a hole, from a place on a
 /// proxy's way: there it leaves the surface and comes down elsewhere, and may be held where it does.
 fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
     let [from, to] = way;
@@ -158,16 +158,16 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
     for at in [[20.3, 30.6], [25.0, 30.4], [41.0, 17.0]] {
         let mut replayer = on_native(&terrain, law).expect("opened");
         let ground = terrain.height_mm(at[0], at[1]).expect("inside");
-        let mut feel = |off: [f64; 3]| {
+        let mut step = |off: [f64; 3]| {
             let hip = [at[0] + off[0], at[1] + off[1], ground + off[2]];
             let hip = terrain.scale().to_grid(hip).expect("addressable");
-            replayer.feel(hip).expect("felt")
+            replayer.step(hip).expect("felt")
         };
-        let _ = feel([0.0, 0.0, 0.5]);
-        let stuck = feel([0.0, 0.0, -1.0]).proxy;
+        let _ = step([0.0, 0.0, 0.5]);
+        let stuck = step([0.0, 0.0, -1.0]).proxy;
         for tick in 0..3_600_000 {
             let mut count = || 0.03 * (chance.below(3) as f64 - 1.0);
-            let now = feel([count(), count(), -1.0 + count()]).proxy;
+            let now = step([count(), count(), -1.0 + count()]).proxy;
             assert_eq!(now, stuck, "tick {tick} at {at:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! What the quick soak's scenes are made of, counted: each kind of ground, habit
+//! Content of the quick stress test's scenes, counted: each kind of ground, habit
 //! of the HIP and twin that is promised is there, felt, and judged.
 
 use std::collections::BTreeMap;
@@ -97,7 +97,7 @@ fn all_that_is_promised_is_felt_and_judged() {
     for number in 0..SCENES {
         let scene = Scene::random(SEED, number);
         let mut judge = Judge::new(&scene.terrain);
-        let Ok(seen) = scene.feel(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
+        let Ok(seen) = scene.step(&mut buffers, [0; 3], scene.supply, |_| Ok(())) else {
             panic!("scene {number} does not settle");
         };
         for (i, now) in seen.iter().enumerate() {

@@ -54,7 +54,7 @@ fn felt(state: ContactState, proxy: [f64; 3], displacement: [f64; 3]) -> Contact
 }
 
 fn waiting(hip: [f64; 3]) -> Seen {
-    Seen::new(hip, felt(ContactState::Waiting, hip, [0.0; 3]), [0; 3])
+    Seen::new(hip, felt(ContactState::Unseeded, hip, [0.0; 3]), [0; 3])
 }
 
 fn free(hip: [f64; 3]) -> Seen {
@@ -78,7 +78,7 @@ fn touching(hip: [f64; 3], proxy: [f64; 3]) -> Seen {
 fn letting_go(hip: [f64; 3], displacement: [f64; 3]) -> Seen {
     Seen::new(
         hip,
-        felt(ContactState::Fading, [10.5, 10.5, 2.0], displacement),
+        felt(ContactState::Releasing, [10.5, 10.5, 2.0], displacement),
         [0; 3],
     )
 }
@@ -586,7 +586,7 @@ fn played(supply: Supply) -> (Scene, Vec<Seen>, Buffers) {
     let scene = Scene::given(ridge(), path.to_vec(), Execution::LockStep, supply);
     let mut buffers = Buffers::default();
     let seen = scene
-        .feel(&mut buffers, [0; 3], supply, |_| Ok(()))
+        .step(&mut buffers, [0; 3], supply, |_| Ok(()))
         .expect("it settles");
     (scene, seen, buffers)
 }
@@ -596,7 +596,7 @@ fn other_bits(seen: &[Seen]) -> Vec<Vec<Seen>> {
     let changes: [fn(&mut ContactOutput); 4] = [
         |f| f.displacement.z = f32::from_bits(f.displacement.z.to_bits() ^ 1),
         |f| f.proxy = f.proxy.midpoint(&point([0.0, 0.0, 0.0])),
-        |f| f.state = ContactState::Waiting,
+        |f| f.state = ContactState::Unseeded,
         |f| f.displacement.x = -0.0,
     ];
     changes
@@ -643,7 +643,7 @@ fn other_bits_far_away_are_found() {
     let shift = [3200, 6400, -1_000_000];
     let (scene, seen, mut buffers) = played(Supply::Held);
     let pulled = Supply::Pulled { latency: 0 };
-    let away = scene.feel(&mut buffers, shift, pulled, |_| Ok(()));
+    let away = scene.step(&mut buffers, shift, pulled, |_| Ok(()));
     let away = away.expect("it settles");
     let judge = |away: &[Seen], by| twin::same_bits(Invariant::Shift, &seen, away, by);
     assert_eq!(judge(&away, shift), Ok(()));
@@ -661,7 +661,7 @@ fn a_scene_that_feels_otherwise_mirrored_is_found() {
         let path = scene.path.iter().map(|p| turned(*p)).collect();
         let twin = scene.with(symmetry.terrain(&scene.terrain), path);
         let other = twin
-            .feel(&mut buffers, [0; 3], Supply::Held, |_| Ok(()))
+            .step(&mut buffers, [0; 3], Supply::Held, |_| Ok(()))
             .expect("it settles");
         let mut judge =
             |other: &[Seen]| twin::same_way(&scene, symmetry, &seen, other, &mut buffers);

@@ -1,4 +1,4 @@
-//! What a command that was killed had recorded is found, named and left alone.
+//! Partial recordings of killed commands are found, named and left alone.
 #![cfg(unix)]
 
 use std::fs;

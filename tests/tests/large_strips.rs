@@ -12,7 +12,7 @@ use heightfield::{OpenOptions, Raster};
 
 /// Samples each way: 4.1 GB of single floats.
 const SIDE: u32 = 32_000;
-/// Where the strip begins.
+/// Place where the strip begins.
 const FIRST: u32 = 4096;
 /// Rows of heights that are written; between them the file has nothing, which reads as zeros.
 const EVERY: u32 = 997;

@@ -62,7 +62,7 @@ fn a_bad_link_changes_nothing_that_is_felt() {
         let hips = path
             .iter()
             .map(|mm| unit().to_grid(*mm).expect("addressable"));
-        hips.map(|hip| felt(&replayer.feel(hip).expect("felt")))
+        hips.map(|hip| felt(&replayer.step(hip).expect("felt")))
             .collect()
     };
     let mut clean = on_native(&terrain, law).expect("opened");
@@ -236,7 +236,7 @@ fn a_device_that_restarts_ends_a_replay_with_a_word() {
     let mut hips = path
         .iter()
         .map(|mm| unit().to_grid(*mm).expect("addressable"));
-    let error = hips.find_map(|hip| replayer.feel(hip).err());
+    let error = hips.find_map(|hip| replayer.step(hip).err());
     assert!(matches!(error, Some(LinkError::Restarted)), "{error:?}");
 }
 

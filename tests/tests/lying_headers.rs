@@ -16,7 +16,7 @@ const TILE_BYTES: u32 = TILE * TILE * 4;
 /// The height of all samples of the full image, and of what lies behind it in the data.
 const HEIGHT: f32 = 7.0;
 const OTHER: f32 = 900.0;
-/// Where the data of other images begins.
+/// Place where the data of other images begins.
 const OTHERS: u32 = DATA + TILE_BYTES;
 
 /// As much as the full image would take, of which little is used.

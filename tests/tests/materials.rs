@@ -378,15 +378,15 @@ fn patchwork(raster: &Raster) -> Materials {
 
 fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<(ContactState, [u32; 9])> {
     let scale = *replayer.terrain().scale();
-    let feel = |mm: &[f64; 3]| {
+    let step = |mm: &[f64; 3]| {
         let hip = scale.to_grid(*mm).expect("addressable");
-        let sample = replayer.feel(hip).expect("felt");
+        let sample = replayer.step(hip).expect("felt");
         let [x, y, z] = sample.proxy.cell().map(|cell| cell as u32);
         let [u, v, w] = sample.proxy.frac().to_array().map(f32::to_bits);
         let [fx, fy, fz] = sample.force_n.to_array().map(f32::to_bits);
         (sample.state, [x, y, z, u, v, w, fx, fy, fz])
     };
-    path.iter().map(feel).collect()
+    path.iter().map(step).collect()
 }
 
 #[test]

@@ -20,7 +20,7 @@ use heightfield::Raster;
 
 /// What has to be the same: all but the work and the time it took, which
 /// depend on when a tile came.
-type Felt = (
+type Answer = (
     [i32; 3],
     [u32; 3],
     [i32; 3],
@@ -29,7 +29,7 @@ type Felt = (
     ContactState,
 );
 
-fn felt(sample: &TickRecord) -> Felt {
+fn felt(sample: &TickRecord) -> Answer {
     let bits = |v: hapterra_core::Vec3| v.to_array().map(f32::to_bits);
     (
         sample.hip.cell(),
@@ -41,13 +41,13 @@ fn felt(sample: &TickRecord) -> Felt {
     )
 }
 
-fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<Felt> {
+fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<Answer> {
     let scale = *replayer.terrain().scale();
-    let mut feel = |mm: &[f64; 3]| {
+    let mut step = |mm: &[f64; 3]| {
         let hip = scale.to_grid(*mm).expect("addressable");
-        felt(&replayer.feel(hip).expect("felt"))
+        felt(&replayer.step(hip).expect("felt"))
     };
-    path.iter().map(&mut feel).collect()
+    path.iter().map(&mut step).collect()
 }
 
 fn holed() -> Raster {
@@ -150,7 +150,7 @@ fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
 /// other, and what was felt until then is kept.
 #[cfg(unix)]
 #[test]
-fn an_interrupted_demonstration_on_the_emulated_board_ends_in_an_orderly_manner() {
+fn interrupted_emulated_demo_ends_in_order() {
     use std::io::BufRead;
     use std::os::unix::process::CommandExt;
 

@@ -132,7 +132,7 @@ fn cells_are_as_large_as_on_their_own_body() {
 }
 
 /// A map that is not conformal shears the ground, and a turned grid of degrees is sheared by
-/// itself: felt cells are square on the ground all the same, in every direction.
+/// itself: haptic cells are square on the ground all the same, in every direction.
 #[test]
 fn what_a_map_shears_is_felt_in_its_true_shape() {
     let mut sheared = 0;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use hapterra_tests::{bounded, hapterra_binary, stand_in};
 use heightfield::{OpenOptions, Raster, RasterError, files_read_with, gdal};
 
-/// Whether there is a libgdal; says so where not.
+/// Returns true if there is a libgdal; says so where not.
 fn has_gdal() -> bool {
     gdal()
         .inspect_err(|why| eprintln!("skipped: {why}"))

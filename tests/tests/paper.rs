@@ -8,7 +8,7 @@ use hapterra_core::force::SurfaceParams;
 use hapterra_tests::field::{FieldContact, position};
 
 /// What a rule says of a HIP: whether there is contact, and the proxy.
-type Felt = (bool, [f64; 3]);
+type Answer = (bool, [f64; 3]);
 
 /// A field as wide as a test's, made by a function.
 struct Field(fn(i32, i32) -> f32);
@@ -24,7 +24,7 @@ impl Heights for Field {
 }
 
 /// The paper's rule and the product's over a field of 64 × 64 patches.
-fn rules(height: fn(i32, i32) -> f32) -> [Box<dyn FnMut([f64; 3]) -> Felt>; 2] {
+fn rules(height: fn(i32, i32) -> f32) -> [Box<dyn FnMut([f64; 3]) -> Answer>; 2] {
     let mut paper = Paper::<_, f64>::new(Field(height), Start::LastPoint, 20);
     let mut swept = FieldContact::new(64, height);
     [
@@ -34,7 +34,7 @@ fn rules(height: fn(i32, i32) -> f32) -> [Box<dyn FnMut([f64; 3]) -> Felt>; 2] {
             (displacement.is_some(), [0, 1, 2].map(|i| hip[i] + way[i]))
         }),
         Box::new(move |hip| {
-            let felt = swept.feel(hip);
+            let felt = swept.step(hip);
             let touches = felt.state == ContactState::Touching;
             (touches, position(&felt.proxy))
         }),
@@ -91,7 +91,7 @@ fn eq_8_to_11_at_the_local_closest_point_the_partial_derivatives_vanish() {
 }
 
 #[test]
-fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_vertex() {
+fn section_4_3_2_bounded_closest_point_is_on_edge_or_vertex() {
     let patch = Patch::new(CORNERS.map(|h| h - 0.4));
     for hip in [
         (-0.5, 0.4),
@@ -123,7 +123,7 @@ fn section_4_3_2_outside_the_square_the_bounded_closest_point_is_on_an_edge_or_v
 }
 
 #[test]
-fn step_1_no_patch_higher_than_the_segment_means_free_space_and_the_proxy_is_the_hip() {
+fn step_1_segment_above_all_patches_is_free_space() {
     for mut rule in rules(rolling) {
         for i in 0..100 {
             let hip = [5.0 + 0.5 * f64::from(i), 20.0, 2.25];
@@ -187,10 +187,10 @@ fn surface(x: f64, y: f64) -> f64 {
 fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
     let law = SurfaceParams::PREMIUM;
     let mut contact = FieldContact::new(64, rolling);
-    contact.feel([30.5, 30.5, 3.0]);
+    contact.step([30.5, 30.5, 3.0]);
     for depth in [0.01, 0.1, 0.5] {
         let hip = [30.5, 30.5, surface(30.5, 30.5) - depth];
-        let felt = contact.feel(hip);
+        let felt = contact.step(hip);
         let proxy = position(&felt.proxy);
         let force = law.spring().force_n(felt.displacement);
         for axis in 0..3 {
@@ -208,8 +208,8 @@ fn walls(x: i32, _: i32) -> f32 {
 #[test]
 fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
     let mut contact = FieldContact::new(64, walls);
-    contact.feel([10.0, 30.3, 3.0]);
-    let felt = contact.feel([50.0, 30.7, 3.0]);
+    contact.step([10.0, 30.3, 3.0]);
+    let felt = contact.step([50.0, 30.7, 3.0]);
     assert_eq!(felt.state, ContactState::Touching);
     let proxy = position(&felt.proxy);
     assert!(
@@ -217,8 +217,8 @@ fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
         "stopped by the first wall: {proxy:?}"
     );
     // And stays there until the HIP comes back.
-    let felt = contact.feel([40.0, 31.0, 3.0]);
+    let felt = contact.step([40.0, 31.0, 3.0]);
     assert!(position(&felt.proxy)[0] < 20.0);
-    let felt = contact.feel([15.0, 31.0, 3.0]);
+    let felt = contact.step([15.0, 31.0, 3.0]);
     assert_eq!(felt.state, ContactState::Free);
 }

@@ -1,4 +1,4 @@
-//! Whether the pictures on the pages are those that core's examples draw.
+//! The pictures on the pages are those that core's examples draw.
 
 use std::error::Error;
 
@@ -27,7 +27,7 @@ fn is_kept(drawn: Result<String, Box<dyn Error>>, example: &str, kept: &str) {
     );
 }
 
-/// Whether two pictures have the same words, and numbers that are all but the same.
+/// Returns true if two pictures have the same words, and numbers that are all but the same.
 fn is_same(one: &str, other: &str) -> bool {
     let words = |text: &str| -> Vec<String> {
         let words = text.split([' ', ',', '"', '<', '>', '\n']);

@@ -246,7 +246,7 @@ fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
         // All of it is in reach: cells of the middle are too wide in the north.
         let all = said(&hapterra(command, &file, &["--exaggeration", "9"]));
         let [percent, latitude] = shape(&all).expect("a line");
-        // The last row of felt cells.
+        // The last row of haptic cells.
         assert!((54.0..54.5).contains(&latitude), "{all}");
         let off = percent - wanted(47.25, latitude);
         assert!(off.abs() < 0.2, "{percent} for {}", wanted(47.25, latitude));

@@ -1,4 +1,4 @@
-//! What random scenes found, as small as it gets, each by the name of its cause.
+//! Regressions that random scenes found, as small as possible, each by the name of its cause.
 
 use hapterra_core::contact::ContactState;
 use hapterra_tests::invariants::Violation;
@@ -20,7 +20,7 @@ fn run(
     let scene = Scene::given(terrain, path.to_vec(), execution, supply);
     let mut buffers = Buffers::default();
     scene.run(&mut buffers)?;
-    let seen = scene.feel(&mut buffers, [0; 3], supply, |_| Ok(()))?;
+    let seen = scene.step(&mut buffers, [0; 3], supply, |_| Ok(()))?;
     Ok(seen.iter().map(|seen| seen.felt.state).collect())
 }
 
@@ -106,7 +106,7 @@ fn a_contact_lost_after_a_late_tile_fades_from_what_was_felt_last() {
     path.push([40.5, 10.5, 0.5]);
     let supply = Supply::Pulled { latency: 40 };
     let states = run(terrain, &path, Execution::LockStep, supply).expect("holds");
-    assert_eq!(states.last(), Some(&ContactState::Fading));
+    assert_eq!(states.last(), Some(&ContactState::Releasing));
 }
 
 /// The way from the surface to a HIP 1.1·10⁻⁵ cell below it was so short that
@@ -174,7 +174,7 @@ fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
         [
             ContactState::Free,
             ContactState::Free,
-            ContactState::Waiting
+            ContactState::Unseeded
         ]
     );
 }
@@ -190,7 +190,7 @@ fn a_way_in_over_the_corner_of_the_field_touches_nothing() {
         let states = run(terrain, &path, Execution::LockStep, Supply::Held).expect("holds");
         assert_eq!(
             states.last(),
-            Some(&ContactState::Waiting),
+            Some(&ContactState::Unseeded),
             "{depth} cells deep"
         );
     }
@@ -203,7 +203,7 @@ fn a_hip_straight_above_its_proxy_is_let_go() {
     let mut buffers = Buffers::default();
     for number in [9, 99, 186] {
         let scene = Scene::random(91, number);
-        let seen = scene.feel(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
+        let seen = scene.step(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
         for seen in seen.expect("it settles") {
             let [x, y, z] = [0, 1, 2].map(|axis| seen.hip[axis] - seen.proxy[axis]);
             let touching = seen.felt.state == ContactState::Touching && seen.felt.converged;
@@ -288,7 +288,7 @@ fn a_slope_far_above_the_hip_leads_on_to_its_end() {
     let scene = Scene::given(slope, path.to_vec(), Execution::LockStep, Supply::Held);
     let mut buffers = Buffers::default();
     scene.run(&mut buffers).expect("holds");
-    let seen = scene.feel(&mut buffers, [0; 3], Supply::Held, |_| Ok(()));
+    let seen = scene.step(&mut buffers, [0; 3], Supply::Held, |_| Ok(()));
     let last = seen.expect("settles").pop().expect("ticks");
     assert_eq!(last.proxy[..2], [200.0, 3.0]);
 }

@@ -1,4 +1,4 @@
-//! What a replay feels, against a dense search in `f64` that shares no code
+//! Replays against a dense search in `f64` that shares no code
 //! with the loop.
 
 use hapterra::replay::{OfflineDevice, Rule, on_native};
@@ -45,9 +45,9 @@ fn heights<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     }
 }
 
-fn feel(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
+fn render(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     let hip = replayer.terrain().scale().to_grid(hip_mm);
-    replayer.feel(hip.expect("addressable")).expect("felt")
+    replayer.step(hip.expect("addressable")).expect("felt")
 }
 
 /// Distance from the nearest border of a patch that a place is not on.
@@ -68,7 +68,7 @@ fn judge(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
     let mut touched = 0;
     let mut near_holes = 0;
     for hip_mm in wander(&terrain, seed, rows, 0.5) {
-        let sample = feel(&mut replayer, hip_mm);
+        let sample = render(&mut replayer, hip_mm);
         let (hip, proxy) = mm(&sample, &scale);
         let force = sample.force_n.to_array().map(f64::from);
         if sample.state != ContactState::Touching {
@@ -119,7 +119,7 @@ fn synthetic(kind: Kind) -> Raster {
 }
 
 #[test]
-fn on_made_terrains_the_proxy_is_the_local_closest_point_and_the_force_its_spring() {
+fn proxy_is_local_closest_point_on_synthetic_terrains() {
     let scale = Scale::new(1.0, 1.0).expect("scale");
     for kind in [
         Kind::Fractal,
@@ -177,15 +177,15 @@ fn contact_begins_and_ends_at_the_surface() {
             let [x, y] = [10.0 + 1.31 * i as f64, 70.0 - 0.83 * i as f64];
             let ground = terrain.height_mm(x, y).expect("known");
             let top = f64::from(terrain.top()) * scale.cell_mm() + 1.0;
-            feel(&mut replayer, [x, y, top]);
-            let above = feel(&mut replayer, [x, y, ground + gap]);
+            render(&mut replayer, [x, y, top]);
+            let above = render(&mut replayer, [x, y, ground + gap]);
             assert_eq!(above.state, ContactState::Free, "{rule:?} {i}");
-            let below = feel(&mut replayer, [x, y, ground - gap]);
+            let below = render(&mut replayer, [x, y, ground - gap]);
             assert_eq!(below.state, ContactState::Touching, "{rule:?} {i}");
             assert!(below.force_n.z > 0.0);
-            let again = feel(&mut replayer, [x, y, ground + 2.0 * gap]);
+            let again = render(&mut replayer, [x, y, ground + 2.0 * gap]);
             assert_eq!(again.state, ContactState::Free, "{rule:?} {i}");
-            feel(&mut replayer, [x, y, top]);
+            render(&mut replayer, [x, y, top]);
         }
     }
 }
@@ -197,14 +197,14 @@ fn no_force_until_the_hip_has_been_above() {
     let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
     let ground = terrain.height_mm(60.0, 50.0).expect("known");
     for depth in [5.0, 1.0, 0.1] {
-        let sample = feel(&mut replayer, [60.0, 50.0, ground - depth]);
+        let sample = render(&mut replayer, [60.0, 50.0, ground - depth]);
         assert_eq!(
             (sample.state, sample.force_n.length()),
-            (ContactState::Waiting, 0.0)
+            (ContactState::Unseeded, 0.0)
         );
     }
-    feel(&mut replayer, [60.0, 50.0, ground + 0.1]);
-    let sample = feel(&mut replayer, [60.0, 50.0, ground - 1.0]);
+    render(&mut replayer, [60.0, 50.0, ground + 0.1]);
+    let sample = render(&mut replayer, [60.0, 50.0, ground - 1.0]);
     assert_eq!(sample.state, ContactState::Touching);
 }
 
@@ -226,7 +226,7 @@ fn over_a_hole_and_off_the_data_there_is_nothing_to_feel() {
             let mut replayer = opened(&terrain, rule);
             for step in 0..40 {
                 let z = 20.0 - f64::from(step);
-                let sample = feel(&mut replayer, [place[0], place[1], z]);
+                let sample = render(&mut replayer, [place[0], place[1], z]);
                 assert_ne!(
                     sample.state,
                     ContactState::Touching,
@@ -245,24 +245,24 @@ fn the_edge_of_a_hole_lets_go_without_a_kick_and_does_not_hook() {
     let raster = holed();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
-    feel(&mut replayer, [30.0, 50.5, 7.0]);
-    let mut last = feel(&mut replayer, [30.0, 50.5, 4.0]);
+    render(&mut replayer, [30.0, 50.5, 7.0]);
+    let mut last = render(&mut replayer, [30.0, 50.5, 4.0]);
     let mut largest_step = 0.0f32;
     let mut x = 30.0;
     while x < 45.0 {
         x += 0.005;
-        let sample = feel(&mut replayer, [x, 50.5, 4.0]);
+        let sample = render(&mut replayer, [x, 50.5, 4.0]);
         largest_step = largest_step.max((sample.force_n - last.force_n).length());
         last = sample;
     }
     assert_eq!(
         (last.state, last.force_n.length()),
-        (ContactState::Waiting, 0.0)
+        (ContactState::Unseeded, 0.0)
     );
     assert!(largest_step < 0.03, "a kick of {largest_step} N in a tick");
     while x > 30.0 {
         x -= 0.05;
-        let sample = feel(&mut replayer, [x, 50.5, 4.0]);
+        let sample = render(&mut replayer, [x, 50.5, 4.0]);
         assert_eq!(sample.force_n.length(), 0.0, "hooked at {x}");
     }
 }
@@ -275,8 +275,8 @@ fn a_fast_sweep_does_not_pass_through_a_peak() {
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
     let sweep = || {
         let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
-        feel(&mut replayer, [28.0, 32.3, 5.0]);
-        feel(&mut replayer, [36.0, 32.3, 5.0])
+        render(&mut replayer, [28.0, 32.3, 5.0]);
+        render(&mut replayer, [36.0, 32.3, 5.0])
     };
     let swept = sweep();
     assert_eq!(swept.state, ContactState::Touching);
@@ -293,7 +293,7 @@ fn the_same_trajectory_gives_the_same_bits_again() {
     let run = || -> Vec<_> {
         let mut replayer = on_native(&terrain, SurfaceParams::PREMIUM).expect("opened");
         path.iter()
-            .map(|hip| feel(&mut replayer, *hip))
+            .map(|hip| render(&mut replayer, *hip))
             .map(|s| {
                 (
                     s.hip,

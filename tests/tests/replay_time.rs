@@ -15,7 +15,7 @@ const LAW: [&str; 2] = ["--scale=1mm/cell", "--stiffness=0.5"];
 
 /// A row of what was felt.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Felt {
+struct Row {
     t_s: f64,
     hip_mm: [f64; 3],
     contact: bool,
@@ -23,7 +23,7 @@ struct Felt {
     force_n: [f64; 3],
 }
 
-fn rows(text: &str) -> Vec<Felt> {
+fn rows(text: &str) -> Vec<Row> {
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     let row = |line: &str| {
         let numbers = line
@@ -32,7 +32,7 @@ fn rows(text: &str) -> Vec<Felt> {
             .map(|x| x.parse().expect("a number"));
         let numbers: Vec<f64> = numbers.collect();
         let three = |at: usize| [numbers[at], numbers[at + 1], numbers[at + 2]];
-        Felt {
+        Row {
             t_s: numbers[0],
             hip_mm: three(1),
             contact: numbers[4] == 1.0,
@@ -73,7 +73,7 @@ impl Folder {
     }
 
     /// What was felt of `in.csv`, in `out.csv`, and what was said.
-    fn felt(&self, path: &str, more: &[&str]) -> (Vec<Felt>, String) {
+    fn felt(&self, path: &str, more: &[&str]) -> (Vec<Row>, String) {
         self.write("in.csv", path);
         let run = self.replay("in.csv", "out.csv", more);
         let said = said(&run);
@@ -136,7 +136,7 @@ fn path(rows: &str) -> String {
 
 /// Down into the ground at 20 mm/s: the spring's force, and 5 N s/m times 20 mm/s, at most as much
 /// again, from the second tick in contact on.
-fn pressed(felt: &[Felt]) -> usize {
+fn pressed(felt: &[Row]) -> usize {
     let touching: Vec<_> = felt.iter().filter(|row| row.contact).collect();
     for row in &touching[1..] {
         let spring = STIFFNESS * -row.hip_mm[2];
@@ -176,7 +176,7 @@ const VISCOUS: [&str; 5] = [
     concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/viscous.toml"),
 ];
 
-fn trails(felt: &[Felt]) {
+fn trails(felt: &[Row]) {
     let last = felt.last().expect("rows");
     let trail = last.hip_mm[0] - last.proxy_mm[0];
     assert!((trail - 1.3).abs() < 1e-3, "{trail} mm: {last:?}");
@@ -360,7 +360,7 @@ fn reviewed_paths_and_recordings_are_felt_by_time() {
         "case2_recording_4khz_rec4k.csv",
         &[],
     ));
-    let damping = |felt: &[Felt], from: f64, to: f64| {
+    let damping = |felt: &[Row], from: f64, to: f64| {
         let moving = felt
             .iter()
             .filter(|row| row.contact && row.t_s > from && row.t_s < to);

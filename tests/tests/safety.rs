@@ -1,4 +1,4 @@
-//! Whether docs/safety-tests.csv names tests that exist, for each item of docs/safety.md.
+//! The tests in docs/safety-tests.csv exist, for each item of docs/safety.md.
 
 use std::collections::BTreeSet;
 use std::path::Path;

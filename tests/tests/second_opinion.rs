@@ -44,7 +44,7 @@ impl Found {
 fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
     let mut judge = Judge::new(&scene.terrain);
     let mut found = Found::default();
-    let seen = scene.feel(buffers, [0; 3], scene.supply, |_| Ok(()));
+    let seen = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()));
     let seen = seen.expect("it settles");
     for (tick, now) in seen.iter().enumerate() {
         let told = judge.all(now);
@@ -133,7 +133,7 @@ fn a_proxy_beside_its_place_is_seen_there() {
         [20.5, 20.25, ground.height_about(20.5, 20.25) - 0.5],
     ];
     let scene = Scene::given(ground, path, Execution::LockStep, Supply::Held);
-    let seen = scene.feel(&mut Buffers::default(), [0; 3], Supply::Held, |_| Ok(()));
+    let seen = scene.step(&mut Buffers::default(), [0; 3], Supply::Held, |_| Ok(()));
     let honest = seen.expect("it settles")[1];
     assert_eq!(rests_right(&scene.terrain, &honest), Some(true));
     for axis in 0..2 {

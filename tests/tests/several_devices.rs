@@ -182,7 +182,7 @@ fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
 }
 
 #[test]
-fn where_one_board_does_not_confirm_it_is_named_and_the_other_has_confirmed() {
+fn unconfirmed_board_is_named_beside_a_confirmed_one() {
     let pair = Pair::of(Served::start());
     let child = pair.start();
     pair.served[1].deaf.store(true, Ordering::Relaxed);
@@ -394,7 +394,7 @@ fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
 }
 
 #[test]
-fn what_several_devices_cannot_be_given_is_refused_before_anything_is_written() {
+fn options_for_one_device_are_refused_for_several() {
     let folder = tempfile::tempdir().expect("a folder");
     let record = recorded(folder.path(), "felt.csv");
     for (devices, more, says) in [

@@ -51,7 +51,7 @@ impl Circle<'_> {
             let ground = terrain.height_mm(at[0], at[1])?;
             let above = if tick == 0 { 1.0 } else { -(self.depth)(angle) };
             let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
-            let sample = replayer.feel(hip.expect("addressable")).expect("felt");
+            let sample = replayer.step(hip.expect("addressable")).expect("felt");
             (sample.state == ContactState::Touching).then_some(sample)
         });
         felt.collect()

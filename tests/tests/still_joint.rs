@@ -1,4 +1,4 @@
-//! How far the other joints travel while one stands to the count, in a hand that
+//! Travel of the other joints while one stands to the count, in a hand that
 //! is well: what the guard has to let pass before it calls an encoder dead.
 
 use std::f64::consts::TAU;

@@ -71,7 +71,7 @@ fn circle(terrain: &Terrain<'_>, law: SurfaceParams) -> Vec<TickRecord> {
         let lifts = tick % 1_200 < 20;
         let above = if lifts { 1.0 } else { -0.5 };
         let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
-        Some(replayer.feel(hip.expect("addressable")).expect("felt"))
+        Some(replayer.step(hip.expect("addressable")).expect("felt"))
     });
     felt.collect()
 }

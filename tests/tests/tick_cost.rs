@@ -1,4 +1,4 @@
-//! What the whole chain from count to current costs on the emulated
+//! Cost of the whole chain from count to current on the emulated
 //! Cortex-M4F, by count of instructions, and how deep its stack goes.
 
 use std::time::Duration;
@@ -85,13 +85,13 @@ fn a_tick_in_contact_stays_within_its_budget_and_the_stack_too() {
     assert!(stack.high_water > 500, "{stack:?}");
     assert!(3 * stack.high_water <= 2 * stack.size, "{stack:?}");
     let mut costs: [(&str, Mean); 4] =
-        ["disarmed", "free", "waiting", "touching"].map(|name| (name, Mean::default()));
+        ["disarmed", "free", "unseeded", "touching"].map(|name| (name, Mean::default()));
     for pair in samples.windows(2) {
         // A sample tells what the tick before it cost.
         let (sample, cost) = (&pair[0], f64::from(pair[1].cost));
         let kind = match (sample.mode, sample.state) {
             (Mode::Armed, ContactState::Free) => 1,
-            (Mode::Armed, ContactState::Waiting) => 2,
+            (Mode::Armed, ContactState::Unseeded) => 2,
             (Mode::Armed, ContactState::Touching) => 3,
             _ => 0,
         };

@@ -70,9 +70,9 @@ fn ground<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     }
 }
 
-fn feel(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
+fn step(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     let hip = replayer.terrain().scale().to_grid(hip_mm);
-    replayer.feel(hip.expect("addressable")).expect("felt")
+    replayer.step(hip.expect("addressable")).expect("felt")
 }
 
 /// The terrain that a ball of a radius in cells feels, and a point.
@@ -103,7 +103,7 @@ fn walked(raster: &Raster, scale: Scale, radius: f64, rows: usize) -> Vec<f64> {
     for seed in 0..3 {
         let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
         for hip_mm in raised(wander(point, seed, rows, 0.5), &terrains) {
-            let sample = feel(&mut replayer, hip_mm);
+            let sample = step(&mut replayer, hip_mm);
             if sample.state == ContactState::Touching {
                 let proxy = terrain.scale().to_mm(&sample.proxy);
                 let proxy = proxy.map(|mm| mm / scale.cell_mm());
@@ -191,10 +191,10 @@ fn felt_passes(radius: f64, speed: f64, (most_beside, friction): (f64, f32)) -> 
         let share = (f64::from(*pass) + 0.5) / 20.0;
         let beside = radius.max(0.5) * most_beside * (2.0 * share - 1.0);
         let mut x = 15.0 + share * speed;
-        feel(&mut replayer, [x, 30.0 + beside, 40.0]);
+        step(&mut replayer, [x, 30.0 + beside, 40.0]);
         let mut felt = 0.0f32;
         while x < 105.0 {
-            let sample = feel(&mut replayer, [x, 30.0 + beside, 10.0]);
+            let sample = step(&mut replayer, [x, 30.0 + beside, 10.0]);
             felt = felt.max(sample.force_n.length());
             x += speed;
         }
@@ -226,7 +226,7 @@ fn a_pole_is_felt_at_steps_of_one_and_a_half_radii() {
 fn friction_holds_a_ball_at_a_pole_at_any_speed() {
     for radius in [1.0, 2.0, 4.0, 8.0] {
         for speed in [5.0, 12.0, 30.0] {
-            // A tick longer than the window begins the contact anew; 32 felt cells are a radius.
+            // A tick longer than the window begins the contact anew; 32 haptic cells are a radius.
             if speed / radius * 32.0 > 512.0 {
                 continue;
             }
@@ -240,7 +240,7 @@ fn friction_holds_a_ball_at_a_pole_at_any_speed() {
 /// Steps of the force of more than 0.05 N over a path, by what feels it.
 fn steps_of_force(terrain: &Terrain<'_>, path: &[[f64; 3]]) -> usize {
     let mut replayer = on_native(terrain, SurfaceParams::PREMIUM).expect("opened");
-    let forces = path.iter().map(|hip| feel(&mut replayer, *hip).force_n);
+    let forces = path.iter().map(|hip| step(&mut replayer, *hip).force_n);
     let forces: Vec<_> = forces.collect();
     let is_step = |pair: &&[Vec3]| (pair[1] - pair[0]).length() > 0.05;
     forces.windows(2).filter(is_step).count()
@@ -350,7 +350,7 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
         folder,
         &[&["run", "hills.tif", "--out", "run.csv"][..], &native].concat(),
     );
-    assert!(said.contains("felt by a ball of 6 mm"), "{said}");
+    assert!(said.contains("rendered with a ball of 6 mm"), "{said}");
     runs(
         folder,
         &[&["demo", "hills.tif", "--out", "demo"][..], &native].concat(),
@@ -413,7 +413,7 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
     for (words, expected) in [
         (
             ["--tip=20", "--level=0"],
-            "a tip of 20 mm: 20.0 cells of level 0, where 0 to 8 can be felt",
+            "a tip of 20 mm: 20.0 cells of level 0, where 0 to 8 can be rendered",
         ),
         (
             ["--tip=-1", "--level=0"],
@@ -449,7 +449,7 @@ fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
         "1s",
     ];
     let replay = ["replay", "hills.tif", "in.csv", "-o", "out.csv"];
-    let line = "felt by a ball of 7 mm over level";
+    let line = "rendered with a ball of 7 mm over level";
     for (words, more, is_ball) in [
         (&run[..], &[][..], true),
         (&run[..], &["--tip", "0"][..], false),

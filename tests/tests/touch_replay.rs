@@ -70,8 +70,8 @@ fn name(state: State) -> &'static str {
     match state {
         State::Free => "free",
         State::Touching => "touching",
-        State::Fading => "letting go",
-        State::BelowGround { .. } | State::Outside => "waiting",
+        State::Releasing => "releasing",
+        State::BelowGround { .. } | State::Outside => "unseeded",
     }
 }
 
@@ -89,7 +89,7 @@ fn same(
     let mut touched = 0;
     for (row, hip_mm) in wander(terrain, seed, 4_000, -2.0).into_iter().enumerate() {
         let hip = terrain.scale().to_grid(hip_mm).expect("addressable");
-        let sample = replayer.feel(hip).expect("felt");
+        let sample = replayer.step(hip).expect("felt");
         let proxy_mm = terrain.scale().to_mm(&sample.proxy);
         let step = contact.step(hip_mm).expect("a step");
         let bits = step.force_n.map(f32::to_bits);
@@ -134,7 +134,7 @@ fn forces_over_an_array_are_those_of_a_replay() {
     }
 }
 
-/// From less than a cell to 8 of them; the smallest has felt cells of half an encoder's count.
+/// From less than a cell to 8 of them; the smallest has haptic cells of half an encoder's count.
 #[test]
 fn forces_under_a_tip_are_those_of_a_replay() {
     let heights = heights();

@@ -6,9 +6,10 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Session, Timeouts};
-use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
+use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script, Touch};
 use hapterra::place::{
-    Bounds, Coordinates, Laid, Reach, Sizing, SurfaceChange, Target, View, ViewChange, ViewOptions,
+    Bounds, Coordinates, Laid, Placement, PlacementChange, PlacementOptions, Reach, Sizing,
+    SurfaceChange, Target,
 };
 use hapterra::steering::{Steer, Steering};
 use hapterra::terrain::HapticCells;
@@ -54,17 +55,17 @@ struct Touching<'t> {
     steering: Steering<'t>,
     samples: Vec<TickRecord>,
     said: Vec<String>,
-    /// Whether the board's clutch input is held.
+    /// True if the board's clutch input is held.
     pedal: Rc<Cell<bool>>,
 }
 
 /// At the smallest scale, level 8, with a hand that presses on the middle for so long.
 fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>) -> T) -> T {
-    let options = ViewOptions {
+    let options = PlacementOptions {
         target: Target::Whole,
         sizing: Sizing::CellMm(1.05 * RESOLUTION_MM / 256.0),
         level: Some(8),
-        ..ViewOptions::default()
+        ..PlacementOptions::default()
     };
     pressed_at(raster, &options, seconds, play)
 }
@@ -72,14 +73,14 @@ fn pressed<T>(raster: &Raster, seconds: f64, play: impl FnOnce(&mut Touching<'_>
 /// With a hand that presses on a view's home position for so long.
 fn pressed_at<T>(
     raster: &Raster,
-    options: &ViewOptions,
+    options: &PlacementOptions,
     seconds: f64,
     play: impl FnOnce(&mut Touching<'_>) -> T,
 ) -> T {
     let grid = options.target.grid(raster, HapticCells::default());
     let grid = grid.expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
-    let view = View::new(&grid, &reach, options).expect("a view");
+    let view = Placement::new(&grid, &reach, options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
     let law = SurfaceParams::PREMIUM;
     let scene = view.scene(&terrain, law).expect("a scene");
@@ -90,7 +91,7 @@ fn pressed_at<T>(
     let script: Script = touch.press(PUSH_N, seconds).finish();
     let home_mm = view.home_mm;
     let model = PhantomModel::premium_1_5();
-    let arm = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
+    let arm = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
     let pedal = Rc::new(Cell::new(false));
     let foot = Rc::clone(&pedal);
     let device: Native = Native::new(StoppedClock, Some(Box::new(arm.arming())))
@@ -166,7 +167,7 @@ impl Touching<'_> {
         panic!("{steer:?} is never done: {:?}", self.said);
     }
 
-    fn change(&mut self, change: ViewChange) -> TickRecord {
+    fn change(&mut self, change: PlacementChange) -> TickRecord {
         self.steer(Steer::Change(change))
     }
 
@@ -241,7 +242,7 @@ fn all_the_way() -> f32 {
 }
 
 #[test]
-fn zoomed_through_eight_levels_and_back_while_it_is_pressed_the_force_makes_no_step() {
+fn force_makes_no_step_while_zooming_through_eight_levels() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let before = touching.last();
@@ -250,12 +251,12 @@ fn zoomed_through_eight_levels_and_back_while_it_is_pressed_the_force_makes_no_s
         let began = touching.samples.len();
         assert_eq!(touching.level(), 8);
         for level in (0..8).rev() {
-            let sample = touching.change(ViewChange::Zoom(2.0));
+            let sample = touching.change(PlacementChange::Zoom(2.0));
             assert_pressed(&sample, &before, &format!("zoomed to level {level}"));
             assert_eq!(touching.level(), level, "{:?}", touching.said);
         }
         for level in 1..=8 {
-            let sample = touching.change(ViewChange::Zoom(0.5));
+            let sample = touching.change(PlacementChange::Zoom(0.5));
             assert_pressed(&sample, &before, &format!("back to level {level}"));
             assert_eq!(touching.level(), level, "{:?}", touching.said);
         }
@@ -266,18 +267,18 @@ fn zoomed_through_eight_levels_and_back_while_it_is_pressed_the_force_makes_no_s
 }
 
 #[test]
-fn panned_made_steeper_and_softer_while_it_is_pressed_the_force_makes_no_step() {
+fn force_makes_no_step_while_panning_and_scaling() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let began = touching.samples.len();
-        touching.change(ViewChange::Zoom(64.0));
+        touching.change(PlacementChange::Zoom(64.0));
         let under = |touching: &Touching<'_>| {
             let sample = touching.samples.last().expect("samples");
             touching.steering.terrain().scale().to_mm(&sample.proxy)
         };
         let first = touching.last();
         let before = under(touching);
-        let pan = ViewChange::Pan {
+        let pan = PlacementChange::Pan {
             east_mm: 20.0,
             north_mm: -15.0,
         };
@@ -288,14 +289,14 @@ fn panned_made_steeper_and_softer_while_it_is_pressed_the_force_makes_no_step() 
             (moved[0] - 20.0).abs() < 1.5 && (moved[1] + 15.0).abs() < 1.5,
             "{moved:?}"
         );
-        let steeper = touching.change(ViewChange::Exaggerate(1.5));
+        let steeper = touching.change(PlacementChange::Exaggerate(1.5));
         assert_pressed(&steeper, &first, "steeper");
-        let softer = touching.change(ViewChange::Stiffness(0.5));
+        let softer = touching.change(PlacementChange::Stiffness(0.5));
         assert_felt(&softer, "softer");
         let (soft, hard) = (0.5 * STIFFNESS, STIFFNESS);
         let share = softer.force_n.length() / steeper.force_n.length();
         assert!((share - in_series(soft, hard)).abs() < 0.02, "{share}");
-        let harder = touching.change(ViewChange::Stiffness(2.0));
+        let harder = touching.change(PlacementChange::Stiffness(2.0));
         assert_pressed(&harder, &first, "as hard as before");
         let depth = |sample: &TickRecord| sample.hip.to(&sample.proxy).length();
         let deeper = depth(&softer) / depth(&harder);
@@ -304,7 +305,7 @@ fn panned_made_steeper_and_softer_while_it_is_pressed_the_force_makes_no_step() 
             (deeper / wanted - 1.0).abs() < 0.02,
             "a softer spring gives more"
         );
-        let reset = touching.change(ViewChange::Reset);
+        let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.level(), 8);
         assert_eq!(touching.said, [""; 0]);
@@ -326,7 +327,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             dynamic_mu: 0.3,
             static_mu: 0.5,
         };
-        let first = touching.change(ViewChange::Zoom(64.0));
+        let first = touching.change(PlacementChange::Zoom(64.0));
         let began = touching.samples.len();
         let changes = [
             friction,
@@ -336,7 +337,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             SurfaceChange::Texture(texture),
         ];
         for change in changes {
-            let sample = touching.change(ViewChange::Surface(change));
+            let sample = touching.change(PlacementChange::Surface(change));
             assert_eq!(sample.state, ContactState::Touching, "{change:?}");
         }
         assert_eq!(touching.said, [""; 0]);
@@ -360,14 +361,14 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             dynamic_mu: 11.0,
             static_mu: 11.0,
         };
-        touching.change(ViewChange::Surface(friction));
+        touching.change(PlacementChange::Surface(friction));
         assert!(
             touching.said[0].contains("a friction of 11"),
             "{:?}",
             touching.said
         );
         assert_eq!(touching.steering.now().law, wanted, "it stays as it was");
-        let reset = touching.change(ViewChange::Reset);
+        let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.steering.now().law, SurfaceParams::PREMIUM);
         judge(&touching.samples[began..], GENTLE_N);
@@ -375,11 +376,11 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
 }
 
 #[test]
-fn with_the_clutch_the_terrain_goes_with_the_hand_and_is_felt_again_where_it_was() {
+fn clutch_carries_the_terrain_with_the_hand() {
     let raster = hills();
     pressed(&raster, 30.0, |touching| {
         let began = touching.samples.len();
-        let before = touching.change(ViewChange::Zoom(64.0));
+        let before = touching.change(PlacementChange::Zoom(64.0));
         touching.steering.steer(Steer::Clutch(true));
         let open = touching.run(400);
         assert!(open.limits.contains(Limits::CLUTCH_OPEN));
@@ -389,7 +390,7 @@ fn with_the_clutch_the_terrain_goes_with_the_hand_and_is_felt_again_where_it_was
         // Zoomed meanwhile, it stays open.
         touching
             .steering
-            .steer(Steer::Change(ViewChange::Zoom(2.0)));
+            .steer(Steer::Change(PlacementChange::Zoom(2.0)));
         let zoomed = touching.run(300);
         assert!(zoomed.limits.contains(Limits::CLUTCH_OPEN));
         assert_eq!(zoomed.view, 2);
@@ -408,7 +409,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
     let raster = hills();
     pressed(&raster, 30.0, |touching| {
         let began = touching.samples.len();
-        let before = touching.change(ViewChange::Zoom(64.0));
+        let before = touching.change(PlacementChange::Zoom(64.0));
         touching.pedal.set(true);
         let open = touching.run(150);
         let limits = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
@@ -416,7 +417,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
         // What the host did not ask for it leaves alone, and puts views in all the same.
         assert!(touching.steering.is_settled());
         for view in 2..=3 {
-            let zoomed = touching.change(ViewChange::Zoom(1.2));
+            let zoomed = touching.change(PlacementChange::Zoom(1.2));
             assert_eq!((zoomed.limits, zoomed.view), (limits, view));
         }
         touching.pedal.set(false);
@@ -429,7 +430,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
         touching.run(150);
         touching
             .steering
-            .steer(Steer::Change(ViewChange::Zoom(1.2)));
+            .steer(Steer::Change(PlacementChange::Zoom(1.2)));
         touching.poll();
         touching.pedal.set(false);
         let closed = touching.run(900);
@@ -445,7 +446,7 @@ fn what_cannot_be_had_changes_nothing_and_is_told() {
     let raster = hills();
     pressed(&raster, 30.0, |touching| {
         let began = touching.samples.len();
-        let far = ViewChange::Pan {
+        let far = PlacementChange::Pan {
             east_mm: 500.0,
             north_mm: 0.0,
         };
@@ -453,7 +454,7 @@ fn what_cannot_be_had_changes_nothing_and_is_told() {
         assert_pressed(&touching.change(far), &before, "after a place outside");
         assert!(touching.said[0].contains("outside"), "{:?}", touching.said);
         assert_pressed(
-            &touching.change(ViewChange::Stiffness(50.0)),
+            &touching.change(PlacementChange::Stiffness(50.0)),
             &before,
             "after too much",
         );
@@ -504,21 +505,21 @@ fn felt_slope(sample: &TickRecord) -> [f64; 2] {
     [-x / z, -y / z]
 }
 
-/// At the southern end 1 mm is a felt cell; commands bring the northern one under the hand,
+/// At the southern end 1 mm is a haptic cell; commands bring the northern one under the hand,
 /// where a degree of longitude is 4.7 % shorter, and back.
 fn a_far_pan(axis: usize) {
     let raster = slope_of_degrees(axis);
-    let options = ViewOptions {
+    let options = PlacementOptions {
         target: Target::At([10.06, 43.1], Coordinates::Own),
         level: Some(0),
-        ..ViewOptions::default()
+        ..PlacementOptions::default()
     };
     pressed_at(&raster, &options, 60.0, |touching| {
         let first = touching.last();
         assert_felt(&first, "at the beginning");
         let began = touching.samples.len();
         // What a change that changes nothing does to a hand on such a slope.
-        touching.change(ViewChange::Stiffness(1.0));
+        touching.change(PlacementChange::Stiffness(1.0));
         let most = most_times(&touching.samples[began..]);
         let began = touching.samples.len();
         let wanted = [[1.0, 0.0], [0.0, 1.0]][axis];
@@ -540,7 +541,7 @@ fn a_far_pan(axis: usize) {
             terrain.grid().to_ground([x, y])
         };
         let [_, south] = ground(touching);
-        let metres = |north_m: f64| ViewChange::PanGround {
+        let metres = |north_m: f64| PlacementChange::PanGround {
             east_m: 0.0,
             north_m,
         };
@@ -560,7 +561,7 @@ fn a_far_pan(axis: usize) {
         assert!((scale(touching).0 / m_per_mm - 1.0).abs() < 1e-12);
         // Beside the hand there is nothing else to be measured: the same tiles serve.
         let cells = touching.steering.terrain().clone();
-        touching.change(ViewChange::Stiffness(0.9));
+        touching.change(PlacementChange::Stiffness(0.9));
         assert!(touching.steering.terrain().has_tiles_of(&cells));
         assert_eq!(touching.said, [""; 0]);
         judge_press(&touching.samples[began..], GENTLE_N, most + 0.01);
@@ -576,11 +577,11 @@ fn most_times(samples: &[TickRecord]) -> f32 {
 }
 
 #[test]
-fn a_slope_to_the_east_is_true_at_both_ends_of_degrees_and_the_force_makes_no_step() {
+fn slope_to_the_east_is_true_at_both_ends_of_degrees() {
     a_far_pan(0);
 }
 
 #[test]
-fn a_slope_to_the_north_is_true_at_both_ends_of_degrees_and_the_force_makes_no_step() {
+fn slope_to_the_north_is_true_at_both_ends_of_degrees() {
     a_far_pan(1);
 }

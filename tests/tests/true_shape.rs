@@ -50,7 +50,7 @@ fn force(terrain: &Terrain<'_>) -> [f64; 3] {
     let ground = terrain.height_mm(east, north).expect("known");
     for depth in [-2.0, 1.0] {
         let hip = terrain.scale().to_grid([east, north, ground - depth]);
-        let sample = replayer.feel(hip.expect("addressable")).expect("felt");
+        let sample = replayer.step(hip.expect("addressable")).expect("felt");
         if depth > 0.0 {
             assert_eq!(sample.state, ContactState::Touching);
             return sample.force_n.to_array().map(f64::from);

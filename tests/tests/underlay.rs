@@ -7,7 +7,7 @@ use std::time::Duration;
 use hapterra::link::{
     Arming, Client, Emulator, Event, LinkStats, State, Timeouts, Transport, move_arm_while,
 };
-use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
+use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script, Touch};
 use hapterra::place::Reach;
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{Scale, Terrain};
@@ -63,7 +63,7 @@ impl<'t> Slide<'t> {
         let ticks = ((HeldPhantom::ARMED_S + script.duration_s()) * 1e3) as u32;
         let home_mm = [x, y, ground + 15.0];
         let model = PhantomModel::premium_1_5();
-        let rig = HeldPhantom::new(model, hand, Placement { home_mm }, script).expect("in reach");
+        let rig = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
         Self {
             terrain,
             home_mm,

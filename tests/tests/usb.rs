@@ -142,7 +142,7 @@ fn hello() -> Vec<u8> {
         .to_vec()
 }
 
-/// Whether the device answers a hello.
+/// Returns true if the device answers a hello.
 fn answers(board: &mut Board) -> bool {
     let mut reader = FrameReader::<MAX_FRAME>::new();
     for _ in 0..20 {

@@ -93,7 +93,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Whether all of a file is a test, or what tests share.
+/// Returns true if all of a file is a test, or what tests share.
 fn is_of_tests(path: &Path) -> bool {
     let folders = path.parent().into_iter().flat_map(Path::components);
     let is_inside = |name: &str| folders.clone().any(|part| part.as_os_str() == name);

@@ -1,4 +1,4 @@
-//! Whether the boards' pages say the pins that their sources take. That the images
+//! The boards' pages name the pins of their sources. That the images
 //! set them up as the pages say is seen in `tests/images`; that a pin can be what it
 //! is used for is embassy's types' to see to: the images would not compile.
 

@@ -1,4 +1,4 @@
-//! What can be a terrain, and why other things cannot.
+//! Checks of terrains.
 
 use alloc::vec::Vec;
 
@@ -62,7 +62,7 @@ pub enum TerrainError {
     TipCells {
         /// The radius, mm.
         tip_mm: f64,
-        /// Felt cells a cell.
+        /// Haptic cells a cell.
         parts: u32,
         /// Samples from west to east.
         columns: u32,

@@ -37,7 +37,7 @@ pub struct Contact {
     tick_loop: TickLoop,
     scene: Scene,
     materials: usize,
-    /// Where the HIP was.
+    /// Place where the HIP was.
     last: Option<GridPoint>,
 }
 
@@ -48,11 +48,11 @@ pub struct Step {
     pub force_n: [f32; 3],
     /// The proxy: on the surface while it touches, at the HIP while it is free, mm.
     pub proxy_mm: [f64; 3],
-    /// What the proxy is doing.
+    /// State of the proxy.
     pub state: State,
 }
 
-/// What a proxy is doing.
+/// State of a proxy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum State {
     /// The HIP is in the air, and so is the proxy: no force.
@@ -60,7 +60,7 @@ pub enum State {
     /// The proxy is on the surface, and the HIP below it.
     Touching,
     /// The surface that the proxy was on has come to an end, and the last force fades away.
-    Fading,
+    Releasing,
     /// The HIP is below the surface and has not been above it, so that the side it came from is
     /// unknown: no force until it has been above `surface_mm`. A path may begin here, or go on here
     /// from a hole or from outside.
@@ -137,7 +137,7 @@ pub enum StepError {
 pub struct RunError {
     /// The steps before it.
     pub done: Vec<Step>,
-    /// Why it has not happened.
+    /// Its reason.
     pub why: StepError,
 }
 
@@ -252,8 +252,8 @@ impl Contact {
         match sample.state {
             ContactState::Free => State::Free,
             ContactState::Touching => State::Touching,
-            ContactState::Fading => State::Fading,
-            ContactState::Waiting => match self.terrain.height_mm(east, north) {
+            ContactState::Releasing => State::Releasing,
+            ContactState::Unseeded => match self.terrain.height_mm(east, north) {
                 Some(surface_mm) if up < surface_mm => State::BelowGround { surface_mm },
                 _ => State::Outside,
             },

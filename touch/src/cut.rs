@@ -50,24 +50,24 @@ impl Terrain {
         (!hole).then(|| mix(mix(sw, se, u), mix(nw, ne, u), v))
     }
 
-    /// Felt cells a cell of the ground, along a side: 1 for a point.
+    /// Haptic cells a cell of the ground, along a side: 1 for a point.
     fn parts(&self) -> u32 {
         self.ball.as_ref().map_or(1, Ball::parts)
     }
 
-    /// The scale of felt cells: that of the samples, or a whole part of it under a ball.
+    /// The scale of haptic cells: that of the samples, or a whole part of it under a ball.
     pub(crate) fn felt_scale(&self) -> Scale {
         self.scale.in_parts(self.parts())
     }
 
-    /// Felt patches east and north.
+    /// Haptic patches east and north.
     pub(crate) fn size(&self) -> [i32; 2] {
         let parts = self.parts() as i32;
         // Checked: at most MAX_CELL of them.
         [self.columns, self.rows].map(|count| (count as i32 - 1) * parts)
     }
 
-    /// A whole height in felt cells that no sample exceeds.
+    /// A whole height in haptic cells that no sample exceeds.
     pub(crate) fn top(&self) -> i32 {
         let Some(range) = self.range else {
             return MAX_CELL + 1;
@@ -142,7 +142,7 @@ impl Terrain {
         Ok(())
     }
 
-    /// Reads the felt heights of a tile, in felt cells, row by row: NaN in holes. Returns how many a
+    /// Reads the felt heights of a tile, in haptic cells, row by row: NaN in holes. Returns how many a
     /// row has.
     fn read_felt(&self, first: [u32; 2], room: &mut Vec<f64>) -> Result<usize, Unread> {
         let Some(ball) = &self.ball else {
@@ -165,8 +165,8 @@ impl Terrain {
         Ok(TILE_SAMPLES)
     }
 
-    /// Reads the samples that a ball's nodes depend on, `side` of them each way from a felt sample on,
-    /// in felt cells: NaN in holes and beside the field.
+    /// Reads the samples that a ball's nodes depend on, `side` of them each way from a rendered sample on,
+    /// in haptic cells: NaN in holes and beside the field.
     fn samples_around(
         &self,
         ball: &Ball,
@@ -194,7 +194,7 @@ impl Terrain {
         Ok((samples, nodes))
     }
 
-    /// Reads samples of the field from one to before another, in felt cells: NaN in holes.
+    /// Reads samples of the field from one to before another, in haptic cells: NaN in holes.
     fn read_cells(
         &self,
         from: [i64; 2],

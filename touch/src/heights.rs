@@ -1,4 +1,4 @@
-//! Where heights come from: an array, or a callback.
+//! Source of heights: an array, or a callback.
 
 use alloc::vec::Vec;
 

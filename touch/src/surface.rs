@@ -5,7 +5,7 @@ use core::ops::RangeInclusive;
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Material, MaterialTable, SurfaceParams, Texture};
 
-/// How a surface is rendered: stiffness, limit, friction, damping, shading, texture, and materials
+/// Parameters of a surface: stiffness, limit, friction, damping, shading, texture, and materials
 /// where it is not the same everywhere. Checked when it is made; all of it acts in every step.
 ///
 /// ```

@@ -231,9 +231,9 @@ impl Terrain {
     /// it, and so is [`Self::height_mm`]. The centre is within 2 % of the radius of where it belongs.
     /// Materials are those under the centre. Forces are those of `hapterra replay --tip`, bit for bit.
     ///
-    /// Felt cells are a 32nd of the radius, and the window of a contact has 512 of them. A proxy that
+    /// Haptic cells are a 32nd of the radius, and the window of a contact has 512 of them. A proxy that
     /// stays more than 15 radii behind its HIP, east or north, is let go
-    /// ([`State::Fading`](crate::State::Fading)), where a replay may begin anew beside the HIP.
+    /// ([`State::Releasing`](crate::State::Releasing)), where a replay may begin anew beside the HIP.
     ///
     /// ```
     /// use hapterra_touch::Terrain;

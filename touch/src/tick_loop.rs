@@ -7,7 +7,7 @@ use hapterra_core::force::MaterialTable;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::GuardInputs;
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{HipCommand, Scene, TickRecord, View};
+use hapterra_core::scene::{HipCommand, Scene, SceneChange, TickRecord};
 use hapterra_core::terrain::{Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome, RefusedScene};
 use self_cell::{MutBorrow, self_cell};
@@ -82,7 +82,7 @@ impl TickLoop {
             running.view = running.view.wrapping_add(1);
             // Tiles with materials are other tiles than those without.
             let before = running.haptics.scene().and_then(|scene| scene.materials);
-            running.accept(Command::View(View {
+            running.accept(Command::SceneChange(SceneChange {
                 number: running.view,
                 scene,
                 hip,

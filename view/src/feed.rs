@@ -42,11 +42,11 @@ impl RrdFile {
     }
 }
 
-/// How a stream ended.
+/// End of a stream.
 pub struct Ended {
     /// The writer said that there is no more; it was killed where it did not.
     pub is_told: bool,
-    /// What was wrong with the file for rerun's own viewer. The page goes on without it.
+    /// Error of the file for rerun's own viewer. The page goes on without it.
     pub rrd: Result<()>,
 }
 

@@ -16,7 +16,7 @@ use hapterra_view::server::Server;
 
 /// More options, separated by spaces: `hapterra` starts this program.
 const OPTIONS: &str = "HAPTERRA_VIEW_OPTIONS";
-/// How long the page stays after the session's end, once nobody looks.
+/// Time for which the page stays after the session's end, once nobody looks.
 const LINGER: Duration = Duration::from_secs(15);
 /// Between two looks at whether somebody looks.
 const LOOK: Duration = Duration::from_millis(100);
@@ -50,7 +50,7 @@ fn show(options: &Options) -> Result<()> {
     let server = Server::start(options.bind, &ports, kept, options.page_bytes)?;
     if server.is_open() {
         tell(
-            "hapterra-view: warning: other machines can reach the page: whoever does sees the terrain and the hand",
+            "hapterra-view: warning: other machines can open the page, and see the terrain and the hand",
         );
     }
     let url = server.url();

@@ -1,4 +1,4 @@
-//! What the command line says.
+//! Options of the command line.
 
 use std::ffi::OsString;
 use std::net::{IpAddr, Ipv4Addr};
@@ -28,20 +28,20 @@ Options reach it through HAPTERRA_VIEW_OPTIONS, separated by spaces.
 /// The port that is tried first.
 const PORT: u16 = 8760;
 
-/// What the command line says.
+/// Options of the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// The page's port; none for the usual one or a free one.
     pub port: Option<u16>,
     /// The page's address.
     pub bind: IpAddr,
-    /// Whether a browser is opened.
+    /// True if a browser is opened.
     pub browser: bool,
     /// Bytes of a live session's history.
     pub history_bytes: usize,
     /// Bytes of a page's memory from which on it begins anew.
     pub page_bytes: u64,
-    /// How long the page stays after the session's end, once nobody looks; none: until
+    /// Time for which the page stays after the session's end, once nobody looks; none: until
     /// somebody has, and then the usual time.
     pub linger: Option<Duration>,
     /// A recording for rerun's own viewer.

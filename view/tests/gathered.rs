@@ -1,4 +1,4 @@
-//! What happened is told to a page that is drawn by software a second at a time, and what a
+//! Gathered messages to a page that is drawn by software, a second at a time, and what a
 //! page missed in larger parts still.
 
 mod common;

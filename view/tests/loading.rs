@@ -1,4 +1,4 @@
-//! How long it takes until a browser shows the terrain.
+//! Time that it takes until a browser shows the terrain.
 //!
 //! `HAPTERRA=PROGRAM TERRAIN=FILE cargo test --release --test loading -- --ignored --nocapture`
 //! measures it; without a file it takes the terrain that the demo has itself.

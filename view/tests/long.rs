@@ -96,7 +96,7 @@ fn each_harm_is_found_alone() {
 
 #[test]
 #[ignore = "takes ten minutes"]
-fn ten_minutes_of_touching_stay_bounded_and_pages_and_viewer_may_come_and_go() {
+fn ten_minutes_of_history_stay_bounded() {
     let folder = folder("long");
     let Some(mut demo) = touching(&folder) else {
         println!("SKIPPED: HAPTERRA names no program");

@@ -1,4 +1,4 @@
-//! What is shown of a run, beside the CSV of the same run.
+//! Display of a run, beside the CSV of the same run.
 
 mod common;
 

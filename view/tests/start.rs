@@ -1,4 +1,4 @@
-//! What a page is told first: the whole terrain at its coarsest level.
+//! First messages to a page: the whole terrain at its coarsest level.
 
 mod common;
 

@@ -15,7 +15,7 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// Whether `address` lies in this memory.
+    /// Returns true if `address` lies in this memory.
     pub(crate) fn contains(&self, address: u64) -> bool {
         (self.origin..self.origin + self.length).contains(&address)
     }
@@ -32,7 +32,7 @@ pub(crate) struct Exception {
     /// Of a call through a register: parts of the names of what it can lead to. They are
     /// judged like anything else that an interrupt reaches.
     pub(crate) leads_to: &'static [&'static str],
-    /// Why it is safe.
+    /// Reason for which it is safe.
     #[expect(dead_code, reason = "for the reader of the table")]
     pub(crate) because: &'static str,
 }

@@ -17,11 +17,11 @@ use crate::view;
 pub(crate) struct Request {
     /// Terrain file; none for one that the demo makes itself.
     pub(crate) file: Option<OsString>,
-    /// Whether it is shown live.
+    /// True if it is shown live.
     pub(crate) view: bool,
-    /// Whether it is touched on a page in a browser, without any device.
+    /// True if it is touched on a page in a browser, without any device.
     pub(crate) touch: bool,
-    /// Where that page is only written to.
+    /// Place where that page is only written to.
     pub(crate) out: Option<PathBuf>,
     /// Passed on to `hapterra demo` as they are.
     pub(crate) extra: Vec<OsString>,

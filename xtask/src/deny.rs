@@ -20,7 +20,7 @@ const WORKSPACES: [&str; 4] = [
 pub(crate) enum Advisories {
     /// No advisory is about them.
     Checked,
-    /// Why they were not.
+    /// Reason for which they were not.
     NotChecked(String),
 }
 
@@ -83,7 +83,7 @@ fn has_database() -> bool {
     entries.any(|entry| entry.path().join("crates").is_dir())
 }
 
-/// Why a program failed: its last line.
+/// Returns the reason for which a program failed: its last line.
 fn last_line(text: &str) -> &str {
     let mut lines = text.lines().rev().map(str::trim);
     lines.find(|line| !line.is_empty()).unwrap_or_default()

@@ -19,7 +19,7 @@ pub(crate) fn root() -> &'static Path {
         .expect("xtask/ lies in the workspace")
 }
 
-/// Where cargo puts what it builds for the host.
+/// Returns the place where cargo puts what it builds for the host.
 pub(crate) fn target_dir() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(dir) => std::path::absolute(&dir).unwrap_or_else(|_| dir.into()),
@@ -103,7 +103,7 @@ pub(crate) fn output(command: &mut Command) -> Option<String> {
     output.status.success().then_some(text)
 }
 
-/// Where `program` is on the PATH.
+/// Returns the place where `program` is on the PATH.
 pub(crate) fn on_path(program: &str) -> Option<PathBuf> {
     let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
     let path = std::env::var_os("PATH")?;

@@ -63,14 +63,14 @@ impl<'g> Parry<'g> {
         )
     }
 
-    /// Whether the way from the last HIP to this one is free.
+    /// Returns true if the way from the last HIP to this one is free.
     #[inline]
     fn is_free(&self, from: Vector, to: Vector) -> bool {
         let ray = Ray::new(from, to - from);
         self.field.cast_local_ray(&ray, 1.0, false).is_none()
     }
 
-    /// Whether the HIP is below the triangles: parry has no call for that.
+    /// Returns true if the HIP is below the triangles: parry has no call for that.
     #[inline]
     fn is_below(&self, hip: &Hip) -> bool {
         let facet = Facet::under(hip.wide[0], hip.wide[1]);

@@ -14,7 +14,7 @@ use crate::{continuity, report, solver, state};
 /// Arguments of `hapterra-lab contact`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// What is measured, and written.
+    /// Files to measure and to write.
     #[command(flatten)]
     pub files: Files,
 

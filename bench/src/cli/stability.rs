@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::ValueHint;
-use hapterra::cli::options::quantity::{DAMPING, STIFFNESS};
+use hapterra::cli::options::quantity::{DAMPING, FREQUENCY, STIFFNESS, TIME};
 use hapterra::cli::options::surface::{SurfaceChoice, SurfaceOptions, choice};
-use hapterra::cli::terminal::{interrupt, left_behind, progress};
+use hapterra::cli::terminal::{interrupt, partial_files, progress};
 use hapterra::cli::{Failure, OrHint as _, report};
 use hapterra::output::{Output, OutputError};
 use hapterra_core::force::{Controller, Damping};
@@ -20,16 +20,16 @@ const OTHER_PICTURE: &str = "name another file with --picture";
 /// Arguments of `hapterra-lab stability`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Tick rates, Hz: whole kilohertz from 1000 to 10000
-    #[arg(long, value_name = "HZ,…", value_delimiter = ',', default_value = "1000,2000,4000,10000", value_parser = parse_rate)]
+    /// Tick rates: whole kilohertz from 1kHz to 10kHz
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', default_value = "1kHz,2kHz,4kHz,10kHz", value_parser = parse_rate)]
     pub rate: Vec<TickRate>,
 
-    /// Stiffnesses, N/mm
-    #[arg(long, value_name = "N_PER_MM,…", value_delimiter = ',', default_value = "0.1,0.2,0.5,1,1.5,2,2.5,3,4,6,8,12,20", value_parser = parse_stiffness)]
+    /// Stiffnesses, as 0.5N/mm
+    #[arg(long, value_name = "N/MM,…", value_delimiter = ',', default_value = "0.1,0.2,0.5,1,1.5,2,2.5,3,4,6,8,12,20", value_parser = parse_stiffness)]
     pub stiffness: Vec<f64>,
 
-    /// Dampings of the surface, N·s/m
-    #[arg(long, value_name = "NS_PER_M,…", value_delimiter = ',', default_value = "0", value_parser = parse_damping)]
+    /// Dampings of the surface, as 2Ns/m
+    #[arg(long, value_name = "NS/M,…", value_delimiter = ',', default_value = "0", value_parser = parse_damping)]
     pub damping: Vec<Damping>,
 
     /// Surface whose micro-relief is tried: sand, rock, or a FILE.toml [default: none]
@@ -46,10 +46,10 @@ pub struct Args {
     )]
     pub passivity: Vec<Passivity>,
 
-    /// Microseconds from reading the encoders to the amplifiers; 200 is what a nucleo-g474re
-    /// may take, and 1130 is more than a nucleo-h743zi2 with duty cycles takes
-    #[arg(long, value_name = "US", default_value_t = 200, value_parser = clap::value_parser!(u32).range(0..=10_000))]
-    pub delay_us: u32,
+    /// Time from reading the encoders to the amplifiers; a nucleo-g474re may take 200us, and a
+    /// nucleo-h743zi2 with duty cycles takes less than 1130us
+    #[arg(long, value_name = "TIME", default_value = "200us", value_parser = parse_delay)]
+    pub delay: f64,
 
     /// Friction of the arm's joints, as parts of the model's
     #[arg(long, value_name = "PART,…", value_delimiter = ',', default_value = "0.1,1", value_parser = parse_part)]
@@ -87,7 +87,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         stiffness_n_per_mm: args.stiffness.clone(),
         dampings: dampings(args),
         texture: of_surface.load()?.law.texture,
-        delay_s: 1e-6 * f64::from(args.delay_us),
+        delay_s: args.delay,
         arm_frictions: args.arm_friction.clone(),
     };
     plan.rates.sort_by_key(|rate| rate.hz());
@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.out.is_some() && args.out == args.picture {
         return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
     }
-    left_behind::tell(
+    partial_files::tell(
         { args.out.iter() }
             .chain(&args.picture)
             .map(PathBuf::as_path),
@@ -123,7 +123,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     });
     progress.finish_and_clear();
     let map = map.map_err(|error| Failure::new(error.to_string()))?;
-    let map = map.ok_or_else(|| Failure::new("interrupted: no limits are said"))?;
+    let map = map.ok_or_else(|| Failure::new("interrupted: no limits are printed"))?;
     report::put(&map.summary())?;
     if let Some(csv) = csv {
         write(csv, &map).or_hint(OTHER_FILE)?;
@@ -167,8 +167,14 @@ fn write(mut csv: Output, map: &Map) -> Result<(), OutputError> {
 }
 
 fn parse_rate(text: &str) -> Result<TickRate, String> {
-    let rate = text.trim().parse().ok().and_then(TickRate::new);
-    rate.ok_or_else(|| "expected whole kilohertz from 1000 to 10000 Hz".to_owned())
+    let hz = FREQUENCY.read(text)?;
+    let rate = (hz.fract() == 0.0).then(|| TickRate::new(hz as u32));
+    let whole = "whole kilohertz from 1kHz to 10kHz";
+    rate.flatten().ok_or_else(|| format!("expected {whole}"))
+}
+
+fn parse_delay(text: &str) -> Result<f64, String> {
+    TIME.read_within(text, [0.0, 0.01])
 }
 
 fn parse_stiffness(text: &str) -> Result<f64, String> {

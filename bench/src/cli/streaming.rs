@@ -1,6 +1,7 @@
 //! `hapterra-lab streaming`: what terrain larger than memory costs.
 
 use hapterra::cli::Failure;
+use hapterra::cli::options::quantity::TIME;
 
 use super::files::{self, Files, spinner};
 use crate::report;
@@ -9,7 +10,7 @@ use crate::streaming::{self, Plan};
 /// Arguments of `hapterra-lab streaming`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// What is measured, and written.
+    /// Files to measure and to write.
     #[command(flatten)]
     pub files: Files,
 
@@ -18,11 +19,11 @@ pub struct Args {
           default_values_t = [6, 7, 8, 9, 10], value_parser = clap::value_parser!(u32).range(6..=10))]
     pub sizes: Vec<u32>,
 
-    /// Latencies of a web server, ms; 0 is a file on disk [default: 0,20,50,100,200, or 0 without
-    /// the feature remote]
-    #[arg(long, value_name = "LIST", value_delimiter = ',',
-          value_parser = clap::value_parser!(u32).range(0..=10_000))]
-    pub latencies: Vec<u32>,
+    /// Latencies of a web server, as 20ms; 0ms is a file on disk
+    ///
+    /// [default: 0ms,20ms,50ms,100ms,200ms, or 0ms without the feature remote]
+    #[arg(long, value_name = "TIME,…", value_delimiter = ',', value_parser = parse_latency)]
+    pub latency: Vec<u32>,
 
     /// What a process of its own measures
     #[arg(long, hide = true)]
@@ -67,10 +68,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
+/// Reads a time in whole milliseconds.
+fn parse_latency(text: &str) -> Result<u32, String> {
+    let ms = 1e3 * TIME.read_within(text, [0.0, 10.0])?;
+    let whole = ms.round();
+    ((ms - whole).abs() < 1e-6)
+        .then_some(whole as u32)
+        .ok_or_else(|| "a latency is a whole number of milliseconds, as 20ms".to_owned())
+}
+
 fn plan(args: &Args) -> Result<Plan, Failure> {
     let has_server = cfg!(feature = "remote");
-    let latencies_ms = match (args.latencies.is_empty(), has_server) {
-        (false, _) => args.latencies.clone(),
+    let latencies_ms = match (args.latency.is_empty(), has_server) {
+        (false, _) => args.latency.clone(),
         (true, true) => streaming::LATENCIES_MS.to_vec(),
         (true, false) => vec![0],
     };

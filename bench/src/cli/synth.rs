@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::ValueHint;
 use hapterra::cli::options::input::parse_size;
-use hapterra::cli::terminal::{interrupt, left_behind, progress};
+use hapterra::cli::options::quantity::GROUND;
+use hapterra::cli::terminal::{interrupt, partial_files, progress};
 use hapterra::cli::{Failure, report};
 use hapterra::synth::{Grid, Kind, Synth, write};
 
@@ -27,14 +28,14 @@ pub struct Args {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
-    /// Side of a cell in metres
-    #[arg(long, value_name = "METRES", default_value_t = 10.0, value_parser = parse_length)]
-    pub cell_m: f64,
+    /// Side of a cell, as 10m
+    #[arg(long, value_name = "LENGTH", default_value = "10m", value_parser = parse_length)]
+    pub cell: f64,
 
-    /// Height of the terrain in metres, from its lowest to its highest place at most
+    /// Height of the terrain, from its lowest to its highest place at most, as 500m
     /// [default: what suits the kind, some tens of cells; a plane rises by a fifth of a
     /// cell per cell to the east]
-    #[arg(long, value_name = "METRES", value_parser = parse_length)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     pub amplitude: Option<f64>,
 }
 
@@ -48,7 +49,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let error = format!("too small: {columns} × {rows} samples");
         return Err(Failure::new(error).hint("a surface needs at least --size 2x2"));
     }
-    let usual = args.kind.usual_amplitude_cells() * args.cell_m;
+    let usual = args.kind.usual_amplitude_cells() * args.cell;
     let stated = args.amplitude.map(|height| match args.kind {
         // Its own amplitude is a slope.
         Kind::Plane => height / Synth::new(Kind::Plane, 0, 1.0).rise(columns, rows),
@@ -58,9 +59,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let grid = Grid {
         columns,
         rows,
-        cell_m: args.cell_m,
+        cell_m: args.cell,
     };
-    left_behind::tell([args.out.as_path()]);
+    partial_files::tell([args.out.as_path()]);
     let progress = progress::bar(Some(rows.into()), "{bar:30} {pos}/{len} rows, {eta} left");
     interrupt::listen();
     let written = write(&args.out, &synth, &grid, &mut || {
@@ -76,8 +77,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn parse_length(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(length) if length > 0.0 && length <= 1e9 => Ok(length),
-        _ => Err("metres, above 0 and at most 1e9".into()),
+    match GROUND.read(text)? {
+        length if length > 0.0 && length <= 1e9 => Ok(length),
+        _ => Err("a length above 0 m and at most 1e9 m".into()),
     }
 }

@@ -32,9 +32,9 @@ pub(super) fn measure() -> Vec<Row> {
         ("tile 0.2 cell late", late(0.2), None),
         ("tile 0.45 cell late", late(0.45), None),
         ("tile 1 cell late", late(1.0), None),
-        ("0.2 cell late over an underlay", late(0.2), under),
-        ("0.45 cell late over an underlay", late(0.45), under),
-        ("1 cell late over an underlay", late(1.0), under),
+        ("0.2 cell late over a coarse fallback", late(0.2), under),
+        ("0.45 cell late over a coarse fallback", late(0.45), under),
+        ("1 cell late over a coarse fallback", late(1.0), under),
     ]
     .map(|(name, due, underlay)| Row::of(name, SWEPT, &[&felt(due, underlay)]))
     .to_vec()
@@ -92,13 +92,13 @@ fn felt(due: u32, underlay: Option<Underlay>) -> Vec<Answer> {
             converged: felt.converged,
             displacement: felt.displacement.to_array(),
         });
-        let focus = RequestHint {
+        let hint = RequestHint {
             missing_tile: felt.missing_tile,
             proxy: felt.proxy.column(),
             hip: hip.grid.column(),
             velocity: [STEP as f32, 0.0],
         };
-        coming.extend(std::iter::from_fn(|| requester.next_request(tick, &focus)));
+        coming.extend(std::iter::from_fn(|| requester.next_request(tick, &hint)));
         // The tile that the HIP begins over comes at once.
         let is_here = |key: &TileKey| key.index.col == 0 || tick >= approach + due;
         for key in coming.extract_if(.., |key| is_here(key)) {

@@ -1,4 +1,4 @@
-//! What the HIP slides over.
+//! Ground under the HIP.
 
 use crate::grid::Grid;
 
@@ -7,7 +7,7 @@ const SIDE: usize = 64;
 
 /// A kind of ground, by its height above the middle of the field.
 pub(super) struct Ground {
-    /// What it is called in tables.
+    /// Its name in tables.
     pub(super) name: &'static str,
     height: fn(f64, f64) -> f64,
 }

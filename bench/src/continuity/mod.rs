@@ -1,4 +1,4 @@
-//! How much the force changes when the HIP moves a hundredth of a cell along the
+//! Change of the force when the HIP moves a hundredth of a cell along the
 //! ground: on smooth ground, over ridges, in valleys, across the edges of
 //! patches, and while a tile arrives.
 //!
@@ -127,9 +127,9 @@ mod tests {
             ("tile 0.45 cell late", 0.05),
             ("tile 1 cell late", 0.012),
             // What the surface moves in a tick, and the way of the HIP.
-            ("0.2 cell late over an underlay", 0.0531),
-            ("0.45 cell late over an underlay", 0.0531),
-            ("1 cell late over an underlay", 0.0531),
+            ("0.2 cell late over a coarse fallback", 0.0531),
+            ("0.45 cell late over a coarse fallback", 0.0531),
+            ("1 cell late over a coarse fallback", 0.0531),
         ];
         for (ground, bound) in bounds {
             assert!(ours(ground) < bound, "{ground}: {}", ours(ground));

@@ -1,4 +1,4 @@
-//! What is told of one variant on one ground, and how the HIP slides there.
+//! Row of one variant on one ground and one path of the HIP.
 
 use crate::compare::Label;
 use crate::haptics::Answer;
@@ -14,7 +14,7 @@ pub(super) const SIDE: usize = 8;
 /// One variant on one ground.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// What the HIP slides over.
+    /// Ground under the HIP.
     pub ground: &'static str,
     /// Which variant.
     pub label: Label,

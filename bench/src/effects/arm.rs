@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use hapterra::phantom::{Encoder, PhantomModel, Placement};
+use hapterra::phantom::{ArmFrame, Encoder, PhantomModel};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{GuardInputs, Mode};
 use hapterra_core::phantom::{Calibration, Kinematics};
@@ -10,14 +10,14 @@ use hapterra_core::scene::Source;
 use hapterra_core::terrain::Tile;
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
-use super::felt::Felt;
+use super::effect_tick::EffectTick;
 use super::replay::{self, WINDOW};
 use super::vector::Vector;
 use crate::grid::Grid;
 use crate::haptics::Hip;
 use crate::path::Dice;
 
-/// Why nothing can be measured on a terrain: it is too small, or the arm does not reach it.
+/// Reason for which nothing can be measured on a terrain: it is too small, or the arm does not reach it.
 #[derive(Clone, Debug)]
 pub struct NotMeasured(pub(crate) String);
 
@@ -43,7 +43,7 @@ const ARMING: usize = 6000;
 pub(super) struct Arm<'g> {
     pub(super) grid: &'g Grid,
     pub(super) model: PhantomModel,
-    pub(super) placement: Placement,
+    pub(super) placement: ArmFrame,
 }
 
 /// The tip's place, mm over the terrain, and what the encoders read there.
@@ -68,7 +68,7 @@ impl<'g> Arm<'g> {
         Self {
             grid,
             model: PhantomModel::premium_1_5(),
-            placement: Placement {
+            placement: ArmFrame {
                 home_mm: [x, y, grid.height(x, y).floor()],
             },
         }
@@ -156,14 +156,20 @@ impl<'g> Arm<'g> {
     }
 
     /// What the way feels like under a law, with what is looked at.
-    pub(super) fn feel(&self, law: SurfaceParams, way: &Way) -> Result<Vec<Felt>, NotMeasured> {
+    pub(super) fn render(
+        &self,
+        law: SurfaceParams,
+        way: &Way,
+    ) -> Result<Vec<EffectTick>, NotMeasured> {
         let mut tiles = replay::tiles();
         let mut driven = Driven::begin(self, law, way, &mut tiles)?;
         for place in &way.down {
             driven.tick(place);
         }
         let felt = way.there.iter().map(|place| driven.tick(place));
-        let felt = felt.map(|outcome| Felt::of(&outcome.sample)).collect();
+        let felt = felt
+            .map(|outcome| EffectTick::of(&outcome.sample))
+            .collect();
         driven.is_armed().map(|()| felt)
     }
 }

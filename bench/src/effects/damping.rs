@@ -1,11 +1,11 @@
 //! Damping: the force against the documented formula, with the velocity by FOAW in f64 and with the
 //! tip's own; and whether it ever pulls.
 
-use hapterra::phantom::{Placement, kinematics};
+use hapterra::phantom::{ArmFrame, kinematics};
 use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured, Place, Way};
-use super::felt::Felt;
+use super::effect_tick::EffectTick;
 use super::foaw;
 use super::law::Effect;
 use super::row::{self, Error};
@@ -25,7 +25,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
     let law = Effect::Damping.law();
     let mut errors = Vec::new();
     for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
-        let felt = arm.feel(law, &way)?;
+        let felt = arm.render(law, &way)?;
         let place = row::Place(&grid.name, way.name, Effect::Damping.name());
         let own = off_mn(&law, &felt, |tick| by_foaw(&arm, &way, tick));
         let path = off_mn(&law, &felt, |tick| vec![by_path(&way, tick)]);
@@ -39,7 +39,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
 /// How far each force is from the documented one, mN, with the nearest of some velocities.
 fn off_mn(
     law: &SurfaceParams,
-    felt: &[Felt],
+    felt: &[EffectTick],
     velocities_mm_s: impl Fn(usize) -> Vec<Vector>,
 ) -> Vec<f64> {
     let felt = felt.iter().enumerate().skip(READINGS);
@@ -68,7 +68,7 @@ fn damped_n(law: &SurfaceParams, spring_mm: Vector, velocity_mm_s: Vector) -> Ve
 }
 
 /// How much each force pulls at the tip, mN.
-fn pulls_mn(felt: &[Felt]) -> Vec<f64> {
+fn pulls_mn(felt: &[EffectTick]) -> Vec<f64> {
     let whole = felt.iter().filter(|felt| felt.whole);
     let pulls = whole.map(|felt| {
         let along = dot(felt.force_n, felt.spring()) / length(felt.spring()).max(f64::MIN_POSITIVE);
@@ -99,7 +99,7 @@ fn by_foaw(arm: &Arm<'_>, way: &Way, tick: usize) -> Vec<Vector> {
     });
     let velocity = |tie: usize| {
         let rates = [0, 1, 2].map(|axis| slopes[axis][(tie >> axis) & 1]);
-        Placement::turn_to_terrain(jacobian.map(|row| 1e3 * dot(row, rates)))
+        ArmFrame::turn_to_terrain(jacobian.map(|row| 1e3 * dot(row, rates)))
     };
     (0..8).map(velocity).collect()
 }
@@ -119,8 +119,8 @@ mod tests {
         let arm = Arm::over(&grid);
         let way = arm.tap(2000).expect("in reach");
         let law = Effect::Damping.law();
-        let felt = arm.feel(law, &way).expect("felt");
-        let off = |law: &SurfaceParams, felt: &[Felt]| {
+        let felt = arm.render(law, &way).expect("felt");
+        let off = |law: &SurfaceParams, felt: &[EffectTick]| {
             worst(off_mn(law, felt, |tick| by_foaw(&arm, &way, tick)))
         };
         assert!(off(&law, &felt) < ROUNDING && worst(pulls_mn(&felt)) == 0.0);

@@ -2,7 +2,7 @@
 //! virtual arm.
 
 use crate::stability::grasp::Grasp;
-use hapterra::phantom::{HeldPhantom, PhantomModel, Placement, Script};
+use hapterra::phantom::{ArmFrame, HeldPhantom, PhantomModel, Script};
 use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured};
@@ -79,7 +79,7 @@ fn tapped(
     let mut arm = Arm::over(grid);
     let [x, y, _] = arm.placement.home_mm;
     let ground = grid.height(x, y);
-    arm.placement = Placement {
+    arm.placement = ArmFrame {
         home_mm: [x, y, ground + HOME],
     };
     let mut script = Script::start([x, y, ground + ABOVE]);

@@ -1,9 +1,9 @@
 //! Friction: the tangential over the normal force of a proxy that slides, and whether one that
 //! sticks stays.
 
-use super::felt::Felt;
+use super::effect_tick::EffectTick;
 use super::law::{Effect, FRICTION};
-use super::replay::feel;
+use super::replay::render;
 use super::row::{Error, Place};
 use super::vector::{Vector, dot, length, minus, normal, plus};
 use crate::compare::Effort;
@@ -30,7 +30,7 @@ const TREMBLE: f64 = 0.025;
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     let law = Effect::Friction.law();
     let slide = path::slide_at(grid, "slide 0.01", [STEP, DEPTH], effort.ticks);
-    let slid = feel(grid, law, &slide.hips);
+    let slid = render(grid, law, &slide.hips);
     let off = off_percent(
         grid,
         f64::from(FRICTION.dynamic_mu),
@@ -38,7 +38,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     );
     let part = |sign: f64| off.iter().map(|off| (sign * off).max(0.0)).collect();
     let (hips, from) = held(grid);
-    let stuck = feel(grid, law, &hips);
+    let stuck = render(grid, law, &hips);
     let drifts = from
         .iter()
         .filter_map(|from| drift(&stuck[*from..][..HELD]));
@@ -66,7 +66,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 
 /// How far the tangential over the normal force is from a coefficient, percent of that, in each
 /// tick in which the proxy slid within a patch.
-fn off_percent(grid: &Grid, mu: f64, felt: &[Felt]) -> Vec<f64> {
+fn off_percent(grid: &Grid, mu: f64, felt: &[EffectTick]) -> Vec<f64> {
     let slid = felt.windows(2).filter(|pair| {
         let both = pair[0].whole && pair[1].whole;
         both && pair[0].proxy != pair[1].proxy
@@ -82,7 +82,7 @@ fn off_percent(grid: &Grid, mu: f64, felt: &[Felt]) -> Vec<f64> {
 }
 
 /// The farthest that a proxy is from where it was first; none where it was not felt.
-fn drift(felt: &[Felt]) -> Option<f64> {
+fn drift(felt: &[EffectTick]) -> Option<f64> {
     let first = felt.first()?.proxy;
     let is_felt = felt.iter().all(|felt| felt.whole);
     let far = felt.iter().map(|felt| length(minus(felt.proxy, first)));
@@ -143,7 +143,7 @@ mod tests {
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
         let mut worst = |mu: f32| {
             law.friction.dynamic_mu = mu;
-            let felt = feel(&grid, law, &slide.hips);
+            let felt = render(&grid, law, &slide.hips);
             let off = off_percent(&grid, 0.3, &felt[slide.approach..]);
             let above = off.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             (above, -off.iter().copied().fold(f64::INFINITY, f64::min))
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn a_proxy_that_creeps_is_seen() {
-        let felt = Felt {
+        let felt = EffectTick {
             hip: [0.0; 3],
             proxy: [0.0, 0.0, 0.1],
             force_n: [0.0, 0.0, 0.05],
@@ -175,7 +175,7 @@ mod tests {
     fn a_proxy_on_ice_drifts() {
         let grid = terrain();
         let (hips, from) = held(&grid);
-        let felt = feel(&grid, Effect::None.law(), &hips);
+        let felt = render(&grid, Effect::None.law(), &hips);
         let drift = drift(&felt[from[0]..][..HELD]);
         assert!(drift.is_some_and(|drift| drift > 0.01), "{drift:?}");
     }

@@ -3,7 +3,7 @@
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams, Texture};
 
-/// What a surface does besides pushing.
+/// Effect of a surface besides the spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// A surface like ice.
@@ -57,7 +57,7 @@ impl Effect {
         Self::All,
     ];
 
-    /// What it is called in tables.
+    /// Its name in tables.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! What each effect of a surface costs, and how exact it is.
+//! Cost and error of each effect of a surface.
 //!
 //! - [`Effect`]: the laws that are compared;
 //! - `time`: the whole tick from encoder counts to currents, all effects in turns;
@@ -11,8 +11,8 @@
 
 mod arm;
 mod damping;
+mod effect_tick;
 mod energy;
-mod felt;
 mod foaw;
 mod friction;
 mod law;

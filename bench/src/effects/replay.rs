@@ -1,4 +1,4 @@
-//! What is felt along a path of points, in lock-step.
+//! Forces along a path of points, in lock-step.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
@@ -8,7 +8,7 @@ use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics};
 
 use super::SIDE;
-use super::felt::Felt;
+use super::effect_tick::EffectTick;
 use crate::grid::Grid;
 use crate::haptics::Hip;
 use crate::product::{buffers, fill};
@@ -66,7 +66,7 @@ pub(super) fn open<'t>(
 }
 
 /// What each point feels like under a law.
-pub(super) fn feel(grid: &Grid, law: SurfaceParams, hips: &[Hip]) -> Vec<Felt> {
+pub(super) fn render(grid: &Grid, law: SurfaceParams, hips: &[Hip]) -> Vec<EffectTick> {
     let mut tiles = tiles();
     let scene = scene(grid, law, Source::Points, GridPoint::default());
     let mut haptics = open(grid, scene, &mut tiles);
@@ -75,7 +75,7 @@ pub(super) fn feel(grid: &Grid, law: SurfaceParams, hips: &[Hip]) -> Vec<Felt> {
         let _ = haptics.accept(Command::Hip(point));
         let mut ticks = (0..MAX_TICKS).map(|_| haptics.tick(&Default::default(), true));
         let answered = ticks.find(|outcome| outcome.answers.is_some());
-        answered.map(|outcome| Felt::of(&outcome.sample))
+        answered.map(|outcome| EffectTick::of(&outcome.sample))
     };
     (0..).zip(hips).map_while(&mut answer).collect()
 }

@@ -1,4 +1,4 @@
-//! What is told of an effect: the time of a tick with it, and its errors.
+//! Row of an effect: the time of a tick with it, and its errors.
 
 use crate::stats::quantiles;
 
@@ -34,7 +34,7 @@ pub struct Time {
     pub ratio: f64,
 }
 
-/// How far something is from what the documented formula says.
+/// Difference from the documented formula.
 #[derive(Clone, Debug)]
 pub struct Error {
     /// The terrain's name.
@@ -43,19 +43,19 @@ pub struct Error {
     pub path: &'static str,
     /// The effect's name.
     pub effect: &'static str,
-    /// What is looked at.
+    /// Its quantity.
     pub what: &'static str,
     /// In what it is measured.
     pub unit: &'static str,
     /// The errors.
     pub spread: Spread,
-    /// What the worst may be, where docs/explanation/effects.md promises something.
+    /// Largest permitted error, where docs/explanation/effects.md promises one.
     pub bound: Option<f64>,
-    /// How many were judged.
+    /// Number of judged errors.
     pub judged: usize,
 }
 
-/// How errors are spread; the larger, the worse.
+/// Distribution of errors; the larger, the worse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// Half are below.

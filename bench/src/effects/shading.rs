@@ -1,9 +1,9 @@
 //! Shading: the direction of the force against that of the documented normal, and how far it turns
 //! from one HIP to the next.
 
-use super::felt::Felt;
+use super::effect_tick::EffectTick;
 use super::law::Effect;
-use super::replay::feel;
+use super::replay::render;
 use super::row::{Error, Place};
 use super::vector::{Vector, cross, degrees, length, minus, normal, plus, unit};
 use crate::compare::Effort;
@@ -24,7 +24,7 @@ const TURNED: f64 = 60.0;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     let slide = path::slide_at(grid, "slide 0.01", [STEP, DEPTH], effort.ticks);
-    let felt = |effect: Effect| feel(grid, effect.law(), &slide.hips).split_off(slide.approach);
+    let felt = |effect: Effect| render(grid, effect.law(), &slide.hips).split_off(slide.approach);
     let (plain, shaded) = (felt(Effect::None), felt(Effect::Shading));
     let [none, own] =
         [Effect::None, Effect::Shading].map(|of| Place(&grid.name, slide.name, of.name()));
@@ -42,7 +42,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 }
 
 /// How far each force is from where it should point, degrees.
-fn off(grid: &Grid, felt: &[Felt]) -> Vec<f64> {
+fn off(grid: &Grid, felt: &[EffectTick]) -> Vec<f64> {
     let off = felt.iter().filter(|felt| felt.whole).filter_map(|felt| {
         let own = normal(felt.slopes(grid)?);
         let [x, y, _] = felt.proxy;
@@ -54,11 +54,11 @@ fn off(grid: &Grid, felt: &[Felt]) -> Vec<f64> {
 
 /// Degrees between forces that follow each other while the proxy goes on evenly: shading does not
 /// move a proxy that leaves a ridge.
-fn turns(felt: &[Felt]) -> Vec<f64> {
-    let goes = |pair: &[Felt]| length(minus(pair[1].proxy, pair[0].proxy));
+fn turns(felt: &[EffectTick]) -> Vec<f64> {
+    let goes = |pair: &[EffectTick]| length(minus(pair[1].proxy, pair[0].proxy));
     let pairs = felt.windows(2);
     let pairs = pairs.filter(|pair| pair[0].whole && pair[1].whole && goes(pair) <= FARTHEST);
-    let turn = |pair: &[Felt]| degrees(pair[0].force_n, pair[1].force_n);
+    let turn = |pair: &[EffectTick]| degrees(pair[0].force_n, pair[1].force_n);
     pairs.map(turn).collect()
 }
 
@@ -126,8 +126,8 @@ mod tests {
     fn a_direction_that_is_a_degree_off_is_seen_and_so_is_none() {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
-        let worst = |felt: &[Felt]| off(&grid, felt).into_iter().fold(0.0, f64::max);
-        let shaded = feel(&grid, Effect::Shading.law(), &slide.hips);
+        let worst = |felt: &[EffectTick]| off(&grid, felt).into_iter().fold(0.0, f64::max);
+        let shaded = render(&grid, Effect::Shading.law(), &slide.hips);
         assert!(worst(&shaded) < ROUNDING);
         let (sin, cos) = 1_f64.to_radians().sin_cos();
         let mut wrong = shaded.clone();
@@ -138,7 +138,7 @@ mod tests {
         // About the axis of the turn a force does not move.
         let least = off(&grid, &wrong).into_iter().fold(f64::INFINITY, f64::min);
         assert!(worst(&wrong) > 0.9 && least > ROUNDING, "{least}");
-        let plain = feel(&grid, Effect::None.law(), &slide.hips);
+        let plain = render(&grid, Effect::None.law(), &slide.hips);
         assert!(worst(&plain) > 1.0);
         assert!(turns(&plain).into_iter().fold(0.0, f64::max) > 1.0);
     }
@@ -149,7 +149,7 @@ mod tests {
         let mut dice = path::Dice(3);
         let rough = Grid::from_fn("rough", [64, 64], |_, _| dice.between(0.0, 6.0) as f32);
         let slide = path::slide_at(&rough, "", [STEP, DEPTH], 8000);
-        let shaded = feel(&rough, Effect::Shading.law(), &slide.hips);
+        let shaded = render(&rough, Effect::Shading.law(), &slide.hips);
         let off = off(&rough, &shaded);
         let worst = off.iter().copied().fold(0.0, f64::max);
         let most = shaded.iter().filter_map(|felt| {

@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use hapterra_core::force::{SurfaceParams, Texture};
 
-use super::felt::Felt;
+use super::effect_tick::EffectTick;
 use super::law::Effect;
 use super::relief::rise;
-use super::replay::feel;
+use super::replay::render;
 use super::row::{Error, Place};
 use super::vector::{Vector, dot, length, minus, plus};
 use crate::compare::Effort;
@@ -31,10 +31,10 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
         let slide = path::slide_at(grid, name, [step, DEPTH], effort.ticks);
         for effect in [Effect::Grain, Effect::Grating] {
             let law = effect.law();
-            let off = off_percent(&law, &feel(grid, law, &slide.hips));
+            let off = off_percent(&law, &render(grid, law, &slide.hips));
             let place = Place(&grid.name, name, effect.name());
             let [high, along] = [0, 1].map(|i| off.iter().map(|off| off[i]).collect());
-            errors.extend(place.error(("felt height off", "% of A"), MAX_HIGH, high));
+            errors.extend(place.error(("rendered height off", "% of A"), MAX_HIGH, high));
             let what = ("force along the surface off", "% of the steepest");
             errors.extend(place.error(what, MAX_ALONG, along));
         }
@@ -44,7 +44,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 
 /// How far what is felt is from the formula, tick by tick: along the force without texture,
 /// percent of the amplitude, and across it, percent of what the steepest slope does.
-fn off_percent(law: &SurfaceParams, felt: &[Felt]) -> Vec<[f64; 2]> {
+fn off_percent(law: &SurfaceParams, felt: &[EffectTick]) -> Vec<[f64; 2]> {
     let texture = &law.texture;
     let (amplitude, stiffness) = (
         f64::from(texture.amplitude_mm),
@@ -85,7 +85,7 @@ fn wanted(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vecto
     plus(high, across, -share * depth.min(deepest(texture)))
 }
 
-/// How much of a texture is felt, by the proxy's way over the map.
+/// Share of a texture that is felt, by the proxy's way over the map.
 struct Fade {
     wavelength: f64,
     /// Wavelengths a tick.
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::state::terrain;
 
-    fn worst(law: &SurfaceParams, felt: &[Felt]) -> [f64; 2] {
+    fn worst(law: &SurfaceParams, felt: &[EffectTick]) -> [f64; 2] {
         let off = off_percent(law, felt);
         [0, 1].map(|i| off.iter().map(|off| off[i]).fold(0.0, f64::max))
     }
@@ -135,7 +135,7 @@ mod tests {
         let slide = path::slide_at(&grid, "", [0.05, DEPTH], 2000);
         for effect in [Effect::Grain, Effect::Grating] {
             let law = effect.law();
-            let felt = feel(&grid, law, &slide.hips);
+            let felt = render(&grid, law, &slide.hips);
             let [high, along] = worst(&law, &felt);
             assert!(high < MAX_HIGH && along < MAX_ALONG, "{high} {along}");
             let wrong: [fn(&mut Texture); 3] = [
@@ -170,7 +170,7 @@ mod tests {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [0.18, DEPTH], 2000);
         let law = Effect::Grating.law();
-        let mut felt = feel(&grid, law, &slide.hips);
+        let mut felt = render(&grid, law, &slide.hips);
         assert!(worst(&law, &felt)[0] < MAX_HIGH);
         for felt in &mut felt {
             let added = wanted(&law.texture, felt.proxy, felt.spring(), 1.0);

@@ -3,7 +3,7 @@
 use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured};
-use super::felt::Felt;
+use super::effect_tick::EffectTick;
 use super::law::Effect;
 use super::row::{Error, Place};
 use super::vector::{degrees, length};
@@ -20,7 +20,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
     let law = Effect::All.law();
     let mut errors = Vec::new();
     for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
-        let felt = arm.feel(law, &way)?;
+        let felt = arm.render(law, &way)?;
         let place = Place(&grid.name, way.name, Effect::All.name());
         let turn = ("force off the spring's direction", "°");
         errors.extend(place.error(turn, MAX_TURN, off_degrees(&felt)));
@@ -31,7 +31,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
 }
 
 /// Between the force and the way from the HIP to the proxy; no force pulls by less than 90°.
-fn off_degrees(felt: &[Felt]) -> Vec<f64> {
+fn off_degrees(felt: &[EffectTick]) -> Vec<f64> {
     let felt = felt.iter().filter(|felt| felt.whole);
     let felt = felt.filter(|felt| length(felt.force_n) > 0.0);
     felt.map(|felt| degrees(felt.force_n, felt.spring()))
@@ -39,7 +39,7 @@ fn off_degrees(felt: &[Felt]) -> Vec<f64> {
 }
 
 /// Each force over the most it may be, percent.
-fn shares(law: &SurfaceParams, felt: &[Felt]) -> Vec<f64> {
+fn shares(law: &SurfaceParams, felt: &[EffectTick]) -> Vec<f64> {
     let felt = felt.iter().filter(|felt| felt.whole);
     let share = felt.map(|felt| length(felt.force_n) / most_n(law, length(felt.spring())));
     share.map(|share| 100.0 * share).collect()
@@ -62,7 +62,7 @@ mod tests {
     #[test]
     fn a_force_that_pulls_or_is_too_large_is_seen() {
         let law = Effect::All.law();
-        let felt = |force_n| Felt {
+        let felt = |force_n| EffectTick {
             hip: [0.0; 3],
             proxy: [0.0, 0.0, 1.0],
             force_n,

@@ -39,7 +39,7 @@ pub fn continuity(rows: &[Row]) -> String {
 fn shown(row: &Row) -> String {
     let missed = match row.missed {
         0.0 => String::new(),
-        part => format!(", nothing felt in {:.0} %", 100.0 * part),
+        part => format!(", no contact in {:.0} %", 100.0 * part),
     };
     format!("{}, {}{missed}", number(row.largest), number(row.p99))
 }

@@ -1,4 +1,4 @@
-//! What was measured, as a table, a CSV file and a picture.
+//! Measurements as a table, a CSV file and a picture.
 
 mod continuity;
 mod effects;

@@ -1,4 +1,4 @@
-//! What streaming costs, as a table and as a CSV file.
+//! Costs of streaming, as a table and as a CSV file.
 
 use std::path::Path;
 

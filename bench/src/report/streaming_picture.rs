@@ -1,4 +1,4 @@
-//! What streaming costs against the size of the terrain.
+//! Costs of streaming against the size of the terrain.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What the figures come to: ours over the opponents, and the paper's own.
+//! Summary of the figures: ours over the opponents, and the paper's own.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ const OURS: &str = "hapterra swept";
 /// point or the collision alone, on a 2.4 GHz Pentium 4.
 const TABLE_1: [(&str, f64); 2] = [("average update", 968e3), ("closest point alone", 200e3)];
 
-/// How many times faster than the opponents, terrain by terrain.
+/// Returns the speed-up over the opponents, terrain by terrain.
 #[must_use]
 pub fn summary(rows: &[Row]) -> String {
     let mut text = String::from("\nhow many times faster than the opponent is hapterra swept?\n");

@@ -4,7 +4,7 @@ use hapterra_core::rate::TickRate;
 
 use super::contact_loop::HOME;
 use hapterra::phantom::kinematics::jacobian;
-use hapterra::phantom::{PhantomModel, Placement};
+use hapterra::phantom::{ArmFrame, PhantomModel};
 
 /// Properties of the arm at the tip, up and down, in the home pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ impl AtTip {
     /// Of a model.
     #[must_use]
     pub fn new(model: &PhantomModel) -> Self {
-        let Placement { home_mm } = HOME;
+        let ArmFrame { home_mm } = HOME;
         let joints = HOME.joints_at(model, home_mm).unwrap_or_default();
         let up = jacobian(model, joints)[2];
         // The joint that moves the tip up and down; the others hardly do in this pose.

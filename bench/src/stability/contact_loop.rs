@@ -13,7 +13,7 @@ use hapterra_core::terrain::{FieldSize, RequestHint, Tile, TileKey, TileRequeste
 use hapterra_core::tick::{Board, Command, Haptics};
 
 use super::surface_work::SurfaceWork;
-use hapterra::phantom::{Encoder, HeldPhantom, PhantomModel, Placement, kinematics};
+use hapterra::phantom::{ArmFrame, Encoder, HeldPhantom, PhantomModel, kinematics};
 
 /// Tiles to a side of the loop's window, and cells of the plane, of 4 mm.
 const WINDOW: usize = 4;
@@ -21,7 +21,7 @@ const CELLS: i32 = 64;
 pub(super) const CELL_MM: f64 = 4.0;
 /// The plane's height, and the place of the arm's home pose: in its middle, close above it.
 pub(super) const PLANE_MM: f64 = 20.0;
-pub(super) const HOME: Placement = Placement {
+pub(super) const HOME: ArmFrame = ArmFrame {
     home_mm: [128.0, 128.0, 24.0],
 };
 /// Largest force, N: that of every other scene.
@@ -41,7 +41,7 @@ pub(super) struct Step {
 }
 
 /// What is felt, and by which loop.
-pub(super) struct Felt {
+pub(super) struct LoopSettings {
     pub(super) rate: TickRate,
     pub(super) stiffness_n_per_mm: f64,
     pub(super) damping: Damping,
@@ -54,7 +54,11 @@ pub(super) struct Felt {
 
 /// Runs an arm in an arming hand until its script ends, and shows every tick with the time since the script
 /// began, s. Ends early where `look` says so.
-pub(super) fn run(felt: &Felt, mut arm: HeldPhantom, look: &mut dyn FnMut(f64, &Step) -> bool) {
+pub(super) fn run(
+    felt: &LoopSettings,
+    mut arm: HeldPhantom,
+    look: &mut dyn FnMut(f64, &Step) -> bool,
+) {
     let mut tiles = vec![Tile::VACANT; WINDOW * WINDOW + 1];
     let mut spare: Vec<_> = tiles.iter_mut().collect();
     let slots = std::array::from_fn(|_| {
@@ -182,7 +186,7 @@ impl Wire {
     }
 }
 
-fn scene(felt: &Felt) -> Scene {
+fn scene(felt: &LoopSettings) -> Scene {
     let [east, north, up] = HOME.home_mm.map(|mm| mm / CELL_MM);
     Scene {
         epoch: 1,

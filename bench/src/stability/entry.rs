@@ -21,10 +21,10 @@ const PRESS_N: f64 = 1.0;
 const BEGIN_MM_S: f64 = 60.0;
 /// The tip begins so far above the surface, mm.
 const ABOVE_MM: f64 = 0.2;
-/// How long force takes to come in: in the ramp, and while the clutch closes, s.
+/// Time that force takes to come in: in the ramp, and while the clutch closes, s.
 const RAMP_S: f64 = 2.0;
 const CLOSING_S: f64 = 0.5;
-/// How long is looked at after that, s.
+/// Time for which is looked at after that, s.
 const AFTER_S: f64 = 10.0;
 /// Swings are looked for from so long after the hand has begun to press with all of it on, s.
 const SETTLES_S: f64 = 0.25;
@@ -42,7 +42,7 @@ pub enum Entry {
     Clutch,
 }
 
-/// What a press did while force came in.
+/// Outcome of a press while the force ramps up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entered {
     /// The largest swing from half of the force on, mm.
@@ -57,7 +57,7 @@ impl Entered {
     /// See [`Self::MAX_SWING_MM`].
     pub const MAX_GIVEN_MJ: f64 = 0.05;
 
-    /// Whether force came in well.
+    /// Returns true if force came in well.
     #[must_use]
     pub fn is_good(&self) -> bool {
         self.swing_mm <= Self::MAX_SWING_MM && self.given_mj <= Self::MAX_GIVEN_MJ

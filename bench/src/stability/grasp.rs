@@ -1,16 +1,16 @@
-//! How a hand holds the tip.
+//! Grasps of the tip.
 
 use hapterra::phantom::HandModel;
 
 /// A grasp, from the loosest to the tightest.
 ///
 /// Identification studies give 10 to 1,000 N/m and 0.5 to 5 N·s/m towards the target for
-/// fingers on a stylus, wrists more; limp and firm are a stated choice at the ends of that,
+/// fingers on a stylus, wrists more; light and firm are a stated choice at the ends of that,
 /// and normal is [`HandModel::default`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grasp {
-    /// Two fingertips that hardly hold: what hums first.
-    Limp,
+    /// Two fingertips that hardly hold: the first to be unstable.
+    Light,
     /// A relaxed precision grip.
     Normal,
     /// A fist around the stylus.
@@ -19,23 +19,23 @@ pub enum Grasp {
 
 impl Grasp {
     /// All, from the loosest to the tightest.
-    pub const ALL: [Self; 3] = [Self::Limp, Self::Normal, Self::Firm];
+    pub const ALL: [Self; 3] = [Self::Light, Self::Normal, Self::Firm];
 
     /// Its name, in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Limp => "limp",
+            Self::Light => "light",
             Self::Normal => "normal",
             Self::Firm => "firm",
         }
     }
 
-    /// What the hand is made of.
+    /// Returns the masses, springs and dampers of the hand.
     #[must_use]
     pub fn hand(self) -> HandModel {
         match self {
-            Self::Limp => HandModel {
+            Self::Light => HandModel {
                 mass_kg: 0.05,
                 arm_n_per_m: 30.0,
                 arm_ns_per_m: 0.5,

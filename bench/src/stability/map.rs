@@ -25,7 +25,7 @@ pub struct Map {
     pub trials: Vec<Trial>,
 }
 
-/// What is asked for.
+/// Plan of the trials.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Tick rates.
@@ -273,7 +273,7 @@ impl Map {
     }
 }
 
-/// Whether the passivity controller acts.
+/// Returns true if the passivity controller acts.
 const fn is_controlled(damping: Damping) -> bool {
     matches!(damping.controller, Controller::On)
 }

@@ -1,4 +1,4 @@
-//! How stiff a surface may be before the hand feels the ticks: the tick of the boards in a
+//! Largest stable stiffness of a surface: the tick of the boards in a
 //! closed loop with a virtual Premium 1.5 and a person's hand, over stiffness, tick rate and
 //! grasp.
 //!

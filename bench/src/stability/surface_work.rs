@@ -53,7 +53,7 @@ impl SurfaceWork {
 mod tests {
     use super::*;
     use crate::stability::contact_loop::HOME;
-    use hapterra::phantom::{HandModel, Placement, Script};
+    use hapterra::phantom::{ArmFrame, HandModel, Script};
 
     #[test]
     fn an_arm_that_is_only_driven_gets_the_work_as_energy_of_motion() {
@@ -71,7 +71,7 @@ mod tests {
             grip_n_per_m: 0.0,
             grip_ns_per_m: 0.0,
         };
-        let Placement { home_mm } = HOME;
+        let ArmFrame { home_mm } = HOME;
         let script = Script::start(home_mm).wait(1.0);
         let mut arm = HeldPhantom::new(model, hand, HOME, script).expect("in reach");
         let mut work = SurfaceWork::new(&model);

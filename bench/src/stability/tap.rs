@@ -20,10 +20,10 @@ const REST_S: f64 = 1.0;
 /// Taps of each speed.
 const TAPS: usize = 3;
 
-/// What a few taps of one speed showed.
+/// Outcome of a few taps of one speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Taps {
-    /// What the surface gave to the arm in one tap at most, mJ. A passive surface gives
+    /// Largest energy that the surface gave to the arm in one tap, mJ. A passive surface gives
     /// nothing.
     pub given_mj: f64,
     /// Slowest and fastest that the tip was when a tap first touched the surface, m/s.
@@ -35,12 +35,12 @@ impl Grasp {
     /// [`TAP_SPEEDS_M_S`].
     ///
     /// A normal or firm hand moves as it aims, but for the last of the three: it slows down
-    /// already, since it comes to rest 25 mm below the surface. A limp hand swings on the way, at
+    /// already, since it comes to rest 25 mm below the surface. A light grasp swings on the way, at
     /// 2 Hz, and is slower or faster than it aims. Found by trials; the tests see that the speed
     /// is met.
     fn aim_m_s(self, speed_m_s: f64) -> f64 {
         let factors = match self {
-            Self::Limp => [1.095, 1.172, 0.664],
+            Self::Light => [1.095, 1.172, 0.664],
             Self::Normal => [1.0, 1.0, 1.033],
             Self::Firm => [1.0, 1.0, 1.055],
         };

@@ -1,4 +1,4 @@
-//! What is known of a spring that is felt in ticks, beside what the trials say.
+//! Theory of a sampled spring, beside the trials.
 
 use hapterra_core::force::{Controller, Damping, Pattern, Texture};
 use hapterra_core::rate::TickRate;
@@ -106,7 +106,7 @@ fn the_arm_at_its_tip_is_what_its_data_say() {
 }
 
 #[test]
-fn a_soft_surface_is_still_in_every_hand_and_a_stiff_one_shakes_a_limp_one_until_it_ticks_faster() {
+fn stiff_surface_is_unstable_in_light_grasp_until_rate_rises() {
     for grasp in Grasp::ALL {
         let soft = tried(1000, 0.5, grasp);
         assert_eq!(verdict(&soft), Verdict::Still, "{soft:?}");
@@ -114,13 +114,13 @@ fn a_soft_surface_is_still_in_every_hand_and_a_stiff_one_shakes_a_limp_one_until
         let is_felt = { soft.taps.iter() }.all(|taps| taps.is_some_and(|taps| taps.given_mj > 0.0));
         assert!(is_felt, "{soft:?}");
     }
-    let shaken = tried(1000, 6.0, Grasp::Limp);
+    let shaken = tried(1000, 6.0, Grasp::Light);
     assert_eq!(verdict(&shaken), Verdict::Unstable, "{shaken:?}");
     let Press::Held { swings_hz, .. } = shaken.press else {
         panic!("{shaken:?}")
     };
     assert!((2.0..200.0).contains(&swings_hz), "{swings_hz}");
-    let faster = tried(4000, 6.0, Grasp::Limp);
+    let faster = tried(4000, 6.0, Grasp::Light);
     assert_eq!(verdict(&faster), Verdict::Still, "{faster:?}");
 }
 
@@ -130,9 +130,9 @@ const LAG_S: f64 = 0.238e-3 / 2.18;
 #[test]
 fn a_tap_touches_the_surface_at_the_speed_that_it_is_called_by() {
     for grasp in Grasp::ALL {
-        // A limp hand is held back by the arm's friction at rest, now more and now less.
+        // A light grasp is held back by the arm's friction at rest, now more and now less.
         let off = match grasp {
-            Grasp::Limp => 0.05,
+            Grasp::Light => 0.05,
             Grasp::Normal | Grasp::Firm => 0.015,
         };
         for (hz, stiffness) in [(1000, 0.5), (1000, 2.0), (10_000, 1.0)] {
@@ -199,7 +199,7 @@ fn with_the_controller_a_tap_gives_nothing_and_a_stiffer_surface_is_still() {
             }
         }
     }
-    let stiff = tried_damped(1000, 6.0, Grasp::Limp, 80e-6, CONTROLLED);
+    let stiff = tried_damped(1000, 6.0, Grasp::Light, 80e-6, CONTROLLED);
     assert_eq!(verdict(&stiff), Verdict::Still, "{stiff:?}");
 }
 
@@ -221,7 +221,7 @@ fn what_is_said_before_a_surface_is_felt_is_what_the_trials_show() {
         for (hz, without, with) in table {
             for (still, damping) in [(without, UNDAMPED), (with, CONTROLLED)] {
                 let at = |stiffness| {
-                    let press = set(hz, stiffness, Grasp::Limp, delay_s, damping).press();
+                    let press = set(hz, stiffness, Grasp::Light, delay_s, damping).press();
                     press.expect("in reach").verdict(count_mm)
                 };
                 let name = format!("{hz} Hz, {delay_s} s, {still} N/mm");
@@ -232,7 +232,7 @@ fn what_is_said_before_a_surface_is_felt_is_what_the_trials_show() {
     }
 }
 
-/// The highest and steepest grain there is, on which a limp hand is rocked most of all that
+/// The highest and steepest grain there is, on which a light grasp is rocked most of all that
 /// were tried.
 #[test]
 fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
@@ -244,7 +244,7 @@ fn a_texture_is_held_still_up_to_a_share_of_the_stiffness() {
     };
     assert!(texture.is_valid());
     let at = |hz, stiffness, delay_s, damping| {
-        let trial = tried_on(texture, hz, stiffness, Grasp::Limp, delay_s, damping);
+        let trial = tried_on(texture, hz, stiffness, Grasp::Light, delay_s, damping);
         verdict(&trial)
     };
     for (table, left, delay_s) in [
@@ -303,7 +303,7 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
     assert_eq!(begins, wanted.concat());
     let limit = |grasp| map.up_to((TickRate::DEFAULT, UNDAMPED, 1.0), grasp, Verdict::Hum);
     assert_eq!(
-        (limit(Grasp::Limp), limit(Grasp::Firm)),
+        (limit(Grasp::Light), limit(Grasp::Firm)),
         (Some(0.5), Some(6.0))
     );
     let none = plan.map(&|_| false).expect("in reach");
@@ -321,7 +321,7 @@ fn enters_up_to(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
             for (entry, up_to) in [(Entry::Ramp, ramp), (Entry::Clutch, clutch)] {
                 let setting = Setting {
                     arm_friction,
-                    ..set(hz, stiffness, Grasp::Limp, delay_s, CONTROLLED)
+                    ..set(hz, stiffness, Grasp::Light, delay_s, CONTROLLED)
                 };
                 let entered = setting.enters(entry).expect("in reach").expect("no fault");
                 assert_eq!(
@@ -376,7 +376,7 @@ fn little_friction_makes_small_swings_only() {
         for entry in [Entry::Ramp, Entry::Clutch] {
             let setting = Setting {
                 arm_friction: 0.1,
-                ..set(hz, 4.0, Grasp::Limp, SHORT_S, CONTROLLED)
+                ..set(hz, 4.0, Grasp::Light, SHORT_S, CONTROLLED)
             };
             let entered = setting.enters(entry).expect("in reach").expect("no fault");
             assert!(entered.swing_mm < 0.16, "{hz} Hz, {entry:?}: {entered:?}");
@@ -388,7 +388,7 @@ fn little_friction_makes_small_swings_only() {
 fn without_the_controller_the_tip_swings() {
     let setting = Setting {
         arm_friction: 0.1,
-        ..set(1000, 3.0, Grasp::Limp, 0.1e-3, UNDAMPED)
+        ..set(1000, 3.0, Grasp::Light, 0.1e-3, UNDAMPED)
     };
     for entry in [Entry::Ramp, Entry::Clutch] {
         let entered = setting.enters(entry).expect("in reach").expect("no fault");

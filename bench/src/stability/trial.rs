@@ -4,7 +4,7 @@ use hapterra_core::force::{Damping, Texture};
 use hapterra_core::guard::Fault;
 use hapterra_core::rate::TickRate;
 
-use super::contact_loop::{self, Felt, HOME, PLANE_MM};
+use super::contact_loop::{self, HOME, LoopSettings, PLANE_MM};
 use super::entry::{Entered, Entry};
 use super::grasp::Grasp;
 use super::map::Column;
@@ -18,10 +18,10 @@ const LOOKED_AT_S: f64 = 1.0;
 /// The tip swings by more than this, mm: no hand holds it.
 const UNSTABLE_MM: f64 = 1.0;
 
-/// What is tried.
+/// Setting of a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// How often the loop ticks.
+    /// Number of times that the loop ticks.
     pub rate: TickRate,
     /// The surface's stiffness, N/mm.
     pub stiffness_n_per_mm: f64,
@@ -37,7 +37,7 @@ pub struct Setting {
     pub arm_friction: f64,
 }
 
-/// What a press did.
+/// Outcome of a press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Press {
     /// The tip swung by so much and so often in the last second: eastward, northward or up,
@@ -52,10 +52,10 @@ pub enum Press {
     Tripped(Fault),
 }
 
-/// What a trial showed.
+/// Outcome of a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// What was tried.
+    /// Its setting.
     pub setting: Setting,
     /// The press.
     pub press: Press,
@@ -66,7 +66,7 @@ pub struct Trial {
     pub entries: [Option<Entered>; 2],
 }
 
-/// What the hand feels of a press.
+/// Verdict on a press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// The tip swings by no more than an encoder count.
@@ -90,7 +90,7 @@ impl Verdict {
 }
 
 impl Press {
-    /// What the hand feels, where an encoder count is so much of the tip's way, mm.
+    /// Returns the verdict, where an encoder count is `count_mm` of the tip's path.
     #[must_use]
     pub fn verdict(&self, count_mm: f64) -> Verdict {
         match *self {
@@ -171,7 +171,7 @@ impl Setting {
         clutch_s: Option<[f64; 2]>,
         look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
     ) {
-        let felt = Felt {
+        let felt = LoopSettings {
             rate: self.rate,
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             damping: self.damping,

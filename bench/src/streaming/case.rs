@@ -9,11 +9,11 @@ use heightfield::{OpenOptions, Raster};
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Pace, SentTile, board};
-use super::felt::Felt;
 use super::hand::{Hand, Late};
 use super::meter::{Meter, Traffic, peak_bytes};
 use super::row::{Reading, Row};
 use super::run::{self, fastest};
+use super::tick_counts::TickCounts;
 use super::way::{Way, Ways};
 use super::{CELL_MM, NotMeasured, RATES, SPEEDS, USUAL};
 
@@ -24,7 +24,7 @@ pub(super) struct Case {
     pub(super) terrain: String,
     /// The file: a path, or a URL.
     pub(super) source: String,
-    /// Where the ways of the HIP are written down.
+    /// Place where the ways of the HIP are written down.
     pub(super) ways: String,
     /// How the file is read.
     pub(super) reading: Reading,
@@ -32,7 +32,7 @@ pub(super) struct Case {
     pub(super) latency_ms: u32,
     /// Halvings in the search for the fastest speed.
     pub(super) halvings: u32,
-    /// Whether virtual time stands still while a block is read.
+    /// True if virtual time stands still while a block is read.
     pub(super) stands_while_reading: bool,
 }
 
@@ -115,7 +115,7 @@ struct Bench<'c> {
 
 /// A session from the opening of the file to the end of a motion.
 struct Motion {
-    felt: Felt,
+    felt: TickCounts,
     tiles: Vec<SentTile>,
     /// The ticks in which the motion began and ended.
     moved: [u64; 2],
@@ -230,7 +230,7 @@ impl Bench<'_> {
 }
 
 impl Motion {
-    fn of(chain: Chain<'_>, felt: Felt, moved: [u64; 2]) -> Self {
+    fn of(chain: Chain<'_>, felt: TickCounts, moved: [u64; 2]) -> Self {
         let host = chain.host.iter().map(|spent| 1e3 * spent.as_secs_f64());
         Self {
             felt,

@@ -1,6 +1,6 @@
 //! The arm that is moved along a way: encoder counts for places of the HIP.
 
-use hapterra::phantom::{Encoder, PhantomModel, Placement};
+use hapterra::phantom::{ArmFrame, Encoder, PhantomModel};
 use hapterra::place::Reach;
 use hapterra::terrain::Terrain;
 use hapterra_core::force::SurfaceParams;
@@ -28,7 +28,7 @@ pub(super) enum Late {
 /// A Premium 1.5 whose tip is led exactly where it is to be.
 pub(super) struct Hand {
     model: PhantomModel,
-    placement: Placement,
+    placement: ArmFrame,
     encoders: [Encoder; 3],
 }
 
@@ -39,7 +39,7 @@ impl Hand {
         let encoders = std::array::from_fn(|joint| Encoder::new(&model.drive[joint]));
         Self {
             model,
-            placement: Placement {
+            placement: ArmFrame {
                 home_mm: ways.middle().map(|cells| cells * CELL_MM),
             },
             encoders,

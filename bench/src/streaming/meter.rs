@@ -1,4 +1,4 @@
-//! What a process takes: memory, and bytes that it reads.
+//! Use of memory by a process, and bytes that it reads.
 
 use std::io::{self, BufRead as _, Write as _};
 
@@ -47,11 +47,14 @@ fn asked() -> Result<Traffic, NotMeasured> {
         io::stdin().lock().read_line(&mut line)?;
         Ok(line)
     };
-    let line = ask().map_err(|error| NotMeasured(format!("nobody counts: {error}")))?;
+    let line =
+        ask().map_err(|error| NotMeasured(format!("the counter does not answer: {error}")))?;
     let mut numbers = line.split_whitespace().map(str::parse);
     match (numbers.next(), numbers.next()) {
         (Some(Ok(requests)), Some(Ok(bytes))) => Ok(Traffic { requests, bytes }),
-        _ => Err(NotMeasured(format!("nobody counts: {line:?} was answered"))),
+        _ => Err(NotMeasured(format!(
+            "the counter does not answer: {line:?} was answered"
+        ))),
     }
 }
 

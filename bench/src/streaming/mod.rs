@@ -13,7 +13,6 @@
 mod case;
 mod chain;
 mod cog;
-mod felt;
 mod hand;
 mod line;
 mod meter;
@@ -23,6 +22,7 @@ mod row;
 mod run;
 #[cfg(feature = "remote")]
 mod server;
+mod tick_counts;
 mod way;
 
 pub use crate::effects::NotMeasured;
@@ -35,7 +35,7 @@ const CELL_MM: f64 = 0.05;
 /// Sides of the made terrains, samples: 10⁶, 10⁷, 10⁸, 10⁹ and 10¹⁰ of them to a part in twenty, in
 /// whole tiles.
 pub const SIDES: [u32; 5] = [1024, 3168, 10_016, 31_648, 100_000];
-/// What a web server waits before it answers, ms; 0 is a file on disk.
+/// Latencies of a web server, ms; 0 is a file on disk.
 pub const LATENCIES_MS: [u32; 5] = [0, 20, 50, 100, 200];
 /// Links, 1,000 bytes a second each way: full-speed USB, and a slow serial line.
 pub const RATES: [u32; 2] = [1000, 200];
@@ -44,7 +44,7 @@ pub const SPEEDS: [u32; 3] = [500, 2_000, 5_000];
 /// The speed of the run in which tiles and bytes are counted, cells a second.
 pub const USUAL: u32 = SPEEDS[1];
 
-/// What is measured.
+/// Plan of the measurements.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// Sizes of the made terrains, as powers of ten, 6 to 10.
@@ -53,7 +53,7 @@ pub struct Plan {
     pub latencies_ms: Vec<u32>,
     /// Halvings in the search for the fastest speed: six tell it to 9 %, four to 40 %.
     pub halvings: u32,
-    /// Whether virtual time stands still while a block of a file is read, so that what is counted
+    /// True if virtual time stands still while a block of a file is read, so that what is counted
     /// does not depend on the machine. A web server's latency goes on.
     pub stands_while_reading: bool,
 }

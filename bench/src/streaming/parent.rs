@@ -85,7 +85,7 @@ pub fn measure(
 /// The exponent of ten of the smallest made terrain.
 const SIDES_FROM: u32 = 6;
 
-/// Whether the disk has room for a made terrain. Where the system does not tell, writing decides.
+/// Checks that the disk has room for a made terrain. Where the system does not tell, writing decides.
 fn room_for(path: &Path, side: u32) -> Result<(), NotMeasured> {
     let needed = cog::most_bytes(side);
     let folder = path.parent().unwrap_or(path);

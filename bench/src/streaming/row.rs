@@ -1,4 +1,4 @@
-//! What is measured of one terrain, over one latency and one link.
+//! Measurements of one terrain, over one latency and one link.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 pub struct Row {
     /// Name of the terrain.
     pub terrain: String,
-    /// How the file was read: `blocks` when they are touched, or `whole` before anything is felt.
+    /// Reading of the file: `blocks` when they are touched, or `whole` before the session.
     pub reading: Reading,
-    /// What a web server waits before it answers, ms; 0 for a file on disk.
+    /// Latency of a web server, ms; 0 for a file on disk.
     pub latency_ms: u32,
-    /// What the link to the device carries each way, 1,000 bytes a second.
+    /// Bandwidth of the link to the device each way, 1,000 bytes a second.
     pub link_kb_per_s: u32,
     /// Samples of the terrain.
     pub samples: u64,
@@ -45,7 +45,7 @@ pub struct Row {
     pub tile_bytes_p99: Option<u64>,
     /// Tiles a second while the HIP outruns the link, 20,000 cells a second on the straight way.
     pub tiles_per_s: Option<f64>,
-    /// What the host takes for a tick that asks for tiles, ms: mean of the same run as the tiles.
+    /// Time of the host for a tick that requests tiles, ms: mean of the same run as the tiles.
     pub host_ms_mean: Option<f64>,
     /// The same at worst.
     pub host_ms_worst: Option<f64>,
@@ -120,7 +120,7 @@ impl Row {
     }
 }
 
-/// How a file was read.
+/// Reading of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Reading {

@@ -4,8 +4,8 @@ use hapterra_core::contact::ContactState;
 
 use super::NotMeasured;
 use super::chain::Chain;
-use super::felt::{Felt, lacks_terrain};
 use super::hand::Hand;
+use super::tick_counts::{TickCounts, lacks_terrain};
 use super::way::Way;
 
 /// Ticks after which nothing more is expected: a server has had its 10 s of silence by then.
@@ -38,7 +38,7 @@ pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &Way) -> Result<(),
             is_touching |= sample.state == ContactState::Touching;
         })?;
         if chain.now() > LONGEST {
-            let why = format!("nothing was felt for {LONGEST} ticks");
+            let why = format!("no contact for {LONGEST} ticks");
             return Err(NotMeasured(why));
         }
     }
@@ -58,14 +58,14 @@ pub(super) fn travel(
     way: &Way,
     speed: f64,
     to_a_hole: bool,
-) -> Result<(Felt, [u64; 2]), NotMeasured> {
+) -> Result<(TickCounts, [u64; 2]), NotMeasured> {
     let start = hand.below(way.at(0.0))?;
     let mut at_rest = None;
     for _ in 0..REST {
         chain.tick(start, &mut |sample| at_rest = Some(sample.hip))?;
     }
     let ticks = duration(way.cells(), 1e-3 * speed).ceil() as u32;
-    let (mut felt, mut moves) = (Felt::default(), false);
+    let (mut felt, mut moves) = (TickCounts::default(), false);
     let began = chain.now();
     let mut ended = began + u64::from(ticks);
     for tick in 1..=ticks + AFTER {
@@ -86,7 +86,7 @@ pub(super) fn travel(
     let tally = chain.tally();
     if tally.lost + tally.dropped > 0 {
         let lost = tally.lost + tally.dropped;
-        let why = format!("{lost} samples were lost, so holes cannot be counted");
+        let why = format!("{lost} samples were lost, so gaps cannot be counted");
         return Err(NotMeasured(why));
     }
     Ok((felt, [began, ended]))

@@ -1,4 +1,4 @@
-//! Where the HIP goes over a terrain: a way at one height below the surface.
+//! Path of the HIP over a terrain, at one depth below the surface.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -64,7 +64,7 @@ impl Way {
             let height = terrain.height_mm(east * CELL_MM, north * CELL_MM);
             let why = || {
                 let place = format!("at column {east} and row {north} from the south-west");
-                NotMeasured(format!("it has a hole {place}, where the HIP would go"))
+                NotMeasured(format!("it has no data {place}, where the HIP would move"))
             };
             Ok([east, north, height.ok_or_else(why)? / CELL_MM])
         };
@@ -86,7 +86,7 @@ impl Ways {
         if room < LEAST {
             let least = LEAST + 2 * FROM_BORDER;
             let [columns, rows] = size;
-            let has = format!("{columns} × {rows} samples; the ways need {least} each way");
+            let has = format!("{columns} × {rows} samples; the paths need {least} along each side");
             return Err(NotMeasured(has));
         }
         let (long, side) = (STRAIGHT.min(room), TURNING.min(room));
@@ -150,7 +150,7 @@ impl Ways {
             places.map(|places| Way { places })
         });
         let [Some(straight), Some(turning)] = ways else {
-            return Err(wrong("it holds no two ways".into()));
+            return Err(wrong("it has no room for two paths".into()));
         };
         Ok(Self { straight, turning })
     }
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_terrain_without_room_or_with_a_hole_on_the_way_is_refused_with_the_place() {
+    fn terrain_without_room_for_the_path_is_refused_by_place() {
         let why = ways(700, 300, false).expect_err("too narrow").to_string();
         assert!(why.contains("700 × 300 samples"), "{why}");
         let raster = Raster::from_fn(640, 640, |x, y| if x + y == 700 { f32::NAN } else { 1.0 });

@@ -1,7 +1,7 @@
 //! The whole tick: encoder counts, pose, HIP, contact, force, guard, torques,
 //! currents.
 
-use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
+use hapterra::phantom::{ArmFrame, Encoder, PhantomModel, kinematics};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::{
     Controller, Damping, Material, Pattern, Shading, SurfaceParams, Texture,
@@ -48,7 +48,7 @@ impl Samples for Under<'_> {
 struct Arm<'g> {
     grid: &'g Grid,
     model: PhantomModel,
-    placement: Placement,
+    placement: ArmFrame,
 }
 
 /// All of them.
@@ -308,7 +308,7 @@ impl<'g> Arm<'g> {
         Self {
             grid,
             model: PhantomModel::premium_1_5(),
-            placement: Placement {
+            placement: ArmFrame {
                 home_mm: [x, y, grid.height(x, y).floor()],
             },
         }

@@ -21,7 +21,7 @@ pub(crate) const ROUGH: Friction = Friction {
     viscous_s: 0.001,
 };
 /// The states that are counted on them, too.
-const RUBBING: [&str; 4] = ["first contact", "sliding", "sliding fast", "resting"];
+const IN_CONTACT: [&str; 4] = ["first contact", "sliding", "sliding fast", "resting"];
 
 /// Targets by state.
 fn target(state: &str) -> Target {
@@ -62,7 +62,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     rows.extend(
         STATES
             .iter()
-            .filter(|(state, _)| RUBBING.contains(state))
+            .filter(|(state, _)| IN_CONTACT.contains(state))
             .map(|(state, make)| {
                 let scene = rough(scene(&grid));
                 let name = format!("{state}, rough");

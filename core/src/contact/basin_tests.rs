@@ -49,7 +49,7 @@ impl Single {
         Some([last[0]?, last[1]?])
     }
 
-    /// Whether columns whose ground, or air over it, is no farther from the HIP than `reach` join
+    /// Returns true if columns whose ground, or air over it, is no farther from the HIP than `reach` join
     /// two places.
     fn joins(&self, hip: [f64; 3], [from, to]: [[f64; 3]; 2], reach: f64) -> bool {
         const SIDE: usize = 200;

@@ -1,4 +1,4 @@
-//! How much of the force is felt at the boundary of the surface.
+//! Share of the force at the edge of the surface.
 //!
 //! In contact the proxy is held at the edge of a hole, at the border of the
 //! data, and before a tile that is not here. The force then fades with the
@@ -27,7 +27,7 @@ pub const RATE: f32 = RATE_PER_S / 1_000.0;
 /// included, never shares a slot of the window with the tile under the proxy.
 pub const FAR: u32 = TILE_CELLS as u32 - 1;
 
-/// Whether the cell under the HIP is too far from the proxy's to matter.
+/// Returns true if the cell under the HIP is too far from the proxy's to matter.
 #[inline]
 fn is_far(proxy: Cell, hip: Cell) -> bool {
     proxy.x.abs_diff(hip.x).max(proxy.y.abs_diff(hip.y)) >= FAR
@@ -40,7 +40,7 @@ pub(super) struct Target {
     /// in the HIP within [`FAR`] of the proxy's cell, and 1 beyond. What is missing
     /// counts as not there.
     pub(super) fade: f32,
-    /// Whether nothing fades as long as the HIP stays over its cell: there is a patch.
+    /// True if nothing fades as long as the HIP stays over its cell: there is a patch.
     pub(super) over_patch: bool,
 }
 

@@ -1,4 +1,4 @@
-//! How much one tick may do, counted in units of work.
+//! The budget of a tick, in work units.
 //!
 //! Every piece of work asks whether the budget has its units, and is put off to
 //! the next tick where it has not; what is done is counted, asked for or not. So a
@@ -85,7 +85,7 @@ impl Budget {
         }
     }
 
-    /// Whether so many units are left.
+    /// Returns true if so many units are left.
     #[must_use]
     #[inline]
     pub(super) const fn has(&self, units: u32) -> bool {

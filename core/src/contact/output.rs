@@ -1,4 +1,4 @@
-//! What one tick of the contact answers.
+//! The result of one tick of the contact.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -6,28 +6,28 @@ use serde::{Deserialize, Serialize};
 use crate::grid::GridPoint;
 use crate::terrain::TileIndex;
 
-/// What the proxy is doing.
+/// State of the proxy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ContactState {
     /// The HIP has not been seen above the surface yet: no force.
     #[default]
-    Waiting,
+    Unseeded,
     /// The proxy is free: it is where the HIP is, or on its way there.
     Free,
     /// The proxy is on the surface and the HIP below it.
     Touching,
     /// The surface that the proxy was on has come to an end: the last force fades
     /// away.
-    Fading,
+    Releasing,
 }
 
 /// One tick's answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactOutput {
-    /// What the proxy is doing.
+    /// State of the proxy.
     pub state: ContactState,
-    /// Where the proxy is.
+    /// Position of the proxy.
     pub proxy: GridPoint,
     /// From the HIP to the proxy in cells, times the boundary fade: what the spring
     /// stretches by. Zero unless touching or fading.

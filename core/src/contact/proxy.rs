@@ -28,7 +28,7 @@ use landing::Landing;
 #[derive(Clone, Debug)]
 enum Phase {
     /// The HIP has not been above the surface yet.
-    Waiting,
+    Unseeded,
     /// The last tick ended free, with the proxy in the HIP.
     Free,
     /// On a path through the air that is not at its end.
@@ -36,7 +36,7 @@ enum Phase {
     /// On the surface.
     OnSurface(OnSurface),
     /// The surface ended: the last force fades away.
-    Fading {
+    Releasing {
         proxy: GridPoint,
         displacement: Vec3,
         fade: f32,
@@ -50,17 +50,17 @@ impl Phase {
     const fn exits(&self) -> (&'static str, &'static [&'static str]) {
         match self {
             // The HIP is above the surface.
-            Self::Waiting => ("waiting", &["free"]),
+            Self::Unseeded => ("unseeded", &["free"]),
             // The path goes on in the next tick; it has hit the surface; it leads under it from
             // the side, or the HIP has leapt.
-            Self::Free => ("free", &["sweeping", "on surface", "waiting"]),
+            Self::Free => ("free", &["sweeping", "on surface", "unseeded"]),
             // The same, and the path is at its end.
-            Self::Sweeping(_) => ("sweeping", &["free", "on surface", "waiting"]),
+            Self::Sweeping(_) => ("sweeping", &["free", "on surface", "unseeded"]),
             // The HIP is free; the path to it goes on; the surface is lost; it has ended under the
             // HIP, or the HIP has leapt.
-            Self::OnSurface(_) => ("on surface", &["free", "sweeping", "fading", "waiting"]),
+            Self::OnSurface(_) => ("on surface", &["free", "sweeping", "releasing", "unseeded"]),
             // The force has faded, and the HIP is above the surface or not.
-            Self::Fading { .. } => ("fading", &["free", "waiting"]),
+            Self::Releasing { .. } => ("releasing", &["free", "unseeded"]),
         }
     }
 }
@@ -80,7 +80,7 @@ struct Sweeping {
 struct OnSurface {
     descent: Descent,
     leave: Leave,
-    /// How much of the force is felt: less than 1 at the boundary of the surface, and
+    /// Share of the force that is felt: less than 1 at the boundary of the surface, and
     /// while a contact comes in after a wait.
     fade: f32,
     departures: Departures,
@@ -152,7 +152,7 @@ impl Contact {
                 shortcuts: settings.shortcuts && is_smooth,
                 ..settings
             },
-            phase: Phase::Waiting,
+            phase: Phase::Unseeded,
             landing: None,
             rough,
             hip: GridPoint::default(),
@@ -180,14 +180,14 @@ impl Contact {
         &self.hip
     }
 
-    /// How much of the force is felt: less than 1 where it fades at the boundary of
+    /// Share of the force: less than 1 where it fades at the edge of
     /// the surface, or comes in after a wait.
     #[must_use]
     pub const fn boundary_fade(&self) -> f32 {
         match &self.phase {
             Phase::Sweeping(Sweeping { fade, .. })
             | Phase::OnSurface(OnSurface { fade, .. })
-            | Phase::Fading { fade, .. } => *fade,
+            | Phase::Releasing { fade, .. } => *fade,
             _ => 1.0,
         }
     }
@@ -215,7 +215,7 @@ impl Contact {
     }
 
     /// How rough the surface is from the next step on. A proxy that was held is judged again.
-    pub(crate) fn feels_friction(&mut self, friction: Friction) {
+    pub(crate) fn set_friction(&mut self, friction: Friction) {
         if let Some(rough) = &mut self.rough {
             self.at_rest &= !rough.takes(friction);
         } else if !friction.is_none() {
@@ -323,7 +323,7 @@ impl Contact {
             return self.step_on_rough_ground(window, hip);
         }
         let mut budget = Budget::new(self.settings.work_per_tick);
-        self.remembers_what_was_felt();
+        self.remember_contact();
         self.gives_up_beyond_window::<D>(&hip);
         if !hip.is_same(&self.hip) {
             self.redirect(window, hip, known, &mut budget);
@@ -340,7 +340,7 @@ impl Contact {
         let (from, to) = (self.hip.column(), hip.column());
         let way = from.x.abs_diff(to.x).max(from.y.abs_diff(to.y));
         if way > (D * TILE_CELLS) as u32 {
-            self.phase = Phase::Waiting;
+            self.phase = Phase::Unseeded;
         }
     }
 
@@ -354,7 +354,7 @@ impl Contact {
     }
 
     #[inline]
-    fn remembers_what_was_felt(&mut self) {
+    fn remember_contact(&mut self) {
         let ContactOutput {
             state,
             proxy,
@@ -407,8 +407,8 @@ impl Contact {
         budget: &mut Budget,
     ) -> Turn {
         match &mut self.phase {
-            Phase::Waiting => self.looks_around(window, hip, budget),
-            Phase::Fading { .. } => self.fades_out(window, hip, budget),
+            Phase::Unseeded => self.looks_around(window, hip, budget),
+            Phase::Releasing { .. } => self.fades_out(window, hip, budget),
             Phase::Free => self.flies(window, hip, budget),
             Phase::Sweeping(_) => self.sweeps(window, hip, budget),
             Phase::OnSurface(_) => self.descends(window, hip, budget),

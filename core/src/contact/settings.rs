@@ -1,10 +1,10 @@
-//! What does not change while a contact lasts.
+//! Settings of a contact, constant while it lasts.
 
 use super::budget::{WORK_PER_TICK, work_per_tick};
 use super::friction::Friction;
 use crate::rate::TickRate;
 
-/// What does not change while a contact lasts.
+/// Settings of a contact, constant while it lasts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSettings {
     /// Ticks a second: fades are bounded in time.
@@ -15,9 +15,9 @@ pub struct ContactSettings {
     /// Slower than this, in cells a second, a proxy that slides comes to rest:
     /// [`Self::STICKS_BELOW_MM_S`].
     pub sticks_below: f32,
-    /// How rough the surface is.
+    /// Friction of the surface.
     pub friction: Friction,
-    /// Whether the shortcuts are taken: free as before, and sliding within a patch.
+    /// True if the fast paths are taken: free as before, and sliding within a patch.
     /// Without them every answer has the same bits.
     pub shortcuts: bool,
 }

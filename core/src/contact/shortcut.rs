@@ -1,4 +1,4 @@
-//! What nearly every tick is, answered with fewer instructions: free as before, or
+//! Fast paths for nearly every tick: free as before, or
 //! sliding on within a gentle patch.
 //!
 //! Each answers with the bits that the whole contact (`proxy`) would answer with,
@@ -16,7 +16,7 @@ use super::tolerance::BESIDE_OF_NEAR_HIP;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::{CellBox, CellContent, Window};
 
-/// Whether a free HIP's path is clear, by one comparison or by a look at the nine
+/// Returns true if a free HIP's path is clear, by one comparison or by a look at the nine
 /// samples around it.
 #[inline]
 pub(super) fn is_free<const D: usize>(
@@ -32,7 +32,7 @@ pub(super) fn is_free<const D: usize>(
 /// A proxy at rest well inside a convex patch, all of its force felt.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Follow {
-    /// Where it rests.
+    /// Place where it rests.
     pub(super) point: SurfacePoint,
     /// A cell known to hold a patch, for the HIP to be over: nothing fades.
     over: Cell,

@@ -128,7 +128,7 @@ impl StraightWay {
         Some(low)
     }
 
-    /// Whether the distance is surely nowhere on the way up to `t = 1` more than at its start:
+    /// Returns true if the distance is surely nowhere on the way up to `t = 1` more than at its start:
     /// half the squares by no more than `noise`.
     pub(super) fn never_rises_above_start(&self, noise: f32) -> bool {
         // Of the mean slope from the start to `t`, which times `t` is the rise.
@@ -169,7 +169,7 @@ pub(super) fn steepest(su: f32, sv: f32, border: Side, way: Vec3) -> Vec3 {
     best
 }
 
-/// Whether a direction leads into the patch of a point on this border.
+/// Returns true if a direction leads into the patch of a point on this border.
 fn leads_in(way: Vec3, border: Side) -> bool {
     way.x * border.east as f32 <= 0.0 && way.y * border.north as f32 <= 0.0
 }

@@ -1,4 +1,4 @@
-//! What a tick looks at, by what the HIP does: patches searched, and
+//! Costs of a tick by the motion of the HIP: patches searched, and
 //! evaluations of the distance there.
 
 use core::cell::Cell;

@@ -1,4 +1,4 @@
-//! What every tick must keep, on terrain from flat to absurd.
+//! Invariants of every tick, on terrain from flat to absurd.
 
 use std::vec::Vec;
 
@@ -94,11 +94,11 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
         let at = std::format!("{name} tick {tick} hip {x:?} {felt:?}");
         assert!(felt.displacement.is_finite(), "{at}");
         match felt.state {
-            ContactState::Waiting | ContactState::Free => {
+            ContactState::Unseeded | ContactState::Free => {
                 assert_eq!(felt.displacement, Vec3::ZERO, "{at}");
             }
             // What it was on is not there any more.
-            ContactState::Fading => {}
+            ContactState::Releasing => {}
             ContactState::Touching => {
                 let z = truth.beside(proxy);
                 let bound = 2e-6 + slope * 3e-7 + z.abs() * 5e-7;
@@ -550,10 +550,10 @@ fn a_mirrored_way_along_grid_lines_is_felt_mirrored() {
 }
 
 /// A ground, the height around which it is felt, and how far up and down from there.
-type FeltGround = (fn(i32, i32) -> f32, f64, f64);
+type TestGround = (fn(i32, i32) -> f32, f64, f64);
 
 /// Ground of every kind.
-const GROUNDS: [FeltGround; 7] = [
+const GROUNDS: [TestGround; 7] = [
     (flat, 2.0, 0.6),
     (hills, 0.0, 3.5),
     (rough, 1.0, 1.2),
@@ -680,6 +680,6 @@ fn hip_that_leaps_beyond_the_window_begins_anew() {
     assert_eq!(state([2.5, 2.5, 1.0]), ContactState::Free);
     assert_eq!(state([2.5, 2.5, -0.5]), ContactState::Touching);
     assert_eq!(state([-60.5, 2.5, -0.5]), ContactState::Touching);
-    assert_eq!(state([4.5, 2.5, -0.5]), ContactState::Waiting);
+    assert_eq!(state([4.5, 2.5, -0.5]), ContactState::Unseeded);
     assert_eq!(state([4.5, 2.5, 0.5]), ContactState::Free);
 }

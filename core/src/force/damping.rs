@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::passivity::{MAX_MJ, Moment, Motion, Passivity, Takes};
-use super::{FeltWith, SurfaceParams, clamp_length};
+use super::{EffectContext, SurfaceParams, clamp_length};
 use crate::scalar::{larger, smaller};
 
 /// What a shaded force may give on the way to an edge, and take beyond it, before it is turned
@@ -18,18 +18,18 @@ const SLOW_MM_S: f32 = 30.0;
 /// So much more may have been created before it is turned less, mJ.
 const LEAST_MJ: f32 = 0.1;
 
-/// How a surface takes energy out of a motion against it.
+/// Damping of a surface: dissipation of a motion against it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Damping {
     /// Newtons for a metre a second along the force. What it adds or takes is never more
     /// than the spring's force: it comes in with the depth, and never pulls.
     pub ns_per_m: f32,
-    /// Whether energy that the ticks create is taken back.
+    /// Dissipation of the energy leak of the sampled wall.
     pub controller: Controller,
 }
 
-/// Whether the passivity controller acts: it takes back the energy that a spring which is felt
+/// The passivity controller, on or off: it dissipates the energy that a spring which is sampled
 /// in ticks creates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -52,13 +52,13 @@ impl Damping {
         controller: Controller::On,
     };
 
-    /// Whether nothing else than usual is asked for.
+    /// Returns true if this is the default.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// Whether its number is one that a loop can work with.
+    /// Returns true if its number is one that a loop can work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         (0.0..=Self::MAX_NS_PER_M).contains(&self.ns_per_m)
@@ -77,7 +77,7 @@ impl Damper {
     /// Of a scene. Points have no hand that energy could be given to.
     // A call: it is made by two, once for a scene.
     #[inline(never)]
-    pub(crate) fn of(law: &SurfaceParams, felt: &FeltWith) -> Option<Self> {
+    pub(crate) fn of(law: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
         let is_controlled = felt.arm && law.is_controlled();
         let controller = is_controlled.then(|| Passivity::new(felt));
         (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {

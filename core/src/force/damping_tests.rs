@@ -16,8 +16,8 @@ fn damper(law: &SurfaceParams, hz: u32) -> Option<Damper> {
 }
 
 /// With an arm.
-fn felt(hz: u32, latency_s: f32) -> FeltWith {
-    FeltWith {
+fn felt(hz: u32, latency_s: f32) -> EffectContext {
+    EffectContext {
         cell_mm: 1.0,
         rate: TickRate::new(hz).expect("a rate"),
         latency_s,
@@ -69,7 +69,7 @@ fn the_controller_acts_on_every_arm_unless_it_is_off() {
     }
     assert_eq!(SurfaceParams::PREMIUM.damping.controller, Controller::On);
     // Points have no hand.
-    let points = FeltWith {
+    let points = EffectContext {
         arm: false,
         ..felt(1000, 0.1e-3)
     };
@@ -334,7 +334,7 @@ fn across_a_shaded_or_textured_force_nothing_is_taken() {
 }
 
 #[test]
-fn what_a_force_gives_that_comes_later_than_it_is_said_to_is_not_all_taken_back() {
+fn energy_of_unstated_latency_is_not_all_dissipated() {
     // So it matters that a board states how long it and its amplifiers take.
     let on = law(1.0, 0.0, Controller::On);
     let known = Taps::new(1000, 1.1e-3);

@@ -1,4 +1,4 @@
-//! How deep a tip is.
+//! Depth of a tip.
 
 use glam::Vec3;
 

@@ -1,9 +1,9 @@
-//! What a scene adds to the force of the spring.
+//! Effects that a scene adds to the force of the spring.
 
 use glam::Vec3;
 
-use super::in_force::MaterialInForce;
-use super::{Damper, FeltWith, MaterialTable, Shader, SurfaceParams, Texturer};
+use super::active_material::ActiveMaterial;
+use super::{Damper, EffectContext, MaterialTable, Shader, SurfaceParams, Texturer};
 use crate::contact::{Contact, Friction};
 use crate::scalar::root;
 use crate::terrain::{TileIndex, Window};
@@ -14,14 +14,14 @@ pub(crate) struct Effects {
     shader: Option<Shader>,
     texturer: Option<Texturer>,
     pub(crate) damper: Option<Damper>,
-    material: Option<MaterialInForce>,
+    material: Option<ActiveMaterial>,
     cell_mm: f32,
 }
 
 impl Effects {
     /// Of a scene without materials.
     #[inline(never)]
-    pub(crate) fn of(law: &SurfaceParams, felt: &FeltWith) -> Option<Self> {
+    pub(crate) fn of(law: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
         let shader = Shader::of(law.shading);
         let texturer = Texturer::of(&law.texture, felt.cell_mm, felt.rate);
         let damper = Damper::of(law, felt);
@@ -40,9 +40,9 @@ impl Effects {
     pub(crate) fn with_materials(
         table: &MaterialTable,
         law: &SurfaceParams,
-        felt: &FeltWith,
+        felt: &EffectContext,
     ) -> Option<Self> {
-        let material = MaterialInForce::of(table, law, felt.cell_mm, felt.rate)?;
+        let material = ActiveMaterial::of(table, law, felt.cell_mm, felt.rate)?;
         let mut damper = Damper::of(&table.hardest(law), felt);
         if let Some(damper) = &mut damper {
             damper.feels(material.law());
@@ -127,14 +127,12 @@ impl Effects {
 
     /// The law that is felt, where it is another than the scene's.
     pub(crate) fn law<'l>(&'l self, of_scene: &'l SurfaceParams) -> &'l SurfaceParams {
-        self.material
-            .as_ref()
-            .map_or(of_scene, MaterialInForce::law)
+        self.material.as_ref().map_or(of_scene, ActiveMaterial::law)
     }
 
     /// What holds the proxy back from the next tick on, in a scene with materials.
     pub(crate) fn friction(&self) -> Option<Friction> {
-        self.material.as_ref().map(MaterialInForce::friction)
+        self.material.as_ref().map(ActiveMaterial::friction)
     }
 
     /// A tile without which the last displacement is not that of the whole terrain.

@@ -16,8 +16,8 @@ const LAW: SurfaceParams = SurfaceParams {
     ..SurfaceParams::PREMIUM
 };
 
-fn felt() -> FeltWith {
-    FeltWith {
+fn felt() -> EffectContext {
+    EffectContext {
         cell_mm: 1.0,
         rate: TickRate::DEFAULT,
         latency_s: 0.0,
@@ -192,7 +192,7 @@ fn a_slide_over_facets_is_as_smooth_with_the_controller_as_without() {
 }
 
 #[test]
-fn without_the_controller_nothing_is_known_of_energy_and_all_of_it_is_turned() {
+fn shading_turns_all_force_without_the_controller() {
     let uncontrolled = SurfaceParams {
         damping: Damping {
             controller: Controller::Off,

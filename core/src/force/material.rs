@@ -2,7 +2,7 @@
 //!
 //! The host sorts the ground into classes, and tells the device which material of the table
 //! each sample has; so the device knows nothing of a file's own classes.
-//! `in_force.rs` beside this file has how one material follows another.
+//! `active_material.rs` beside this file has how one material follows another.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -12,17 +12,17 @@ use crate::contact::Friction;
 use crate::crc::{CRC, add};
 use crate::force::Damping;
 
-/// How long the surface takes from one material to the next, seconds. So a border of
+/// Time from one material to the next, seconds. So a border of
 /// classes changes a force by at most ten times a second what the two materials differ by.
 pub const MATERIAL_CHANGE_S: f32 = 0.1;
 
-/// What one class of ground feels like.
+/// Surface of one class of ground.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Material {
     /// Newtons for a millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,
-    /// How rough it is.
+    /// Its friction.
     pub friction: Friction,
     /// Damping along the force, N·s/m, as [`Damping::ns_per_m`].
     pub damping_ns_per_m: f32,
@@ -31,7 +31,7 @@ pub struct Material {
 }
 
 impl Material {
-    /// What a scene's law says of its surface.
+    /// Returns the material that a scene's surface parameters describe.
     #[must_use]
     pub const fn of(law: &SurfaceParams) -> Self {
         Self {
@@ -58,7 +58,7 @@ impl Material {
         }
     }
 
-    /// Whether its numbers are such that a loop can work with.
+    /// Returns true if its numbers are such that a loop can work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.law(&SurfaceParams::PREMIUM).is_valid()
@@ -97,7 +97,7 @@ impl MaterialTable {
         &self.materials
     }
 
-    /// Whether there is a default with a stiffness, and all numbers are such that a loop can
+    /// Returns true if there is a default with a stiffness, and all numbers are such that a loop can
     /// work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {

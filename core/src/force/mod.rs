@@ -1,10 +1,10 @@
 //! From proxy and haptic interface point to newtons.
 
+mod active_material;
 mod damping;
 mod depth;
+mod effect_context;
 mod effects;
-mod felt_with;
-mod in_force;
 mod material;
 mod passivity;
 mod relief;
@@ -22,8 +22,8 @@ pub use crate::scalar::clamp_length;
 use crate::scalar::smaller;
 pub(crate) use damping::Damper;
 pub use damping::{Controller, Damping};
+pub(crate) use effect_context::EffectContext;
 pub(crate) use effects::Effects;
-pub(crate) use felt_with::FeltWith;
 pub use material::{MATERIAL_CHANGE_S, Material, MaterialTable};
 pub(crate) use passivity::{Moment, Shares};
 pub use shading::{Shader, Shading};
@@ -39,9 +39,9 @@ pub struct SurfaceParams {
     pub stiffness_n_per_mm: f32,
     /// Largest force in newtons; the direction is kept.
     pub max_force_n: f32,
-    /// How rough the surface is.
+    /// Friction of the surface.
     pub friction: Friction,
-    /// What takes energy out of a motion against it.
+    /// Damping of a motion against it.
     pub damping: Damping,
     /// Which normals the force follows.
     pub shading: Shading,
@@ -60,7 +60,7 @@ impl SurfaceParams {
         texture: Texture::NONE,
     };
 
-    /// Whether stiffness and limit are finite and not negative, and friction, damping and texture
+    /// Returns true if stiffness and limit are finite and not negative, and friction, damping and texture
     /// are such.
     #[must_use]
     pub fn is_valid(&self) -> bool {

@@ -1,4 +1,4 @@
-//! How much energy the ticks have created at the tip, and the damping that takes it back
+//! The energy leak of the sampled wall at the tip, and the damping that dissipates it
 //! (Hannaford and Ryu 2002).
 //!
 //! A spring gives no more than it was given. One that is felt in ticks does: its force is that of
@@ -15,7 +15,7 @@ use glam::Vec3;
 
 use super::depth::Depth;
 use super::yielding::RateLimitSoftening;
-use super::{FeltWith, Spring, SurfaceParams};
+use super::{EffectContext, Spring, SurfaceParams};
 use crate::scalar::{larger, smaller};
 
 /// More than this is forgotten, mJ.
@@ -122,7 +122,7 @@ impl Shares {
 }
 
 impl Passivity {
-    pub(super) fn new(felt: &FeltWith) -> Self {
+    pub(super) fn new(felt: &EffectContext) -> Self {
         let tick_s = felt.rate.tick_s();
         let latency_s = felt.latency_s.max(0.0).min(MAX_LATE as f32 * tick_s);
         let late = latency_s / tick_s;

@@ -26,7 +26,7 @@ pub enum Shading {
 }
 
 impl Shading {
-    /// Whether there is none.
+    /// Returns true if there is none.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::None

@@ -15,7 +15,7 @@ const DEPTH: f64 = 0.01;
 const STEP: f64 = 0.01;
 
 /// What a HIP felt: where the proxy was, without shading and with it.
-struct Felt {
+struct ShadedTick {
     proxy: GridPoint,
     plain: Vec3,
     shaded: Vec3,
@@ -52,7 +52,7 @@ fn felt_along<const D: usize>(
     height: Height,
     friction: Friction,
     way: impl IntoIterator<Item = [f64; 2]>,
-) -> Vec<Felt> {
+) -> Vec<ShadedTick> {
     let settings = ContactSettings {
         friction,
         ..ContactSettings::AT_1_KHZ
@@ -65,7 +65,7 @@ fn felt_along<const D: usize>(
     way.map(|at| {
         let output = *contact.step(&field.window, &hip_over(height, at, -DEPTH));
         assert_eq!(output.state, ContactState::Touching, "at {at:?}");
-        Felt {
+        ShadedTick {
             proxy: output.proxy,
             plain: output.displacement,
             shaded: shader.shade(&field.window, &contact),
@@ -80,9 +80,9 @@ fn degrees(a: Vec3, b: Vec3) -> f32 {
 }
 
 /// Largest change of direction from one HIP to the next, degrees: without shading, and with it.
-fn largest_turns(felt: &[Felt]) -> (f32, f32) {
+fn largest_turns(felt: &[ShadedTick]) -> (f32, f32) {
     felt.windows(2).fold((0.0, 0.0), |(plain, shaded), pair| {
-        let turned = |of: fn(&Felt) -> Vec3| degrees(of(&pair[0]), of(&pair[1]));
+        let turned = |of: fn(&ShadedTick) -> Vec3| degrees(of(&pair[0]), of(&pair[1]));
         (
             f32::max(plain, turned(|felt| felt.plain)),
             f32::max(shaded, turned(|felt| felt.shaded)),

@@ -1,4 +1,4 @@
-//! What a texture is: the micro-relief that a scene asks for.
+//! Textures: the micro-relief of a scene.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use crate::rate::TickRate;
 /// Part of a wavelength that the proxy may go in a tick while the texture is felt in whole.
 pub(super) const WHOLE: f32 = 0.125;
 
-/// What a texture looks like.
+/// Pattern of a texture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]
@@ -26,11 +26,11 @@ pub enum Pattern {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Texture {
-    /// What it looks like.
+    /// Its pattern.
     pub pattern: Pattern,
-    /// How far it reaches above and below the surface, hand millimetres.
+    /// Largest height above and below the surface, device millimetres.
     pub amplitude_mm: f32,
-    /// From ridge to ridge on the map, hand millimetres; the shortest wavelength of grain,
+    /// From ridge to ridge on the map, device millimetres; the shortest wavelength of grain,
     /// which is made of rises and falls of half of that.
     pub wavelength_mm: f32,
     /// In which direction the ridges of a grating follow each other, degrees from east to north.
@@ -60,13 +60,13 @@ impl Texture {
     /// Wavelengths to a cell that places can be counted in.
     const WAVES_PER_CELL: (f32, f32) = (1.0 / 1_048_576.0, 1_048_576.0);
 
-    /// Whether the surface is even.
+    /// Returns true if the surface is even.
     #[must_use]
     pub fn is_none(&self) -> bool {
         self.pattern == Pattern::None
     }
 
-    /// Whether its numbers are such that a loop can work with.
+    /// Returns true if its numbers are such that a loop can work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let (shortest, longest) = Self::WAVELENGTHS_MM;
@@ -78,7 +78,7 @@ impl Texture {
                 && (-360.0..=360.0).contains(&self.direction_deg)
     }
 
-    /// Whether cells of such a size can carry it.
+    /// Returns true if cells of such a size can carry it.
     #[must_use]
     pub fn fits(&self, cell_mm: f32) -> bool {
         let (fewest, most) = Self::WAVES_PER_CELL;

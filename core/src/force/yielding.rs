@@ -26,7 +26,7 @@ const RECOVERS_MJ_PER_S: f32 = 5.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RateLimitSoftening {
     share: f32,
-    /// How long the tip has rested, s.
+    /// Time for which the tip has rested, s.
     rested_s: f32,
 }
 

@@ -65,14 +65,14 @@ impl GridPoint {
         Cell::new(self.cell[0], self.cell[1])
     }
 
-    /// Whether the point is over or under a line of the grid, on which patches meet.
+    /// Returns true if the point is over or under a line of the grid, on which patches meet.
     #[must_use]
     #[inline]
     pub const fn is_on_grid_line(&self) -> bool {
         self.frac[0] == 0.0 || self.frac[1] == 0.0
     }
 
-    /// Where in its cell the point lies, each component in `[0, 1)`.
+    /// Returns the position in the cell, each component in `[0, 1)`.
     #[must_use]
     pub const fn frac(&self) -> Vec3 {
         Vec3::from_array(self.frac)
@@ -110,7 +110,7 @@ impl GridPoint {
         Self::new([x, y, z], Vec3::new(fx, fy, fz))
     }
 
-    /// Whether this point is lower than `other`.
+    /// Returns true if this point is lower than `other`.
     #[must_use]
     #[inline]
     pub fn is_below(&self, other: &Self) -> bool {
@@ -118,7 +118,7 @@ impl GridPoint {
         here < there || (here == there && self.frac[2] < other.frac[2])
     }
 
-    /// Whether this is `other`, bit for bit.
+    /// Returns true if this is `other`, bit for bit.
     ///
     /// Every tick of a HIP at rest asks it, so it is written in a way that does not
     /// become a call of `memcmp`.

@@ -7,26 +7,26 @@ use super::mode::Mode;
 use crate::rate::TickRate;
 use crate::scalar::smaller;
 
-/// How long something may block an arm command before it is refused, ms.
+/// Time for which something may block an arm command before it is refused, ms.
 const BLOCKED_TIMEOUT_MS: u32 = 50;
-/// How long it may wait for the dead-man switch, ms.
+/// Time for which it may wait for the dead-man switch, ms.
 const SWITCH_TIMEOUT_MS: u32 = 30_000;
 /// For how long the force has to stay small, ms.
 const CONFIRM_MS: u32 = 100;
-/// How long force takes to come in, ms.
+/// Time that force takes to come in, ms.
 const RAMP_MS: u32 = 2_000;
-/// How long it takes to go out, ms.
+/// Time that it takes to go out, ms.
 pub(crate) const FADE_MS: u32 = 100;
 
 /// The force that counts as small, N.
 pub const SMALL_FORCE_N: f32 = 0.2;
 
-/// What became of the arm commands so far.
+/// Outcome of the arm commands so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Decision {
     /// Arm commands decided, wrapping.
     pub count: u8,
-    /// Why the last of them was refused; nothing if it was granted.
+    /// Reasons for the refusal of the last one; empty if it was granted.
     pub refused: Blockers,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct Arming {
     since: u32,
     /// Ticks that something has blocked a request.
     blocked: u32,
-    /// Whether the request in force has been decided.
+    /// True if the request in force has been decided.
     decided: bool,
     pub(super) decision: Decision,
     /// The switch was seen open during the request.

@@ -1,4 +1,4 @@
-//! What went wrong: numbered, stable, latched.
+//! Faults: numbered, stable, latched.
 
 use serde::{Deserialize, Serialize};
 
@@ -93,7 +93,7 @@ impl Fault {
         self as u8
     }
 
-    /// What it means, in a sentence for the user.
+    /// Returns its meaning, in a sentence for the user.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         match self {
@@ -125,7 +125,7 @@ impl Fault {
         }
     }
 
-    /// What the user can do about it. Clearing it comes after that.
+    /// Returns the remedy, for the user. Clearing it comes after that.
     #[must_use]
     pub const fn what_to_do(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! What the amplifiers say about themselves: whether they are ready, and which currents
+//! Feedback of the amplifiers: whether they are ready, and which currents
 //! flow.
 
 use glam::Vec3;
@@ -6,23 +6,23 @@ use glam::Vec3;
 use super::{Fault, GuardInputs};
 use crate::rate::TickRate;
 
-/// How long after the enable an amplifier need not be ready yet, ms. An ESCON's digital
+/// Time for which after the enable an amplifier need not be ready yet, ms. An ESCON's digital
 /// inputs switch within 8 ms.
 const ENABLE_MS: u32 = 10;
-/// How long an amplifier that was ready may say that it is not, ms: a spike on the wire.
+/// Time for which an amplifier that was ready may say that it is not, ms: a spike on the wire.
 const SPIKE_MS: u32 = 2;
 /// Time constant of the comparison of currents, ms. Twice what it takes an amplifier that
 /// reads duty cycles at 1 kHz to follow the fastest change of force (5.5 A in 8 ms, each
 /// current 1 ms late) without coming near the tolerance.
 const COMPARE_MS: u32 = 20;
 
-/// How far a measured current may be from its command, A, averaged over the comparison's
+/// Largest difference of a measured current from its command, A, averaged over the comparison's
 /// 20 ms. A tenth of an amplifier's range: three times what an ESCON's reading of a duty
 /// cycle may be wrong. What is 2 A off is found within 15 ms, an amplifier that pushes at
 /// its peak by itself within 5 ms.
 pub const CURRENT_TOLERANCE_A: f32 = 0.55;
 
-/// How far a measured current may be from its command without its sign, A, averaged as
+/// Largest difference of a measured current from its command without its sign, A, averaged as
 /// above. An error that changes its sign, as that of an amplifier whose own loop
 /// oscillates, is nothing on the average with its sign. Twice the tolerance: the fastest
 /// change of force, to and fro in every tick, is 0.69 A away for an amplifier that is 1 ms
@@ -46,7 +46,7 @@ pub(super) struct Feedback {
     /// The command of the tick before the last, A: a monitor is converted at the
     /// beginning of a tick and read in the next.
     before_a: Vec3,
-    /// Whether currents were measured in the last tick with the amplifiers off, or since.
+    /// True if currents were measured in the last tick with the amplifiers off, or since.
     is_measured: bool,
     /// What was measured in this tick, A, without its sign; zero where nothing was.
     measured_a: Vec3,
@@ -72,7 +72,7 @@ impl Feedback {
         }
     }
 
-    /// Whether an amplifier that is on says for too long that it is not ready.
+    /// Returns true if an amplifier that is on says for too long that it is not ready.
     pub(super) fn is_unready(&mut self, sense: &GuardInputs) -> bool {
         self.on = self.on.saturating_add(1);
         let counts = sense.amplifier_not_ready && self.on > self.enable_ticks;
@@ -80,7 +80,7 @@ impl Feedback {
         self.unready > self.spike_ticks
     }
 
-    /// Whether currents are measured.
+    /// Returns true if currents are measured.
     pub(super) const fn has_monitors(&self) -> bool {
         self.is_measured
     }

@@ -1,11 +1,11 @@
-//! What keeps the arm from being armed, and why output is reduced: two sets of
+//! Blockers of arming and reasons for reduced output: two sets of
 //! named bits. Neither is a fault.
 
 use bitflags::bitflags;
 use serde::{Deserialize, Serialize};
 
 bitflags! {
-    /// What keeps the amplifiers off. The bits are stable.
+    /// Reasons for which the amplifiers are off. The bits are stable.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     pub struct Blockers: u16 {
         /// There is no calibration record.
@@ -43,7 +43,7 @@ bitflags! {
 }
 
 bitflags! {
-    /// Why the force is not what the scene asked for. The bits are stable.
+    /// Reasons for a force below that of the scene. The bits are stable.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     pub struct Limits: u16 {
         /// The force was longer than the device may make.
@@ -78,7 +78,7 @@ bitflags! {
 }
 
 impl Blockers {
-    /// What only the user or the host can change: an arm command waits for it.
+    /// Blockers that only the user or the host can clear: an arm command waits for them.
     pub const BY_HAND: Self = Self::HOST_DISARMED
         .union(Self::DEAD_MAN_STILL_HELD)
         .union(Self::DEAD_MAN_RELEASED)
@@ -89,14 +89,14 @@ impl Blockers {
         self.iter_names().map(|(name, bit)| (name, bit.meaning()))
     }
 
-    /// What one bit means and what to do; of the lowest where there are more.
+    /// Returns the meaning of one bit and its remedy; of the lowest where there are more.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());
         match lowest {
             Self::NO_CALIBRATION => "there is no calibration record: calibrate the arm",
             Self::NOT_ZEROED => "where the joints are is not known: put the arm into its zero pose",
-            Self::NO_SCENE => "there is nothing to feel: run a terrain",
+            Self::NO_SCENE => "no scene is loaded: run a terrain",
             Self::REPLAY => "a trajectory is being replayed: end it first",
             Self::FAULT_LATCHED => "a fault is latched: see to its cause, then clear it",
             Self::EMERGENCY_STOP => "the emergency stop is pressed, or its wire is broken",
@@ -126,7 +126,7 @@ impl Limits {
         self.iter_names().map(|(name, bit)| (name, bit.meaning()))
     }
 
-    /// What one bit means; of the lowest where there are more.
+    /// Returns the meaning of one bit; of the lowest where there are more.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());
@@ -137,14 +137,20 @@ impl Limits {
             Self::THERMAL_DERATED => "a motor is warm and may have less current",
             Self::SPEED_LIMITED => "the tip is too fast for the full force",
             Self::RAMPING => "force is coming in after arming",
-            Self::FADING => "force is going out before disarming",
-            Self::TERRAIN_MISSING => "terrain that might be felt here is on its way",
-            Self::BOUNDARY_FADING => "the surface fades at its border, or comes in after a wait",
-            Self::CLUTCH_OPEN => "the clutch is open, so that nothing is felt",
-            Self::CLUTCH_MOVES => "the force goes out for a change of view, or comes in after one",
+            Self::FADING => "the force ramps down before disarming",
+            Self::TERRAIN_MISSING => "terrain that may be touched here has not arrived yet",
+            Self::BOUNDARY_FADING => {
+                "the force ramps down at the edge of the surface, or up after a wait"
+            }
+            Self::CLUTCH_OPEN => "the clutch is open: no force",
+            Self::CLUTCH_MOVES => {
+                "the force ramps down before a change of placement, or up after one"
+            }
             Self::CLUTCH_INPUT => "the board's clutch input is held",
-            Self::ENERGY_TAKEN_BACK => "the surface is damped, to take back energy of the ticks",
-            Self::TERRAIN_COARSE => "the ground is felt coarsely until its tile has come",
+            Self::ENERGY_TAKEN_BACK => {
+                "the surface is damped to dissipate the energy leak of the sampled wall"
+            }
+            Self::TERRAIN_COARSE => "the coarse fallback is rendered until the tile arrives",
             _ => "",
         }
     }

@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::{Guard, Mode};
 use crate::rate::TickRate;
 
-/// How long outputs are held at most, s.
+/// Longest time for which outputs are held, s.
 pub const HOLD_S: u32 = 60;
 
 /// What the outputs are held at.

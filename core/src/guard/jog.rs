@@ -34,7 +34,7 @@ pub const FAR_RAD: f32 = 0.2;
 /// one of its two channels dead an encoder still goes one up and one down.
 const STILL_COUNTS: f32 = 1.0;
 
-/// What a host asks for: a current in one motor for a time.
+/// A host's request: a current in one motor for a time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Jog {
     /// The axis, 0 to 2: which of the board's three commands.
@@ -42,12 +42,12 @@ pub struct Jog {
     /// The current that the amplifier is asked for, A, whatever the record says of the
     /// motor's sign. At most [`JOG_SHARE`] of the continuous current either way.
     pub current_a: f32,
-    /// How long it stays after it has come in, ms; at most [`JOG_MOST_MS`].
+    /// Duration at full current, ms; at most [`JOG_MOST_MS`].
     pub hold_ms: u16,
 }
 
 impl Jog {
-    /// Whether a device with this record would do it as it is.
+    /// Returns true if a device with this record accepts it unchanged.
     #[must_use]
     pub fn is_valid(&self, record: &Calibration) -> bool {
         let most = JOG_SHARE * record.continuous_current_a;
@@ -67,7 +67,7 @@ pub(super) struct JogRun {
     left: u32,
     /// Joint angles when the amplifiers came on.
     from_rad: Option<Vec3>,
-    /// Whether the axis' encoder has moved since.
+    /// True if the axis' encoder has moved since.
     moved: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What may reach the amplifiers: every failure ends in zero.
+//! The gate to the amplifiers: every failure ends in zero.
 //!
 //! A tick calls three functions in this order: [`Guard::watch`] checks the inputs
 //! and what was measured, and decides whether anything may be driven at all;
@@ -58,42 +58,42 @@ pub const MAX_COUNTS_PER_S: u32 = 128_000;
 /// limits are measured by hand.
 pub const LIMIT_MARGIN_RAD: f32 = 0.087;
 
-/// What the encoders, the safety inputs and the amplifiers say.
+/// Inputs of the guard: encoders, safety inputs and amplifiers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GuardInputs {
     /// Counts of axes 1 to 3 since power-up.
     pub counts: [i32; 3],
-    /// Whether the dead-man switch is held.
+    /// True if the dead-man switch is held.
     pub dead_man: bool,
-    /// Whether the emergency stop is pressed, or its wire broken.
+    /// True if the emergency stop is pressed, or its wire broken.
     pub emergency_stop: bool,
-    /// Whether the encoder or amplifier hardware says that it cannot work.
+    /// True if the encoder or amplifier hardware says that it cannot work.
     pub hardware_failed: bool,
-    /// Whether a converter's settings do not read back as they were written.
+    /// True if a converter's settings do not read back as they were written.
     pub outputs_not_as_set: bool,
-    /// Whether an amplifier says that it is not ready, or its wire is broken.
+    /// True if an amplifier says that it is not ready, or its wire is broken.
     pub amplifier_not_ready: bool,
     /// Currents that flow in motors 1 to 3, mA, as of the tick before; none where the
     /// amplifiers have no monitors.
     pub measured_ma: Option<[i16; 3]>,
-    /// Whether the clutch input is held, as it reads in this tick: it may bounce.
+    /// True if the clutch input is held, as it reads in this tick: it may bounce.
     pub clutch: bool,
 }
 
-/// What the guard is told in a tick besides the inputs.
+/// Conditions of a tick besides the inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct Surroundings<'a> {
     /// The arm and its pose, if there is a calibration.
     pub arm: Option<(&'a Kinematics, &'a Pose)>,
-    /// Whether the arm has been zeroed.
+    /// True if the arm has been zeroed.
     pub zeroed: bool,
-    /// What there is to feel.
+    /// Kind of the scene.
     pub scene: SceneKind,
-    /// Whether the watchdog is being fed.
+    /// True if the watchdog is being fed.
     pub watchdog_live: bool,
 }
 
-/// What there is to feel.
+/// Kind of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SceneKind {
     /// Nothing.
@@ -104,12 +104,12 @@ pub enum SceneKind {
     Points,
 }
 
-/// What the amplifiers are to be given.
+/// Commands to the amplifiers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuardOutputs {
     /// Motor currents of the three axes, amperes. Zero unless enabled.
     pub currents_a: Vec3,
-    /// Whether the amplifiers are to be on.
+    /// True if the amplifiers are to be on.
     pub enabled: bool,
     /// Shares of full scale, -1 to 1, that the outputs are held at while the amplifiers
     /// are off ([`Guard::hold`]). Zero while they are on.
@@ -119,19 +119,19 @@ pub struct GuardOutputs {
 /// The state of the guard after a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Report {
-    /// How far arming has come.
+    /// Progress of arming.
     pub mode: Mode,
-    /// What keeps the amplifiers off; nothing while they are on.
+    /// Reasons for which the amplifiers are off; empty while they are on.
     pub blockers: Blockers,
-    /// Why the last tick's force was less than asked for.
+    /// Reasons for which the last tick's force was reduced.
     pub limits: Limits,
     /// The latched fault.
     pub fault: Option<Fault>,
-    /// What became of the last arm command.
+    /// Outcome of the last arm command.
     pub decision: Decision,
 }
 
-/// What stands between the force that is wanted and the amplifiers.
+/// The guard between the wanted force and the amplifiers.
 ///
 /// ```
 /// use hapterra_core::Vec3;
@@ -227,7 +227,7 @@ impl Guard {
         self.motors.configure(mechanism.calibration());
     }
 
-    /// How far arming has come.
+    /// Progress of arming.
     #[must_use]
     pub const fn mode(&self) -> Mode {
         self.arming.mode
@@ -278,14 +278,14 @@ impl Guard {
         self.limits |= limits;
     }
 
-    /// How fast the tip of a driven arm moves, device frame, mm/s, by the readings of every
+    /// Returns the tip's velocity of a driven arm, device frame, mm/s, by the readings of every
     /// millisecond (FOAW).
     #[must_use]
     pub fn tip_velocity_mm_s(&self, mechanism: &Kinematics, pose: &Pose) -> Vec3 {
         self.speed.velocity_mm_s(mechanism, pose)
     }
 
-    /// How warm the motors are.
+    /// Returns the temperatures of the motors.
     #[must_use]
     pub const fn motors(&self) -> &Motors {
         &self.motors

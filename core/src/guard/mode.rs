@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How far arming has come. Amplifiers are on in `Ramping`, `Armed` and
+/// Progress of arming. Amplifiers are on in `Ramping`, `Armed` and
 /// `Fading`, and in no other.
 ///
 /// ```text
@@ -47,7 +47,7 @@ impl Mode {
         }
     }
 
-    /// Whether the amplifiers are on.
+    /// Returns true if the amplifiers are on.
     #[must_use]
     pub const fn drives(self) -> bool {
         matches!(self, Self::Ramping | Self::Armed | Self::Fading)

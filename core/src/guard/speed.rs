@@ -113,13 +113,13 @@ impl SpeedMonitor {
         pose.tip_velocity_mm_s(counts * self.hz * mechanism.radians_per_count())
     }
 
-    /// Whether the tip is below the limit in every pose.
+    /// Returns true if the tip is below the limit in every pose.
     fn is_surely_slow(&self, moved: [i32; 3]) -> bool {
         let slow = |axis: usize| moved[axis].unsigned_abs() <= self.surely_slow[axis];
         slow(0) && slow(1) && slow(2)
     }
 
-    /// Whether the last two readings alone tell that it is below the limit: FOAW
+    /// Returns true if the last two readings alone tell that it is below the limit: FOAW
     /// costs as much as all the rest of a tick.
     fn is_roughly_slow(&self, moved: [i32; 3], speed_of: impl Fn(Vec3) -> Vec3) -> bool {
         let [x, y, z] = moved.map(|moved| moved as f32);

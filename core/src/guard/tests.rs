@@ -457,7 +457,7 @@ fn currents_keep_their_direction_at_the_peak_and_say_so() {
 }
 
 #[test]
-fn a_motor_that_works_hard_is_derated_and_says_so_and_stays_below_its_limit() {
+fn hard_working_motor_is_derated_below_its_limit() {
     let mut bench = Bench::armed();
     bench.wanted_n = Vec3::Z * 6.0;
     let mut derated = None;

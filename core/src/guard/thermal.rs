@@ -1,4 +1,4 @@
-//! How warm the motors are, and what current they may still be given.
+//! Temperatures of the motors, and the currents that they still allow.
 //!
 //! A winding heats in seconds, the housing around it in minutes, so two nodes
 //! a motor. The winding's resistance is taken hot, which errs on the warm side.
@@ -34,7 +34,7 @@ pub const UNSEEN_K: f32 = 5.0;
 /// no farther, either: monitors without supply may tell of currents for hours that never flowed.
 const MAX_K: Vec3 = Vec3::splat(200.0);
 
-/// What the two nodes of each motor are above the air, K: all that the model has to
+/// Excess of the two nodes of each motor over the air, K: all that the model has to
 /// know of what was before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Temperatures {
@@ -58,7 +58,7 @@ impl Temperatures {
     ///
     /// A motor that begins here may have its continuous current at once, and its peak
     /// again after 70 s without load
-    /// (`from_hot_the_continuous_current_is_there_at_once_and_the_peak_after_a_minute`).
+    /// (`hot_motor_has_continuous_current_at_once_and_peak_later`).
     pub const HOT: Self = Self {
         winding_k: Vec3::splat((CONTINUOUS_C - AIR_C) * 3.1 / 17.1),
         housing_k: Vec3::splat((CONTINUOUS_C - AIR_C) * 14.0 / 17.1),
@@ -106,7 +106,7 @@ pub struct Motors {
     ticks: u32,
     /// The most that each axis may be given now, A.
     pub(super) allowed_a: Vec3,
-    /// Whether a winding is too hot to go on.
+    /// True if a winding is too hot to go on.
     pub(super) too_hot: bool,
 }
 
@@ -141,7 +141,7 @@ impl Motors {
         self.update_limits();
     }
 
-    /// What a board has to keep over a reset.
+    /// Returns the state that a board keeps over a reset.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {
         self.at
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn from_hot_the_continuous_current_is_there_at_once_and_the_peak_after_a_minute() {
+    fn hot_motor_has_continuous_current_at_once_and_peak_later() {
         let mut motors = Motors::new(khz(1));
         motors.begin_at(Temperatures::HOT);
         motors.configure(&Calibration::PREMIUM_1_5);

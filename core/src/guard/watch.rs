@@ -36,7 +36,7 @@ impl Guard {
         jumped
     }
 
-    /// Whether an encoder moved farther than it can.
+    /// Returns true if an encoder moved farther than it can.
     fn has_jumped(&mut self, counts: [i32; 3]) -> bool {
         let most = self.max_counts;
         let jumped = self.counts.is_some_and(|last| {

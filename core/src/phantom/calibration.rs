@@ -62,7 +62,7 @@ pub struct Calibration {
     pub peak_current_a: Vec3,
     /// Current a motor can bear for ever, A.
     pub continuous_current_a: Vec3,
-    /// How the motors warm.
+    /// Thermal model of the motors.
     pub thermal: Thermal,
     /// Largest force the device may make at the tip, N.
     pub max_force_n: f32,
@@ -130,7 +130,7 @@ impl JointLimits {
         }
     }
 
-    /// Whether a pose lies inside, give or take `margin_rad`. Not-a-number
+    /// Returns true if a pose lies inside, give or take `margin_rad`. Not-a-number
     /// lies outside.
     #[must_use]
     pub fn allow(&self, q: Vec3, margin_rad: f32) -> bool {
@@ -138,14 +138,14 @@ impl JointLimits {
         wide.each_allows(q) && wide.linkage_allows(q)
     }
 
-    /// Whether each joint by itself lies inside.
+    /// Returns true if each joint by itself lies inside.
     #[must_use]
     #[inline]
     pub fn each_allows(&self, q: Vec3) -> bool {
         q.cmpge(self.min_rad).all() && q.cmple(self.max_rad).all()
     }
 
-    /// Whether the linkage allows q2 and q3 together.
+    /// Returns true if the linkage allows q2 and q3 together.
     #[must_use]
     #[inline]
     pub fn linkage_allows(&self, q: Vec3) -> bool {

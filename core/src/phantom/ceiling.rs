@@ -1,4 +1,4 @@
-//! What no calibration record can raise: the ceilings of each model, and of the board.
+//! Absolute limits of each model and of the board, which no calibration record can raise.
 //!
 //! A record decides what the guard protects. One that is mistyped or hostile could name a
 //! motor that bears 20 A or that never warms, and the protection would be gone. So the
@@ -35,7 +35,7 @@ const STOPS_RAD: f32 = 5.0 * (core::f32::consts::PI / 180.0);
 const ROUNDING: f32 = 1e-4;
 
 impl Calibration {
-    /// Whether the record stays within its model's ceilings.
+    /// Checks that the record stays within its model's ceilings.
     pub(super) fn check_ceilings(&self) -> Result<(), CalibrationError> {
         let preset = self.model.preset();
         let (mine, theirs) = (&self.thermal, &preset.thermal);
@@ -97,7 +97,7 @@ impl Calibration {
         Ok(())
     }
 
-    /// Whether the arm is about as large, as finely counted and as free to turn as the model.
+    /// Checks that the arm is about as large, as finely counted and as free to turn as the model.
     fn check_geometry(&self, preset: &Self) -> Result<(), CalibrationError> {
         self.at_most(CalibrationField::L1, self.l1_mm, LINK_SHARE * preset.l1_mm)?;
         self.at_most(CalibrationField::L2, self.l2_mm, LINK_SHARE * preset.l2_mm)?;
@@ -123,7 +123,7 @@ impl Calibration {
         )
     }
 
-    /// Whether a radian of each joint has about as many counts as the model's. Where it has
+    /// Checks that a radian of each joint has about as many counts as the model's. Where it has
     /// not, the number that is farther from the preset's is named.
     fn check_counts(&self, preset: &Self) -> Result<(), CalibrationError> {
         let (least, most) = match preset.has_guessed_ratios() {
@@ -153,7 +153,7 @@ impl Calibration {
         Ok(())
     }
 
-    /// Whether the record asks for no current that the board cannot command.
+    /// Checks that the board can command every current of the record.
     /// `full_scale_a` is the current at the ends of its outputs' range, A.
     ///
     /// # Errors

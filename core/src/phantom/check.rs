@@ -1,4 +1,4 @@
-//! Whether a calibration record can be worked with, and what to do if not.
+//! Checks of calibration records, with remedies.
 
 use core::fmt;
 
@@ -84,7 +84,7 @@ impl CalibrationField {
         }
     }
 
-    /// What it is and where to get it from.
+    /// Returns its meaning and its source.
     #[must_use]
     pub const fn advice(self) -> &'static str {
         match self {
@@ -119,7 +119,7 @@ impl CalibrationField {
     }
 }
 
-/// Why a record cannot be worked with.
+/// Reason for which a record is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CalibrationError {
@@ -127,9 +127,9 @@ pub struct CalibrationError {
     pub field: CalibrationField,
     /// The axis, 1 to 3, where there is one for each.
     pub axis: Option<u8>,
-    /// What it is.
+    /// Its value.
     pub value: f32,
-    /// What it does not keep.
+    /// The bound that it breaks.
     pub bound: Bound,
 }
 
@@ -190,7 +190,7 @@ impl fmt::Display for CalibrationError {
 impl core::error::Error for CalibrationError {}
 
 impl Calibration {
-    /// Whether every number is one that the loop can work with, and within what the
+    /// Checks that the loop can work with every number, and that it is within what the
     /// model may have.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ use libm::{atan2f, sqrtf};
 
 use super::calibration::Calibration;
 
-/// Why no pose puts the tip there.
+/// Reason for which no pose puts the tip there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Unreachable {

@@ -43,7 +43,7 @@ fn workspace(record: &Calibration, step: usize) -> impl Iterator<Item = Vec3> {
 }
 
 #[test]
-fn the_tip_of_counts_is_within_a_micrometre_over_the_workspace_of_every_preset() {
+fn tip_from_counts_is_within_a_micrometre_for_every_preset() {
     for model in MODELS {
         for (sign, zero_rad) in [(1.0, Vec3::ZERO), (-1.0, Vec3::new(0.3, 0.5, 0.7))] {
             let record = Calibration {
@@ -70,7 +70,7 @@ fn the_tip_of_counts_is_within_a_micrometre_over_the_workspace_of_every_preset()
 }
 
 #[test]
-fn counts_are_those_of_the_pose_wherever_the_counters_stood_in_the_zero_pose() {
+fn counts_follow_the_pose_for_any_zero() {
     let record = Calibration {
         encoder_sign: Vec3::new(1.0, -1.0, 1.0),
         zero_rad: Vec3::new(0.0, 0.2, 0.3),

@@ -49,7 +49,7 @@ impl Model {
 }
 
 impl Calibration {
-    /// Whether the cable ratios are still a preset's for which nobody has published a
+    /// Returns true if the cable ratios are still a preset's without a published
     /// measurement: every model's but the Premium 1.5's. Positions and forces are then
     /// off by as much as the ratios are, so a calibration measures them.
     #[must_use]

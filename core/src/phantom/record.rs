@@ -29,7 +29,7 @@ struct Record {
     calibration: Calibration,
 }
 
-/// Why bytes are no calibration record.
+/// Reason for which bytes are no calibration record.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RecordError {
     /// They do not begin as a record does.

@@ -1,4 +1,4 @@
-//! How fast the joints turn, from their counts: first-order adaptive windowing
+//! Joint velocities from counts: first-order adaptive windowing
 //! (FOAW) with the best-fit slope (Janabi-Sharifi, Hayward & Chen 2000).
 //!
 //! A difference of two readings is off by up to one count, however slow the

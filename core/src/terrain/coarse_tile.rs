@@ -10,7 +10,7 @@ use super::index::{TILE_CELLS, TileIndex, TileKey};
 use super::tile::Tile;
 use crate::grid::{Cell, MAX_CELL};
 
-/// Where a coarse tile lies, and how coarse it is.
+/// Index and level of a coarse tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CoarseTile {
@@ -27,7 +27,7 @@ impl CoarseTile {
     /// The coarsest, as a power of two: all that positions can count.
     pub const MAX_SHIFT: u8 = 24;
 
-    /// Whether it is one that the loop can work with, in a scene of this level.
+    /// Returns true if it is one that the loop can work with, in a scene of this level.
     #[must_use]
     pub fn is_valid(&self, level: u8) -> bool {
         let Cell { x, y } = self.first;
@@ -71,7 +71,7 @@ impl CoarseTile {
         Some(([col, row], [east, north]))
     }
 
-    /// Whether it reaches under all of a tile of the scene's level.
+    /// Returns true if it reaches under all of a tile of the scene's level.
     pub(super) fn covers(&self, index: TileIndex) -> bool {
         let first = index.first_cell();
         let last = first.offset(TILE_CELLS as i32, TILE_CELLS as i32);

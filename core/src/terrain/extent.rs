@@ -1,4 +1,4 @@
-//! How large a field is, and boxes of its cells.
+//! Sizes of fields, and boxes of their cells.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ impl FieldSize {
         Self { columns, rows }
     }
 
-    /// Whether it is a size that a field can have: from 1 to [`MAX_CELL`] cells
+    /// Returns true if a field can have this size: from 1 to [`MAX_CELL`] cells
     /// each way.
     #[must_use]
     pub fn is_valid(self) -> bool {
@@ -45,7 +45,7 @@ impl FieldSize {
         (0..=last.row).flat_map(move |row| (0..=last.col).map(move |col| TileIndex::new(col, row)))
     }
 
-    /// Whether the field has the cell.
+    /// Returns true if the field has the cell.
     #[must_use]
     #[inline]
     pub const fn has_cell(self, cell: Cell) -> bool {
@@ -53,13 +53,13 @@ impl FieldSize {
         (cell.x as u32) < self.columns as u32 && (cell.y as u32) < self.rows as u32
     }
 
-    /// Whether the field has the tile.
+    /// Returns true if the field has the tile.
     #[must_use]
     pub fn has_tile(self, tile: TileIndex) -> bool {
         self.has(tile.col, tile.row, TILE_SHIFT)
     }
 
-    /// Whether some cell of the field lies in a square of 2ˢʰⁱᶠᵗ cells a side,
+    /// Returns true if some cell of the field lies in a square of 2ˢʰⁱᶠᵗ cells a side,
     /// given by its column and row among such squares.
     pub(super) fn has(self, col: i32, row: i32, shift: u32) -> bool {
         (0..=(self.columns - 1) >> shift).contains(&col)

@@ -52,7 +52,7 @@ impl TileIndex {
         )
     }
 
-    /// Whether it is another tile's neighbour, along a side or at a corner, or that tile itself.
+    /// Returns true if it is another tile's neighbour, along a side or at a corner, or that tile itself.
     #[must_use]
     pub(crate) fn is_beside(self, other: Self) -> bool {
         self.col

@@ -39,7 +39,7 @@ impl<const D: usize> MaxPyramid<D> {
         self.0[plane][row][col] = top;
     }
 
-    /// Where a node is: level `k` of the second plane is (D/2ᵏ)² long.
+    /// Returns the place where a node is: level `k` of the second plane is (D/2ᵏ)² long.
     #[inline]
     fn place(level: u32, col: i32, row: i32) -> [usize; 3] {
         if level == 0 {

@@ -1,4 +1,4 @@
-//! What the device holds of the height field, and how it asks for more.
+//! The device's part of the height field, and its requests for more.
 
 mod coarse_tile;
 mod extent;

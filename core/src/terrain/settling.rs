@@ -1,4 +1,4 @@
-//! How far each tile of a window may be from the underlay while it settles.
+//! Largest distance of each tile of a window from the coarse fallback while it blends in.
 //!
 //! A tile that comes where the underlay was felt does not take its place at once: each sample
 //! moves from the underlay's height to the tile's at a bounded rate. The sample of a tile that may
@@ -19,7 +19,7 @@
 
 use super::index::{TileIndex, wrap};
 
-/// How fast the surface moves from the underlay to a tile that has come, millimetres of the tip
+/// Speed of the surface from the coarse fallback to an arrived tile, millimetres of the tip
 /// a second. So a force changes by it at most by this times the stiffness: 25 N/s at 0.5 N/mm, where the
 /// guard lets 1,000 N/s through.
 pub const SETTLING_MM_S: f32 = 50.0;
@@ -30,7 +30,7 @@ pub(super) struct TileBlend<const D: usize> {
     pub(super) slots: [[Allowance; D]; D],
     /// How many tiles settle.
     pub(super) count: u16,
-    /// Whether the surface may have changed otherwise since the last tick.
+    /// True if the surface may have changed otherwise since the last tick.
     pub(super) has_changed: bool,
 }
 

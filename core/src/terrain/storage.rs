@@ -32,7 +32,7 @@ pub struct TileArena<const D: usize> {
     size: FieldSize,
 }
 
-/// Why heights are no field that a storage can hold.
+/// Reason for which a storage cannot hold heights as a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FieldError {
     /// No cells, or more than there is room for.
@@ -58,7 +58,7 @@ impl<const D: usize> TileArena<D> {
     pub const MAX_CELLS: i32 = {
         assert!(
             D <= MAX_CELL as usize / TILE_CELLS,
-            "that many cells cannot be told apart"
+            "that many cells cannot be addressed"
         );
         (D * TILE_CELLS) as i32
     };

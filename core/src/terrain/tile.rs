@@ -12,7 +12,7 @@ const QUARTERS: usize = BLOCKS / 2;
 /// vertical to a hand, and up to it the contact is exact.
 pub const MAX_STEP_CELLS: f32 = 1e4;
 
-/// Why the bytes of a tile were refused. The buffer is left vacant.
+/// Reason for which the bytes of a tile were refused. The buffer is left vacant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TileError {
@@ -143,7 +143,7 @@ impl Tile {
         self.has_materials.then_some(*material)
     }
 
-    /// Whether it is the surface over the patches of a tile of its level.
+    /// Returns true if it is the surface over the patches of a tile of its level.
     #[inline]
     pub(super) fn is_surface_of(&self, index: TileIndex) -> bool {
         self.index == index && self.content == Content::Surface
@@ -307,7 +307,7 @@ impl Tile {
         [south[u], south[u + 1], north[u], north[u + 1]]
     }
 
-    /// Whether `low` is above the corners of the patches in the columns and rows
+    /// Returns true if `low` is above the corners of the patches in the columns and rows
     /// from `from` to `to` (taken modulo 32), at most two each way. NaN samples do
     /// not count.
     #[must_use]
@@ -330,7 +330,7 @@ impl Tile {
         post.copied().unwrap_or(f32::NAN)
     }
 
-    /// Whether no sample is a hole.
+    /// Returns true if no sample is a hole.
     #[must_use]
     pub(super) const fn is_whole(&self) -> bool {
         self.is_whole
@@ -355,7 +355,7 @@ impl Tile {
             .saturating_add(1)
     }
 
-    /// Whether `low` is above every sample of the 8- or 16-cell block that
+    /// Returns true if `low` is above every sample of the 8- or 16-cell block that
     /// holds a cell.
     #[inline]
     pub(super) fn block_is_below(&self, shift: u32, cell: Cell, low: Altitude) -> bool {
@@ -368,7 +368,7 @@ impl Tile {
         low.above(self.base) > top
     }
 
-    /// Whether `low` is above every sample.
+    /// Returns true if `low` is above every sample.
     pub(super) fn is_below(&self, low: Altitude) -> bool {
         low.above(self.base) > self.highest
     }

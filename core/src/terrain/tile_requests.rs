@@ -14,7 +14,7 @@ use super::index::{TileIndex, TileKey, wrap};
 use super::underlay::{PARTS, Underlay};
 use crate::grid::Cell;
 
-/// How far ahead in time the HIP's path is looked at, ticks.
+/// Horizon of the HIP's extrapolated path, ticks.
 pub const HORIZON_TICKS: i32 = 200;
 /// Cells around proxy and HIP that are always wanted.
 pub const MARGIN_CELLS: i32 = 12;
@@ -27,7 +27,7 @@ const ANSWER_SHARE: f32 = 0.125;
 /// Places along the predicted path around which tiles are wanted.
 const LOOK_AHEAD: i32 = 8;
 
-/// Where the loop needs terrain, as the last tick left it, in cells.
+/// Position and motion for which the loop needs terrain, as the last tick left them, in cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RequestHint {
     /// The tile without which the tick could not be completed.
@@ -131,7 +131,7 @@ impl<const D: usize> TileRequester<D> {
         self.asked.len()
     }
 
-    /// Whether this tile was asked for; an answer nobody asked for is dropped.
+    /// Returns true if this tile was requested; any other answer is dropped.
     #[must_use]
     pub fn awaits(&self, key: TileKey) -> bool {
         self.asked.iter().any(|(asked, _)| *asked == key)
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn over_an_underlay_what_the_hip_has_left_before_it_can_come_is_not_asked_for() {
+    fn tiles_left_behind_are_not_requested_over_a_fallback() {
         for has_underlay in [false, true] {
             let mut requester = requester();
             if has_underlay {

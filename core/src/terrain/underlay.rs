@@ -13,7 +13,7 @@ use super::tile::Tile;
 use crate::grid::{Altitude, Cell};
 use crate::scalar::{larger, smaller};
 
-/// Where the tiles of an underlay lie.
+/// Position of the tiles of a coarse fallback.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Underlay {
@@ -27,7 +27,7 @@ pub struct Underlay {
 pub(super) const PARTS: usize = 2;
 
 impl Underlay {
-    /// Whether it is one that the loop can work with, in a scene of this level.
+    /// Returns true if it is one that the loop can work with, in a scene of this level.
     #[must_use]
     pub fn is_valid(&self, level: u8) -> bool {
         // Otherwise two tiles would have one name.
@@ -191,12 +191,12 @@ impl Coarse<'_> {
         Some([smaller(low, near[0]), larger(high, near[1])])
     }
 
-    /// Whether all of it is known to lie below `low`.
+    /// Returns true if all of it is known to lie below `low`.
     pub(super) fn is_below(&self, low: Altitude) -> bool {
         self.tiles().all(|tile| tile.is_below(low))
     }
 
-    /// Whether it has heights all over a tile of the scene's level.
+    /// Returns true if it has heights all over a tile of the scene's level.
     pub(super) fn covers(&self, index: TileIndex) -> bool {
         self.wide.0.covers(index) && self.tiles().all(Tile::is_whole)
     }

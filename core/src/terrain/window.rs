@@ -10,7 +10,7 @@ use super::tile::Tile;
 use super::underlay::Laid;
 use crate::grid::{Altitude, Cell};
 
-/// What lies in a cell.
+/// Content of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CellContent {
     /// A patch.
@@ -165,7 +165,7 @@ impl<'t, const D: usize> Window<'t, D> {
         spent
     }
 
-    /// Whether `key` names a tile of this field.
+    /// Returns true if `key` names a tile of this field.
     #[must_use]
     pub fn expects(&self, key: TileKey) -> bool {
         key.level == self.level && self.size.has_tile(key.index)
@@ -189,7 +189,7 @@ impl<'t, const D: usize> Window<'t, D> {
         self.slots[wrap::<D>(key.index.row)][wrap::<D>(key.index.col)].key()
     }
 
-    /// What lies in `cell`.
+    /// Returns the content of `cell`.
     #[must_use]
     #[inline]
     pub fn ground(&self, cell: Cell) -> CellContent {
@@ -230,7 +230,7 @@ impl<'t, const D: usize> Window<'t, D> {
         })
     }
 
-    /// Whether everything in the box is known to lie below `low`.
+    /// Returns true if everything in the box is known to lie below `low`.
     ///
     /// `false` may also mean "cannot tell cheaply". Compares one number for the
     /// whole field, then four nodes at most.
@@ -240,7 +240,7 @@ impl<'t, const D: usize> Window<'t, D> {
         low.cell() >= self.top || self.box_is_clear(span.clipped(self.size), low)
     }
 
-    /// Whether all samples around a box of two patches a side at most are
+    /// Returns true if all samples around a box of two patches a side at most are
     /// known to lie below `low`, by the nine samples themselves.
     ///
     /// `false` also where the box is larger, or not all in one tile that is held.
@@ -331,7 +331,7 @@ impl<'t, const D: usize> Window<'t, D> {
         tile.is_surface_of(index).then_some(tile)
     }
 
-    /// Whether the field has a cell there, be it a hole.
+    /// Returns true if the field has a cell there, be it a hole.
     #[inline]
     pub(crate) fn has_cell(&self, cell: Cell) -> bool {
         self.size.has_cell(cell)

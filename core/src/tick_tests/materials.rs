@@ -341,7 +341,7 @@ fn where_the_tile_has_no_materials_the_one_before_stays() {
     let mut at = |x: f32, z: f32| {
         seq += 1;
         let hip = GridPoint::new([300, 300, 0], Vec3::new(x, 0.5, z));
-        device.feel(seq, hip).force_n.z
+        device.step(seq, hip).force_n.z
     };
     at(5.0, 1.0);
     assert_eq!(at(5.0, -1.0), 0.4, "the default");
@@ -382,7 +382,7 @@ fn small_windows_that_wait_for_tiles_give_the_bits_of_a_large_one() {
             let z = ground + if down { -0.7 } else { 6.0 };
             let place = |c: f64| (c.floor() as i32, (c - c.floor()) as f32);
             let ((x, u), (y, v), (z, w)) = (place(x), place(y), place(z));
-            let sample = device.feel(i, GridPoint::new([x, y, z], Vec3::new(u, v, w)));
+            let sample = device.step(i, GridPoint::new([x, y, z], Vec3::new(u, v, w)));
             (sample.proxy, sample.force_n)
         });
         way.by_ref().collect()

@@ -3,7 +3,7 @@
 use super::*;
 use crate::clutch::ClutchHold::{self, InPlace, LetGo, WithHand};
 use crate::guard::MAX_SLEW_N_PER_S;
-use crate::scene::View;
+use crate::scene::SceneChange;
 
 /// Most that the force may change in a tick, N.
 const SLEW_N: f32 = MAX_SLEW_N_PER_S / 1000.0;
@@ -57,14 +57,14 @@ impl<'t> Watched<'t> {
     }
 
     /// Puts another view in, which has these heights.
-    fn put(&mut self, view: View, height: fn(i32, i32) -> f32) {
+    fn put(&mut self, view: SceneChange, height: fn(i32, i32) -> f32) {
         let scene = view.scene;
         self.device.height = height;
         self.device.size = scene.size;
         if !view.keeps_tiles {
             self.device.requester.reset(scene.level, scene.size);
         }
-        self.device.say(Command::View(view));
+        self.device.say(Command::SceneChange(view));
     }
 
     fn depth_mm(&self, cell_mm: f32) -> f32 {
@@ -82,9 +82,9 @@ fn coarse(x: i32, y: i32) -> f32 {
     0.5 * gentle(2 * x, 2 * y)
 }
 
-fn view(number: u8, level: u8, hip: GridPoint) -> View {
+fn view(number: u8, level: u8, hip: GridPoint) -> SceneChange {
     let size = (SIZE >> level, SIZE >> level);
-    View {
+    SceneChange {
         number,
         scene: Scene {
             epoch: 100 + u32::from(number),
@@ -105,7 +105,7 @@ fn halved(point: GridPoint) -> GridPoint {
 }
 
 #[test]
-fn while_the_clutch_is_held_there_is_no_force_and_the_terrain_goes_with_the_hand() {
+fn held_clutch_has_no_force_and_carries_the_terrain() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
     let felt = arm.tick();
@@ -148,7 +148,7 @@ fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
 }
 
 #[test]
-fn held_for_another_view_the_terrain_stays_in_its_place_and_the_press_comes_back() {
+fn terrain_stays_while_held_for_another_placement() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
     let felt = arm.tick();
@@ -253,7 +253,7 @@ fn the_boards_input_opens_the_clutch_and_all_who_hold_it_have_to_let_go() {
 }
 
 #[test]
-fn an_input_that_is_held_opens_the_clutch_of_the_next_scene_too_but_of_no_replay() {
+fn held_clutch_input_opens_next_scene_but_no_replay() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::armed(&mut tiles, plane);
     device.say(Command::ClutchInput(true));
@@ -262,7 +262,7 @@ fn an_input_that_is_held_opens_the_clutch_of_the_next_scene_too_but_of_no_replay
     device.requester.reset(0, points.size);
     device.say(Command::Scene(points));
     let at = |z| GridPoint::new([320, 320, 0], Vec3::new(0.5, 0.5, z));
-    assert_eq!(device.feel(0, at(9.0)).limits, Limits::empty());
+    assert_eq!(device.step(0, at(9.0)).limits, Limits::empty());
     let again = scene(Source::Encoders);
     device.requester.reset(0, again.size);
     device.say(Command::Scene(again));
@@ -373,7 +373,7 @@ fn without_its_tiles_a_view_is_not_felt_and_the_clutch_stays_open() {
     arm.clutch(WithHand);
     arm.ticks(110);
     let wanted = view(1, 1, halved(arm.last.sample.hip));
-    arm.device.say(Command::View(wanted));
+    arm.device.say(Command::SceneChange(wanted));
     arm.clutch(LetGo);
     let outcome = |arm: &mut Watched<'_>| {
         let sense = GuardInputs {
@@ -403,14 +403,14 @@ fn a_view_that_comes_while_force_is_felt_disarms_as_another_scene_does() {
     let mut arm = Watched::pressed(&mut tiles, gentle);
     let before = arm.last.sample.force_n;
     let wanted = view(1, 0, arm.last.sample.hip);
-    arm.device.say(Command::View(wanted));
+    arm.device.say(Command::SceneChange(wanted));
     let now = arm.device.tick(DEEP);
     assert_eq!(now.sample.mode, Mode::Fading);
     assert!((now.sample.force_n - before).length() < 0.1);
 }
 
 #[test]
-fn whatever_a_host_says_the_force_makes_no_step_and_little_energy_is_given() {
+fn no_host_makes_the_force_step() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
     let mut rng = 12_345_u32;
@@ -471,10 +471,10 @@ fn points_go_on_in_another_view() {
     let mut tiles = buffers::<4>();
     let mut device = replaying_on(&mut tiles, gentle);
     let at = |z| GridPoint::new([320, 320, 0], Vec3::new(0.5, 0.5, z));
-    assert_eq!(device.feel(0, at(9.0)).state, ContactState::Free);
-    let before = device.feel(1, at(2.0));
+    assert_eq!(device.step(0, at(9.0)).state, ContactState::Free);
+    let before = device.step(1, at(2.0));
     assert_eq!(before.state, ContactState::Touching);
-    let wanted = View {
+    let wanted = SceneChange {
         scene: Scene {
             source: Source::Points,
             ..view(1, 1, at(0.0)).scene
@@ -483,12 +483,12 @@ fn points_go_on_in_another_view() {
     };
     device.requester.reset(1, wanted.scene.size);
     (device.height, device.size) = (coarse, wanted.scene.size);
-    device.say(Command::View(wanted));
-    let after = device.feel(2, wanted.hip);
+    device.say(Command::SceneChange(wanted));
+    let after = device.step(2, wanted.hip);
     assert_eq!((after.state, after.view), (ContactState::Touching, 1));
     // As it does on an arm.
     assert!(after.force_n.length() < 0.1 * before.force_n.length());
-    let after = (3..40).map(|seq| device.feel(seq, wanted.hip)).last();
+    let after = (3..40).map(|seq| device.step(seq, wanted.hip)).last();
     let after = after.expect("points");
     assert!(after.force_n.length() > 0.5, "{}", after.force_n);
 }

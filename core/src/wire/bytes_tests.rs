@@ -18,7 +18,7 @@ use crate::force::{
 };
 use crate::grid::{Cell, GridPoint};
 use crate::guard::{Fault, Limits, Mode};
-use crate::scene::{Scene, Source, TickRecord, View};
+use crate::scene::{Scene, SceneChange, Source, TickRecord};
 use crate::terrain::{CoarseTile, FieldSize, TileIndex, TileKey, Underlay};
 
 fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
@@ -159,7 +159,7 @@ fn a_view_and_the_clutch() {
         hold_clock: false,
         materials: None,
     };
-    let view = View {
+    let view = SceneChange {
         number: 200,
         scene,
         hip: GridPoint::new([1, 2, -1], Vec3::ZERO),
@@ -173,7 +173,7 @@ fn a_view_and_the_clutch() {
         [float(0.0), float(0.0), float(0.0)].concat(),
         std::vec![1],
     ];
-    assert_eq!(bytes(&ToDevice::View(view)), wanted.concat());
+    assert_eq!(bytes(&ToDevice::SceneChange(view)), wanted.concat());
     let holds = [
         (ClutchHold::LetGo, 0),
         (ClutchHold::WithHand, 1),

@@ -1,4 +1,4 @@
-//! How host and device introduce themselves to each other.
+//! Introduction of host and device to each other.
 
 use core::fmt;
 
@@ -24,7 +24,7 @@ pub struct HostHello {
     pub silence_s: u16,
 }
 
-/// What tells two boards of a kind apart: the identifier that the chip's maker gave it,
+/// Identifier of a board among others of its kind: the one that the chip's maker gave it,
 /// 96 bits. Shown in upper-case hexadecimal digits, as the board's USB descriptor has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SerialNumber([u8; 12]);
@@ -39,7 +39,7 @@ impl SerialNumber {
         Self(identifier)
     }
 
-    /// Whether there is none.
+    /// Returns true if there is none.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::NONE

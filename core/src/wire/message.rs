@@ -14,7 +14,7 @@ use super::status::Status;
 pub use super::tile::{Heights, TileMessage};
 use crate::guard::Report;
 use crate::phantom::Calibration;
-use crate::scene::{HipCommand, Scene, TickRecord, View};
+use crate::scene::{HipCommand, Scene, SceneChange, TickRecord};
 use crate::terrain::TileKey;
 
 /// Samples in a telemetry message, at most.
@@ -65,7 +65,7 @@ pub enum ToDevice<'a> {
     /// Another view of the scene in force, while the clutch is open
     /// ([`Request::Clutch`]): the arm stays armed. Answered by [`ToHost::SceneAck`] with
     /// the epoch of the view's scene.
-    View(View),
+    SceneChange(SceneChange),
     /// As [`Self::Scene`], of a scene with materials.
     #[serde(borrow)]
     MaterialScene(MaterialScene<'a>),
@@ -85,7 +85,7 @@ pub enum ToHost {
     SceneAck {
         /// The scene's epoch.
         epoch: u32,
-        /// Whether the scene was valid and is now in force.
+        /// True if the scene was valid and is now in force.
         accepted: bool,
     },
     /// Asks for a tile.

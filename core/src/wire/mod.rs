@@ -1,4 +1,4 @@
-//! What travels between the device and the host: one link, one table of
+//! The link between device and host: one table of
 //! messages, one framing. This page is the specification of the conversation.
 //!
 //! # Frames
@@ -116,7 +116,7 @@
 //! - Each request is done once. The number of the last one again: it is answered again,
 //!   or is still under way. An older number (by less than 128, wrapping) is not heard.
 //!   To arm is answered when the loop has decided, to store when it is stored.
-//! - Another view of the scene in force ([`ToDevice::View`](message::ToDevice::View)) is put in
+//! - Another view of the scene in force ([`ToDevice::SceneChange`](message::ToDevice::SceneChange)) is put in
 //!   only while nothing is felt: with the clutch held ([`Request::Clutch`](request::Request::Clutch)) and
 //!   open, as a sample of the view in force says; in a replay between two points. It is answered as a scene is, also where
 //!   it is refused, and nothing is disarmed. The host says it every 0.4 s until it is answered, and gives

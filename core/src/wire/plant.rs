@@ -23,7 +23,7 @@ pub struct Currents {
     pub tick: u32,
     /// Motor currents of the three axes, amperes.
     pub currents_a: [f32; 3],
-    /// Whether the amplifiers are enabled.
+    /// True if the amplifiers are enabled.
     pub enabled: bool,
     /// Length of the board's tick, ns.
     pub tick_ns: u32,

@@ -1,4 +1,4 @@
-//! What a host asks a device to do, and the answer: each is done once, however
+//! Requests of a host and their answers: each is done once, however
 //! often it is asked.
 //!
 //! A request travels in [`ToDevice::Request`](super::message::ToDevice::Request)
@@ -66,7 +66,7 @@ pub enum Request {
     Mark,
 }
 
-/// Why a request was refused. Nothing was touched.
+/// Reason for which a request was refused. Nothing was touched.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 pub enum Refusal {
     /// The arm cannot be armed.
@@ -93,7 +93,7 @@ pub enum Refusal {
     /// Nobody pressed the dead-man switch within [`PRESS_MS`].
     ///
     /// [`PRESS_MS`]: super::status::PRESS_MS
-    #[error("nobody pressed the dead-man switch: the calibration is in force but not stored")]
+    #[error("the dead-man switch was not pressed: the calibration is in use but not stored")]
     NotPressed,
     /// The device's memory has no room left; it makes room when it starts.
     #[error(
@@ -113,6 +113,6 @@ pub enum Refusal {
 pub struct Answer {
     /// The request's number.
     pub number: u8,
-    /// Whether it was done; why not.
+    /// Outcome, or the reason for the refusal.
     pub result: Result<(), Refusal>,
 }

@@ -25,7 +25,7 @@ impl SessionNumber {
     }
 }
 
-/// What each frame of the link holds: a message and the session that it belongs to.
+/// Content of a frame of the link: a message and the session that it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InSession<M> {
     /// The session.
@@ -34,7 +34,7 @@ pub struct InSession<M> {
     pub message: M,
 }
 
-/// How many samples a session had.
+/// Number of samples in a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleCount {
     /// Samples that were put into messages and given to the line so far.
@@ -43,7 +43,7 @@ pub struct SampleCount {
     pub dropped: u32,
 }
 
-/// How a session ended.
+/// End of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SessionEnd {
@@ -67,7 +67,7 @@ pub struct LastSession {
     pub session: u32,
     /// The number of the hello that opened it.
     pub opened_by: u8,
-    /// How it ended.
+    /// Its end.
     pub end: SessionEnd,
     /// Its samples.
     pub count: SampleCount,
@@ -75,7 +75,7 @@ pub struct LastSession {
 
 /// Bounds of the time for which a host may be silent while the arm is armed, seconds.
 pub const SILENCE_S: (u16, u16) = (5, 3_600);
-/// What a host names as that time that only looks: it opens no session, and is no host
+/// Session number of a host that only looks: it opens no session, and is no host
 /// whose silence ends anything.
 pub const ONLY_LOOKS: u16 = 0;
 /// That time where the user says nothing, seconds.

@@ -1,4 +1,4 @@
-//! What a device reports about itself: how it booted, the state of its guard, what
+//! A device's report about itself: how it booted, the state of its guard, what
 //! it measures.
 
 use heapless::String;
@@ -9,7 +9,7 @@ use crate::guard::Fault;
 use crate::phantom::{CalibrationError, Model};
 use crate::scene::Health;
 
-/// Why the board last started.
+/// Cause of the board's last start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetCause {
@@ -28,7 +28,7 @@ pub enum ResetCause {
     BrownOut,
 }
 
-/// What kind of end the program came to.
+/// Kind of end of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -49,10 +49,10 @@ pub enum CrashKind {
 /// Bytes of a file's name that a crash keeps: its end.
 pub const CRASH_FILE: usize = 24;
 
-/// How the program ended before the board was reset.
+/// End of the program before the board was reset.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crash {
-    /// What kind of end.
+    /// Its kind.
     pub kind: CrashKind,
     /// Address of the instruction; zero where it is not known.
     pub pc: u32,
@@ -68,12 +68,12 @@ pub struct Crash {
     pub file: String<CRASH_FILE>,
 }
 
-/// What the board found when it started.
+/// Findings of the board at its start.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BootReport {
-    /// Why it started.
+    /// Cause of the start.
     pub cause: ResetCause,
-    /// How the program before had ended, if it crashed.
+    /// End of the program before, if it crashed.
     pub crash: Option<Crash>,
     /// Supply below which the chip holds itself in reset, as its option bytes have it,
     /// millivolts; zero where no chip says so.
@@ -85,7 +85,7 @@ pub struct BootReport {
 pub const RESETS_BELOW_MV: u16 = 2_600;
 
 impl BootReport {
-    /// Whether the chip would run on at a supply at which it need not work.
+    /// Returns true if the chip runs on at a supply at which it need not work.
     #[must_use]
     pub fn lacks_brown_out_reset(&self) -> bool {
         (1..RESETS_BELOW_MV).contains(&self.resets_below_mv)
@@ -109,7 +109,7 @@ impl BootReport {
     }
 }
 
-/// Where the calibration in force comes from.
+/// Source of the calibration in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CalibrationSource {
@@ -140,9 +140,9 @@ pub struct TickFigures {
 /// The stack, in bytes; zero where the board does not measure it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StackFigures {
-    /// How large it is.
+    /// Its size.
     pub size: u32,
-    /// How much of it was ever used.
+    /// Largest use so far.
     pub high_water: u32,
 }
 
@@ -164,9 +164,9 @@ pub enum UsbClock {
 pub struct Status {
     /// Board, versions, rates, scene.
     pub device: DeviceHello,
-    /// How it started.
+    /// Its start.
     pub boot: BootReport,
-    /// Where the calibration in force comes from, and of what model it is.
+    /// Source of the calibration in force, and its model.
     pub calibration: CalibrationSource,
     /// The calibration's model.
     pub model: Option<Model>,

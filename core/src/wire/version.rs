@@ -1,4 +1,4 @@
-//! How two ends of different protocols tell each other so.
+//! The version check between two ends of different protocols.
 //!
 //! These frames belong to no session. They are the same in every protocol, the first
 //! included: protocols 1 to 3 had a hello of variant 0 and a refusal of variant 1,
@@ -35,7 +35,7 @@ pub enum VersionCheck {
 }
 
 impl VersionCheck {
-    /// Whether a frame's decoded bytes are a version check and no part of a session.
+    /// Returns true if a frame's decoded bytes are a version check and no part of a session.
     #[must_use]
     pub fn is_in(content: &[u8]) -> bool {
         content.first().is_some_and(|first| *first < 128)

@@ -1,4 +1,4 @@
-//! How much of the stack was ever used.
+//! Largest use of the stack.
 //!
 //! cortex-m-rt paints it before `main` (feature `paint-stack`); what still
 //! bears the paint was never used.

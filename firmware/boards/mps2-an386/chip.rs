@@ -1,4 +1,4 @@
-//! What the application is made of on the emulated board.
+//! Parts of the application on the emulated board.
 
 use hapterra_firmware::native::VirtualAmplifiersOff;
 

@@ -26,7 +26,7 @@ const FRAME: usize = 64;
 
 static COUNTS: ConstStaticCell<Queue<Sensed, 4>> = ConstStaticCell::new(Queue::new());
 static CURRENTS: ConstStaticCell<Queue<Currents, 4>> = ConstStaticCell::new(Queue::new());
-/// Whether counts wait for a tick.
+/// True if counts wait for a tick.
 static COUNTS_WAIT: AtomicBool = AtomicBool::new(false);
 /// Raised when a tick has left its currents.
 pub(crate) static ANSWERED: Signal<CriticalSectionRawMutex, ()> = Signal::new();

@@ -16,7 +16,7 @@ use crate::registers::{TIMER_HZ, Timer, clock_timer, tick_timer};
 /// Counts between two ticks at 1 kHz.
 const PERIOD: u32 = TIMER_HZ / 1000;
 
-/// Why time stands still, as bits.
+/// Reason for which time stands still, as bits.
 #[derive(Clone, Copy)]
 pub(crate) enum Reason {
     /// The application said so: it has nothing to do, or waits for tiles.

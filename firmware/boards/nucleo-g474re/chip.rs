@@ -196,7 +196,7 @@ fn leave_mark() -> bool {
     }
 }
 
-/// Whether the flash has two banks, as the chip is sold. With one, its pages are others than
+/// Returns true if the flash has two banks, as the chip is sold. With one, its pages are others than
 /// those that the calibrations are kept in.
 fn has_two_banks() -> bool {
     pac::FLASH.optr().read().dbank()
@@ -210,7 +210,7 @@ fn compare_supply() {
     });
 }
 
-/// Whether the supply is below that level.
+/// Returns true if the supply is below that level.
 pub(crate) fn supply_is_low() -> bool {
     pac::PWR.sr2().read().pvdo()
 }

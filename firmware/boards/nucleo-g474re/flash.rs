@@ -13,7 +13,7 @@ use embassy_stm32::pac;
 
 use crate::stm32::failure;
 
-/// Whether a word could not be read since this was last cleared.
+/// True if a word could not be read since this was last cleared.
 static FAILED: AtomicBool = AtomicBool::new(false);
 /// The NMI, as an exception's number.
 const NMI: i16 = -14;

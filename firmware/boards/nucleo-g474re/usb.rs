@@ -9,7 +9,7 @@ use embassy_stm32::pac::usb::vals::Stat;
 use embassy_usb::driver::{Bus, EndpointAddress};
 use hapterra_firmware::usb::EndpointHalt;
 
-/// Where the loader is (AN2606): its vector table.
+/// Place where the loader is (AN2606): its vector table.
 pub(crate) const LOADER: u32 = 0x1FFF_0000;
 /// RCC_CRRCR, and its bit that switches the oscillator of USB on.
 pub(crate) const USB_OSCILLATOR: (u32, u32) = (0x4002_1098, 1 << 0);

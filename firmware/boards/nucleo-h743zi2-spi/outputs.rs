@@ -37,7 +37,7 @@ const SYNC_HIGH: u32 = CYCLES_PER_US / 4;
 /// Set for good when a frame did not go out: what the converter holds is then unknown,
 /// and the tick switches off.
 static FAILED: AtomicBool = AtomicBool::new(false);
-/// Whether the converter did not read back as it was set.
+/// True if the converter did not read back as it was set.
 static NOT_AS_SET: AtomicBool = AtomicBool::new(true);
 
 pub(crate) type Outputs = Ad5754<Bus>;
@@ -74,12 +74,12 @@ pub(crate) fn new(
     })
 }
 
-/// Whether a frame did not go out.
+/// Returns true if a frame did not go out.
 pub(crate) fn failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
 
-/// Whether the converter does not read back as it was set.
+/// Returns true if the converter does not read back as it was set.
 pub(crate) fn not_as_set() -> bool {
     NOT_AS_SET.load(Ordering::Relaxed)
 }

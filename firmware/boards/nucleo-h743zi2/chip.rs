@@ -242,7 +242,7 @@ fn compare_supply() {
     });
 }
 
-/// Whether the supply is below that level.
+/// Returns true if the supply is below that level.
 pub(crate) fn supply_is_low() -> bool {
     pac::PWR.csr1().read().pvdo()
 }

@@ -101,12 +101,12 @@ impl CurrentOutputs for Outputs {
     }
 }
 
-/// Whether the outputs have failed: a timer cannot tell.
+/// Returns true if the outputs have failed: a timer cannot tell.
 pub(crate) const fn failed() -> bool {
     false
 }
 
-/// Whether the outputs are not as they were set: a timer cannot tell.
+/// Returns true if the outputs are not as they were set: a timer cannot tell.
 pub(crate) const fn not_as_set() -> bool {
     false
 }

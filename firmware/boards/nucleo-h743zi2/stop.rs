@@ -30,7 +30,7 @@ const SYSCFG_CFGR: usize = 0x18 / 4;
 /// in use are breaks.
 const BREAKS: u32 = 1 << 2 | 1 << 3 | 1 << 6 | 1 << 13 | 1 << 14 | 1 << 15;
 
-/// Whether the enable pin is high.
+/// Returns true if the enable pin is high.
 fn amplifiers_are_on() -> bool {
     GPIOF.odr().read().odr(3) == Odr::HIGH
 }

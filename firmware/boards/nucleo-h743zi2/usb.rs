@@ -7,7 +7,7 @@ use embassy_stm32::pac::USB_OTG_FS;
 use embassy_usb::driver::{Bus, EndpointAddress};
 use hapterra_firmware::usb::EndpointHalt;
 
-/// Where the loader is (AN2606): its vector table.
+/// Place where the loader is (AN2606): its vector table.
 pub(crate) const LOADER: u32 = 0x1FF0_9800;
 
 /// RCC_CR, and its bit that switches the oscillator of USB on.

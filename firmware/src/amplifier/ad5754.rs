@@ -32,7 +32,7 @@ const RANGE_BITS: u16 = 0b111;
 const POWER_BITS: u16 = 0b111_1011_1111;
 /// What is read in turn: the ranges of A, B and C, the power register, the codes.
 const REGISTERS: u8 = 7;
-/// How long the part may take to power its outputs up, µs: twice what the data sheet asks
+/// Time that the part may take to power its outputs up, µs: twice what the data sheet asks
 /// for before the first code is written.
 const POWER_UP_US: u32 = 20;
 

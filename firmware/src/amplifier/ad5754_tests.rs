@@ -88,7 +88,7 @@ fn on() -> (On<Ad5754<Wires>, Pin>, Wires, Pin) {
 }
 
 #[test]
-fn it_is_zero_before_it_has_a_range_and_has_one_before_power_and_time_to_power_up() {
+fn converter_has_range_and_zero_before_power() {
     let (_off, wires, _) = off();
     let read_range = [[0x88, 0, 0]];
     let expected = [&SET_UP[..], &read_range, &ZERO].concat();
@@ -138,7 +138,7 @@ fn nothing_is_switched_on_before_all_of_it_read_back() {
 }
 
 #[test]
-fn a_converter_that_lost_its_range_or_is_overloaded_is_told_within_seven_ticks() {
+fn lost_range_or_overload_is_reported_within_seven_ticks() {
     for lose in [
         |part: &mut Part| part.range[2] = 0,
         |part: &mut Part| part.power = 0,

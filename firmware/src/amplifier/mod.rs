@@ -34,7 +34,7 @@ pub trait CurrentOutputs {
     /// Keeps the outputs ready in a tick with the power stages off.
     fn maintain(&mut self) {}
 
-    /// Whether the outputs are as they were set, as far as they can be asked. The power
+    /// Returns true if the outputs are as they were set, as far as they can be asked. The power
     /// stages are not switched on before that.
     fn are_as_set(&self) -> bool {
         true

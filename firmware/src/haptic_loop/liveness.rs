@@ -1,4 +1,4 @@
-//! Whether the watchdog is being fed, as the tick sees it.
+//! Check that the watchdog is being fed, as the tick sees it.
 //!
 //! The watchdog resets a board whose tasks hang. The tick need not wait for that:
 //! it sees that nothing feeds the watchdog and switches off first.

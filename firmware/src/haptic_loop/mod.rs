@@ -121,7 +121,7 @@ where
         drive
     }
 
-    /// What the board is to keep over a reset after this tick, if anything: a copy of the
+    /// Returns the state to keep over a reset after this tick, if any: a copy of the
     /// motors' temperatures, and which of the two it is. Called after each tick.
     pub fn motors_to_keep(&mut self) -> Option<(usize, Words)> {
         self.motor_log.tick(&self.haptics.temperatures())
@@ -139,7 +139,7 @@ where
         self.haptics.calibration()
     }
 
-    /// How warm the motors are by the thermal model.
+    /// Returns the temperatures of the motors by the thermal model.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {
         self.haptics.temperatures()

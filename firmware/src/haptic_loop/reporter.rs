@@ -1,4 +1,4 @@
-//! What the loop tells the link, and how often.
+//! Reports of the loop to the link.
 //!
 //! Samples go out a thousand times a second whatever the tick rate, because a link
 //! that is full of samples has no room for tiles. Where the guard stands goes out
@@ -35,7 +35,7 @@ impl Reporter {
         }
     }
 
-    /// Whether this tick's sample is sent.
+    /// Returns true if this tick's sample is sent.
     pub(super) fn sends_sample(&mut self, sample: &TickRecord) -> bool {
         // The first sample of a scene is always sent.
         let is_first = sample.tick == 1;
@@ -46,7 +46,7 @@ impl Reporter {
         self.ticks_since_sample == 0
     }
 
-    /// Whether this tick's report is sent; `mark` is the number of the latest mark that is over.
+    /// Returns true if this tick's report is sent; `mark` is the number of the latest mark that is over.
     pub(super) fn sends_report(&mut self, report: &Report, mark: u8) -> bool {
         self.ticks_since_report = self.ticks_since_report.saturating_add(1);
         self.ticks_since_report >= self.report_every || self.last_report != packed(report, mark)

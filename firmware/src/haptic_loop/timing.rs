@@ -1,4 +1,4 @@
-//! What a tick costs and whether it came in time, by the board's own timers.
+//! Cost and lateness of a tick, by the board's own timers.
 //!
 //! A tick that begins late is counted. A gap of more than one and a half periods is a fault:
 //! the timer's own count tells the time within a period only, so it cannot see that whole

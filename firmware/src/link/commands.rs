@@ -23,7 +23,7 @@ impl<'t, const D: usize> Link<'t, D> {
             command,
             Command::Scene(_)
                 | Command::DropScene
-                | Command::View(_)
+                | Command::SceneChange(_)
                 | Command::Clutch(_)
                 | Command::Mark(_)
                 | Command::Tile(_)

@@ -1,4 +1,4 @@
-//! What the link knows of the device (its arm, calibration and last start), and
+//! The link's knowledge of the device (its arm, calibration and last start), and
 //! what of it the host has yet to be told.
 
 use hapterra_core::guard::{Blockers, Fault, Limits, Mode, Report};
@@ -43,7 +43,7 @@ pub(crate) struct DeviceState {
     hello: DeviceHello,
     pub(super) boot: BootReport,
     pub(super) calibration: Option<Calibration>,
-    /// Where the calibration comes from.
+    /// Source of the calibration.
     pub(super) source: CalibrationSource,
     /// No calibration may ask for more, A.
     full_scale_a: f32,
@@ -128,18 +128,18 @@ impl DeviceState {
         (self.hello.tick_hz / 1000).max(1)
     }
 
-    /// Whether the amplifiers are on.
+    /// Returns true if the amplifiers are on.
     pub(super) const fn drives(&self) -> bool {
         self.health.report.mode.drives()
     }
 
-    /// Whether nothing is driven, no arm command waits for the loop and nothing for a
+    /// Returns true if nothing is driven, no arm command waits for the loop and nothing for a
     /// press.
     pub(super) fn is_at_rest(&self) -> bool {
         !self.drives() && self.arming.is_none() && !self.waits_for_press()
     }
 
-    /// Whether a calibration is stored when somebody presses the dead-man switch.
+    /// Returns true if a calibration is stored when somebody presses the dead-man switch.
     pub(super) const fn waits_for_press(&self) -> bool {
         matches!(self.storing, Storing::Waiting(_))
     }
@@ -192,7 +192,7 @@ impl DeviceState {
         mechanism.map_err(Refusal::Calibration)
     }
 
-    /// Whether an arm command is under way that has not switched anything on.
+    /// Returns true if an arm command is under way that has not switched anything on.
     pub(super) fn is_being_armed(&self) -> bool {
         self.may_drive && !self.drives()
     }

@@ -24,7 +24,7 @@ impl<const D: usize> Link<'_, D> {
         self.loader = LoaderEntry::Offered;
     }
 
-    /// Whether the board is to enter its loader: the host has asked for it, has been
+    /// Returns true if the board is to enter its loader: the host has asked for it, has been
     /// answered, the amplifiers are off, and the loop holds no output any more.
     #[must_use]
     pub fn enters_loader(&self) -> bool {
@@ -35,7 +35,7 @@ impl<const D: usize> Link<'_, D> {
             && self.device.may_change_settings().is_ok()
     }
 
-    /// Whether the board is on its way into its loader, where nothing else is done.
+    /// Returns true if the board is on its way into its loader, where nothing else is done.
     pub(super) fn is_leaving(&self) -> bool {
         self.loader == LoaderEntry::Wanted
     }

@@ -17,7 +17,7 @@ pub(super) fn opened(session: SessionNumber, last: SessionEnd, bad_frames: u32) 
 
 pub(super) fn ended() {
     #[cfg(feature = "defmt")]
-    defmt::info!("the host said goodbye; disarmed");
+    defmt::info!("the host closed the session; disarmed");
 }
 
 pub(super) fn forsaken() {

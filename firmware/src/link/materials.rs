@@ -12,12 +12,12 @@ use super::commands::CommandRoom;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KnownTable {
     sum: u32,
-    /// How many materials it has.
+    /// Number of materials that it has.
     count: usize,
 }
 
 impl<const D: usize> Link<'_, D> {
-    /// Whether the loop has the materials of a scene, or the scene has none.
+    /// Returns true if the loop has the materials of a scene, or the scene has none.
     pub(super) fn has_materials_of(&self, scene: &Scene) -> bool {
         let is_known = |sum: u32| self.materials.is_some_and(|known| known.sum == sum);
         scene.materials.is_none_or(is_known)

@@ -1,4 +1,4 @@
-//! What the link does with each message of the host.
+//! Handling of each message of the host.
 
 use hapterra_core::scene::{HipCommand, Scene};
 use hapterra_core::terrain::RETRY_TICKS;
@@ -75,7 +75,7 @@ impl<const D: usize> Link<'_, D> {
             (ToDevice::GetCalibration { number }, _) => self.tell_calibration(session, number),
             (_, SessionState::Leaving) => {}
             (ToDevice::Scene(scene), _) => self.take_scene(scene, room),
-            (ToDevice::View(view), _) => self.take_view(view, room),
+            (ToDevice::SceneChange(view), _) => self.take_view(view, room),
             (ToDevice::Tile(tile), _) => self.take_tile(&tile, None, room),
             (ToDevice::MaterialScene(scene), _) => self.take_material_scene(&scene, room),
             (ToDevice::MaterialTile(message), _) => {
@@ -229,7 +229,7 @@ impl<const D: usize> Link<'_, D> {
     fn forget_positions(&mut self) {
         self.view = 0;
         self.clutch = ClutchOfHost::LetGo;
-        self.focus = None;
+        self.request_hint = None;
         self.points.clear();
         self.replay = ReplayProgress::default();
     }

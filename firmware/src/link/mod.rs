@@ -117,7 +117,7 @@ pub struct Link<'t, const D: usize> {
     /// nothing has changed since. Its search is long, so it does not run at every
     /// tick.
     nothing_to_request_at: Option<u32>,
-    focus: Option<RequestHint>,
+    request_hint: Option<RequestHint>,
     last_record: QueuedTick,
     spare: Vec<&'t mut Tile, SPARES>,
     points: Deque<HipCommand, POINTS_AHEAD>,
@@ -154,7 +154,7 @@ impl<'t, const D: usize> Link<'t, D> {
             clutch: ClutchOfHost::default(),
             requester: TileRequester::new(),
             nothing_to_request_at: None,
-            focus: None,
+            request_hint: None,
             last_record: QueuedTick::default(),
             spare: spare.into_iter().collect(),
             points: Deque::new(),
@@ -205,7 +205,7 @@ impl<'t, const D: usize> Link<'t, D> {
         self.forget_conversation();
     }
 
-    /// Whether there is nothing for the loop to do until the host has spoken.
+    /// Returns true if there is nothing for the loop to do until the host has spoken.
     ///
     /// True without a scene, between the points of a replay, and, in a scene
     /// that asks for it ([`Scene::hold_clock`]), while the host owes a tile. An
@@ -229,19 +229,19 @@ impl<'t, const D: usize> Link<'t, D> {
             && self.device.is_at_rest()
     }
 
-    /// Whether the scene in force is rendered through the encoders.
+    /// Returns true if the scene in force is rendered through the encoders.
     fn renders_arm(&self) -> bool {
         self.scene.is_some_and(|s| s.source == Source::Encoders)
     }
 
-    /// Whether the arm is in use: the scene in force is rendered through the
+    /// Returns true if the arm is in use: the scene in force is rendered through the
     /// encoders, or force is still going out.
     #[must_use]
     pub fn drives_arm(&self) -> bool {
         self.renders_arm() || self.device.drives()
     }
 
-    /// What the board's status LED shows.
+    /// Returns the pattern of the board's status LED.
     #[must_use]
     pub fn led_pattern(&self) -> LedPattern {
         let touching = self.last_record.sample.state == ContactState::Touching;
@@ -261,7 +261,7 @@ impl<'t, const D: usize> Link<'t, D> {
         self.device.stored(result);
     }
 
-    /// Whether the host has heard that the arm is disarmed, and is gone.
+    /// Returns true if the host has heard that the arm is disarmed, and is gone.
     #[must_use]
     pub fn has_ended(&self) -> bool {
         self.session.state() == SessionState::Gone && self.tx.is_empty()

@@ -1,4 +1,4 @@
-//! What the link does when it is polled: it reads what the loop did, hands on what
+//! Polling of the link: it reads what the loop did, hands on what
 //! the loop needs, and fills the queue to the host.
 
 use hapterra_core::guard::Mode;
@@ -36,7 +36,11 @@ impl<const D: usize> Link<'_, D> {
             let ticks_per_ms = self.device.ticks_per_ms();
             // What was felt before the view that was put in says nothing about it.
             if record.sample.view == self.view {
-                self.focus = Some(tiles::focus(&self.last_record, &record, ticks_per_ms));
+                self.request_hint = Some(tiles::request_hint(
+                    &self.last_record,
+                    &record,
+                    ticks_per_ms,
+                ));
             }
             self.last_record = record;
             if record.answers.is_some() {

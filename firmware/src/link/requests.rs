@@ -1,4 +1,4 @@
-//! What the link does with requests: each is done once, whatever is repeated, and
+//! Handling of requests: each is done once, whatever is repeated, and
 //! answered when it is done.
 
 use hapterra_core::guard::Jog;
@@ -27,7 +27,7 @@ enum Progress {
 }
 
 impl Progress {
-    /// Whether there is an answer.
+    /// Returns true if there is an answer.
     const fn is_over(self) -> bool {
         matches!(self, Self::Done(_) | Self::Marked(_))
     }
@@ -43,7 +43,7 @@ pub(super) struct LatestRequest {
 }
 
 impl LatestRequest {
-    /// Whether a request of this number is new and to be done. One that was done
+    /// Returns true if a request of this number is new and to be done. One that was done
     /// already is answered again; an older one is not heeded any more.
     fn is_new(&mut self, number: u8) -> bool {
         let Some((latest, progress)) = self.latest else {

@@ -146,7 +146,7 @@ impl Session {
         self.state == SessionState::Open
     }
 
-    /// Whether there is a session of this number. What belongs to another is not
+    /// Returns true if there is a session of this number. What belongs to another is not
     /// heard.
     pub(super) fn is_of(&self, session: SessionNumber) -> bool {
         self.state != SessionState::Closed && self.number == session
@@ -210,7 +210,7 @@ impl Session {
         self.silence_ticks = u32::from(seconds.clamp(least, most)).saturating_mul(tick_hz);
     }
 
-    /// Whether the host of the open session has not been heard for [`ABSENT_MS`]; said once
+    /// Returns true if the host of the open session has not been heard for [`ABSENT_MS`]; said once
     /// until it is heard again.
     pub(super) fn is_absent(&mut self, tick: u32, ticks_per_ms: u32) -> bool {
         let silent = tick.wrapping_sub(self.heard_at);
@@ -218,7 +218,7 @@ impl Session {
         is_absent && !core::mem::replace(&mut self.told_absent, true)
     }
 
-    /// Whether the host of the session that is open, or was detached, has been silent for
+    /// Returns true if the host of the session that is open, or was detached, has been silent for
     /// too long.
     pub(super) fn is_forsaken(&self, tick: u32) -> bool {
         let has_begun = matches!(self.state, SessionState::Open | SessionState::Detached);

@@ -15,7 +15,7 @@ use super::Link;
 /// Bytes moved at once in either direction.
 const CHUNK: usize = 64;
 
-/// What the link's task needs from the board.
+/// Interface of the board for the link's task.
 pub trait LinkBoard {
     /// Waits for the next tick to have ended.
     fn tick_done(&self) -> impl Future<Output = ()>;

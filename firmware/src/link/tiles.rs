@@ -61,7 +61,7 @@ impl<'t, const D: usize> Link<'t, D> {
         let (true, Some(scene)) = (self.session.is_open(), self.scene) else {
             return;
         };
-        let focus = self.focus.unwrap_or_else(|| RequestHint {
+        let request_hint = self.request_hint.unwrap_or_else(|| RequestHint {
             proxy: scene.home.column(),
             hip: scene.home.column(),
             ..RequestHint::default()
@@ -73,8 +73,8 @@ impl<'t, const D: usize> Link<'t, D> {
         while self.tx.has_room() {
             // A tile that was asked for has its buffer already.
             let key = match self.spare.len() > self.requester.in_flight() {
-                true => self.requester.next_request(now, &focus),
-                false => self.requester.next_repeat(now, &focus),
+                true => self.requester.next_request(now, &request_hint),
+                false => self.requester.next_repeat(now, &request_hint),
             };
             let Some(key) = key else {
                 self.nothing_to_request_at = Some(now);
@@ -103,7 +103,11 @@ pub fn fill_tile(tile: &mut Tile, message: &TileMessage<'_>) -> Result<(), TileE
 
 /// Says where the loop needs terrain after `record`, which followed `last`. The
 /// velocity is in cells a millisecond, the tile requester's unit of time, at every tick rate.
-pub(super) fn focus(last: &QueuedTick, record: &QueuedTick, ticks_per_ms: u32) -> RequestHint {
+pub(super) fn request_hint(
+    last: &QueuedTick,
+    record: &QueuedTick,
+    ticks_per_ms: u32,
+) -> RequestHint {
     let (last, sample) = (&last.sample, &record.sample);
     let ticks = sample.tick.wrapping_sub(last.tick);
     // A new scene counts its ticks from one again, and a view has other cells: neither

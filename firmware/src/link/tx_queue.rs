@@ -68,7 +68,7 @@ fn in_session(session: SessionNumber, message: &ToHost, free: &mut [u8]) -> Opti
 pub(super) struct TxQueue {
     urgent: Frames<URGENT>,
     telemetry: Frames<MAX_TELEMETRY>,
-    /// Whether a zero goes first, which ends a frame that was cut off before.
+    /// True if a zero goes first, which ends a frame that was cut off before.
     starts_clean: bool,
 }
 
@@ -91,12 +91,12 @@ impl TxQueue {
         self.urgent.is_empty() && self.telemetry.is_empty() && !self.starts_clean
     }
 
-    /// Whether any one answer or request fits for sure.
+    /// Returns true if any one answer or request fits for sure.
     pub(super) fn has_room(&self) -> bool {
         self.urgent.room() >= MAX_URGENT
     }
 
-    /// Whether the writer has caught up with telemetry.
+    /// Returns true if the writer has caught up with telemetry.
     pub(super) fn wants_telemetry(&self) -> bool {
         self.telemetry.is_empty()
     }
@@ -120,7 +120,7 @@ impl TxQueue {
                 .push(|free| in_session(session, message, free))
     }
 
-    /// Whether telemetry waits that an urgent frame would overtake.
+    /// Returns true if telemetry waits that an urgent frame would overtake.
     pub(super) fn telemetry_waits(&self) -> bool {
         !self.telemetry.is_empty() && self.telemetry.sent == 0
     }

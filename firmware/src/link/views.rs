@@ -5,7 +5,7 @@
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::guard::Limits;
-use hapterra_core::scene::{Scene, Source, View};
+use hapterra_core::scene::{Scene, SceneChange, Source};
 use hapterra_core::terrain::RequestHint;
 use hapterra_core::tick::Command;
 use hapterra_core::wire::message::ToHost;
@@ -56,7 +56,7 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Puts another view in, and answers; one that was said twice is answered twice.
-    pub(super) fn take_view(&mut self, view: View, room: CommandRoom) {
+    pub(super) fn take_view(&mut self, view: SceneChange, room: CommandRoom) {
         let (epoch, ahead) = (view.scene.epoch, view.number.wrapping_sub(self.view));
         let is_again = ahead == 0 && self.scene == Some(view.scene);
         if !is_again && !(1..NEWER).contains(&ahead) {
@@ -70,7 +70,7 @@ impl<const D: usize> Link<'_, D> {
         self.say(&ToHost::SceneAck { epoch, accepted });
     }
 
-    /// Whether nothing is felt now: the clutch is open, as the loop has said since it is
+    /// Returns true if nothing is felt now: the clutch is open, as the loop has said since it is
     /// held, or it is a replay between two points.
     fn may_change_view(&self, scene: &Scene) -> bool {
         let latest = &self.last_record.sample;
@@ -86,7 +86,7 @@ impl<const D: usize> Link<'_, D> {
         })
     }
 
-    fn put_in(&mut self, view: View, room: CommandRoom) {
+    fn put_in(&mut self, view: SceneChange, room: CommandRoom) {
         let (scene, at) = (view.scene, view.hip.column());
         if !view.keeps_tiles {
             self.requester.reset(scene.level, scene.size);
@@ -96,7 +96,7 @@ impl<const D: usize> Link<'_, D> {
             self.requester.lay(scene.underlay);
         }
         self.requester.forget_asked();
-        self.focus = Some(RequestHint {
+        self.request_hint = Some(RequestHint {
             proxy: at,
             hip: at,
             ..RequestHint::default()
@@ -104,6 +104,6 @@ impl<const D: usize> Link<'_, D> {
         self.nothing_to_request_at = None;
         self.scene = Some(scene);
         self.view = view.number;
-        self.command(room, Command::View(view));
+        self.command(room, Command::SceneChange(view));
     }
 }

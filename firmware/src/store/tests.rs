@@ -18,7 +18,7 @@ struct Flash<const WRITE: usize, const ERASE: usize> {
     /// Steps (words written, blocks erased) until the power fails.
     left: usize,
     steps: usize,
-    /// Whether a word that was cut off cannot be read, as on chips with a check a
+    /// True if a word that was cut off cannot be read, as on chips with a check a
     /// word, or reads as what there is of it.
     checks: bool,
     /// Words that cannot be read.
@@ -45,7 +45,7 @@ impl<const WRITE: usize, const ERASE: usize> Flash<WRITE, ERASE> {
         }
     }
 
-    /// Whether this step is still done, and whether it is the one cut in half.
+    /// Checks that this step is still done, and whether it is the one cut in half.
     fn step(&mut self) -> Result<bool, Failed> {
         self.steps += 1;
         match self.left {
@@ -148,7 +148,7 @@ fn store<const W: usize, const E: usize>(
 
 /// An older firmware may have let it through.
 #[test]
-fn a_whole_record_above_a_ceiling_is_refused_by_name_and_no_older_one_is_taken() {
+fn record_above_a_limit_is_refused_without_falling_back() {
     let mut store = store(Flash::<8, 2048>::new(4096), 2048);
     let mut hostile = Calibration::PREMIUM_1_5;
     hostile.peak_current_a.y = 20.0;

@@ -20,7 +20,7 @@ use embassy_usb::driver::{
 /// The link's endpoint, the only one that can be halted.
 const LINK: usize = 1;
 
-/// How an endpoint's halt ends on a chip's USB peripheral.
+/// End of an endpoint's halt on a chip's USB peripheral.
 pub trait EndpointHalt {
     /// Ends the halt of an endpoint, if it has one, and makes DATA0 the toggle of its
     /// next packet, halt or not (USB 2.0, 9.4.5). An endpoint that is not in use stays

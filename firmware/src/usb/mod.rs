@@ -1,4 +1,4 @@
-//! How the boards present themselves on USB: one vendor-specific interface
+//! USB descriptors of the boards: one vendor-specific interface
 //! with a bulk endpoint in each direction, found by these numbers.
 //!
 //! Windows takes it without a driver (WinUSB, by Microsoft OS 2.0 descriptors);
@@ -24,7 +24,7 @@ pub use endpoint_filter::{EndpointFilter, EndpointHalt};
 pub const VENDOR_ID: u16 = 0x1209;
 /// Product: one of pid.codes' numbers for testing, until the project has its own.
 pub const PRODUCT_ID: u16 = 0x0001;
-/// What the product string says; the test numbers alone could be anybody's.
+/// The product string; the test numbers alone identify no vendor.
 pub const PRODUCT: &str = "hapterra";
 /// Class code of the link's interface: vendor-specific.
 pub const INTERFACE_CLASS: u8 = 0xFF;

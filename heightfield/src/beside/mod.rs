@@ -1,4 +1,4 @@
-//! What lies beside a file under the same name: a header (`.hdr`), a reference system
+//! Files beside a file under the same name: a header (`.hdr`), a reference system
 //! (`.prj`), a world file, a mask (`.msk`), overviews (`.ovr`), GDAL's notes (`.aux.xml`). A file on
 //! disk or at a URL has neighbours.
 
@@ -124,7 +124,7 @@ fn elsewhere(
     Ok(None)
 }
 
-/// Whether a file is a page of a web site, or empty: some servers have one for every name.
+/// Checks that a file is a page of a web site, or empty: some servers have one for every name.
 /// Of the neighbours, GDAL's notes alone begin like one.
 fn is_page(found: &FileBytes) -> Result<bool, RasterError> {
     let head = found.head(256)?;

@@ -164,14 +164,14 @@ impl Shared {
                 let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
                 if unread <= WARNINGS {
                     tracing::warn!(
-                        "columns {} to {}, rows {} to {} of {name} cannot be read and are a hole: {fault}",
+                        "columns {} to {}, rows {} to {} of {name} cannot be read and count as no data: {fault}",
                         part.column,
                         part.column + part.columns - 1,
                         part.row,
                         part.row + part.rows - 1
                     );
                 } else if unread == WARNINGS + 1 {
-                    tracing::warn!("more of {name} cannot be read and are holes");
+                    tracing::warn!("more of {name} cannot be read and count as no data");
                 }
                 Ok(Read {
                     block: None,

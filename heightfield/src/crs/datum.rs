@@ -1,4 +1,4 @@
-//! What a reference system's longitudes and latitudes count from, and how they become
+//! Datums of reference systems, and how their longitudes and latitudes become
 //! those of WGS 84.
 //!
 //! The way is a shift of three or seven parameters, by the text's own numbers or by
@@ -23,7 +23,7 @@ pub(crate) struct Datum {
     shift: Option<Shift>,
 }
 
-/// What longitudes and latitudes of a file are when they are said and asked for. They
+/// Meaning of a file's longitudes and latitudes in input and output. They
 /// always count from Greenwich, whatever the file's own prime meridian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LonLat<'r> {
@@ -104,7 +104,7 @@ impl Datum {
         }
     }
 
-    /// Whether its own degrees are those that are said, to 4 m.
+    /// Returns true if its own degrees are those that are said, to 4 m.
     pub(super) fn counts_lonlat(&self) -> bool {
         let is_shifted = matches!(self.shift, Some(Shift::Parameters { .. }));
         self.meridian == 0.0 && !is_shifted

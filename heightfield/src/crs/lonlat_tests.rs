@@ -1,10 +1,10 @@
-//! What longitudes and latitudes are, whatever the system counts itself.
+//! Longitudes and latitudes under systems of every kind.
 
 use super::*;
 
 const DEGREE_M: f64 = 111_000.0;
 
-/// Whether there is a libgdal, which describes texts without a code; says so where there is none.
+/// Returns true if there is a libgdal, which describes texts without a code; says so where there is none.
 pub(super) fn has_libgdal() -> bool {
     let library = heightfield_gdal::Library::load(heightfield_gdal::Settings::default());
     if let Err(why) = &library {

@@ -53,7 +53,7 @@ impl Projection {
     }
 }
 
-/// Whether two places are one: at a pole all longitudes are.
+/// Returns true if two places are one: at a pole all longitudes are.
 fn are_same(one: (f64, f64), other: (f64, f64)) -> bool {
     let north = (other.1 - one.1).to_radians();
     let turned = (other.0 - one.0).to_radians();

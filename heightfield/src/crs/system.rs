@@ -153,7 +153,7 @@ impl ReferenceSystem {
         &self.name
     }
 
-    /// Whether its places on the globe are known.
+    /// Returns true if its places on the globe are known.
     #[must_use]
     pub const fn has_lonlat(&self) -> bool {
         matches!(self.unit, Unit::Angle(_)) || self.projection.is_some()
@@ -164,7 +164,7 @@ impl ReferenceSystem {
         self.unit
     }
 
-    /// Whether the coordinates of another system are in the same unit.
+    /// Returns true if the coordinates of another system are in the same unit.
     pub(crate) fn has_unit_of(&self, other: &Self) -> bool {
         match (self.unit, other.unit) {
             (Unit::Length(Some(own)), Unit::Length(Some(other)))
@@ -173,7 +173,7 @@ impl ReferenceSystem {
         }
     }
 
-    /// What its longitudes and latitudes are.
+    /// Returns the meaning of its longitudes and latitudes.
     #[must_use]
     pub fn lonlat(&self) -> LonLat<'_> {
         self.datum
@@ -181,7 +181,7 @@ impl ReferenceSystem {
             .map_or(LonLat::Unstated, |datum| datum.lonlat())
     }
 
-    /// Whether its own coordinates are these longitudes and latitudes, to 4 m.
+    /// Returns true if its own coordinates are these longitudes and latitudes, to 4 m.
     #[must_use]
     pub fn counts_lonlat(&self) -> bool {
         let datum = self.datum.as_ref();

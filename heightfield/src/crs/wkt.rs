@@ -163,7 +163,7 @@ impl Node {
         }
     }
 
-    /// Whether its keyword is one of some.
+    /// Returns true if its keyword is one of some.
     pub(super) fn is(&self, keywords: &[&str]) -> bool {
         keywords.contains(&self.keyword.as_str())
     }
@@ -201,7 +201,7 @@ impl Node {
         (size.is_finite() && size > 0.0).then_some(size)
     }
 
-    /// Whether one of its axes points that way.
+    /// Returns true if one of its axes points that way.
     pub(super) fn has_axis(&self, direction: &str) -> bool {
         let axes = self.children.iter().filter(|child| child.is(&["AXIS"]));
         let mut ends = axes.filter_map(|axis| axis.values.get(1));

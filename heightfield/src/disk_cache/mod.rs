@@ -1,4 +1,4 @@
-//! What was worked out or fetched before, kept in a folder on disk that has a bound and may
+//! The disk cache: results and downloads in a folder that has a bound and may
 //! be deleted at any time.
 //!
 //! A record is one file. Its name is a hash of what it is about (`Name`): the file it was
@@ -97,7 +97,7 @@ impl DiskCache {
         Some(strategy.cache_dir().join("hapterra"))
     }
 
-    /// Whether it keeps anything.
+    /// Returns true if it keeps anything.
     pub(crate) const fn is_on(&self) -> bool {
         self.0.is_some()
     }

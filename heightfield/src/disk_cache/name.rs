@@ -25,7 +25,7 @@ impl Name {
         Self([hash(0), hash(0x6861_7074_6572_7261)])
     }
 
-    /// Where it is in the folder.
+    /// Returns the place where it is in the folder.
     pub(super) fn path(&self) -> PathBuf {
         let text = format!("{:016x}{:016x}", self.0[0], self.0[1]);
         let (folder, rest) = text.split_at(2);

@@ -1,4 +1,4 @@
-//! Whether a folder is the user's own: whoever else may write in it could lay records there that
+//! Check that a folder is the user's own: anyone else with write access could put records there that
 //! would be rendered, or a link by which other files would be deleted.
 
 use std::fs;

@@ -1,4 +1,4 @@
-//! How much the records of a folder take, and which of them go.
+//! Size of the records in a folder, and their removal.
 
 use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What tells a file from others, and from itself in another state.
+//! Stamp of a file: distinguishes it from others, and from itself in another state.
 
 use std::fs::Metadata;
 use std::path::Path;

@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_without_a_name_leaves_nothing_and_takes_half_of_what_is_free_at_most() {
+    fn unnamed_file_leaves_nothing_and_takes_half_the_free_space() {
         let folder = tempfile::tempdir().expect("a folder");
         let disk = DiskCache::at(folder.path(), 1);
         let mut first = disk.file_without_name(1 << 20).expect("a file");

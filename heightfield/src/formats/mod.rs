@@ -24,7 +24,7 @@ pub(super) const FORMATS: [Format; 6] = [
     headered::FORMAT,
 ];
 
-/// Whether a file that begins with some bytes is read here, and not by GDAL.
+/// Returns true if a file that begins with some bytes is read here, and not by GDAL.
 fn is_read_here(head: &[u8]) -> bool {
     FORMATS.iter().any(|format| (format.begins)(head))
 }

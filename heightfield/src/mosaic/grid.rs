@@ -48,7 +48,7 @@ impl Grid {
         })
     }
 
-    /// Where on it a file lies.
+    /// Returns the place of a file on it.
     ///
     /// # Errors
     /// [`RasterError::TilesDiffer`], with what differs.
@@ -141,7 +141,7 @@ impl Grid {
     }
 }
 
-/// Whether both systems see the corners of the second file in the same places: the same
+/// Returns true if both systems see the corners of the second file in the same places: the same
 /// system has many texts.
 fn same_places(ours: &Decoded, theirs: &Decoded) -> bool {
     const DEGREES: f64 = 1e-7;

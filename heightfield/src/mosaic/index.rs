@@ -29,7 +29,7 @@ struct Index {
     grid: Grid,
     tiles: Vec<Tile>,
     spots: Vec<Spot>,
-    /// Whether single floats hold all samples.
+    /// True if single floats hold all samples.
     is_single: bool,
 }
 
@@ -164,7 +164,7 @@ fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     Ok(outline)
 }
 
-/// Whether single floats hold all heights of a file.
+/// Returns true if single floats hold all heights of a file.
 fn is_single(outline: &Decoded) -> bool {
     let is_plain = (outline.scale, outline.offset) == (1.0, 0.0);
     let is_turned = (outline.scale, outline.offset) == (-1.0, 0.0);

@@ -74,7 +74,7 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
     Ok(files)
 }
 
-/// Whether a name is that of a file that holds a terrain and its place, perhaps packed. A
+/// Returns true if a name is that of a file that holds a terrain and its place, perhaps packed. A
 /// picture seldom does, and lies beside tiles to show them.
 pub(super) fn is_tile(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();

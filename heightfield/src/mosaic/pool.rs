@@ -80,7 +80,7 @@ impl Pool {
                 // That it holds nothing is no fault of a file among others.
                 if !matches!(fault, RasterError::AllNoData { .. }) {
                     let path = without_key(&source.path);
-                    tracing::warn!("{path} cannot be read and is a hole: {fault}");
+                    tracing::warn!("{path} cannot be read and counts as no data: {fault}");
                 }
                 Ok(None)
             }

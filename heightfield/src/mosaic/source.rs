@@ -20,7 +20,7 @@ pub(super) struct Source {
     /// The samples of the terrain that it has: columns from the west, rows from the
     /// **south**.
     pub(super) covers: Part,
-    /// Whether its columns begin in the east, and its rows in the north.
+    /// True if its columns begin in the east, and its rows in the north.
     pub(super) turned: [bool; 2],
 }
 

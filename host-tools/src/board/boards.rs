@@ -7,11 +7,11 @@ use super::memories::Memories;
 pub struct Board {
     /// Its name, which is also its image's.
     pub name: &'static str,
-    /// What probe-rs calls its chip; none for a board that is only emulated.
+    /// Name of its chip in probe-rs; none for a board that is only emulated.
     pub chip: Option<&'static str>,
     /// The memories of that chip.
     pub memories: Option<Memories>,
-    /// What it is.
+    /// Its description.
     pub what: &'static str,
 }
 

@@ -29,7 +29,7 @@ pub enum BuildError {
     Failed {
         /// The board.
         board: &'static str,
-        /// Where it was built.
+        /// Place where it was built.
         root: PathBuf,
     },
 }

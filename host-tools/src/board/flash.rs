@@ -18,7 +18,7 @@ pub struct Flashed {
     pub bytes: usize,
 }
 
-/// How far the writing is, bytes over all phases so far.
+/// Progress of writing, bytes over all phases so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Bytes done.
@@ -27,7 +27,7 @@ pub struct Progress {
     pub of: u64,
 }
 
-/// Why an image could not be written.
+/// Reason for which an image was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum FlashError {
     /// probe-rs does not know the chip.

@@ -22,7 +22,7 @@ pub struct Image {
     pub(super) memories: Memories,
     /// What goes into the chip's flash.
     pub(super) parts: Vec<Part>,
-    /// Where it goes, for people.
+    /// Its memories, for people.
     pub placed: Vec<Placed>,
 }
 
@@ -33,18 +33,18 @@ pub(super) struct Part {
     pub(super) bytes: Vec<u8>,
 }
 
-/// What an image takes of one of its chip's memories.
+/// Part of an image in one of its chip's memories.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Placed {
     /// First address and the one past the last of the memory.
     pub memory: Range<u64>,
-    /// Whether it keeps its content without power.
+    /// True if it keeps its content without power.
     pub is_flash: bool,
     /// Bytes taken.
     pub bytes: u64,
 }
 
-/// Why a file is no image for a board.
+/// Reason for which a file is no image for a board.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The board has no chip.
@@ -77,7 +77,7 @@ pub enum ImageError {
         path: PathBuf,
         /// The chip.
         chip: String,
-        /// Where the part begins.
+        /// Place where the part begins.
         address: u64,
         /// How long the part is, bytes.
         bytes: u64,

@@ -6,7 +6,7 @@
 pub struct Probe {
     /// Which kind of probe.
     pub kind: &'static str,
-    /// What it calls itself, if it does.
+    /// Its own name, if it has one.
     pub name: Option<String>,
     /// As probe-rs and `hapterra flash --probe` take it: `VID:PID[:SERIAL]`.
     pub selector: String,

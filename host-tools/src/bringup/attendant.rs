@@ -1,4 +1,4 @@
-//! What the user is asked to do, to read and to say.
+//! Instructions, readings and questions for the user.
 
 use std::fmt;
 
@@ -131,7 +131,7 @@ impl fmt::Display for Task {
     }
 }
 
-/// Where a scale pulls against the push of an axis.
+/// Returns the direction in which a scale pulls against the push of an axis.
 const fn against(axis: usize) -> &'static str {
     match axis {
         0 => "to your left",
@@ -158,12 +158,12 @@ pub enum Reading {
     MovedMm(Direction, u16),
     /// What the scale reads, grams; at rest, or at the moment that was called out.
     ScaleGrams {
-        /// Whether the motor pushed.
+        /// True if the motor pushed.
         pushed: bool,
     },
 }
 
-/// What becomes of the board while the enable line is measured.
+/// State of the board while the enable line is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardIs {
     /// It runs, disarmed.

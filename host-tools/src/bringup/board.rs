@@ -17,7 +17,7 @@ use crate::link::{Dialogue, LinkError};
 
 /// Between two looks, ms of the board's time.
 const LOOK_MS: u32 = 100;
-/// How long the board looks out for what the user was asked to do, in looks.
+/// Time for which the board looks out for what the user was asked to do, in looks.
 const LOOKS: usize = 600;
 /// Looks within which a board that was told to disarm has let the force out.
 const LOOKS_TO_DISARM: usize = 20;
@@ -27,7 +27,7 @@ const STILL_COUNTS: u32 = 3;
 /// A board on the link.
 pub(super) struct Board<'d, 't> {
     dialogue: &'d mut Dialogue<'t>,
-    /// Whether the attendant wants to stop.
+    /// True if the attendant wants to stop.
     stops: fn() -> bool,
     /// It was asked for something that drives, and has not confirmed that it is disarmed
     /// since.
@@ -242,7 +242,7 @@ impl<'d, 't> Board<'d, 't> {
         Ok(())
     }
 
-    /// Whether the board says that it is disarmed, once it was told to.
+    /// Checks that the board says that it is disarmed, once it was told to.
     fn disarm(&mut self) -> Result<bool, LinkError> {
         let answer = self.dialogue.request(&Request::Disarm)?;
         for _ in 0..LOOKS_TO_DISARM {

@@ -1,4 +1,4 @@
-//! What a step finds wrong, by name, with what to do about it.
+//! Findings of the steps, by name, with their remedies.
 
 use hapterra_core::guard::{Blockers, Fault};
 use hapterra_core::wire::request::Refusal;
@@ -6,7 +6,7 @@ use hapterra_core::wire::request::Refusal;
 use super::attendant::Task;
 use crate::calibrate::FitError;
 
-/// Why a step is not passed. Axes and joints are counted from 1.
+/// Reason for which a step is not passed. Axes and joints are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Finding {
     /// The board has a fault.
@@ -130,7 +130,9 @@ pub enum Finding {
         current_a: f32,
     },
     /// It cannot be told from the hand's own motion which way a motor turns.
-    #[error("it cannot be told which way motor {motor} turns: the hand moved more than the motor")]
+    #[error(
+        "the direction of motor {motor} cannot be determined: the hand moved more than the motor"
+    )]
     Unclear {
         /// The motor.
         motor: usize,
@@ -168,7 +170,7 @@ pub enum Finding {
 }
 
 impl Finding {
-    /// What to do, in the imperative.
+    /// Returns the remedy, in the imperative.
     #[must_use]
     pub fn what_to_do(&self) -> String {
         match self {
@@ -200,7 +202,7 @@ impl Finding {
             Self::SwappedMotors { .. } => "exchange the two motors' plugs, or the two commands",
             Self::NoPush { .. } => "check that the amplifier is there, has power and its enable, then fuse and motor cable",
             Self::Unclear { .. } => {
-                "hold the tip more loosely and as still as you can, and try again; if it stays so, a current may flow that nobody commands: measure the command at the amplifier again (--again-from outputs)"
+                "hold the tip more loosely and as still as you can, and try again; if it stays so, a current may flow without a command: measure the command at the amplifier again (--again-from outputs)"
             }
             Self::Drifts { .. } | Self::MovesByItself { .. } => "measure the arm's weight again: hapterra calibrate --measure zero,gravity",
             Self::StopLeavesPower => "wire the stop's second contact into the supply of the power stages; the board alone is not to be relied on",

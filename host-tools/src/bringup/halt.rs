@@ -1,10 +1,10 @@
-//! Why a step ends before it is passed.
+//! Reason for which a step ends before it is passed.
 
 use super::attendant::Stopped;
 use super::finding::Finding;
 use crate::link::LinkError;
 
-/// Why a step ends before it is passed.
+/// Reason for which a step ends before it is passed.
 #[derive(Debug, thiserror::Error)]
 pub enum Halt {
     /// The attendant stopped.

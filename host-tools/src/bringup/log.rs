@@ -66,16 +66,16 @@ fn fingerprint(record: &Calibration) -> String {
     format!("{sum:08x}")
 }
 
-/// What became of a step.
+/// Outcome of a step.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
     /// Which step.
     pub step: Step,
-    /// Whether it was passed.
+    /// True if it was passed.
     pub passed: bool,
     /// When, UTC.
     pub at: String,
-    /// What was measured, or what was wrong.
+    /// Measurement, or fault.
     pub result: String,
 }
 
@@ -90,7 +90,7 @@ pub struct Log {
     pub entries: Vec<Entry>,
 }
 
-/// Why a log cannot be kept.
+/// Reason for which a log cannot be kept.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// There is no home folder to keep it in.
@@ -121,7 +121,7 @@ pub enum LogError {
 }
 
 impl Log {
-    /// Where the log of a board is kept, in the user's data folder: a file for each board,
+    /// Returns the path of a board's log in the user's data folder: a file for each board,
     /// by its name and serial number.
     ///
     /// # Errors

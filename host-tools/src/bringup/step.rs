@@ -54,13 +54,13 @@ impl Step {
         Self::FirstTouch,
     ];
 
-    /// Whether what it finds depends on the calibration record.
+    /// Returns true if what it finds depends on the calibration record.
     #[must_use]
     pub fn depends_on_calibration(self) -> bool {
         self >= Self::Calibration
     }
 
-    /// What it is, for a heading.
+    /// Returns its heading.
     #[must_use]
     pub const fn title(self) -> &'static str {
         match self {
@@ -78,7 +78,7 @@ impl Step {
         }
     }
 
-    /// What has to be connected, and what not, before it begins; where that changes.
+    /// Returns the required wiring before it begins, where that changes.
     #[must_use]
     pub const fn wiring(self) -> Option<&'static str> {
         match self {

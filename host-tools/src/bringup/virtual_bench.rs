@@ -42,7 +42,7 @@ pub(super) enum Grip {
     Scale,
 }
 
-/// What is wrong between the board and its amplifiers and switches.
+/// Mistakes between the board and its amplifiers and switches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BenchMistakes {
     /// A command at its amplifier's input is off by so many volts.
@@ -73,9 +73,9 @@ pub struct VirtualBench {
     speed_m_s: f64,
     pub(super) dead_man: bool,
     pub(super) stop: bool,
-    /// Whether the stop's wire is off the board.
+    /// True if the stop's wire is off the board.
     pub(super) stop_wire_off: bool,
-    /// Whether each ready wire is off the board.
+    /// True if each ready wire is off the board.
     pub(super) ready_wire_off: [bool; 3],
     mistakes: BenchMistakes,
     drive: GuardOutputs,
@@ -148,7 +148,7 @@ impl VirtualBench {
         self.stop_wire_off || !closed
     }
 
-    /// Whether a ready input is high: pulled up, and nobody pulls it down.
+    /// Returns true if a ready input is high: pulled up, and nobody pulls it down.
     fn not_ready(&self) -> bool {
         (0..3).any(|axis| {
             let silent = self.mistakes.amplifier_missing[axis] || self.ready_wire_off[axis];
@@ -217,7 +217,7 @@ impl VirtualBench {
     }
 
     /// Feels the way to a point, from now on.
-    pub(super) fn feel(&mut self, to_m: DVec3) {
+    pub(super) fn step(&mut self, to_m: DVec3) {
         (self.goal_m, self.speed_m_s) = (to_m, SLOW_M_S);
     }
 
@@ -246,7 +246,7 @@ impl VirtualBench {
         if high { 3.3 } else { 0.0 }
     }
 
-    /// Whether the power stages have power.
+    /// Returns true if the power stages have power.
     pub(super) fn has_power(&self) -> bool {
         !self.stop || self.mistakes.stop_leaves_power
     }

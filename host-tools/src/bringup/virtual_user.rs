@@ -106,12 +106,12 @@ impl VirtualUser {
             Task::LowerTip => {
                 let tip_m = bench.tip_m();
                 self.before_m = tip_m;
-                bench.feel(tip_m - PUSH_M * DVec3::Z);
+                bench.step(tip_m - PUSH_M * DVec3::Z);
             }
             Task::LiftTip => {
                 // Against the push of the hand, the floor's is what is left over.
                 self.felt_n = bench.scale_grams(DVec3::Z) * crate::calibrate::N_PER_GRAM;
-                bench.feel(self.before_m);
+                bench.step(self.before_m);
             }
         }
     }
@@ -130,7 +130,7 @@ impl VirtualUser {
     }
 }
 
-/// Where an axis pushes the tip in the zero pose as its angle grows.
+/// Returns the direction in which an axis pushes the tip in the zero pose as its angle grows.
 fn pushed_along(axis: usize) -> DVec3 {
     let direction = Direction::ALL.get(axis).copied();
     direction.unwrap_or(Direction::Up).unit()

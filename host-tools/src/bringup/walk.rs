@@ -9,7 +9,7 @@ use super::step::Step;
 use super::steps;
 use crate::link::Dialogue;
 
-/// How far a walk came.
+/// Progress of a walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Walked {
     /// To the end: the log is complete.
@@ -18,7 +18,7 @@ pub enum Walked {
     BoardWasOff,
 }
 
-/// Why a walk ended before its end.
+/// Reason for which a walk ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum BringupError {
     /// A step found something wrong.

@@ -31,7 +31,7 @@ pub const MODELS: [(&str, Model); 5] = [
     ("other", Model::Other),
 ];
 
-/// Why a file is no calibration that can be used.
+/// Reason for which a file is no usable calibration.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {fault}", path.display())]
 pub struct FileError {

@@ -1,6 +1,6 @@
-//! Why measurements do not make a record.
+//! Reason for which measurements make no record.
 
-/// Why measurements do not make a record.
+/// Reason for which measurements make no record.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// A joint hardly moved in any of the checks.
@@ -20,7 +20,7 @@ pub enum FitError {
         off_mm: f64,
     },
     /// Poses that say nothing about a joint's gravity.
-    #[error("none of the poses tells the weight on joint {joint}")]
+    #[error("no pose shows the weight on joint {joint}")]
     NoWeight {
         /// The joint, 2 or 3.
         joint: usize,

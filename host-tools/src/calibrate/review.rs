@@ -1,4 +1,4 @@
-//! What a calibration found, for looking at before it is taken.
+//! Review of a calibration before it is accepted.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use hapterra_core::phantom::Calibration;
 use super::gravity::GravityFit;
 use super::ratios::RatioFit;
 
-/// What was found, for looking at before it is taken; displayed, old and new
+/// Findings before they are accepted; displayed, old and new
 /// numbers side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Review {

@@ -12,7 +12,7 @@ use super::walk::{Attendant, Stopped};
 use crate::link::FaultInjector;
 use crate::phantom::{HandModel, PhantomModel, Plant, kinematics};
 
-/// How long a pose is held until everything is still, s.
+/// Time for which a pose is held until everything is still, s.
 const SETTLE_S: f64 = 4.0;
 /// Where the weight is measured: from the zero pose, mm, device frame.
 const POSES_MM: [[f64; 3]; 4] = [
@@ -27,7 +27,7 @@ pub struct VirtualUser {
     plant: Plant,
     /// What the encoders read, for whoever feeds the device.
     counts: Rc<Cell<[i32; 3]>>,
-    /// How much every reading of the ruler is off, mm.
+    /// Error of every reading of the ruler, mm.
     pub ruler_off_mm: f64,
     /// Takes what the user says, a line at a time.
     pub says: fn(&str),
@@ -67,7 +67,7 @@ impl VirtualUser {
         Rc::clone(&self.counts)
     }
 
-    /// What the user's hands do to the encoders and switches of a device: the encoders
+    /// Returns the hands' effect on the encoders and switches of a device: the encoders
     /// follow the arm, and the dead-man switch is pressed for half of every second, so
     /// that whatever waits for a press gets one.
     #[must_use]

@@ -41,7 +41,7 @@ pub trait Attendant {
     /// [`Stopped`].
     fn hold_still(&mut self, number: usize) -> Result<Option<[f64; 2]>, Stopped>;
 
-    /// Whether the record is right.
+    /// Checks that the record is right.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -53,7 +53,7 @@ pub trait Attendant {
 #[error("stopped: nothing was changed on the device")]
 pub struct Stopped;
 
-/// Why a walk came to no record.
+/// Reason for which a walk made no record.
 #[derive(Debug, thiserror::Error)]
 pub enum WalkError<E: std::error::Error + 'static> {
     /// The attendant stopped.
@@ -73,9 +73,9 @@ pub enum WalkError<E: std::error::Error + 'static> {
 /// Which parts of the record are measured; the zero pose always is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// Whether the cable ratios and encoder signs are measured.
+    /// True if the cable ratios and encoder signs are measured.
     pub ratios: bool,
-    /// Whether the weights on joints 2 and 3 are measured.
+    /// True if the weights on joints 2 and 3 are measured.
     pub gravity: bool,
 }
 

@@ -42,7 +42,7 @@ struct About {
     file: &'static str,
     /// What the terrain is called.
     name: String,
-    /// Felt samples before some were left out, west to east and south to north.
+    /// Rendered samples before some were left out, west to east and south to north.
     of: [u32; 2],
     /// Side of a cell on the ground, m.
     cell_m: Option<f64>,

@@ -12,13 +12,13 @@ use super::options::device::{EmulatedBoard, VirtualDevice};
 use super::options::events::{self, EventOptions};
 use super::options::placing::{self, Placing};
 use super::options::rendering::Rendering;
-use super::options::steering::{self, Commands, ViewControl};
+use super::options::steering::{self, Commands, PlacementControl};
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::run::duration;
 use super::session_summary::{self, SessionSummary};
 use super::settings::SettingsOption;
 use super::terminal::waiting::shown_reading;
-use super::terminal::{interrupt, left_behind, progress, voice};
+use super::terminal::{interrupt, partial_files, progress, writer};
 use super::viewing::{Shown, ToBeShown, Viewing};
 use crate::events::{Event as Told, Watcher};
 use crate::link::{
@@ -27,12 +27,12 @@ use crate::link::{
 use crate::materials::Materials;
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
-use crate::place::{Laid, View};
-use crate::replay::settings::{Device, ViewSettings};
+use crate::place::{Laid, Placement};
+use crate::replay::settings::{Device, PlacementSettings};
 use crate::replay::{LoopColumns, Mark, Record, Recording, Rule, Settings};
 use crate::stability;
 use crate::synth::{Kind, Synth};
-use crate::telemetry::{FeltViews, SampleLog};
+use crate::telemetry::{Placements, SampleLog};
 use heightfield::without_key;
 use heightfield::{Raster, files_read_with};
 
@@ -49,7 +49,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: Option<PathBuf>,
 
-    /// What the file does not say itself.
+    /// Statements about the file that it does not make itself.
     #[command(flatten)]
     pub reading: ReadingOptions,
 
@@ -77,23 +77,23 @@ pub struct Args {
     #[command(flatten)]
     pub placing: Placing,
 
-    /// How it is rendered.
+    /// Rendering.
     #[command(flatten)]
     pub rendering: Rendering,
 
-    /// Where settings are from.
+    /// Source of the settings.
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// How the view may be changed meanwhile.
+    /// Commands that change the placement meanwhile.
     #[command(flatten)]
     pub commands: Commands,
 
-    /// Whether other programs are told what happens.
+    /// Events to other programs.
     #[command(flatten)]
     pub events: EventOptions,
 
-    /// Whether it is shown.
+    /// The viewer.
     #[command(flatten)]
     pub viewing: Viewing,
 }
@@ -176,7 +176,7 @@ impl Outputs {
 /// Runs the tour and shows what was felt.
 fn show(
     args: &Args,
-    (placed, view): (&PlacedTerrain<'_>, &View),
+    (placed, view): (&PlacedTerrain<'_>, &Placement),
     name: &str,
     outputs: &Outputs,
 ) -> Result<(), Failure> {
@@ -191,11 +191,11 @@ fn show(
     if let Some(line) = session_summary::materials(terrain) {
         println!("{line}");
     }
-    left_behind::tell([outputs.recording.as_path(), &outputs.picture]);
+    partial_files::tell([outputs.recording.as_path(), &outputs.picture]);
     let server = args.events.listen()?;
     let (runs_on, mut control) = (device(args), control(args, placed, view)?);
     if let Some(line) = control.listen(&args.commands) {
-        voice::put(std::io::stderr(), &format!("{line}\n"));
+        writer::put(std::io::stderr(), &format!("{line}\n"));
     }
     let arm = placed.held_phantom();
     let stop_s = args.duration.unwrap_or(f64::MAX).min(placed.duration_s());
@@ -265,12 +265,12 @@ fn device(args: &Args) -> VirtualDevice {
 fn control<'t>(
     args: &Args,
     placed: &PlacedTerrain<'t>,
-    view: &View,
-) -> Result<ViewControl<'t>, Failure> {
+    view: &Placement,
+) -> Result<PlacementControl<'t>, Failure> {
     let (law, view) = (placed.law(), *view);
     let arm = (&Calibration::PREMIUM_1_5, args.rendering.level);
     let served = (placed.terrain(), Laid { view, law });
-    Ok(ViewControl::new(served, arm, args.commands.open()?))
+    Ok(PlacementControl::new(served, arm, args.commands.open()?))
 }
 
 /// All that was felt on a tour.
@@ -278,13 +278,13 @@ struct Toured<'t> {
     /// The rows of the recording, with what the loop did.
     rows: Vec<(Record, LoopColumns)>,
     marks: Vec<Mark>,
-    views: FeltViews<'t>,
+    views: Placements<'t>,
     summary: SessionSummary,
 }
 
 /// Draws what was felt in the last view: places and heights of another are other places of
 /// the hand.
-fn draw(toured: &Toured<'_>, first: &View, name: &str, path: &Path) -> Result<(), Failure> {
+fn draw(toured: &Toured<'_>, first: &Placement, name: &str, path: &Path) -> Result<(), Failure> {
     let last = toured.rows.last().map_or(0, |(_, of_loop)| of_loop.view());
     let in_last = toured
         .rows
@@ -333,7 +333,7 @@ fn tour_emulated<'t>(
 struct Tour<'p, 't> {
     placed: &'p PlacedTerrain<'t>,
     stop_s: f64,
-    control: &'p mut ViewControl<'t>,
+    control: &'p mut PlacementControl<'t>,
     /// What shows it.
     shown: Option<ToBeShown<'t>>,
     events: Option<Watcher>,
@@ -351,10 +351,10 @@ impl<'t> Tour<'_, 't> {
         let arming = Some(Arming::VIRTUAL);
         let (mut session, device) = Session::open(terrain, scene, arming, transport, patience)?;
         let line = format!("device         {}\n", session_summary::device(&device));
-        voice::put(std::io::stdout(), &line);
+        writer::put(std::io::stdout(), &line);
         let materials = terrain.grid().materials();
         stability::warn_of(&scene.law, materials.map(Materials::table), &device);
-        let tell = |line: String| voice::put(std::io::stderr(), &(line + "\n"));
+        let tell = |line: String| writer::put(std::io::stderr(), &(line + "\n"));
         let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;
         let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
@@ -451,7 +451,7 @@ fn write(toured: &Toured<'_>, settings: &Settings, path: &Path) -> Result<(), Ou
             && let Some(laid) = &felt.laid
         {
             described = number;
-            recording.view(&ViewSettings::new(number, &felt.terrain, laid))?;
+            recording.view(&PlacementSettings::new(number, &felt.terrain, laid))?;
         }
         recording.write(record, &columns.values())?;
     }

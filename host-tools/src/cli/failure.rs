@@ -1,9 +1,9 @@
-//! How a subcommand fails: what went wrong, and the one thing to do next.
+//! Failures of subcommands: what went wrong, and the one thing to do next.
 
 use std::error::Error;
 use std::fmt::Write as _;
 
-use super::terminal::voice;
+use super::terminal::writer;
 
 /// Any error, as the standard library boxes it.
 type AnyError = Box<dyn Error + Send + Sync>;
@@ -88,7 +88,7 @@ impl Failure {
 
     /// Prints the failure on standard error, after everything that was said before.
     pub fn report(&self) {
-        voice::finish();
-        voice::put(std::io::stderr(), &format!("{}\n", self.text()));
+        writer::finish();
+        writer::put(std::io::stderr(), &format!("{}\n", self.text()));
     }
 }

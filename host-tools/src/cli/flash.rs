@@ -104,7 +104,7 @@ fn image(args: &Args) -> Result<PathBuf, Failure> {
         .or_hint("name one with --image ELF, or build this program anew in a checkout")?;
     println!("source         {}", checkout.root().display());
     let built = checkout.build(args.board);
-    built.or_hint("what cargo said above tells why")
+    built.or_hint("the messages of cargo above say why")
 }
 
 /// This command was built without the part that talks to probes.

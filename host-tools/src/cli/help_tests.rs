@@ -1,8 +1,8 @@
-//! How much the command line asks of its readers.
+//! Size of the command line's help.
 
 use std::collections::BTreeSet;
 
-use clap::CommandFactory as _;
+use clap::{CommandFactory as _, Parser as _};
 
 use super::Cli;
 
@@ -34,4 +34,19 @@ fn options_are_few() {
         options.extend(own);
     }
     assert!(options.len() < 65, "{}: {options:?}", options.len());
+}
+
+#[test]
+fn list_of_formats_stands_alone() {
+    let parsed = |words: &[&str]| Cli::try_parse_from([&["hapterra", "info"], words].concat());
+    assert!(parsed(&["--formats"]).is_ok());
+    for words in [
+        &["--formats", "--bogus"][..],
+        &["--formats", "t.tif"],
+        &["--formats", "--json"],
+        &[],
+    ] {
+        let error = parsed(words).expect_err("refused");
+        assert_eq!(error.exit_code(), 2, "{words:?}");
+    }
 }

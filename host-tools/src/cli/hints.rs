@@ -1,4 +1,4 @@
-//! What to do next about each error of the library: one table an error type.
+//! Hints for each error of the library: one table an error type.
 //!
 //! A hint that depends on the command's own options stands in that command.
 
@@ -62,7 +62,7 @@ impl Hint for GroundError {
                 "name the classes of this ground with --materials".into()
             }
             Self::TooMany(_) => {
-                "leave those out of the table that may feel as the default".into()
+                "leave the classes out of the table that may use the default".into()
             }
         }
     }
@@ -81,7 +81,7 @@ impl Hint for PlaceError {
                 "say the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
             }
             Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } | Self::NoProjection { .. } => {
-                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as holes: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
+                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as no data: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
             }
             Self::Outside { .. } | Self::Hole { .. } => {
                 "choose a place inside: longitude (or x) comes first"
@@ -149,7 +149,7 @@ impl Hint for ReplayError {
                 "a trajectory is CSV: the header t_s,x_mm,y_mm,z_mm, then four numbers a line"
             }
             Self::Output(_) => "name a file in a folder that you may write to with -o",
-            Self::View { .. } => {
+            Self::Placement { .. } => {
                 "replay it on the terrain that it was recorded on; --ignore-settings takes its path alone"
             }
             Self::Interrupted => "nothing was written",
@@ -264,7 +264,7 @@ impl Hint for UpdateError {
                 "plug the board's own USB in; `hapterra list` shows what is seen; a board without working firmware shows its loader when BOOT0 is high at a reset"
             }
             Self::Several(_) => {
-                "name one: --device usb:SERIAL; two that cannot be told apart are unplugged but for one"
+                "name one: --device usb:SERIAL; if two have the same serial number, unplug one"
             }
             Self::OtherBoard { .. } => {
                 "nothing was touched: name the image of that board, or plug in the other one"

@@ -5,14 +5,16 @@ mod link;
 mod place;
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
+use clap::ValueHint;
 use serde::Serialize;
 
 use hapterra_core::terrain::{TILE_CELLS, TILE_SAMPLES};
 
 use super::failure::Failure;
 use super::options::placing::off_in_words;
-use super::options::terrain_file::TerrainFile;
+use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::report::put;
 use crate::place::place_in_words;
 use crate::terrain::{Distortion, HapticGrid};
@@ -25,13 +27,17 @@ use place::{Rectangle, Vertical, from, told};
 /// Arguments of `hapterra info`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The terrain file.
+    /// Terrain: a file, a folder, a quoted pattern ('tiles/*.tif') or a URL
+    #[arg(value_hint = ValueHint::FilePath, required_unless_present = "formats")]
+    pub file: Option<PathBuf>,
+
+    /// Statements about the file that it does not make itself.
     #[command(flatten)]
-    pub terrain: TerrainFile,
+    pub reading: ReadingOptions,
 
     /// List the formats of terrain files that are read on this machine
-    #[arg(long, num_args = 0, default_missing_value = "", value_parser = formats::Printed)]
-    pub formats: Option<formats::Printed>,
+    #[arg(long, conflicts_with_all = ["file", "link", "json"])]
+    pub formats: bool,
 
     /// Show the tiles on a link of this many megabytes a second [1 without a number]
     ///
@@ -55,14 +61,22 @@ fn rate(text: &str) -> Result<f64, String> {
 /// Shows what the file holds.
 ///
 /// # Errors
-/// When the file cannot be opened as a height field.
+/// When the file cannot be opened as a height field, or the output cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let raster = args.terrain.open_without_remarks()?;
-    let grid = HapticGrid::new(&raster, args.terrain.reading.cells());
+    // Clap wants a file where the list is not asked for.
+    let (false, Some(file)) = (args.formats, &args.file) else {
+        return put(&formats::text());
+    };
+    let terrain = TerrainFile {
+        file: file.clone(),
+        reading: args.reading.clone(),
+    };
+    let raster = terrain.open_without_remarks()?;
+    let grid = HapticGrid::new(&raster, terrain.reading.cells());
     let link = args.link.map(|rate| LinkFigures::of(&grid, rate));
     let report = FileReport {
         link: link.transpose().map_err(Failure::new)?,
-        ..FileReport::new(&args.terrain, &grid)
+        ..FileReport::new(&terrain, &grid)
     };
     if args.json {
         let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
@@ -84,7 +98,7 @@ struct FileReport {
     /// The horizontal reference system, as `EPSG:26911`, where the file states it.
     crs: Option<String>,
     crs_name: Option<String>,
-    /// Where the reference system comes from.
+    /// Source of the reference system.
     crs_from: Option<&'static str>,
     /// Outer edges of the cells around all samples, in the file's units.
     bounds: Option<Rectangle>,
@@ -117,7 +131,7 @@ struct FileReport {
     /// Samples that range and number of holes are from: all, or fewer where the raster
     /// stays in its file.
     looked_at: u64,
-    /// Whether that is all of them.
+    /// True if that is all of them.
     known_whole: bool,
     /// Bytes the samples take on the host, at most.
     bytes: usize,
@@ -132,7 +146,7 @@ struct Cell {
     east: f64,
     north: f64,
     unit: &'static str,
-    /// Whether the file states the unit; metres or degrees are assumed if not.
+    /// True if the file states the unit; metres or degrees are assumed if not.
     unit_stated: bool,
     /// Where the unit comes from: the `file`, the `code` of its reference system, an
     /// `option` of this command, or it is `assumed`.
@@ -142,14 +156,14 @@ struct Cell {
     north_m: f64,
     /// Side of the square cell that is felt, m on the ground.
     felt_m: f64,
-    /// Whether heights are interpolated for that, as the stored cells are not square.
+    /// True if heights are interpolated for that, as the stored cells are not square.
     resampled: bool,
-    /// Whether stored cells that are not square are felt as squares.
+    /// True if stored cells that are not square are felt as squares.
     distorted: bool,
     /// How far slopes and lengths are off at worst somewhere in the field, as a share, where
     /// cells are felt as they are in its middle.
     worst_share: Option<f64>,
-    /// Where that is, in the file's coordinates.
+    /// Its place, in the file's coordinates.
     worst_at: Option<[f64; 2]>,
     #[serde(skip)]
     worst: Option<String>,
@@ -351,7 +365,7 @@ impl Cell {
                 match grid.is_distorted() {
                     true => format!("{off}, at {place}"),
                     false => format!(
-                        "true in the middle; felt from there, {off}, at {place}: --at and --bbox measure the cells at a place"
+                        "true in the middle; rendered from there, {off}, at {place}: --at and --bbox measure the cells at a place"
                     ),
                 }
             }),
@@ -373,7 +387,7 @@ impl Cell {
         };
         match self.resampled || self.distorted {
             false => stored,
-            true => format!("{stored}, felt as {felt_m:.3} m squares{hint}"),
+            true => format!("{stored}, rendered as {felt_m:.3} m squares{hint}"),
         }
     }
 }

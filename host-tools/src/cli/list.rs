@@ -17,9 +17,9 @@ pub struct Args {
     pub addresses: Vec<String>,
 }
 
-/// Where the link of an emulated board is looked for without being told.
+/// Place where the link of an emulated board is looked for without being told.
 const USUAL_ADDRESS: &str = "localhost:4000";
-/// How long a board may take to say who it is.
+/// Time that a board may take to say who it is.
 const PATIENCE: Duration = Duration::from_millis(1500);
 
 /// Lists what there is; where there is nothing, what was looked for and what to

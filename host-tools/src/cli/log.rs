@@ -14,11 +14,11 @@ use tracing::callsite::Identifier;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
-use super::sparing::Sparing;
-use super::terminal::voice;
+use super::line_limit::LineLimit;
+use super::terminal::writer;
 use heightfield::shown::shown;
 
-/// Where the lines come from that a device can cause.
+/// Place where the lines come from that a device can cause.
 const BY_DEVICE: &str = "hapterra::link";
 
 /// Starts the log. `RUST_LOG` overrides the `-v` count.
@@ -52,7 +52,7 @@ pub(super) struct Spoken;
 impl Write for Spoken {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let text = String::from_utf8_lossy(bytes);
-        voice::tell(text.trim_end_matches('\n'));
+        writer::tell(text.trim_end_matches('\n'));
         Ok(bytes.len())
     }
 
@@ -65,7 +65,7 @@ impl Write for Spoken {
 pub(super) struct Log<W> {
     open: Arc<dyn Fn() -> W + Send + Sync>,
     /// Of each kind of line that a device can cause, and each thread that serves one.
-    kinds: Arc<Mutex<HashMap<(Identifier, ThreadId), Sparing>>>,
+    kinds: Arc<Mutex<HashMap<(Identifier, ThreadId), LineLimit>>>,
 }
 
 impl<W> Clone for Log<W> {
@@ -93,14 +93,14 @@ impl<W: Write> Log<W> {
         }
         let mut kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
         let key = (about.callsite(), thread::current().id());
-        let kind = kinds.entry(key).or_insert(Sparing::new(1));
+        let kind = kinds.entry(key).or_insert(LineLimit::new(1));
         kind.admit(now)
     }
 
     /// Says how many lines were left out since the last of their kind.
     pub(super) fn end(&self) {
         let kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
-        let left_out: u64 = kinds.values().map(Sparing::left_out).sum();
+        let left_out: u64 = kinds.values().map(LineLimit::left_out).sum();
         if left_out > 0 {
             // There is nobody to tell that nobody can be told.
             let _ = writeln!((self.open)(), "{}", left_out_text(left_out));
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_floods_the_log_gets_a_line_a_second_and_the_rest_is_counted() {
+    fn flooding_device_gets_one_log_line_a_second() {
         let text = written(|| {
             for tile in 0..100_000 {
                 tracing::warn!(target: "hapterra::link::client", tile, "no such tile");

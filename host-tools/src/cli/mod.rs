@@ -8,7 +8,7 @@
 //! - [`report`]: what a command exists to print;
 //! - `settings`: settings files and recordings in place of options;
 //! - `moved` and `old_options`: what earlier versions had, and what to type now;
-//! - `log` and `sparing`: diagnostics, and lines that a device can cause kept to so many
+//! - `log` and `line_limit`: diagnostics, and lines that a device can cause kept to so many
 //!   a second.
 
 pub mod bringup;
@@ -16,15 +16,16 @@ pub mod calibrate;
 pub mod completions;
 pub mod cut;
 pub mod demo;
+mod device_calibration;
 pub mod failure;
 pub mod flash;
 mod guardian;
 mod hints;
 pub mod info;
+mod line_limit;
 pub mod list;
 mod log;
 pub mod man;
-mod met_device;
 mod moved;
 mod old_options;
 pub mod options;
@@ -33,7 +34,6 @@ pub mod report;
 pub mod run;
 mod session_summary;
 mod settings;
-mod sparing;
 pub mod status;
 pub mod terminal;
 pub mod view;
@@ -47,7 +47,7 @@ use clap::{ArgAction, Parser, Subcommand};
 
 pub use failure::{Failure, OrHint};
 use settings::Completed;
-use terminal::voice;
+use terminal::writer;
 
 /// Touch terrain of any size through a Phantom.
 #[derive(Debug, Parser)]
@@ -57,7 +57,7 @@ pub struct Cli {
     #[arg(short, long, action = ArgAction::Count, global = true)]
     pub verbose: u8,
 
-    /// What to do.
+    /// Subcommand.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -155,7 +155,7 @@ pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result
             true => {
                 let option = || old_options::hint(&words, &error);
                 let moved = moved::hint(&error).or_else(option).unwrap_or_default();
-                voice::put(std::io::stderr(), &format!("{}{moved}", error.render()));
+                writer::put(std::io::stderr(), &format!("{}{moved}", error.render()));
             }
             // A reader who goes away has seen enough of the help.
             false => _ = error.print(),
@@ -170,7 +170,7 @@ pub fn finish(verbose: u8, command: impl FnOnce() -> Result<(), Failure>) -> u8 
     let log = log::to_stderr(verbose);
     let outcome = command();
     log.end();
-    voice::finish();
+    writer::finish();
     // A process that is not this crate's own program does not do so at its end.
     let _ = std::io::stdout().flush();
     let code = match outcome {

@@ -1,4 +1,4 @@
-//! What earlier versions had, and what to type now.
+//! Words of earlier versions, and what to type now.
 
 use clap::error::{ContextKind, ContextValue};
 

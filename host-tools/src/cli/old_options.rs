@@ -42,7 +42,7 @@ const fn old(
     }
 }
 
-/// All of them.
+/// Those of `hapterra`.
 const OLD: &[Old] = &[
     old(&["run"], "--record", "-o FILE", ""),
     old(PLACING, "--seconds", "--duration 60s", ""),
@@ -177,6 +177,13 @@ const OLD: &[Old] = &[
     ),
 ];
 
+/// Those of `hapterra-lab`.
+const OLD_IN_LAB: &[Old] = &[
+    old(&["stability"], "--delay-us", "--delay 200us", ""),
+    old(&["streaming"], "--latencies", "--latency 20ms,50ms", ""),
+    old(&["synth"], "--cell-m", "--cell 10m", ""),
+];
+
 /// Returns a line on what to type now where an option that earlier versions had is the error.
 pub(super) fn hint(words: &[OsString], error: &clap::Error) -> Option<String> {
     if error.kind() != ErrorKind::UnknownArgument {
@@ -188,7 +195,7 @@ pub(super) fn hint(words: &[OsString], error: &clap::Error) -> Option<String> {
     let name = argument.split('=').next()?;
     let is_typed = |command: &&str| words.iter().skip(1).any(|word| word == *command);
     let of_command = |old: &&Old| old.name == name && old.commands.iter().any(is_typed);
-    let old = OLD.iter().find(of_command)?;
+    let old = OLD.iter().chain(OLD_IN_LAB).find(of_command)?;
     let within = match old.within {
         "" => String::new(),
         key => format!(", with {key}"),

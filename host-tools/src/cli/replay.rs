@@ -14,12 +14,12 @@ use super::options::rendering::Rendering;
 use super::options::terrain_file::TerrainFile;
 use super::session_summary;
 use super::settings::{SettingsOption, differences};
-use super::terminal::{interrupt, left_behind, progress};
+use super::terminal::{interrupt, partial_files, progress};
 use super::viewing::{self, Viewing};
 use crate::link::{Timeouts, Transport};
 use crate::materials::Materials;
 use crate::output::{Output, keep_apart};
-use crate::replay::settings::{Device, ViewSettings};
+use crate::replay::settings::{Device, PlacementSettings};
 use crate::replay::{
     Mark, OfflineDevice, Pace, Record, ReplayError, Rule, Settings, Summary, Ticks, Trajectory,
     on_native_at, replay_trajectory,
@@ -65,15 +65,15 @@ pub struct Args {
     #[arg(long, default_value = "native")]
     pub device: VirtualDevice,
 
-    /// How the terrain is rendered.
+    /// Rendering of the terrain.
     #[command(flatten)]
     pub rendering: Rendering,
 
-    /// Where settings are from.
+    /// Source of the settings.
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// Whether it is shown.
+    /// The viewer.
     #[command(flatten)]
     pub viewing: Viewing,
 }
@@ -97,7 +97,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     inputs.extend(of_surface);
     inputs.extend(args.settings.file());
     keep_apart(&[&args.out], &inputs).or_hint("name another file with -o")?;
-    left_behind::tell([args.out.as_path()]);
+    partial_files::tell([args.out.as_path()]);
     let viewer = args.viewing.program()?;
     let trajectory = Trajectory::open(&args.trajectory).map_err(ReplayError::from)?;
     let recorded = trajectory
@@ -135,7 +135,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     let home_mm = recorded.as_ref().and_then(|it| it.felt.home_mm);
     let later = recorded.map(|it| (it.views, it.marks));
     let (views, marks) = later.unwrap_or_default();
-    let felt = Felt {
+    let felt = Inputs {
         terrain: &terrain,
         law: (surface.law, rule),
         file,
@@ -163,7 +163,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     }
     if summary.below_ground > 0 {
         eprintln!(
-            "{} rows are below ground and not felt: the HIP had not been above the surface before them",
+            "{} rows are below ground and not rendered: the HIP had not been above the surface before them",
             summary.below_ground
         );
     }
@@ -188,13 +188,13 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
 }
 
 /// What is felt, and how.
-struct Felt<'t> {
+struct Inputs<'t> {
     terrain: &'t Terrain<'t>,
     law: (SurfaceParams, Rule),
     /// The rate of the recording.
     recorded_at: Option<TickRate>,
     /// The other views of the recording.
-    views: Vec<ViewSettings>,
+    views: Vec<PlacementSettings>,
     /// Its marks.
     marks: Vec<Mark>,
     /// The terrain file, as it was named.
@@ -207,14 +207,14 @@ struct Felt<'t> {
     viewer: Option<Program>,
 }
 
-impl<'t> Felt<'t> {
+impl<'t> Inputs<'t> {
     fn shown(&self, replayer: &OfflineDevice<'_>) -> Result<Option<ViewFeed<'t>>, Failure> {
         let Some(program) = &self.viewer else {
             return Ok(None);
         };
         let device = replayer.device();
         let mut picture = self.picture(self.terrain, self.home_mm);
-        picture.facts = vec![("felt by".to_owned(), device.board.to_string())];
+        picture.facts = vec![("rendered by".to_owned(), device.board.to_string())];
         Ok(Some(ViewFeed::start(
             program,
             picture.prepare(),
@@ -254,7 +254,7 @@ fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
     if let (Some(line), false) = (lines.first(), recorded.views.is_empty()) {
         let views = 1 + recorded.views.len();
         return Err(format!(
-            "{line}: a recording of {views} views is felt in its own"
+            "{line}: a recording of {views} placements is rendered in its own"
         ))
         .or_hint("leave that option out, or take the path alone with --ignore-settings");
     }
@@ -288,12 +288,12 @@ fn rate_of(recorded: &Settings) -> Result<TickRate, Failure> {
     let why = format!("the recording has tick_hz = {tick_hz}, and no device has that rate");
     TickRate::new(tick_hz)
         .ok_or(why)
-        .or_hint("mend tick_hz in its settings (whole kilohertz from 1000 to 10000), or take its path alone with --ignore-settings")
+        .or_hint("correct tick_hz in its settings (whole kilohertz from 1000 to 10000), or take its path alone with --ignore-settings")
 }
 
 fn native(
     args: &Args,
-    felt: &Felt<'_>,
+    felt: &Inputs<'_>,
     trajectory: Trajectory,
 ) -> Result<(Summary, Ticks), Failure> {
     let (law, rule) = felt.law;
@@ -308,7 +308,7 @@ fn native(
 fn emulated(
     args: &Args,
     board: &EmulatedBoard,
-    felt: &Felt<'_>,
+    felt: &Inputs<'_>,
     trajectory: Trajectory,
 ) -> Result<(Summary, Ticks), Failure> {
     let (law, rule) = felt.law;
@@ -332,7 +332,7 @@ fn emulated(
 /// The trajectory at the ticks of a device.
 fn ticks(
     args: &Args,
-    felt: &Felt<'_>,
+    felt: &Inputs<'_>,
     trajectory: Trajectory,
     tick_hz: u32,
 ) -> Result<Ticks, Failure> {
@@ -354,7 +354,7 @@ fn ticks(
 
 fn replay<'t>(
     args: &Args,
-    felt: &Felt<'t>,
+    felt: &Inputs<'t>,
     trajectory: Trajectory,
     replayer: &mut OfflineDevice<'t>,
 ) -> Result<(Summary, Ticks), Failure> {

@@ -34,10 +34,10 @@ use super::options::rendering::Rendering;
 use super::options::steering::Commands;
 use super::options::terrain_file::TerrainFile;
 use super::settings::SettingsOption;
-use super::terminal::desk::{self, Seat};
-use super::terminal::speaker::Speaker;
-use super::terminal::voice::tell;
-use super::terminal::{interrupt, left_behind};
+use super::terminal::device_console::DeviceConsole;
+use super::terminal::shared_keyboard::{self, DeviceKeys};
+use super::terminal::writer::tell;
+use super::terminal::{interrupt, partial_files};
 use super::viewing::{ToBeShown, Viewing};
 use crate::link::Timeouts;
 use crate::output::keep_apart;
@@ -93,23 +93,23 @@ pub struct Args {
     #[command(flatten)]
     pub placing: Placing,
 
-    /// How the terrain is rendered.
+    /// Rendering of the terrain.
     #[command(flatten)]
     pub rendering: Rendering,
 
-    /// Where settings are from.
+    /// Source of the settings.
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// How the placement may be changed meanwhile.
+    /// Commands that change the placement meanwhile.
     #[command(flatten)]
     pub commands: Commands,
 
-    /// Whether other programs are told what happens.
+    /// Events to other programs.
     #[command(flatten)]
     pub events: EventOptions,
 
-    /// Whether it is shown.
+    /// The viewer.
     #[command(flatten)]
     pub viewing: Viewing,
 }
@@ -155,7 +155,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     inputs.extend(args.rendering.surface.inputs());
     inputs.extend(args.settings.file());
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
-    left_behind::tell(outputs.iter().map(PathBuf::as_path));
+    partial_files::tell(outputs.iter().map(PathBuf::as_path));
     let events = args.events.listen()?;
     let viewer = args.viewing.program()?;
     let raster = args.terrain.open()?;
@@ -175,11 +175,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     interrupt::listen();
     let (arms, met): (Vec<_>, Vec<_>) = devices.iter().map(OneDevice::meet).unzip();
     let laid = of_each(devices.iter().zip(arms), |(device, arm)| {
-        InReach::of(&asked, arm).map_err(|failure| failure.about(device.speaker.name()))
+        InReach::of(&asked, arm).map_err(|failure| failure.about(device.device_console.name()))
     })?;
     let placed = of_each(devices.iter().zip(&laid), |(device, laid)| {
         Placed::new(device, (&name, laid), law)
-            .map_err(|failure| failure.about(device.speaker.name()))
+            .map_err(|failure| failure.about(device.device_console.name()))
     })?;
     // The coarse levels are read before anything is armed. A viewer shows one device.
     let mut shown = viewer
@@ -189,7 +189,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     materials
         .as_ref()
         .map_or(Ok(()), |it| it.classes().check_came())?;
-    let mut seats = seats_for(args, &devices).into_iter();
+    let mut device_keys = share_keyboard(args, &devices).into_iter();
     let each = devices.iter().zip(&placed).zip(met);
     let servings = each.zip(recordings.into_iter().zip(commands));
     let watchers = (1..).map(|number| {
@@ -205,7 +205,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             met,
             recording,
             commands,
-            seat: seats.next(),
+            device_keys: device_keys.next(),
             shown: shown.take(),
             events,
         },
@@ -221,7 +221,7 @@ fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::new(format!(
-        "a stiffness of {n_per_mm} N/mm: no arm feels more than {STIFFEST_TRIED_N_PER_MM} N/mm"
+        "a stiffness of {n_per_mm} N/mm: no arm renders more than {STIFFEST_TRIED_N_PER_MM} N/mm"
     ))
     .hint("people hold 0.4 to 0.8 N/mm: hapterra-lab stability tries what an arm holds still"))
 }
@@ -236,14 +236,17 @@ fn of_each<T, U>(
 
 /// The places of several devices at the keyboard; none where there is one device, or nobody
 /// types.
-fn seats_for(args: &Args, devices: &[OneDevice]) -> Vec<Arc<Seat>> {
+fn share_keyboard(args: &Args, devices: &[OneDevice]) -> Vec<Arc<DeviceKeys>> {
     if devices.len() == 1 || args.commands.are_typed() || !io::stdin().is_terminal() {
         return vec![];
     }
-    let speakers: Vec<Speaker> = devices.iter().map(|d| d.speaker.clone()).collect();
-    let seats = desk::seats(&speakers);
+    let consoles: Vec<DeviceConsole> = devices.iter().map(|d| d.device_console.clone()).collect();
+    let device_keys = shared_keyboard::share(&consoles);
     let last = devices.len();
-    match seats.first().is_some_and(|seat| seat.has_keys()) {
+    match device_keys
+        .first()
+        .is_some_and(|device_keys| device_keys.has_keys())
+    {
         true => tell(format!(
             "keys           1 to {last} choose the device that keys go to, and come before each Enter: {KEYS}"
         )),
@@ -251,5 +254,5 @@ fn seats_for(args: &Args, devices: &[OneDevice]) -> Vec<Arc<Seat>> {
             "Enter          goes to the device whose number, 1 to {last}, is right before it"
         )),
     }
-    seats
+    device_keys
 }

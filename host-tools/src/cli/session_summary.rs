@@ -1,4 +1,4 @@
-//! What `demo` and `run` say about a session at its end.
+//! Summary of `demo` and `run` at the end of a session.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::failure::{Failure, OrHint};
 use super::options::placing;
 use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT, LinkStats};
 use crate::picture::{GroundFacts, SessionPicture, Surface};
-use crate::place::{View, coordinates_in_words};
+use crate::place::{Placement, coordinates_in_words};
 use crate::replay::Record;
 use crate::telemetry::Figures;
 use crate::terrain::Terrain;
@@ -109,7 +109,7 @@ impl SessionSummary {
     pub(super) fn draw(
         &self,
         path: &Path,
-        (terrain, view): (&Terrain<'_>, &View),
+        (terrain, view): (&Terrain<'_>, &Placement),
         title: &str,
         records: &[Record],
     ) -> Result<(), Failure> {
@@ -126,7 +126,7 @@ impl SessionSummary {
         let picture = SessionPicture {
             title,
             subtitle: &format!(
-                "{}; felt by {}",
+                "{}; rendered by {}",
                 in_words(terrain),
                 kind_of_device(&self.device)
             ),
@@ -151,8 +151,9 @@ impl SessionSummary {
 pub(super) fn tip(terrain: &Terrain<'_>) -> Option<String> {
     let (mm, level) = (terrain.grid().tip_mm(), terrain.level());
     let felt = placing::short(terrain.scale().cell_mm());
-    (mm > 0.0)
-        .then(|| format!("felt by a ball of {mm} mm over level {level}, on cells of {felt} mm"))
+    (mm > 0.0).then(|| {
+        format!("rendered with a ball of {mm} mm over level {level}, on cells of {felt} mm")
+    })
 }
 
 /// A terrain and its scale, in words.
@@ -168,12 +169,14 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     let cell_mm = placing::short(of_level.cell_mm());
     let felt = match grid.side_m() {
         Some(side) if grid.is_resampled() => format!(
-            " felt as {} × {} squares of {side:.3} m,",
+            " rendered as {} × {} squares of {side:.3} m,",
             grid.columns() - 1,
             grid.rows() - 1
         ),
         Some(side) if grid.is_distorted() => {
-            format!(" its stored cells felt as squares of {side:.3} m, not in their true shape,")
+            format!(
+                " its stored cells rendered as squares of {side:.3} m, not in their true shape,"
+            )
         }
         _ => String::new(),
     };

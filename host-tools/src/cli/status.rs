@@ -10,7 +10,7 @@ use super::failure::Failure;
 use super::options::device::Device;
 use super::report::put;
 use super::session_summary;
-use super::terminal::voice::{say, show};
+use super::terminal::writer::{say, show};
 use crate::link::EMULATED;
 use heightfield::shown::shown;
 
@@ -103,7 +103,7 @@ fn calibration(status: &Status) -> String {
 
 fn boot(boot: &BootReport) -> String {
     let cause = match boot.cause {
-        ResetCause::Unknown => "for a reason that it does not tell",
+        ResetCause::Unknown => "for an unknown reason",
         ResetCause::PowerOn => "when power came up",
         ResetCause::Pin => "by the reset button or a debug probe",
         ResetCause::Software => "by its own program",

@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub terrain: Option<PathBuf>,
 
-    /// What the terrain file does not say itself.
+    /// Statements about the terrain file that it does not make itself.
     #[command(flatten)]
     pub reading: ReadingOptions,
 
@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "OUT.rrd", value_hint = ValueHint::FilePath)]
     pub rrd: Option<PathBuf>,
 
-    /// How the terrain was rendered, where the recording does not say.
+    /// Rendering of the terrain, where the recording does not state it.
     #[command(flatten)]
     pub rendering: Rendering,
 }
@@ -102,7 +102,7 @@ fn path_of(args: &Args, recorded: Option<&Settings>) -> Result<PathBuf, Failure>
         .or_hint("name it: hapterra view RECORDING TERRAIN")
 }
 
-/// Whether the recording was cut.
+/// Checks that the recording was cut.
 fn show<'t>(
     mut feed: ViewFeed<'t>,
     mut rows: RecordingRows,
@@ -166,7 +166,7 @@ fn facts(path: &Path, recorded: Option<&Settings>) -> Vec<(String, String)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut facts = vec![("recording".to_owned(), name.into_owned())];
     if let Some(recorded) = recorded {
-        facts.push(("felt by".to_owned(), recorded.device.board.clone()));
+        facts.push(("rendered by".to_owned(), recorded.device.board.clone()));
     }
     facts
 }

@@ -9,16 +9,16 @@ use super::failure::{Failure, Hint};
 use super::options::placing;
 use super::terminal::interrupt;
 use crate::link::{Event, LinkStats};
-use crate::place::View;
+use crate::place::Placement;
 use crate::replay::Record;
-use crate::telemetry::FeltView;
+use crate::telemetry::SessionPlacement;
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Prepared, Program, ProgramError, VARIABLE, ViewFeed};
 
 /// Between two looks at whether the viewer has ended.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether it is shown.
+/// The viewer.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "While it is touched")]
 pub struct Viewing {
@@ -54,7 +54,7 @@ impl Hint for ProgramError {
 }
 
 /// What a viewer shows of a terrain in front of an arm.
-fn picture<'p, 't>(terrain: &'p Terrain<'t>, view: &View, title: &'p str) -> Picture<'p, 't> {
+fn picture<'p, 't>(terrain: &'p Terrain<'t>, view: &Placement, title: &'p str) -> Picture<'p, 't> {
     let file = terrain.raster().georeference();
     Picture {
         terrain,
@@ -78,7 +78,7 @@ impl<'t> ToBeShown<'t> {
     pub(in crate::cli) fn new(
         program: Program,
         terrain: &Terrain<'t>,
-        view: &View,
+        view: &Placement,
         title: &str,
     ) -> Self {
         Self {
@@ -127,7 +127,7 @@ impl<'t> Shown<'t> {
         &mut self,
         sample: &TickRecord,
         record: &Record,
-        (view, felt): (usize, &FeltView<'t>),
+        (view, felt): (usize, &SessionPlacement<'t>),
     ) {
         if view != self.view {
             self.view = view;

@@ -7,7 +7,7 @@ use heightfield::shown::shown_json;
 /// Version of the lines. Fields may be added in a version; none changes its meaning.
 pub const FORMAT: u32 = 1;
 
-/// What happened.
+/// An event.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event<'e> {
@@ -25,7 +25,7 @@ pub enum Event<'e> {
     },
     /// The contact begins or ends.
     Contact {
-        /// Whether it begins.
+        /// True if it begins.
         touching: bool,
         /// Speed of the HIP into the surface, mm/s; none where it ends or is not known.
         speed_mm_s: Option<f64>,
@@ -97,7 +97,7 @@ pub enum Event<'e> {
     },
     /// The session with the device is over.
     End {
-        /// Whether the device has confirmed that it is disarmed.
+        /// True if the device has confirmed that it is disarmed.
         disarmed: bool,
     },
     /// A mark was made.
@@ -113,7 +113,7 @@ pub enum Event<'e> {
     },
 }
 
-/// Where the proxy is.
+/// Position of the proxy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Place {
     /// Device millimetres of the view: east, north, up from the south-west sample at height 0.

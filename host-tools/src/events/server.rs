@@ -39,7 +39,7 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// How many readers have come so far; none where nobody reads now.
+    /// Returns the number of readers that have come so far; none where nobody reads now.
     pub(super) fn readers_so_far(&self) -> Option<u64> {
         let reads = self.shared.readers.load(Ordering::Acquire) > 0;
         reads.then(|| self.shared.joined.load(Ordering::Acquire))
@@ -89,7 +89,7 @@ impl Server {
         })
     }
 
-    /// Where it listens.
+    /// Returns its address.
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address

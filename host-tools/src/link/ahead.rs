@@ -1,4 +1,4 @@
-//! Where the HIP is going to be, and what of the terrain has to be there by then.
+//! The HIP's extrapolated path, and the tiles that it needs.
 
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::TILE_CELLS;

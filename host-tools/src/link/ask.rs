@@ -1,10 +1,10 @@
-//! What a host asks a device for.
+//! Requests of a host.
 
 use std::mem::discriminant;
 
 use hapterra_core::wire::request::Request;
 
-/// What a host asks for; repeated until it is answered.
+/// A host's request, repeated until it is answered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ask {
     /// Something to be done, once.
@@ -16,7 +16,7 @@ pub enum Ask {
 }
 
 impl Ask {
-    /// Whether both ask for the same kind of thing. Not whether they are equal: what is
+    /// Returns true if both ask for the same kind of thing. Not whether they are equal: what is
     /// no number, as a request may hold, equals nothing.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {

@@ -1,4 +1,4 @@
-//! What a host asks for, one thing after the other: said again until it is answered, or
+//! A host's requests, one after the other: repeated until answered, or
 //! given up.
 
 use std::collections::VecDeque;

@@ -1,4 +1,4 @@
-//! What the link looks for on USB and how it moves bytes there, apart from the
+//! The link on USB: devices and transfers, apart from the
 //! system's USB: a device in memory can stand in its place.
 
 use std::io;
@@ -13,7 +13,7 @@ use super::transport::{Transport, is_time_out};
 /// Most bytes in a transfer, a multiple of the packet size.
 pub(super) const TRANSFER: usize = 64 * PACKET;
 
-/// Whether a device with these numbers, and this product string where it can
+/// Returns true if a device with these numbers, and this product string where it can
 /// be read, is a hapterra board.
 #[must_use]
 pub fn is_hapterra(vendor: u16, product: u16, name: Option<&str>) -> bool {
@@ -21,7 +21,7 @@ pub fn is_hapterra(vendor: u16, product: u16, name: Option<&str>) -> bool {
     vendor == VENDOR_ID && product == PRODUCT_ID && named
 }
 
-/// Why none of the boards on USB is taken.
+/// Reason for which no board on USB is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotOne {
     /// None fits.
@@ -56,7 +56,7 @@ pub fn printable(text: &str) -> String {
     text.chars().filter(shown).take(64).collect()
 }
 
-/// Where a board's link is.
+/// Endpoints of a board's link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BulkEndpoints {
     /// Number of the interface to claim.

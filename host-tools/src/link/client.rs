@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{HipCommand, Scene, TickRecord, View};
+use hapterra_core::scene::{HipCommand, Scene, SceneChange, TickRecord};
 use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
 use hapterra_core::wire::hello::DeviceHello;
@@ -31,9 +31,9 @@ pub enum Event<'e> {
     /// The scene is in force. `resumed` tells whether the device held it
     /// already and goes on where it was.
     Opened {
-        /// How the device introduced itself.
+        /// Returns the device's introduction.
         device: &'e DeviceHello,
-        /// Whether it goes on with the scene it held.
+        /// True if it goes on with the scene it held.
         resumed: bool,
     },
     /// The sample of one tick of a scene whose HIP comes from the encoders.
@@ -52,8 +52,8 @@ pub enum Event<'e> {
     /// not answer, or was restarted meanwhile.
     Viewed {
         /// The view.
-        view: &'e View,
-        /// Whether it is in force.
+        view: &'e SceneChange,
+        /// True if it is in force.
         taken: bool,
     },
     /// The answer to a question for the status.
@@ -79,11 +79,11 @@ pub enum Event<'e> {
     Unanswered(&'e Ask),
 }
 
-/// How a session arms the device, as soon as the scene is in force. A device that comes
+/// Arming of the device in a session, as soon as the scene is in force. A device that comes
 /// back after it was lost is armed again by itself only where the arm is virtual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arming {
-    /// What the encoders read in the zero pose, where the host knows.
+    /// Encoder readings in the zero pose, where the host knows them.
     pub zero: Option<[i32; 3]>,
 }
 
@@ -116,7 +116,7 @@ const LOG_EVERY: Duration = Duration::from_secs(1);
 pub struct Client<'t> {
     terrain: Lent<'t>,
     /// The terrain of a view that is not in force yet.
-    next: Option<(View, Terrain<'t>)>,
+    next: Option<(SceneChange, Terrain<'t>)>,
     scene: Scene,
     arming: Option<Arming>,
     talk: Conversation,
@@ -149,7 +149,7 @@ pub struct Client<'t> {
 /// A terrain that is served: the one that the client was lent, or that of another view.
 enum Lent<'t> {
     Whole(&'t Terrain<'t>),
-    View(Box<Terrain<'t>>),
+    SceneChange(Box<Terrain<'t>>),
 }
 
 impl<'t> Deref for Lent<'t> {
@@ -158,7 +158,7 @@ impl<'t> Deref for Lent<'t> {
     fn deref(&self) -> &Terrain<'t> {
         match self {
             Self::Whole(terrain) => terrain,
-            Self::View(terrain) => terrain,
+            Self::SceneChange(terrain) => terrain,
         }
     }
 }
@@ -222,7 +222,7 @@ impl<'t> Client<'t> {
         &self.tally
     }
 
-    /// Where the conversation stands.
+    /// State of the conversation.
     #[must_use]
     pub const fn state(&self) -> State {
         self.talk.state()
@@ -234,7 +234,7 @@ impl<'t> Client<'t> {
         self.talk.session()
     }
 
-    /// How long it waits for what.
+    /// Time-outs.
     #[must_use]
     pub const fn patience(&self) -> &Timeouts {
         self.talk.patience()
@@ -267,7 +267,13 @@ impl<'t> Client<'t> {
     /// Puts another view of the scene in, of this terrain: says it until it is answered
     /// ([`Event::Viewed`]). The clutch has to be open
     /// ([`Request::Clutch`]). What lies around the HIP there is read meanwhile.
-    pub fn put_view(&mut self, now: Duration, view: View, terrain: Terrain<'t>, out: &mut Vec<u8>) {
+    pub fn put_view(
+        &mut self,
+        now: Duration,
+        view: SceneChange,
+        terrain: Terrain<'t>,
+        out: &mut Vec<u8>,
+    ) {
         ahead::read_around(&terrain, &view.hip);
         self.next = Some((view, terrain));
         self.talk.put_view(view, now, out);
@@ -277,7 +283,7 @@ impl<'t> Client<'t> {
     /// will not be. Tells which.
     fn settle_view(&mut self, over: bool, on: &mut dyn FnMut(Event<'_>)) {
         let epoch = self.talk.scene().map(|scene| scene.epoch);
-        let taken = |view: &View| epoch == Some(view.scene.epoch);
+        let taken = |view: &SceneChange| epoch == Some(view.scene.epoch);
         let settled = self.next.take_if(|(view, _)| over || taken(view));
         if let Some((view, terrain)) = settled {
             let taken = taken(&view);
@@ -285,14 +291,14 @@ impl<'t> Client<'t> {
                 self.scene = view.scene;
                 self.awaited.clear();
                 self.ahead.forget();
-                self.terrain = Lent::View(Box::new(terrain));
+                self.terrain = Lent::SceneChange(Box::new(terrain));
             }
             on(Event::Viewed { view: &view, taken });
         }
     }
 
     /// Has a point felt: says it until it is answered.
-    pub fn feel(&mut self, now: Duration, point: HipCommand, out: &mut Vec<u8>) {
+    pub fn step(&mut self, now: Duration, point: HipCommand, out: &mut Vec<u8>) {
         self.point = Some((point, now));
         self.talk.say(&ToDevice::Hip(point), out);
     }
@@ -386,7 +392,7 @@ impl<'t> Client<'t> {
                 self.on_greeted(device, restarted);
                 self.settle_view(true, on);
             }
-            News::View => self.settle_view(true, on),
+            News::SceneChange => self.settle_view(true, on),
             News::SceneAck => self.on_scene_taken(now, out, on),
             News::Answered(ask, message) => self.on_answered(now, ask, &message, out, on),
             News::Other(message) => self.on_message(now, message, out, on),
@@ -593,7 +599,7 @@ impl<'t> Client<'t> {
             tracing::warn!(
                 ?key,
                 so_far,
-                "the device asked for a tile that there is not"
+                "the device requested a tile that does not exist"
             );
         }
     }

@@ -111,7 +111,7 @@ impl Bench<'_> {
             epoch: 5_000 + u32::from(number),
             ..*self.client.scene()
         };
-        let view = View {
+        let view = SceneChange {
             number,
             scene,
             hip: GridPoint::default(),
@@ -308,7 +308,7 @@ fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
 }
 
 #[test]
-fn a_question_that_is_repeated_keeps_its_number_and_takes_none_of_a_request() {
+fn repeated_query_keeps_its_number() {
     on_bench(None, |bench| {
         bench.open();
         bench.said();
@@ -558,7 +558,7 @@ fn goodbye_is_repeated_until_it_is_answered_or_told_that_it_is_not() {
 }
 
 #[test]
-fn over_a_new_line_a_new_session_is_drawn_unless_the_last_was_never_answered() {
+fn new_line_draws_a_new_session_number() {
     on_bench(None, |bench| {
         let first = bench.client.session();
         bench.client.greet(bench.now, &mut bench.out);
@@ -676,7 +676,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
         bench.pass(ms(500)).expect("in time");
         let said = bench.said();
         assert_eq!(
-            (count_of(&said, "View"), count_of(&said, "Scene")),
+            (count_of(&said, "SceneChange"), count_of(&said, "Scene")),
             (1, 0),
             "{said:?}"
         );
@@ -694,7 +694,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
         bench.pass(ms(600)).expect("in time");
         let said = bench.said();
         assert_eq!(
-            (count_of(&said, "View"), count_of(&said, "Scene")),
+            (count_of(&said, "SceneChange"), count_of(&said, "Scene")),
             (0, 0),
             "{said:?}"
         );

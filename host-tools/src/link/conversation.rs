@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use hapterra_core::force::MaterialTable;
-use hapterra_core::scene::{Scene, View};
+use hapterra_core::scene::{Scene, SceneChange};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::materials::{MAX_TABLE_BYTES, MaterialScene, table_bytes};
 use hapterra_core::wire::message::{ToDevice, ToHost};
@@ -18,7 +18,7 @@ use super::error::LinkError;
 use super::messages::append;
 use super::patience::Timeouts;
 
-/// Where the conversation stands.
+/// State of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     /// Nothing was said yet, or goodbye or detach was answered.
@@ -48,7 +48,7 @@ pub(super) enum News {
     SceneAck,
     /// The view that was said is answered: it is in force, where its scene is the one that
     /// is to be.
-    View,
+    SceneChange,
     /// What was asked for is answered by this message.
     Answered(Ask, ToHost),
     /// A message that answers nothing, or more than the conversation.
@@ -71,7 +71,7 @@ pub(super) struct Conversation {
     /// The table of its materials, where it has some.
     materials: Option<MaterialTable>,
     /// Another view of it that was said and is not answered: since when, and when last.
-    view: Option<(View, Duration, Duration)>,
+    view: Option<(SceneChange, Duration, Duration)>,
     patience: Timeouts,
     state: State,
     /// When the state began, and when its message was said last.
@@ -183,7 +183,7 @@ impl Conversation {
         self.say_state(now, out);
     }
 
-    /// Whether its end was said and is not answered.
+    /// Returns true if its end was said and is not answered.
     pub(super) const fn is_ending(&self) -> bool {
         matches!(self.state, State::Leaving | State::Detaching)
     }
@@ -197,15 +197,15 @@ impl Conversation {
 
     /// Puts another view of the scene in, in place of one that is not answered yet. It is
     /// said until it is answered.
-    pub(super) fn put_view(&mut self, view: View, now: Duration, out: &mut Vec<u8>) {
+    pub(super) fn put_view(&mut self, view: SceneChange, now: Duration, out: &mut Vec<u8>) {
         self.view = Some((view, now, now));
         if self.state == State::Open {
-            self.say(&ToDevice::View(view), out);
+            self.say(&ToDevice::SceneChange(view), out);
         }
     }
 
     /// A view that nobody answers, once.
-    pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<View> {
+    pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<SceneChange> {
         let give_up = self.patience.give_up;
         let is_lost = |since: Duration| now.saturating_sub(since) >= give_up;
         let lost = self.view.take_if(|(_, since, _)| is_lost(*since));
@@ -218,7 +218,7 @@ impl Conversation {
             && self.is_due(said, now)
         {
             self.view = Some((view, since, now));
-            self.say(&ToDevice::View(view), out);
+            self.say(&ToDevice::SceneChange(view), out);
         }
     }
 
@@ -472,7 +472,7 @@ impl Conversation {
         }
     }
 
-    /// Whether a message answers the last hello and is the first that does. What answers
+    /// Returns true if a message answers the last hello and is the first that does. What answers
     /// an earlier one, and a double, tells what was.
     fn answers_hello(&mut self, number: u8) -> bool {
         number == self.hello && !std::mem::replace(&mut self.hello_answered, true)
@@ -540,7 +540,7 @@ impl Conversation {
         Ok(Some(News::Greeted { device, restarted }))
     }
 
-    /// Whether there is a scene to be felt and this is not its epoch.
+    /// Returns true if there is a scene to be felt and this is not its epoch.
     fn lacks_scene(&self, epoch: Option<u32>) -> bool {
         self.scene.is_some_and(|scene| epoch != Some(scene.epoch))
     }
@@ -551,7 +551,7 @@ impl Conversation {
         epoch: u32,
         accepted: bool,
     ) -> Result<Option<News>, LinkError> {
-        let is_views = |(view, _, _): &mut (View, _, _)| view.scene.epoch == epoch;
+        let is_views = |(view, _, _): &mut (SceneChange, _, _)| view.scene.epoch == epoch;
         if self.state == State::Open
             && let Some((view, _, _)) = self.view.take_if(is_views)
         {
@@ -559,7 +559,7 @@ impl Conversation {
             if accepted {
                 self.scene = Some(view.scene);
             }
-            return Ok(Some(News::View));
+            return Ok(Some(News::SceneChange));
         }
         if self.state != State::SceneSent || self.lacks_scene(Some(epoch)) {
             return Ok(None);

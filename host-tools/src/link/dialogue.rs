@@ -85,7 +85,7 @@ impl<'t> Dialogue<'t> {
         Ok(Self { exchange, device })
     }
 
-    /// How the device introduced itself.
+    /// Returns the device's introduction.
     #[must_use]
     pub const fn device(&self) -> &DeviceHello {
         &self.device
@@ -341,7 +341,7 @@ impl Exchange<'_> {
         while self.talk.state() != State::Closed {
             let polled = self.poll(LOOK, &mut |_| {});
             polled.map_err(|error| {
-                tracing::debug!(%error, "on the way to the end");
+                tracing::debug!(%error, "while closing the session");
                 match error {
                     LinkError::Taken => error,
                     _ if self.drives => LinkError::NotConfirmed,
@@ -353,7 +353,7 @@ impl Exchange<'_> {
     }
 }
 
-/// Whether a request may lead to something being driven.
+/// Returns true if a request may lead to something being driven.
 const fn drives(request: &Request) -> bool {
     matches!(
         request,

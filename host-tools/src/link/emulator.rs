@@ -20,9 +20,9 @@ pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_ELF";
 pub const QEMU_VARIABLE: &str = "HAPTERRA_QEMU";
 /// QEMU's name when no option says otherwise.
 pub const QEMU: &str = "qemu-system-arm";
-/// How long QEMU may take to connect its lines.
+/// Time that QEMU may take to connect its lines.
 const START: Duration = Duration::from_secs(60);
-/// How long the board may take to end after a goodbye, on a machine that others use, too.
+/// Time that the board may take to end after a goodbye, on a machine that others use, too.
 const END: Duration = Duration::from_secs(60);
 
 /// Bytes of a report that are read, at most.
@@ -35,7 +35,7 @@ pub const EMULATED: &str = "mps2-an386";
 /// 40 ns.
 pub const INSTRUCTIONS_PER_COUNT: f64 = 5.0;
 
-/// Why the board cannot be emulated.
+/// Reason for which the board cannot be emulated.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
     /// Nobody said where the image is.
@@ -132,7 +132,7 @@ impl Emulator {
         Err(io::Error::other(format!("it still ran after {END:?}")))
     }
 
-    /// What the board or QEMU said if it has ended by itself; ends it otherwise.
+    /// Returns the output of the board or QEMU if it has ended by itself; ends it otherwise.
     #[must_use]
     pub fn failure(mut self) -> Option<String> {
         // The link breaks a moment before the process has ended.

@@ -1,11 +1,11 @@
-//! What can go wrong between host and device.
+//! Errors between host and device.
 
 use std::io;
 use std::time::Duration;
 
 use hapterra_core::wire::hello::PROTOCOL;
 
-/// Why there is no link, or no longer.
+/// Reason for which there is no link, or no longer.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// Nothing there to talk to.
@@ -67,7 +67,7 @@ impl LinkError {
         }
     }
 
-    /// Whether trying again later can help.
+    /// Returns true if trying again later can help.
     #[must_use]
     pub const fn is_passing(&self) -> bool {
         matches!(

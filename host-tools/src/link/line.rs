@@ -8,7 +8,7 @@ use super::transport::{NoLine, Transport};
 
 /// Between two looks at the clock while something is waited for.
 pub(super) const LOOK: Duration = Duration::from_millis(50);
-/// How long a device may take over what is said at once before it counts as gone.
+/// Time that a device may take over what is said at once before it counts as gone.
 const TAKES: Duration = Duration::from_secs(5);
 
 /// What [`Session`](super::Session) and [`Dialogue`](super::Dialogue) hold their
@@ -50,7 +50,7 @@ impl<'t> Line<'t> {
         self.is_open = false;
     }
 
-    /// Whether there is a line.
+    /// Returns true if there is a line.
     pub(super) const fn is_open(&self) -> bool {
         self.is_open
     }

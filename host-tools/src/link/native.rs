@@ -208,13 +208,13 @@ impl<C: TickClock> Native<C> {
         self.arm.as_deref()
     }
 
-    /// What the amplifiers got in the last tick.
+    /// Returns the commands to the amplifiers in the last tick.
     #[must_use]
     pub const fn drive(&self) -> GuardOutputs {
         self.drive
     }
 
-    /// What the device would find in its memory if it were restarted now.
+    /// Returns the memory that the device would find after a restart.
     #[must_use]
     pub const fn memory(&self) -> &Stored {
         self.device.memory()

@@ -1,4 +1,4 @@
-//! How long either end waits for the other.
+//! Time-outs of both ends.
 
 use std::time::Duration;
 
@@ -28,7 +28,7 @@ pub struct Timeouts {
 }
 
 impl Timeouts {
-    /// How long a real board lets an armed arm be while its host is silent, unless the user says
+    /// Time for which an armed real board tolerates a silent host, unless the user says
     /// otherwise, seconds: longer than a host that goes on takes to come back.
     pub const REAL_SILENCE_S: u16 = 30;
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hapterra_core::scene::{HipCommand, Scene, View};
+use hapterra_core::scene::{HipCommand, Scene, SceneChange};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::request::Request;
 
@@ -20,7 +20,7 @@ use crate::terrain::Terrain;
 pub struct Session<'t> {
     client: Client<'t>,
     line: Line<'t>,
-    /// Whether it is to go on; what a device does not read is not waited for else.
+    /// True if it is to go on; what a device does not read is not waited for else.
     goes_on: &'t dyn Fn() -> bool,
     /// Until then goodbye is to be said and answered.
     leaves_by: Option<Duration>,
@@ -104,7 +104,7 @@ impl<'t> Session<'t> {
         self.line.hang_up();
     }
 
-    /// Whether it has a line.
+    /// Returns true if it has a line.
     #[must_use]
     pub const fn has_line(&self) -> bool {
         self.line.is_open()
@@ -122,7 +122,7 @@ impl<'t> Session<'t> {
         self.client.tally()
     }
 
-    /// How long it waits for what.
+    /// Time-outs.
     #[must_use]
     pub const fn patience(&self) -> &Timeouts {
         self.client.patience()
@@ -144,7 +144,7 @@ impl<'t> Session<'t> {
     ///
     /// # Errors
     /// [`LinkError::Gone`].
-    pub fn put_view(&mut self, view: View, terrain: Terrain<'t>) -> Result<(), LinkError> {
+    pub fn put_view(&mut self, view: SceneChange, terrain: Terrain<'t>) -> Result<(), LinkError> {
         let line = &mut self.line;
         self.client
             .put_view(line.now(), view, terrain, &mut line.out);
@@ -155,8 +155,8 @@ impl<'t> Session<'t> {
     ///
     /// # Errors
     /// [`LinkError::Gone`].
-    pub fn feel(&mut self, point: HipCommand) -> Result<(), LinkError> {
-        self.client.feel(self.line.now(), point, &mut self.line.out);
+    pub fn step(&mut self, point: HipCommand) -> Result<(), LinkError> {
+        self.client.step(self.line.now(), point, &mut self.line.out);
         self.flush()
     }
 
@@ -188,7 +188,7 @@ impl<'t> Session<'t> {
         self.leaves_by = Some(self.line.now() + self.client.patience().goodbye);
         while self.client.state() != State::Closed {
             self.poll(LOOK, on).map_err(|error| {
-                tracing::debug!(%error, "on the way to goodbye");
+                tracing::debug!(%error, "while closing the session");
                 match error {
                     LinkError::Taken => error,
                     _ => LinkError::NotConfirmed,

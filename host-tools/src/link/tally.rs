@@ -1,4 +1,4 @@
-//! What went over the link, and what of it was lost.
+//! Traffic of the link, and losses.
 
 use std::collections::HashSet;
 

@@ -16,7 +16,7 @@ pub struct Tcp {
     write_wait: Duration,
 }
 
-/// How long a connection may take, and how long the device may take over what is sent at
+/// Time that a connection may take, and how long the device may take over what is sent at
 /// once before it counts as gone.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// The shortest wait: none at all would be for ever.

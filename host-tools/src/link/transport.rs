@@ -1,4 +1,4 @@
-//! What a byte stream to a device is, whatever it runs over.
+//! The byte stream to a device, over any carrier.
 
 use std::io;
 use std::sync::LazyLock;
@@ -72,7 +72,7 @@ impl Transport for NoLine {
     }
 }
 
-/// Whether a read ended because nothing came in time.
+/// Returns true if a read ended because nothing came in time.
 pub(super) fn is_time_out(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), TimedOut | WouldBlock | Interrupted)

@@ -13,7 +13,7 @@ use super::error::LinkError;
 
 /// Transfers under way from the device, so that none of its packets waits.
 const TRANSFERS: usize = 4;
-/// How long the board may leave a transfer unread before it counts as gone. A board reads
+/// Time for which the board may leave a transfer unread before it counts as gone. A board reads
 /// within milliseconds, and an end that is asked for waits for this.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
@@ -73,7 +73,7 @@ impl Usb {
         (devices.into_iter().filter(is_board).collect(), count)
     }
 
-    /// What is looked for on USB, in words: its vendor and product numbers.
+    /// Returns the vendor and product numbers that are searched on USB, in words.
     #[must_use]
     pub fn looked_for() -> String {
         format!("a hapterra board on USB ({VENDOR_ID:04x}:{PRODUCT_ID:04x})")

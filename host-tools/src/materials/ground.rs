@@ -7,7 +7,7 @@ use heightfield::{Raster, Sides, System};
 pub enum GroundError {
     /// One of the two says where it lies, and the other does not.
     #[error(
-        "{unplaced} does not state its reference system, and {placed} does: which class lies where cannot be told"
+        "{unplaced} does not state its reference system, and {placed} does: the classes cannot be placed on the terrain"
     )]
     NoSystem {
         /// The file that says nothing.

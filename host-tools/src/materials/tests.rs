@@ -139,7 +139,7 @@ fn a_tile_has_the_classes_of_its_level() {
 }
 
 #[test]
-fn the_scene_names_the_table_and_another_file_of_classes_makes_another_scene() {
+fn scene_names_its_table_and_its_file_of_classes() {
     let terrain = raster((41, 41), [0.0; 2], 1.0, None, |x, _| x as f32);
     let scene = |materials: Option<&Materials>| {
         let grid = HapticGrid::new(&terrain, HapticCells::Stored).with_materials(materials);

@@ -5,7 +5,7 @@ use libm::exp;
 
 use super::model::AxisDrive;
 
-/// What is wrong with an amplifier.
+/// Fault of an amplifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AmplifierFault {
     /// It is not there, or has no supply: it is not ready, and no current flows.
@@ -51,13 +51,13 @@ impl Amplifier {
         self.fault = fault;
     }
 
-    /// Whether its ready line says that it is ready.
+    /// Returns true if its ready line says that it is ready.
     #[must_use]
     pub fn is_ready(&self) -> bool {
         self.fault != Some(AmplifierFault::Missing)
     }
 
-    /// What its current monitor reads, mA, to the next lower one.
+    /// Returns the reading of its current monitor, mA, to the next lower one.
     #[must_use]
     pub fn monitor_ma(&self) -> i16 {
         // The cast saturates.

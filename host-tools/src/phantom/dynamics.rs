@@ -1,4 +1,4 @@
-//! What the joints do under torque: the mass matrix, the velocity-dependent
+//! Dynamics of the joints: the mass matrix, the velocity-dependent
 //! torques that go with it, gravity and the stops.
 //!
 //! `M(q)·q̈ + c(q, q̇) + G(q) + B·q̇ + friction = τ + Jᵀ·F`, with `c` derived from

@@ -12,7 +12,7 @@
 
 use glam::DVec3;
 
-/// What a hand is made of.
+/// Masses, springs and dampers of a hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandModel {
     /// Mass that moves with the fingers, kg.
@@ -44,7 +44,7 @@ impl Default for HandModel {
 }
 
 impl HandModel {
-    /// How far the tip lags behind the target for each newton, m/N.
+    /// Returns the tip's lag behind the target for each newton, m/N.
     #[must_use]
     pub fn give_m_per_n(&self) -> f64 {
         1.0 / self.arm_n_per_m + 1.0 / self.grip_n_per_m
@@ -75,7 +75,7 @@ impl Hand {
         }
     }
 
-    /// Where the hand wants to be, and how fast that moves, m and m/s.
+    /// Sets the hand's target and its velocity, m and m/s.
     pub fn aim(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
         self.target = DVec3::from(target_m);
         self.target_speed = DVec3::from(speed_m_s);

@@ -4,9 +4,9 @@
 use hapterra_core::guard::GuardInputs;
 
 use super::amplifier::AmplifierFault;
+use super::arm_frame::{ArmFrame, OutOfReach};
 use super::hand::HandModel;
 use super::model::PhantomModel;
-use super::placement::{OutOfReach, Placement};
 use super::plant::Plant;
 use super::script::Script;
 
@@ -17,7 +17,7 @@ const PRESS_S: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub struct HeldPhantom {
     plant: Plant,
-    placement: Placement,
+    placement: ArmFrame,
     script: Script,
     /// When the script begins, s.
     begin_s: f64,
@@ -36,7 +36,7 @@ impl HeldPhantom {
     pub fn new(
         model: PhantomModel,
         hand: HandModel,
-        placement: Placement,
+        placement: ArmFrame,
         script: Script,
     ) -> Result<Self, OutOfReach> {
         placement.check(&model, &script)?;
@@ -88,13 +88,13 @@ impl HeldPhantom {
     /// device has confirmed and force has come in.
     pub const ARMED_S: f64 = 3.0;
 
-    /// How long the script takes, s.
+    /// Returns the duration of the script, s.
     #[must_use]
     pub fn script_s(&self) -> f64 {
         self.script.duration_s()
     }
 
-    /// What encoders, switches and amplifiers say now.
+    /// Returns the present readings of encoders, switches and amplifiers.
     #[must_use]
     pub fn sense(&self) -> GuardInputs {
         GuardInputs {
@@ -116,7 +116,7 @@ impl HeldPhantom {
         let at_m = self
             .placement
             .to_device_m(self.plant.model(), target.position_mm);
-        let speed_m_s = Placement::turn_to_device(target.speed_mm_s).map(|v| v * 1e-3);
+        let speed_m_s = ArmFrame::turn_to_device(target.speed_mm_s).map(|v| v * 1e-3);
         self.plant.aim(at_m, speed_m_s);
         self.t_s += dt_s;
         self.measured_ma = self.plant.monitors_ma();

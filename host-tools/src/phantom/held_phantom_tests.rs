@@ -9,7 +9,7 @@ const TICK_S: f64 = 1e-3;
 
 /// A controller of three lines for a flat surface at height zero: what a
 /// device would do, from counts alone.
-fn wall_currents(model: &PhantomModel, placement: &Placement, counts: [i32; 3]) -> [f64; 3] {
+fn wall_currents(model: &PhantomModel, placement: &ArmFrame, counts: [i32; 3]) -> [f64; 3] {
     let q = std::array::from_fn(|i| Encoder::new(&model.drive[i]).angle_rad(counts[i]));
     let [_, _, height_mm] = placement.to_terrain_mm(model, kinematics::tip(model, q));
     let force = DVec3::new(0.0, 0.0, WALL_N_PER_MM * (-height_mm).max(0.0));
@@ -34,7 +34,7 @@ fn run(arm: &mut HeldPhantom, until_s: f64, mut watch: impl FnMut(f64, [f64; 3])
         arm.step(currents, TICK_S);
         watch(
             height_mm(arm),
-            Placement::turn_to_terrain(arm.plant.motor_force_n()),
+            ArmFrame::turn_to_terrain(arm.plant.motor_force_n()),
         );
     }
 }
@@ -45,7 +45,7 @@ fn press_and_lift(model: PhantomModel) -> (HeldPhantom, f64) {
     let pressed = touch.press(2.0, 1.5);
     let until_s = pressed.script().duration_s();
     let script = pressed.lift(10.0).finish();
-    let placement = Placement { home_mm: [0.0; 3] };
+    let placement = ArmFrame { home_mm: [0.0; 3] };
     let arm = HeldPhantom::new(model, hand, placement, script).expect("in reach");
     (arm, until_s)
 }
@@ -98,7 +98,7 @@ fn tapped_it_stays_stable() {
         .tap(5, 3.0)
         .lift(10.0)
         .finish();
-    let placement = Placement { home_mm: [0.0; 3] };
+    let placement = ArmFrame { home_mm: [0.0; 3] };
     let until = script.duration_s();
     let mut arm =
         HeldPhantom::new(PhantomModel::premium_1_5(), hand, placement, script).expect("reach");
@@ -113,7 +113,7 @@ fn tapped_it_stays_stable() {
 #[test]
 fn names_the_point_it_cannot_reach() {
     let script = Script::start([0.0; 3]).go([0.0, 400.0, 0.0], 50.0);
-    let placement = Placement { home_mm: [0.0; 3] };
+    let placement = ArmFrame { home_mm: [0.0; 3] };
     let error = HeldPhantom::new(
         PhantomModel::premium_1_5(),
         HandModel::default(),

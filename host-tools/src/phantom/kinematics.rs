@@ -83,7 +83,7 @@ pub fn inverse(model: &PhantomModel, tip_m: [f64; 3]) -> Option<[f64; 3]> {
     Some([atan2(y, x), q2, q2 - elbow + FRAC_PI_2])
 }
 
-/// Whether a pose lies inside the mechanical stops.
+/// Returns true if a pose lies inside the mechanical stops.
 #[must_use]
 pub fn within_stops(model: &PhantomModel, q_rad: [f64; 3]) -> bool {
     let limits = &model.limits;

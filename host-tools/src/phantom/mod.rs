@@ -22,9 +22,10 @@
 //!   from the base towards the user, right-handed: for the user, who faces the
 //!   device, y points to the right.
 //! - *Terrain frame*, millimetres as the hand feels them: x east, y north,
-//!   z up. [`Placement`] lays one onto the other.
+//!   z up. [`ArmFrame`] lays one onto the other.
 
 mod amplifier;
+mod arm_frame;
 mod dynamics;
 mod encoder;
 mod friction;
@@ -34,7 +35,6 @@ pub mod kinematics;
 mod model;
 mod motor;
 mod placed_terrain;
-mod placement;
 mod plant;
 mod script;
 mod touch;
@@ -42,6 +42,7 @@ mod tour;
 mod wiring;
 
 pub use amplifier::{Amplifier, AmplifierFault};
+pub use arm_frame::{ArmFrame, OutOfReach};
 pub use dynamics::Dynamics;
 pub use encoder::Encoder;
 pub use hand::{Hand, HandModel};
@@ -49,7 +50,6 @@ pub use held_phantom::HeldPhantom;
 pub use model::{AxisDrive, JointLimits, Lumped, Motor, PhantomModel, STANDARD_GRAVITY};
 pub use motor::MotorTemperature;
 pub use placed_terrain::{PlacedTerrain, PlacingError};
-pub use placement::{OutOfReach, Placement};
 pub use plant::{MAX_SUBSTEP_S, Plant};
 pub use script::{Script, Target};
 pub use touch::{Surface, Touch};

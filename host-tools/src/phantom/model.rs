@@ -31,7 +31,7 @@ pub struct PhantomModel {
     pub drive: [AxisDrive; 3],
 }
 
-/// Where the joints meet their stops, radians. `q2` and `q3` are absolute link
+/// Stops of the joints, radians. `q2` and `q3` are absolute link
 /// angles, so the parallel linkage adds a bound on their difference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {

@@ -1,4 +1,4 @@
-//! How warm a motor gets: winding and housing, two thermal nodes.
+//! Thermal model of a motor: winding and housing, two nodes.
 //!
 //! Only watched, never acted upon: protecting the motor is the guard's job,
 //! and this is how a test sees whether it did.

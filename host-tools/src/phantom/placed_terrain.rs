@@ -22,7 +22,7 @@ pub struct PlacedTerrain<'t> {
     duration_s: f64,
 }
 
-/// Why a terrain cannot be put in front of the arm.
+/// Reason for which a terrain cannot be placed in front of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlacingError {
     /// No part of it is within the arm's reach.
@@ -44,7 +44,7 @@ impl<'t> PlacedTerrain<'t> {
     }
 
     /// Leaves the terrain where a view has it, with this point of it at the tip in the home pose
-    /// (hand millimetres), and tours what the arm gets to of it.
+    /// (device millimetres), and tours what the arm gets to of it.
     ///
     /// # Errors
     /// [`PlacingError`].
@@ -126,7 +126,7 @@ impl<'t> PlacedTerrain<'t> {
         self.arm.clone()
     }
 
-    /// How long the tour takes with arming before it and a rest at its end, s.
+    /// Returns the duration of the tour with arming before it and a rest at its end, s.
     #[must_use]
     pub const fn duration_s(&self) -> f64 {
         self.duration_s

@@ -86,7 +86,7 @@ impl Plant {
         }
     }
 
-    /// Where the hand wants to be, m and m/s in the device frame. Within a
+    /// Sets the hand's target, m and m/s in the device frame. Within a
     /// step the target goes on at that speed. Without a hand, nothing.
     pub fn aim(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
         if let Some(hand) = &mut self.hand {
@@ -111,7 +111,7 @@ impl Plant {
         self.counts()
     }
 
-    /// What the counters read.
+    /// Returns the counters' readings.
     #[must_use]
     pub fn counts(&self) -> [i32; 3] {
         let angles = self.q.to_array();
@@ -125,13 +125,13 @@ impl Plant {
         }
     }
 
-    /// Whether all amplifiers say that they are ready.
+    /// Returns true if all amplifiers say that they are ready.
     #[must_use]
     pub fn amplifiers_are_ready(&self) -> bool {
         self.amplifiers.iter().all(Amplifier::is_ready)
     }
 
-    /// What the amplifiers' current monitors read, mA.
+    /// Returns the readings of the amplifiers' current monitors, mA.
     #[must_use]
     pub fn monitors_ma(&self) -> [i16; 3] {
         self.amplifiers.map(|amplifier| amplifier.monitor_ma())

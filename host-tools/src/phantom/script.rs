@@ -1,4 +1,4 @@
-//! Where the person's hand wants to be, as a function of time: legs along
+//! The hand's target as a function of time: legs along
 //! polylines with smooth starts and ends, mm, terrain frame.
 
 use glam::DVec3;
@@ -8,7 +8,7 @@ const RAMP_S: f64 = 0.15;
 /// Speed of the way back to the beginning of a plan, mm/s.
 const BACK_MM_S: f64 = 60.0;
 
-/// Where the hand wants to be at one moment.
+/// The hand's target at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     /// Position, mm, terrain frame.
@@ -94,7 +94,7 @@ impl Script {
         self.duration_s
     }
 
-    /// Where the plan ends, mm.
+    /// Returns the end of the plan, mm.
     #[must_use]
     pub fn end_mm(&self) -> [f64; 3] {
         self.end_mm.to_array()

@@ -64,7 +64,7 @@ impl<'a> Touch<'a> {
         self
     }
 
-    /// How long the way of such a slide is, ups and downs included, mm.
+    /// Returns the length of such a slide, ups and downs included, mm.
     #[must_use]
     pub fn slide_length_mm(&self, line_mm: &[[f64; 2]], newtons: f64) -> f64 {
         let points = self.follow(&self.course(line_mm), newtons);

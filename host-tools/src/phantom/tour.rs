@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
+use super::arm_frame::{ArmFrame, OutOfReach};
 use super::hand::HandModel;
 use super::model::PhantomModel;
-use super::placement::{OutOfReach, Placement};
 use super::script::Script;
 use super::touch::{Surface, Touch};
 
@@ -38,10 +38,10 @@ pub struct Tour {
     /// Come down, press, slide along a winding line, tap three times, lift.
     pub script: Script,
     /// The middle of the plan at the arm's home.
-    pub placement: Placement,
+    pub placement: ArmFrame,
 }
 
-/// What a tour is planned for.
+/// Conditions of a tour.
 #[derive(Clone, Copy)]
 pub struct TourPlan<'a> {
     /// The terrain, mm.
@@ -111,7 +111,7 @@ impl TourPlan<'_> {
             .lift(12.0)
             .finish();
         let home_mm = self.home_mm.unwrap_or_else(|| middle(&script));
-        let placement = Placement { home_mm };
+        let placement = ArmFrame { home_mm };
         Tour { script, placement }
     }
 
@@ -145,7 +145,7 @@ impl TourPlan<'_> {
         let Some(home_mm) = self.home_mm else {
             return 0.0;
         };
-        let place = Placement { home_mm };
+        let place = ArmFrame { home_mm };
         let beyond = |point: &&[f64; 2]| {
             let [x, y] = **point;
             let ground = (self.surface)(x, y);

@@ -1,15 +1,15 @@
-//! How a board is wired to an arm, with the mistakes that people make.
+//! Wiring of a board to an arm, with the mistakes that people make.
 
 /// Which motor each command reaches, and which encoder each counter reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wiring {
     /// The motor (0 to 2) that each of the three commands reaches.
     pub motor: [usize; 3],
-    /// What each command is multiplied by on its way: −1 where a motor's two wires
+    /// Factor of each command: −1 where a motor's two wires
     /// are crossed, 0 where its amplifier or its cable is missing, 2 where an
     /// amplifier's full scale is twice what the board believes.
     pub gain: [f64; 3],
-    /// Whether each encoder's counter stands still.
+    /// True if each encoder's counter stands still.
     pub dead_encoder: [bool; 3],
 }
 
@@ -55,7 +55,7 @@ impl Wiring {
         currents_a
     }
 
-    /// What the board's counters read where the encoders have turned to `counts`.
+    /// Returns the readings of the board's counters where the encoders have turned to `counts`.
     #[must_use]
     pub fn counts(&self, counts: [i32; 3]) -> [i32; 3] {
         std::array::from_fn(|axis| match self.dead_encoder[axis] {

@@ -25,7 +25,7 @@ pub const LEFT_PX: i32 = 80;
 /// Room below a chart for its labels, finished pixels.
 pub const BELOW_PX: i32 = 52;
 
-/// What to write along the axes.
+/// Titles of the axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Titles<'a> {
     /// Along x, with its unit; empty leaves the x axis without any text.

@@ -1,4 +1,4 @@
-//! What a map says of the ground: a scale bar, and the coordinates of two corners.
+//! Marks of the ground on a map: a scale bar, and the coordinates of two corners.
 
 use plotters::element::Rectangle;
 use plotters::style::{Color, WHITE};
@@ -9,12 +9,12 @@ use super::canvas::PictureError;
 use super::map_view::MapView;
 use super::style::{self, INK, px};
 
-/// What a picture says of the ground.
+/// Facts about the ground for a picture.
 #[derive(Clone, Copy)]
 pub struct GroundFacts<'a> {
-    /// Ground metres a hand millimetre, where the terrain knows its size.
+    /// Ground metres a device millimetre, where the terrain knows its size.
     pub metres_per_mm: Option<f64>,
-    /// Coordinates of a place in hand millimetres east and north, short.
+    /// Coordinates of a place in device millimetres east and north, short.
     pub place_of: &'a dyn Fn(f64, f64) -> String,
     /// Scale and place for the panel: name and value with its unit, short.
     pub lines: &'a [(String, String)],

@@ -117,7 +117,7 @@ fn key(area: &Area<'_>, top: i32, holes: bool) -> Result<i32, PictureError> {
         Ok(())
     })?;
     if holes {
-        entry("no data (a hole)", &|y| {
+        entry("no data", &|y| {
             for (row, column) in (0..16).flat_map(|row| (0..40).map(move |column| (row, column))) {
                 let (x, y) = (px(column), y + px(row - 8));
                 let pixel = [(x, y), (x + px(1) - 1, y + px(1) - 1)];

@@ -203,7 +203,7 @@ impl PixelHeights {
         slope.map_or(1.0, |slope| (1.0 / slope).clamp(0.2, MAX_EXAGGERATION))
     }
 
-    /// Whether a pixel's middle lies off the data, rather than in a hole.
+    /// Returns true if a pixel's middle lies off the data, rather than in a hole.
     fn outside(&self, surface: &Surface<'_>, window: &MapView, x: i32, y: i32) -> bool {
         let east = window.west + (f64::from(x) + 0.5) * self.pixel_mm;
         let north = window.south + window.height - (f64::from(y) + 0.5) * self.pixel_mm;

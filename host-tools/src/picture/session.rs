@@ -22,11 +22,11 @@ pub struct SessionPicture<'a> {
     pub subtitle: &'a str,
     /// The terrain.
     pub surface: Surface<'a>,
-    /// What was felt, in order of time; terrain frame.
+    /// Records in order of time; terrain frame.
     pub records: &'a [Record],
     /// Further figures for the panel, name and value with its unit, short.
     pub facts: &'a [(String, String)],
-    /// Where the terrain is on the ground, where it is shown.
+    /// The terrain's place on the ground, where it is shown.
     pub ground: Option<GroundFacts<'a>>,
 }
 

@@ -23,7 +23,7 @@ pub const SURFACE: RGBColor = RGBColor(120, 105, 82);
 pub const GROUND: RGBColor = RGBColor(233, 226, 212);
 /// Behind the times of contact, laid on with [`TOUCHING_INK`].
 pub const TOUCHING: RGBColor = RGBColor(248, 205, 165);
-/// How much of [`TOUCHING`] covers what is below.
+/// Opacity of [`TOUCHING`].
 pub const TOUCHING_INK: f64 = 0.32;
 /// For the points and curves of other pictures: six hues that differ in
 /// lightness too.

@@ -3,8 +3,8 @@
 
 use hapterra_core::force::SurfaceParams;
 
+use super::placement::{Placement, finest_level};
 use super::surface_change::{SurfaceChange, SurfaceError};
-use super::view::{View, finest_level};
 use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 
 /// A sample of the file as large as this in the hand is felt as one even patch, mm.
@@ -19,7 +19,7 @@ const SOFTEST_N_PER_MM: f32 = 0.005;
 
 /// What may be changed of a view while it is felt.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ViewChange {
+pub enum PlacementChange {
     /// Another place under the hand: so many hand millimetres farther east and north.
     Pan {
         /// Hand millimetres east.
@@ -54,7 +54,7 @@ pub enum ChangeError {
     Outside,
     /// Ground metres, of a file that knows none.
     #[error(
-        "the file does not know how large its cells are on the ground: pan by hand millimetres"
+        "the file does not know how large its cells are on the ground: pan by device millimetres"
     )]
     NoGroundSize,
     /// A factor that is none.
@@ -99,7 +99,7 @@ pub enum ChangeError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Laid {
     /// Place, scale, level and heights.
-    pub view: View,
+    pub view: Placement,
     /// Stiffness and limit.
     pub law: SurfaceParams,
 }
@@ -169,7 +169,7 @@ impl Bounds {
         &self,
         terrain: &Terrain<'r>,
         before: &Laid,
-        changes: &[ViewChange],
+        changes: &[PlacementChange],
         hand: &Hand,
     ) -> Result<Changed<'r>, ChangeError> {
         let at_mm = hand.at_mm();
@@ -209,30 +209,30 @@ impl Bounds {
         grid: &HapticGrid<'_>,
         mut laid: Laid,
         mut at: [f64; 2],
-        change: &ViewChange,
+        change: &PlacementChange,
     ) -> Result<(Laid, [f64; 2]), ChangeError> {
         let Laid { view, law } = &mut laid;
         let scale = view.scale;
         let (cell_mm, height) = (scale.cell_mm(), scale.height_mm_per_unit());
         match *change {
-            ViewChange::Pan { east_mm, north_mm } => {
+            PlacementChange::Pan { east_mm, north_mm } => {
                 at = [at[0] + east_mm / cell_mm, at[1] + north_mm / cell_mm];
                 within(grid, at)?;
             }
-            ViewChange::PanGround { east_m, north_m } => {
+            PlacementChange::PanGround { east_m, north_m } => {
                 let side = grid.side_m().ok_or(ChangeError::NoGroundSize)?;
                 at = [at[0] + east_m / side, at[1] + north_m / side];
                 within(grid, at)?;
             }
-            ViewChange::Zoom(factor) => {
+            PlacementChange::Zoom(factor) => {
                 let factor = factor_of(factor)?;
                 *view = view.scaled(cell_mm * factor, height * factor)?;
                 check_size(grid, view, factor)?;
             }
-            ViewChange::Exaggerate(factor) => {
+            PlacementChange::Exaggerate(factor) => {
                 *view = view.scaled(cell_mm, height * factor_of(factor)?)?;
             }
-            ViewChange::Stiffness(factor) => {
+            PlacementChange::Stiffness(factor) => {
                 let stiffness = law.stiffness_n_per_mm * factor_of(factor)? as f32;
                 // A stiffness of the user's own may go down, and come back.
                 let most = STIFFEST_N_PER_MM.max(self.first.law.stiffness_n_per_mm);
@@ -249,8 +249,10 @@ impl Bounds {
                     }
                 }
             }
-            ViewChange::Surface(change) => *law = change.of(law, grid.materials().is_some())?,
-            ViewChange::Reset => {
+            PlacementChange::Surface(change) => {
+                *law = change.of(law, grid.materials().is_some())?
+            }
+            PlacementChange::Reset => {
                 let first = &self.first.view;
                 let cell_mm = first.scale.cell_mm() * first.as_large_as_in(grid);
                 let height = first.scale.height_mm_per_unit();
@@ -318,7 +320,7 @@ fn within(grid: &HapticGrid<'_>, at: [f64; 2]) -> Result<(), ChangeError> {
 }
 
 /// Refuses what is too large or too small, unless it comes nearer to what is not.
-fn check_size(grid: &HapticGrid<'_>, view: &View, factor: f64) -> Result<(), ChangeError> {
+fn check_size(grid: &HapticGrid<'_>, view: &Placement, factor: f64) -> Result<(), ChangeError> {
     let cell_mm = view.scale.cell_mm();
     let size_mm = f64::from(grid.columns().max(grid.rows()) - 1) * cell_mm;
     if factor > 1.0 && cell_mm > MAX_CELL_MM {

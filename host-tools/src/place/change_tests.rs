@@ -1,5 +1,5 @@
 use super::*;
-use crate::place::{Heights, Reach, Sizing, Target, ViewOptions};
+use crate::place::{Heights, PlacementOptions, Reach, Sizing, Target};
 use hapterra_core::phantom::Calibration;
 use heightfield::Raster;
 
@@ -26,7 +26,7 @@ impl Bench {
 
     /// Does something with the terrain at 0.05 mm a cell, and its bounds.
     fn with<T>(&self, look: impl FnOnce(&Terrain<'_>, Bounds) -> T) -> T {
-        let options = ViewOptions {
+        let options = PlacementOptions {
             target: Target::Whole,
             sizing: Sizing::CellMm(0.05),
             heights: Heights::default(),
@@ -35,7 +35,7 @@ impl Bench {
         let grid = options.target.grid(&self.raster, Default::default());
         let grid = grid.expect("a grid");
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
-        let view = View::new(&grid, &reach, &options).expect("a view");
+        let view = Placement::new(&grid, &reach, &options).expect("a view");
         let terrain = view.terrain(grid).expect("a terrain");
         let bounds = Bounds {
             first: Laid {
@@ -63,7 +63,7 @@ fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
         let before = bounds.first;
-        let zoom = [ViewChange::Zoom(8.0)];
+        let zoom = [PlacementChange::Zoom(8.0)];
         let changed = bounds
             .apply(terrain, &before, &zoom, &hand)
             .expect("zoomed");
@@ -107,7 +107,7 @@ fn the_level_is_chosen_as_a_fit_does_and_a_stated_one_stays() {
         bench.with(|terrain, bounds| {
             let hand = pressing(terrain);
             let level = |factor: f64| {
-                let zoom = [ViewChange::Zoom(factor)];
+                let zoom = [PlacementChange::Zoom(factor)];
                 let changed = bounds.apply(terrain, &bounds.first, &zoom, &hand);
                 changed.expect("zoomed").laid.view.level
             };
@@ -122,7 +122,7 @@ fn panned_there_is_other_ground_under_the_hand_as_deep_as_before() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
         let pan = |change| bounds.apply(terrain, &bounds.first, &[change], &hand);
-        let panned = pan(ViewChange::Pan {
+        let panned = pan(PlacementChange::Pan {
             east_mm: 5.0,
             north_mm: -1.0,
         });
@@ -134,12 +134,12 @@ fn panned_there_is_other_ground_under_the_hand_as_deep_as_before() {
         }
         assert!(panned.terrain.has_tiles_of(terrain));
         // 1000 m are 100 cells of 0.05 mm.
-        let far = pan(ViewChange::PanGround {
+        let far = pan(PlacementChange::PanGround {
             east_m: 1000.0,
             north_m: -200.0,
         });
         assert!((far.expect("panned").hip_mm[0] - expected[0]).abs() < 1e-9);
-        let outside = pan(ViewChange::Pan {
+        let outside = pan(PlacementChange::Pan {
             east_mm: 60.0,
             north_mm: 0.0,
         });
@@ -151,7 +151,10 @@ fn panned_there_is_other_ground_under_the_hand_as_deep_as_before() {
 fn heights_and_stiffness_change_by_factors_and_come_back() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
-        let steeper = [ViewChange::Exaggerate(3.0), ViewChange::Stiffness(0.5)];
+        let steeper = [
+            PlacementChange::Exaggerate(3.0),
+            PlacementChange::Stiffness(0.5),
+        ];
         let changed = bounds.apply(terrain, &bounds.first, &steeper, &hand);
         let changed = changed.expect("changed");
         let Laid { view, law } = changed.laid;
@@ -162,7 +165,7 @@ fn heights_and_stiffness_change_by_factors_and_come_back() {
             hip_mm: changed.hip_mm,
             proxy_mm: None,
         };
-        let back = [ViewChange::Reset];
+        let back = [PlacementChange::Reset];
         let back = bounds.apply(&changed.terrain, &changed.laid, &back, &there);
         let back = back.expect("back").laid;
         assert_eq!(
@@ -178,14 +181,14 @@ fn what_cannot_be_had_is_said_and_names_the_bound() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
         for (change, says) in [
-            (ViewChange::Zoom(2000.0), "no more detail"),
-            (ViewChange::Zoom(1e-3), "mm wide"),
-            (ViewChange::Zoom(-1.0), "no factor"),
-            (ViewChange::Zoom(f64::NAN), "no factor"),
-            (ViewChange::Exaggerate(0.0), "no factor"),
-            (ViewChange::Exaggerate(1e12), "can be felt"),
-            (ViewChange::Stiffness(3.0), "1 N/mm"),
-            (ViewChange::Stiffness(1e-4), "0.005"),
+            (PlacementChange::Zoom(2000.0), "no more detail"),
+            (PlacementChange::Zoom(1e-3), "mm wide"),
+            (PlacementChange::Zoom(-1.0), "no factor"),
+            (PlacementChange::Zoom(f64::NAN), "no factor"),
+            (PlacementChange::Exaggerate(0.0), "no factor"),
+            (PlacementChange::Exaggerate(1e12), "can be rendered"),
+            (PlacementChange::Stiffness(3.0), "1 N/mm"),
+            (PlacementChange::Stiffness(1e-4), "0.005"),
         ] {
             let refused = bounds.apply(terrain, &bounds.first, &[change], &hand);
             let said = refused.err().expect("refused").to_string();
@@ -198,7 +201,7 @@ fn what_cannot_be_had_is_said_and_names_the_bound() {
         let hand = pressing(terrain);
         let mut first = bounds.first;
         first.view = first.view.scaled(80.0, 8.0).expect("a scale");
-        let smaller = [ViewChange::Zoom(0.9)];
+        let smaller = [PlacementChange::Zoom(0.9)];
         assert!(bounds.apply(terrain, &first, &smaller, &hand).is_ok());
     });
 }
@@ -211,7 +214,7 @@ fn in_the_air_the_height_over_the_ground_stays() {
             hip_mm: [51.2, 51.2, ground + 7.0],
             proxy_mm: None,
         };
-        let zoom = [ViewChange::Zoom(4.0)];
+        let zoom = [PlacementChange::Zoom(4.0)];
         let changed = bounds.apply(terrain, &bounds.first, &zoom, &hand);
         let changed = changed.expect("zoomed");
         let [x, y, z] = changed.hip_mm;

@@ -1,8 +1,8 @@
-//! What the numbers of a place are.
+//! Coordinates of a place.
 
 use heightfield::{Georeference, ReferenceSystem};
 
-/// What the numbers of a place are.
+/// Coordinates of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
     /// x and y of the file's own reference system, or columns and rows where it has none.

@@ -1,8 +1,8 @@
-//! Why a terrain cannot be laid in front of the arm as it was asked for.
+//! Reasons for which a terrain cannot be placed in front of the arm as requested.
 
 use crate::terrain::ScaleError;
 
-/// Why a place or a scale cannot be had.
+/// Reason for which a place or a scale is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlaceError {
     /// Longitude and latitude of a file whose reference system is not known.
@@ -68,7 +68,7 @@ pub enum PlaceError {
         bounds: String,
     },
     /// A place without a height.
-    #[error("there is no data at {place}: it is a hole; the terrain covers {bounds}")]
+    #[error("there is no data at {place}; the terrain covers {bounds}")]
     Hole {
         /// As asked for.
         place: String,

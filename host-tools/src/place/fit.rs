@@ -1,4 +1,4 @@
-//! How large a terrain may be for all of it to lie in an arm's reach.
+//! Largest size of a terrain within an arm's workspace.
 
 use super::error::PlaceError;
 use super::reach::Reach;
@@ -14,7 +14,7 @@ const SMALLEST: f64 = 1e-6;
 
 /// What is laid into the reach.
 pub(super) struct Extent<'a> {
-    /// East and north, felt cells.
+    /// East and north, haptic cells.
     pub(super) cells: [f64; 2],
     /// Lowest and highest point in the hand, mm, with cells of a size in the hand, mm.
     pub(super) heights_mm: &'a dyn Fn(f64) -> [f64; 2],
@@ -23,7 +23,7 @@ pub(super) struct Extent<'a> {
 /// Where a terrain lies that was laid into the reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
-    /// Hand millimetres a felt cell.
+    /// Device millimetres a haptic cell.
     pub(super) cell_mm: f64,
     /// The middle of the extent east and north of the home position, mm.
     pub(super) middle_mm: [f64; 2],

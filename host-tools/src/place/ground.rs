@@ -188,7 +188,7 @@ fn in_turn_of(file: &Georeference<'_>, other: [f64; 2], east: f64, [x, y]: [f64;
     [x + ((expected - x) / turn).round() * turn, y]
 }
 
-/// Whether neighbours on an outline are too far apart for one piece of a map.
+/// Returns true if neighbours on an outline are too far apart for one piece of a map.
 fn is_torn(points: &[[f64; 2]]) -> bool {
     let [west, south, east, north] = around(points.iter().copied());
     let whole = (east - west).hypot(north - south);
@@ -199,7 +199,7 @@ fn is_torn(points: &[[f64; 2]]) -> bool {
         .any(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1]) > TORN * whole)
 }
 
-/// A place in felt cells that has a height, and this height in the file's vertical unit.
+/// A place in haptic cells that has a height, and this height in the file's vertical unit.
 pub(super) fn spot(
     grid: &HapticGrid<'_>,
     asked: [f64; 2],
@@ -235,7 +235,7 @@ pub(super) fn spot(
     }
 }
 
-/// The part of a terrain in a box: felt cells, and its lowest and highest point in the
+/// The part of a terrain in a box: haptic cells, and its lowest and highest point in the
 /// file's vertical unit.
 pub(super) fn area(
     grid: &HapticGrid<'_>,
@@ -268,7 +268,7 @@ pub(super) fn area(
     }
 }
 
-/// Lowest and highest of the samples in a rectangle of felt cells, or of many of them
+/// Lowest and highest of the samples in a rectangle of haptic cells, or of many of them
 /// where they are very many.
 fn heights(grid: &HapticGrid<'_>, [west, south, east, north]: Sides) -> Option<[f64; 2]> {
     let along = |from: f64, to: f64| {

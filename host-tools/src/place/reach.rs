@@ -1,4 +1,4 @@
-//! What an arm can get to by its calibration, and how finely it tells places apart.
+//! Workspace and resolution of an arm by its calibration.
 
 use std::f64::consts::PI;
 
@@ -34,7 +34,7 @@ impl ReachBox {
     }
 }
 
-/// What an arm can get to.
+/// Workspace of an arm.
 ///
 /// The arm turns about the base's axis, so its reach is a profile of distances from
 /// this axis and heights, swept through the angles of the first joint.
@@ -80,7 +80,7 @@ impl Reach {
         reach
     }
 
-    /// What one count of the encoders is at the tip in the home pose, mm: the coarsest
+    /// Returns the resolution of the encoders at the tip in the home pose, mm: the coarsest
     /// axis. The levers of the axes are there the upper link, the upper link and the fore
     /// link.
     #[must_use]
@@ -123,7 +123,7 @@ impl Reach {
         ]
     }
 
-    /// Whether the arm gets to every point of a box.
+    /// Returns true if the arm gets to every point of a box.
     #[must_use]
     pub fn holds(&self, of: &ReachBox) -> bool {
         let ([west, south, low], [east, north, high]) = (of.low, of.high);
@@ -131,7 +131,7 @@ impl Reach {
             .is_some_and(|out| self.reaches_all(out, [low, high]))
     }
 
-    /// Where a box of a size lies in the reach: the middle that is closest to the tip in
+    /// Returns the middle of a box of a size in the workspace: the one that is closest to the tip in
     /// its home pose, mm east, north, up of it; not to the side.
     #[must_use]
     pub fn middle_of(&self, size: [f64; 3]) -> Option<[f64; 3]> {
@@ -179,7 +179,7 @@ impl Reach {
         self.step_mm * (row as f64 - PLACES as f64)
     }
 
-    /// Whether all of a rectangle of the profile is reached, from and to distances from the
+    /// Returns true if all of a rectangle of the profile is reached, from and to distances from the
     /// axis and heights over the home pose, mm: all places around it are.
     fn reaches_all(&self, out_mm: [f64; 2], up_mm: [f64; 2]) -> bool {
         let place = |mm: f64| mm / self.step_mm;
@@ -223,7 +223,7 @@ impl Reach {
     }
 }
 
-/// Whether a pose inside the stops by a margin brings the tip to a distance from the axis
+/// Returns true if a pose inside the stops by a margin brings the tip to a distance from the axis
 /// and a height, mm.
 fn is_reached(record: &Calibration, out_mm: f64, up_mm: f64) -> bool {
     // Straight on where the first joint may stand so, else in the middle of its angles.

@@ -5,7 +5,7 @@ use hapterra_core::force::{Damping, Shading, SurfaceParams, Texture};
 
 use crate::surface::NamedSurface;
 
-/// What may be changed of a surface.
+/// Change of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SurfaceChange {
     /// Coefficients of friction: while the tip slides, and at rest.
@@ -27,7 +27,7 @@ pub enum SurfaceChange {
     Named(&'static NamedSurface),
 }
 
-/// Why a surface cannot be changed as it is asked for. It stays as it is.
+/// Reason for which a surface cannot be changed. It stays as it is.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// Coefficients that a contact cannot work with.

@@ -3,7 +3,7 @@
 use super::coordinates::Coordinates;
 use heightfield::{Georeference, LonLat, Sides, System, around};
 
-/// What a terrain covers, in its own coordinates and, where they are known, in longitude
+/// Returns the bounds of a terrain in its own coordinates and, where they are known, in longitude
 /// and latitude.
 #[must_use]
 pub fn bounds_in_words(file: &Georeference<'_>) -> String {

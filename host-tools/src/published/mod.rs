@@ -35,7 +35,7 @@ impl<H: Heights + ?Sized> Heights for &H {
     }
 }
 
-/// Where Newton starts in the patch that held the last closest point.
+/// Start of Newton's iteration in the patch that held the last closest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
     /// In the middle of the patch, always.

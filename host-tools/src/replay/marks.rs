@@ -16,7 +16,7 @@ pub struct Mark {
     /// The host's clock when the mark was asked for, seconds since 1970 in UTC: before the tick,
     /// by what host and link take.
     pub host_unix_s: f64,
-    /// What the user calls it: 1 to 200 characters, none of them a control character.
+    /// The user's text: 1 to 200 characters, none of them a control character.
     pub text: String,
 }
 

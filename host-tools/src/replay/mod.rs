@@ -7,20 +7,22 @@
 //! the result depends on nothing but the terrain, the law, the trajectory and the tick rate.
 //! [`Ticks`] says where the HIP is in each tick.
 
-mod felt;
 mod loop_columns;
 mod marks;
+mod offline_device;
 mod published;
 mod recording;
 pub mod settings;
+mod states;
 mod ticks;
 mod trajectory;
 
-pub use felt::OfflineDevice;
 pub use loop_columns::{LoopColumns, mode_name};
 pub use marks::Mark;
+pub use offline_device::OfflineDevice;
 pub use recording::{Column, Record, Recording, Value};
 pub use settings::{Rule, Settings};
+pub use states::state_name;
 pub use ticks::{Pace, Tick, Ticks};
 pub use trajectory::{
     ColumnValues, RecordedColumns, RecordingRow, RecordingRows, Row, Trajectory, TrajectoryError,
@@ -34,9 +36,9 @@ use hapterra_core::scene::TickRecord;
 use crate::link::{LinkError, Native, Timeouts};
 use crate::output::{Output, OutputError};
 use crate::terrain::{HapticGrid, Terrain, TerrainError};
-use settings::ViewSettings;
+use settings::PlacementSettings;
 
-/// Why a replay did not come to its end. Nothing is left at the output's path.
+/// Reason for which a replay ended early. Nothing is left at the output's path.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The trajectory.
@@ -49,11 +51,11 @@ pub enum ReplayError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// A view of the recording that its terrain cannot be felt in.
-    #[error("view {number} of the recording cannot be felt: {why}")]
-    View {
+    #[error("placement {number} of the recording cannot be rendered: {why}")]
+    Placement {
         /// The view.
         number: u32,
-        /// Why not.
+        /// Reason for the refusal.
         why: TerrainError,
     },
     /// The user.
@@ -61,7 +63,7 @@ pub enum ReplayError {
     Interrupted,
 }
 
-/// What a replay did.
+/// Summary of a replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// Ticks felt, a row of the output each.
@@ -125,7 +127,7 @@ pub fn replay_trajectory<'t>(
         let scale = *replayer.terrain().scale();
         let hip = ticks.trajectory().to_grid(tick.hip_mm, &scale)?;
         summary.leaps += u64::from(replayer.is_leap_to(&hip));
-        let sample = replayer.feel(hip)?;
+        let sample = replayer.step(hip)?;
         let terrain = replayer.terrain();
         let record = Record::new(tick.t_s, tick.hip_mm, &sample, &scale);
         while let Some(mark) = marks.next_if(|mark| mark.t_s <= record.t_s) {
@@ -149,10 +151,10 @@ pub fn replay_trajectory<'t>(
 /// The terrain of a recording's beginning in another of its views.
 ///
 /// # Errors
-/// [`ReplayError::View`].
+/// [`ReplayError::Placement`].
 pub fn terrain_of<'t>(
     first: &Terrain<'t>,
-    view: &ViewSettings,
+    view: &PlacementSettings,
 ) -> Result<Terrain<'t>, ReplayError> {
     let grid = match view.measured_at {
         Some(ground) => HapticGrid::at(first.raster(), first.grid().cells(), ground)
@@ -161,7 +163,7 @@ pub fn terrain_of<'t>(
         None => *first.grid(),
     };
     let number = view.number;
-    let cannot = |why| ReplayError::View { number, why };
+    let cannot = |why| ReplayError::Placement { number, why };
     let scale = view.scale().map_err(|why| cannot(why.into()))?;
     first.relaid(grid, scale, view.level).map_err(cannot)
 }
@@ -184,12 +186,12 @@ fn go_over<'t>(
     Ok(recording.view(view)?)
 }
 
-/// Whether nothing is felt because the HIP is below ground and came there from below, from
+/// Returns true if nothing is felt because the HIP is below ground and came there from below, from
 /// a hole or from outside.
 #[must_use]
 pub fn is_below_ground(sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) -> bool {
     let [x, y, z] = record.hip_mm;
-    let waits = sample.state == ContactState::Waiting && sample.missing_tile.is_none();
+    let waits = sample.state == ContactState::Unseeded && sample.missing_tile.is_none();
     waits && terrain.height_mm(x, y).is_some_and(|ground| z < ground)
 }
 
@@ -215,15 +217,4 @@ pub fn on_native_at<'t>(
 ) -> Result<OfflineDevice<'t>, LinkError> {
     let device = Native::for_replay_at(rate);
     OfflineDevice::open(terrain, law, device, Timeouts::EMULATED)
-}
-
-/// A state's name in a recording.
-#[must_use]
-pub fn state_name(state: ContactState) -> &'static str {
-    match state {
-        ContactState::Waiting => "waiting",
-        ContactState::Free => "free",
-        ContactState::Touching => "touching",
-        ContactState::Fading => "letting go",
-    }
 }

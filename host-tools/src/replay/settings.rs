@@ -1,4 +1,4 @@
-//! What a recording says of itself: on which terrain, at which place and scale, under
+//! Settings of a recording: on which terrain, at which place and scale, under
 //! which law and by which device it was felt.
 //!
 //! The text is TOML. In a CSV recording each of its lines stands behind `# ` before the
@@ -16,7 +16,7 @@ use crate::terrain::{HapticCells, HapticGrid, Scale, ScaleError, Terrain};
 use heightfield::ReferenceSystem;
 use heightfield::shown::shown;
 
-/// What the first line of the settings begins with; its value is [`FORMAT`].
+/// Key of the first line of the settings; its value is [`FORMAT`].
 pub const KEY: &str = "hapterra-recording";
 /// Version of the settings' format that this program writes and reads.
 pub const FORMAT: u32 = 1;
@@ -37,11 +37,11 @@ pub struct Settings {
     pub protocol: u16,
     /// The terrain file.
     pub terrain: TerrainFile,
-    /// What of it was felt, where and how large.
-    pub felt: Felt,
+    /// The rendered part, its place and scale.
+    pub felt: RenderedTerrain,
     /// The force law and the contact rule.
     pub force: Force,
-    /// What the ground was made of, where that was not the same everywhere; the law is then
+    /// Materials of the ground, where there were several; the law is then
     /// that of the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub materials: Option<MaterialSettings>,
@@ -50,7 +50,7 @@ pub struct Settings {
     /// The views that were put in while it was felt, in their order; the one of the
     /// beginning is [`Self::felt`] and [`Self::force`].
     #[serde(rename = "view", default, skip_serializing_if = "Vec::is_empty")]
-    pub views: Vec<ViewSettings>,
+    pub views: Vec<PlacementSettings>,
     /// The marks that were made while it was felt, in their order.
     #[serde(rename = "mark", default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<Mark>,
@@ -58,27 +58,27 @@ pub struct Settings {
 
 /// A view that was put in while a terrain was felt.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ViewSettings {
-    /// What the rows of this view have in the column `view`, from 1 on.
+pub struct PlacementSettings {
+    /// Number of this placement in the column `view`, from 1 on.
     pub number: u32,
-    /// Side of a felt cell of level 0 on the ground, m, where the file knows it; none also in
+    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it; none also in
     /// recordings of earlier versions, whose cells are those of the beginning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
-    /// Where a cell of the file is as large as that, in the file's coordinates, x and y;
+    /// Place where a cell of the file is that large, in the file's coordinates, x and y;
     /// none where the cells are those of the beginning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured_at: Option<[f64; 2]>,
     /// Level of detail.
     pub level: u8,
-    /// Hand millimetres a felt cell of level 0.
+    /// Device millimetres a haptic cell of level 0.
     pub cell_mm: f64,
-    /// Hand millimetres a vertical unit of the file.
+    /// Device millimetres a vertical unit of the file.
     pub height_mm_per_unit: f64,
     /// Times that heights are higher than true to scale, where the file knows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
-    /// The point of the terrain at the tip in the arm's home pose, hand millimetres, as far as
+    /// The point of the terrain at the tip in the arm's home pose, device millimetres, as far as
     /// the host knows: a clutch that the user holds moves it.
     pub home_mm: [f64; 3],
     /// Newtons for a millimetre between the HIP and the proxy.
@@ -88,10 +88,10 @@ pub struct ViewSettings {
     /// Which normals the force follows; left out where they are those of the patches.
     #[serde(default, skip_serializing_if = "Shading::is_none")]
     pub shading: Shading,
-    /// How rough the surface is; left out where it is like ice.
+    /// Friction of the surface; left out where there is none.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
-    /// What takes energy out of a motion against it; left out where nothing is asked for.
+    /// Damping of a motion against it; left out where there is none.
     #[serde(default, skip_serializing_if = "Damping::is_none")]
     pub damping: Damping,
     /// Its micro-relief; left out where it is even.
@@ -102,10 +102,10 @@ pub struct ViewSettings {
 /// The views alone, as TOML has them.
 #[derive(Serialize)]
 struct Views<'v> {
-    view: [&'v ViewSettings; 1],
+    view: [&'v PlacementSettings; 1],
 }
 
-impl ViewSettings {
+impl PlacementSettings {
     /// A view by its number and terrain.
     #[must_use]
     pub fn new(number: u32, terrain: &Terrain<'_>, laid: &Laid) -> Self {
@@ -170,27 +170,27 @@ pub struct TerrainFile {
     pub crs: Option<String>,
 }
 
-/// What was felt of a terrain.
+/// The rendered terrain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Felt {
+pub struct RenderedTerrain {
     /// Which cells of the file.
     pub cells: HapticCells,
-    /// Felt samples of level 0, west to east and south to north.
+    /// Rendered samples of level 0, west to east and south to north.
     pub samples: [u32; 2],
-    /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
+    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
-    /// Where a cell of the file is as large as that, in the file's coordinates, x and y;
+    /// Place where a cell of the file is that large, in the file's coordinates, x and y;
     /// none where it is in the middle of the field.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured_at: Option<[f64; 2]>,
     /// Level of detail: every 2^level-th sample.
     pub level: u8,
-    /// Hand millimetres a felt cell of level 0.
+    /// Device millimetres a haptic cell of level 0.
     pub cell_mm: f64,
-    /// Hand millimetres a vertical unit of the file.
+    /// Device millimetres a vertical unit of the file.
     pub height_mm_per_unit: f64,
-    /// Radius of the ball that felt it, hand millimetres; left out where it was a point. The HIP
+    /// Radius of the ball that felt it, device millimetres; left out where it was a point. The HIP
     /// and the proxy are the ball's centre.
     #[serde(default, skip_serializing_if = "is_point")]
     pub tip_mm: f64,
@@ -213,7 +213,7 @@ pub enum Rule {
     Paper,
 }
 
-/// How force was made.
+/// Rendering of the force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Force {
     /// Newtons for a millimetre between the HIP and the proxy.
@@ -225,10 +225,10 @@ pub struct Force {
     /// Which normals the force follows; left out where they are those of the patches.
     #[serde(default, skip_serializing_if = "Shading::is_none")]
     pub shading: Shading,
-    /// How rough the surface is; left out where it is like ice.
+    /// Friction of the surface; left out where there is none.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
-    /// What takes energy out of a motion against it; left out where nothing is asked for.
+    /// Damping of a motion against it; left out where there is none.
     #[serde(default, skip_serializing_if = "Damping::is_none")]
     pub damping: Damping,
     /// Its micro-relief; left out where it is even.
@@ -242,14 +242,14 @@ fn is_point(tip_mm: &f64) -> bool {
     *tip_mm == 0.0
 }
 
-/// What the ground was made of.
+/// Materials of the ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialSettings {
     /// The file of classes, as it was named.
     pub file: String,
     /// Hash of its classes and of where they lie.
     pub fingerprint: String,
-    /// What the classes feel like.
+    /// Surfaces of the classes.
     #[serde(flatten)]
     pub looks: Looks,
 }
@@ -304,7 +304,7 @@ pub struct OtherTerrain {
 }
 
 impl Settings {
-    /// What is felt of a terrain under a law and a rule; `file` names the terrain.
+    /// Makes the settings of a terrain under surface parameters and a rule; `file` names the terrain.
     /// `home_mm` is the place in the arm's home pose, where there is an arm.
     #[must_use]
     pub fn new(
@@ -329,7 +329,7 @@ impl Settings {
                     .and_then(ReferenceSystem::code)
                     .map(|code| format!("EPSG:{code}")),
             },
-            felt: Felt {
+            felt: RenderedTerrain {
                 cells: grid.cells(),
                 samples: [grid.columns(), grid.rows()],
                 cell_m: grid.side_m(),
@@ -445,7 +445,7 @@ impl Settings {
 }
 
 impl Settings {
-    /// Whether a terrain has other classes than those of the recording.
+    /// Returns true if a terrain has other classes than those of the recording.
     fn has_other_classes(&self, grid: &HapticGrid<'_>) -> bool {
         let now = grid.materials().map(MaterialSettings::of);
         let print = |settings: &MaterialSettings| settings.fingerprint.clone();
@@ -465,7 +465,7 @@ impl Device {
     }
 }
 
-impl Felt {
+impl RenderedTerrain {
     /// In what the cells of the same heights differ, where the same kind is felt.
     fn difference(&self, grid: &HapticGrid<'_>) -> Option<String> {
         if grid.cells() != self.cells {
@@ -486,7 +486,7 @@ impl Felt {
         })
     }
 
-    /// Hand millimetres a vertical unit at another size in the hand and the recorded
+    /// Device millimetres a vertical unit at another size in the hand and the recorded
     /// proportions.
     #[must_use]
     pub fn height_at_cell_mm(&self, cell_mm: f64) -> f64 {
@@ -506,7 +506,7 @@ mod tests {
     use hapterra_core::force::Pattern;
 
     use super::*;
-    use crate::place::View;
+    use crate::place::Placement;
     use heightfield::Raster;
 
     fn raster(height: f32) -> Raster {
@@ -569,7 +569,7 @@ mod tests {
         settings = Settings::new("t.tif", &terrain, (law, Rule::Swept), None, settings.device);
         assert_eq!(settings.law(), law);
         let (grid, scale) = (terrain.grid(), terrain.scale_of_level_0());
-        let view = View {
+        let view = Placement {
             home_mm: [1.0; 3],
             home_ground: [0.0; 2],
             scale,
@@ -580,7 +580,7 @@ mod tests {
             heights_mm: [0.0; 2],
             reach_mm: [0.0; 4],
         };
-        let view = ViewSettings::new(1, &terrain, &Laid { view, law });
+        let view = PlacementSettings::new(1, &terrain, &Laid { view, law });
         assert_eq!(view.law(), law);
         settings.views = vec![view];
         let text = settings.to_toml();

@@ -1,6 +1,6 @@
 //! Who looks on while a terrain is served.
 
-use hapterra_core::scene::View;
+use hapterra_core::scene::SceneChange;
 
 use crate::link::{Ask, Event, LinkStats};
 use crate::terrain::Terrain;
@@ -19,13 +19,13 @@ pub trait Onlooker<'t> {
 
     /// Another view that is to be put in now, with its terrain; taken after each look at
     /// the line. An [`Event::Viewed`] tells what came of it.
-    fn view(&mut self) -> Option<(View, Terrain<'t>)> {
+    fn view(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
         None
     }
 
     /// May show how it goes; called after each look at the line.
     fn show(&mut self, tally: &LinkStats);
 
-    /// Whether it has seen enough.
+    /// Returns true if it has seen enough.
     fn is_over(&self) -> bool;
 }

@@ -252,7 +252,7 @@ fn a_panic_says_goodbye_and_where_that_is_not_heard_the_user_is_told() {
 }
 
 #[test]
-fn what_cannot_begin_says_goodbye_and_where_that_is_not_heard_the_user_is_told() {
+fn failed_start_closes_the_session_or_warns_the_user() {
     for deaf in [false, true] {
         let bench = Bench::new();
         // The host before was killed.
@@ -288,7 +288,7 @@ fn an_end_that_is_asked_for_while_it_greets_is_heeded() {
 }
 
 #[test]
-fn a_device_that_was_silent_is_taken_up_over_another_line_once_the_first_is_closed() {
+fn silent_device_is_reopened_once_its_first_line_is_closed() {
     let bench = Bench::new();
     let mut onlooker = Looks::times(2_000, || {});
     let mut connect = || {
@@ -309,7 +309,7 @@ fn a_device_that_was_silent_is_taken_up_over_another_line_once_the_first_is_clos
 }
 
 #[test]
-fn an_end_that_is_asked_for_while_the_device_is_away_is_said_once_it_is_back() {
+fn close_during_an_outage_is_sent_after_it() {
     for back in [true, false] {
         let bench = Bench::new();
         let goes_on = Cell::new(true);
@@ -340,7 +340,7 @@ fn an_end_that_is_asked_for_while_the_device_is_away_is_said_once_it_is_back() {
 }
 
 #[test]
-fn whoever_loses_the_device_to_another_host_is_told_that_the_arm_may_be_armed() {
+fn losing_the_device_warns_of_an_armed_arm() {
     let bench = Bench::new();
     let mut another = None;
     let mut onlooker = Looks::times(u32::MAX, || {});

@@ -4,11 +4,11 @@ use hapterra_core::force::{Pattern, Shading, Texture};
 
 use super::marks::text_of;
 use super::{Steer, Wanted};
-use crate::place::{SurfaceChange, ViewChange};
+use crate::place::{PlacementChange, SurfaceChange};
 use crate::surface::NamedSurface;
 use heightfield::shown::shown;
 
-/// What is understood, for messages.
+/// The known commands, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
      exaggerate TIMES, surface ice|sand|rock, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
      shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
@@ -21,7 +21,7 @@ pub struct Command {
     /// Seconds of the device's time since the beginning; as soon as what came before is
     /// done, where nothing is said.
     pub at_s: Option<f64>,
-    /// What is to be done.
+    /// Action of the command.
     pub wanted: Wanted,
 }
 
@@ -104,22 +104,22 @@ fn mark_in(line: &str) -> Option<&str> {
 fn read(words: &[&str]) -> Result<Steer, &'static str> {
     let change = |change| Ok(Steer::Change(change));
     match words {
-        ["pan", east, north] => change(ViewChange::Pan {
+        ["pan", east, north] => change(PlacementChange::Pan {
             east_mm: number(east)?,
             north_mm: number(north)?,
         }),
-        ["pan-m", east, north] => change(ViewChange::PanGround {
+        ["pan-m", east, north] => change(PlacementChange::PanGround {
             east_m: number(east)?,
             north_m: number(north)?,
         }),
-        ["zoom", times] => change(ViewChange::Zoom(factor(times)?)),
-        ["exaggerate", times] => change(ViewChange::Exaggerate(factor(times)?)),
-        ["stiffness", times] => change(ViewChange::Stiffness(factor(times)?)),
+        ["zoom", times] => change(PlacementChange::Zoom(factor(times)?)),
+        ["exaggerate", times] => change(PlacementChange::Exaggerate(factor(times)?)),
+        ["stiffness", times] => change(PlacementChange::Stiffness(factor(times)?)),
         [
             "surface" | "friction" | "viscous-friction" | "damping" | "shading" | "texture",
             ..,
-        ] => change(ViewChange::Surface(surface(words)?)),
-        ["reset"] => change(ViewChange::Reset),
+        ] => change(PlacementChange::Surface(surface(words)?)),
+        ["reset"] => change(PlacementChange::Reset),
         ["clutch", "on"] => Ok(Steer::Clutch(true)),
         ["clutch", "off"] => Ok(Steer::Clutch(false)),
         ["pan" | "pan-m", ..] => Err("it takes two numbers"),
@@ -197,16 +197,16 @@ mod tests {
     use super::*;
 
     const fn of_surface(change: SurfaceChange) -> Steer {
-        Steer::Change(ViewChange::Surface(change))
+        Steer::Change(PlacementChange::Surface(change))
     }
 
     #[test]
     fn each_command_is_read() {
-        let pan = ViewChange::Pan {
+        let pan = PlacementChange::Pan {
             east_mm: 5.0,
             north_mm: -0.5,
         };
-        let pan_m = ViewChange::PanGround {
+        let pan_m = PlacementChange::PanGround {
             east_m: -1e3,
             north_m: 0.0,
         };
@@ -216,17 +216,17 @@ mod tests {
             (
                 "at 2.5 zoom 2",
                 Some(2.5),
-                Steer::Change(ViewChange::Zoom(2.0)),
+                Steer::Change(PlacementChange::Zoom(2.0)),
             ),
             (
                 "exaggerate 1.5",
                 None,
-                Steer::Change(ViewChange::Exaggerate(1.5)),
+                Steer::Change(PlacementChange::Exaggerate(1.5)),
             ),
             (
                 "stiffness .5",
                 None,
-                Steer::Change(ViewChange::Stiffness(0.5)),
+                Steer::Change(PlacementChange::Stiffness(0.5)),
             ),
             (
                 "friction 0.3 .5",
@@ -278,7 +278,11 @@ mod tests {
                     seed: 0,
                 })),
             ),
-            ("at 0 reset", Some(0.0), Steer::Change(ViewChange::Reset)),
+            (
+                "at 0 reset",
+                Some(0.0),
+                Steer::Change(PlacementChange::Reset),
+            ),
             ("clutch\ton\r", None, Steer::Clutch(true)),
             ("clutch off", None, Steer::Clutch(false)),
         ] {

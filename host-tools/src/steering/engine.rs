@@ -1,16 +1,16 @@
-//! What the user wants of the view, done with a device.
+//! Changes of the placement by the user, done with a device.
 
 use std::time::{Duration, Instant};
 
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
-use hapterra_core::scene::{Source, TickRecord, View};
+use hapterra_core::scene::{SceneChange, Source, TickRecord};
 use hapterra_core::wire::request::Request;
 
 use super::Steer;
 use crate::link::{Ask, Event};
-use crate::place::{Bounds, Changed, Hand, Laid, ViewChange};
+use crate::place::{Bounds, Changed, Hand, Laid, PlacementChange};
 use crate::terrain::Terrain;
 
 /// Changes that wait for the clutch to open; they are done at once.
@@ -24,8 +24,8 @@ const GROUND_WITHIN: Duration = Duration::from_secs(2);
 
 /// A view that is to be put in.
 pub struct Put<'r> {
-    /// What the device is told.
-    pub view: View,
+    /// Message to the device.
+    pub view: SceneChange,
     /// The terrain that it is felt on.
     pub terrain: Terrain<'r>,
     /// Place, scale and law.
@@ -55,7 +55,7 @@ pub struct Steering<'r> {
     terrain: Terrain<'r>,
     /// Number of the view in force on the device.
     number: u8,
-    waiting: Vec<ViewChange>,
+    waiting: Vec<PlacementChange>,
     /// The user holds the clutch.
     held: bool,
     /// The board's clutch input holds it open.
@@ -106,7 +106,7 @@ impl<'r> Steering<'r> {
         &self.terrain
     }
 
-    /// Whether nothing that was wanted is under way.
+    /// Returns true if nothing that was wanted is under way.
     #[must_use]
     pub const fn is_settled(&self) -> bool {
         let rests = match self.stage {
@@ -135,7 +135,7 @@ impl<'r> Steering<'r> {
         std::mem::take(&mut self.lines)
     }
 
-    /// What is to be asked of the device now.
+    /// Returns the requests to the device now.
     pub fn asks(&mut self) -> Vec<Ask> {
         std::mem::take(&mut self.asks)
     }
@@ -283,7 +283,7 @@ impl<'r> Steering<'r> {
     /// waited for.
     fn next_view(
         &self,
-        changes: &[ViewChange],
+        changes: &[PlacementChange],
         sample: &TickRecord,
         waits: bool,
     ) -> Result<Option<Put<'r>>, String> {
@@ -304,7 +304,7 @@ impl<'r> Steering<'r> {
         };
         let (hip, home) = (on_grid(hip_mm)?, on_grid(laid.view.home_mm)?);
         let scene = terrain.scene(laid.law, Source::Encoders, home);
-        let view = View {
+        let view = SceneChange {
             number: self.number.wrapping_add(1),
             scene: terrain.underlaid(scene, laid.view.reach_mm),
             hip,
@@ -317,7 +317,7 @@ impl<'r> Steering<'r> {
         }))
     }
 
-    fn on_viewed(&mut self, view: &View, taken: bool) {
+    fn on_viewed(&mut self, view: &SceneChange, taken: bool) {
         let Stage::Putting(put) = &self.stage else {
             return;
         };
@@ -325,7 +325,7 @@ impl<'r> Steering<'r> {
             self.number = view.number;
             (self.now, self.terrain) = (**put).clone();
         } else {
-            let line = "the device did not take the view: it stays as it was";
+            let line = "the device refused the placement: it stays as it was";
             self.lines.push(line.to_owned());
         }
         self.stage = Stage::Open;

@@ -2,13 +2,13 @@
 
 use super::*;
 use crate::link::hello;
-use crate::place::{Reach, Sizing, View as PlacedView, ViewOptions};
+use crate::place::{Placement, PlacementOptions, Reach, Sizing};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::terrain::TileIndex;
 use heightfield::Raster;
 
-const ZOOM: Steer = Steer::Change(ViewChange::Zoom(2.0));
+const ZOOM: Steer = Steer::Change(PlacementChange::Zoom(2.0));
 
 /// An engine over a plane, at 1 mm a cell.
 fn with<T>(look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
@@ -19,14 +19,14 @@ fn with<T>(look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
 }
 
 fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) -> T {
-    let options = ViewOptions {
+    let options = PlacementOptions {
         sizing: Sizing::CellMm(1.0),
-        ..ViewOptions::default()
+        ..PlacementOptions::default()
     };
     let grid = options.target.grid(raster, Default::default());
     let grid = grid.expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
-    let view = PlacedView::new(&grid, &reach, &options).expect("a view");
+    let view = Placement::new(&grid, &reach, &options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
     let law = SurfaceParams::PREMIUM;
     let bounds = Bounds {
@@ -74,13 +74,13 @@ fn open(steering: &mut Steering<'_>) {
 }
 
 /// Opens the clutch, and takes the view that is put in.
-fn put(steering: &mut Steering<'_>) -> View {
+fn put(steering: &mut Steering<'_>) -> SceneChange {
     open(steering);
     samples(steering, Limits::CLUTCH_OPEN, 1);
     steering.take_put().expect("a view").view
 }
 
-fn viewed(steering: &mut Steering<'_>, view: &View, taken: bool) {
+fn viewed(steering: &mut Steering<'_>, view: &SceneChange, taken: bool) {
     steering.on_event(&Event::Viewed { view, taken });
 }
 
@@ -115,7 +115,7 @@ fn a_view_that_is_not_taken_leaves_everything_as_it_was_and_is_told() {
 }
 
 #[test]
-fn a_clutch_that_does_not_open_or_a_device_that_does_not_answer_is_given_up() {
+fn unopened_clutch_or_silent_device_is_given_up() {
     for answers in [true, false] {
         with(|steering| {
             steering.steer(ZOOM);
@@ -161,7 +161,7 @@ fn a_view_waits_for_the_tile_under_the_proxy() {
 
 /// It begins anew with the view that is in force, under the number 0.
 #[test]
-fn a_device_that_was_restarted_counts_views_anew_and_one_that_was_not_goes_on() {
+fn restarted_device_counts_placements_from_zero() {
     for (resumed, number) in [(false, 1), (true, 2)] {
         with(|steering| {
             let view = put(steering);
@@ -217,7 +217,7 @@ fn sample_at(steering: &Steering<'_>, north_mm: f64, limits: Limits) -> TickReco
 }
 
 #[test]
-fn a_clutch_that_is_taken_far_from_where_cells_were_measured_has_them_measured_anew() {
+fn far_clutch_measures_cells_again() {
     let raster = degrees();
     let held = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
     for (north_mm, by_input) in [(80.0, false), (80.0, true), (0.1, false), (0.1, true)] {

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use super::Steer;
-use crate::place::ViewChange;
+use crate::place::PlacementChange;
 
 /// The keys, for the screen.
 pub const KEYS: &str = "arrows pan, + - zoom, ] [ heights, . , stiffness, space held or c: clutch, 0 reset, Enter goes on";
-/// Hand millimetres of a pan by a key.
+/// Device millimetres of a pan by a key.
 const PAN_MM: f64 = 5.0;
 /// Times larger by a key.
 const ZOOM: f64 = 1.5;
@@ -26,7 +26,7 @@ pub enum Key {
     Arrow(i8, i8),
 }
 
-/// What keys come to: most are one change, and the clutch has a state.
+/// Commands from keys: most are one change, and the clutch has a state.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Keys {
     /// The clutch is held by a key that repeats: when it was heard last.
@@ -35,21 +35,21 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// What a key means at a time since any fixed moment; none where it has no meaning.
+    /// Returns the meaning of a key at a time since any fixed moment; none where it has no meaning.
     pub fn press(&mut self, key: Key, now: Duration) -> Option<Steer> {
         let change = |change| Some(Steer::Change(change));
         match key {
-            Key::Arrow(east, north) => change(ViewChange::Pan {
+            Key::Arrow(east, north) => change(PlacementChange::Pan {
                 east_mm: PAN_MM * f64::from(east),
                 north_mm: PAN_MM * f64::from(north),
             }),
-            Key::Char('+' | '=') => change(ViewChange::Zoom(ZOOM)),
-            Key::Char('-' | '_') => change(ViewChange::Zoom(1.0 / ZOOM)),
-            Key::Char(']') => change(ViewChange::Exaggerate(MORE)),
-            Key::Char('[') => change(ViewChange::Exaggerate(1.0 / MORE)),
-            Key::Char('.') => change(ViewChange::Stiffness(MORE)),
-            Key::Char(',') => change(ViewChange::Stiffness(1.0 / MORE)),
-            Key::Char('0') => change(ViewChange::Reset),
+            Key::Char('+' | '=') => change(PlacementChange::Zoom(ZOOM)),
+            Key::Char('-' | '_') => change(PlacementChange::Zoom(1.0 / ZOOM)),
+            Key::Char(']') => change(PlacementChange::Exaggerate(MORE)),
+            Key::Char('[') => change(PlacementChange::Exaggerate(1.0 / MORE)),
+            Key::Char('.') => change(PlacementChange::Stiffness(MORE)),
+            Key::Char(',') => change(PlacementChange::Stiffness(1.0 / MORE)),
+            Key::Char('0') => change(PlacementChange::Reset),
             Key::Char(' ') => {
                 let was_held = self.held.replace(now).is_some() || self.toggled;
                 (!was_held).then_some(Steer::Clutch(true))
@@ -63,7 +63,7 @@ impl Keys {
         }
     }
 
-    /// Whether the key that holds the clutch was let go by now, once.
+    /// Returns the release of the key that holds the clutch, once.
     pub fn released(&mut self, now: Duration) -> Option<Steer> {
         let is_over = |heard: &mut Duration| now.saturating_sub(*heard) >= LET_GO;
         let over = self.held.take_if(is_over).is_some();
@@ -84,9 +84,9 @@ mod tests {
         let mut keys = Keys::default();
         let mut factor = |key| match keys.press(Key::Char(key), ms(0)) {
             Some(Steer::Change(
-                ViewChange::Zoom(factor)
-                | ViewChange::Exaggerate(factor)
-                | ViewChange::Stiffness(factor),
+                PlacementChange::Zoom(factor)
+                | PlacementChange::Exaggerate(factor)
+                | PlacementChange::Stiffness(factor),
             )) => factor,
             other => panic!("{key}: {other:?}"),
         };
@@ -95,7 +95,7 @@ mod tests {
             assert!(factor(more) > 1.0);
         }
         let north = keys.press(Key::Arrow(0, 1), ms(0));
-        let pan = ViewChange::Pan {
+        let pan = PlacementChange::Pan {
             east_mm: 0.0,
             north_mm: PAN_MM,
         };

@@ -16,7 +16,7 @@ const WAITING: usize = 64;
 /// A mark as it was made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Made {
-    /// What the user calls it.
+    /// The user's name for it.
     pub text: String,
     /// The host's clock when the mark was asked for, seconds since 1970 in UTC.
     pub host_unix_s: f64,
@@ -88,7 +88,7 @@ impl Marks {
         }));
     }
 
-    /// What is to be asked of the device now.
+    /// Returns the requests to the device now.
     pub fn asks(&mut self) -> Vec<Ask> {
         std::mem::take(&mut self.asks)
     }

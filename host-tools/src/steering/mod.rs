@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! keys ─────┐
-//!           ├─ Steer ─ Steering ─ clutch held ─ View put in ─ clutch let go
+//!           ├─ Steer ─ Steering ─ clutch held ─ placement changed ─ clutch let go
 //! commands ─┘             ▲                                        │
 //!                         └──────────── samples ───────────────────┘
 //! ```
@@ -19,13 +19,13 @@ pub mod keys;
 mod marks;
 mod queue;
 
-use crate::place::ViewChange;
+use crate::place::PlacementChange;
 
 pub use engine::{Put, Steering};
 pub use marks::{Made, Marks};
 pub use queue::{CommandQueue, Origin};
 
-/// What a command asks for.
+/// Request of a command.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Wanted {
     /// Another view.
@@ -36,11 +36,11 @@ pub enum Wanted {
     Enter(u32),
 }
 
-/// What the user wants of the view.
+/// Request of the user for the placement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steer {
     /// Another view.
-    Change(ViewChange),
+    Change(PlacementChange),
     /// Hold the clutch, or let it go: while it is held the terrain goes with the hand.
     Clutch(bool),
 }

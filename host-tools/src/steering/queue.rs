@@ -22,7 +22,7 @@ const WAITING_EACH: usize = 1 << 16;
 /// is the last.
 const LONGEST: u64 = 1 << 16;
 
-/// Where commands come from.
+/// Source of commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// Standard input, line by line as it comes.
@@ -231,11 +231,11 @@ fn read_lines(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::place::ViewChange;
+    use crate::place::PlacementChange;
     use crate::steering::Steer;
     use crate::timeouts::{next, wait_for, wait_until};
 
-    fn change(change: ViewChange) -> Wanted {
+    fn change(change: PlacementChange) -> Wanted {
         Wanted::Steer(Steer::Change(change))
     }
 
@@ -265,14 +265,14 @@ mod tests {
             !told.is_empty()
         });
         let mut due = |t_s, is_free| queue.due(t_s, is_free, &mut |_| {});
-        let zoom = |times| change(ViewChange::Zoom(times));
+        let zoom = |times| change(PlacementChange::Zoom(times));
         assert_eq!(due(1.0, true), Some(zoom(2.0)));
         assert_eq!(due(1.0, false), None, "not while that is under way");
         // The file is read meanwhile.
         let fourth = wait_for("the fourth line", || due(1.1, true));
         assert_eq!(fourth, zoom(4.0));
         let fifth = wait_for("the fifth line", || due(1.2, true));
-        assert_eq!(fifth, change(ViewChange::Reset));
+        assert_eq!(fifth, change(PlacementChange::Reset));
         let sixth = wait_for("the sixth line", || due(1.2, true));
         assert_eq!(sixth, Wanted::Mark("done".to_owned()));
         assert_eq!(due(9.0, true), None);
@@ -304,7 +304,7 @@ mod tests {
         std::fs::write(&path, text).expect("written");
         let mut queues = CommandQueue::of_several(&Origin::File(path), 2, || {}).expect("opened");
         let (due, told) = all_due(&mut queues, &[3, 4]);
-        let zoom = |times| change(ViewChange::Zoom(times));
+        let zoom = |times| change(PlacementChange::Zoom(times));
         assert_eq!(due[0], [2.0, 4.0, 5.0].map(zoom));
         // An answer does not wait for what is before it.
         let is_answer = |it: &&Wanted| matches!(it, Wanted::Enter(_));
@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(answer, Some(Wanted::Enter(7)));
         assert_eq!(queue.due(0.0, false, &mut |why| panic!("{why}")), None);
         let zoom = queue.due(0.0, true, &mut |why| panic!("{why}"));
-        assert_eq!(zoom, Some(change(ViewChange::Zoom(2.0))));
+        assert_eq!(zoom, Some(change(PlacementChange::Zoom(2.0))));
     }
 
     #[test]
@@ -353,7 +353,7 @@ mod tests {
         // The third one is not served any more, and the first one has its command.
         drop(queues.pop());
         let (due, _) = all_due(&mut queues, &[1]);
-        assert_eq!(due[0], [change(ViewChange::Reset)]);
+        assert_eq!(due[0], [change(PlacementChange::Reset)]);
         let mut told = vec![];
         let (mut taken, t_s) = (0, 0.0);
         // What is not due yet is left where there is a bound.

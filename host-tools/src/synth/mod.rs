@@ -14,7 +14,7 @@ pub use write::{WriteError, WriteFault, write};
 
 use heightfield::{Raster, RasterError};
 
-/// What a terrain looks like.
+/// Shape of a terrain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
     /// Mountains: eight octaves of smooth noise
@@ -67,7 +67,7 @@ impl Synth {
         (height * self.amplitude) as f32
     }
 
-    /// How much a plane of so many samples rises from its lowest corner to its highest.
+    /// Returns the rise of a plane of `columns` × `rows` samples from its lowest corner to its highest.
     pub fn rise(&self, columns: u32, rows: u32) -> f64 {
         f64::from(self.height(columns - 1, rows - 1)) - f64::from(self.height(0, 0))
     }

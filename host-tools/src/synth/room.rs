@@ -1,4 +1,4 @@
-//! Whether a file will fit, before the disk is full of its first half.
+//! Check that a file fits on the disk before it is written.
 
 use std::path::Path;
 
@@ -44,7 +44,7 @@ pub(super) fn check(
 
 fn free_at(path: &Path) -> Option<u64> {
     let free = fs4::available_space(folder_of(path));
-    free.inspect_err(|error| tracing::debug!("free space is not told: {error}"))
+    free.inspect_err(|error| tracing::debug!("free space is unknown: {error}"))
         .ok()
 }
 

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::Synth;
 
-/// How much of a terrain is written, and how large it is on the ground.
+/// Size of a written terrain, in samples and on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// Samples from west to east, at least 2.

@@ -19,11 +19,11 @@ use crate::output::Output;
 #[error("cannot write {}: {fault}", path.display())]
 pub struct WriteError {
     path: PathBuf,
-    /// Why.
+    /// Its reason.
     pub fault: WriteFault,
 }
 
-/// Why a terrain could not be written.
+/// Reason for which a terrain was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteFault {
     /// The file could not be created or filled.

@@ -35,7 +35,7 @@ impl Mean {
         self.max
     }
 
-    /// How many values were taken.
+    /// Returns the number of values.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count

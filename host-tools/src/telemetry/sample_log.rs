@@ -3,15 +3,15 @@
 use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::hello::DeviceHello;
 
-use super::felt_views::{FeltView, FeltViews};
 use super::figures::Figures;
+use super::placements::{Placements, SessionPlacement};
 use super::timeline::Timeline;
 use crate::replay::Record;
 use crate::terrain::Terrain;
 
 /// Keeps time and figures of the samples that were felt on a terrain.
 pub struct SampleLog<'t> {
-    views: FeltViews<'t>,
+    views: Placements<'t>,
     /// The view of the latest sample.
     view: usize,
     tick_hz: u32,
@@ -24,7 +24,7 @@ impl<'t> SampleLog<'t> {
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, device: &DeviceHello) -> Self {
         Self {
-            views: FeltViews::new(terrain.clone()),
+            views: Placements::new(terrain.clone()),
             view: 0,
             tick_hz: device.tick_hz,
             timeline: Timeline::new(device.tick_hz),
@@ -43,19 +43,19 @@ impl<'t> SampleLog<'t> {
     }
 
     /// The views so far.
-    pub const fn views(&mut self) -> &mut FeltViews<'t> {
+    pub const fn views(&mut self) -> &mut Placements<'t> {
         &mut self.views
     }
 
     /// The views alone.
     #[must_use]
-    pub fn into_views(self) -> FeltViews<'t> {
+    pub fn into_views(self) -> Placements<'t> {
         self.views
     }
 
     /// The view of the latest sample, counted from 0, with its terrain.
     #[must_use]
-    pub fn view(&self) -> (usize, &FeltView<'t>) {
+    pub fn view(&self) -> (usize, &SessionPlacement<'t>) {
         (self.view, self.views.get(self.view))
     }
 

@@ -1,6 +1,6 @@
-//! How far felt cells are from their true shape where they were not measured.
+//! Distortion of haptic cells away from the place where they were measured.
 //!
-//! Felt cells are all alike, as large as the file's are at one place. The file's own cells are
+//! Haptic cells are all alike, as large as the file's are at one place. The file's own cells are
 //! not: those of degrees get narrower towards the poles, and a map's scale changes.
 
 use super::felt_grid::HapticGrid;
@@ -10,21 +10,21 @@ use heightfield::{CellSize, Sides};
 /// changes smoothly.
 const PLACES: u32 = 17;
 
-/// The worst of the felt cells of a rectangle.
+/// The worst of the haptic cells of a rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distortion {
-    /// How far lengths, and so slopes, are off there in the direction in which they are off
+    /// Error of lengths, and so of slopes, there in the direction in which they are off
     /// most: 0.01 is one hundredth of the true ones.
     pub share: f64,
-    /// Where that is, in the file's coordinates.
+    /// Its place, in the file's coordinates.
     pub ground: [f64; 2],
 }
 
 impl Distortion {
-    /// What a surface counts as true to, as a share.
+    /// Tolerance of a true surface, as a share.
     pub const TRUE: f64 = 1e-3;
 
-    /// Whether the surface is not true to 0.1 % all over the rectangle.
+    /// Returns true if the surface is not true to 0.1 % all over the rectangle.
     #[must_use]
     pub fn is_felt(&self) -> bool {
         self.share > Self::TRUE
@@ -32,7 +32,7 @@ impl Distortion {
 }
 
 impl HapticGrid<'_> {
-    /// The felt cell of a rectangle (west, south, east, north, in felt cells) that is
+    /// The haptic cell of a rectangle (west, south, east, north, in haptic cells) that is
     /// farthest from its true shape, among 17 × 17 places of the part that is inside the
     /// field. `None` where the file does not know how large its cells are, and of a rectangle
     /// beside the field.
@@ -58,7 +58,7 @@ impl HapticGrid<'_> {
         off.max_by(|one, other| one.share.total_cmp(&other.share))
     }
 
-    /// How far the longest and the shortest step of a felt cell's side in any direction are
+    /// How far the longest and the shortest step of a haptic cell's side in any direction are
     /// from that side, as a share, where the file's cells are of a size.
     fn off_by(&self, cell: &CellSize) -> Option<f64> {
         let side = self.side_m()?;

@@ -96,7 +96,7 @@ impl<'r> HapticGrid<'r> {
         Self { materials, ..self }
     }
 
-    /// The same ground, felt by a ball of a radius in hand millimetres; 0 for a point.
+    /// The same ground, rendered with a ball of a radius in hand millimetres; 0 for a point.
     #[must_use]
     pub const fn with_tip(self, tip_mm: f64) -> Self {
         Self { tip_mm, ..self }

@@ -55,7 +55,7 @@ pub enum TerrainError {
     Scale(#[from] ScaleError),
     /// Higher or lower than positions can be.
     #[error(
-        "heights reach {cells:.4e} cells at {} mm a unit and {} mm a cell; at most ±{MAX_CELL} can be felt",
+        "heights reach {cells:.4e} cells at {} mm a unit and {} mm a cell; at most ±{MAX_CELL} can be rendered",
         scale.height_mm_per_unit(), scale.cell_mm()
     )]
     TooTall {
@@ -66,7 +66,7 @@ pub enum TerrainError {
     },
     /// A tip that is no ball, or one so large that tiles would take too long.
     #[error(
-        "a tip of {} mm: {:.1} cells of level {level}, where 0 to {} can be felt",
+        "a tip of {} mm: {:.1} cells of level {level}, where 0 to {} can be rendered",
         tip.tip_mm, tip.cells, tip::MAX_CELLS
     )]
     Tip {
@@ -76,7 +76,7 @@ pub enum TerrainError {
         level: u8,
     },
     /// More cells than positions can count.
-    #[error("{0} samples in a row or column; at most {MAX_CELL} can be felt")]
+    #[error("{0} samples in a row or column; at most {MAX_CELL} can be rendered")]
     TooLarge(u32),
     /// Decimated away.
     #[error("level {level} leaves nothing of {columns} × {rows} samples")]

@@ -1,4 +1,4 @@
-//! What is felt, in messages to a viewer.
+//! Messages to a viewer about a session.
 
 use std::io::Write;
 use std::process::Child;
@@ -30,10 +30,10 @@ const LIVE_BYTES: usize = 8 << 20;
 /// Bytes that may wait where nothing is armed: a replay is faster than a viewer for
 /// moments, and a recording waits.
 const PATIENT_BYTES: usize = 64 << 20;
-/// How long the viewer may take at the end for what it was not told yet.
+/// Time that the viewer may take at the end for what it was not told yet.
 const AT_THE_END: Duration = Duration::from_secs(5);
 
-/// How many messages, samples in batches among them, the viewer was not told.
+/// Number of messages, samples in batches among them, that the viewer did not get.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
     /// Messages.
@@ -47,7 +47,7 @@ pub struct ViewFeed<'t> {
     terrain: Terrain<'t>,
     /// The terrain of the beginning, in whose tiles there is detail for good.
     first: Terrain<'t>,
-    /// Where the terrain of the beginning stands for all of the time.
+    /// Place where the terrain of the beginning stands for all of the time.
     stands: bool,
     /// The view in force, where it has other cells than the terrain that stands.
     standing: Option<Standing<'t>>,
@@ -208,7 +208,7 @@ impl<'t> ViewFeed<'t> {
         self.tell_scene();
     }
 
-    /// Whether the viewer knows the view in force.
+    /// Returns true if the viewer knows the view in force.
     fn tell_scene(&mut self) -> bool {
         let Some(scene) = self.scene_due.take() else {
             return true;

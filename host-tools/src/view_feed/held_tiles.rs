@@ -11,7 +11,7 @@ use hapterra_view_stream::Tiles;
 #[derive(Debug, Default)]
 pub(super) struct HeldTiles {
     side: i32,
-    /// Felt cells a cell of the level: a tile is shown as the one of the level around it.
+    /// Haptic cells a cell of the level: a tile is shown as the one of the level around it.
     parts: i32,
     slots: BTreeMap<u32, TileIndex>,
     awaited: Option<TileIndex>,
@@ -45,7 +45,7 @@ impl HeldTiles {
         self.awaited = tile;
     }
 
-    /// Another view has felt cells of another size.
+    /// Another view has haptic cells of another size.
     pub(super) fn go_over(&mut self, parts: u32) {
         self.parts = parts as i32;
     }
@@ -62,7 +62,7 @@ impl HeldTiles {
         self.has_changed = true;
     }
 
-    /// Where a tile is held.
+    /// Returns the place where a tile is held.
     fn slot(&self, index: TileIndex) -> u32 {
         let [col, row] = [index.col, index.row].map(|i| i.rem_euclid(self.side.max(1)));
         (row * self.side + col) as u32

@@ -25,7 +25,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Whether a place (cells) lies in its middle half, along both sides.
+    /// Returns true if a place (cells) lies in its middle half, along both sides.
     pub(super) fn is_around(&self, place: [f64; 2]) -> bool {
         let [west, south, east, north] = self.cells.map(f64::from);
         let is_between = |at: f64, low: f64, high: f64| {

@@ -1,4 +1,4 @@
-//! What is felt, told to a viewer: `hapterra-view`, a program of its own.
+//! The feed of a viewer: `hapterra-view`, a program of its own.
 //!
 //! ```text
 //! samples, tiles ─▶ ViewFeed ─▶ bounded queue ─▶ thread ══ pipe ══▶ hapterra-view

@@ -1,4 +1,4 @@
-//! Where the viewer is, and how it is started.
+//! Path and start of the viewer.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 pub const VARIABLE: &str = "HAPTERRA_VIEW";
 const NAME: &str = "hapterra-view";
 
-/// Why there is no viewer.
+/// Reason for which there is no viewer.
 #[derive(Debug, thiserror::Error)]
 pub enum ProgramError {
     /// Nowhere to be found.

@@ -51,7 +51,7 @@ impl Queue {
         }
     }
 
-    /// Whether a message was taken. If not there was no room for it.
+    /// Returns true if a message was taken. If not there was no room for it.
     pub(super) fn offer(&self, message: Message) -> bool {
         self.offer_or_return(message).is_ok()
     }

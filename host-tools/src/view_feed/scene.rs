@@ -8,20 +8,20 @@ use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT};
 use crate::terrain::Terrain;
 use heightfield::System;
 
-/// What a viewer is to show.
+/// Content of a viewer.
 pub struct Picture<'p, 't> {
     /// The terrain as it is felt.
     pub terrain: &'p Terrain<'t>,
-    /// What the user calls it.
+    /// The user's name for it.
     pub title: &'p str,
     /// Place and scale: a name and what there is to say, short.
     pub facts: Vec<(String, String)>,
     /// The place under the tip in the arm's home pose, mm; the middle of the terrain where
     /// no arm felt it.
     pub home_mm: Option<[f64; 3]>,
-    /// What is laid in front of the arm, west, south, east, north, mm; else the whole.
+    /// The part in front of the arm, west, south, east, north, mm; else the whole.
     pub laid_mm: Option<[f64; 4]>,
-    /// Whether samples come as they are felt.
+    /// True if samples come as they are felt.
     pub is_live: bool,
 }
 

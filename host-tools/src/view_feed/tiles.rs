@@ -32,7 +32,7 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Of a device with an empty window of `side` × `side` tiles, with so many felt cells a cell of
+    /// Of a device with an empty window of `side` × `side` tiles, with so many haptic cells a cell of
     /// the level.
     pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {

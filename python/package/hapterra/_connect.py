@@ -67,7 +67,7 @@ class Sample(NamedTuple):
     proxy_mm: _Vector
     #: Force on the hand, N.
     force_n: _Vector
-    #: "free", "touching", "letting go" or "waiting", as in recordings.
+    #: "free", "touching", "releasing" or "unseeded", as in recordings.
     state: str
     #: How far arming has come: "disarmed", "requested", "confirming", "ramping", "armed", "fading".
     mode: str

@@ -38,10 +38,10 @@ class State(enum.IntEnum):
     #: The proxy is on the surface, and the HIP below it.
     TOUCHING = 1
     #: The surface that the proxy was on has come to an end, and the last force fades away.
-    FADING = 2
+    RELEASING = 2
     #: The HIP is below the surface and has not been above it: no force until it has.
     BELOW_GROUND = 3
-    #: The HIP is in a hole or outside and has not been above the surface: no force.
+    #: The HIP is in a no-data area or outside, and was not above the surface yet: no force.
     OUTSIDE = 4
 
 

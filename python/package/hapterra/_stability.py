@@ -67,7 +67,7 @@ def stability(
         stiffness=stiffness,
         damping=damping,
         passivity=passivity,
-        delay_us=delay_us,
+        delay=None if delay_us is None else f"{delay_us}us",
         arm_friction=arm_friction,
         **more,
     )

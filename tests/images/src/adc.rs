@@ -29,7 +29,7 @@ const DEEPPWD: u32 = 1 << 29;
 const ADCAL: u32 = 1 << 31;
 /// Bit of CFGR: no queue of injected sequences. With a queue the program cannot start one.
 const JQDIS: u32 = 1 << 31;
-/// How long a sequence takes, ns: three conversions of the slower chip in its slower revision,
+/// Time that a sequence takes, ns: three conversions of the slower chip in its slower revision,
 /// an H743 of revision V, whose converter halves its clock once more.
 const SEQUENCE_NS: u64 = 75_000;
 /// The time without a conversion after which the next one is wrong on a G474, ns: a tenth less
@@ -37,7 +37,7 @@ const SEQUENCE_NS: u64 = 75_000;
 const STALE_NS: u64 = 900_000;
 /// What a wrong conversion reads.
 const WRONG: u32 = 0xFFF;
-/// How long the regulator takes to start, ns: a G474's 20 µs, an H743's 10.
+/// Time that the regulator takes to start, ns: a G474's 20 µs, an H743's 10.
 const REGULATOR_NS: [u64; 2] = [20_000, 10_000];
 
 /// The converter, and the voltages at its channels.

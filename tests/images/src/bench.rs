@@ -9,7 +9,7 @@ use crate::machine::{Machine, Stop};
 
 /// A level plane, on which every board's arm is pressed.
 pub struct Bench {
-    /// What it is like to press it.
+    /// The plane to press.
     pub plane: Plane,
     raster: Raster,
     scale: Scale,

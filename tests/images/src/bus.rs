@@ -32,7 +32,7 @@ const H743_IDC: (u32, u32) = (0x5C00_1000, 0x2003_6450);
 /// DWT's cycle counter.
 const CYCCNT: u32 = 0xE000_1004;
 
-/// How long a sector takes to be erased, ns: twice the watchdog's time. A real
+/// Time that a sector takes to be erased, ns: twice the watchdog's time. A real
 /// H743 takes seconds, which would be as many minutes here.
 const ERASE_NS: u64 = 100_000_000;
 
@@ -67,9 +67,9 @@ pub struct Bus {
     pub nvic: Nvic,
     /// The independent watchdog.
     pub watchdog: Watchdog,
-    /// What is on the SPI of a board that has it.
+    /// Converter on the SPI of a board that has one.
     pub converter: Converter,
-    /// What reads the current monitors.
+    /// Converter that reads the current monitors.
     pub adc: Adc,
     /// The USB peripheral, plugged in.
     pub usb: Cable,
@@ -81,9 +81,9 @@ pub struct Bus {
     pub supply: Supply,
     /// Bits that option bytes have cleared, of those that the chip is sold with.
     pub cleared_options: Option<(u32, u32)>,
-    /// Whether a debugger has halted the core.
+    /// True if a debugger has halted the core.
     pub is_halted: bool,
-    /// Whether the core has locked up.
+    /// True if the core has locked up.
     pub is_locked_up: bool,
     /// A memory with a double error, of those of [`BreakAt::memories`].
     pub failing_memory: Option<usize>,
@@ -91,7 +91,7 @@ pub struct Bus {
     pub enable_held_at: Option<bool>,
     /// A command's pin (axis 0 to 2) and the 12-bit reading that it is held at from outside.
     pub command_held_at: Option<(usize, u16)>,
-    /// Whether the oscillator of USB follows the host's start-of-frames.
+    /// True if the oscillator of USB follows the host's start-of-frames.
     pub usb_clock_follows: bool,
     /// What reads the commands back.
     read_back: Adc,
@@ -99,7 +99,7 @@ pub struct Bus {
     pub now_ns: u64,
     /// Runs while a test measures.
     pub stopwatch: Option<Stopwatch>,
-    /// What reached commands and enable pin, in order, since it was last taken.
+    /// Effects on commands and enable pin, in order, since they were last taken.
     pub effects: Vec<Effect>,
 }
 
@@ -230,14 +230,14 @@ impl Bus {
         }
     }
 
-    /// Whether duty cycles leave the chip, on a board that commands by them.
+    /// Returns true if duty cycles leave the chip, on a board that commands by them.
     #[must_use]
     pub fn drives_duty_cycles(&mut self) -> Option<bool> {
         self.duty_outputs()
             .map(|outputs| outputs == Outputs::Pulses)
     }
 
-    /// What is at the pins of the duty cycles, on a board that commands by them.
+    /// Returns the outputs at the pins of the duty cycles, on a board that commands by them.
     #[must_use]
     pub fn duty_outputs(&mut self) -> Option<Outputs> {
         self.follow_gate();
@@ -302,7 +302,7 @@ impl Bus {
         drives && register(ODR) >> pin & 1 == 1
     }
 
-    /// What is commanded on axes 1 to 3, as the registers have it.
+    /// Returns the commands of axes 1 to 3, as the registers have them.
     #[must_use]
     pub fn commands(&mut self) -> [i32; 3] {
         match self.chip.commands {
@@ -440,12 +440,12 @@ impl Bus {
         }
     }
 
-    /// Whether this is the register that says that a frame is out.
+    /// Returns true if this is the register that says that a frame is out.
     fn is_sent(&self, address: u32) -> bool {
         matches!(self.chip.commands, Commands::Serial { sent, .. } if sent.0 == address)
     }
 
-    /// Whether this is the register with what came back from the SPI.
+    /// Returns true if this is the register with what came back from the SPI.
     fn is_back(&self, address: u32) -> bool {
         matches!(self.chip.commands, Commands::Serial { back, .. } if back == address)
     }
@@ -562,7 +562,7 @@ impl Bus {
         *self.words.entry(register).or_default() |= bits;
     }
 
-    /// Whether the flash still says that a word of it could not be read.
+    /// Returns true if the flash still says that a word of it could not be read.
     #[must_use]
     pub fn reports_unreadable(&self) -> bool {
         let (register, bit) = match self.chip.flash.unreadable {

@@ -1,4 +1,4 @@
-//! Where the two chips keep what the images use.
+//! Registers and memories of the two chips that the images use.
 
 use crate::shutdown::{BreakAt, Freeze};
 use crate::supply::{Comparator, ResetFlags};
@@ -43,7 +43,7 @@ pub enum UsbKind {
     },
 }
 
-/// What commands the amplifiers of axes 1 to 3, and the code of a current.
+/// Commands to the amplifiers of axes 1 to 3, and the code of a current.
 #[derive(Clone, Copy, Debug)]
 pub enum Commands {
     /// Converters on the chip: their data registers, 12 bits, the middle is zero, and
@@ -66,7 +66,7 @@ pub enum Commands {
     },
 }
 
-/// What a chip does when the core loads a word of flash that cannot be read.
+/// Reaction of a chip to a load of a word of flash that cannot be read.
 #[derive(Clone, Copy, Debug)]
 pub enum Unreadable {
     /// It loads anything, sets the bit `failed`, and `second` where that is in the
@@ -89,7 +89,7 @@ pub enum Unreadable {
     },
 }
 
-/// How a chip's flash is erased, sector by sector, and where the calibrations
+/// Flash of a chip: its sectors, and where the calibrations
 /// are in it.
 #[derive(Clone, Copy, Debug)]
 pub struct Flash {
@@ -105,7 +105,7 @@ pub struct Flash {
     pub second_bank: u32,
     /// Bytes of a word, which has a check of its own.
     pub word: u32,
-    /// What a word that cannot be read does.
+    /// Reaction to a word that cannot be read.
     pub unreadable: Unreadable,
 }
 
@@ -121,7 +121,7 @@ pub struct Chip {
     pub chip: &'static str,
     /// Environment variable with the image's path.
     pub variable: &'static str,
-    /// Whether the core is a Cortex-M7.
+    /// True if the core is a Cortex-M7.
     pub is_m7: bool,
     /// Core clock.
     pub core_hz: u64,
@@ -151,7 +151,7 @@ pub struct Chip {
     /// The clock recovery of USB's oscillator, and the synchronisation source that is the
     /// start-of-frame of the USB that is used.
     pub recovery: (u32, u32),
-    /// What a halted core stops.
+    /// Peripherals that a halted core stops.
     pub freeze: Freeze,
     /// The outputs' break.
     pub output_break: Option<BreakAt>,
@@ -193,7 +193,7 @@ pub struct Chip {
     pub read_back: Option<(u32, [usize; 3])>,
     /// The flash with the calibrations.
     pub flash: Flash,
-    /// Where the commands of axes 1 to 3 are.
+    /// Place where the commands of axes 1 to 3 are.
     pub commands: Commands,
 }
 

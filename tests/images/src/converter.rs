@@ -24,10 +24,10 @@ const BIPOLAR_10_V: u16 = 0b100;
 const EOT: u32 = 1 << 3;
 /// Bytes of a frame.
 const FRAME: usize = 3;
-/// How long SYNC has to be high after a frame that writes and after one that reads, ns.
+/// Time for which SYNC has to be high after a frame that writes and after one that reads, ns.
 const HIGH_AFTER_WRITE_NS: u64 = 100;
 const HIGH_AFTER_READ_NS: u64 = 200;
-/// How long the outputs take to power up, ns.
+/// Time that the outputs take to power up, ns.
 const POWER_UP_NS: u64 = 10_000;
 
 /// The converter, and the wires to it.
@@ -48,11 +48,11 @@ pub struct Converter {
     asked: u16,
     /// Bytes that came back and were not read yet.
     back: Vec<u8>,
-    /// Whether the SPI's clock has failed: frames do not go out.
+    /// True if the SPI's clock has failed: frames do not go out.
     pub is_cut: bool,
-    /// Whether the wire back is broken: ones are read, by the pull-up.
+    /// True if the wire back is broken: ones are read, by the pull-up.
     pub is_silent: bool,
-    /// How long SYNC was high at least, after a frame that writes and after one that asks
+    /// Time for which SYNC was high at least, after a frame that writes and after one that asks
     /// for a register, ns; zero before there were any.
     pub shortest_high_ns: (u64, u64),
     /// Frames that were lost because SYNC was high for too short a time, or because the

@@ -57,7 +57,7 @@ enum Owner {
 /// Code without a branch before its end.
 struct Block {
     owner: Owner,
-    /// Whether an H743 has it in flash.
+    /// True if an H743 has it in flash.
     in_flash: bool,
     bytes: u32,
     code: Vec<Instruction>,

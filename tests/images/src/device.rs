@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Ask, Bulk, BulkEndpoints, Event, Session, Timeouts, Transport};
-use hapterra::phantom::{Encoder, PhantomModel, Placement, kinematics};
+use hapterra::phantom::{ArmFrame, Encoder, PhantomModel, kinematics};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{Mode, Report};
@@ -75,17 +75,17 @@ pub struct Device<'t> {
     pub machine: Rc<RefCell<Machine>>,
     session: Session<'t>,
     endpoints: BulkEndpoints,
-    /// Where the encoders are.
+    /// Place where the encoders are.
     pub counts: [i32; 3],
     /// The latest sample.
     pub latest: Option<TickRecord>,
-    /// Where the guard stands, as last told.
+    /// State of the guard, as last reported.
     pub guard: Option<Report>,
     /// The latest status.
     pub status: Option<Status>,
     /// The latency that the board states, µs.
     pub latency_us: u16,
-    /// What came of the latest request that was answered.
+    /// Outcome of the latest request that was answered.
     pub answer: Option<(Request, Result<(), Refusal>)>,
     /// The ticks that were marked.
     pub marked: Vec<u32>,
@@ -246,7 +246,7 @@ impl<'t> Device<'t> {
         }
     }
 
-    /// What is commanded on axes 1 to 3: converter codes or compare counts.
+    /// Returns the commands of axes 1 to 3: converter codes or compare counts.
     #[must_use]
     pub fn commands(&self) -> [i32; 3] {
         self.machine.borrow().bus().commands()
@@ -266,8 +266,8 @@ fn endpoints(found: &Found) -> BulkEndpoints {
 pub struct Plane {
     /// The arm.
     pub model: PhantomModel,
-    /// Where the terrain lies.
-    pub place: Placement,
+    /// Place where the terrain lies.
+    pub place: ArmFrame,
     /// Rise east and north, millimetres a millimetre.
     pub slope: [f64; 2],
     /// Height above the origin, mm.
@@ -282,14 +282,14 @@ impl Plane {
     pub fn level(home_mm: [f64; 3], height_mm: f64) -> Self {
         Self {
             model: PhantomModel::premium_1_5(),
-            place: Placement { home_mm },
+            place: ArmFrame { home_mm },
             slope: [0.0; 2],
             height_mm,
             law: SurfaceParams::PREMIUM,
         }
     }
 
-    /// How far (mm) a terrain point is above the plane, along its normal.
+    /// Returns the height (mm) of a terrain point above the plane, along its normal.
     #[must_use]
     pub fn above_mm(&self, [east, north, up]: [f64; 3]) -> f64 {
         let surface = self.height_mm + self.slope[0] * east + self.slope[1] * north;
@@ -327,7 +327,7 @@ impl Plane {
         let depth_mm = -self.above_mm(self.place.to_terrain_mm(&self.model, tip));
         let newtons = (f64::from(self.law.stiffness_n_per_mm) * depth_mm)
             .clamp(0.0, self.law.max_force_n.into());
-        let force = Placement::turn_to_device(self.normal().map(|n| n * newtons));
+        let force = ArmFrame::turn_to_device(self.normal().map(|n| n * newtons));
         let jacobian = kinematics::jacobian(&self.model, q);
         // What holds the links, by the record: -g2·cos q2 and -g3·sin q3 pull.
         let record = Calibration::PREMIUM_1_5;

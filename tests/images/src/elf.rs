@@ -16,7 +16,7 @@ pub struct Segment {
     pub loaded: u32,
     /// Bytes in memory.
     pub size: u32,
-    /// What is in the file; the rest of `size` is not set by it.
+    /// Its bytes in the file; the rest of `size` is not set by it.
     pub bytes: Vec<u8>,
 }
 
@@ -31,11 +31,11 @@ pub struct Function {
 
 /// An image: segments and symbols.
 pub struct Image {
-    /// What is loaded.
+    /// Segments to load.
     pub segments: Vec<Segment>,
     functions: BTreeMap<String, Function>,
     symbols: BTreeMap<String, Function>,
-    /// Where code (true) and data in it (false) begin.
+    /// Place where code (true) and data in it (false) begin.
     mapping: BTreeMap<u32, bool>,
 }
 

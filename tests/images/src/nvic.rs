@@ -161,13 +161,13 @@ impl Nvic {
         (0..INTERRUPTS).any(|i| self.enabled[i] && self.pending[i])
     }
 
-    /// Whether an interrupt is let through.
+    /// Returns true if an interrupt is let through.
     #[must_use]
     pub fn is_enabled(&self, interrupt: usize) -> bool {
         self.enabled[interrupt]
     }
 
-    /// Whether an interrupt is let through and has not been taken.
+    /// Returns true if an interrupt is let through and has not been taken.
     #[must_use]
     pub fn waits(&self, interrupt: usize) -> bool {
         self.enabled[interrupt] && self.pending[interrupt]

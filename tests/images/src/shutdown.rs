@@ -1,4 +1,4 @@
-//! What stops the arm in hardware: the break of TIM1, and what a halted core stops.
+//! Shutdown in hardware: the break of TIM1, and the peripherals that a halted core stops.
 //!
 //! Modelled as RM0433 has it: of TIM1 CEN of CR1, the gate, the compare modes of CCMR1 and CCMR2, the
 //! enables of CCER (38.4.7 to 38.4.11), and (38.3.16, 38.3.28, 38.4.20) BKE, BKP, OSSI and MOE
@@ -70,7 +70,7 @@ pub struct Sources {
     pub system: bool,
 }
 
-/// What the break does to its timer now. It wins over a write that would switch the
+/// Applies the break to its timer. It wins over a write that would switch the
 /// outputs on.
 pub fn follow(timer: &mut Timer, sources: Sources) {
     let bdtr = timer.get(BDTR);
@@ -82,7 +82,7 @@ pub fn follow(timer: &mut Timer, sources: Sources) {
     }
 }
 
-/// What a timer does to the pins of its first three channels.
+/// Outputs of a timer's first three channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outputs {
     /// Duty cycles.
@@ -95,7 +95,7 @@ pub enum Outputs {
     Floating,
 }
 
-/// What the timer does to its pins. `is_stopped`: the halted core stops it, which is to its
+/// Returns the timer's outputs. `is_stopped`: the halted core stops it, which is to its
 /// outputs as if MOE were not set.
 #[must_use]
 pub fn outputs(timer: &Timer, is_stopped: bool) -> Outputs {

@@ -1,4 +1,4 @@
-//! What the haptic interrupt takes, by the model of cycles over every instruction that it
+//! Time of the haptic interrupt, by the model of cycles over every instruction that it
 //! executes and every peripheral that it reads or writes.
 
 use std::cell::RefCell;

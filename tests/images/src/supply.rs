@@ -7,12 +7,12 @@
 
 use std::collections::HashMap;
 
-/// What a board's regulator gives, millivolts.
+/// Voltage of a board's regulator, millivolts.
 pub const NOMINAL_MV: u32 = 3_300;
 /// EXTI's line of the comparator.
 const LINE: u32 = 1 << 16;
 
-/// Where a chip keeps its comparator.
+/// Registers of a chip's comparator.
 #[derive(Clone, Copy, Debug)]
 pub struct Comparator {
     /// Control register, the bit that switches it on, and the first of the level's
@@ -45,7 +45,7 @@ impl Default for Supply {
 }
 
 impl Supply {
-    /// Whether the comparator is on and says that the supply is low.
+    /// Returns true if the comparator is on and says that the supply is low.
     #[must_use]
     pub fn is_low(&self, at: &Comparator, words: &HashMap<u32, u32>) -> bool {
         let (control, on, level) = at.control;
@@ -70,7 +70,7 @@ impl Supply {
     }
 }
 
-/// Why a chip was reset.
+/// Reason for which a chip was reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reset {
     /// Power came up: memory holds nothing.
@@ -96,7 +96,7 @@ pub struct ResetFlags {
 }
 
 impl ResetFlags {
-    /// What the register reads after a reset.
+    /// Returns the register after a reset.
     #[must_use]
     pub const fn after(&self, cause: Reset) -> u32 {
         let [power_up, watchdog, software, brown_out] = self.of;

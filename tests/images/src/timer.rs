@@ -170,7 +170,7 @@ impl Timer {
         self.set(CNT, if ends { 0 } else { (to % period) as u32 });
     }
 
-    /// Whether its interrupt is asserted.
+    /// Returns true if its interrupt is asserted.
     #[must_use]
     pub fn is_asserting(&self) -> bool {
         self.get(SR) & self.get(DIER) & 0x1F != 0

@@ -20,7 +20,7 @@ pub struct Watchdog {
     prescaler: u32,
     reload: u32,
     fed_ns: u64,
-    /// How often it was fed.
+    /// Number of times that it was fed.
     pub feedings: u64,
 }
 
@@ -72,7 +72,7 @@ impl Watchdog {
         (u64::from(self.reload) + 1) * (4 << self.prescaler)
     }
 
-    /// Whether it resets the chip now.
+    /// Returns true if it resets the chip now.
     #[must_use]
     pub fn has_expired(&self, now_ns: u64) -> bool {
         self.running && now_ns - self.fed_ns >= self.timeout_ns()

@@ -1,4 +1,4 @@
-//! What a board knows of itself after it was reset: why, how the program before
+//! A board's report after a reset: why, how the program before
 //! ended, and its calibration. And how much of its stack it needs.
 
 use hapterra::terrain::Terrain;
@@ -164,7 +164,7 @@ fn store(device: &mut Device<'_>) -> Result<(), Refusal> {
 }
 
 #[test]
-fn a_full_memory_is_not_erased_while_the_watchdog_waits_but_at_the_next_start() {
+fn full_memory_is_erased_at_the_next_start() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let (areas, bytes) = machine.chip.flash.calibrations;

@@ -1,4 +1,4 @@
-//! What is loaded and what is reserved lies in the chip's memories, as
+//! Loaded and reserved segments lie in the chip's memories, as
 //! probe-rs's registry knows them.
 
 use std::ops::Range;

@@ -87,7 +87,7 @@ fn drain(machine: &mut Machine) {
 }
 
 #[test]
-fn ending_a_halt_that_is_not_there_hangs_nothing_and_starts_the_toggle_anew() {
+fn clearing_no_halt_hangs_nothing_and_resets_the_toggle() {
     for mut machine in machines() {
         let board = machine.chip.board;
         enumerate(&mut machine).expect("enumerated");

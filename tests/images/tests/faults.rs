@@ -1,4 +1,4 @@
-//! What goes wrong in the boards' own images: each ends in no current and
+//! Faults in the boards' own images: each ends in no current and
 //! amplifiers off, in a number of ticks that is stated here.
 
 use hapterra_core::guard::Fault;
@@ -259,7 +259,7 @@ fn a_panic_switches_the_amplifiers_off_before_anything_else() {
 /// A reset lets go of the enable line, and an amplifier takes its time to follow: so what it
 /// is commanded matters. A start may also take long.
 #[test]
-fn a_start_after_a_crash_commands_no_current_before_it_does_anything_that_takes_long() {
+fn start_after_crash_commands_no_current_first() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         let board = machine.chip.board;

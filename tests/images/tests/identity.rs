@@ -1,4 +1,4 @@
-//! How the boards' own images tell one board from another: by the chip's identifier.
+//! Identity of boards in their own images: the chip's identifier.
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -1,4 +1,4 @@
-//! What the haptic interrupt takes in the boards' own images, by the model of cycles
+//! Time of the haptic interrupt in the boards' own images, by the model of cycles
 //! (docs/reference/cycles.md), and what the page, the build and the images make of it.
 
 #[path = "../../../firmware/build/tick_rate.rs"]

@@ -73,7 +73,7 @@ fn assert_as_after_a_reset(machine: &Machine) {
 }
 
 #[test]
-fn asked_for_its_loader_a_board_resets_and_goes_there_before_it_sets_anything_up() {
+fn board_enters_its_loader_before_any_setup() {
     for mut machine in machines() {
         let board = machine.chip.board;
         let begin = fill_rom(&mut machine);

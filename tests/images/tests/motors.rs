@@ -1,4 +1,4 @@
-//! How warm a board takes its motors to be after a start: what it kept in its RAM goes on
+//! Motor temperatures of a board after a start: those that it kept in its RAM go on
 //! after a reset, and everything else is hot.
 
 use hapterra::terrain::Terrain;
@@ -36,7 +36,7 @@ fn on_each(mut then: impl FnMut(Machine, &Plane, &Terrain<'_>, Scene)) {
     });
 }
 
-/// Where the image keeps the copies.
+/// Returns the place where the image keeps the copies.
 fn place(machine: &Machine) -> u32 {
     let symbol = machine.image.symbol_like(&["motor_memory", "COPIES"]);
     symbol.expect("the copies").address

@@ -1,4 +1,4 @@
-//! What leaves the boards' own images for the amplifiers, and what the amplifiers say
+//! Outputs of the boards' own images to the amplifiers, and the amplifiers' feedback
 //! back.
 
 use hapterra_core::guard::{Blockers, Fault};

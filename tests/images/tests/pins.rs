@@ -1,4 +1,4 @@
-//! Whether the images set up every pin as its board's page says, alternate function
+//! The images set up every pin as the board's page says, alternate function
 //! included, and no other: read from the chip's registers after a reset.
 
 use std::collections::BTreeMap;

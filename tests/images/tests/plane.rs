@@ -1,7 +1,7 @@
 //! A plane pressed by a millimetre, from encoder counts to what is at the
 //! amplifiers' inputs, in the boards' own images.
 
-use hapterra::phantom::{PhantomModel, Placement};
+use hapterra::phantom::{ArmFrame, PhantomModel};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::SurfaceParams;
 use hapterra_image_tests::bus::Effect;
@@ -12,7 +12,7 @@ use heightfield::Raster;
 fn plane() -> Plane {
     Plane {
         model: PhantomModel::premium_1_5(),
-        place: Placement {
+        place: ArmFrame {
             home_mm: [100.0, 100.0, 75.0],
         },
         slope: [0.25, -0.125],
@@ -22,7 +22,7 @@ fn plane() -> Plane {
 }
 
 #[test]
-fn a_plane_pressed_by_a_millimetre_gives_the_currents_of_the_f64_computation() {
+fn plane_at_a_millimetre_has_the_currents_of_f64() {
     let plane = plane();
     let height = |x: u32, y: u32| 55.0 + 0.25 * x as f32 - 0.125 * y as f32;
     let raster = Raster::from_fn(201, 201, height).expect("raster");

@@ -1,4 +1,4 @@
-//! What the chips can tell of their own outputs is asked in every tick.
+//! The chips' own outputs are read back in every tick.
 
 use hapterra_core::guard::{Blockers, Fault};
 use hapterra_image_tests::bench::Bench;

@@ -1,4 +1,4 @@
-//! What switches the arm off when the program cannot, and what the chip itself does when
+//! Shutdown without the program, and the chip's reaction when
 //! its supply, its stack or its core fails.
 
 use std::cell::Cell;
@@ -170,7 +170,7 @@ fn a_core_that_a_debugger_halts_is_stopped_by_the_chip() {
 }
 
 #[test]
-fn a_core_that_locks_up_stops_the_duty_cycles_and_the_watchdog_does_the_rest() {
+fn locked_core_stops_duty_cycles_and_the_watchdog_resets() {
     on_each(|machine, terrain, scene| {
         let board = machine.chip.board;
         let device = Device::arm(machine, terrain, scene);
@@ -478,7 +478,7 @@ fn core_hz(machine: &Machine) -> u64 {
 }
 
 #[test]
-fn no_core_is_faster_than_it_may_be_with_an_oscillator_that_is_a_hundredth_fast() {
+fn core_clock_stays_in_bounds_with_a_fast_oscillator() {
     for mut machine in machines() {
         let (board, chip) = (machine.chip.board, machine.chip);
         assert_eq!(machine.run_ms(20), Stop::Time, "{board}");

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use hapterra::phantom::{AmplifierFault, HandModel, PhantomModel, Placement, Plant, kinematics};
+use hapterra::phantom::{AmplifierFault, ArmFrame, HandModel, PhantomModel, Plant, kinematics};
 use hapterra::terrain::Terrain;
 
 use crate::chance::Chance;
@@ -20,7 +20,7 @@ const TREMOR_HZ: [f64; 3] = [8.3, 9.7, 11.2];
 /// Length of a tick, s.
 const TICK_S: f64 = 1e-3;
 
-/// What the hand is up to.
+/// Mood of the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mood {
     /// Held off the terrain.
@@ -37,7 +37,7 @@ pub enum Mood {
 pub struct Arm<'t> {
     terrain: &'t Terrain<'t>,
     plant: Plant,
-    placement: Placement,
+    placement: ArmFrame,
     /// Turns a second and phase of the waves that make the way: two east, two
     /// north, two up.
     waves: [(f64, f64); 6],
@@ -57,7 +57,7 @@ impl<'t> Arm<'t> {
         let ground_mm = terrain
             .height_mm(east, north)
             .expect("no hole in the middle");
-        let placement = Placement {
+        let placement = ArmFrame {
             home_mm: [east, north, ground_mm],
         };
         let model = PhantomModel::premium_1_5();
@@ -82,7 +82,7 @@ impl<'t> Arm<'t> {
         self.placement.home_mm
     }
 
-    /// What the encoders read.
+    /// Returns the encoders' counts.
     #[must_use]
     pub fn counts(&self) -> [i32; 3] {
         self.plant.counts()
@@ -109,7 +109,7 @@ impl<'t> Arm<'t> {
         self.target_mm = self.target(mood);
         let speed = std::array::from_fn(|i| 1e-3 * (self.target_mm[i] - before[i]) / TICK_S);
         let at = self.placement.to_device_m(self.plant.model(), before);
-        self.plant.aim(at, Placement::turn_to_device(speed));
+        self.plant.aim(at, ArmFrame::turn_to_device(speed));
         self.plant.step(currents_a, TICK_S);
     }
 

@@ -16,7 +16,7 @@ const WINDOW: usize = 4;
 /// The device.
 pub type Board = Device<SetClock, WINDOW>;
 
-/// What every board of the campaign has stored.
+/// Stored calibration of every board of the campaign.
 pub const STORED: Stored = Stored::Found(Calibration::PREMIUM_1_5);
 
 /// The two halves of the application hand tile buffers to each other by reference, for

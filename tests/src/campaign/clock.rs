@@ -5,12 +5,12 @@ use std::rc::Rc;
 
 use hapterra_firmware::board::TickClock;
 
-/// What the clock says in the present tick.
+/// Reading of the clock in the present tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reading {
     /// Counts since the tick was due.
     pub since_due: u32,
-    /// Whether the next tick is due before this one is done.
+    /// True if the next tick is due before this one is done.
     pub overrun: bool,
     /// Periods that passed without a tick before this one.
     pub missing: u32,

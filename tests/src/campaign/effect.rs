@@ -1,4 +1,4 @@
-//! What a kind of mishap does to a tick.
+//! Effects of injected faults on a tick.
 
 use hapterra::phantom::AmplifierFault;
 use hapterra_core::grid::GridPoint;
@@ -16,7 +16,7 @@ use super::kind::{Kind, LOADED_TICKS};
 use super::pipe::Unkind;
 use crate::chance::Chance;
 
-/// What the core of the device does in a tick.
+/// Actions of the device's core in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Core {
     /// It runs.
@@ -32,7 +32,7 @@ pub enum Core {
 /// One mishap under way.
 #[derive(Clone, Debug)]
 pub struct Mishap {
-    /// What it is.
+    /// Its value.
     pub kind: Kind,
     /// Its first tick, and the one past its last.
     pub ticks: std::ops::Range<u64>,
@@ -114,7 +114,7 @@ impl Mishap {
         }
     }
 
-    /// What it does to an amplifier, and to which.
+    /// Returns the amplifier's fault and its index.
     #[must_use]
     pub fn amplifier(&self) -> Option<(usize, AmplifierFault)> {
         let fault = match self.kind {
@@ -125,7 +125,7 @@ impl Mishap {
         Some((self.axis, fault))
     }
 
-    /// What it does to the link.
+    /// Returns its effect on the link.
     #[must_use]
     pub fn unkind(&self) -> Unkind {
         let none = Unkind::default();
@@ -152,7 +152,7 @@ impl Mishap {
         }
     }
 
-    /// What it does to tiles.
+    /// Returns its effect on tiles.
     #[must_use]
     pub fn tiles(&self) -> Tiles {
         match self.kind {
@@ -162,7 +162,7 @@ impl Mishap {
         }
     }
 
-    /// What it does to the clock at `now`.
+    /// Returns the clock's reading at `now`.
     #[must_use]
     pub fn reading(&self, now: u64) -> Reading {
         match self.kind {
@@ -182,27 +182,27 @@ impl Mishap {
         }
     }
 
-    /// Whether the link's task hangs.
+    /// Returns true if the link's task hangs.
     #[must_use]
     pub fn stalls(&self) -> bool {
         self.kind == Kind::TaskStalled
     }
 
-    /// Whether the device is told at `now` that its transport was interrupted, as
+    /// Returns true if the device is told at `now` that its transport was interrupted, as
     /// USB tells it; a silent line tells nothing.
     #[must_use]
     pub fn unplugs(&self, now: u64) -> bool {
         self.kind == Kind::LinkSilence && self.sign > 0 && now == self.ticks.start
     }
 
-    /// Whether an endpoint is halted and cleared at `now`: what was under way on it is
+    /// Returns true if an endpoint is halted and cleared at `now`: what was under way on it is
     /// lost.
     #[must_use]
     pub fn halts_endpoint(&self, chance: &mut Chance) -> bool {
         self.kind == Kind::EndpointHalt && chance.below(20) == 0
     }
 
-    /// What it does to the core at `now`.
+    /// Returns the core's actions at `now`.
     #[must_use]
     pub fn core(&self, now: u64) -> Core {
         let is_last = now + 1 == self.ticks.end;
@@ -218,7 +218,7 @@ impl Mishap {
         }
     }
 
-    /// What it does to the hand.
+    /// Returns its effect on the hand.
     #[must_use]
     pub fn mood(&self) -> Mood {
         match self.kind {

@@ -12,7 +12,7 @@ pub const OFF_COUNTS: u32 = 2 * (MAX_COUNTS_PER_S / 1_000);
 pub struct Misled {
     /// The force, N.
     pub force_n: f64,
-    /// What the encoder that was farthest off was off by then, counts.
+    /// Largest error of an encoder by then, counts.
     pub off_counts: u32,
 }
 

@@ -1,4 +1,4 @@
-//! What the ground of a segment feels like: ice, or effects and materials drawn at random.
+//! Surface of a segment's ground: frictionless, or effects and materials drawn at random.
 
 use hapterra::materials::{ClassMaterial, Looks, Materials};
 use hapterra_core::contact::Friction;
@@ -21,7 +21,7 @@ pub enum Ground {
 }
 
 impl Ground {
-    /// What `cargo xtask campaign` has to be told for it, after a space.
+    /// Returns its option of `cargo xtask campaign`, after a space.
     #[must_use]
     pub const fn option(self) -> &'static str {
         match self {
@@ -159,12 +159,12 @@ fn material(chance: &mut Chance, stiffness_n_per_mm: f32) -> Material {
 
 /// All that may be felt of a scene: a law of each of its materials.
 #[derive(Clone, Debug)]
-pub struct Felt {
+pub struct SceneSurfaces {
     laws: Vec<SurfaceParams>,
     hardest: SurfaceParams,
 }
 
-impl Felt {
+impl SceneSurfaces {
     /// Of a law, and of a table where there is one.
     #[must_use]
     pub fn of(law: &SurfaceParams, table: Option<&MaterialTable>) -> Self {
@@ -202,7 +202,7 @@ impl Felt {
         spring_n.min(self.hardest.max_force_n)
     }
 
-    /// Whether energy that the ticks create is taken back.
+    /// Dissipation of the energy leak of the sampled wall.
     #[must_use]
     pub const fn is_controlled(&self) -> bool {
         self.hardest.is_controlled()
@@ -219,7 +219,7 @@ impl Felt {
         }
     }
 
-    /// Whether its force is that of one spring: no material follows a softer one.
+    /// Returns true if its force is that of one spring: no material follows a softer one.
     #[must_use]
     pub fn is_spring(&self) -> bool {
         let stiff = |law: &SurfaceParams| law.stiffness_n_per_mm;
@@ -227,7 +227,7 @@ impl Felt {
         pairs.all(|pair| stiff(&pair[0]) == stiff(&pair[1]))
     }
 
-    /// Whether some of it is damped.
+    /// Returns true if some of it is damped.
     #[must_use]
     pub fn is_damped(&self) -> bool {
         self.laws.iter().any(|law| law.damping.ns_per_m > 0.0)
@@ -247,7 +247,7 @@ impl Felt {
         self.laws.iter().fold([0.0; 2], relief)
     }
 
-    /// Whether the force is turned by as much as shading turns it.
+    /// Returns true if the force is turned by as much as shading turns it.
     #[must_use]
     pub fn is_shaded(&self) -> bool {
         self.hardest.shading != Shading::None

@@ -20,7 +20,7 @@ use crate::chance::Chance;
 /// Bytes of a tile's samples.
 const TILE_BYTES: usize = 33 * 33 * 4;
 
-/// How the host answers requests for tiles.
+/// The host's answers to requests for tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tiles {
     /// As asked.
@@ -112,7 +112,7 @@ impl<'t> Host<'t> {
         self.to_device.send(&bytes, now, unkind, chance);
     }
 
-    /// What arrives at the device in this tick; `take` tells how many bytes it
+    /// Delivers the bytes of this tick to the device; `take` returns how many bytes it
     /// took.
     pub fn deliver(&mut self, now: u64, take: &mut dyn FnMut(&[u8]) -> usize) {
         while let Some(piece) = self.to_device.receive(now) {
@@ -123,7 +123,7 @@ impl<'t> Host<'t> {
         }
     }
 
-    /// What the device said in this tick goes on its way, and what arrives is
+    /// Sends the device's bytes of this tick, and what arrives is
     /// answered.
     pub fn hear(
         &mut self,

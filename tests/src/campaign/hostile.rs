@@ -45,7 +45,7 @@ pub fn calibration(chance: &mut Chance) -> Calibration {
     record
 }
 
-/// Whether a record that is in force keeps the ceilings of a Premium 1.5.
+/// Checks that a record that is in force keeps the ceilings of a Premium 1.5.
 ///
 /// # Errors
 /// The first number above.

@@ -1,4 +1,4 @@
-//! What is made to go wrong, and what is expected of it.
+//! Injected faults, and their expected outcomes.
 
 use hapterra_core::guard::Fault;
 
@@ -83,7 +83,7 @@ pub enum Kind {
     Clutch,
 }
 
-/// What may become of it. What is not in here is a violation.
+/// Permitted outcomes. All others are violations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expectation {
     /// It may be ridden through: the arm stays armed.
@@ -158,7 +158,7 @@ impl Kind {
         Self::Clutch,
     ];
 
-    /// What is expected.
+    /// Returns the expected outcome.
     #[must_use]
     pub const fn expectation(self) -> Expectation {
         match self {
@@ -229,7 +229,7 @@ impl Kind {
         }
     }
 
-    /// How long it lasts, ticks.
+    /// Returns the time for which it lasts, ticks.
     #[must_use]
     pub const fn duration(self) -> Duration {
         match self {

@@ -1,4 +1,4 @@
-//! What motors make at the tip, in f64: joint torques through an arm's levers.
+//! Motor forces at the tip, in f64: joint torques through an arm's levers.
 
 use hapterra::phantom::{PhantomModel, kinematics};
 use hapterra_core::phantom::Calibration;
@@ -50,7 +50,7 @@ pub fn torques_nm(model: &PhantomModel, currents_a: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// Whether the links are within 30° of being in line, or the tip within 80 mm of
+/// Returns true if the links are within 30° of being in line, or the tip within 80 mm of
 /// the base's axis: there small torques are large forces.
 #[must_use]
 pub fn is_near_singular(model: &PhantomModel, q: [f64; 3]) -> bool {

@@ -16,7 +16,7 @@ pub mod board;
 pub mod clock;
 pub mod effect;
 pub mod extremes;
-pub mod felt;
+pub mod force_watch;
 pub mod ground;
 pub mod host;
 pub mod hostile;

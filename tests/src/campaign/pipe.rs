@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::chance::Chance;
 
-/// What a pipe does to a piece of bytes.
+/// Disturbance of a pipe's transfers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Unkind {
     /// Share of pieces that are lost.

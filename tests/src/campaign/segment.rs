@@ -20,8 +20,8 @@ use super::arm::{Arm, Mood};
 use super::board::{self, Board};
 use super::clock::{Reading, SetClock};
 use super::effect::{Core, Mishap};
-use super::felt::FeltWatch;
-use super::ground::{Effects, Felt, Ground};
+use super::force_watch::ForceWatch;
+use super::ground::{Effects, Ground, SceneSurfaces};
 use super::host::{Host, Tiles};
 use super::hostile;
 use super::kind::Kind;
@@ -47,16 +47,16 @@ const TRIES: u64 = 40;
 const ASK: u64 = 60;
 const PRESS: u64 = 200;
 
-/// What must not happen happened.
+/// Violation of an invariant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation {
     /// The segment.
     pub segment: u64,
-    /// What its ground feels like.
+    /// Surface of its ground.
     pub ground: Ground,
     /// The tick in it.
     pub tick: u64,
-    /// What.
+    /// Its description.
     pub what: String,
 }
 
@@ -80,19 +80,19 @@ pub fn run(
         .and_then(|effects| effects.materials(&raster, SAMPLES));
     let grid = HapticGrid::new(&raster, HapticCells::default()).with_materials(materials.as_ref());
     let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
-    let mut stretch = Stretch::new(&terrain, effects, chance);
-    let played = stretch.play(tally);
-    let felt = &stretch.felt;
-    stretch.watch.extremes.given_mj = felt.most_given_mj;
-    stretch.watch.extremes.watched_ticks = felt.watched_ticks;
-    stretch.watch.extremes.ramp_ticks = felt.ramp_ticks;
-    stretch.watch.extremes.clutch_ticks = felt.clutch_ticks;
-    stretch.watch.extremes.turns = felt.most_turns;
-    tally.add(stretch.now, stretch.armed, &stretch.watch.extremes);
+    let mut running = Segment::new(&terrain, effects, chance);
+    let played = running.play(tally);
+    let felt = &running.felt;
+    running.watch.extremes.given_mj = felt.most_given_mj;
+    running.watch.extremes.watched_ticks = felt.watched_ticks;
+    running.watch.extremes.ramp_ticks = felt.ramp_ticks;
+    running.watch.extremes.clutch_ticks = felt.clutch_ticks;
+    running.watch.extremes.turns = felt.most_turns;
+    tally.add(running.now, running.armed, &running.watch.extremes);
     played.map_err(|what| Violation {
         segment,
         ground,
-        tick: stretch.now,
+        tick: running.now,
         what,
     })
 }
@@ -113,11 +113,11 @@ fn terrain(chance: &mut Chance) -> Raster {
     raster.expect("a terrain")
 }
 
-struct Stretch<'t> {
+struct Segment<'t> {
     terrain: &'t Terrain<'t>,
     /// What is felt besides the spring.
     effects: Option<Effects>,
-    felt: FeltWatch,
+    felt: ForceWatch,
     /// From this tick on nothing is wrong.
     calm_from: u64,
     /// The device may hold tiles that are not the terrain's, whose borders are open.
@@ -142,14 +142,14 @@ struct Stretch<'t> {
     armed: u64,
 }
 
-impl<'t> Stretch<'t> {
+impl<'t> Segment<'t> {
     fn new(terrain: &'t Terrain<'t>, effects: Option<Effects>, mut chance: Chance) -> Self {
         let record = Calibration::PREMIUM_1_5;
         let clock = SetClock::default();
         let device = board::new(clock.clone());
         let arm = Arm::new(terrain, &mut chance);
         let scene = scene(terrain, &arm, effects.as_ref(), &mut chance);
-        let felt = FeltWatch::new(felt(terrain, &scene), scene.cell_mm);
+        let felt = ForceWatch::new(felt(terrain, &scene), scene.cell_mm);
         let host = Host::new(terrain, scene, chance.bits());
         Self {
             terrain,
@@ -491,9 +491,9 @@ impl<'t> Stretch<'t> {
 }
 
 /// What may be felt of a scene.
-fn felt(terrain: &Terrain<'_>, scene: &Scene) -> Felt {
+fn felt(terrain: &Terrain<'_>, scene: &Scene) -> SceneSurfaces {
     let materials = terrain.grid().materials();
-    Felt::of(&scene.law, materials.map(Materials::table))
+    SceneSurfaces::of(&scene.law, materials.map(Materials::table))
 }
 
 fn scene(

@@ -27,7 +27,7 @@ pub struct Shares {
 }
 
 impl Shares {
-    /// What is let through of a force that the guard does not clamp.
+    /// Returns the share of a force that the guard does not clamp.
     #[must_use]
     pub fn product(self) -> f32 {
         self.clutch * self.ramp

@@ -1,4 +1,4 @@
-//! Whether the tip swings: it goes to and fro faster than any hand does.
+//! Detection of a swinging tip: it moves to and fro faster than any hand does.
 
 use hapterra_core::Vec3;
 

@@ -1,4 +1,4 @@
-//! What became of everything that went wrong, as a table.
+//! Outcomes of all injected faults, as a table.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::extremes::Extremes;
 use super::kind::Kind;
 use crate::rows::Rows;
 
-/// What became of a mishap.
+/// Outcome of an injected fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The arm stayed armed.
@@ -100,7 +100,7 @@ impl LinkStats {
         self.rows.sum(|row| row.injected)
     }
 
-    /// How often a kind was injected.
+    /// Returns the number of times that a kind was injected.
     #[must_use]
     pub fn injected_of(&self, kind: Kind) -> u32 {
         self.rows.get(kind).map_or(0, |row| row.injected)

@@ -1,4 +1,4 @@
-//! What has to hold in every tick, whatever goes wrong.
+//! Invariants of every tick under any fault.
 //!
 //! The currents are held to three bounds, each worked out in f64 from them alone:
 //! - with the levers of the pose that the encoders tell, the force is within the
@@ -29,12 +29,12 @@ const MAX_CREATED_MJ: f32 = 2.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
 
-/// What is true of the arm in a tick, whatever the device is told.
+/// True state of the arm in a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
     /// Joint angles, rad.
     pub q_rad: [f64; 3],
-    /// What encoders that are right read there, counts.
+    /// Counts of faultless encoders there.
     pub counts: [i32; 3],
     /// Temperatures of the windings, °C.
     pub winding_c: [f64; 3],
@@ -45,7 +45,7 @@ pub struct Watch {
     record: Calibration,
     model: PhantomModel,
     last: Option<TickRecord>,
-    /// Whether the host has asked to hold outputs with the amplifiers off.
+    /// True if the host has asked to hold outputs with the amplifiers off.
     pub may_hold: bool,
     /// The largest so far.
     pub extremes: Extremes,

@@ -1,4 +1,4 @@
-//! What both sides say before any of it is harmed: how the device introduced itself, how
+//! Account of both sides' frames before any fault: how the device introduced itself, how
 //! many samples each session had, and whether a host has asked to arm.
 
 use std::collections::{HashMap, HashSet};
@@ -20,7 +20,7 @@ pub(super) struct Account {
     greetings: Vec<(u32, DeviceHello)>,
 }
 
-/// Whether a host asks to arm in any of these frames.
+/// Returns true if a host asks to arm in any of these frames.
 pub(super) fn asks_to_arm(mut bytes: &[u8]) -> bool {
     let mut reader = Box::new(FrameReader::<MAX_FRAME>::new());
     while !bytes.is_empty() {
@@ -75,7 +75,7 @@ impl Account {
         of_it.map(|(_, device)| device)
     }
 
-    /// Whether the sample of this tick was told in this session.
+    /// Returns true if the sample of this tick was told in this session.
     pub(super) fn has_told(&self, session: u32, tick: u32) -> bool {
         let ticks = self.ticks.get(&session);
         ticks.is_some_and(|ticks| ticks.contains(&tick))

@@ -1,4 +1,4 @@
-//! What a host asks for besides arming and disarming, one thing after the other: another view
+//! Requests of a host besides arming and disarming, one after the other: another placement
 //! while it feels, and afterwards the calibration, held outputs, storing, and a jog.
 
 use std::collections::VecDeque;

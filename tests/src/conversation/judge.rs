@@ -12,7 +12,7 @@ pub(super) const FADE: u64 = 150;
 pub(super) const SILENCE_S: u16 = 5;
 const SILENCE: u64 = SILENCE_S as u64 * 1_000 + FADE;
 
-/// What must not happen.
+/// Violation of the protocol.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wrong {
     /// Nothing came to an end in `LONGEST` ticks.

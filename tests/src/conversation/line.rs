@@ -11,7 +11,7 @@ pub enum Direction {
     ToHost,
 }
 
-/// What happens to a frame.
+/// Fault of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Harm {
     /// It is lost.

@@ -1,9 +1,9 @@
-//! What goes wrong in a run.
+//! Plan of the faults of a run.
 
 use super::line::{Direction, Harm};
 use crate::chance::Chance;
 
-/// What befalls one of the two ends.
+/// Interruption of one of the two ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interruption {
     /// The host's program is killed and started again.
@@ -29,7 +29,7 @@ pub enum Interruption {
 pub struct Plan {
     /// Harm to single frames, by their number in their direction.
     pub harms: Vec<(Direction, usize, Harm)>,
-    /// What happens at a tick.
+    /// Interruptions by tick.
     pub interruptions: Vec<(u64, Interruption)>,
     /// The host leaves while the arm is armed, without a request to disarm before.
     pub abrupt: bool,

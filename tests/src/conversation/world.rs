@@ -8,7 +8,7 @@ use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{GuardInputs, Mode};
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{Scene, Source, View};
+use hapterra_core::scene::{Scene, SceneChange, Source};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::app::{TileBuffers, WorkingMemory};
@@ -32,7 +32,7 @@ const FELT: u32 = 60;
 /// Times that the host takes up a session that went silent.
 const RESUMPTIONS: u32 = 4;
 
-/// How a run ended.
+/// End of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// The host knows that the device is disarmed.
@@ -41,16 +41,16 @@ pub enum End {
     Told,
 }
 
-/// What came of a run.
+/// Report of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Report {
-    /// How it ended.
+    /// Its end.
     pub end: End,
     /// The tick of the end.
     pub ticks: u64,
     /// Frames put onto the line, to the device and to the host.
     pub frames: [usize; 2],
-    /// Whether the arm was ever driven.
+    /// True if the arm was ever driven.
     pub driven: bool,
     /// Sessions of which the host says that it does not know their end.
     pub uncertain: u64,
@@ -412,7 +412,7 @@ impl<'t> World<'t> {
         }
     }
 
-    /// Whether something of a list is left or under way.
+    /// Returns true if something of a list is left or under way.
     fn has_errands(&self, list: usize) -> bool {
         let lists = self.errands.as_ref();
         lists.is_some_and(|lists| !lists[list].are_done())
@@ -445,7 +445,7 @@ impl<'t> World<'t> {
             epoch: 5_000 + u32::from(number),
             ..*self.client.scene()
         };
-        let view = View {
+        let view = SceneChange {
             number,
             scene,
             hip: scene.home,

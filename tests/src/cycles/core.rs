@@ -1,4 +1,4 @@
-//! How long instructions take in two cores, without what their memories add.
+//! Time that instructions take in two cores, without what their memories add.
 //!
 //! Upper bounds: where a manual has a range, its end; no two instructions overlap that may.
 

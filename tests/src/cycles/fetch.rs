@@ -1,6 +1,6 @@
-//! What a flash adds: lines that arrive late.
+//! Wait states of a flash: lines that arrive late.
 
-/// How a memory gives code to its core.
+/// Fetches of code from a memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flash {
     /// Bytes that one read gives.

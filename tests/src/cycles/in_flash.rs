@@ -1,4 +1,4 @@
-//! What of the tick an H743 leaves in flash: the linker script says it.
+//! Parts of the tick that an H743 leaves in flash, by the linker script.
 
 const SCRIPT: &str = include_str!("../../../firmware/memory/nucleo-h743zi2.x");
 /// Around the patterns.
@@ -18,7 +18,7 @@ fn patterns() -> impl Iterator<Item = &'static str> {
     lines.filter_map(|line| line.trim().strip_prefix("*(.text.")?.strip_suffix(')'))
 }
 
-/// Whether a name fits a pattern whose only special character is `*`, at both ends.
+/// Returns true if a name fits a pattern whose only special character is `*`, at both ends.
 fn fits(name: &str, pattern: &str) -> bool {
     let parts = pattern.split('*').filter(|part| !part.is_empty());
     let behind = |rest: Option<usize>, part: &str| {

@@ -1,4 +1,4 @@
-//! What an instruction is to the clock: Thumb-2 of an ARMv7E-M core, by its encoding
+//! Kinds of instructions by their time: Thumb-2 of an ARMv7E-M core, by its encoding
 //! (DDI 0403E, A5 and A6).
 
 /// A kind of instruction, as far as it takes time of its own.
@@ -36,7 +36,7 @@ pub enum Kind {
 /// An instruction at its address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instruction {
-    /// Where it is.
+    /// Its place.
     pub address: u32,
     /// Its bytes.
     pub length: u32,

@@ -31,10 +31,10 @@ pub const H743_DATA_LINES: u64 = 615;
 /// Cycles of the core for one of them: 13 of the bus, four of which are transfers.
 pub const H743_DATA_LINE: u64 = 26;
 const _: () = assert!(H743_DATA_LINES * H743_DATA_LINE <= H743_DATA);
-/// Where the peripherals are.
+/// Place where the peripherals are.
 const PERIPHERALS: std::ops::Range<u32> = 0x4000_0000..0x6000_0000;
 
-/// What a tick takes.
+/// Cycles of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cycles {
     /// Instructions.
@@ -57,7 +57,7 @@ pub struct Tick {
     line: Option<u32>,
     /// Loads and stores.
     accesses: u64,
-    /// Where the result of the floating-point instruction before is.
+    /// Place where the result of the floating-point instruction before is.
     before: Option<u32>,
 }
 

@@ -1,4 +1,4 @@
-//! What is done with arbitrary bytes: the bodies of the fuzz targets in `fuzz/`,
+//! Bodies of the fuzz targets in `fuzz/`: arbitrary bytes,
 //! which a plain test drives, too (`tests/fuzzed.rs`).
 
 mod bytes;

@@ -10,7 +10,7 @@ use hapterra_core::grid::{Cell, GridPoint, MAX_CELL};
 use hapterra_core::guard::{Fault, GuardInputs};
 use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::rate::TickRate;
-use hapterra_core::scene::{HipCommand, Scene, Source, View};
+use hapterra_core::scene::{HipCommand, Scene, SceneChange, Source};
 use hapterra_core::terrain::{CoarseTile, FieldSize, Tile, TileKey, Underlay};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
@@ -47,7 +47,7 @@ pub fn run(data: &[u8]) {
                 if kind == 255 {
                     scene.materials = Some(table.check_sum());
                 }
-                let view = View {
+                let view = SceneChange {
                     number: kind,
                     scene,
                     hip: position(&mut bytes),
@@ -56,7 +56,7 @@ pub fn run(data: &[u8]) {
                 if is_taken(&scene, &table) {
                     law = scene.law;
                 }
-                spare.extend(haptics.accept(Command::View(view)).ok().flatten());
+                spare.extend(haptics.accept(Command::SceneChange(view)).ok().flatten());
                 ticks = None;
             }
             // A table, and a scene of it or of another.
@@ -151,7 +151,7 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// Whether the loop takes a scene, with the table that it has.
+/// Returns true if the loop takes a scene, with the table that it has.
 fn is_taken(scene: &Scene, table: &MaterialTable) -> bool {
     let is_here = |sum: u32| sum == table.check_sum() && table.is_valid();
     scene.is_valid() && scene.materials.is_none_or(is_here)

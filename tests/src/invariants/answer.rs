@@ -1,4 +1,4 @@
-//! What a tick says, by itself.
+//! Invariants of a single tick.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::grid::MAX_CELL;
@@ -37,7 +37,7 @@ impl Judge<'_> {
         let felt = &seen.felt;
         let none = felt.displacement.to_array() == [0.0; 3];
         let free_at_hip = !seen.is_free() || seen.proxy == seen.hip;
-        let may_press = seen.is_touching() || felt.state == ContactState::Fading;
+        let may_press = seen.is_touching() || felt.state == ContactState::Releasing;
         let is_part = !seen.is_touching() || is_part_of_the_way(seen);
         if (!may_press && !none) || !free_at_hip || !is_part {
             return self.fail(Invariant::Consistent, format!("{seen:?}"));
@@ -71,7 +71,7 @@ fn length(v: [f64; 3]) -> f64 {
     distance(v, [0.0; 3])
 }
 
-/// Whether the displacement is the way from the HIP to the proxy, times a boundary fade
+/// Returns true if the displacement is the way from the HIP to the proxy, times a boundary fade
 /// in `[0, 1]`.
 fn is_part_of_the_way(seen: &Seen) -> bool {
     let way = [0, 1, 2].map(|i| seen.proxy[i] - seen.hip[i]);

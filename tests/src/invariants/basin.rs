@@ -46,7 +46,7 @@ impl Judge<'_> {
         self.fail(Invariant::Basin, detail)
     }
 
-    /// Whether a column has places of ground or air so near to the HIP.
+    /// Returns true if a column has places of ground or air so near to the HIP.
     fn is_open(&self, [x, y]: [f64; 2], hip: [f64; 3], reach: f64) -> bool {
         let up = reach * reach - (x - hip[0]).powi(2) - (y - hip[1]).powi(2);
         let ground = patches_at(self.terrain, x, y).map(|patch| patch.height(x, y));
@@ -56,7 +56,7 @@ impl Judge<'_> {
     }
 }
 
-/// Whether two places are joined by columns that are open.
+/// Returns true if two places are joined by columns that are open.
 fn is_flooded(
     from: [f64; 2],
     to: [f64; 2],

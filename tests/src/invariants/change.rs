@@ -1,4 +1,4 @@
-//! How a tick goes on from the one before.
+//! Invariants from one tick to the next.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::contact::boundary_fade::RATE;
@@ -23,7 +23,7 @@ const STALLED: u32 = 4;
 
 impl Judge<'_> {
     pub(super) fn was_seen_above(&self, before: &Seen, seen: &Seen) -> Verdict {
-        if before.felt.state == ContactState::Waiting && seen.is_touching() {
+        if before.felt.state == ContactState::Unseeded && seen.is_touching() {
             return self.fail(Invariant::SeenAbove, format!("{before:?} then {seen:?}"));
         }
         Ok(())
@@ -39,7 +39,7 @@ impl Judge<'_> {
         let broken = match (before.boundary_fade(), seen.boundary_fade()) {
             (Some(was), Some(is)) => hopped < 2.0 * NEAR && (is - was).abs() > rate,
             // Let go: there was next to nothing left.
-            (Some(was), None) => seen.felt.state == ContactState::Waiting && was > rate,
+            (Some(was), None) => seen.felt.state == ContactState::Unseeded && was > rate,
             (None, _) => false,
         };
         if broken {
@@ -56,7 +56,7 @@ impl Judge<'_> {
     /// What was felt last fades to nothing in equal steps.
     pub(super) fn lets_go_gently(&mut self, before: &Seen, seen: &Seen) -> Verdict {
         let felt = |seen: &Seen| seen.felt.displacement.as_dvec3().length();
-        let lets_go = |seen: &Seen| seen.felt.state == ContactState::Fading;
+        let lets_go = |seen: &Seen| seen.felt.state == ContactState::Releasing;
         if lets_go(seen) && !lets_go(before) {
             self.let_go_from = felt(before);
         }
@@ -87,7 +87,7 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// Whether a proxy is farther from the HIP than it was before.
+    /// Returns true if a proxy is farther from the HIP than it was before.
     pub(super) fn is_farther(&self, before: &Seen, seen: &Seen) -> bool {
         let [was, is] = [before, seen].map(|at| distance(at.proxy, seen.hip));
         let allowed = |seen: &Seen| seen.allowed_in_space(self.terrain);
@@ -148,7 +148,7 @@ impl Judge<'_> {
         let inside = |p: [f64; 3]| {
             (0..2).all(|axis| (0.0..f64::from(self.terrain.size[axis])).contains(&p[axis]))
         };
-        let held = |seen: &Seen| seen.felt.state != ContactState::Waiting;
+        let held = |seen: &Seen| seen.felt.state != ContactState::Unseeded;
         // Any place on a wall's top is farther from the HIP than the proxy was.
         let out_of_reach = WALL - seen.hip[2] > distance(before.proxy, seen.hip) + 1.0;
         if self.terrain.kind != Kind::Walls

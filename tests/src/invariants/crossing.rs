@@ -1,4 +1,4 @@
-//! Where a straight way goes through the surface.
+//! Crossing of a straight line with the surface.
 
 use super::surface::Patch;
 use crate::scene::terrain::Terrain;
@@ -13,7 +13,7 @@ pub struct Crossing {
     pub depth: f64,
 }
 
-/// Whether and where the way from `from` to `to` meets the surface from above.
+/// Returns the place where the line from `from` to `to` meets the surface from above, if it does.
 ///
 /// Cell by cell; in each the gap is a quadratic of which the first root is
 /// found by halving. `None` when it stays above every patch.
@@ -68,7 +68,7 @@ impl Gap {
         f0 * (1.0 - s) * (1.0 - s) + 2.0 * f1 * s * (1.0 - s) + f2 * s * s
     }
 
-    /// Where it is largest.
+    /// Returns the place where it is largest.
     fn top(&self) -> f64 {
         let [f0, f1, f2] = self.f;
         let bend = f0 - 2.0 * f1 + f2;

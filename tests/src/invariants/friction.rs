@@ -130,7 +130,7 @@ impl Judge<'_> {
         is_pressed.then_some(start)
     }
 
-    /// Whether there is ground at a place, and a HIP is clearly below its tangent plane.
+    /// Returns true if there is ground at a place, and a HIP is clearly below its tangent plane.
     fn is_pressed_at(&self, [x, y]: [f64; 2], hip: [f64; 3]) -> bool {
         let mut patches = patches_at(self.terrain, x, y).peekable();
         patches.peek().is_some()

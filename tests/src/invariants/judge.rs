@@ -13,10 +13,10 @@ use super::{Invariant, Violation};
 use crate::scene::run::Scene;
 use crate::scene::terrain::Terrain;
 
-/// What the judge learned that is no yes or no.
+/// Measurements of the oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// Ticks waiting, free, touching and letting go.
+    /// Ticks unseeded, free, touching and releasing.
     pub states: [u64; 4],
     /// Ticks that left work over.
     pub unconverged: u64,
@@ -82,17 +82,17 @@ pub struct Judge<'g> {
     pub(super) still: u32,
     tick: usize,
     pub(super) before: Option<Seen>,
-    /// Where the proxy was when its motion for the last HIP began.
+    /// Place where the proxy was when its motion for the last HIP began.
     pub(super) began: [f64; 3],
     /// What was felt, cells, when the proxy began to let go.
     pub(super) let_go_from: f64,
     /// Ticks in a row in which a proxy in the air came no farther.
     pub(super) stalled: u32,
-    /// What was learned.
+    /// Its measurements.
     pub measured: Measured,
 }
 
-/// What is wrong with a tick.
+/// Verdict on a tick.
 pub type Verdict = Result<(), Violation>;
 
 impl<'g> Judge<'g> {

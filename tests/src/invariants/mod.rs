@@ -1,4 +1,4 @@
-//! What must hold in every tick, on any terrain, for any path of the HIP. It is judged
+//! Invariants of every tick, on any terrain, for any path of the HIP. They are checked
 //! in f64, by methods that are none of the product's.
 //!
 //! [`judge`] lists the invariants in the order they are judged; [`material`] judges what a loop
@@ -20,7 +20,7 @@ mod shading;
 pub mod surface;
 pub mod texture;
 
-/// What every tick must keep.
+/// Invariant of every tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Invariant {
     /// The answer is finite, and the proxy is a valid position.
@@ -97,7 +97,7 @@ pub struct Violation {
     pub invariant: Invariant,
     /// The tick in its scene.
     pub tick: usize,
-    /// What was found.
+    /// Its details.
     pub detail: String,
 }
 

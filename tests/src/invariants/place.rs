@@ -1,4 +1,4 @@
-//! Where a proxy lies.
+//! Invariants of the proxy's place.
 
 use super::judge::{Judge, Verdict};
 use super::seen::{ERROR, Seen};
@@ -168,7 +168,7 @@ impl Judge<'_> {
     }
 }
 
-/// Whether a way from a place of a patch leads into it, or along its border.
+/// Returns true if a way from a place of a patch leads into it, or along its border.
 fn leads_into(start: [f64; 2], way: [f64; 3], patch: &Patch) -> bool {
     (0..2).all(|axis| {
         let place = start[axis] - f64::from(patch.cell[axis]);

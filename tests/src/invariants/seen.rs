@@ -35,12 +35,12 @@ pub struct Seen {
     pub force_n: [[f64; 3]; CELLS_MM.len()],
 }
 
-/// What shading makes of a displacement.
+/// Displacement after shading.
 #[derive(Clone, Copy, Debug)]
 pub struct Shaded {
     /// The displacement, turned.
     pub displacement: Vec3,
-    /// Whether every sample that it takes was here.
+    /// True if every sample that it takes was here.
     pub is_whole: bool,
 }
 
@@ -76,7 +76,7 @@ impl Seen {
         self.felt.state == ContactState::Touching
     }
 
-    /// Whether the proxy has stayed on the ground where it was in the tick before.
+    /// Returns true if the proxy has stayed on the ground where it was in the tick before.
     pub(super) fn stays(&self, before: &Self) -> bool {
         self.is_touching() && before.is_touching() && self.felt.proxy == before.felt.proxy
     }

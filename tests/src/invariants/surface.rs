@@ -54,7 +54,7 @@ impl Patch {
         [self.b + self.a * v, self.c + self.a * u]
     }
 
-    /// How steep it is at a place.
+    /// Returns its slope at a place.
     #[must_use]
     pub fn slope(&self, x: f64, y: f64) -> f64 {
         let [east, north] = self.slopes(x, y);
@@ -68,7 +68,7 @@ impl Patch {
         [self.d, b, c, b + self.c + self.a]
     }
 
-    /// What is mixed for the height above `from` at a place, signs left out: a
+    /// Returns the size of the terms of the height above `from` at a place, signs left out: a
     /// corner that has no part in the place does not count.
     #[must_use]
     pub fn mixed_size(&self, x: f64, y: f64, from: f64) -> f64 {

@@ -43,7 +43,7 @@ pub(super) struct Added {
 
 /// A texture as it is felt, cells.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Felt {
+pub(super) struct TextureBounds {
     /// How far it reaches above and below the surface.
     pub(super) amplitude: f64,
     /// What it adds to the depth.
@@ -123,11 +123,11 @@ impl TextureJudge {
     }
 
     /// How high and how steep the whole texture is at a place, under so much depth, cells.
-    pub(super) fn relief(&self, proxy: &GridPoint, depth: f64) -> Felt {
+    pub(super) fn relief(&self, proxy: &GridPoint, depth: f64) -> TextureBounds {
         let (amplitude, wavelength) = self.sizes();
         let (height, slopes) = height_and_slopes(&self.texture, proxy);
         let deepest = wavelength * wavelength / (48.0 * amplitude);
-        Felt {
+        TextureBounds {
             amplitude,
             rise: amplitude * height * (depth / amplitude).min(1.0),
             along: slopes.length() * depth.min(deepest),

@@ -10,7 +10,7 @@ const CAPACITY: usize = 8 << 10;
 /// Bytes that a device may send in a tick: a full-speed USB's, about.
 pub const A_TICK: usize = 1_024;
 
-/// What is done to one direction.
+/// Fault of one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Harm {
     /// Share of bytes in which a bit flips.
@@ -21,7 +21,7 @@ pub struct Harm {
     pub twice: f64,
     /// Milliseconds that a transfer is late, at most.
     pub late: u32,
-    /// What is on its way stays there, and so does what is sent.
+    /// True if no transfer moves.
     pub stalled: bool,
     /// Nothing gets in, and what was on its way is gone.
     pub cut: bool,
@@ -48,7 +48,7 @@ pub struct Way {
 }
 
 impl Way {
-    /// What is done to it from now on.
+    /// Sets its fault from now on.
     pub fn harm(&mut self, harm: Harm) {
         self.harm = harm;
         if harm.cut {

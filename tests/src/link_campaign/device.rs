@@ -24,13 +24,13 @@ pub struct Board<'t> {
     arm: Arm<'t>,
     /// Holds every tick to its bounds.
     pub watch: Watch,
-    /// Whether the hand holds the dead-man switch.
+    /// True if the hand holds the dead-man switch.
     pub dead_man: bool,
-    /// What the hand is up to.
+    /// Mood of the hand.
     pub mood: Mood,
-    /// What the amplifiers got in the last tick.
+    /// Commands to the amplifiers in the last tick.
     pub drive: GuardOutputs,
-    /// Whether the device's time stands still while it waits for the host.
+    /// True if the device's time stands still while it waits for the host.
     pub lock_step: bool,
     /// Ticks so far, and those with the amplifiers on.
     pub ticks: [u64; 2],
@@ -75,7 +75,7 @@ impl<'t> Board<'t> {
         self.device.receive(bytes)
     }
 
-    /// What the device says, as far as there is room for it.
+    /// Returns the device's bytes, as far as there is room for them.
     pub fn say<'b>(&mut self, into: &'b mut [u8; A_TICK], room: usize) -> &'b [u8] {
         let room = room.min(A_TICK);
         let said = self.device.link.transmit(&mut into[..room]);

@@ -1,4 +1,4 @@
-//! What goes wrong on the link, and for how long.
+//! Faults of the link, and their durations.
 
 use super::cable::Harm;
 use crate::chance::Chance;
@@ -69,7 +69,7 @@ impl Kind {
 /// One fault of a kind that lasts.
 #[derive(Clone, Copy, Debug)]
 pub struct Fault {
-    /// What it is.
+    /// Its value.
     pub kind: Kind,
     /// When it ends, ms.
     pub end: u64,
@@ -84,8 +84,8 @@ impl Fault {
     pub fn of(kind: Kind, now: u64, chance: &mut Chance) -> Self {
         let (shortest, longest) = kind.duration();
         // As many short ones as long ones.
-        let stretch = chance.between(0.0, 1.0);
-        let length = (longest - shortest) as f64 * stretch * stretch;
+        let segment = chance.between(0.0, 1.0);
+        let length = (longest - shortest) as f64 * segment * segment;
         Self {
             kind,
             end: now + shortest as u64 + length as u64,
@@ -94,7 +94,7 @@ impl Fault {
         }
     }
 
-    /// What it does to the direction to the device and to that to the host.
+    /// Returns its faults of the directions to the device and to the host.
     #[must_use]
     pub fn harms(&self) -> [Harm; 2] {
         let harm = match self.kind {

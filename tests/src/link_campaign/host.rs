@@ -22,7 +22,7 @@ const PATIENCE: Timeouts = Timeouts {
     ..Timeouts::REAL_TIME
 };
 
-/// How a host came to its end.
+/// End of a host.
 #[derive(Debug)]
 pub enum End {
     /// It has taken its leave, and says that all is well.
@@ -31,7 +31,7 @@ pub enum End {
     Told(LinkError),
 }
 
-/// What the user was told of arming.
+/// Report of arming to the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
     /// Nothing yet.
@@ -45,19 +45,19 @@ pub enum Told {
 /// A host.
 pub struct Host<'t> {
     client: Client<'t>,
-    /// How the device said that the session before had ended, once it has greeted.
+    /// End of the session before, by the device's introduction.
     pub last_end: Option<SessionEnd>,
-    /// Whether the scene is in force.
+    /// True if the scene is in force.
     pub opened: bool,
-    /// Whether it has asked to arm.
+    /// True if it has asked to arm.
     pub asked: bool,
-    /// What its user was told of that.
+    /// Its user's report of that.
     pub told: Told,
-    /// Where the device's guard stands, as its user sees it.
+    /// State of the device's guard, as its user sees it.
     pub view: Option<Report>,
     /// Samples that came since they were last taken.
     pub samples: Vec<TickRecord>,
-    /// How it ended.
+    /// Its end.
     pub end: Option<End>,
 }
 
@@ -157,13 +157,13 @@ impl<'t> Host<'t> {
         client.due(now, out, &mut on)
     }
 
-    /// Whether its user sees that the arm waits for the dead-man switch.
+    /// Returns true if its user sees that the arm waits for the dead-man switch.
     #[must_use]
     pub fn waits_for_the_hand(&self) -> bool {
         self.sees(&[Mode::Requested])
     }
 
-    /// Whether its user sees that the device is in one of these modes.
+    /// Returns true if its user sees that the device is in one of these modes.
     #[must_use]
     pub fn sees(&self, modes: &[Mode]) -> bool {
         self.view.is_some_and(|view| modes.contains(&view.mode))

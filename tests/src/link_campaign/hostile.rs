@@ -6,7 +6,7 @@ use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams,
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::Report;
 use hapterra_core::phantom::Calibration;
-use hapterra_core::scene::{HipCommand, Scene, Source, TickRecord, View};
+use hapterra_core::scene::{HipCommand, Scene, SceneChange, Source, TickRecord};
 use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
 use hapterra_core::wire::materials::{MaterialScene, MaterialTile, TileMaterials};
@@ -21,7 +21,7 @@ use crate::chance::Chance;
 /// Bytes that a hostile program says in a millisecond, at most.
 const A_MILLISECOND: usize = 2_048;
 
-/// What a hostile host says in a millisecond.
+/// Returns a hostile host's bytes of a millisecond.
 pub fn host(chance: &mut Chance) -> Vec<u8> {
     match chance.below(6) {
         0 => noise(chance, A_MILLISECOND),
@@ -105,7 +105,7 @@ fn host_message<'b>(chance: &mut Chance) -> ToDevice<'b> {
         6 => ToDevice::Status { number: 0 },
         7 => match chance.below(2) {
             0 => ToDevice::Heartbeat,
-            _ => ToDevice::View(View {
+            _ => ToDevice::SceneChange(SceneChange {
                 number: chance.bits() as u8,
                 scene: host_scene(chance, epoch),
                 hip: GridPoint::default(),
@@ -181,7 +181,7 @@ fn host_request(chance: &mut Chance) -> Request {
     ][chance.below(8)]
 }
 
-/// How something that is no device behaves.
+/// Behaviour of something that is no device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Behaviour {
     /// It says nothing.
@@ -216,7 +216,7 @@ impl Behaviour {
         Self::RefusesScenes,
     ];
 
-    /// What it says in the millisecond `now` to a host that serves a scene and has said
+    /// Returns its bytes in the millisecond `now` to a host that serves a scene and has said
     /// hello with this number.
     pub fn say(
         self,

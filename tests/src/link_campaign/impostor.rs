@@ -6,15 +6,15 @@ use hapterra_core::wire::message::ToDevice;
 
 use super::host::{End, Host};
 use super::hostile::Behaviour;
-use super::stretch::Stretch;
+use super::segment::Segment;
 use super::tally::Outcome;
 use super::wire;
 
-/// How long the host puts up with it, ms.
+/// Time for which the host puts up with it, ms.
 const MEETS: u64 = 12_000;
-/// How long a session may take to open or to fail, ms.
+/// Time that a session may take to open or to fail, ms.
 const OPENS: u64 = 8_500;
-/// How long leaving may take, ms.
+/// Time that leaving may take, ms.
 const LEAVES: u64 = 3_500;
 /// Bytes that a host may say in a second to whatever it is.
 const A_SECOND: usize = 1 << 20;
@@ -23,17 +23,17 @@ const A_SECOND: usize = 1 << 20;
 ///
 /// # Errors
 /// Where it does not end, or says without bound.
-pub fn meet(stretch: &mut Stretch<'_>) -> Result<Outcome, String> {
-    let behaviour = Behaviour::ALL[stretch.chance.below(Behaviour::ALL.len())];
-    let outcome = talk(stretch, behaviour);
+pub fn meet(segment: &mut Segment<'_>) -> Result<Outcome, String> {
+    let behaviour = Behaviour::ALL[segment.chance.below(Behaviour::ALL.len())];
+    let outcome = talk(segment, behaviour);
     outcome.map_err(|what| format!("{behaviour:?}: {what}"))
 }
 
-fn talk(stretch: &mut Stretch<'_>, behaviour: Behaviour) -> Result<Outcome, String> {
-    let began = stretch.now;
-    let chance = &mut stretch.chance;
+fn talk(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcome, String> {
+    let began = segment.now;
+    let chance = &mut segment.chance;
     let mut out = Vec::new();
-    let mut host = Host::start(stretch.terrain, stretch.scene, began, chance, &mut out);
+    let mut host = Host::start(segment.terrain, segment.scene, began, chance, &mut out);
     let mut hellos = Hellos::default();
     let mut said = 0;
     for now in began..=began + MEETS + LEAVES {
@@ -44,7 +44,7 @@ fn talk(stretch: &mut Stretch<'_>, behaviour: Behaviour) -> Result<Outcome, Stri
         hellos.hear(&out);
         out.clear();
         let told = (host.session(), hellos.last);
-        let heard = behaviour.say(now, &stretch.scene, told, chance);
+        let heard = behaviour.say(now, &segment.scene, told, chance);
         host.step(now, &heard, &mut out);
         host.samples.clear();
         let seconds = 1 + ((now - began) / 1_000) as usize;

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! A *run* is one host from its hello to its end, with one fault in it ([`fault`]) that
-//! begins in one of the run's steps ([`play`]). In every tick [`stretch`] judges what is
+//! begins in one of the run's steps ([`play`]). In every tick [`segment`] judges what is
 //! felt: force and currents ([`crate::campaign::watch`]), the proxy against the bilinear
 //! surface ([`surface`]), amplifiers that nobody asked for, a user who sees something
 //! else than what is. At the end of a run [`play`] judges what the host said of it:
@@ -27,7 +27,7 @@ pub mod hostile;
 pub mod impostor;
 pub mod play;
 pub mod report;
-pub mod stretch;
+pub mod segment;
 pub mod surface;
 pub mod tally;
 pub mod tap;
@@ -40,7 +40,7 @@ use heightfield::Raster;
 use crate::campaign::Violation;
 use crate::chance::Chance;
 use fault::Kind;
-use stretch::Stretch;
+use segment::Segment;
 pub use tally::LinkStats;
 
 /// The seed that is used without being told another.
@@ -79,20 +79,20 @@ pub fn segment(seed: u64, number: u64, tally: &mut LinkStats) -> Result<(), Viol
     let raster = terrain(&mut chance);
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
-    let mut stretch = Stretch::new(&terrain, chance);
+    let mut segment = Segment::new(&terrain, chance);
     let mut deck = Kind::ALL;
     for left in (1..deck.len()).rev() {
-        deck.swap(left, stretch.chance.below(left + 1));
+        deck.swap(left, segment.chance.below(left + 1));
     }
     let played = deck
         .into_iter()
-        .try_for_each(|kind| play::run(&mut stretch, kind, tally).map_err(|what| (kind, what)));
-    let (board, off) = (&stretch.board, stretch.off_surface);
-    tally.add(board.ticks, stretch.touching, off, &board.watch.extremes);
+        .try_for_each(|kind| play::run(&mut segment, kind, tally).map_err(|what| (kind, what)));
+    let (board, off) = (&segment.board, segment.off_surface);
+    tally.add(board.ticks, segment.touching, off, &board.watch.extremes);
     played.map_err(|(kind, what)| Violation {
         ground: crate::campaign::Ground::Ice,
         segment: number,
-        tick: stretch.now,
+        tick: segment.now,
         what: format!("{kind:?}: {what}"),
     })
 }

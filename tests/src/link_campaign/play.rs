@@ -4,26 +4,26 @@
 use super::fault::{Fault, Kind};
 use super::host::{End, SILENCE_S, Told};
 use super::impostor;
-use super::stretch::Stretch;
+use super::segment::Segment;
 use super::tally::{LinkStats, Outcome};
 use crate::campaign::arm::Mood;
 use hapterra_core::guard::Mode;
 
-/// How long a session may take to open or to fail, ms.
+/// Time that a session may take to open or to fail, ms.
 const OPENS: u64 = 8_500;
-/// How long the answer to arming, or the word that there is none, may take, ms.
+/// Time that the answer to arming, or the word that there is none, may take, ms.
 const ANSWERS: u64 = 6_000;
-/// How long leaving may take, ms.
+/// Time that leaving may take, ms.
 const LEAVES: u64 = 3_500;
-/// How long the arm takes from the press of the switch until all force is in, ms.
+/// Time that the arm takes from the press of the switch until all force is in, ms.
 const ARMS: u64 = 2_600;
-/// How long the user's hand takes to the switch, ms.
+/// Time that the user's hand takes to the switch, ms.
 const REACTION: u64 = 150;
 /// For how long a host may be silent, as hosts here tell the device, ms.
 const SILENCE: u64 = 1_000 * SILENCE_S as u64;
-/// How long after that the force may take to be out, ms.
+/// Time that after that the force may take to be out, ms.
 const LETS_GO: u64 = 300;
-/// How long before a host vanished the device may have heard it last, ms: a sign of life
+/// Time for which before a host vanished the device may have heard it last, ms: a sign of life
 /// comes twice a second, and a line that was harmed may have lost some.
 const AGO: u64 = 700;
 /// Requests for a tile that a device may repeat early in a session: those that were under
@@ -52,16 +52,16 @@ struct Plan {
 ///
 /// # Errors
 /// What must not be.
-pub fn run(stretch: &mut Stretch<'_>, kind: Kind, tally: &mut LinkStats) -> Result<(), String> {
+pub fn run(segment: &mut Segment<'_>, kind: Kind, tally: &mut LinkStats) -> Result<(), String> {
     if kind == Kind::HostileDevice {
-        let outcome = impostor::meet(stretch)?;
+        let outcome = impostor::meet(segment)?;
         tally.count(kind, outcome);
         return Ok(());
     }
     // A run that ended before anything went wrong in it, as one whose host left a device
     // that was disarmed, is not counted.
     loop {
-        if let Some(outcome) = try_run(stretch, kind)? {
+        if let Some(outcome) = try_run(segment, kind)? {
             tally.count(kind, outcome);
             return Ok(());
         }
@@ -69,21 +69,21 @@ pub fn run(stretch: &mut Stretch<'_>, kind: Kind, tally: &mut LinkStats) -> Resu
 }
 
 /// Plays a run; how it ended, if what was planned for it happened.
-fn try_run(stretch: &mut Stretch<'_>, kind: Kind) -> Result<Option<Outcome>, String> {
+fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, String> {
     let steps = [Step::Open, Step::Arm, Step::Feel, Step::Leave];
-    let step = steps[stretch.chance.below(4)];
+    let step = steps[segment.chance.below(4)];
     // A host that leaves is gone when the force is out, in a tenth of a second.
     let within = if step == Step::Leave { 90 } else { 400 };
     let plan = Plan {
         kind,
         step,
-        after: stretch.chance.below(within) as u64,
+        after: segment.chance.below(within) as u64,
         done: false,
     };
-    let other_scene = stretch.chance.below(2) == 0;
-    stretch.start_host(other_scene);
+    let other_scene = segment.chance.below(2) == 0;
+    segment.start_host(other_scene);
     let mut run = Run {
-        stretch,
+        segment,
         plan,
         is_whole: true,
     };
@@ -93,9 +93,9 @@ fn try_run(stretch: &mut Stretch<'_>, kind: Kind) -> Result<Option<Outcome>, Str
 }
 
 struct Run<'s, 't> {
-    stretch: &'s mut Stretch<'t>,
+    segment: &'s mut Segment<'t>,
     plan: Plan,
-    /// Whether one host has talked to one device all the time, so that counts can be
+    /// True if one host has talked to one device all the time, so that counts can be
     /// exact.
     is_whole: bool,
 }
@@ -105,8 +105,8 @@ impl Run<'_, '_> {
         let mut outcome = self.steps()?;
         // A host that was killed has one after it, which goes all the way.
         while outcome == Outcome::Killed && self.plan.kind == Kind::HostKilled {
-            let other_scene = self.stretch.chance.below(2) == 0;
-            self.stretch.start_host(other_scene);
+            let other_scene = self.segment.chance.below(2) == 0;
+            self.segment.start_host(other_scene);
             self.is_whole = true;
             outcome = self.steps()?;
         }
@@ -125,23 +125,23 @@ impl Run<'_, '_> {
 
     /// One step: how the run ended, if it did.
     fn take(&mut self, step: Step) -> Result<Option<Outcome>, String> {
-        let began = self.stretch.now;
-        let feels = 1_000 + self.stretch.chance.below(5_000) as u64;
+        let began = self.segment.now;
+        let feels = 1_000 + self.segment.chance.below(5_000) as u64;
         let mut pressed = None;
         match step {
-            Step::Arm => self.stretch.with_host(|host, _, _| host.arm()),
+            Step::Arm => self.segment.with_host(|host, _, _| host.arm()),
             Step::Leave => self
-                .stretch
+                .segment
                 .with_host(|host, now, out| host.leave(now, out)),
             Step::Open | Step::Feel => {}
         }
         loop {
-            let at = self.stretch.now - began;
+            let at = self.segment.now - began;
             if let Some(outcome) = self.go_wrong(step, at)? {
                 return Ok(Some(outcome));
             }
-            self.stretch.step()?;
-            let Some(host) = &self.stretch.host else {
+            self.segment.step()?;
+            let Some(host) = &self.segment.host else {
                 return Ok(Some(Outcome::Killed));
             };
             if host.end.is_some() {
@@ -167,21 +167,21 @@ impl Run<'_, '_> {
         self.plan.done || self.plan.step != step
     }
 
-    /// Whether arming has come to its end: the user was told that it does not come to
+    /// Returns true if arming has come to its end: the user was told that it does not come to
     /// that, or sees that the arm is disarmed, or the force is in. Presses the switch
     /// where the user sees that it is waited for.
     fn is_armed(&mut self, pressed: &mut Option<u64>) -> bool {
-        let now = self.stretch.now;
-        let Some(host) = &self.stretch.host else {
+        let now = self.segment.now;
+        let Some(host) = &self.segment.host else {
             return false;
         };
         if host.waits_for_the_hand() {
             let since = *pressed.get_or_insert(now);
-            self.stretch.board.dead_man = now >= since + REACTION;
+            self.segment.board.dead_man = now >= since + REACTION;
         }
         let settled = pressed.is_some_and(|at| now >= at + ARMS);
         if settled {
-            self.stretch.board.mood = Mood::Wanders;
+            self.segment.board.mood = Mood::Wanders;
         }
         match host.told {
             Told::Nothing => false,
@@ -196,35 +196,35 @@ impl Run<'_, '_> {
             return Ok(None);
         }
         self.plan.done = true;
-        let stretch = &mut *self.stretch;
+        let segment = &mut *self.segment;
         match self.plan.kind {
             Kind::HostKilled => {
-                stretch.kill_host();
+                segment.kill_host();
                 self.wait(1_500)?;
                 return Ok(Some(Outcome::Killed));
             }
             Kind::HostVanishes => {
-                stretch.kill_host();
+                segment.kill_host();
                 self.vanished()?;
                 return Ok(Some(Outcome::Killed));
             }
             Kind::HostileHost => {
                 self.is_whole = false;
-                let fault = Fault::of(Kind::HostileHost, stretch.now, &mut stretch.chance);
-                stretch.begin(fault);
-                if stretch.chance.below(2) == 0 {
-                    stretch.kill_host();
+                let fault = Fault::of(Kind::HostileHost, segment.now, &mut segment.chance);
+                segment.begin(fault);
+                if segment.chance.below(2) == 0 {
+                    segment.kill_host();
                     self.wait_until(fault.end)?;
                     return Ok(Some(Outcome::Killed));
                 }
             }
             Kind::DeviceRestarted => {
                 self.is_whole = false;
-                stretch.restart_device();
+                segment.restart_device();
             }
             kind => {
-                let fault = Fault::of(kind, stretch.now, &mut stretch.chance);
-                stretch.begin(fault);
+                let fault = Fault::of(kind, segment.now, &mut segment.chance);
+                segment.begin(fault);
             }
         }
         Ok(None)
@@ -232,13 +232,13 @@ impl Run<'_, '_> {
 
     /// Up to so many milliseconds with no host.
     fn wait(&mut self, most: usize) -> Result<(), String> {
-        let end = self.stretch.now + self.stretch.chance.below(most) as u64;
+        let end = self.segment.now + self.segment.chance.below(most) as u64;
         self.wait_until(end)
     }
 
     fn wait_until(&mut self, end: u64) -> Result<(), String> {
-        while self.stretch.now < end {
-            self.stretch.step()?;
+        while self.segment.now < end {
+            self.segment.step()?;
         }
         Ok(())
     }
@@ -246,27 +246,27 @@ impl Run<'_, '_> {
     /// No host for longer than the device waits for one: force is let out, and the arm
     /// disarmed; not before.
     fn vanished(&mut self) -> Result<(), String> {
-        let was_on = self.stretch.board.drive.enabled;
+        let was_on = self.segment.board.drive.enabled;
         // Time that stands still does not run out.
-        let runs = !self.stretch.board.lock_step;
-        self.wait_until(self.stretch.now + SILENCE - LETS_GO)?;
-        let still_on = self.stretch.board.drive.enabled;
-        self.wait_until(self.stretch.now + 2 * LETS_GO + AGO)?;
-        let stretch = &mut *self.stretch;
-        if runs && was_on && stretch.board.drive.enabled {
+        let runs = !self.segment.board.lock_step;
+        self.wait_until(self.segment.now + SILENCE - LETS_GO)?;
+        let still_on = self.segment.board.drive.enabled;
+        self.wait_until(self.segment.now + 2 * LETS_GO + AGO)?;
+        let segment = &mut *self.segment;
+        if runs && was_on && segment.board.drive.enabled {
             return Err("the arm is armed, and its host has vanished".into());
         }
-        stretch.let_go = runs && was_on && still_on;
+        segment.let_go = runs && was_on && still_on;
         Ok(())
     }
 
     /// Judges the end of a host: what it says has to be so.
     fn ended(&mut self) -> Result<Outcome, String> {
-        let stretch = &mut *self.stretch;
-        if let Some(End::Told(error)) = stretch.host.as_ref().and_then(|host| host.end.as_ref()) {
+        let segment = &mut *self.segment;
+        if let Some(End::Told(error)) = segment.host.as_ref().and_then(|host| host.end.as_ref()) {
             return Ok(Outcome::Told(error.to_string()));
         }
-        if stretch.board.drive.enabled {
+        if segment.board.drive.enabled {
             return Err("an end was agreed on, and the amplifiers are on".into());
         }
         self.counts()?;
@@ -274,15 +274,15 @@ impl Run<'_, '_> {
     }
 
     fn counts(&self) -> Result<(), String> {
-        let Some(host) = &self.stretch.host else {
+        let Some(host) = &self.segment.host else {
             return Ok(());
         };
-        let (tally, tap) = (host.tally(), &self.stretch.tap);
+        let (tally, tap) = (host.tally(), &self.segment.tap);
         let (told, made) = (tally.samples + tally.lost + tally.dropped, tap.made());
         // What is dropped last of all, or last of a scene, no tap sees.
         let unseen = match tally.dropped {
             0 => 0,
-            _ => tap.unseen(self.stretch.board.ticks[0]),
+            _ => tap.unseen(self.segment.board.ticks[0]),
         };
         if self.is_whole && !(made..=made + unseen).contains(&told) {
             return Err(format!(
@@ -301,10 +301,10 @@ impl Run<'_, '_> {
 
     /// The user lets the arm go and waits a moment.
     fn afterwards(&mut self) -> Result<(), String> {
-        self.stretch.host = None;
-        self.stretch.board.dead_man = false;
-        self.stretch.board.mood = Mood::Lifted;
-        self.stretch.step()?;
+        self.segment.host = None;
+        self.segment.board.dead_man = false;
+        self.segment.board.mood = Mood::Lifted;
+        self.segment.step()?;
         self.wait(1_000)
     }
 }

@@ -1,4 +1,4 @@
-//! Whether a proxy lies on the bilinear surface, by an oracle in f64 that shares no code
+//! Oracle in f64 of proxies on the bilinear surface, which shares no code
 //! with the product.
 
 use hapterra::terrain::Terrain;
@@ -8,7 +8,7 @@ use hapterra_core::scene::TickRecord;
 use crate::field::position;
 use crate::oracle::Oracle;
 
-/// How far a proxy in contact may be from the surface, perpendicular to it, cells:
+/// Largest distance of a proxy in contact from the surface, perpendicular to it, cells:
 /// [`crate::invariants`]' bound and four units in the last place of a tile's largest
 /// height above its base, in single precision.
 pub const OFF_SURFACE: f64 = 2e-6 + 4.0 * 64.0 * f32::EPSILON as f64;

@@ -1,4 +1,4 @@
-//! What became of the runs, as a table.
+//! Outcomes of the runs, as a table.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use super::fault::Kind;
 use crate::campaign::extremes::Extremes;
 use crate::rows::Rows;
 
-/// How a run ended.
+/// End of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Host and device agreed on the end.

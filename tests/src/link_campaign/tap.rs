@@ -1,4 +1,4 @@
-//! What leaves the device, read where it leaves: what the judge knows and the host does
+//! Tap of the frames that leave the device: what the oracle knows and the host does
 //! not.
 
 use std::collections::HashMap;
@@ -21,7 +21,7 @@ pub struct Moment {
     pub now: u64,
     /// Ticks that the device has run.
     pub ticks: u64,
-    /// Whether the line has not stood still lately: otherwise what leaves may have been
+    /// True if the line has not stood still lately: otherwise what leaves may have been
     /// said at any time before.
     pub flows: bool,
 }
@@ -69,7 +69,7 @@ impl Tap {
         self.before + self.ticks.map_or(0, length)
     }
 
-    /// How many samples at most were made and have not left when the device has run so
+    /// Returns the largest number of samples that were made and have not left when the device has run so
     /// many ticks: after the last of each scene that did, as many as the device ran ticks.
     #[must_use]
     pub fn unseen(&self, ticks: u64) -> u64 {

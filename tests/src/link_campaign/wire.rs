@@ -29,19 +29,19 @@ pub fn version_check(check: VersionCheck) -> Vec<u8> {
     encode(&check, &mut frame).unwrap_or(&[]).to_vec()
 }
 
-/// What a device said in a frame, and in which session.
+/// Returns a device's message in a frame, and its session.
 #[must_use]
 pub fn said_by_device(frame: &[u8]) -> Option<InSession<ToHost>> {
     decode(frame).ok()
 }
 
-/// What a host said in a frame, and in which session.
+/// Returns a host's message in a frame, and its session.
 #[must_use]
 pub fn said_by_host(frame: &[u8]) -> Option<InSession<ToDevice<'_>>> {
     decode(frame).ok()
 }
 
-/// What a device said in a frame, changed by `change`, as it travels.
+/// Returns a device's frame, changed by `change`, encoded.
 #[must_use]
 pub fn changed(frame: &[u8], change: impl FnOnce(&mut ToHost)) -> Option<Vec<u8>> {
     let InSession {

@@ -16,7 +16,7 @@ impl Scene {
     /// The first violation.
     pub fn run(&self, buffers: &mut Buffers) -> Result<Measured, Violation> {
         let mut judge = Judge::of(self);
-        let seen = self.feel(buffers, [0; 3], self.supply, |seen| judge.look(seen))?;
+        let seen = self.step(buffers, [0; 3], self.supply, |seen| judge.look(seen))?;
         let mut chance = Chance::new(self.seed);
         let wanted = |twin: usize| {
             matches!(self.twins, Twins::One(n) if n == twin) || self.twins == Twins::All

@@ -11,7 +11,7 @@ use crate::chance::Chance;
 /// One scene in so many has materials.
 const EVERY: usize = 4;
 
-/// How the classes lie.
+/// Layout of the classes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// All samples are of one.
@@ -38,12 +38,12 @@ pub const LAYOUTS: [Layout; 6] = [
     Layout::Blobs,
 ];
 
-/// What the ground of a scene is made of.
+/// Materials of a scene's ground.
 #[derive(Clone, Debug)]
 pub struct Materials {
     /// The materials, the default first.
     pub table: Vec<Material>,
-    /// How the classes lie.
+    /// Layout of the classes.
     pub layout: Layout,
     /// The scene's own law: a limit, and a stiffness that is the default's or a multiple.
     pub law: SurfaceParams,
@@ -162,7 +162,7 @@ impl Materials {
         MaterialTable::new(&self.table).expect("as many as fit")
     }
 
-    /// Whether no material knows friction.
+    /// Returns true if no material knows friction.
     #[must_use]
     pub fn is_like_ice(&self) -> bool {
         self.table.iter().all(|one| one.friction.is_none())

@@ -78,7 +78,7 @@ fn replay_in(
     }
 }
 
-/// Whether each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each point was
+/// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each point was
 /// felt with all of its terrain: one that needs more tiles than its window holds is not.
 fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {

@@ -61,7 +61,7 @@ impl Recorded {
         for hip in &scene.path {
             events.extend(player.supplied.installed.drain(..).map(Event::Tile));
             events.push(Event::Hip(point(*hip)));
-            let felt = player.feel(*hip).expect("one tick is one answer");
+            let felt = player.step(*hip).expect("one tick is one answer");
             answers.push(Counted {
                 instructions: 0,
                 cycles: Cycles::default(),

@@ -20,23 +20,23 @@ use crate::invariants::{Invariant, Violation};
 /// Ticks that one point may be repeated for.
 const PATIENCE: usize = 20_000;
 
-/// What was felt of a point.
+/// Answer to a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Replied {
     /// The HIP, where the terrain was made.
     pub hip: [f64; 3],
     /// The proxy there.
     pub proxy: [f64; 3],
-    /// What the loop told of the tick that answered it.
+    /// Record of the tick that answered it.
     pub sample: TickRecord,
 }
 
-/// Where and how a scene is replayed.
+/// Conditions of a scene's replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Replay {
     /// By so many cells the terrain lies elsewhere.
     pub shift: [i32; 3],
-    /// How the tiles come.
+    /// Supply of the tiles.
     pub supply: Supply,
 }
 
@@ -75,7 +75,7 @@ pub fn replay<const D: usize>(
     let mut all = Vec::with_capacity(scene.path.len());
     for (tick, hip) in scene.path.iter().enumerate() {
         let sample = device
-            .feel(shifted(*hip, replay.shift))
+            .step(shifted(*hip, replay.shift))
             .ok_or_else(|| Violation {
                 invariant: Invariant::Settles,
                 tick,
@@ -107,7 +107,7 @@ pub fn noted(scene: &Scene, materials: &Materials) -> (SceneMessage, Vec<Event>,
     };
     let mut device = Device::<WINDOW>::new(scene, materials, &mut buffers, how);
     for hip in &scene.path {
-        let answer = device.feel(shifted(*hip, how.shift));
+        let answer = device.step(shifted(*hip, how.shift));
         assert!(answer.is_some(), "{hip:?} is never answered");
     }
     let message = message(scene, materials, how.shift);
@@ -188,7 +188,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
     }
 
     /// One point: ticks until it is answered, or `None`.
-    fn feel(&mut self, hip: GridPoint) -> Option<TickRecord> {
+    fn step(&mut self, hip: GridPoint) -> Option<TickRecord> {
         let seq = self.seq;
         self.seq += 1;
         let _ = self.haptics.accept(Command::Hip(HipCommand { seq, hip }));

@@ -32,23 +32,23 @@ const DEEP_EVERY: u64 = 8;
 /// A terrain, a path of the HIP, and the settings it is felt with.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What is felt.
+    /// Answer of a variant.
     pub terrain: Terrain,
     /// The HIP, cells.
     pub path: Vec<[f64; 3]>,
-    /// Whether a tick is repeated until it is done.
+    /// Execution: a tick once, or repeated until it is done.
     pub execution: Execution,
-    /// How the tiles come.
+    /// Supply of the tiles.
     pub supply: Supply,
-    /// How rough the surface is.
+    /// Friction of the surface.
     pub friction: Friction,
     /// Which normals the force follows.
     pub shading: Shading,
     /// Its micro-relief, of cells of a millimetre.
     pub texture: Texture,
-    /// What its ground is made of, in a scene that is replayed on materials besides.
+    /// Materials of its ground, in a scene that is replayed on materials besides.
     pub materials: Option<Materials>,
-    /// Whether the contact takes its shortcuts.
+    /// True if the contact takes its shortcuts.
     pub shortcuts: bool,
     /// Units of work of a tick: what it has at 1 kHz, or at 10 kHz.
     pub(super) work_per_tick: u32,
@@ -69,7 +69,7 @@ pub enum Surface {
 }
 
 impl Surface {
-    /// What `cargo xtask soak` has to be told for it, after a space.
+    /// Returns its option of `cargo xtask soak`, after a space.
     #[must_use]
     pub const fn option(self) -> &'static str {
         match self {
@@ -87,7 +87,7 @@ const GRATING: Texture = Texture {
     ..Texture::NONE
 };
 
-/// Whether a texture feels the same a multiple of 32 cells away: it lies fast on the terrain's
+/// Returns true if a texture feels the same a multiple of 32 cells away: it lies fast on the terrain's
 /// cells, of so many millimetres.
 pub(super) fn is_alike(texture: &Texture, cell_mm: f32) -> bool {
     // So many waves can be told without rounding.
@@ -242,7 +242,7 @@ impl Scene {
     ///
     /// # Errors
     /// What `look` says, or that a tick does not settle.
-    pub fn feel(
+    pub fn step(
         &self,
         buffers: &mut Buffers,
         shift: [i32; 3],
@@ -255,7 +255,7 @@ impl Scene {
     /// The same with a window of `D × D` tiles.
     ///
     /// # Errors
-    /// As [`Self::feel`].
+    /// As [`Self::step`].
     pub fn feel_in<const D: usize>(
         &self,
         buffers: &mut Buffers,
@@ -266,7 +266,7 @@ impl Scene {
         let mut player = Player::<D>::new(self, buffers, shift, supply);
         let mut all = Vec::with_capacity(self.path.len());
         for (tick, hip) in self.path.iter().enumerate() {
-            let felt = player.feel(*hip).ok_or_else(|| Violation {
+            let felt = player.step(*hip).ok_or_else(|| Violation {
                 invariant: Invariant::Settles,
                 tick,
                 detail: format!("never settles for {hip:?}"),
@@ -278,7 +278,7 @@ impl Scene {
         Ok(all)
     }
 
-    /// Whether it feels the same a multiple of 32 cells away.
+    /// Returns true if it feels the same a multiple of 32 cells away.
     #[must_use]
     pub fn is_textured_alike(&self) -> bool {
         is_alike(&self.texture, 1.0)
@@ -315,7 +315,7 @@ pub struct Player<'t, 'g, const D: usize> {
     texturer: Option<Texturer>,
     /// The last displacement, shaded and textured.
     textured: Vec3,
-    /// Where it feels.
+    /// Place where it feels.
     pub supplied: SuppliedWindow<'t, 'g, D>,
     execution: Execution,
     shift: [i32; 3],
@@ -345,7 +345,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
 
     /// One HIP: one tick, or in lock-step as many as it takes. `None` when those do
     /// not end. The work is that of the tick which spent most.
-    pub fn feel(&mut self, hip: [f64; 3]) -> Option<ContactOutput> {
+    pub fn step(&mut self, hip: [f64; 3]) -> Option<ContactOutput> {
         let hip = shifted(hip, self.shift);
         let mut work = 0;
         let in_real_time = self.execution == Execution::RealTime;
@@ -394,7 +394,7 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         self.shader.as_ref().and_then(Shader::missing)
     }
 
-    /// What the last HIP felt, as the judge sees it.
+    /// Returns the last HIP's answer, for the oracle.
     #[must_use]
     pub fn seen(&self, hip: [f64; 3], felt: ContactOutput) -> Seen {
         Seen {

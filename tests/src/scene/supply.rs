@@ -34,7 +34,7 @@ impl Default for Buffers {
     }
 }
 
-/// How the tiles come.
+/// Supply of the tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Supply {
     /// All are here from the start.

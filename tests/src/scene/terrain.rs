@@ -7,7 +7,7 @@ use crate::chance::Chance;
 /// Heights beyond this, in cells, are holes: no position can say them.
 const TALLEST: f32 = (1 << 29) as f32;
 
-/// What a terrain is like.
+/// Kind of a terrain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// One height everywhere.
@@ -67,7 +67,7 @@ pub const WALL_EVERY: i32 = 23;
 /// a hole.
 #[derive(Clone, Debug)]
 pub struct Terrain {
-    /// What it is like.
+    /// Its kind.
     pub kind: Kind,
     /// Patches east and north.
     pub size: [i32; 2],

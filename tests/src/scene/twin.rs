@@ -27,7 +27,7 @@ pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Compared
         shortcuts: false,
         ..scene.clone()
     };
-    let again = scene.feel(buffers, [0; 3], scene.supply, |_| Ok(()))?;
+    let again = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()))?;
     same_bits(Invariant::Repeatable, seen, &again, [0; 3]).map(|()| true)
 }
 
@@ -68,7 +68,7 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Com
         // Of grain, and of most gratings, another part is there; it is judged as well.
         let mut judge = Judge::new(&scene.terrain).with_texture(scene.texture);
         let pulled = Supply::Pulled { latency: 0 };
-        let seen = scene.feel(buffers, shift, pulled, |seen| judge.look_at_texture(seen))?;
+        let seen = scene.step(buffers, shift, pulled, |seen| judge.look_at_texture(seen))?;
         Ok(seen.into_iter().map(|seen| Seen {
             textured: seen.textured.filter(|_| scene.is_textured_alike()),
             ..seen
@@ -105,7 +105,7 @@ pub fn windowed(
     let small = scene.feel_in::<7>(buffers, [0; 3], pulled, |_| Ok(()))?;
     same_bits(Invariant::Window, seen, &small, [0; 3])?;
     if scene.supply != Supply::Held {
-        let whole = scene.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+        let whole = scene.step(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
         same_bits(Invariant::Window, seen, &whole, [0; 3])?;
     }
     Ok(true)
@@ -172,12 +172,12 @@ pub fn turned(scene: &Scene, buffers: &mut Buffers, chance: &mut Chance) -> Comp
     };
     let path: Vec<_> = scene.path.iter().map(inside).collect();
     let scene = &scene.with(scene.terrain.clone(), path);
-    let seen = scene.feel(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    let seen = scene.step(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
     let symmetries = symmetry::all();
     let symmetry = symmetries[chance.below(symmetries.len())];
     let twin = twin_of(scene, symmetry);
     let mut judge = Judge::of(&twin);
-    let other = twin.feel(buffers, [0; 3], Supply::Held, |seen| judge.look(seen))?;
+    let other = twin.step(buffers, [0; 3], Supply::Held, |seen| judge.look(seen))?;
     same_way(scene, symmetry, &seen, &other, buffers)
 }
 
@@ -290,12 +290,12 @@ fn is_near(proxy: [f64; 3], a: &Seen, b: &Seen) -> bool {
     distance(proxy, b.proxy) <= 1e-4 * distance(a.proxy, a.hip).max(1.0)
 }
 
-/// Whether a proxy that was moved by a hair's breadth, cells, is elsewhere by far more.
+/// Returns true if a proxy that was moved by a hair's breadth, cells, is elsewhere by far more.
 fn is_elsewhere(there: &Seen, here: &Seen, hair: f64) -> bool {
     distance(there.proxy, here.proxy) > JUMP * hair * distance(here.proxy, here.hip).max(1.0)
 }
 
-/// Whether a hair's breadth makes the difference in the mirrored or turned twin, as it is felt
+/// Returns true if a hair's breadth makes the difference in the mirrored or turned twin, as it is felt
 /// once more.
 fn is_twin_undecided(
     scene: &Scene,
@@ -311,7 +311,7 @@ fn is_twin_undecided(
     })
 }
 
-/// Whether a hair's breadth on the way to this tick, or in this tick alone, cells, makes the
+/// Returns true if a hair's breadth on the way to this tick, or in this tick alone, cells, makes the
 /// difference, too.
 fn is_undecided(
     scene: &Scene,
@@ -347,7 +347,7 @@ fn felt_at(
     for (now, hip) in scene.path[..=tick].iter().enumerate() {
         let by = moved(now);
         let hip = [0, 1, 2].map(|i| hip[i] + by[i]);
-        felt = player.feel(hip).map(|felt| Seen::new(hip, felt, [0; 3]));
+        felt = player.step(hip).map(|felt| Seen::new(hip, felt, [0; 3]));
     }
     felt
 }

@@ -1,4 +1,4 @@
-//! What a soak has seen so far.
+//! Counts of a stress test so far.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -9,7 +9,7 @@ use crate::invariants::judge::Measured;
 use crate::invariants::material::Judged;
 use crate::scene::terrain::{KINDS, Kind};
 
-/// What came of one scene.
+/// Outcome of one scene.
 #[derive(Clone, Debug)]
 pub enum Found {
     /// Everything held.
@@ -27,7 +27,7 @@ pub struct Broken {
     pub kind: Kind,
     /// Which invariant, by name; `Panic` for a panic.
     pub invariant: String,
-    /// What was found.
+    /// Its details.
     pub what: String,
 }
 

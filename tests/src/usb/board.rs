@@ -134,7 +134,7 @@ impl Board {
         self.wire.borrow().babbles
     }
 
-    /// Whether the watchdog is fed now: loop and link have lived since it was
+    /// Returns true if the watchdog is fed now: loop and link have lived since it was
     /// asked last.
     pub fn is_alive(&mut self) -> bool {
         self.monitor.may_feed_watchdog(&[Part::Tick, Part::Link])

@@ -32,7 +32,7 @@ pub(super) struct Wire {
     setup: Option<[u8; 8]>,
     into_device: [Pipe; 2],
     out_of_device: [Pipe; 2],
-    /// Whether the control endpoint takes a packet now.
+    /// True if the control endpoint takes a packet now.
     control_listens: bool,
     /// Packets longer than the endpoint's: never acknowledged, but counted.
     pub(super) babbles: u32,

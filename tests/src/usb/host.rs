@@ -18,7 +18,7 @@ const RECOVERY_MS: u64 = 10;
 /// Bytes in a full-speed packet, bulk or control.
 pub const PACKET: usize = 64;
 
-/// Why a transfer failed.
+/// Reason for which a transfer failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// Not answered in `PATIENCE_MS`.
@@ -143,7 +143,7 @@ pub fn string(port: &mut impl Port, index: u8) -> Result<String, Failure> {
     Ok(String::from_utf16_lossy(&units))
 }
 
-/// What enumeration read.
+/// Results of the enumeration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
     /// Device descriptor.

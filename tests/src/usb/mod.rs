@@ -6,7 +6,7 @@ pub mod board;
 mod driver;
 pub mod host;
 
-/// How a device answers a packet to it.
+/// Answer of a device to a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handshake {
     /// Taken.
@@ -17,7 +17,7 @@ pub enum Handshake {
     Stall,
 }
 
-/// How a device answers a request for a packet.
+/// Answer of a device to a request for a packet.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// A packet.
@@ -30,7 +30,7 @@ pub enum Answer {
 
 /// A device at the end of the cable.
 pub trait Port {
-    /// Whether it shows itself.
+    /// Returns true if it shows itself.
     fn is_attached(&self) -> bool;
     /// The host resets the bus.
     fn bus_reset(&mut self);

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use hapterra::link::{Arming, Event, Native, Session, Timeouts};
-use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script, Touch};
+use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script, Touch};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{GuardInputs, GuardOutputs, Report, WORKING_SHARE};
@@ -57,7 +57,7 @@ impl<'t> Bed<'t> {
         let [x, y] = MIDDLE_MM;
         let home_mm = [x, y, PLANE_MM + 4.0];
         let model = PhantomModel::premium_1_5();
-        let rig = HeldPhantom::new(model, HandModel::default(), Placement { home_mm }, script);
+        let rig = HeldPhantom::new(model, HandModel::default(), ArmFrame { home_mm }, script);
         let rig = rig.expect("in reach").arming();
         let log = Log::default();
         let seen = Rc::clone(&log);

@@ -65,7 +65,7 @@ fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
     assert_eq!((last.mode, last.fault), (Mode::Armed, None));
     assert_eq!(
         (last.state, last.missing_tile),
-        (ContactState::Waiting, None)
+        (ContactState::Unseeded, None)
     );
     // And while the host was away the device knew why there was less force.
     let reasons = bed.samples.iter().map(|s| s.limits);

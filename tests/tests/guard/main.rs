@@ -18,7 +18,7 @@ use std::cell::RefCell;
 use bed::{BEGIN, Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, Wrong, on_plane, plane, press, rub};
 
 #[test]
-fn armed_only_after_the_switch_was_pressed_and_force_comes_in_over_two_seconds() {
+fn arming_needs_the_switch_and_ramps_over_two_seconds() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let bed = Bed::new(&terrain, press(1.0).finish(), NOTHING).run(PRESSED + 500);

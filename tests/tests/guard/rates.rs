@@ -1,7 +1,7 @@
 //! Other tick rates.
 
 use hapterra::link::{Arming, Event, Native, Session, Timeouts};
-use hapterra::phantom::{HandModel, HeldPhantom, PhantomModel, Placement};
+use hapterra::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::guard::{Fault, Mode};
 use hapterra_core::scene::{Source, TickRecord};
@@ -19,7 +19,7 @@ fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {
     let [x, y] = MIDDLE_MM;
     let home_mm = [x, y, PLANE_MM + 4.0];
     let model = PhantomModel::premium_1_5();
-    let (hand, place) = (HandModel::default(), Placement { home_mm });
+    let (hand, place) = (HandModel::default(), ArmFrame { home_mm });
     let rig = HeldPhantom::new(model, hand, place, press(1.0).finish()).expect("in reach");
     let off = Rc::new(RefCell::new(None));
     let seen = Rc::clone(&off);

@@ -3,7 +3,7 @@
 
 use std::process::{Command, Stdio};
 
-use hapterra::replay::settings::ViewSettings;
+use hapterra::replay::settings::PlacementSettings;
 use hapterra::replay::{Settings, Trajectory};
 use hapterra_core::contact::{MAX_PIECE, WORK_PER_TICK};
 use hapterra_tests::{UNCONTROLLED, hapterra_binary};
@@ -268,7 +268,7 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
         panic!("{:?}", settings.views);
     };
     let first_m = settings.felt.cell_m.expect("known");
-    let latitude = |view: ViewSettings| view.measured_at.expect("a place")[1];
+    let latitude = |view: PlacementSettings| view.measured_at.expect("a place")[1];
     let [up, down] = [latitude(north) - 56.0, latitude(softer) - latitude(south)];
     // The hand goes on meanwhile.
     assert!(
@@ -378,7 +378,7 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
 
 /// Before cells were measured anew, views did not say where: theirs are those of the beginning.
 #[test]
-fn a_recording_whose_views_do_not_say_where_they_were_measured_is_felt_as_it_was() {
+fn recording_without_measured_places_replays_unchanged() {
     let folder = Folder::of(SIZE);
     demo(&folder);
     folder.replays("demo/hills.csv", "again.csv", &[]);

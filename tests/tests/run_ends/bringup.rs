@@ -115,7 +115,7 @@ fn where_a_board_does_not_confirm_the_end_of_a_bring_up_the_user_is_told() {
 }
 
 #[test]
-fn the_second_signal_ends_a_bring_up_at_once_and_tells_that_the_arm_may_be_armed() {
+fn second_signal_ends_bringup_and_warns_of_an_armed_arm() {
     let folder = tempfile::tempdir().expect("a folder");
     let (served, bench) = at_a_bench();
     let child = armed(&served, &bench, folder.path());

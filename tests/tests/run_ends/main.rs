@@ -100,7 +100,7 @@ fn stiffness_that_no_arm_feels_is_refused() {
         .expect("it runs");
     let told = told(&output);
     assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("no arm feels more than 20 N/mm"), "{told}");
+    assert!(told.contains("no arm renders more than 20 N/mm"), "{told}");
 }
 
 /// A bound of the system on the size of files stands for a disk that is full.

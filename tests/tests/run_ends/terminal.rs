@@ -1,4 +1,4 @@
-//! What becomes of the terminal, or of the pipe in its place, does not end the session.
+//! A lost terminal, or a lost pipe in its place, does not end the session.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
@@ -99,7 +99,7 @@ fn a_disk_that_is_full_costs_its_lines_and_nothing_else() {
 }
 
 #[test]
-fn where_nobody_reads_the_first_signal_is_a_goodbye_and_the_second_ends_it_at_once() {
+fn unread_output_does_not_stop_the_first_and_second_signal() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = Served::start();
     let (_unread, mut pipe) = std::io::pipe().expect("a pipe");

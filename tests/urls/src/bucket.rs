@@ -28,7 +28,7 @@ pub struct Server {
     _runtime: Runtime,
 }
 
-/// What was asked of a server, and what it answered.
+/// Requests to a server, and its answers.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
     /// Methods, paths and statuses of the answers.
@@ -37,7 +37,7 @@ pub struct Seen {
     pub bytes: usize,
 }
 
-/// Why a server does not answer with a file.
+/// Reason for which a server does not answer with a file.
 pub(crate) struct Refusal {
     pub(crate) status: StatusCode,
     /// What programs know it by.
@@ -98,13 +98,13 @@ impl Server {
         }
     }
 
-    /// Where it is.
+    /// Returns its place.
     #[must_use]
     pub fn endpoint(&self) -> &str {
         &self.url
     }
 
-    /// What was asked of it since this was called last.
+    /// Takes the requests since the last call.
     #[must_use]
     pub fn take_seen(&self) -> Seen {
         std::mem::take(&mut lock(&self.seen))

@@ -26,7 +26,7 @@ pub struct Server {
     _runtime: Runtime,
 }
 
-/// What goes wrong with an answer.
+/// Fault of an answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fault {
     /// Nothing.
@@ -77,7 +77,7 @@ struct Faults {
     requests: Vec<String>,
     /// Names of the headers of all requests.
     headers: BTreeSet<String>,
-    /// Where answers redirect to.
+    /// Target of redirects.
     redirect: String,
     bytes: usize,
     /// Requests that wait for their answers, now and at most.
@@ -166,7 +166,7 @@ impl Server {
         self.shared.state().version += 1;
     }
 
-    /// How many requests were waiting for their answers at once, at most.
+    /// Returns the number of requests that were waiting for their answers at once, at most.
     #[must_use]
     pub fn most_at_once(&self) -> usize {
         self.shared.state().at_once[1]

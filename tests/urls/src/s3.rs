@@ -44,7 +44,7 @@ impl Server {
         }
     }
 
-    /// Where it is.
+    /// Returns its place.
     #[must_use]
     pub fn endpoint(&self) -> &str {
         &self.url

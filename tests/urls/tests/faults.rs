@@ -1,4 +1,4 @@
-//! What a server or the line to it may do wrong: it is told, and nothing wrong is felt.
+//! Faults of a server or the line to it: they are reported, and nothing wrong is rendered.
 
 use hapterra_tests::timeouts::wait_for;
 use hapterra_url_tests::cog::cog;

@@ -1,4 +1,4 @@
-//! What lies before the hand is asked for before its tiles are.
+//! Blocks ahead of the hand are requested before its tiles.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use hapterra::terrain::{Scale, Terrain, TileBuffer};
 use hapterra_core::Vec3;
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::{Source, View};
+use hapterra_core::scene::{SceneChange, Source};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::timeouts::{pass, wait_until};
 use hapterra_url_tests::cog::cog;
@@ -32,7 +32,7 @@ fn hills() -> (tempfile::TempDir, Raster, Server) {
     (folder, raster.expect("opens"), server)
 }
 
-/// Whether all of a tile is here.
+/// Returns true if all of a tile is here.
 fn is_here(terrain: &Terrain<'_>, key: TileKey) -> bool {
     let before = terrain.raster().not_yet();
     let mut buffer = TileBuffer::default();
@@ -57,7 +57,7 @@ fn requests_later(server: &Server) -> usize {
 }
 
 #[test]
-fn a_tile_that_was_read_ahead_takes_no_request_and_too_many_are_not_asked_for() {
+fn tiles_read_ahead_need_no_request() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let keys = [TileKey::new(0, 60, 20), TileKey::new(0, 61, 20)];
@@ -95,7 +95,7 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     raster.stop_waiting();
     let before = requests(&server);
     server.hold(true);
-    let view = View {
+    let view = SceneChange {
         number: 1,
         scene,
         hip: at(3500),

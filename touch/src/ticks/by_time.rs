@@ -15,7 +15,7 @@ const MAX_REST_S: f64 = 600.0;
 pub(super) struct Timed {
     row: Row,
     t_s: f64,
-    /// Whether a tick was at it or next to it.
+    /// True if a tick was at it or next to it.
     is_felt: bool,
 }
 

@@ -1,10 +1,10 @@
-//! What rows were for ticks, in numbers.
+//! Relation of rows to ticks, in numbers.
 
 /// The HIP may move on one straight line for so long before that is odd, s: a hand turns ten times
 /// a second at most.
 pub const ODD_MOVE_S: f64 = 0.05;
 
-/// Why the times of rows are not used.
+/// Reason for which the times of rows are not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Untimed {
     /// There are none.
@@ -18,7 +18,7 @@ pub enum Untimed {
 /// Counts of a path that is read tick by tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
-    /// Why the times of rows are not used, if they are not.
+    /// Reason for which the times of rows are not used, if any.
     pub untimed: Option<Untimed>,
     /// Rows read.
     pub rows: u64,

@@ -24,7 +24,7 @@ pub use fault::{TickError, TimeFault};
 /// single precision.
 const ON_TICK: f64 = 0.01;
 
-/// How rows become ticks.
+/// Rule by which rows become ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// By the rows' own times. A file without times has one row a tick.
@@ -47,7 +47,7 @@ pub struct Row {
     pub view: u32,
 }
 
-/// Where the HIP is in a tick.
+/// The HIP in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
     /// Time of the tick, s: that of its row to the bit, if it has one.
@@ -108,7 +108,7 @@ impl<R> Ticks<R> {
         &mut self.rows
     }
 
-    /// What rows have been for ticks so far, and what is odd about their times.
+    /// Returns the relation of rows to ticks so far, and what is odd about their times.
     #[must_use]
     pub const fn counts(&self) -> &Counts {
         &self.counts

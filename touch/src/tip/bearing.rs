@@ -107,7 +107,7 @@ impl Samples {
 /// What of a block bears a ball.
 pub(super) struct Bearing {
     pub(super) columns: usize,
-    /// Whether the patch north-east of a sample has four samples.
+    /// True if the patch north-east of a sample has four samples.
     patches: Vec<bool>,
     /// Samples of such patches; less than everything where a sample is of none.
     pub(super) nodes: Vec<f64>,

@@ -19,8 +19,8 @@
 //! at most `d² / 4R` on a plane; `d` is chosen so that this is at most 0.5 % of the radius.
 //!
 //! Between two nodes the centre's surface is interpolated, and wrong where it bends. So a ball has
-//! nodes that are a fraction of its radius apart, whatever the samples are: **felt cells**, of which
-//! a whole number makes a cell of the ground. Lengths below are in felt cells.
+//! nodes that are a fraction of its radius apart, whatever the samples are: **haptic cells**, of which
+//! a whole number makes a cell of the ground. Lengths below are in haptic cells.
 
 mod bearing;
 
@@ -33,11 +33,11 @@ pub use bearing::{Nodes, Samples};
 
 /// Largest radius, cells of the ground.
 pub const MAX_CELLS: f64 = 8.0;
-/// Felt cells in a radius, at least.
+/// Haptic cells in a radius, at least.
 pub const FELT_CELLS: f64 = 32.0;
-/// A felt cell is not made smaller than this, hand millimetres: half an encoder's count.
+/// A haptic cell is not made smaller than this, device millimetres: half an encoder's count.
 pub const FINEST_MM: f64 = 1.0 / 64.0;
-/// Heights of the centre are rounded to multiples of this, felt cells: slopes stay true to a
+/// Heights of the centre are rounded to multiples of this, haptic cells: slopes stay true to a
 /// thousandth, and tiles take half the bytes.
 pub const CENTRE_STEP: f64 = 1.0 / (1 << 10) as f64;
 /// What the ball may rest too low for want of a line, as a part of its radius.
@@ -46,7 +46,7 @@ const SAG: f64 = 5e-3;
 /// A radius that no ball over cells of a size has.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "a tip of {tip_mm} mm: {cells:.1} cells of {cell_mm} mm, where 0 to {MAX_CELLS} can be felt"
+    "a tip of {tip_mm} mm: {cells:.1} cells of {cell_mm} mm, where 0 to {MAX_CELLS} can be rendered"
 )]
 pub struct TipError {
     /// The radius, mm.
@@ -62,7 +62,7 @@ pub struct TipError {
 pub struct Ball {
     /// Radius.
     radius: f64,
-    /// Felt cells a cell of the ground.
+    /// Haptic cells a cell of the ground.
     parts: u32,
     /// Samples around a block that its nodes depend on.
     halo: usize,
@@ -72,7 +72,7 @@ pub struct Ball {
     caps: Arc<[f64]>,
 }
 
-/// A height of the centre, felt cells, as tiles have it.
+/// A height of the centre, haptic cells, as tiles have it.
 #[must_use]
 pub fn rounded(centre: f64) -> f64 {
     libm::round(centre / CENTRE_STEP) * CENTRE_STEP
@@ -122,7 +122,7 @@ impl Ball {
         }
     }
 
-    /// Felt cells a cell of the ground, along a side.
+    /// Haptic cells a cell of the ground, along a side.
     #[must_use]
     pub const fn parts(&self) -> u32 {
         self.parts
@@ -134,7 +134,7 @@ impl Ball {
         self.halo
     }
 
-    /// Radius, felt cells.
+    /// Radius, haptic cells.
     #[must_use]
     pub const fn radius(&self) -> f64 {
         self.radius

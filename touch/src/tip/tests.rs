@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use super::*;
 
-/// Where the bilinear surface of a block is at a place; none where a corner has no data.
+/// Returns the height of the bilinear surface of a block at a place; none where a corner has no data.
 fn surface(block: &Samples, [u, v]: [f64; 2]) -> Option<f64> {
     let cell = |at: f64, samples: usize| {
         let inside = (0.0..=(samples - 1) as f64).contains(&at);
@@ -91,7 +91,7 @@ fn centre(block: &Samples, [u, v]: [f64; 2], radius: f64) -> f64 {
 
 /// A ball over heights by column and row, which is felt from the node on the sample at zero on.
 struct Rest {
-    /// Felt cells a cell.
+    /// Haptic cells a cell.
     parts: usize,
     /// Samples around that node.
     halo: usize,

@@ -56,7 +56,7 @@ impl Square {
         Some(Self { low, side, bar })
     }
 
-    /// Whether a place is in its middle.
+    /// Returns true if a place is in its middle.
     fn is_around(&self, place: [f64; 2]) -> bool {
         let inner = MARGIN * self.side..=(1.0 - MARGIN) * self.side;
         { place.iter().zip(self.low) }.all(|(at, low)| inner.contains(&(at - low)))

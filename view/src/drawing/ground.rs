@@ -78,7 +78,7 @@ impl Ground {
         Self { up_per_mm, ..self }
     }
 
-    /// Whether the terrain of another view is as high in the picture.
+    /// Returns true if the terrain of another view is as high in the picture.
     pub(super) fn is_as_high_as(&self, other: &Self) -> bool {
         (self.relief - other.relief).abs() <= SAME * self.relief.abs()
     }
@@ -203,7 +203,7 @@ pub(super) mod tests {
                 after.sample([7.0, 9.0], 1.0)
             );
             assert!(after.is_as_high_as(&before));
-            // Felt cells are of another level; the eye comes nearer, or stays where it was
+            // Haptic cells are of another level; the eye comes nearer, or stays where it was
             // because the palm is still smaller than what is laid.
             assert_eq!((before.tile_cells(), after.tile_cells()), (32, 64));
             assert!(after.near < before.near + 1e-9);

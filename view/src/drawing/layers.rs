@@ -84,7 +84,7 @@ impl Layers {
         Ok(entries)
     }
 
-    /// Whether an entity is part of a layer that is shown.
+    /// Returns true if an entity is part of a layer that is shown.
     fn has(&self, entity: &str) -> bool {
         let mut blocks = self.layers.iter().flat_map(|layer| &layer.blocks);
         blocks.any(|block| block.entity == entity)
@@ -367,7 +367,7 @@ impl Part<'_> {
 }
 
 impl Block {
-    /// Whether a square lies in it, or part of one: its first cell and its side.
+    /// Returns true if a square lies in it, or part of one: its first cell and its side.
     fn has(&self, ([x, y], side): ([i32; 2], i32)) -> bool {
         let [west, south, east, north] = self.extent;
         let ends = |first: i32| first.saturating_add(side);
@@ -414,7 +414,7 @@ fn contains(outer: [i32; 4], [west, south, east, north]: [i32; 4]) -> bool {
 }
 
 impl Cut {
-    /// Whether a cell of a mesh lies in one tile that is shown. Cells of the finest layer are
+    /// Returns true if a cell of a mesh lies in one tile that is shown. Cells of the finest layer are
     /// not larger than a tile; a larger one is never under a single tile, and stays.
     fn hides(&self, [west, south, east, north]: [i32; 4]) -> bool {
         let side = self.side.max(1);

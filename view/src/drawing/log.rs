@@ -8,14 +8,14 @@ use re_log_types::{
 };
 use re_sdk_types::{AsComponents, SerializedComponentColumn};
 
-/// What the viewer calls recordings and layouts of this program.
+/// The viewer's name for recordings and layouts of this program.
 pub const APPLICATION: &str = "hapterra";
 /// The timeline: the device's time since the beginning.
 pub const TIMELINE: &str = "time";
 
 /// An entry of the log.
 pub struct Entry {
-    /// What a later entry with the same key takes the place of; none of what happened.
+    /// Key of entries that replace each other; none for what happened.
     pub key: Option<String>,
     /// The entry.
     pub message: LogMsg,

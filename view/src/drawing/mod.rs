@@ -48,13 +48,13 @@ use plots::Plots;
 use tiles::Tiles;
 use words::Words;
 
-/// What has been drawn of a scene.
+/// State of the drawing of a scene.
 pub struct Drawing {
     log: Log,
     scene: Scene,
     /// Where the hand is, in the view in force.
     ground: Ground,
-    /// Where the terrain is: of a recording as in its first view.
+    /// Place where the terrain is: of a recording as in its first view.
     terrain: Ground,
     layers: Layers,
     tiles: Tiles,
@@ -94,7 +94,7 @@ impl Drawing {
         self.plots.finish(&self.log)
     }
 
-    /// Whether samples come as they are felt.
+    /// Returns true if samples come as they are felt.
     #[must_use]
     pub fn is_live(&self) -> bool {
         self.scene.is_live

@@ -1,4 +1,4 @@
-//! What is plotted over time: a row for each sample.
+//! Plots over time: a row for each sample.
 
 use anyhow::Result;
 use hapterra_view_stream::{Link, Sample, Scene, TickCost};

@@ -14,7 +14,7 @@ use super::shade::{HOLE, Heights, Rgb};
 
 /// Samples along the side of a tile.
 const SIDE: usize = TILE_CELLS as usize + 1;
-/// How far an outline floats above the surface, in felt cells.
+/// How far an outline floats above the surface, in haptic cells.
 const FLOAT_CELLS: f64 = 0.35;
 /// What a tile's samples are known by among the parts of its entity.
 const MESH: &str = "mesh";

@@ -77,7 +77,7 @@ impl Words {
         }
         let surface = match sample.ground_mm.is_finite() {
             true => format!("{:.1} {unit}", height(sample.ground_mm)),
-            false => "a hole".into(),
+            false => "no data".into(),
         };
         let _ = writeln!(
             text,

@@ -1,4 +1,4 @@
-//! What happened, put together: some time of an entity as one entry.
+//! Gathering of events: some time of an entity as one entry.
 //!
 //! The viewer takes about a millisecond for each entry that it is told, however small. A page
 //! that comes late, and one that is drawn by software, are told the same rows in far fewer

@@ -1,4 +1,4 @@
-//! What a page that comes now has to be told, and the queues of the pages that are there.
+//! History for new pages, and the queues of the present ones.
 //!
 //! What stands still (terrain, tiles, layout) is kept once, by key: a later entry takes
 //! the place of an earlier one. What happens in time is put together (`gather`) and kept up to
@@ -37,7 +37,7 @@ pub fn encoding() -> (CrateVersion, EncodingOptions) {
     (CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED)
 }
 
-/// What pages are told, now and from now on.
+/// Messages to pages, now and from now on.
 pub struct History {
     /// Bytes of what happened in time that are kept of a live session.
     limit: usize,
@@ -62,7 +62,7 @@ struct State {
     came: u64,
 }
 
-/// How a session ended.
+/// End of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// `hapterra` said that there is no more.
@@ -194,7 +194,7 @@ impl History {
         state.pages.retain(|other| !Arc::ptr_eq(other, page));
     }
 
-    /// What is kept, and for how many pages.
+    /// Returns the size of the history, and the number of pages.
     #[must_use]
     pub fn kept(&self) -> Kept {
         let state = locked(&self.state);

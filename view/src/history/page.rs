@@ -38,7 +38,7 @@ struct Queue {
     ended: Option<End>,
 }
 
-/// What a page is told next.
+/// Next message to a page.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Next {
     /// This.
@@ -79,13 +79,13 @@ impl Page {
         self.pieces
     }
 
-    /// Whether nothing waits for it.
+    /// Returns true if nothing waits for it.
     #[must_use]
     pub fn is_told_all(&self) -> bool {
         locked(&self.queue).blobs.is_empty()
     }
 
-    /// What the page is told next, waiting for at most `wait`.
+    /// Returns the next message to the page, waiting for at most `wait`.
     #[must_use]
     pub fn next(&self, wait: std::time::Duration) -> Next {
         let queue = locked(&self.queue);

@@ -23,7 +23,7 @@ pub struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// Whether it is answered, by a server on `port`.
+    /// Checks that it is answered, by a server on `port`.
     ///
     /// # Errors
     /// The status with which it is refused.
@@ -51,7 +51,7 @@ impl Asked<'_> {
     }
 }
 
-/// Whether `Host` names an address, or `localhost`, and the server's port.
+/// Returns true if `Host` names an address, or `localhost`, and the server's port.
 fn is_own(host: &str, port: u16) -> bool {
     let (name, said) = match host.rsplit_once(':') {
         Some((name, said)) if !said.ends_with(']') => (name, said.parse().ok()),

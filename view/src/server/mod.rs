@@ -68,7 +68,7 @@ impl Server {
         Ok(Self { address })
     }
 
-    /// Where the page is.
+    /// Returns the URL of the page.
     #[must_use]
     pub fn url(&self) -> String {
         let mut address = self.address;
@@ -78,7 +78,7 @@ impl Server {
         format!("http://{address}/")
     }
 
-    /// Whether other machines can ask for it.
+    /// Returns true if other machines can ask for it.
     #[must_use]
     pub fn is_open(&self) -> bool {
         !self.address.ip().is_loopback()

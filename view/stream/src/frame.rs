@@ -7,7 +7,7 @@ use crate::Message;
 /// Bytes of a frame's body at most: a layer of the largest size, and room.
 pub const MAX_BODY: usize = 16 << 20;
 
-/// Why there is no message.
+/// Reason for which there is no message.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
     /// The pipe.

@@ -1,4 +1,4 @@
-//! What `hapterra` tells `hapterra-view`, over a pipe and in one direction.
+//! Messages of `hapterra` to `hapterra-view`, over a pipe and in one direction.
 //!
 //! A frame is the length of its body as four bytes, least significant first, and the
 //! body: one [`Message`] in postcard. A body has at most [`MAX_BODY`] bytes. The first

@@ -39,18 +39,18 @@ pub struct Hello {
     pub program: String,
 }
 
-/// What is touched, where it lies, and how large it is.
+/// The touched terrain, its place and its size.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
-    /// What the user calls the terrain.
+    /// The user's name for the terrain.
     pub title: String,
     /// Place, scale and device, for people: a name and what there is to say.
     pub facts: Vec<(String, String)>,
-    /// Whether samples come as they are felt. A recording is there as a whole.
+    /// True if samples come as they are felt. A recording is there as a whole.
     pub is_live: bool,
-    /// Whether the device keeps the tiles of the view before.
+    /// True if the device keeps the tiles of the view before.
     pub keeps_tiles: bool,
-    /// Level of detail of the tiles: every 2ᴸ-th sample, and felt cells as much larger.
+    /// Level of detail of the tiles: every 2ᴸ-th sample, and haptic cells as much larger.
     pub level: u8,
     /// Side of a cell of level 0, mm.
     pub cell_mm: f64,
@@ -60,7 +60,7 @@ pub struct Scene {
     pub tip_mm: f64,
     /// The place under the tip in the arm's home pose, mm. The picture's origin.
     pub home_mm: [f64; 3],
-    /// What is laid in front of the arm, from west, south to east, north, mm.
+    /// The part in front of the arm, from west, south to east, north, mm.
     pub laid_mm: [f64; 4],
     /// Ground metres in a millimetre; none where the terrain does not know its size, and
     /// all lengths are told in millimetres.
@@ -71,7 +71,7 @@ pub struct Scene {
     pub height_unit: String,
     /// The file's coordinates of places, where it knows any.
     pub coordinates: Option<Coordinates>,
-    /// How the cost of a tick is told, where it is known.
+    /// Units of a tick's cost, where they are known.
     pub tick: Option<TickCost>,
 }
 
@@ -84,11 +84,11 @@ pub struct Coordinates {
     pub east: [f64; 2],
     /// A millimetre to the north.
     pub north: [f64; 2],
-    /// Decimals that tell a felt cell from the next.
+    /// Decimals that tell a haptic cell from the next.
     pub decimals: u8,
 }
 
-/// How the cost of a tick is told.
+/// Units of a tick's cost.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TickCost {
     /// `µs`, or what the emulated board counts.
@@ -108,7 +108,7 @@ pub struct TickCost {
 pub struct Layer {
     /// Counted from the coarsest, which is 0 and shows the whole.
     pub number: u32,
-    /// Where its south-west sample is, in cells of level 0.
+    /// Its south-west sample, in cells of level 0.
     pub first: [i32; 2],
     /// Cells between samples.
     pub step: i32,
@@ -123,7 +123,7 @@ pub struct Layer {
 /// A tile with all its samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tile {
-    /// Where it is kept; a tile that comes to the same place later takes it.
+    /// Its slot; a later tile in the same slot replaces it.
     pub slot: u32,
     /// Column and row among the tiles of the felt level.
     pub index: [i32; 2],
@@ -141,7 +141,7 @@ pub struct Tiles {
     pub awaited: Vec<[i32; 2]>,
 }
 
-/// What was felt in a tick.
+/// Record of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// Time since the beginning, s.
@@ -154,14 +154,14 @@ pub struct Sample {
     pub force_n: [f32; 3],
     /// Height of the surface over or under the HIP, mm; NaN in a hole and off the data.
     pub ground_mm: f64,
-    /// Whether the surface is touched.
+    /// True if the surface is touched.
     pub contact: bool,
-    /// What the tick before cost, in counts of the device's clock; none where it is not
+    /// Cost of the tick before, in counts of the device's clock; none where it is not
     /// known.
     pub cost: Option<u32>,
 }
 
-/// What went over the link since the beginning.
+/// Traffic of the link since the beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Link {
     /// The device's time, s.

@@ -69,7 +69,7 @@ impl Page {
 /// Colours of a picture of a page.
 #[derive(Debug)]
 pub struct Colours {
-    /// How many there are.
+    /// Their number.
     pub count: usize,
     /// Pixels near each that was asked for.
     pub near: Vec<usize>,
@@ -281,7 +281,7 @@ impl Browser {
         self.value(page, &expression)
     }
 
-    /// How far a part differs between two pictures: a mean over its pixels and colours, of 255.
+    /// Returns the difference of a part between two pictures: a mean over its pixels and colours, of 255.
     pub fn difference(&mut self, page: &Page, pictures: [&str; 2], part: [f64; 4]) -> f64 {
         let script = "
             const [a, b] = parts.map((part) => part.data);

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use hapterra_view_stream::{Message, write};
 
-/// What has not come by then hangs: pages that software draws on a busy machine take minutes.
+/// Time after which a page hangs: pages that software draws on a busy machine take minutes.
 pub const HANG: Duration = Duration::from_secs(900);
 
 /// How a viewer is started whose page nobody opens by itself, on any port that is free.
@@ -85,12 +85,12 @@ impl Running {
         }
     }
 
-    /// Where its viewer's page is.
+    /// Returns the address of its viewer's page.
     pub fn address(&self) -> String {
         format!("http://127.0.0.1:{}/", self.port())
     }
 
-    /// Whether it goes on.
+    /// Returns true if it goes on.
     pub fn goes_on(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
     }
@@ -116,7 +116,7 @@ impl Running {
         self.child.wait().expect("a child").success()
     }
 
-    /// What it says from now on until its viewer has ended, too, and what nobody has read yet.
+    /// Returns its unread output, and waits until it and its viewer have ended.
     pub fn words(&self) -> String {
         self.told
             .iter()
@@ -179,7 +179,7 @@ impl Viewer {
         self.running.port()
     }
 
-    /// Where its page is.
+    /// Returns the address of its page.
     pub fn address(&self) -> String {
         self.running.address()
     }

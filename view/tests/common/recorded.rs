@@ -63,7 +63,7 @@ pub fn places(chunks: &[Chunk]) -> Vec<(i64, Vec<[f32; 3]>)> {
 pub struct Csv {
     names: Vec<String>,
     pub rows: Vec<Vec<String>>,
-    /// Hand millimetres of a cell of level 0 and of a vertical unit, by view.
+    /// Device millimetres of a cell of level 0 and of a vertical unit, by view.
     pub scales: Vec<[f64; 2]>,
     /// The picture's units in a cell of level 0: metres, or millimetres in the first view.
     pub units: f64,
@@ -206,7 +206,7 @@ pub fn check(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>) {
     }
 }
 
-/// What was felt in several views lies where it lies on the ground: places and heights of
+/// Checks that records of several placements lie at their places on the ground: places and heights of
 /// all of them in one scale, in `stretched` views as high as in the first.
 pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: bool) {
     let drawn = places(&shown["/hand/hip"]);

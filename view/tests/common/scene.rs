@@ -159,7 +159,7 @@ pub fn tiles_around([col, row]: [i32; 2]) -> Vec<Message> {
     messages
 }
 
-/// What is told in the batch that ends at a tick: samples, the tiles around the hand where
+/// Returns the batch that ends at a tick: samples, the tiles around the hand where
 /// they have changed, and the link.
 pub fn batch(from: u64, to: u64, held: &mut Vec<[i32; 2]>) -> Vec<Message> {
     let mut messages = Vec::new();

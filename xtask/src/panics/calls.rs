@@ -18,7 +18,7 @@ pub(crate) struct Function {
     pub(crate) aliases: Vec<String>,
     /// Functions it branches to, by index.
     pub(crate) callees: Vec<usize>,
-    /// Whether it branches through a register.
+    /// True if it branches through a register.
     pub(crate) has_indirect: bool,
 }
 

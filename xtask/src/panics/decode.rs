@@ -1,4 +1,4 @@
-//! Where a Thumb-2 instruction can go besides the next one.
+//! Branch targets of a Thumb-2 instruction besides the next one.
 //!
 //! Only branches are decoded, by their encodings in the ARMv7-M manual
 //! (DDI 0403E, A7.7): for these few lines no disassembler is needed, and the

@@ -1,4 +1,4 @@
-//! Whether an interrupt of an image can reach a panic.
+//! Check that no interrupt of an image reaches a panic.
 //!
 //! The finished ELF is judged, not the source: link-time optimisation removes
 //! most bounds checks, and what it left is what runs. Its vector table names what is judged:
@@ -139,7 +139,7 @@ fn known<'t>(table: &'t [Exception], caller: &Function, callee: &str) -> Option<
         .find(|e| is_caller(e.caller) && callee.contains(e.callee))
 }
 
-/// Whether a function of this name is a panic or what all panics end in.
+/// Returns true if a function of this name is a panic or what all panics end in.
 fn panics(name: &str) -> bool {
     name.starts_with("core::panicking::")
         || name.ends_with("rust_begin_unwind")

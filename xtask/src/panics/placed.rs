@@ -1,4 +1,4 @@
-//! Whether what an interrupt reaches lies in the memory without wait states.
+//! Check that the code of an interrupt lies in the memory without wait states.
 //!
 //! Its linker script names two areas: that memory, and those functions that are to stay in flash.
 //! What is in neither was forgotten.

@@ -1,4 +1,4 @@
-//! What can be reached from one node of a graph, and on which way.
+//! Nodes that can be reached from one node of a graph, and the paths to them.
 
 /// The nodes reached, nearest first, each with the place in this list of the node
 /// that it was first reached from; the root has none.

@@ -1,4 +1,4 @@
-//! What the emulated core of the image tests is built with: cmake for its C
+//! Tools that build the emulated core of the image tests: cmake for its C
 //! code, libclang for its bindings.
 
 use anyhow::{Context, Error, Result};

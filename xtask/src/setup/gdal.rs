@@ -23,7 +23,7 @@ pub(crate) fn ready_or_say_why() {
     }
 }
 
-/// Whether a terrain's name says that GDAL reads it.
+/// Returns true if a terrain's name says that GDAL reads it.
 pub(crate) fn is_wanted_for(file: &Path) -> bool {
     let extension = file
         .extension()

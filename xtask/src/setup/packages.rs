@@ -1,4 +1,4 @@
-//! What the commands need from the system: what each is called by the package
+//! System packages of the commands: their names in the package
 //! managers, and one way to install it.
 
 use std::process::Command;

@@ -47,7 +47,7 @@ impl Toolchain {
         command
     }
 
-    /// Where it builds. Two compilers in one directory would undo each other's work.
+    /// Returns the place where it builds. Two compilers in one directory would undo each other's work.
     pub(crate) fn target_dir(self) -> PathBuf {
         match self {
             Self::Own => target_dir(),

@@ -1,4 +1,4 @@
-//! What can be the hand, what it can set, and what it hears.
+//! Hands, settings and sounds of the page.
 
 use serde_json::json;
 

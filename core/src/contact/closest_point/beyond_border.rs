@@ -1,4 +1,4 @@
-//! Where downhill goes on from a point of a patch's border.
+//! Continuation of the descent from a point of a patch's border.
 //!
 //! The distance to the HIP has a slope into each patch that meets there, and its
 //! way goes on in the one into which the slope is steepest: in a mirrored scene
@@ -30,7 +30,7 @@ pub(super) enum Onward {
 /// What a neighbouring patch has to offer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Offer {
-    /// Where the way enters the neighbour.
+    /// Place where the way enters the neighbour.
     pub(super) entry: SurfacePoint,
     /// The neighbour's closest point.
     pub(super) closest: Nearest,
@@ -38,7 +38,7 @@ pub(super) struct Offer {
     gain: f32,
     /// The rounding of that.
     noise: f32,
-    /// Whether it gets less by more than the last places of both points may be off.
+    /// True if it gets less by more than the last places of both points may be off.
     pub(super) is_surely_nearer: bool,
     /// How far the HIP is that way, cells: of two ways as good as each other
     /// the one toward it is taken, however the scene is turned.
@@ -177,7 +177,7 @@ impl Asking {
         }
     }
 
-    /// Whether the best offer is down a way that is steeper than another.
+    /// Returns true if the best offer is down a way that is steeper than another.
     #[inline]
     fn has_steeper_than(&self, steepness: f32) -> bool {
         let is_steeper = |best: &Offer| steepness < best.steepness * (1.0 - EQUALLY_STEEP);

@@ -61,14 +61,14 @@ impl Convexity {
         })
     }
 
-    /// Whether the squared distance is convex all over the patch, a point of which
+    /// Returns true if the squared distance is convex all over the patch, a point of which
     /// is `z` cells above the HIP.
     #[inline]
     fn all_over(&self, z: f32) -> bool {
         z <= self.convex
     }
 
-    /// Whether the squared distance is convex between two places, the second one
+    /// Returns true if the squared distance is convex between two places, the second one
     /// `to.z` cells above the HIP, and wherever a path downhill may swing out to.
     fn between(&self, (u, v): (f32, f32), to: &Place) -> bool {
         let moved = (to.u - u).abs().max((to.v - v).abs());
@@ -92,7 +92,7 @@ impl Convexity {
         (height <= self.shallow).then(|| self.by_one_hessian(patch, hip, height))
     }
 
-    /// Whether an exact place inside the patch is its closest point, all over it.
+    /// Returns true if an exact place inside the patch is its closest point, all over it.
     #[inline]
     pub(in crate::contact) fn is_closest(&self, place: &Place) -> bool {
         place.z >= 0.0 && self.all_over(place.z)
@@ -250,7 +250,7 @@ fn closest_on_line(hip: f32, slope: f32, [start, end]: [f32; 2]) -> (f32, f32, i
     }
 }
 
-/// Whether the distance surely falls out of the patch at a place of its border.
+/// Returns true if the distance surely falls out of the patch at a place of its border.
 #[inline(always)]
 fn falls_out(patch: &Patch, (p, q): (f32, f32), place: &Place, side: Side) -> bool {
     let falls = |toward: i32, slope: f32| toward == 0 || toward as f32 * slope < -LEVEL;

@@ -145,7 +145,7 @@ const fn exchanged_if(turned: bool, (u, v): (f32, f32)) -> (f32, f32) {
     if turned { (v, u) } else { (u, v) }
 }
 
-/// Whether the patch is steeper northward than eastward at a place; of two slopes
+/// Returns true if the patch is steeper northward than eastward at a place; of two slopes
 /// alike, as at the foot of a raised corner, the HIP's direction is decisive,
 /// which a mirrored scene shares.
 fn is_steeper_north(patch: &Patch, (p, q): (f32, f32), (u, v): (f32, f32)) -> bool {
@@ -153,7 +153,7 @@ fn is_steeper_north(patch: &Patch, (p, q): (f32, f32), (u, v): (f32, f32)) -> bo
     north > east || (north == east && (q - v).abs() > (p - u).abs())
 }
 
-/// Whether the eliminated variable ended at a limit while the searched one did
+/// Returns true if the eliminated variable ended at a limit while the searched one did
 /// not, or is no longer the steeper one: the other search is then better
 /// conditioned.
 fn wants_turning(found: &Ruling) -> bool {

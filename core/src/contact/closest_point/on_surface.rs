@@ -43,7 +43,7 @@ pub(in crate::contact) enum Leave {
 }
 
 impl Leave {
-    /// Whether it may leave at a point.
+    /// Returns true if it may leave at a point.
     #[inline]
     pub(in crate::contact) fn is_allowed_at(&self, point: &SurfacePoint) -> bool {
         match self {
@@ -314,14 +314,14 @@ fn patch_at<const D: usize>(
     }
 }
 
-/// Whether a proxy that rests `z` cells above the HIP may in truth be below it,
+/// Returns true if a proxy that rests `z` cells above the HIP may in truth be below it,
 /// and would pull: up a wall rounding decides.
 fn is_hardly_above(patch: &Patch, z: f32) -> bool {
     let [sw, se, nw, ne] = patch.with_sizes().corners;
     z <= HEIGHT_NOISE * ((sw + se) + (nw + ne))
 }
 
-/// Whether the straight way from a point, on this border of its patch, to the HIP
+/// Returns true if the straight way from a point, on this border of its patch, to the HIP
 /// begins above the surface: above the one-sided slope of the patch it leads into.
 #[inline(always)]
 fn leads_off<const D: usize>(
@@ -355,7 +355,7 @@ fn leads_off_beyond<const D: usize>(
     }
 }
 
-/// Whether the HIP, so far east and north of a point, lies above the tangent plane
+/// Returns true if the HIP, so far east and north of a point, lies above the tangent plane
 /// of the patch there.
 #[inline]
 pub(in crate::contact) fn passes_over(

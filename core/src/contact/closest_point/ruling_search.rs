@@ -65,7 +65,7 @@ impl Rulings<'_> {
         closest
     }
 
-    /// Whether as many were looked at as there may be.
+    /// Returns true if as many were looked at as there may be.
     pub(super) const fn is_spent(&self) -> bool {
         self.looked >= self.most
     }
@@ -97,7 +97,7 @@ impl Rulings<'_> {
         newest
     }
 
-    /// Whether a ruling is one where F has its minimum, as far as can be told.
+    /// Returns true if a ruling is one where F has its minimum, as far as can be told.
     fn is_settled(&self, ruling: &Ruling) -> bool {
         let step = ruling.slope / ruling.curvature;
         ruling.curvature > 0.0
@@ -106,7 +106,7 @@ impl Rulings<'_> {
                 || ruling.slope.abs() <= ruling.noise(self.patch, self.hip.0).slope)
     }
 
-    /// Whether a ruling is surely farther from the HIP than another.
+    /// Returns true if a ruling is surely farther from the HIP than another.
     fn is_farther(&self, ruling: &Ruling, other: &Ruling) -> bool {
         let more = other.gain_on(ruling);
         more > 0.0 && {
@@ -115,7 +115,7 @@ impl Rulings<'_> {
         }
     }
 
-    /// Whether the straight way between the closest points of two rulings is surely nowhere
+    /// Returns true if the straight way between the closest points of two rulings is surely nowhere
     /// farther from the HIP than its start. A patch that is not twisted has no crest.
     fn is_plainly_downhill(&self, from: &Ruling, to: &Ruling) -> bool {
         let way = (to.u - from.u, to.v - from.v);

@@ -1,4 +1,4 @@
-//! How the HIP pulls a proxy along the surface, how hard it presses, and what friction holds.
+//! The friction cone: pull along the surface, pressure, and the limit that friction holds.
 //!
 //! With `D` the vector from the proxy to the HIP, the pull is the part of `D` along the
 //! steepest direction in which the proxy could go, over all patches that meet at it;
@@ -26,7 +26,7 @@ pub(in crate::contact) struct Pull {
     pub(in crate::contact) pulls: f32,
     /// Length squared of the rest, cells².
     pub(in crate::contact) presses: f32,
-    /// Whether the HIP is above the tangent plane: nothing presses then.
+    /// True if the HIP is above the tangent plane: nothing presses then.
     pub(in crate::contact) is_above: bool,
     /// What rounding may make of the pull, cells.
     rounding: f32,
@@ -79,7 +79,7 @@ pub(in crate::contact) struct Cone {
     pub(in crate::contact) mu: f32,
     /// The viscous part, as the number of ticks by whose motion the proxy trails.
     pub(in crate::contact) drag: f32,
-    /// Where the proxy was when the tick began; the chord from there is the motion.
+    /// Place where the proxy was when the tick began; the chord from there is the motion.
     pub(in crate::contact) from: GridPoint,
 }
 
@@ -120,17 +120,17 @@ pub(in crate::contact) struct Excess {
 }
 
 impl Excess {
-    /// Whether a walk ends here: friction holds, and by hardly more than it has to.
+    /// Returns true if a walk ends here: friction holds, and by hardly more than it has to.
     pub(in crate::contact) fn is_small(&self) -> bool {
         self.over.abs() <= 0.5 * SHORT * self.held
     }
 
-    /// Whether friction holds the pull.
+    /// Returns true if friction holds the pull.
     pub(in crate::contact) fn is_held(&self) -> bool {
         self.pulls <= self.held
     }
 
-    /// Whether the pull is more than a walk may end with.
+    /// Returns true if the pull is more than a walk may end with.
     pub(in crate::contact) fn is_pulled(&self) -> bool {
         self.over > 0.0
     }

@@ -1,4 +1,4 @@
-//! Where on a straight way the cone begins to hold: the first root of what pulls in excess.
+//! The first place on a straight path where the cone holds: the first root of the excess pull.
 
 use super::cone::Excess;
 

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub(super) use cone::Cone;
 pub(super) use walk::{Walk, Walked};
 
-/// How rough a surface is.
+/// Friction of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Friction {
@@ -50,13 +50,13 @@ impl Friction {
         }
     }
 
-    /// Whether there is none.
+    /// Returns true if there is none.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// Whether every number is one that a contact can work with.
+    /// Returns true if every number is one that a contact can work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let ordered = self.dynamic_mu <= self.static_mu;

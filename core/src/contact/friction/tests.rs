@@ -17,7 +17,7 @@ fn at(p: [f32; 3]) -> GridPoint {
 }
 
 /// A contact on `height`, with the steps of its HIP.
-fn feel(
+fn step(
     friction: Friction,
     height: impl Fn(i32, i32) -> f32 + 'static,
     path: impl IntoIterator<Item = [f32; 3]>,
@@ -49,7 +49,7 @@ fn on_a_plane_of_any_slope_it_slides_at_its_coefficient() {
                 let depth = (tick as f32 * 0.02 - 0.2).min(0.7);
                 (along * (0.013 * tick as f32) - normal * depth).to_array()
             });
-            let felt = feel(Friction::coulomb(mu), plane, path);
+            let felt = step(Friction::coulomb(mu), plane, path);
             for (hip, felt) in &felt[200..] {
                 assert_eq!(felt.state, ContactState::Touching);
                 let is = ratio(felt, slope);
@@ -74,7 +74,7 @@ fn a_crease_in_the_middle_of_a_tick_lets_it_go_no_farther() {
                 let depth = (0.2 * tick as f32 - 0.3).min(0.5);
                 [x, 0.5, bend * (x - 4.0).max(0.0) - depth]
             });
-            for (hip, felt) in &feel(Friction::coulomb(MU), roof, path)[8..] {
+            for (hip, felt) in &step(Friction::coulomb(MU), roof, path)[8..] {
                 let [cell, _, _] = felt.proxy.cell();
                 let x = cell as f32 + felt.proxy.frac().x;
                 if (x - 24.0).abs() < 1e-3 {
@@ -102,7 +102,7 @@ fn stuck_is_stuck_to_the_bit() {
             -depth + 0.03 * noise(3),
         ]
     });
-    let felt = feel(Friction::coulomb(0.9), twisted, path);
+    let felt = step(Friction::coulomb(0.9), twisted, path);
     let stuck = felt[300].1.proxy;
     for (hip, felt) in &felt[300..] {
         assert_eq!(felt.proxy, stuck, "{hip:?}");
@@ -120,7 +120,7 @@ fn static_friction_holds_until_it_breaks_and_comes_back_after_a_rest() {
     let push = (0..200).map(|tick| [0.01 * tick as f32, 0.5, -1.0]);
     let rest = (0..50).map(|_| [1.99, 0.5, -1.0]);
     let again = (0..100).map(|tick| [1.99 + 0.01 * tick as f32, 0.5, -1.0]);
-    let felt = feel(
+    let felt = step(
         friction,
         |_, _| 0.0,
         press.chain(push).chain(rest).chain(again),
@@ -141,7 +141,7 @@ fn an_encoder_count_now_and_then_does_not_make_it_stick() {
     };
     let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
     let push = (0..2_000).map(|tick| [(tick / 8) as f32 * 0.03, 0.5, -1.0]);
-    let felt = feel(friction, |_, _| 0.0, press.chain(push));
+    let felt = step(friction, |_, _| 0.0, press.chain(push));
     for (hip, felt) in &felt[600..] {
         assert!(-felt.displacement.x < 0.301, "{hip:?}: {felt:?}");
     }
@@ -193,7 +193,7 @@ fn the_viscous_part_grows_with_the_speed() {
     for speed in [0.002_f32, 0.01] {
         let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
         let push = (0..600).map(|tick| [speed * tick as f32, 0.5, -1.0]);
-        let felt = feel(friction, |_, _| 0.0, press.chain(push));
+        let felt = step(friction, |_, _| 0.0, press.chain(push));
         let lag = -felt[690].1.displacement.x;
         let expected = 0.2 + 0.02 * speed * 1e3;
         assert!((lag / expected - 1.0).abs() < 1e-3, "{lag} for {expected}");
@@ -205,7 +205,7 @@ fn lifting_never_drags() {
     let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
     let push = (0..100).map(|tick| [0.01 * tick as f32, 0.5, -1.0]);
     let lift = (0..100).map(|tick| [1.0, 0.5, -1.0 + 0.02 * tick as f32]);
-    let felt = feel(
+    let felt = step(
         Friction::coulomb(0.5),
         |_, _| 0.0,
         press.chain(push).chain(lift),
@@ -297,7 +297,7 @@ fn a_proxy_that_trails_a_far_hip_does_not_go_for_it() {
         for phase in 0..50 {
             let from = 0.01 * phase as f32;
             let path = [on(from, -1.0), on(from, depth), on(36.0, depth)];
-            let felt = feel(friction, plane, path);
+            let felt = step(friction, plane, path);
             let trails = felt[2].1.displacement.length();
             assert!(trails > 39.0, "{depth} {from}: {trails} of 41");
         }

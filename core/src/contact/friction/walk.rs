@@ -47,7 +47,7 @@ struct Asked {
     pull: Pull,
     at: SurfacePoint,
     patch: Patch,
-    /// Whether a tile beside it is missing.
+    /// True if a tile beside it is missing.
     is_open: bool,
 }
 
@@ -84,7 +84,7 @@ fn off(leave: &Leave, point: &SurfacePoint) -> Option<Walked> {
 /// A walk under way.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Walk {
-    /// Where it is.
+    /// Its place.
     pub(in crate::contact) point: SurfacePoint,
     /// The coefficient of a proxy that has not moved yet.
     pub(in crate::contact) at_rest: Option<f32>,
@@ -169,9 +169,9 @@ fn newton(at: &Asked, view: &HipView) -> Option<(f32, f32)> {
 struct End {
     /// What friction holds there, cells.
     held: Vec3,
-    /// Whether the cone holds there.
+    /// True if the cone holds there.
     rests: bool,
-    /// Whether the pull is that of the patch there, and the HIP not above.
+    /// True if the pull is that of the patch there, and the HIP not above.
     is_known: bool,
 }
 

@@ -1,4 +1,4 @@
-//! How often a proxy has left the surface for one HIP: by rounding it could do so for ever.
+//! Count of departures from the surface for one HIP: by rounding there could be no end of them.
 
 use crate::contact::closest_point::{Leave, position_on};
 use crate::contact::surface::{HipView, SurfacePoint};
@@ -37,7 +37,7 @@ pub(super) fn count_departure(departures: &mut Departures, from: GridPoint, view
     }
 }
 
-/// Where a proxy that has hit the surface may leave it again.
+/// Returns the place where a proxy that has hit the surface may leave it again.
 pub(super) fn may_leave<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::on_ground::{Came, Felt};
+use super::on_ground::{Came, SurfaceContact};
 use super::{Contact, Phase, Turn};
 use crate::contact::budget::Budget;
 use crate::contact::closest_point::{Leave, position_on};
@@ -93,7 +93,7 @@ impl Contact {
         hip: GridPoint,
     ) {
         let mut budget = Budget::new(self.settings.work_per_tick);
-        self.remembers_what_was_felt();
+        self.remember_contact();
         self.gives_up_beyond_window::<D>(&hip);
         if self.output.converged || !self.hip.is_same(&hip) {
             self.begins_to_walk(window, hip, &mut budget);
@@ -243,7 +243,7 @@ impl Contact {
         let Some(proxy) = position_on(window, &point) else {
             return Turn::Ends;
         };
-        let felt = Felt {
+        let felt = SurfaceContact {
             point,
             proxy,
             displacement: hip.to(&proxy),

@@ -10,7 +10,7 @@ use crate::grid::GridPoint;
 use crate::terrain::{CellContent, Window};
 
 impl Contact {
-    /// Waiting ends when the HIP is above the patch it is over, or above everything.
+    /// [`Phase::Unseeded`] ends when the HIP is above the patch it is over, or above everything.
     #[inline(never)]
     pub(super) fn looks_around<const D: usize>(
         &mut self,
@@ -29,7 +29,7 @@ impl Contact {
         if is_above {
             return self.becomes_free(hip);
         }
-        self.phase = Phase::Waiting;
+        self.phase = Phase::Unseeded;
         let is_missing = ground == CellContent::Missing;
         if is_missing {
             budget.lacks(cell);

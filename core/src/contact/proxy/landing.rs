@@ -18,22 +18,22 @@ pub(super) struct Landing {
     /// Over or under the place of the surface; the height does not count.
     at: GridPoint,
     /// From the HIP to the proxy, cells.
-    stretch: Vec3,
+    displacement: Vec3,
 }
 
 impl Contact {
     /// A contact whose proxy begins on the surface over the column of a place, with the
-    /// HIP as far from it as `stretch` says, cells. Nothing is felt before the terrain
+    /// HIP as far from it as `displacement` says, cells. Nothing is felt before the terrain
     /// there is known, and [`Contact::land`] has said where that puts the HIP.
     #[must_use]
-    pub fn landing(settings: ContactSettings, at: GridPoint, stretch: Vec3) -> Self {
+    pub fn landing(settings: ContactSettings, at: GridPoint, displacement: Vec3) -> Self {
         Self {
-            landing: Some(Landing { at, stretch }),
+            landing: Some(Landing { at, displacement }),
             ..Self::new(settings)
         }
     }
 
-    /// Whether the contact waits to begin on the surface.
+    /// Returns true if the contact waits to begin on the surface.
     #[must_use]
     pub const fn is_landing(&self) -> bool {
         self.landing.is_some()
@@ -41,9 +41,9 @@ impl Contact {
 
     /// The proxy as it is seen from the HIP, cells, while it touches or is about to.
     #[must_use]
-    pub fn stretch(&self) -> Option<Vec3> {
+    pub fn displacement(&self) -> Option<Vec3> {
         match &self.landing {
-            Some(landing) => Some(landing.stretch),
+            Some(landing) => Some(landing.displacement),
             None if self.output.state == ContactState::Touching => {
                 Some(self.hip.to(&self.output.proxy))
             }
@@ -58,7 +58,7 @@ impl Contact {
     /// The force comes in as it does after a late tile.
     #[must_use]
     pub fn land<const D: usize>(&mut self, window: &Window<'_, D>) -> Option<GridPoint> {
-        let Landing { at, stretch } = self.landing.as_ref()?;
+        let Landing { at, displacement } = self.landing.as_ref()?;
         let (cell, frac) = (at.column(), at.frac());
         let (u, v) = (frac.x, frac.y);
         let point = SurfacePoint { cell, u, v };
@@ -67,7 +67,7 @@ impl Contact {
             CellContent::Hole => self.landing = None,
             CellContent::Patch(_) => {
                 let surface = position_on(window, &point)?;
-                let hip = GridPoint::new(surface.cell(), surface.frac() - *stretch);
+                let hip = GridPoint::new(surface.cell(), surface.frac() - *displacement);
                 self.landing = None;
                 self.phase = Phase::OnSurface(OnSurface::at(point, 0.0));
                 self.hip = hip;
@@ -110,8 +110,9 @@ mod tests {
         let mut tiles = buffers::<2>();
         let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), wall);
         // Pushed three cells into the wall from the west, as the HIP sees the proxy.
-        let stretch = Vec3::new(-3.0, 0.1, 0.0);
-        let mut contact = Contact::landing(ContactSettings::AT_1_KHZ, column(10.5, 20.5), stretch);
+        let displacement = Vec3::new(-3.0, 0.1, 0.0);
+        let mut contact =
+            Contact::landing(ContactSettings::AT_1_KHZ, column(10.5, 20.5), displacement);
         assert!(contact.is_landing());
         let hip = contact.land(&field.window).expect("the terrain is there");
         assert!(!contact.is_landing());
@@ -125,7 +126,7 @@ mod tests {
             assert!(change < 0.15, "tick {tick}: {change} cells at once");
             last = output.displacement;
         }
-        assert!(last.length() <= stretch.length() + 1e-4, "{last}");
+        assert!(last.length() <= displacement.length() + 1e-4, "{last}");
         assert!(last.x < -2.0, "on its side: {last}");
     }
 
@@ -133,8 +134,9 @@ mod tests {
     fn without_its_terrain_it_names_the_tile_and_makes_no_force() {
         let mut tiles = buffers::<2>();
         let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), |_, _| 2.0);
-        let stretch = Vec3::new(40.0, 0.0, 1.0);
-        let mut contact = Contact::landing(ContactSettings::AT_1_KHZ, column(60.5, 5.5), stretch);
+        let displacement = Vec3::new(40.0, 0.0, 1.0);
+        let mut contact =
+            Contact::landing(ContactSettings::AT_1_KHZ, column(60.5, 5.5), displacement);
         let hip = GridPoint::new([20, 5, 1], Vec3::splat(0.5));
         for _ in 0..3 {
             assert_eq!(contact.land(&field.window), None);
@@ -143,8 +145,8 @@ mod tests {
             assert_eq!(output.displacement, Vec3::ZERO);
         }
         assert_eq!(
-            contact.stretch(),
-            Some(stretch),
+            contact.displacement(),
+            Some(displacement),
             "for another view meanwhile"
         );
         let _ = field.install(TileKey::new(0, 1, 0));
@@ -158,13 +160,14 @@ mod tests {
         let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), |x, _| {
             if x > 20 { f32::NAN } else { 0.0 }
         });
-        let stretch = Vec3::new(0.0, 0.0, 1.0);
-        let mut contact = Contact::landing(ContactSettings::AT_1_KHZ, column(30.5, 5.5), stretch);
+        let displacement = Vec3::new(0.0, 0.0, 1.0);
+        let mut contact =
+            Contact::landing(ContactSettings::AT_1_KHZ, column(30.5, 5.5), displacement);
         assert_eq!(contact.land(&field.window), None);
         let output = *contact.step(&field.window, &column(30.5, 5.5));
         assert_eq!(
             (output.state, output.missing_tile),
-            (ContactState::Waiting, None)
+            (ContactState::Unseeded, None)
         );
         assert!(!contact.is_landing());
     }

@@ -26,9 +26,9 @@ pub(super) enum Came {
 }
 
 /// A point of the surface that is felt.
-pub(super) struct Felt {
+pub(super) struct SurfaceContact {
     pub(super) point: SurfacePoint,
-    /// Where it is.
+    /// Its place.
     pub(super) proxy: GridPoint,
     /// From the HIP to it, cells.
     pub(super) displacement: Vec3,
@@ -102,7 +102,7 @@ impl Contact {
         if self.rough.is_some() {
             return self.is_held_at(window, hip, point, came, budget);
         }
-        let felt = Felt {
+        let felt = SurfaceContact {
             point,
             proxy: view.position(&point, z),
             displacement: view.displacement(&point, z),
@@ -115,7 +115,7 @@ impl Contact {
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        felt: Felt,
+        felt: SurfaceContact,
         came: Came,
         budget: &mut Budget,
     ) -> Turn {
@@ -166,7 +166,7 @@ impl Contact {
         let Some((proxy, displacement)) = self.felt else {
             return self.looks_around(window, hip, budget);
         };
-        self.phase = Phase::Fading {
+        self.phase = Phase::Releasing {
             proxy,
             displacement,
             fade: 1.0,
@@ -182,7 +182,7 @@ impl Contact {
         budget: &mut Budget,
     ) -> Turn {
         let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
-        if let Phase::Fading {
+        if let Phase::Releasing {
             proxy,
             displacement,
             fade,
@@ -191,7 +191,7 @@ impl Contact {
             *fade = approach(*fade, 0.0, most);
             if *fade > 0.0 {
                 self.output = ContactOutput {
-                    state: ContactState::Fading,
+                    state: ContactState::Releasing,
                     proxy: *proxy,
                     displacement: *displacement * *fade,
                     converged: true,

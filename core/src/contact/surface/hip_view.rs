@@ -64,7 +64,7 @@ impl HipView {
         (column, CellContent::Hole)
     }
 
-    /// Whether the HIP is above the patch of these corners, which it is over.
+    /// Returns true if the HIP is above the patch of these corners, which it is over.
     pub(crate) fn is_above(&self, cell: Cell, corners: &Corners) -> bool {
         let (u, v) = self.in_patch(cell);
         self.patch(corners).height(u, v) < 0.0

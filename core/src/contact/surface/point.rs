@@ -108,7 +108,7 @@ impl SurfacePoint {
         }
     }
 
-    /// Whether it is the very place that `other` is, also where they name it in
+    /// Returns true if it is the very place that `other` is, also where they name it in
     /// different patches.
     pub(in crate::contact) fn is_same_place(&self, other: &Self) -> bool {
         let place = |point: &Self| {
@@ -135,7 +135,7 @@ impl SurfacePoint {
         }
     }
 
-    /// Whether it is farther from its patch's border than any rounding.
+    /// Returns true if it is farther from its patch's border than any rounding.
     #[inline]
     pub(in crate::contact) fn is_well_inside(&self) -> bool {
         is_well_inside(self.u) && is_well_inside(self.v)
@@ -153,7 +153,7 @@ impl SurfacePoint {
     }
 }
 
-/// Whether a coordinate is farther from its patch's border than any rounding.
+/// Returns true if a coordinate is farther from its patch's border than any rounding.
 #[inline]
 pub(in crate::contact) fn is_well_inside(x: f32) -> bool {
     x > BORDER && x < 1.0 - BORDER

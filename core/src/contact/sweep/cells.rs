@@ -63,7 +63,7 @@ impl Step {
         }
     }
 
-    /// Whether it is no more than a point.
+    /// Returns true if it is no more than a point.
     pub(super) fn is_point(&self) -> bool {
         self.from == self.to && self.z_from == self.z_to
     }
@@ -127,7 +127,7 @@ impl Steps {
         }
     }
 
-    /// Whether the last cell has been given.
+    /// Returns true if the last cell has been given.
     pub(super) fn is_done(&self) -> bool {
         self.done
     }
@@ -223,19 +223,19 @@ impl Axis {
         }
     }
 
-    /// Where in a square the border ahead is.
+    /// Returns the place where in a square the border ahead is.
     #[inline]
     fn ahead(&self) -> f32 {
         if self.toward > 0 { 1.0 } else { 0.0 }
     }
 
-    /// Where in the square the path is after a fraction of it.
+    /// Returns the place where in the square the path is after a fraction of it.
     #[inline]
     fn at(&self, t: f32) -> f32 {
         (self.start + self.way * t - self.floor).clamp(0.0, 1.0)
     }
 
-    /// Where in the last square the path ends.
+    /// Returns the place where in the last square the path ends.
     #[inline]
     fn ends(&self) -> f32 {
         (self.end - self.floor).clamp(0.0, 1.0)

@@ -1,4 +1,4 @@
-//! Where a straight line first goes from above a patch to below it.
+//! The first crossing of a straight line from above a patch to below it.
 
 /// First root of the height gap along a segment, as a fraction of it, from the
 /// gap's Bernstein coefficients: at the start, blossom, at the end.

@@ -138,7 +138,7 @@ impl Path {
         Swept::Clear
     }
 
-    /// Whether the piece up to `end` is intersected cell by cell: it is short, and
+    /// Returns true if the piece up to `end` is intersected cell by cell: it is short, and
     /// in height, too, which would otherwise cost bits.
     fn is_walked(&self, end: &GridPoint) -> bool {
         let span = CellBox::around(self.at.column(), end.column());

@@ -156,7 +156,7 @@ fn a_current_that_flows_with_the_amplifiers_off_is_a_fault() {
 }
 
 #[test]
-fn the_fastest_change_of_force_is_no_mismatch_for_an_amplifier_a_millisecond_late() {
+fn fastest_force_change_is_no_mismatch_for_late_amplifier() {
     let mut bench = Bench::armed();
     let mut commands = [Vec3::ZERO; 3];
     for ticks in 0..2_000 {

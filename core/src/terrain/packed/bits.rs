@@ -68,7 +68,7 @@ impl<'b> BitReader<'b> {
         self.held -= count;
     }
 
-    /// Whether all bytes were used, and what is left of the last one is zeros.
+    /// Returns true if all bytes were used, and what is left of the last one is zeros.
     pub(super) fn is_at_end(&self) -> bool {
         let unused = self.held as i32 - 8 * self.beyond as i32;
         self.bytes.len() == 0 && self.ahead == 0 && (0..8).contains(&unused)

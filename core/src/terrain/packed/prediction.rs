@@ -1,4 +1,4 @@
-//! What a sample's number should be by those before it.
+//! Prediction of a sample's number from those before it.
 
 use crate::terrain::TILE_SAMPLES;
 

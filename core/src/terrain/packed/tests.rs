@@ -1,4 +1,4 @@
-//! Whether a tile is bit for bit what it was, and bytes that are no tile are refused.
+//! Packed tiles: bit for bit what they were; other bytes are refused.
 //!
 //! The judge is [`Tile::load`] with the bytes of the same heights.
 

@@ -59,7 +59,7 @@ impl<'b> Unpacker<'b> {
         }
     }
 
-    /// Whether the bytes were those of all samples until now, and no more.
+    /// Returns true if the bytes were those of all samples until now, and no more.
     pub(in crate::terrain) fn is_at_end(&self) -> bool {
         self.bits.is_at_end() && self.runs.as_ref().is_none_or(|runs| runs.left == 0)
     }
@@ -90,7 +90,7 @@ impl Runs {
         }
     }
 
-    /// Whether the next sample is a hole.
+    /// Returns true if the next sample is a hole.
     #[inline]
     fn is_hole(&mut self, bits: &mut BitReader<'_>) -> bool {
         if self.left == 0 {

@@ -1,4 +1,4 @@
-//! What lies in a window where the surface is not a tile of the scene's level: before it comes,
+//! Content of a window where the surface is not a tile of the scene's level: before it arrives,
 //! and while it settles ([`TileBlend`](super::TileBlend)).
 
 use super::{CellContent, Corners, Window};
@@ -11,7 +11,7 @@ use crate::terrain::underlay::Underlay;
 
 /// A height that is felt at a sample, and whether it is a tile's.
 #[derive(Clone, Copy)]
-struct Felt {
+struct BlendedHeight {
     height: f32,
     is_of_tile: bool,
 }
@@ -68,7 +68,7 @@ impl<'t, const D: usize> Window<'t, D> {
         Some(self.put(tile, settles))
     }
 
-    /// Whether a patch is that of its tile, and not of the underlay, nor between the two.
+    /// Returns true if a patch is that of its tile, and not of the underlay, nor between the two.
     #[must_use]
     #[inline]
     pub fn is_settled(&self, cell: Cell) -> bool {
@@ -188,7 +188,7 @@ impl<'t, const D: usize> Window<'t, D> {
             let sample = cell.offset(corner & 1, corner >> 1);
             let felt = match is_on_border(sample.x) || is_on_border(sample.y) {
                 true => self.felt(sample, coarse[corner as usize], base),
-                false => Felt {
+                false => BlendedHeight {
                     height: *height,
                     is_of_tile,
                 },
@@ -202,8 +202,8 @@ impl<'t, const D: usize> Window<'t, D> {
     /// The height felt at a sample that several tiles may share, in cells above `base`.
     // A call: four copies of it would be a kilobyte.
     #[inline(never)]
-    fn felt(&self, sample: Cell, coarse: f32, base: i32) -> Felt {
-        let mut felt = Felt {
+    fn felt(&self, sample: Cell, coarse: f32, base: i32) -> BlendedHeight {
+        let mut felt = BlendedHeight {
             height: coarse,
             is_of_tile: false,
         };
@@ -223,7 +223,7 @@ impl<'t, const D: usize> Window<'t, D> {
                 let (col, row) = (sample.x - first.x, sample.y - first.y);
                 let own =
                     tile.post(col as usize, row as usize) + tile.base().wrapping_sub(base) as f32;
-                felt = Felt {
+                felt = BlendedHeight {
                     height: within(own, coarse, allowed),
                     is_of_tile: true,
                 };
@@ -256,7 +256,7 @@ impl<'t, const D: usize> Window<'t, D> {
             .material(patch, far)
     }
 
-    /// Whether what is felt in place of a tile is known to lie below `low`, all over the tile.
+    /// Returns true if what is felt in place of a tile is known to lie below `low`, all over the tile.
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_is_below(&self, index: TileIndex, low: Altitude) -> bool {
@@ -276,12 +276,12 @@ impl<'t, const D: usize> Window<'t, D> {
     }
 }
 
-/// Whether a column or row of samples is the border of two tiles.
+/// Returns true if a column or row of samples is the border of two tiles.
 const fn is_on_border(at: i32) -> bool {
     at & (TILE_CELLS as i32 - 1) == 0
 }
 
-/// Whether no corner of a cell is on the border of its tile.
+/// Returns true if no corner of a cell is on the border of its tile.
 fn is_inside(cell: Cell) -> bool {
     let on_border = |at: i32| is_on_border(at) || is_on_border(at + 1);
     !(on_border(cell.x) || on_border(cell.y))

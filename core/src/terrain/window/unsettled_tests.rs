@@ -242,7 +242,7 @@ fn cells_that_share_samples_of_the_underlay_agree_to_the_bit() {
 }
 
 #[test]
-fn no_sample_moves_faster_than_it_may_and_in_the_end_it_is_the_tile_s_to_the_bit() {
+fn blended_samples_keep_their_speed_and_end_at_the_tile() {
     let mut room = room();
     let mut bed = Bed::with_underlay(&mut room);
     let heights = |bed: &Bed<'_>| {
@@ -297,7 +297,7 @@ fn no_sample_moves_faster_than_it_may_and_in_the_end_it_is_the_tile_s_to_the_bit
 }
 
 #[test]
-fn a_tile_that_nobody_feels_is_the_surface_at_once_and_one_beside_bends_to_it() {
+fn untouched_tile_is_the_surface_at_once() {
     let mut room = room();
     let mut bed = Bed::with_underlay(&mut room);
     bed.comes(6, 4, HERE);
@@ -330,7 +330,7 @@ fn without_its_underlay_a_tile_is_the_surface_at_once_and_stays_it() {
 }
 
 #[test]
-fn holes_of_a_tile_are_holes_at_once_and_those_of_the_underlay_are_not_known() {
+fn no_data_of_a_tile_acts_at_once() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
     bed.window.lay(Some(Underlay {
@@ -398,7 +398,7 @@ fn a_hole_of_the_near_tile_is_not_known_where_the_wide_one_has_none() {
 }
 
 #[test]
-fn what_the_near_tile_alone_has_counts_for_what_is_clear_and_for_how_far_a_tile_moves() {
+fn near_tile_counts_for_clearance_and_blend_distance() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
     bed.lays_part(WIDE, 0, &|_, _| 0.0);

@@ -33,7 +33,7 @@ use crate::{chip, outputs};
 
 /// The emergency stop's input.
 pub(crate) trait Stop {
-    /// Whether the stop is pressed, its wire is broken, or either was so for a moment.
+    /// Returns true if the stop is pressed, its wire is broken, or either was so for a moment.
     fn is_pressed(&mut self) -> bool;
 }
 

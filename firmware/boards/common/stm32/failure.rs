@@ -20,7 +20,7 @@ use crate::chip::{ENABLE_OFF, amplifiers_off, write_back};
 
 /// Ticks since the start, counted by the interrupt below the haptic one.
 static TICKS: AtomicU32 = AtomicU32::new(0);
-/// Whether a record of this program's end is written or being written. The first one
+/// True if a record of this program's end is written or being written. The first one
 /// tells the cause; what fails after it follows from that.
 static HAS_ENDED: AtomicBool = AtomicBool::new(false);
 /// CFSR: MMFAR holds the address of a forbidden access.

@@ -1,4 +1,4 @@
-//! What the amplifiers say: a ready line of each, and a current monitor of each where
+//! Feedback of the amplifiers: a ready line of each, and a current monitor of each where
 //! they have one.
 
 use embassy_stm32::adc::{Adc, AnyAdcChannel};
@@ -26,7 +26,7 @@ pub(crate) struct Feedback {
 }
 
 impl Feedback {
-    /// Whether an amplifier is not ready.
+    /// Returns true if an amplifier is not ready.
     pub(crate) fn is_unready(&self) -> bool {
         self.ready.iter().any(Input::is_high)
     }

@@ -1,4 +1,4 @@
-//! What the STM32 boards share: everything but pins, clocks and outputs.
+//! Common parts of the STM32 boards: everything but pins, clocks and outputs.
 //!
 //! Each image names its pins and clocks in `chip.rs`, its outputs in `outputs.rs`, and
 //! how its flash is read in `flash.rs`; [`start`] assembles the application from them.

@@ -31,7 +31,7 @@ pub(crate) fn set_up(mpu: &MPU) {
     cortex_m::asm::isb();
 }
 
-/// Whether an address is in the guard.
+/// Returns true if an address is in the guard.
 pub(crate) fn has(address: u32) -> bool {
     (FIRST..FIRST + BYTES).contains(&address)
 }

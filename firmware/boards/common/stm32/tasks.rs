@@ -28,7 +28,7 @@ const CHECK_MS: u32 = 10;
 /// How often the stack and the oscillator of USB are measured, milliseconds.
 const MEASURE_MS: u32 = 1_000;
 
-/// How long the host has to fetch the answer before the board enters its loader.
+/// Time for which the host has to fetch the answer before the board enters its loader.
 const FAREWELL: Duration = Duration::from_millis(50);
 
 /// What the LED shows: the link sets it, the supervisor shows it.

@@ -1,4 +1,4 @@
-//! Whether the oscillator of USB follows the host's start-of-frames, as the chip's clock
+//! Check that the oscillator of USB follows the host's start-of-frames, as the chip's clock
 //! recovery tells it. Full speed allows 0.25 % of error; alone the oscillator has 1 % at 30 °C
 //! and 3.5 % over all temperatures, and only some hosts put up with that.
 

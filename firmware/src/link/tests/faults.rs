@@ -1,4 +1,4 @@
-//! What a session does when things go wrong.
+//! Sessions with injected faults.
 
 use std::collections::HashSet;
 use std::vec;
@@ -376,7 +376,7 @@ fn an_arm_that_was_only_looked_at_is_let_go_after_the_time_too() {
 }
 
 #[test]
-fn a_host_that_detaches_arms_nothing_and_one_that_says_goodbye_after_it_disarms() {
+fn detached_host_arms_nothing_and_later_close_disarms() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.ask(Request::Zero { counts: [0; 3] });
     rig.ask(Request::Arm);
@@ -527,7 +527,7 @@ fn duplicated_frames_change_nothing() {
 }
 
 #[test]
-fn a_point_whose_answer_was_lost_is_answered_again_without_being_felt_again() {
+fn lost_answer_is_repeated_without_another_step() {
     let mut rig = Rig::in_scene(scene(Source::Points));
     let first = rig.descend(3)[2];
     rig.send(&point(2, 1.8, 3.8));
@@ -718,7 +718,7 @@ fn a_tile_that_never_comes_is_asked_for_again_and_again() {
 }
 
 #[test]
-fn where_time_stands_still_a_tile_that_does_not_come_is_asked_for_after_two_alives() {
+fn missing_tile_is_requested_again_after_two_heartbeats() {
     let held = Scene {
         hold_clock: true,
         ..scene(Source::Encoders)

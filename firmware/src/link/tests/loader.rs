@@ -10,7 +10,7 @@ use super::rig::{Rig, scene};
 const TO_ENTER: fn(&Request) -> bool = |r| matches!(r, Request::EnterLoader);
 const TO_ARM: fn(&Request) -> bool = |r| matches!(r, Request::Arm);
 
-/// Whether the board is to enter its loader.
+/// Returns true if the board is to enter its loader.
 fn enters(rig: &Rig) -> bool {
     rig.device.link.enters_loader()
 }

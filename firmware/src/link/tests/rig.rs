@@ -130,7 +130,7 @@ pub(super) struct Rig {
     pub(super) asked: Vec<(u8, Request)>,
     /// Refusals heard.
     pub(super) refused: Vec<VersionCheck>,
-    /// Whether tiles asked for are answered.
+    /// True if tiles asked for are answered.
     pub(super) answers_tiles: bool,
     /// What the answer to a tile becomes on the way.
     pub(super) damage: fn(&mut Vec<u8>),

@@ -1,4 +1,4 @@
-//! What a session does when nothing goes wrong.
+//! Sessions without faults.
 
 use std::vec::Vec;
 

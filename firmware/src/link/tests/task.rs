@@ -78,7 +78,7 @@ impl LinkBoard for Board {
 
 /// What the board does after a poll, which is to set the LED, goes on.
 #[test]
-fn the_board_looks_at_the_link_after_every_tick_while_the_host_does_not_read() {
+fn board_polls_the_link_while_the_host_does_not_read() {
     let mut device = device(Stored::Missing, BootReport::default());
     let sent = Sent(frame(&ToDevice::Hello(HELLO)));
     let board = Board::default();

@@ -5,7 +5,7 @@ use std::vec::Vec;
 use hapterra_core::clutch::ClutchHold;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
-use hapterra_core::scene::{Scene, Source, TickRecord, View};
+use hapterra_core::scene::{Scene, SceneChange, Source, TickRecord};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 
@@ -13,8 +13,8 @@ use super::rig::{Rig, scene};
 
 const TO_CLUTCH: fn(&Request) -> bool = |r| matches!(r, Request::Clutch { .. });
 
-fn view(number: u8, hip: GridPoint) -> View {
-    View {
+fn view(number: u8, hip: GridPoint) -> SceneChange {
+    SceneChange {
         number,
         scene: Scene {
             epoch: 1_000 + u32::from(number),
@@ -59,13 +59,13 @@ fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
     let wanted = view(1, latest(&rig).hip);
     rig.heard
         .retain(|message| !matches!(message, ToHost::TileRequest { .. }));
-    rig.say(&ToDevice::View(wanted));
+    rig.say(&ToDevice::SceneChange(wanted));
     rig.run(40);
     assert_eq!(taken(&rig), [(1_001, true)]);
     assert!(!rig.needs().is_empty(), "its own tiles are asked for");
     assert_eq!((latest(&rig).view, latest(&rig).mode), (1, Mode::Armed));
     // Said again, because the answer was lost.
-    rig.say(&ToDevice::View(wanted));
+    rig.say(&ToDevice::SceneChange(wanted));
     rig.run(10);
     assert_eq!(taken(&rig), [(1_001, true); 2]);
     rig.ask(Request::Clutch {
@@ -77,13 +77,13 @@ fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
     assert_eq!(sample.limits, Limits::empty());
     assert_eq!(rig.status().device.epoch, Some(1_001));
     // Said once more, late: it is in force, and nothing is done.
-    rig.say(&ToDevice::View(wanted));
+    rig.say(&ToDevice::SceneChange(wanted));
     rig.run(10);
     assert_eq!(taken(&rig), [(1_001, true); 3]);
     assert_eq!(latest(&rig).mode, Mode::Armed);
     // One from before, late.
-    rig.say(&ToDevice::View(view(0, sample.hip)));
-    rig.say(&ToDevice::View(view(200, sample.hip)));
+    rig.say(&ToDevice::SceneChange(view(0, sample.hip)));
+    rig.say(&ToDevice::SceneChange(view(200, sample.hip)));
     rig.run(10);
     assert_eq!(taken(&rig).len(), 3, "nobody waits for an answer to that");
 }
@@ -93,7 +93,7 @@ fn a_view_that_comes_while_something_is_felt_is_refused() {
     let mut rig = Rig::armed();
     rig.run(20);
     let before = latest(&rig);
-    rig.say(&ToDevice::View(view(1, before.hip)));
+    rig.say(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
@@ -102,7 +102,7 @@ fn a_view_that_comes_while_something_is_felt_is_refused() {
     rig.ask(Request::Clutch {
         hold: ClutchHold::LetGo,
     });
-    rig.say(&ToDevice::View(view(1, before.hip)));
+    rig.say(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!(latest(&rig).mode, Mode::Armed);
@@ -112,21 +112,21 @@ fn a_view_that_comes_while_something_is_felt_is_refused() {
         hold: ClutchHold::InPlace,
     });
     rig.run(20);
-    rig.say(&ToDevice::View(view(1, before.hip)));
+    rig.say(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
     // It is open, but what the loop has said is of the view before.
     let mut rig = with_an_open_clutch();
-    rig.say(&ToDevice::View(view(1, before.hip)));
-    rig.say(&ToDevice::View(view(2, before.hip)));
+    rig.say(&ToDevice::SceneChange(view(1, before.hip)));
+    rig.say(&ToDevice::SceneChange(view(2, before.hip)));
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, true), (1_002, false)]);
     // Nor is a replay put in like this.
     let mut rig = with_an_open_clutch();
     let mut points = view(1, before.hip);
     points.scene.source = Source::Points;
-    rig.say(&ToDevice::View(points));
+    rig.say(&ToDevice::SceneChange(points));
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!(latest(&rig).mode, Mode::Armed);

@@ -37,7 +37,7 @@ fn known(key: &str) -> Option<&'static str> {
     })
 }
 
-/// Whether a file begins with a header's key.
+/// Returns true if a file begins with a header's key.
 pub(super) fn looks_like_header(head: &[u8]) -> bool {
     let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
     let text = String::from_utf8_lossy(head);

@@ -42,7 +42,7 @@ fn decode(input: &FileBytes) -> Result<Decoded, RasterError> {
     if let Some(word) = &header.no_data_word {
         let word = beginning(word);
         decoded.remarks.push(format!(
-            "its no-data value is the text '{word}', which is no number: samples with this text are holes, and those of {}",
+            "its no-data value is the text '{word}', which is no number: samples with this text count as no data, and those of {}",
             header.no_data()
         ));
     }

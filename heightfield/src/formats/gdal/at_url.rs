@@ -103,7 +103,7 @@ pub(super) fn fault(error: io::Error) -> RasterError {
     }
 }
 
-/// Whether a file that begins so is fetched as a whole.
+/// Returns true if a file that begins so is fetched as a whole.
 pub(super) fn is_fetched(head: &[u8]) -> bool {
     FETCHED.iter().any(|bytes| head.starts_with(bytes))
 }

@@ -152,8 +152,7 @@ fn opened(
         return Err(RasterError::UnknownFormat);
     }
     if driver == "GRASSASCIIGrid" && has_stars(place, options)? {
-        let why =
-            "it reads * as a height of 0: write a number for holes (r.out.ascii null_value=-9999)";
+        let why = "it reads * as a height of 0: write a number for no data (r.out.ascii null_value=-9999)";
         return Err(RasterError::ByGdal(Error::Refused(why.into())));
     }
     let part = match chosen(&dataset, options) {
@@ -181,7 +180,7 @@ fn open(library: &Library, path: &Path, options: &OpenOptions) -> Result<Dataset
     library.open(path, &open_options(options)).map_err(fault)
 }
 
-/// Whether a text has a star, as GRASS writes where there is no height.
+/// Checks that a text has a star, as GRASS writes where there is no height.
 fn has_stars(place: &Place, options: &OpenOptions) -> Result<bool, RasterError> {
     let input = FileBytes::open(&place.source, &options.elsewhere)?;
     let mut reader = input.reader()?;
@@ -302,7 +301,7 @@ fn decoded(
     }
     if OF_FILES.contains(&driver.as_str()) && no_data.is_none() {
         decoded.remarks.push(
-            "it is read by GDAL, which has height 0 where none of its files is: for holes, make it with a no-data value (gdalbuildvrt -vrtnodata)"
+            "it is read by GDAL, which has height 0 where none of its files is: to mark no data, build it with a no-data value (gdalbuildvrt -vrtnodata)"
                 .into(),
         );
     }

@@ -1,4 +1,4 @@
-//! What NetCDF's conventions (CF) say of heights and places, where GDAL leaves it to its callers.
+//! NetCDF's conventions (CF) for heights and places, where GDAL leaves them to its callers.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub(super) struct Conventions {
     missing: Option<String>,
     /// Metres in a unit of the axes.
     axes_m: Option<f64>,
-    /// Whether the samples of a row lie from north to south.
+    /// True if the samples of a row lie from north to south.
     pub(super) is_turned: bool,
 }
 
@@ -105,7 +105,7 @@ impl Conventions {
             .collect();
         if !felt.is_empty() {
             decoded.remarks.push(format!(
-                "its missing_value {} is felt as a height: GDAL knows one no-data value (--input no-data=VALUE)",
+                "its missing_value {} is read as a height: GDAL knows one no-data value (--input no-data=VALUE)",
                 felt.join(", ")
             ));
         }

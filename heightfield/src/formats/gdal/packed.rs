@@ -19,7 +19,7 @@ const MAX_BYTES: u64 = 1 << 30;
 const MAX_ENTRIES: usize = 1 << 14;
 /// Files that GDAL is asked for.
 const MAX_TRIED: usize = 64;
-/// Where a tar file says that it is one.
+/// Place where a tar file says that it is one.
 const TAR_SIGN: usize = 257;
 /// How files are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! Where GDAL finds a file, and what has to stay there while it reads.
+//! Names of files for GDAL, and what must stay there while it reads.
 
 use std::path::{Path, PathBuf};
 
@@ -84,7 +84,7 @@ impl Place {
         Ok(self)
     }
 
-    /// Whether GDAL reads it through this program.
+    /// Returns true if GDAL reads it through this program.
     pub(super) const fn is_served(&self) -> bool {
         self.served.is_some()
     }
@@ -108,7 +108,7 @@ impl Place {
         }
     }
 
-    /// Why something at its server could not be read.
+    /// Returns the reason for which something at its server could not be read.
     pub(super) fn take_fault(&self) -> Option<std::io::Error> {
         let (_, mount) = self.served.as_ref()?;
         mount.take_fault()

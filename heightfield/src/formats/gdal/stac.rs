@@ -30,7 +30,7 @@ struct Item {
     stated: Option<([u32; 2], [f64; 6])>,
 }
 
-/// Why a document of items is not read; none where a file is something else.
+/// Returns the reason for which a document of items is not read; none where a file is something else.
 pub(super) fn refused(
     place: &Place,
     options: &OpenOptions,
@@ -194,7 +194,7 @@ impl Item {
 }
 
 impl Item {
-    /// Whether a file lies where the item says, if it does.
+    /// Returns true if a file lies where the item says, if it does.
     fn is_place_of(&self, file: &Dataset) -> bool {
         let Some((size, stated)) = self.stated else {
             return true;

@@ -11,7 +11,7 @@ use crate::numbers::{self, NoDataText};
 use crate::read::Stored;
 use crate::{Endian, RasterError, SampleType};
 
-/// Whether a text is such a header: it says how many columns and rows there are.
+/// Returns true if a text is such a header: it says how many columns and rows there are.
 pub(super) fn is_header(text: &str) -> bool {
     let keys = Keys::read(text);
     keys.0.contains_key("ncols") && keys.0.contains_key("nrows")

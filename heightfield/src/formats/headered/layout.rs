@@ -1,4 +1,4 @@
-//! How samples lie in a file without a header of its own.
+//! Layout of samples in a file without a header of its own.
 
 use crate::plain::Plain;
 use crate::read::Stored;
@@ -88,7 +88,7 @@ impl Layout {
         Ok(())
     }
 
-    /// Where the last sample of a band ends; `None` where that cannot be counted.
+    /// Returns the place where the last sample of a band ends; `None` where that cannot be counted.
     fn end(&self, band: u32) -> Option<u64> {
         let steps = self.steps(band)?;
         let last_row = u64::from(self.rows)
@@ -146,7 +146,7 @@ impl Layout {
         })
     }
 
-    /// Where the samples of a band lie; the size has been checked.
+    /// Returns the place where the samples of a band lie; the size has been checked.
     pub(super) fn plain(&self, band: u32) -> Result<Plain, RasterError> {
         let uncounted = || RasterError::AbsurdSize("its header's sizes".into());
         let steps = self.steps(band).ok_or_else(uncounted)?;

@@ -30,7 +30,7 @@ pub(super) const FORMAT: Format = Format {
     },
 };
 
-/// Whether a file begins as one of a kind that has no plain samples: a header of the same name
+/// Returns true if a file begins as one of a kind that has no plain samples: a header of the same name
 /// beside it is that of another file.
 pub(crate) fn is_of_another_kind(head: &[u8]) -> bool {
     const BEGINNINGS: [&[u8]; 7] = [

@@ -15,7 +15,7 @@ const MAX_SIDES: usize = 32;
 pub(super) struct Header {
     /// Byte order, kind and bytes of a sample, as `<f4`.
     pub(super) descr: String,
-    /// Whether the first index runs fastest.
+    /// True if the first index runs fastest.
     pub(super) column_major: bool,
     pub(super) shape: Vec<u64>,
     /// Bytes before the samples.
@@ -93,7 +93,7 @@ fn unfamiliar(what: &str) -> RasterError {
 struct Rest<'t>(&'t str);
 
 impl<'t> Rest<'t> {
-    /// Whether a sign comes next, which is passed then.
+    /// Returns true if a sign comes next, which is passed then.
     fn takes(&mut self, sign: &str) -> bool {
         let rest = self.0.trim_start();
         let after = rest.strip_prefix(sign);

@@ -69,7 +69,7 @@ impl Codes {
         })
     }
 
-    /// Whether the heights are those of ground: on Earth, and for the most part close
+    /// Returns true if the heights are those of ground: on Earth, and for the most part close
     /// to those beside them, which the colours of a photograph are not.
     fn look_like(&self, encoding: Encoding) -> bool {
         /// Metres: below the deepest sea and above the highest mountain.

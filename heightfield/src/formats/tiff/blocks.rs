@@ -28,13 +28,13 @@ const USUAL_BLOCK: u32 = 256;
 /// Of longer rows of plain samples parts are read.
 const MAX_ROW: u32 = 32_768;
 
-/// Whether single blocks of an image can be read: its rows can, or a strip or tile is not too
+/// Returns true if single blocks of an image can be read: its rows can, or a strip or tile is not too
 /// large.
 fn suit(layout: &Layout) -> bool {
     layout.is_read_by_rows() || is_small(layout, chunks(layout))
 }
 
-/// Whether a block of so many columns and rows is not too large to be decoded.
+/// Returns true if a block of so many columns and rows is not too large to be decoded.
 fn is_small(layout: &Layout, block: [u32; 2]) -> bool {
     let [columns, rows] = block.map(u64::from);
     let samples = columns.saturating_mul(rows);
@@ -67,7 +67,7 @@ fn chunks(layout: &Layout) -> [u32; 2] {
     [several(columns), down]
 }
 
-/// Where the bytes of a part lie in the file.
+/// Returns the place where the bytes of a part lie in the file.
 fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
     let mut ranges = vec![];
     let bands = layout.bands_read();
@@ -137,7 +137,7 @@ impl Image {
         })
     }
 
-    /// Whether parts of it can be read, and nothing has to be unpacked for that.
+    /// Returns true if parts of it can be read, and nothing has to be unpacked for that.
     pub(super) fn has_parts(&self) -> bool {
         suit(&self.layout)
     }
@@ -367,7 +367,7 @@ fn stamped(inputs: &[&FileBytes]) -> Result<Option<Vec<(FileBytes, FileStamp)>>,
 }
 
 impl Image {
-    /// Whether it shows all of another image in fewer samples of the same type and index.
+    /// Returns true if it shows all of another image in fewer samples of the same type and index.
     fn is_overview_of(&self, full: &Self) -> bool {
         let (ours, theirs) = (&self.layout, &full.layout);
         let times = [
@@ -392,7 +392,7 @@ impl Image {
             .map(|tag| &tag.value)
     }
 
-    /// Whether it lies where another image lies, as far as it says so: most overviews do not.
+    /// Returns true if it lies where another image lies, as far as it says so: most overviews do not.
     fn has_place_of(&self, full: &Self, times: [f64; 2]) -> bool {
         const PIXEL_SCALE: u16 = 33550;
         const TIE_POINTS: u16 = 33922;

@@ -1,4 +1,4 @@
-//! Whether a file can hold what its header promises, before room is made for it.
+//! Check that a file can hold what its header promises, before memory is allocated.
 
 use super::layout::Layout;
 use super::unpack;

@@ -1,4 +1,4 @@
-//! What the decoder's errors say to the user.
+//! Errors of the decoder, for the user.
 
 use tiff_reader::TiffError;
 

@@ -1,4 +1,4 @@
-//! Where the image lies: reference system, map to the ground, units.
+//! Georeference of the image: reference system, map to the ground, units.
 
 use geotiff_core::geokeys::{
     GEODETIC_CRS_TYPE, GEOG_CITATION, GT_CITATION, PROJ_CITATION, PROJECTED_CRS_TYPE,

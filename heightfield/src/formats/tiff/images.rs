@@ -1,4 +1,4 @@
-//! What each image of a file is.
+//! Kinds of the images of a file.
 
 use std::sync::Arc;
 

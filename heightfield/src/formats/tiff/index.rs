@@ -1,4 +1,4 @@
-//! Where the strips or tiles of an image lie: the lists of its directory, as the decoder has them.
+//! Index of an image's strips or tiles: the lists of its directory, as the decoder has them.
 
 use tiff_reader::{Ifd, TagValue};
 
@@ -12,7 +12,7 @@ const TILE_BYTE_COUNTS: u16 = 325;
 /// A strip or tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Chunk {
-    /// Where it lies in the file.
+    /// Place where it lies in the file.
     pub(super) place: u64,
     /// Bytes stored for it; 0 for one that a sparse file leaves out.
     pub(super) bytes: u64,

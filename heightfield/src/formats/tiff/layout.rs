@@ -1,4 +1,4 @@
-//! How an image's samples are stored, and whether they can be heights.
+//! Storage of an image's samples, and whether they can be heights.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -180,12 +180,12 @@ impl Layout {
         })
     }
 
-    /// Whether rows are read without the others of their strip or tile.
+    /// Returns true if rows are read without the others of their strip or tile.
     pub(super) fn is_read_by_rows(&self) -> bool {
         self.is_plain || self.unpacked.is_some()
     }
 
-    /// Whether nothing has to be unpacked on disk for a part.
+    /// Returns true if nothing has to be unpacked on disk for a part.
     #[cfg(test)]
     pub(super) fn is_at_hand(&self, part: &Part) -> bool {
         self.unpacked.as_ref().is_none_or(|unpacked| {
@@ -201,7 +201,7 @@ impl Layout {
         if self.tiled { "tiles" } else { "strips" }
     }
 
-    /// Whether it has strips.
+    /// Returns true if it has strips.
     pub(super) const fn has_strips(&self) -> bool {
         !self.tiled
     }
@@ -306,7 +306,7 @@ impl Layout {
         Some((first..end).map_while(move |number| index.at(number)))
     }
 
-    /// How many chunks a band has.
+    /// Returns the number of chunks that a band has.
     pub(super) fn chunks_of_band(&self) -> u64 {
         u64::from(self.chunks_across()) * u64::from(self.rows.div_ceil(self.chunk.1))
     }
@@ -394,7 +394,7 @@ fn check_predictor(image: &Ifd, format: SampleFormat) -> Result<(), RasterError>
     }
 }
 
-/// Whether bytes are samples: neither packed, nor differences, nor with their bits turned.
+/// Returns true if bytes are samples: neither packed, nor differences, nor with their bits turned.
 fn has_plain_samples(image: &Ifd) -> bool {
     (image.compression(), image.predictor(), image.fill_order()) == (1, 1, 1)
 }

@@ -17,7 +17,7 @@ use crate::disk_cache::DiskCache;
 /// A mask. 0 is no data.
 pub(super) struct Mask {
     directory: Directory,
-    /// Where it is laid out as masks are.
+    /// Place where it is laid out as masks are.
     layout: Option<Layout>,
 }
 

@@ -1,4 +1,4 @@
-//! What GDAL notes beside the samples: no-data, scale, offset, unit.
+//! GDAL's metadata beside the samples: no-data, scale, offset, unit.
 
 use tiff_reader::Ifd;
 

@@ -119,7 +119,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
 enum Told {
     /// A remark on how they are read.
     Remark(String),
-    /// Why all are in memory.
+    /// Reason for which all are in memory.
     Whole(String),
 }
 
@@ -248,7 +248,7 @@ fn open(input: &FileBytes) -> Result<TiffFile, RasterError> {
     })
 }
 
-/// Whether a list is not read because it is too long, however long the file is.
+/// Returns true if a list is not read because it is too long, however long the file is.
 fn is_long(reason: &str) -> bool {
     [MAX_LIST, ALL_LISTS]
         .iter()

@@ -34,7 +34,7 @@ pub(super) struct Unpacked {
 struct Kept {
     /// The strip or tile at each place of the file.
     slots: Vec<Option<Slot>>,
-    /// How often something was asked for.
+    /// Number of times that something was asked for.
     asked: u64,
 }
 
@@ -42,7 +42,7 @@ struct Kept {
 struct Slot {
     /// Where it lies in the TIFF, and how many rows of it are wanted.
     is_of: (u64, u32),
-    /// How many bytes are here, and what is wrong with the others.
+    /// Number of bytes that are here, and what is wrong with the others.
     bytes: u64,
     fault: Option<String>,
     /// When it was asked for last.
@@ -101,7 +101,7 @@ impl Unpacked {
         read.unwrap_or_else(|| Err(RasterError::damaged("TIFF: nothing was unpacked")))
     }
 
-    /// Whether a strip or tile is unpacked already.
+    /// Returns true if a strip or tile is unpacked already.
     #[cfg(test)]
     pub(super) fn has(&self, chunk: &Chunk) -> bool {
         self.kept().find(chunk).is_some()

@@ -235,7 +235,7 @@ fn the_tile_that_was_asked_for_longest_ago_goes_first() {
 }
 
 #[test]
-fn of_a_strip_that_is_cut_the_rows_before_are_there_and_it_is_told_why_the_others_are_not() {
+fn cut_strip_keeps_its_rows_and_reports_the_missing_ones() {
     fn cut(bytes: &[u8]) -> Vec<u8> {
         let packed = runs(bytes);
         packed[..packed.len() / 2].to_vec()

@@ -5,12 +5,12 @@ use super::error::UpdateError;
 /// A device that could be updated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plugged {
-    /// Where it is plugged in: the same place before and after it changes into its
+    /// Its USB port: the same before and after it changes into its
     /// loader.
     pub place: String,
     /// Its serial number. A loader's is another than that of the board's firmware.
     pub serial: Option<String>,
-    /// Whether it is a loader already, and not a board that runs its firmware.
+    /// True if it is a loader already, and not a board that runs its firmware.
     pub is_loader: bool,
 }
 

@@ -1,9 +1,9 @@
-//! Why an update failed, and whether the board still has its program.
+//! Failures of updates, and whether the board still has its program.
 
 use std::error::Error;
 use std::{fmt, io};
 
-/// Why an image could not be brought onto a board through its loader.
+/// Reason for which the loader did not write an image.
 #[derive(Debug, thiserror::Error)]
 pub enum UpdateError {
     /// Nothing to update is plugged in.
@@ -30,7 +30,7 @@ pub enum UpdateError {
     #[error("the loader describes its flash in a way that is not understood: {0:?}")]
     Layout(String),
     /// The loader's flash is not that of the board's chip.
-    #[error("the loader is not that of {board}: it says its flash is {said:?}")]
+    #[error("the loader is not that of {board}: it reports the flash {said:?}")]
     OtherChip {
         /// The board that the image is for.
         board: &'static str,
@@ -81,9 +81,9 @@ pub enum UpdateError {
 /// A failed update.
 #[derive(Debug)]
 pub struct UpdateFailure {
-    /// Why.
+    /// Its reason.
     pub error: UpdateError,
-    /// Whether anything was erased: the board has then no whole program.
+    /// True if anything was erased: the board has then no whole program.
     pub erased: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What a loader says of its flash: `@Internal Flash  /0x08000000/256*02Kg`, which is a
+//! A loader's description of its flash: `@Internal Flash  /0x08000000/256*02Kg`, which is a
 //! name, the first address, and runs of pages (UM0424, 4.3.2).
 
 use super::error::UpdateError;
@@ -15,7 +15,7 @@ pub struct Layout {
     pub start: u64,
     /// Bytes of a page.
     pub page_bytes: u64,
-    /// How many pages.
+    /// Number of pages.
     pub pages: u64,
 }
 

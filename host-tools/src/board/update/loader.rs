@@ -122,7 +122,7 @@ impl<P: ControlPipe> Loader<P> {
         Ok(loader)
     }
 
-    /// What the loader says of its flash.
+    /// Returns the loader's description of its flash.
     #[must_use]
     pub const fn layout(&self) -> &Layout {
         &self.layout

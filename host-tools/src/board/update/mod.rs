@@ -30,6 +30,6 @@ pub use choice::{Choice, Plugged, choose};
 pub use error::{UpdateError, UpdateFailure};
 pub use layout::Layout;
 pub use loader::{ControlPipe, Loader, request};
-pub use plan::{Plan, Stretch};
+pub use plan::{FlashRange, Plan};
 pub use procedure::{Step, update};
 pub use system::{LOADER_PRODUCT_ID, LOADER_VENDOR_ID, SystemPipe, open_loader, plugged};

@@ -12,22 +12,22 @@ use crate::board::memories::Memories;
 const ERASED: u8 = 0xFF;
 /// Whole words of flash, and what they will hold.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Stretch {
+pub struct FlashRange {
     /// The first address.
     pub address: u64,
-    /// What will be there.
+    /// Its new content.
     pub bytes: Vec<u8>,
 }
 
-/// What an update erases and writes.
+/// Erasures and writes of an update.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// First addresses of the pages to erase; first that with the vectors.
     pub erased: Vec<u64>,
     /// The word with the first two vectors, stack and start: written last.
-    pub vectors: Stretch,
+    pub vectors: FlashRange,
     /// Everything else, in order. What is not written of an erased page stays erased.
-    pub others: Vec<Stretch>,
+    pub others: Vec<FlashRange>,
 }
 
 impl Plan {
@@ -57,26 +57,26 @@ impl Plan {
         let behind = vectors.split_off(memories.word_bytes as usize);
         let word = std::mem::replace(vectors, behind);
         let others = pages.into_iter().map(|(address, bytes)| match address {
-            _ if address == start => Stretch {
+            _ if address == start => FlashRange {
                 address: start + memories.word_bytes,
                 bytes,
             },
-            _ => Stretch { address, bytes },
+            _ => FlashRange { address, bytes },
         });
         Ok(Self {
             erased,
-            vectors: Stretch {
+            vectors: FlashRange {
                 address: start,
                 bytes: word,
             },
-            others: others.filter(|stretch| !stretch.bytes.is_empty()).collect(),
+            others: others.filter(|range| !range.bytes.is_empty()).collect(),
         })
     }
 
     /// Bytes that are written.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let others: usize = self.others.iter().map(|stretch| stretch.bytes.len()).sum();
+        let others: usize = self.others.iter().map(|range| range.bytes.len()).sum();
         self.vectors.bytes.len() + others
     }
 }
@@ -129,7 +129,7 @@ mod tests {
     const G474: &str = "@Internal Flash   /0x08000000/256*02Kg";
 
     #[test]
-    fn an_image_takes_the_pages_that_it_lies_in_and_no_other_and_its_first_word_apart() {
+    fn image_erases_its_own_pages_only() {
         let plan = plan(&[(FLASH, 2049), (FLASH + 0x3010, 3)], G474).expect("fits");
         assert_eq!(plan.erased, [FLASH, FLASH + 0x800, FLASH + 0x3000]);
         assert_eq!((plan.vectors.address, plan.vectors.bytes.len()), (FLASH, 8));

@@ -2,11 +2,11 @@
 
 use super::error::{UpdateError, UpdateFailure};
 use super::loader::{ControlPipe, Loader};
-use super::plan::{Plan, Stretch};
+use super::plan::{FlashRange, Plan};
 use crate::board::boards::Board;
 use crate::board::image::Image;
 
-/// How far an update is.
+/// Progress of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// So many pages of so many are erased.
@@ -56,15 +56,15 @@ fn carry_out<P: ControlPipe>(
         progress(Step::Erased(done, pages));
     }
     let mut written = 0;
-    for stretch in &plan.others {
-        loader.write(stretch.address, &stretch.bytes)?;
-        written += stretch.bytes.len();
+    for range in &plan.others {
+        loader.write(range.address, &range.bytes)?;
+        written += range.bytes.len();
         progress(Step::Written(written, bytes));
     }
     let mut compared = 0;
-    for stretch in &plan.others {
-        compare(loader, stretch)?;
-        compared += stretch.bytes.len();
+    for range in &plan.others {
+        compare(loader, range)?;
+        compared += range.bytes.len();
         progress(Step::Compared(compared, bytes));
     }
     loader.write(plan.vectors.address, &plan.vectors.bytes)?;
@@ -74,11 +74,11 @@ fn carry_out<P: ControlPipe>(
     loader.leave(plan.vectors.address)
 }
 
-fn compare<P: ControlPipe>(loader: &mut Loader<P>, stretch: &Stretch) -> Result<(), UpdateError> {
-    let found = loader.read(stretch.address, stretch.bytes.len())?;
-    let mut pairs = found.iter().zip(&stretch.bytes);
+fn compare<P: ControlPipe>(loader: &mut Loader<P>, range: &FlashRange) -> Result<(), UpdateError> {
+    let found = loader.read(range.address, range.bytes.len())?;
+    let mut pairs = found.iter().zip(&range.bytes);
     match pairs.position(|(is, was)| is != was) {
         None => Ok(()),
-        Some(at) => Err(UpdateError::Differs(stretch.address + at as u64)),
+        Some(at) => Err(UpdateError::Differs(range.address + at as u64)),
     }
 }

@@ -93,7 +93,7 @@ impl ControlPipe for &mut Scripted {
     }
 }
 
-/// Whether all of the image is in flash.
+/// Returns true if all of the image is in flash.
 fn is_whole(device: &Scripted, image: &Image) -> bool {
     image.parts.iter().all(|part| {
         let at = (part.address - FLASH) as usize;
@@ -167,7 +167,7 @@ fn a_loader_that_something_else_has_left_in_the_middle_is_brought_to_rest() {
 }
 
 #[test]
-fn a_loader_that_goes_away_at_any_moment_leaves_no_half_of_a_program_and_can_be_tried_again() {
+fn lost_loader_leaves_no_half_program_and_can_be_retried() {
     for rom in ROMS {
         let image = image(rom);
         let (whole, _) = try_update(Scripted::new(rom, Faults::default()), &image);
@@ -270,8 +270,7 @@ fn assert_untouched(device: &Scripted) {
 }
 
 #[test]
-fn another_chips_loader_or_an_image_that_does_not_belong_there_is_refused_before_anything_is_erased()
- {
+fn foreign_loader_or_image_is_refused_before_erasing() {
     for (rom, other) in [(&G474, &H743), (&H743, &G474)] {
         let mut device = Scripted::new(rom, Faults::default());
         let mut loader = Loader::open(&mut device, other.words, &FUNCTIONAL).expect("a loader");

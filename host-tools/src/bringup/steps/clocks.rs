@@ -1,4 +1,4 @@
-//! Whether the board's clocks are what it takes them for: its ticks against another clock, and
+//! Checks of the board's clocks: its ticks against another clock, and
 //! the oscillator of its USB against the host's.
 
 use hapterra_core::wire::status::UsbClock;

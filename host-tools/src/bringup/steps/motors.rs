@@ -11,9 +11,9 @@ use crate::bringup::attendant::{Attendant, Reading, Task};
 use crate::bringup::finding::Finding;
 use crate::calibrate::N_PER_GRAM;
 
-/// How long the current stays, ms, to see which way the joint gives.
+/// Time for which the current stays, ms, to see which way the joint gives.
 const GIVE_MS: u16 = 500;
-/// How long it stays to be read off a scale, ms.
+/// Time for which it stays to be read off a scale, ms.
 const SCALE_MS: u16 = 3_000;
 /// A joint has moved by this much under a jog, rad: 0.3 mm at the tip of a Premium 1.5,
 /// a third of what a relaxed hand gives under it.

@@ -19,7 +19,7 @@ const LOOKS: usize = 600;
 
 /// What was felt of the plane.
 #[derive(Default)]
-struct Felt {
+struct PlaneContact {
     /// Deepest HIP below the proxy, mm, and the force up there, N.
     deepest: (f32, f32),
     /// The largest force, N.
@@ -30,7 +30,7 @@ struct Felt {
     looked_mm: f32,
 }
 
-impl Felt {
+impl PlaneContact {
     fn take(&mut self, sample: &TickRecord) {
         self.now_n = sample.force_n.length();
         self.most_n = self.most_n.max(self.now_n);
@@ -76,15 +76,16 @@ pub(super) fn soft_plane(
 }
 
 /// Whether a move has come to its end.
-type IsDone = fn(&Felt) -> bool;
+type IsDone = fn(&PlaneContact) -> bool;
 
 /// Lets the tip be lowered until it is deep enough, and lifted until nothing is felt.
-fn touched(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<Felt, Halt> {
-    let mut felt = Felt::default();
+fn touched(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<PlaneContact, Halt> {
+    let mut felt = PlaneContact::default();
     // Deep enough, and not on its way any more.
-    let deep =
-        |felt: &Felt| felt.deepest.0 >= DEEP_MM && felt.deepest.0 - felt.looked_mm < STILL_MM;
-    let free = |felt: &Felt| felt.now_n == 0.0;
+    let deep = |felt: &PlaneContact| {
+        felt.deepest.0 >= DEEP_MM && felt.deepest.0 - felt.looked_mm < STILL_MM
+    };
+    let free = |felt: &PlaneContact| felt.now_n == 0.0;
     let moves = [Task::LowerTip, Task::LiftTip];
     for (task, done) in moves.into_iter().zip([deep as IsDone, free]) {
         attendant.begin(task);

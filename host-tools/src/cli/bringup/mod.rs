@@ -11,7 +11,7 @@ use hapterra_core::phantom::Calibration;
 
 use super::failure::{Failure, Hint};
 use super::terminal::interrupt;
-use super::terminal::voice::{say, tell};
+use super::terminal::writer::{say, tell};
 use crate::bringup::{
     Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, Walked, walk,
 };
@@ -19,9 +19,9 @@ use crate::link::{DeviceAddress, Dialogue, HostClock, LinkError, Native, Transpo
 use crate::phantom::Wiring;
 use terminal::UserAtTerminal;
 
-/// How long a device may take to answer.
+/// Time that a device may take to answer.
 pub(super) const PATIENCE: Duration = Duration::from_secs(4);
-/// How long a device in this program may take to answer.
+/// Time that a device in this program may take to answer.
 const VIRTUAL_PATIENCE: Duration = Duration::from_secs(20);
 
 /// Arguments of `hapterra bringup`.
@@ -112,7 +112,7 @@ fn bring_up<A: Attendant>(
     Ok(())
 }
 
-/// Where the log is kept.
+/// Returns the place where the log is kept.
 fn place(args: &Args, dialogue: &Dialogue<'_>) -> Result<Option<PathBuf>, Failure> {
     Ok(match (&args.log, &args.device) {
         (Some(path), _) => Some(path.clone()),

@@ -1,4 +1,4 @@
-//! Whether a board was brought up before it serves terrain.
+//! Check that a board was brought up before it serves terrain.
 
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::hello::DeviceHello;
@@ -53,7 +53,7 @@ pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(),
     Ok(dialogue.end()?)
 }
 
-/// Whether a board of this name may drive a real arm: all but those that are known to
+/// Returns true if a board of this name may drive a real arm: all but those that are known to
 /// drive none.
 fn is_real(board: &str) -> bool {
     let is_emulated = BOARDS

@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::bringup::{Attendant, Question, Reading, Stopped, Task};
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::questions::{ask, number};
-use crate::cli::terminal::voice::say;
+use crate::cli::terminal::writer::say;
 use crate::link::DeviceAddress;
 
 /// A user at a terminal.

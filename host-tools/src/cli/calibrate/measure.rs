@@ -1,8 +1,8 @@
-//! What is measured, for `--measure`.
+//! Measurements, for `--measure`.
 
 use std::str::FromStr;
 
-/// What is measured of an arm.
+/// Measurements of an arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Measure {
     /// The zero pose: the first step of all measuring.

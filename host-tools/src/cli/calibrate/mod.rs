@@ -16,8 +16,8 @@ use hapterra_core::wire::status::PRESS_MS;
 use super::failure::{Failure, OrHint};
 use super::options::device::{Device, DeviceChoice};
 use super::report::put;
-use super::terminal::left_behind;
-use super::terminal::voice::say;
+use super::terminal::partial_files;
+use super::terminal::writer::say;
 use crate::calibrate::{Attendant, Plan, VirtualUser, file, walk};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 use crate::output::keep_apart;
@@ -27,7 +27,7 @@ use set::Setting;
 
 /// What to do where the record cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
-/// How long a device in this program may take to answer.
+/// Time that a device in this program may take to answer.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Arguments of `hapterra calibrate`.
@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Some(None) => return put(&file::to_toml(&args.device.look(held)?)),
         None => {}
     }
-    left_behind::tell(args.out.as_deref());
+    partial_files::tell(args.out.as_deref());
     if args.device.device != DeviceChoice::There(DeviceAddress::Native) {
         let mut user = UserAtTerminal::new(args.yes);
         return args

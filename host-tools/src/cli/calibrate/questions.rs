@@ -3,7 +3,7 @@
 
 use crate::calibrate::{Attendant, Direction, N_PER_GRAM, Review, Stopped};
 use crate::cli::terminal::questions::{ask, number};
-use crate::cli::terminal::voice::{say, show};
+use crate::cli::terminal::writer::{say, show};
 
 /// A user at a terminal.
 pub(super) struct UserAtTerminal {

@@ -14,12 +14,12 @@ use crate::cli::failure::{Failure, OrHint};
 use crate::cli::session_summary;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::questions::ask;
-use crate::cli::terminal::voice::{self, say};
+use crate::cli::terminal::writer::{self, say};
 use crate::link::{DeviceAddress, Dialogue, Usb};
 
-/// How long the board may take to answer.
+/// Time that the board may take to answer.
 const PATIENCE: Duration = Duration::from_secs(4);
-/// How long a device may take to show up again as another: on Windows, a driver's first
+/// Time that a device may take to show up again as another: on Windows, a driver's first
 /// start takes seconds.
 const REAPPEARS: Duration = Duration::from_secs(15);
 /// Between two looks at what is plugged in.
@@ -69,11 +69,11 @@ fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
     say(format!(
         "loader         {serial} at {place}, as it was found"
     ));
-    let question = format!("is that the {board} that is to be written? [y/N]");
+    let question = format!("is this the {board} to write? [y/N]");
     match ask(&question).as_deref() {
         Some("y" | "Y" | "yes") => Ok(()),
         _ => Err(Failure::new(format!(
-            "nobody said that the loader {serial} at {place} is the board that is meant"
+            "the loader {serial} at {place} was not confirmed as the board to write"
         ))
         .hint(format!(
             "nothing was touched; name it: --device usb:{serial}"
@@ -118,7 +118,7 @@ fn wait_for<T>(
 }
 
 fn write(args: &Args, image: &Image, loader: &mut Loader<SystemPipe>) -> Result<usize, Failure> {
-    voice::finish();
+    writer::finish();
     let bar = progress::bar(Some(0), "{msg:10} {bar:30} {pos} of {len}");
     let written = update(loader, args.board, image, &mut |step| {
         let (what, done, of) = match step {

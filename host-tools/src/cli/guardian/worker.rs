@@ -13,7 +13,7 @@ use crate::cli::terminal::interrupt;
 /// Programs that the worker starts have other parents, so it is nothing to them.
 pub(super) const VARIABLE: &str = "HAPTERRA_GUARDIAN";
 
-/// Where news goes; none where this is no worker.
+/// Destination of news; none where this is no worker.
 static NEWS: OnceLock<Mutex<File>> = OnceLock::new();
 
 /// Connects to the guardian. Returns false if no guardian has started this process.
@@ -28,7 +28,7 @@ pub(super) fn begin() -> bool {
     });
     if let Err(error) = connected {
         // The guardian still sees the end of this process, and passes signals on.
-        eprintln!("warning: the guardian is not told which arm may be armed: {error}");
+        eprintln!("warning: the guardian does not know which arm may be armed: {error}");
     }
     true
 }

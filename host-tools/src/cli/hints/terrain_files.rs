@@ -1,4 +1,4 @@
-//! What to do about a terrain file that does not open.
+//! Hints for a terrain file that does not open.
 //!
 //! Commands of other programs are tried by `tests/tests/converters.rs` where these
 //! programs are installed.
@@ -143,7 +143,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         }
         _ => {
             return format!(
-                "get the file again; where it came from, this tells whether it is whole: gdalinfo -checksum {}",
+                "get the file again; at its source, this shows whether it is complete: gdalinfo -checksum {}",
                 names(path).0
             );
         }

@@ -1,35 +1,12 @@
-//! `hapterra info --formats`: what is read, by this program and by GDAL.
+//! `hapterra info --formats`: the formats that this program and GDAL read.
 
-use std::ffi::OsStr;
 use std::fmt::Write as _;
 
-use clap::builder::TypedValueParser;
+use heightfield::{gdal, own_formats};
 use heightfield_gdal::Error;
 
-use crate::cli::report::put;
-use heightfield::{gdal, own_formats};
-
-/// The list is printed in place of what the command does, as `--help` is: no file is wanted for it.
-#[derive(Clone, Copy, Debug)]
-pub struct Printed;
-
-impl TypedValueParser for Printed {
-    type Value = Self;
-
-    fn parse_ref(
-        &self,
-        _: &clap::Command,
-        _: Option<&clap::Arg>,
-        _: &OsStr,
-    ) -> Result<Self, clap::Error> {
-        // A list that is cut, as by `head`, is none that was asked for.
-        let said = put(&text());
-        std::process::exit(i32::from(said.is_err()))
-    }
-}
-
 /// The formats, and the libgdal that was found or what to do about it.
-fn text() -> String {
+pub(super) fn text() -> String {
     let own: Vec<_> = own_formats().collect();
     let mut text = format!("read by hapterra:\n  {}\n", own.join(", "));
     match gdal() {

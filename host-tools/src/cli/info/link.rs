@@ -1,4 +1,4 @@
-//! What the tiles of a file take on the link, and how fast a HIP may move over them.
+//! Size of a file's tiles on the link, and the HIP's speed that they allow.
 
 use serde::Serialize;
 

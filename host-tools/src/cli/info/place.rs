@@ -1,4 +1,4 @@
-//! Where a terrain lies, what its heights count from, and where each of that comes from.
+//! Place and vertical datum of a terrain, and the source of each.
 
 use serde::Serialize;
 

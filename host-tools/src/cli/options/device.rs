@@ -10,11 +10,11 @@ use crate::link::{
     DeviceAddress, Dialogue, Emulator, EmulatorError, HostClock, IMAGE_VARIABLE, Lines, LinkError,
     Native, QEMU, QEMU_VARIABLE, Transport, move_arm_while,
 };
-use crate::phantom::{HandModel, HeldPhantom, PhantomModel, Placement, Script};
+use crate::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script};
 
-/// How long a real device may take to answer.
+/// Time that a real device may take to answer.
 const PATIENCE: Duration = Duration::from_secs(4);
-/// How long an emulated board may take to answer, on a busy machine.
+/// Time that an emulated board may take to answer, on a busy machine.
 pub(in crate::cli) const EMULATED_PATIENCE: Duration = Duration::from_secs(60);
 
 /// A device by the name that the command line gives it.
@@ -41,7 +41,7 @@ impl FromStr for DeviceChoice {
     }
 }
 
-/// Where the loop runs that moves no real arm: in this program, or on an emulated board.
+/// Device without a real arm: in this program, or on an emulated board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum VirtualDevice {
     /// In this program: the application compiled for this machine.
@@ -189,7 +189,7 @@ fn resting() -> Result<HeldPhantom, Failure> {
     let home_mm = [0.0; 3];
     let script = Script::start(home_mm);
     let model = PhantomModel::premium_1_5();
-    HeldPhantom::new(model, HandModel::default(), Placement { home_mm }, script)
+    HeldPhantom::new(model, HandModel::default(), ArmFrame { home_mm }, script)
         .map_err(Failure::new)
 }
 

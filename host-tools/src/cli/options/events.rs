@@ -3,10 +3,10 @@
 use std::num::NonZeroU32;
 
 use crate::cli::failure::{Failure, OrHint};
-use crate::cli::terminal::voice::tell;
+use crate::cli::terminal::writer::tell;
 use crate::events::{Server, Watcher};
 
-/// Whether events are sent to other programs.
+/// Events to other programs.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 #[command(next_help_heading = "While it is touched")]
 pub struct EventOptions {
@@ -17,7 +17,7 @@ pub struct EventOptions {
     pub events: Option<Events>,
 }
 
-/// Where events are sent, and which samples.
+/// Destination of events, and their samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Events {
     /// The port of 127.0.0.1; 0 takes a free one.

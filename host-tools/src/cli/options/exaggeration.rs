@@ -1,4 +1,4 @@
-//! How high a terrain is rendered.
+//! Height of a rendered terrain.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use crate::place::Heights;
 /// The unit of a height in the hand for each vertical unit of the file.
 const MM_PER_UNIT: &str = "mm/unit";
 
-/// How high a terrain is rendered.
+/// Height of a rendered terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exaggeration {
     /// This many times higher than true to scale; upside down below zero. One is every command's

@@ -7,7 +7,8 @@ use super::rendering::Rendering;
 use super::scale::MapScale;
 use crate::cli::failure::Failure;
 use crate::place::{
-    Coordinates, FELT_MM, Reach, Target, View, ViewOptions, coordinates_in_words, place_in_words,
+    Coordinates, FELT_MM, Placement, PlacementOptions, Reach, Target, coordinates_in_words,
+    place_in_words,
 };
 use crate::terrain::{Distortion, HapticCells, HapticGrid, Terrain};
 use heightfield::{Georeference, Raster};
@@ -43,7 +44,7 @@ pub struct Placing {
 /// A grid, and what is asked for of it.
 pub(in crate::cli) struct Asked<'r> {
     pub(in crate::cli) grid: HapticGrid<'r>,
-    options: ViewOptions,
+    options: PlacementOptions,
 }
 
 impl Placing {
@@ -60,20 +61,20 @@ impl Placing {
         let options = self.options(rendering);
         let grid = options.target.grid(raster, cells)?;
         // Whichever arm it will be: of one, all but the reach shows already.
-        let tried = View::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options);
+        let tried = Placement::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options);
         tried
             .map(|_| Asked { grid, options })
             .map_err(Failure::from)
     }
 
-    fn options(&self, rendering: &Rendering) -> ViewOptions {
+    fn options(&self, rendering: &Rendering) -> PlacementOptions {
         let coordinates = self.crs.unwrap_or(Coordinates::Own);
         let target = match (self.at, self.bbox) {
             (Some(at), _) => Target::At(at, coordinates),
             (None, Some(sides)) => Target::Box(sides, coordinates),
             (None, None) => Target::Whole,
         };
-        ViewOptions {
+        PlacementOptions {
             target,
             sizing: MapScale::sizing(rendering.scale),
             heights: rendering.exaggeration.unwrap_or_default().into(),
@@ -87,13 +88,13 @@ impl Asked<'_> {
     ///
     /// # Errors
     /// Heights that the arm does not reach.
-    pub(in crate::cli) fn view(&self, arm: &Calibration) -> Result<View, Failure> {
-        Ok(View::new(&self.grid, &Reach::of(arm), &self.options)?)
+    pub(in crate::cli) fn view(&self, arm: &Calibration) -> Result<Placement, Failure> {
+        Ok(Placement::new(&self.grid, &Reach::of(arm), &self.options)?)
     }
 }
 
 /// Where a terrain lies and how large it is, in lines as `run` and `demo` print them.
-pub(in crate::cli) fn told(view: &View, terrain: &Terrain<'_>) -> String {
+pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(
         "place          {} under the home position\nscale          {}\n",
@@ -122,14 +123,14 @@ pub(in crate::cli) fn told(view: &View, terrain: &Terrain<'_>) -> String {
     text
 }
 
-/// How far the shape of felt cells is off at worst.
+/// How far the shape of haptic cells is off at worst.
 pub(in crate::cli) fn off_in_words(worst: &Distortion) -> String {
     let percent = 100.0 * worst.share;
     format!("slopes and lengths are off by up to {percent:.2} %")
 }
 
-/// A view's scale, and what a felt cell of its level is.
-pub(in crate::cli) fn scale_in_words(view: &View) -> String {
+/// A view's scale, and what a haptic cell of its level is.
+pub(in crate::cli) fn scale_in_words(view: &Placement) -> String {
     let (level, cell_mm) = (view.level, short(view.felt_cell_mm()));
     match (view.ground_m_per_mm(), view.felt_cell_m()) {
         (Some(scale), Some(cell_m)) => format!(
@@ -142,7 +143,10 @@ pub(in crate::cli) fn scale_in_words(view: &View) -> String {
 }
 
 /// Scale and place, in short lines for a picture: a name and what there is to say.
-pub(in crate::cli) fn picture_lines(view: &View, file: &Georeference<'_>) -> Vec<(String, String)> {
+pub(in crate::cli) fn picture_lines(
+    view: &Placement,
+    file: &Georeference<'_>,
+) -> Vec<(String, String)> {
     let mut lines = vec![];
     if let Some(scale) = view.ground_m_per_mm() {
         lines.push(("1 mm in the hand".to_owned(), format!("{} m", short(scale))));
@@ -150,11 +154,11 @@ pub(in crate::cli) fn picture_lines(view: &View, file: &Georeference<'_>) -> Vec
     let cell_mm = short(view.felt_cell_mm());
     lines.push(match view.felt_cell_m() {
         Some(metres) => (
-            format!("felt cell, level {}", view.level),
+            format!("haptic cell, level {}", view.level),
             format!("{} m, {cell_mm} mm", short(metres)),
         ),
         None => (
-            format!("felt cell, level {}", view.level),
+            format!("haptic cell, level {}", view.level),
             format!("{cell_mm} mm"),
         ),
     });

@@ -41,7 +41,19 @@ pub const GROUND: Units = Units {
 /// A time.
 pub const TIME: Units = Units {
     name: "a time",
-    units: &[("s", 1.0), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0)],
+    units: &[
+        ("s", 1.0),
+        ("ms", 1e-3),
+        ("min", 60.0),
+        ("h", 3600.0),
+        ("us", 1e-6),
+        ("µs", 1e-6),
+    ],
+};
+/// A rate of the loop.
+pub const FREQUENCY: Units = Units {
+    name: "a rate",
+    units: &[("Hz", 1.0), ("kHz", 1e3)],
 };
 /// A force for each unit of speed.
 pub const DAMPING: Units = Units {

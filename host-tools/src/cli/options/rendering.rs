@@ -15,7 +15,7 @@ const HAND_MM: f64 = 7.0;
 /// Radii that can be asked for, mm.
 const RADII_MM: [f64; 2] = [0.0, 100.0];
 
-/// How the terrain is rendered.
+/// Rendering of the terrain.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Place and scale")]
 pub struct Rendering {
@@ -48,7 +48,7 @@ pub struct Rendering {
           value_parser = |text: &str| LENGTH.read_within(text, RADII_MM))]
     pub tip: Option<f64>,
 
-    /// What it feels like.
+    /// Its surface.
     #[command(flatten)]
     pub surface: SurfaceOptions,
 }

@@ -1,4 +1,4 @@
-//! How large a terrain is rendered.
+//! Scale of a rendered terrain.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,7 +9,7 @@ use crate::place::Sizing;
 /// The unit of the size of a cell in the hand.
 const MM_PER_CELL: &str = "mm/cell";
 
-/// How large a terrain is rendered.
+/// Scale of a rendered terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MapScale {
     /// Ground metres a device millimetre.
@@ -19,7 +19,7 @@ pub enum MapScale {
 }
 
 impl MapScale {
-    /// How a terrain is sized in front of an arm.
+    /// Returns the size of a terrain in front of an arm.
     #[must_use]
     pub const fn sizing(scale: Option<Self>) -> Sizing {
         match scale {

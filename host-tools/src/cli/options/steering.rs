@@ -9,19 +9,19 @@ use hapterra_core::phantom::Calibration;
 
 use super::placing::{self, scale_in_words, short};
 use crate::cli::failure::{Failure, OrHint};
-use crate::cli::terminal::desk::Seat;
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::keyboard::keyboard;
 use crate::cli::terminal::raw_keys::RawMode;
+use crate::cli::terminal::shared_keyboard::DeviceKeys;
 use crate::link::{Ask, Event};
 use crate::place::{Bounds, Laid, Reach};
 use crate::replay::Mark;
 use crate::steering::keys::{KEYS, Key, Keys};
 use crate::steering::{CommandQueue, Made, Marks, Origin, Put, Steer, Steering, Wanted};
-use crate::telemetry::{FeltViews, SampleLog};
+use crate::telemetry::{Placements, SampleLog};
 use crate::terrain::Terrain;
 
-/// How the placement and the surface may be changed while they are touched.
+/// Commands that change placement and surface during a session.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "While it is touched")]
 pub struct Commands {
@@ -97,14 +97,14 @@ impl Commands {
             .or_hint("name another file with --commands, or `-` for standard input")
     }
 
-    /// Whether they come from standard input.
+    /// Returns true if they come from standard input.
     pub(in crate::cli) fn are_typed(&self) -> bool {
         self.commands == Some(Origin::StandardInput)
     }
 }
 
 /// Keys and commands on one side, a session on the other.
-pub(in crate::cli) struct ViewControl<'t> {
+pub(in crate::cli) struct PlacementControl<'t> {
     steering: Steering<'t>,
     marks: Marks,
     commands: CommandQueue,
@@ -122,7 +122,7 @@ enum Typing {
     /// The terminal, in raw mode until this is dropped.
     Terminal(RawMode),
     /// The terminal of several devices.
-    Seat(Arc<Seat>),
+    DeviceKeys(Arc<DeviceKeys>),
 }
 
 impl Typing {
@@ -131,12 +131,12 @@ impl Typing {
         match self {
             Self::Nobody => None,
             Self::Terminal(_) => Some(keyboard().keys()),
-            Self::Seat(seat) => seat.has_keys().then(|| seat.keys()),
+            Self::DeviceKeys(device_keys) => device_keys.has_keys().then(|| device_keys.keys()),
         }
     }
 }
 
-impl<'t> ViewControl<'t> {
+impl<'t> PlacementControl<'t> {
     /// Begins with what is served first.
     pub(in crate::cli) fn new(
         (terrain, laid): (&Terrain<'t>, Laid),
@@ -175,8 +175,8 @@ impl<'t> ViewControl<'t> {
     }
 
     /// Takes the keys that are pressed for one of several devices from now on.
-    pub(in crate::cli) fn sit(&mut self, seat: &Arc<Seat>) {
-        self.typing = Typing::Seat(Arc::clone(seat));
+    pub(in crate::cli) fn use_keys(&mut self, device_keys: &Arc<DeviceKeys>) {
+        self.typing = Typing::DeviceKeys(Arc::clone(device_keys));
     }
 
     /// Takes what the device tells.
@@ -213,7 +213,7 @@ impl<'t> ViewControl<'t> {
         }
     }
 
-    /// What is to be asked of the device now.
+    /// Returns the requests to the device now.
     pub(in crate::cli) fn asks(&mut self) -> Vec<Ask> {
         let mut asks = self.steering.asks();
         asks.extend(self.marks.asks());
@@ -235,7 +235,7 @@ impl<'t> ViewControl<'t> {
     }
 
     /// The view that is to be put in now, which samples may be felt in from now on.
-    pub(in crate::cli) fn put(&mut self, views: &mut FeltViews<'t>) -> Option<Put<'t>> {
+    pub(in crate::cli) fn put(&mut self, views: &mut Placements<'t>) -> Option<Put<'t>> {
         let put = self.steering.take_put()?;
         views.put(put.view.number, put.terrain.clone(), put.laid);
         Some(put)

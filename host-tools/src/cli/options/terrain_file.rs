@@ -14,7 +14,7 @@ use heightfield::shown::shown;
 use heightfield::{CellUnit, Certainty, OpenOptions, Raster, files_read_with};
 use heightfield::{file_name, is_url};
 
-/// Where `--help` lists these options.
+/// Heading of these options in `--help`.
 const INPUT: &str = "Input";
 /// Environment variable with the folder of the disk cache.
 const FOLDER_VARIABLE: &str = "HAPTERRA_CACHE_DIR";
@@ -32,12 +32,12 @@ pub struct TerrainFile {
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
-    /// What the file does not say itself.
+    /// Statements about the file that it does not make itself.
     #[command(flatten)]
     pub reading: ReadingOptions,
 }
 
-/// What the user says about a terrain file that it does not say itself.
+/// Statements of the user about a terrain file.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ReadingOptions {
     /// What the file does not state, as no-data=-9999, band=2 or cell=30m

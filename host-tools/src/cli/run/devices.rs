@@ -7,10 +7,10 @@ use std::str::FromStr;
 use hapterra_core::phantom::Calibration;
 
 use super::Args;
+use crate::cli::device_calibration::calibration_of;
 use crate::cli::failure::Failure;
-use crate::cli::met_device::calibration_of;
-use crate::cli::terminal::desk;
-use crate::cli::terminal::speaker::Speaker;
+use crate::cli::terminal::device_console::DeviceConsole;
+use crate::cli::terminal::shared_keyboard;
 use crate::link::{DeviceAddress, tcp_address};
 
 /// A device as the command line names it.
@@ -56,11 +56,11 @@ pub(super) struct OneDevice {
     pub(super) plant: Option<String>,
     /// What is felt on it is written there.
     pub(super) record: Option<PathBuf>,
-    pub(super) speaker: Speaker,
+    pub(super) device_console: DeviceConsole,
 }
 
 impl OneDevice {
-    /// Whether the arm is virtual, held by a hand that follows a script.
+    /// Returns true if the arm is virtual, held by a hand that follows a script.
     pub(super) fn is_scripted(&self) -> bool {
         self.plant.is_some() || self.address == DeviceAddress::Native
     }
@@ -73,7 +73,7 @@ impl OneDevice {
         if self.is_scripted() {
             return (preset, Ok(()));
         }
-        match calibration_of(&self.address, &|line| self.speaker.tell(line)) {
+        match calibration_of(&self.address, &|line| self.device_console.tell(line)) {
             Ok(calibration) => (calibration, Ok(())),
             Err(failure) => (preset, Err(failure)),
         }
@@ -89,16 +89,16 @@ pub(super) fn of(args: &Args) -> Result<Vec<OneDevice>, Failure> {
     if are_several {
         check(args)?;
     }
-    let speakers = Speaker::of_each(&addresses_of(args));
-    let numbered = args.device.iter().zip(speakers).zip(1..);
-    let devices = numbered.map(|((device, speaker), number)| OneDevice {
+    let consoles = DeviceConsole::of_each(&addresses_of(args));
+    let numbered = args.device.iter().zip(consoles).zip(1..);
+    let devices = numbered.map(|((device, device_console), number)| OneDevice {
         address: device.address.clone(),
         plant: device.plant.clone(),
         record: match (&args.out, are_several) {
             (Some(path), true) => Some(of_device(path, number)),
             (path, _) => path.clone(),
         },
-        speaker,
+        device_console,
     });
     Ok(devices.collect())
 }
@@ -111,8 +111,11 @@ fn addresses_of(args: &Args) -> Vec<DeviceAddress> {
 /// What several devices cannot be given.
 fn check(args: &Args) -> Result<(), Failure> {
     let count = args.device.len();
-    if count > desk::MOST {
-        let error = format!("{count} devices; at most {} can be served", desk::MOST);
+    if count > shared_keyboard::MOST {
+        let error = format!(
+            "{count} devices; at most {} can be served",
+            shared_keyboard::MOST
+        );
         return Err(Failure::new(error).hint("serve the others by another `hapterra run`"));
     }
     apart(&addresses_of(args))?;
@@ -155,7 +158,7 @@ fn apart(addresses: &[DeviceAddress]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Whether both name a board on USB, and one does not say which.
+/// Returns true if both name a board on USB, and one does not say which.
 fn may_be_same_board(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     match (first, second) {
         (DeviceAddress::Usb(first), DeviceAddress::Usb(second)) => {
@@ -165,7 +168,7 @@ fn may_be_same_board(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     }
 }
 
-/// Whether both are known to be the same device. Each device in this program's memory is
+/// Returns true if both are known to be the same device. Each device in this program's memory is
 /// another one.
 fn is_same(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     match (first, second) {
@@ -175,7 +178,7 @@ fn is_same(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     }
 }
 
-/// Whether two `HOST:PORT` are the same socket, also by two names of a host.
+/// Returns true if two `HOST:PORT` are the same socket, also by two names of a host.
 fn is_same_socket(first: &str, second: &str) -> bool {
     if first == second {
         return true;

@@ -1,4 +1,4 @@
-//! What may be said of several devices.
+//! Messages about several devices.
 
 use clap::Parser;
 
@@ -34,7 +34,7 @@ fn one_device_has_the_files_name_and_its_lines_have_none() {
             panic!("{more}");
         };
         assert_eq!(only.record.as_deref(), Some(Path::new("felt.csv")));
-        assert_eq!(only.speaker.name(), None);
+        assert_eq!(only.device_console.name(), None);
     }
 }
 
@@ -43,7 +43,10 @@ fn each_of_several_devices_has_its_number_its_name_and_its_recording() {
     let devices = devices(
         "--device native --device usb:7 --device native --device tcp:h:1 --out out/felt.x.csv",
     );
-    let names: Vec<_> = devices.iter().map(|device| device.speaker.name()).collect();
+    let names: Vec<_> = devices
+        .iter()
+        .map(|device| device.device_console.name())
+        .collect();
     let expected = ["[1 native]", "[2 usb:7]", "[3 native]", "[4 tcp:h:1]"];
     assert_eq!(names, expected.map(Some));
     for (device, number) in devices.iter().zip(1..) {

@@ -9,12 +9,12 @@ use crate::cli::failure::Failure;
 use crate::cli::options::placing::Asked;
 use crate::cli::terminal::waiting::shown_reading;
 use crate::phantom::PlacedTerrain;
-use crate::place::View;
+use crate::place::Placement;
 use crate::terrain::Terrain;
 
 /// What lies where in front of an arm.
 pub(super) struct InReach<'r> {
-    view: View,
+    view: Placement,
     terrain: Terrain<'r>,
     arm: Calibration,
 }
@@ -34,7 +34,7 @@ impl<'r> InReach<'r> {
 /// The same, how it feels, and how an arm that is virtual moves over it.
 pub(super) struct Placed<'t> {
     pub(super) terrain: &'t Terrain<'t>,
-    pub(super) view: View,
+    pub(super) view: Placement,
     pub(super) scene: Scene,
     /// Of the arm that feels it.
     pub(super) arm: Calibration,

@@ -14,10 +14,10 @@ use crate::cli::bringup::required::{brought_up, drives_no_arm};
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::guardian::{self, News};
 use crate::cli::options::placing;
-use crate::cli::options::steering::ViewControl;
+use crate::cli::options::steering::PlacementControl;
 use crate::cli::session_summary::{self, SessionSummary};
-use crate::cli::terminal::desk::Seat;
 use crate::cli::terminal::interrupt;
+use crate::cli::terminal::shared_keyboard::DeviceKeys;
 use crate::cli::viewing::ToBeShown;
 use crate::events::Watcher;
 use crate::link::{
@@ -53,7 +53,7 @@ pub(super) struct Serving<'p, 't> {
     pub(super) recording: Option<Recording>,
     pub(super) commands: CommandQueue,
     /// Its place at a keyboard that several devices share.
-    pub(super) seat: Option<Arc<Seat>>,
+    pub(super) device_keys: Option<Arc<DeviceKeys>>,
     pub(super) shown: Option<ToBeShown<'t>>,
     pub(super) events: Option<Watcher>,
 }
@@ -83,9 +83,9 @@ impl<'t> Serving<'_, 't> {
 
     fn session(self) -> Result<(), Failure> {
         let (args, placed, device) = (self.args, self.placed, self.device);
-        let speaker = &device.speaker;
-        let name = speaker.name().unwrap_or_default();
-        let tell = |line: &str| speaker.tell(line);
+        let device_console = &device.device_console;
+        let name = device_console.name().unwrap_or_default();
+        let tell = |line: &str| device_console.tell(line);
         let service = service(args, (device, placed), &tell);
         let may_be_armed = |may| interrupt::device_may_be_armed(name, &device.address, may);
         may_be_armed(true);
@@ -94,17 +94,17 @@ impl<'t> Serving<'_, 't> {
         // Where it could not be opened, what has to be told is told.
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
-        speaker.say(format!("terrain        {}: {how}", args.terrain.name()));
-        speaker.show(placing::told(&placed.view, placed.terrain));
+        device_console.say(format!("terrain        {}: {how}", args.terrain.name()));
+        device_console.show(placing::told(&placed.view, placed.terrain));
         if let Some(line) = session_summary::materials(placed.terrain) {
-            speaker.say(line);
+            device_console.say(line);
         }
-        speaker.say(format!(
+        device_console.say(format!(
             "device         {}",
             session_summary::device(&hello)
         ));
         if let Some(line) = told_of_last_end(&hello) {
-            speaker.tell(line);
+            device_console.tell(line);
         }
         let materials = placed.terrain.grid().materials();
         let table = materials.map(Materials::table);
@@ -114,25 +114,26 @@ impl<'t> Serving<'_, 't> {
             view: placed.view,
             law: placed.scene.law,
         };
-        let mut control = ViewControl::new(
+        let mut control = PlacementControl::new(
             (placed.terrain, laid),
             (&placed.arm, args.rendering.level),
             self.commands,
         );
         // Before anybody else asks the keyboard for anything.
-        match &self.seat {
-            Some(seat) => control.sit(seat),
-            None if speaker.name().is_some() => {}
+        match &self.device_keys {
+            Some(device_keys) => control.use_keys(device_keys),
+            None if device_console.name().is_some() => {}
             None => {
                 if let Some(line) = control.listen(&args.commands) {
-                    speaker.tell(line);
+                    device_console.tell(line);
                 }
             }
         }
         // A viewer that does not start ends nothing.
-        let shown = (self.shown).and_then(|shown| shown.start(&hello, |line| speaker.tell(line)));
-        let control = (control, self.seat.as_ref());
-        let watch = Watch::new(args, (placed, speaker), &hello, recording, control);
+        let shown =
+            (self.shown).and_then(|shown| shown.start(&hello, |line| device_console.tell(line)));
+        let control = (control, self.device_keys.as_ref());
+        let watch = Watch::new(args, (placed, device_console), &hello, recording, control);
         let mut watch = watch.shown(shown).with_events(self.events);
         let end = served.serve(&mut watch);
         let is_others = matches!(end.why, Err(LinkError::Taken));
@@ -148,12 +149,12 @@ impl<'t> Serving<'_, 't> {
             figures: log.figures,
             tally: end.tally,
         };
-        speaker.show(summary.text());
+        device_console.show(summary.text());
         if let (Ok(()), Some(path)) = (&kept, &device.record) {
-            speaker.say(format!("recording      {}", path.display()));
+            device_console.say(format!("recording      {}", path.display()));
         }
         if let Some(shown) = log.shown {
-            shown.end(|line| speaker.say(line));
+            shown.end(|line| device_console.say(line));
         }
         ended.and(kept)
     }
@@ -192,7 +193,7 @@ fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
     }
 }
 
-/// Whether a device may be served: a real board was brought up, and one that is given a
+/// Checks that a device may be served: a real board was brought up, and one that is given a
 /// virtual arm drives no real one.
 fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Result<(), Failure> {
     match (&device.plant, &device.address) {

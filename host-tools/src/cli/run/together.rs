@@ -22,13 +22,14 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
         let threads: Vec<_> = servings
             .into_iter()
             .map(|serving| {
-                let speaker = serving.device.speaker.clone();
-                let name = speaker.name().unwrap_or_default().to_owned();
+                let device_console = serving.device.device_console.clone();
+                let name = device_console.name().unwrap_or_default().to_owned();
                 let thread = scope.spawn(move || {
                     // Names the device in what the link logs of it.
-                    let _named = tracing::error_span!("device", name = speaker.name()).entered();
+                    let _named =
+                        tracing::error_span!("device", name = device_console.name()).entered();
                     let ended = serving.serve();
-                    ended.inspect_err(|failure| speaker.tell(failure.text()))
+                    ended.inspect_err(|failure| device_console.tell(failure.text()))
                 });
                 (name, thread)
             })

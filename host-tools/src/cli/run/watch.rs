@@ -1,23 +1,23 @@
-//! What is seen, shown and recorded of a session while it goes on.
+//! Display and recording of a running session.
 
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use hapterra_core::scene::{TickRecord, View};
+use hapterra_core::scene::{SceneChange, TickRecord};
 use hapterra_core::wire::hello::DeviceHello;
 
 use super::Args;
 use super::placed::Placed;
-use crate::cli::options::steering::{self, ViewControl};
+use crate::cli::options::steering::{self, PlacementControl};
 use crate::cli::terminal::arming_prompts::ArmingPrompts;
-use crate::cli::terminal::desk::Seat;
-use crate::cli::terminal::speaker::Speaker;
+use crate::cli::terminal::device_console::DeviceConsole;
+use crate::cli::terminal::shared_keyboard::DeviceKeys;
 use crate::cli::viewing::Shown;
 use crate::events::{Event as Told, Watcher};
 use crate::link::{Ask, Event, LinkStats};
 use crate::output::OutputError;
-use crate::replay::settings::ViewSettings;
+use crate::replay::settings::PlacementSettings;
 use crate::replay::{LoopColumns, Record, Recording, Value, is_below_ground, state_name};
 use crate::serving::Onlooker;
 use crate::telemetry::{Figures, SampleLog};
@@ -39,14 +39,14 @@ pub(super) struct Watch<'t> {
     latest: Option<(TickRecord, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
-    /// How many views the recording has been told of.
+    /// Number of views that the recording has been told of.
     described: usize,
-    control: ViewControl<'t>,
+    control: PlacementControl<'t>,
     prompts: ArmingPrompts,
     line_due: Instant,
     shown: Option<Shown<'t>>,
     events: Option<Watcher>,
-    speaker: Speaker,
+    device_console: DeviceConsole,
 }
 
 /// What was seen in all.
@@ -65,14 +65,14 @@ pub(super) struct Seen<'t> {
 impl<'t> Watch<'t> {
     pub(super) fn new(
         args: &Args,
-        (placed, speaker): (&Placed<'t>, &Speaker),
+        (placed, device_console): (&Placed<'t>, &DeviceConsole),
         device: &DeviceHello,
         recording: Option<Recording>,
-        (control, seat): (ViewControl<'t>, Option<&Arc<Seat>>),
+        (control, device_keys): (PlacementControl<'t>, Option<&Arc<DeviceKeys>>),
     ) -> Self {
-        let (script_s, prompts) = match (&placed.tour, seat) {
+        let (script_s, prompts) = match (&placed.tour, device_keys) {
             (Some(tour), _) => (tour.duration_s(), ArmingPrompts::for_a_script()),
-            (None, Some(seat)) => (f64::MAX, ArmingPrompts::at(seat)),
+            (None, Some(device_keys)) => (f64::MAX, ArmingPrompts::at(device_keys)),
             (None, None) => (f64::MAX, ArmingPrompts::at_the_terminal()),
         };
         Self {
@@ -88,7 +88,7 @@ impl<'t> Watch<'t> {
             line_due: Instant::now() + LINE_EVERY,
             shown: None,
             events: None,
-            speaker: speaker.clone(),
+            device_console: device_console.clone(),
         }
     }
 
@@ -111,7 +111,7 @@ impl<'t> Watch<'t> {
 
     /// Ends the recording, and takes the line at the bottom of the terminal away.
     pub(super) fn finish(mut self) -> Seen<'t> {
-        self.speaker.status(None);
+        self.device_console.status(None);
         self.take_marks(true);
         let (ticks, figures) = (self.log.ticks(), self.log.figures());
         let stood_still = self.stands_still();
@@ -137,7 +137,7 @@ impl<'t> Watch<'t> {
     /// Takes the marks that were made, at the end also those that were only asked for.
     fn take_marks(&mut self, is_over: bool) {
         for mark in self.control.marks(&self.log, is_over) {
-            self.speaker.tell(steering::marked(&mark));
+            self.device_console.tell(steering::marked(&mark));
             if let Some(events) = &self.events {
                 events.mark(&mark);
             }
@@ -160,10 +160,11 @@ impl<'t> Watch<'t> {
             && let Some(laid) = &felt.laid
         {
             self.described = view;
-            self.speaker.tell(steering::told(view, laid, &felt.terrain));
+            self.device_console
+                .tell(steering::told(view, laid, &felt.terrain));
             if let Some(recording) = &mut self.recording {
                 let number = u32::try_from(view).unwrap_or(u32::MAX);
-                let settings = ViewSettings::new(number, &felt.terrain, laid);
+                let settings = PlacementSettings::new(number, &felt.terrain, laid);
                 let failed = recording.view(&settings).err();
                 self.failed = self.failed.take().or(failed);
             }
@@ -198,21 +199,21 @@ impl<'t> Onlooker<'t> for Watch<'t> {
     }
 
     fn hear(&mut self, line: &str) {
-        self.speaker.tell(line);
+        self.device_console.tell(line);
     }
 
     fn asks(&mut self) -> Vec<Ask> {
         let lines = self.prompts.lines();
-        lines.iter().for_each(|line| self.speaker.tell(line));
+        lines.iter().for_each(|line| self.device_console.tell(line));
         if let Some(events) = &mut self.events {
             events.arming(lines, self.prompts.asks());
         }
-        let (speaker, events) = (&self.speaker, &self.events);
+        let (device_console, events) = (&self.device_console, &self.events);
         let refuse = |text: String| {
             if let Some(events) = events {
                 events.say(&Told::Refused { text: &text });
             }
-            speaker.tell(text);
+            device_console.tell(text);
         };
         self.control.look(self.log.t_s(), &mut |text| refuse(text));
         if let Some(number) = self.control.entered()
@@ -228,7 +229,7 @@ impl<'t> Onlooker<'t> for Watch<'t> {
         asks
     }
 
-    fn view(&mut self) -> Option<(View, Terrain<'t>)> {
+    fn view(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
         let put = self.control.put(self.log.views())?;
         Some((put.view, put.terrain))
     }
@@ -247,10 +248,10 @@ impl<'t> Onlooker<'t> for Watch<'t> {
             line += &format!("  [{}]", self.control.in_words());
         }
         if std::io::stderr().is_terminal() {
-            self.speaker.status(Some(line));
+            self.device_console.status(Some(line));
         } else if Instant::now() >= self.line_due {
             self.line_due = Instant::now() + LINE_EVERY;
-            self.speaker.tell(line);
+            self.device_console.tell(line);
         }
     }
 
@@ -268,7 +269,7 @@ fn in_words(
     let force = glam::DVec3::from(record.force_n).length();
     let ([x, y, z], t_s) = (record.hip_mm, record.t_s);
     let state = match is_below_ground(sample, record, terrain) {
-        true => "below ground: raise the tip above the surface, then it can be felt",
+        true => "below ground: raise the tip above the surface to touch it",
         false => state_name(sample.state),
     };
     let (tiles, lost) = (tally.tiles, tally.lost + tally.dropped);

@@ -16,7 +16,7 @@ const MAX_BYTES: u64 = 1 << 20;
 /// Reads a settings file; `is_known` says which keys it may have.
 pub(super) fn read(path: &Path, is_known: impl Fn(&str) -> bool) -> Result<Vec<Setting>, Failure> {
     let name = path.display();
-    let other = "mend the file, or leave it out with --settings none";
+    let other = "correct the file, or leave it out with --settings none";
     let text = regular_file::read_text(path, MAX_BYTES)
         .map_err(|why| format!("{name}: {why}"))
         .or_hint("name another file with --settings")?;

@@ -10,7 +10,7 @@ use crate::cli::options::rendering::Rendering;
 use crate::cli::options::scale::MapScale;
 use crate::cli::options::surface::SurfaceChoice;
 use crate::replay::Settings;
-use crate::replay::settings::Felt;
+use crate::replay::settings::RenderedTerrain;
 use crate::terrain::HapticCells;
 
 /// The options that a recording was made with. The user may state a scale and cells of another kind:
@@ -20,7 +20,7 @@ pub(super) fn settings(
     recorded: &Settings,
     (scale, stated_cells): (Option<MapScale>, Option<HapticCells>),
 ) -> Vec<Setting> {
-    let Felt {
+    let RenderedTerrain {
         cells,
         level,
         cell_mm,
@@ -55,7 +55,7 @@ pub(super) fn settings(
 
 /// The recorded height, at the scale that the user states. Cells of another kind have another size on
 /// the ground: there the factor keeps the proportions.
-fn height(felt: &Felt, scale: Option<MapScale>, cells: HapticCells) -> Exaggeration {
+fn height(felt: &RenderedTerrain, scale: Option<MapScale>, cells: HapticCells) -> Exaggeration {
     let cell_mm = match scale {
         None => Some(felt.cell_mm),
         Some(scale) => scale.cell_mm(felt.cell_m),

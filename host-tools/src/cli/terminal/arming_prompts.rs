@@ -12,9 +12,9 @@ use std::time::Instant;
 use hapterra_core::guard::{Blockers, Fault, Mode, Report};
 use hapterra_core::wire::request::{Refusal, Request};
 
-use super::desk::Seat;
 use super::keyboard::keyboard;
-use crate::cli::sparing::Sparing;
+use super::shared_keyboard::DeviceKeys;
+use crate::cli::line_limit::LineLimit;
 use crate::link::{Ask, Event};
 
 /// More than an arm that is armed, faulted and armed again in a second needs.
@@ -42,7 +42,7 @@ trait Enter {
     /// Forgets what was pressed so far.
     fn forget(&mut self);
 
-    /// Whether Enter was pressed since the last look.
+    /// Returns true if Enter was pressed since the last look.
     fn was_pressed(&mut self) -> bool;
 }
 
@@ -60,9 +60,9 @@ impl Enter for AtTheTerminal {
 }
 
 /// The user at a terminal of several devices.
-impl Enter for Arc<Seat> {
+impl Enter for Arc<DeviceKeys> {
     fn forget(&mut self) {
-        Seat::forget(self);
+        DeviceKeys::forget(self);
     }
 
     fn was_pressed(&mut self) -> bool {
@@ -96,11 +96,11 @@ pub(in crate::cli) struct ArmingPrompts {
     /// Enter was pressed with the arm in its zero pose: its counts are asked for.
     zeroing: bool,
     say: Vec<Ask>,
-    /// Whether there is a user who arms; a virtual hand follows its script.
+    /// True if there is a user who arms; a virtual hand follows its script.
     leads: bool,
     /// Lines for the user, in order.
     lines: Vec<Line>,
-    sparing: Sparing,
+    line_limit: LineLimit,
 }
 
 impl ArmingPrompts {
@@ -121,10 +121,10 @@ impl ArmingPrompts {
     }
 
     /// Listens to what is pressed for one of several devices.
-    pub(in crate::cli) fn at(seat: &Arc<Seat>) -> Self {
+    pub(in crate::cli) fn at(device_keys: &Arc<DeviceKeys>) -> Self {
         Self {
-            press_enter: seat.press_enter(),
-            ..Self::listening(Arc::clone(seat))
+            press_enter: device_keys.press_enter(),
+            ..Self::listening(Arc::clone(device_keys))
         }
     }
 
@@ -140,7 +140,7 @@ impl ArmingPrompts {
             say: vec![],
             leads: true,
             lines: vec![],
-            sparing: Sparing::new(LINES_A_SECOND),
+            line_limit: LineLimit::new(LINES_A_SECOND),
         }
     }
 
@@ -297,7 +297,7 @@ impl ArmingPrompts {
         let now = Instant::now();
         let mut said = vec![];
         for line in self.lines.drain(..) {
-            let Some(left_out) = self.sparing.admit(now) else {
+            let Some(left_out) = self.line_limit.admit(now) else {
                 continue;
             };
             if left_out > 0 {

@@ -12,7 +12,7 @@ use std::thread::Builder;
 use std::time::Duration;
 
 use super::raw_keys;
-use super::voice::put;
+use super::writer::put;
 use crate::cli::guardian::{self, News};
 use crate::link::DeviceAddress;
 
@@ -94,7 +94,7 @@ pub(in crate::cli) fn end_without_guardian() {
     if !IS_LISTENING.load(Ordering::Relaxed) {
         exit(INTERRUPTED);
     }
-    super::voice::tell("the process that watches this one is gone: it ends");
+    super::writer::tell("the process that watches this one is gone: it ends");
     REQUESTED.store(true, Ordering::Relaxed);
 }
 
@@ -174,7 +174,7 @@ fn may_be_armed() -> MutexGuard<'static, BTreeSet<String>> {
     MAY_BE_ARMED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Whether an end was asked for.
+/// Returns true if an end was asked for.
 #[must_use]
 pub fn requested() -> bool {
     let requested = REQUESTED.load(Ordering::Relaxed);

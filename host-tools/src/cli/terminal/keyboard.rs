@@ -25,7 +25,7 @@ pub(in crate::cli) struct Keyboard {
     pressed: Receiver<Pressed>,
     /// Keys that were taken while Enter was looked for.
     keys: Vec<Key>,
-    /// How often Enter was pressed and not taken.
+    /// Number of times that Enter was pressed and not taken.
     enters: usize,
     /// Somebody types: a line that was typed before a question is no answer. What a pipe
     /// holds is there on purpose.
@@ -96,7 +96,7 @@ impl Keyboard {
         while self.is_typed && self.lines.try_recv().is_ok() {}
     }
 
-    /// Whether a line was typed, or Enter was pressed, since the last look; never where
+    /// Returns true if a line was typed, or Enter was pressed, since the last look; never where
     /// nobody types.
     pub(in crate::cli) fn was_pressed(&mut self) -> bool {
         self.sort();

@@ -1,7 +1,7 @@
 //! Questions at a terminal, or at a pipe, whose lines are the answers.
 
 use super::keyboard::keyboard;
-use super::voice::{say, show};
+use super::writer::{say, show};
 
 /// Asks, and gives the answer without the space around it; none where the input ends, an
 /// end is asked for, or the answer is `q`. What was typed before is no answer.

@@ -13,7 +13,7 @@ use crossterm::terminal::{disable_raw_mode, enable_raw_mode};
 use super::interrupt;
 use crate::steering::keys::Key;
 
-/// Whether the terminal is in raw mode: lines then end in CR LF.
+/// True if the terminal is in raw mode: lines then end in CR LF.
 static IS_RAW: AtomicBool = AtomicBool::new(false);
 
 /// What the thread at the keyboard has read.
@@ -54,7 +54,7 @@ pub(in crate::cli) fn put_back() {
     }
 }
 
-/// Whether the terminal is in raw mode.
+/// Returns true if the terminal is in raw mode.
 pub(super) fn is_raw() -> bool {
     IS_RAW.load(Ordering::Relaxed)
 }

@@ -1,4 +1,4 @@
-//! What may take long shows that it goes on: on a terminal a line at the bottom, else a line every
+//! Signs of life of long work: on a terminal a line at the bottom, else a line every
 //! few seconds.
 
 use std::io::{IsTerminal, stderr};

@@ -5,7 +5,7 @@ use std::io::Write;
 use super::{BEFORE_CONTACT, CONTACT, Column, NUMBERS, Record, Value};
 use crate::output::{Output, OutputError};
 use crate::replay::marks::Mark;
-use crate::replay::settings::{Settings, ViewSettings};
+use crate::replay::settings::{PlacementSettings, Settings};
 
 /// A CSV recording being written.
 pub(super) struct Csv {
@@ -43,7 +43,7 @@ impl Csv {
 
     /// Says between two rows that the rows from here on were felt in another view. What
     /// passes comments over passes it over, and all comments together are the settings.
-    pub(super) fn view(&mut self, view: &ViewSettings) -> Result<(), OutputError> {
+    pub(super) fn view(&mut self, view: &PlacementSettings) -> Result<(), OutputError> {
         self.flush()?;
         self.remark(&view.to_toml());
         Ok(())

@@ -13,7 +13,7 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::scene::TickRecord;
 
 use super::marks::Mark;
-use super::settings::{Settings, ViewSettings};
+use super::settings::{PlacementSettings, Settings};
 use crate::output::{Output, OutputError};
 use crate::terrain::Scale;
 
@@ -42,25 +42,25 @@ const PARQUET: &str = "parquet";
 pub struct Record {
     /// Time, s.
     pub t_s: f64,
-    /// Where the HIP was, mm; terrain frame.
+    /// The HIP, mm; terrain frame.
     pub hip_mm: [f64; 3],
-    /// Whether the surface was touched.
+    /// True if the surface was touched.
     pub contact: bool,
-    /// Where the proxy was, mm: at the HIP unless touching.
+    /// The proxy, mm: at the HIP unless touching.
     pub proxy_mm: [f64; 3],
     /// Force on the hand, N.
     pub force_n: [f64; 3],
 }
 
 impl Record {
-    /// What was felt in a tick of a device with `tick_hz` ticks a second.
+    /// Makes the record of a tick of a device with `tick_hz` ticks a second.
     #[must_use]
     pub fn of_tick(sample: &TickRecord, tick_hz: u32, scale: &Scale) -> Self {
         let t_s = f64::from(sample.tick) / f64::from(tick_hz.max(1));
         Self::new(t_s, scale.to_mm(&sample.hip), sample, scale)
     }
 
-    /// What was felt at a time, s, with the HIP at a place, mm.
+    /// Makes the record at a time, s, with the HIP at a place, mm.
     #[must_use]
     pub fn new(t_s: f64, hip_mm: [f64; 3], sample: &TickRecord, scale: &Scale) -> Self {
         let contact = sample.state == ContactState::Touching;
@@ -157,7 +157,7 @@ impl Recording {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn view(&mut self, view: &ViewSettings) -> Result<(), OutputError> {
+    pub fn view(&mut self, view: &PlacementSettings) -> Result<(), OutputError> {
         match &mut self.0 {
             Form::Csv(csv) => csv.view(view),
             Form::Parquet(parquet) => {

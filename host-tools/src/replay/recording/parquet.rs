@@ -18,7 +18,7 @@ use parquet::schema::types::{ColumnPath, Type};
 use super::{BEFORE_CONTACT, CONTACT, Column, NUMBERS, Record, Value};
 use crate::output::{Output, OutputError};
 use crate::replay::marks::Mark;
-use crate::replay::settings::{KEY, Settings, ViewSettings};
+use crate::replay::settings::{KEY, PlacementSettings, Settings};
 
 /// Rows that are kept before they are written as one group: a minute of a device.
 const GROUP: usize = 60_000;
@@ -63,7 +63,7 @@ impl Parquet {
     }
 
     /// Rows of another view follow. The file's metadata is written at its end.
-    pub(super) fn view(&mut self, view: &ViewSettings) {
+    pub(super) fn view(&mut self, view: &PlacementSettings) {
         self.settings += &view.to_toml();
     }
 

@@ -110,7 +110,7 @@ fn a_parquet_recording_is_what_its_library_reads() {
 }
 
 #[test]
-fn settings_stand_before_the_header_and_nothing_is_left_of_what_is_not_finished() {
+fn settings_precede_header_and_unfinished_files_vanish() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = std::fs::read_to_string(recorded(&folder, "r.csv")).expect("there");
     let settings: Vec<_> = text

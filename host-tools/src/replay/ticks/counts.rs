@@ -1,4 +1,4 @@
-//! What rows were for ticks, in words.
+//! Relation of rows to ticks, in words.
 
 use hapterra_touch::ticks::{Counts, ODD_MOVE_S, Untimed};
 
@@ -28,13 +28,13 @@ pub(super) fn remarks(counts: &Counts) -> Vec<String> {
         (
             odd,
             format!(
-                "{odd} times the HIP moves for more than {ODD_MOVE_S} s between two rows, {longest} s at most: it is felt on straight lines there. t_s is in seconds"
+                "{odd} times the HIP moves for more than {ODD_MOVE_S} s between two rows, {longest} s at most: straight lines are rendered there. t_s is in seconds"
             ),
         ),
         (
             counts.passed_over,
             format!(
-                "{} of {} rows lie between two ticks and are not felt",
+                "{} of {} rows lie between two ticks and are not rendered",
                 counts.passed_over, counts.rows
             ),
         ),

@@ -11,10 +11,13 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::{COLUMNS, Settings, Trajectory, TrajectoryError, TrajectoryFault, is_parquet};
+use crate::replay::states::update_name;
 use heightfield::regular_file;
 
 /// Names of columns of numbers with a fraction end in a unit.
 const UNITS: [&str; 3] = ["_s", "_mm", "_n"];
+/// Name of the column of the proxy's states.
+const STATE: &str = "state";
 
 /// A recording in memory.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +44,7 @@ pub enum ColumnValues {
 type Columns = Vec<(String, ColumnValues)>;
 
 impl RecordedColumns {
-    /// Reads a recording, CSV or Parquet. Columns of CSV without a unit are counts, else numbers,
+    /// Reads a recording, CSV or Parquet; states of the proxy have today's names. Columns of CSV without a unit are counts, else numbers,
     /// else words, as all their values are.
     ///
     /// # Errors
@@ -50,12 +53,23 @@ impl RecordedColumns {
         // This checks the header.
         let settings = Trajectory::open(path)?.settings;
         let read = read(path).map_err(|fault| TrajectoryError::new(path, fault));
-        let (columns, was_cut) = read?;
+        let (mut columns, was_cut) = read?;
+        if let Some(states) = columns.iter_mut().find_map(states) {
+            states.iter_mut().for_each(update_name);
+        }
         Ok(Self {
             settings,
             columns,
             was_cut,
         })
+    }
+}
+
+/// Values of the column of the proxy's states.
+fn states((name, values): &mut (String, ColumnValues)) -> Option<&mut Vec<String>> {
+    match values {
+        ColumnValues::Texts(texts) if name == STATE => Some(texts),
+        _ => None,
     }
 }
 

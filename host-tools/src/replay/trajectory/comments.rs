@@ -113,7 +113,7 @@ pub(super) fn lines_before_a_row(stream: impl Read) -> u64 {
     }
 }
 
-/// Whether the row that begins from here on is not ended: the file stops in its middle.
+/// Returns true if the row that begins from here on is not ended: the file stops in its middle.
 pub(super) fn row_is_cut(stream: impl Read) -> bool {
     let (mut reader, mut line) = (BufReader::new(stream), Vec::new());
     loop {

@@ -94,13 +94,13 @@ impl<R: Read + Seek> Rows<R> {
         Ok(view)
     }
 
-    /// Whether the file ended in the middle of a row, as that of a recording that was killed
+    /// Returns true if the file ended in the middle of a row, as that of a recording that was killed
     /// does. Such a row is none.
     pub(super) const fn was_cut(&self) -> bool {
         self.was_cut
     }
 
-    /// Whether the file ends in the middle of the present row: no row can be read
+    /// Returns true if the file ends in the middle of the present row: no row can be read
     /// afterwards.
     fn is_cut(&mut self) -> bool {
         let Some(begin) = self.record.position().map(csv::Position::byte) else {

@@ -1,4 +1,4 @@
-//! What is wrong with a trajectory, and where.
+//! Faults of trajectories, and their places.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use hapterra_touch::ticks::TimeFault;
 
 use crate::replay::settings::SettingsError;
 
-/// What is wrong with which trajectory.
+/// Fault of a trajectory.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {fault}", path.display())]
 pub struct TrajectoryError {
@@ -21,7 +21,7 @@ impl TrajectoryError {
         Self { path, fault }
     }
 
-    /// Whether the settings of the recording are what cannot be used.
+    /// Returns true if the settings of the recording are what cannot be used.
     #[must_use]
     pub const fn is_about_settings(&self) -> bool {
         matches!(self.fault, TrajectoryFault::Settings(_))

@@ -9,8 +9,8 @@ mod columns;
 mod comments;
 mod csv;
 mod fault;
-mod felt_rows;
 mod parquet;
+mod recording_rows;
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -22,7 +22,7 @@ use hapterra_touch::ticks::TimeFault;
 
 pub use columns::{ColumnValues, RecordedColumns};
 pub use fault::TrajectoryError;
-pub use felt_rows::{RecordingRow, RecordingRows};
+pub use recording_rows::{RecordingRow, RecordingRows};
 
 use super::settings::Settings;
 use crate::terrain::Scale;
@@ -158,7 +158,7 @@ impl Trajectory {
         }
     }
 
-    /// Whether the last row of the recording was cut in its middle, and is left out: the
+    /// Returns true if the last row of the recording was cut in its middle, and is left out: the
     /// command that wrote it was killed. Known after the last row.
     #[must_use]
     pub fn was_cut(&self) -> bool {
@@ -209,7 +209,7 @@ fn later_remarks(file: &mut File) -> Result<String, TrajectoryFault> {
     later.map_err(TrajectoryFault::Unreadable)
 }
 
-/// Whether a file begins as Parquet does; what cannot be wound back is CSV.
+/// Checks that a file begins as Parquet does; what cannot be wound back is CSV.
 fn is_parquet(file: &mut File) -> Result<bool, TrajectoryFault> {
     if file.stream_position().is_err() {
         return Ok(false);

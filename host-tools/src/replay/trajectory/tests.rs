@@ -59,6 +59,21 @@ fn a_path_may_have_no_times() {
 }
 
 #[test]
+fn earlier_names_of_states_are_read_as_today_s() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("t.csv");
+    let text = "t_s,x_mm,y_mm,z_mm,contact,state\n0,1,2,3,0,waiting\n1,1,2,3,0,letting go\n2,1,2,3,0,unseeded\n3,1,2,3,0,free\n";
+    std::fs::write(&path, text).expect("written");
+    let read = RecordedColumns::read(&path).expect("a recording");
+    let wanted = ["unseeded", "releasing", "unseeded", "free"].map(String::from);
+    let last = read.columns.last();
+    assert_eq!(
+        last,
+        Some(&("state".into(), ColumnValues::Texts(wanted.into())))
+    );
+}
+
+#[test]
 fn a_recording_that_was_cut_in_a_row_has_the_rows_before() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("t.csv");

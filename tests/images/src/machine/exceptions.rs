@@ -6,7 +6,7 @@ use super::fault_injection::Load;
 use super::{Machine, Stop, THUMB};
 use crate::chip::Unreadable;
 
-/// Where an exception's return leads: no memory is there.
+/// Place where an exception's return leads: no memory is there.
 pub(super) const EXC_RETURN: u64 = 0xFFFF_FFF8;
 /// Positions in the vector table.
 const NMI: u32 = 2;
@@ -16,7 +16,7 @@ const BUS_FAULT: u32 = 5;
 /// is in it.
 const BUS_FAULTS_ON: (u32, u32) = (0xE000_ED24, 1 << 17);
 const BUS_FAULTS_PRIORITY: (u32, u32) = (0xE000_ED18, 8);
-/// Where an exception's frame has the place to go back to.
+/// Place where an exception's frame has the place to go back to.
 const PC_IN_FRAME: u32 = 24;
 /// Priority of an execution that no interrupt can be below.
 const THREAD: i16 = 256;

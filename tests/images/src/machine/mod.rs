@@ -26,7 +26,7 @@ use running::SLICE;
 /// The Thumb bit of the program status.
 const THUMB: u64 = 1 << 24;
 
-/// Why the machine stopped.
+/// Reason for which the machine stopped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The time is up.
@@ -45,7 +45,7 @@ pub enum Stop {
 pub struct Machine {
     /// The chip.
     pub chip: &'static Chip,
-    /// What it runs.
+    /// Its image.
     pub image: Image,
     core: Unicorn<'static, ()>,
     bus: Rc<RefCell<Bus>>,
@@ -59,7 +59,7 @@ pub struct Machine {
     protection: Protection,
     /// Vectors taken since it was last cleared.
     pub taken: Vec<u32>,
-    /// How often a hard fault was taken.
+    /// Number of times that a hard fault was taken.
     pub hard_faults: u32,
     /// Instructions between two looks at time and interrupts.
     pub slice: usize,
@@ -68,9 +68,9 @@ pub struct Machine {
     pub raises_tick_every: Option<u32>,
     /// Looks that found the core there.
     pub found_busy: u32,
-    /// How often the haptic interrupt was raised out of turn.
+    /// Number of times that the haptic interrupt was raised out of turn.
     pub raised: u32,
-    /// How often the haptic interrupt was pending and could not be taken
+    /// Number of times that the haptic interrupt was pending and could not be taken
     /// although no tick was under way.
     pub delayed: u32,
     /// Looks that found PRIMASK set although the haptic interrupt was let through.
@@ -192,13 +192,13 @@ impl Machine {
         bus.raise_interrupts();
     }
 
-    /// Whether the amplifiers are switched on.
+    /// Returns true if the amplifiers are switched on.
     #[must_use]
     pub fn is_enabled(&self) -> bool {
         self.bus().output(self.chip.enable)
     }
 
-    /// What reached commands and enable pin since this was last asked.
+    /// Takes the effects on commands and enable pin since the last call.
     #[must_use]
     pub fn take_effects(&mut self) -> Vec<Effect> {
         std::mem::take(&mut self.bus().effects)

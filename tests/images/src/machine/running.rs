@@ -15,7 +15,7 @@ const EXCEPTION_NS: u64 = 200;
 const SLEEP_NS: u64 = 5_000;
 
 impl Machine {
-    /// Where the core is.
+    /// Returns the place where the core is.
     #[must_use]
     pub fn place(&self) -> String {
         let pc = self.register(RegisterARM::PC) as u32;
@@ -109,7 +109,7 @@ impl Machine {
         }
     }
 
-    /// Whether the haptic interrupt is being handled.
+    /// Returns true if the haptic interrupt is being handled.
     #[must_use]
     pub fn is_ticking(&self) -> bool {
         let vector = self.chip.tick_interrupt as u32 + 16;
@@ -140,7 +140,7 @@ impl Machine {
         self.masked += u32::from(let_through && masked);
     }
 
-    /// Whether the last instruction was a WFE or WFI.
+    /// Returns true if the last instruction was a WFE or WFI.
     fn is_waiting(&self) -> bool {
         let pc = self.register(RegisterARM::PC) as u32 & !1;
         let before = |back: u32| {

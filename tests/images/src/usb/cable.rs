@@ -49,13 +49,13 @@ impl Cable {
         self.peripheral.write(offset, value, mask);
     }
 
-    /// Whether the interrupt is asserted.
+    /// Returns true if the interrupt is asserted.
     #[must_use]
     pub fn is_asserting(&self) -> bool {
         self.peripheral.is_asserting()
     }
 
-    /// Whether the device shows itself to a host.
+    /// Returns true if the device shows itself to a host.
     #[must_use]
     pub fn is_attached(&self) -> bool {
         self.peripheral.is_attached()

@@ -8,7 +8,7 @@ const CNTR: u32 = 0x40;
 const ISTR: u32 = 0x44;
 const DADDR: u32 = 0x4C;
 const BCDR: u32 = 0x58;
-/// Where the packet memory begins behind the registers.
+/// Place where the packet memory begins behind the registers.
 const MEMORY: u32 = 0x400;
 
 /// Bits of an endpoint's register.

@@ -16,9 +16,9 @@ pub trait Peripheral {
     fn read(&mut self, offset: u32) -> u32;
     /// A word that the core writes, in the bytes of `mask`.
     fn write(&mut self, offset: u32, value: u32, mask: u32);
-    /// Whether the interrupt is asserted.
+    /// Returns true if the interrupt is asserted.
     fn is_asserting(&self) -> bool;
-    /// Whether it shows itself to a host.
+    /// Returns true if it shows itself to a host.
     fn is_attached(&self) -> bool;
     /// The host resets the bus.
     fn bus_reset(&mut self);

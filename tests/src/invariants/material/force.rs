@@ -3,7 +3,7 @@
 use glam::DVec3;
 use hapterra_core::grid::GridPoint;
 
-use super::in_force::InForce;
+use super::active_material::ActiveMaterial;
 
 /// Rounding, as a part of a force.
 const ROUNDING: f64 = 1e-5;
@@ -12,7 +12,7 @@ const LEAST_N: f64 = 1e-12;
 
 /// What a tick is felt with.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Felt<'p> {
+pub(super) struct TickConditions<'p> {
     /// From the HIP to the proxy, cells.
     pub(super) way: DVec3,
     /// By so much it may be off, cells.
@@ -36,9 +36,9 @@ pub(super) struct Wanted {
     pub(super) allowed_n: f64,
 }
 
-impl Felt<'_> {
+impl TickConditions<'_> {
     /// The force where neither shading turns it nor a border fades it.
-    pub(super) fn force(&self, material: &InForce) -> Wanted {
+    pub(super) fn force(&self, material: &ActiveMaterial) -> Wanted {
         let (mut stretch, mut allowed) = (self.way, self.allowed + ROUNDING * self.way.length());
         if self.way.length() > LEAST_N
             && let Some((judge, share)) = material.texture()
@@ -56,7 +56,7 @@ impl Felt<'_> {
     }
 
     /// The spring's force, damped along itself.
-    fn damped(&self, material: &InForce, spring: DVec3, allowed: f64) -> Wanted {
+    fn damped(&self, material: &ActiveMaterial, spring: DVec3, allowed: f64) -> Wanted {
         let (size, damping) = (spring.length(), 1e-3 * material.damping());
         let fast_mm_s = self.velocity_mm_s.length();
         let unsure = (1e-3 * material.unsure_damping() * fast_mm_s).min(size);
@@ -80,7 +80,7 @@ impl Felt<'_> {
 
     /// The least and the largest size of a force whose direction shading has turned; also of one
     /// that fades, of which the least is nothing.
-    pub(super) fn sizes(&self, material: &InForce, fades: bool) -> [f64; 2] {
+    pub(super) fn sizes(&self, material: &ActiveMaterial, fades: bool) -> [f64; 2] {
         let depth = self.way.length();
         let off = self.allowed + ROUNDING * depth;
         let (mut least, mut most) = (depth - off, depth + off);

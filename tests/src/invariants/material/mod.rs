@@ -1,12 +1,12 @@
-//! What a loop feels of a scene with materials, judged by docs/how-to/materials.md and
+//! Oracle of scenes with materials, by docs/how-to/materials.md and
 //! docs/explanation/effects.md.
 //!
 //! The judge knows the class of each sample itself, and follows in f64 what may be in force. Where
 //! a proxy lies on the line half way between two samples either class is right: then it follows
 //! both, until the force tells which one it is.
 
+mod active_material;
 mod force;
-mod in_force;
 mod slides;
 
 use glam::DVec3;
@@ -23,8 +23,8 @@ use crate::scene::materials::Materials;
 use crate::scene::replayed::Replied;
 use crate::scene::run::Scene;
 use crate::scene::terrain::Kind;
-use force::Felt;
-use in_force::InForce;
+use active_material::ActiveMaterial;
+use force::TickConditions;
 
 /// A place so near to the line half way between two samples has either class, cells.
 const HALF_WAY: f64 = 1e-6;
@@ -33,7 +33,7 @@ const FOLLOWED: usize = 256;
 /// Points a second: ticks.
 const RATE_HZ: f64 = 1e3;
 
-/// What a judge learned.
+/// Measurements of an oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Judged {
     /// Points in contact whose force was judged: in whole, and by its size.
@@ -70,10 +70,10 @@ pub struct MaterialJudge<'g> {
     shading: Shading,
     shift: [i32; 3],
     /// What may be in force; none where nobody knows.
-    courses: Vec<InForce>,
+    courses: Vec<ActiveMaterial>,
     before: Option<Replied>,
     point: usize,
-    /// What was learned.
+    /// Its measurements.
     pub judged: Judged,
 }
 
@@ -87,7 +87,7 @@ impl<'g> MaterialJudge<'g> {
             kind: scene.terrain.kind,
             shading: scene.shading,
             shift,
-            courses: vec![InForce::default(materials)],
+            courses: vec![ActiveMaterial::default(materials)],
             before: None,
             point: 0,
             judged: Judged::default(),
@@ -113,7 +113,7 @@ impl<'g> MaterialJudge<'g> {
         let (force, state) = (replied.sample.force_n.as_dvec3(), replied.sample.state);
         let most = f64::from(self.materials.law.max_force_n);
         let is_bounded = force.length() <= most * (1.0 + 1e-6);
-        let may_press = matches!(state, ContactState::Touching | ContactState::Fading);
+        let may_press = matches!(state, ContactState::Touching | ContactState::Releasing);
         if !is_bounded || !(may_press || force == DVec3::ZERO) {
             return self.fail(
                 Invariant::Material,
@@ -160,7 +160,7 @@ impl<'g> MaterialJudge<'g> {
             .is_some_and(|before| before.sample.proxy == proxy);
         let touched = self.is_touched_before();
         let nearest = self.nearest(replied.proxy);
-        let mut next: Vec<InForce> = Vec::new();
+        let mut next: Vec<ActiveMaterial> = Vec::new();
         let courses = std::mem::take(&mut self.courses);
         let was_open = courses.is_empty();
         for course in courses {
@@ -191,7 +191,7 @@ impl<'g> MaterialJudge<'g> {
     /// Drops the courses with another force.
     fn keep_what_is_felt(
         &mut self,
-        courses: &mut Vec<InForce>,
+        courses: &mut Vec<ActiveMaterial>,
         was_open: bool,
         replied: &Replied,
         seen: &Seen,
@@ -235,7 +235,7 @@ impl<'g> MaterialJudge<'g> {
     }
 
     /// Along the spring no force is against it. Shading turns it by 60° at most.
-    fn never_pulls(&self, felt: &Felt<'_>, force: DVec3, replied: &Replied) -> Verdict {
+    fn never_pulls(&self, felt: &TickConditions<'_>, force: DVec3, replied: &Replied) -> Verdict {
         let (depth, size) = (felt.way.length(), force.length());
         let is_even = self.materials.table.iter().all(|one| one.texture.is_none());
         let least = match self.shading {
@@ -251,11 +251,11 @@ impl<'g> MaterialJudge<'g> {
         Ok(())
     }
 
-    fn felt<'p>(&self, replied: &'p Replied, seen: &Seen) -> Felt<'p> {
+    fn felt<'p>(&self, replied: &'p Replied, seen: &Seen) -> TickConditions<'p> {
         let cell_mm = f64::from(self.materials.cell_mm);
         let [hip, proxy] = [replied.hip, replied.proxy].map(DVec3::from_array);
         let from = self.before.map_or(replied.hip, |before| before.hip);
-        Felt {
+        TickConditions {
             way: proxy - hip,
             allowed: seen.allowed_in_space(self.place.terrain),
             proxy: &replied.sample.proxy,

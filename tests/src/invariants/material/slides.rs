@@ -5,7 +5,7 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
 
-use super::in_force::InForce;
+use super::active_material::ActiveMaterial;
 use super::{MaterialJudge, RATE_HZ};
 use crate::invariants::Invariant;
 use crate::invariants::judge::Verdict;
@@ -22,7 +22,7 @@ const SLACK: f64 = 0.031;
 
 impl MaterialJudge<'_> {
     /// On a plane a proxy that slides, not too fast, ends where as much pulls as friction holds.
-    pub(super) fn slides(&mut self, course: &InForce, seen: &Seen) -> Verdict {
+    pub(super) fn slides(&mut self, course: &ActiveMaterial, seen: &Seen) -> Verdict {
         let (friction, [_, most]) = (course.friction(), course.frictions());
         let Some(before) = self.before else {
             return Ok(());

@@ -28,7 +28,7 @@ pub struct Account {
     pub name: &'static str,
     /// Its key, in base 64.
     pub key: &'static str,
-    /// Whether one of its containers may be public.
+    /// True if one of its containers may be public.
     is_public_allowed: bool,
 }
 
@@ -116,7 +116,7 @@ impl Service for Microsoft {
     }
 }
 
-/// Whether somebody without a key may read a container.
+/// Checks that somebody without a key may read a container.
 fn check_public(account: &Account, container: &str) -> Result<(), Refusal> {
     if !account.is_public_allowed {
         let why = "Public access is not permitted on this storage account.";

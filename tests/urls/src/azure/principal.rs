@@ -13,7 +13,7 @@ pub const PRINCIPAL: [&str; 3] = ["hills-tenant", "surveying", "under the stone"
 /// The token that it gets, as `az account get-access-token` prints one.
 pub const TOKEN: &str = "eyJ0.of-the-surveying.program";
 
-/// Where the secret is changed.
+/// Place where the secret is changed.
 pub(super) const PATH: &str = "/hills-tenant/oauth2/v2.0/token";
 
 /// # Errors

@@ -26,7 +26,7 @@ pub(super) fn made(account: &Account, container: &str, until: &str) -> String {
     format!("sp=r&se={until}&spr=https,http&sv={VERSION}&sr=c&sig={signature}")
 }
 
-/// Whether a request carries one.
+/// Returns true if a request carries one.
 pub(super) fn is_in(request: &Parts) -> bool {
     let query = request.uri.query().unwrap_or_default();
     query.split('&').any(|pair| pair.starts_with("sig="))

@@ -7,7 +7,7 @@ use ruzstd::decoding::StreamingDecoder;
 use weezl::decode::{Configuration, Decoder};
 use weezl::{BitOrder, LzwStatus};
 
-/// Whether what a compression of this code has packed can be unpacked piece by piece. LERC has
+/// Returns true if what a compression of this code has packed can be unpacked piece by piece. LERC has
 /// bits of all samples of a strip or tile beside their values.
 pub(super) const fn is_known(code: u16) -> bool {
     matches!(code, 1 | 5 | 8 | 32773 | 32946 | 50000)

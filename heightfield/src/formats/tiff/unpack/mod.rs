@@ -28,7 +28,7 @@ pub(super) const ENDIAN: Endian = match cfg!(target_endian = "big") {
     false => Endian::Little,
 };
 
-/// Whether the strips or tiles of a layout can be unpacked row by row. A row is held in memory.
+/// Returns true if the strips or tiles of a layout can be unpacked row by row. A row is held in memory.
 pub(super) fn suits(layout: &Layout) -> bool {
     codec::is_known(layout.directory.ifd().compression())
         && (1..=MAX_BLOCK_BYTES).contains(&layout.row_bytes())
@@ -80,7 +80,7 @@ pub(super) struct Rows<'f> {
     layout: &'f Layout,
     chunk: Chunk,
     unpacked: Box<dyn Read + 'f>,
-    /// How many came.
+    /// Those that have arrived.
     count: u32,
     row: Vec<u8>,
 }
@@ -133,7 +133,7 @@ fn cannot(layout: &Layout, chunk: &Chunk, row: u32, error: &std::io::Error) -> R
     ))
 }
 
-/// Whether all of a band is best read so: its strips are large.
+/// Returns true if all of a band is best read so: its strips are large.
 pub(super) fn suits_whole(layout: &Layout, part: &Part) -> bool {
     let is_whole = *part == Part::whole(layout.columns, layout.rows);
     is_whole && layout.has_strips() && layout.chunk_size() > MAX_DECODED && suits(layout)

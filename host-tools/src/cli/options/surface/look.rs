@@ -1,14 +1,14 @@
-//! What a table says of one material, with its units.
+//! A table's entry for one material, with its units.
 
 use serde::{Deserialize, Deserializer};
 
 use super::super::quantity::{ANGLE, DAMPING, LENGTH, STIFFNESS, TIME, Units};
 
-/// What a table says of one material; nothing where it says nothing.
+/// A table's entry for one material; empty where it states nothing.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Look {
-    /// What it is called.
+    /// Its name.
     pub name: Option<String>,
     /// Stiffness, N/mm.
     #[serde(deserialize_with = "stiffness")]
@@ -50,7 +50,7 @@ pub enum TextureName {
     Grating,
 }
 
-/// Whether the force turns evenly over the edges between patches.
+/// Shading of the force over the edges between patches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ShadingName {
@@ -61,7 +61,7 @@ pub enum ShadingName {
     Smooth,
 }
 
-/// Whether the passivity controller acts.
+/// The passivity controller, on or off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PassivityName {

@@ -22,7 +22,7 @@ use heightfield::{Raster, files_read_with};
 use numbers::{check, over, rubbed, told};
 use table::{Look, PassivityName, ShadingName, TableFile};
 
-/// What a terrain feels like.
+/// Surface of a terrain.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Surface")]
 pub struct SurfaceOptions {
@@ -248,7 +248,7 @@ impl Surface {
             }
             (None, _) => return Ok(None),
             (Some(_), None) => {
-                return Err("--materials without what its classes feel like")
+                return Err("--materials without surfaces for its classes")
                     .or_hint("name a table with --surface FILE.toml; docs/worldcover.toml is one");
             }
             (Some(file), Some(looks)) => (file, looks.clone()),

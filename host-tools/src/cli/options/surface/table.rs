@@ -43,15 +43,15 @@ const RENAMED: [(&str, &str); 2] = [
 pub struct TableFile {
     /// Which normals the force follows.
     pub shading: ShadingName,
-    /// Whether the passivity controller acts.
+    /// The passivity controller, on or off.
     pub passivity: PassivityName,
-    /// Where there is no class.
+    /// Entry for samples without a class.
     pub default: (usize, Look),
     /// By class.
     pub classes: Vec<(i64, usize, Look)>,
 }
 
-/// What is wrong with a table.
+/// Fault of a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// It cannot be read.
@@ -169,7 +169,7 @@ impl TableFile {
             return Err(bad(
                 *line,
                 format!(
-                    "class {class} is one too many: {count} classes, and at most {MAX_CLASSES} can be told apart; leave those out that may feel as the default"
+                    "class {class} is one too many: {count} classes, and at most {MAX_CLASSES} are possible; leave those out that may use the default"
                 ),
             ));
         }

@@ -1,4 +1,4 @@
-//! What of a terrain lies where in front of the arm, and how large.
+//! Placement of a terrain in front of the arm: place, scale, level and heights.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::{Scene, Source};
@@ -17,22 +17,22 @@ use crate::terrain::{
 const RELIEF_MM: f64 = 25.0;
 /// Relief that can be felt well, mm.
 pub(crate) const FELT_MM: f64 = 15.0;
-/// Hand millimetres a felt cell at a place whose scale nobody states.
+/// Device millimetres a haptic cell at a place whose scale nobody states.
 const CELL_MM: f64 = 1.0;
 
-/// How large the terrain is asked to be.
+/// Requested size of the terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Sizing {
-    /// The target fills the arm's reach; of a place, 1 mm is a felt cell.
+    /// The target fills the arm's reach; of a place, 1 mm is a haptic cell.
     #[default]
     Fit,
-    /// Hand millimetres a felt cell of level 0.
+    /// Device millimetres a haptic cell of level 0.
     CellMm(f64),
-    /// Ground metres a hand millimetre.
+    /// Ground metres a device millimetre.
     GroundMPerMm(f64),
 }
 
-/// How high the terrain is asked to be.
+/// Requested height of the terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Heights {
     /// So many times its true proportions. A file that does not know how large its cells are has
@@ -41,7 +41,7 @@ pub enum Heights {
     Exaggerated(f64),
     /// [`suited_height`].
     Suited,
-    /// Hand millimetres a vertical unit of the file.
+    /// Device millimetres a vertical unit of the file.
     MmPerUnit(f64),
 }
 
@@ -51,7 +51,7 @@ impl Default for Heights {
     }
 }
 
-/// Hand millimetres a vertical unit for a terrain that may be too flat to be felt: `plain`,
+/// Device millimetres a vertical unit for a terrain that may be too flat to be felt: `plain`,
 /// which is true to scale, or as much more as makes a `relief` (vertical units) 15 mm high.
 #[must_use]
 pub fn suited_height(plain: f64, relief: f64) -> f64 {
@@ -61,46 +61,46 @@ pub fn suited_height(plain: f64, relief: f64) -> f64 {
     }
 }
 
-/// What is asked for.
+/// Requested placement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ViewOptions {
+pub struct PlacementOptions {
     /// Which part of the terrain.
     pub target: Target,
-    /// How large.
+    /// Its size.
     pub sizing: Sizing,
-    /// How high.
+    /// Its height.
     pub heights: Heights,
     /// Level of detail; chosen by what the encoders tell where nobody states it.
     pub level: Option<u8>,
 }
 
-/// What of a terrain lies where in front of the arm, and how large.
+/// Placement of a terrain in front of the arm: place, scale, level and heights.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// The point of the terrain under the tip in its home pose, hand millimetres east,
+pub struct Placement {
+    /// The point of the terrain under the tip in its home pose, device millimetres east,
     /// north and up from the south-west sample at height zero.
     pub home_mm: [f64; 3],
     /// The same place in the file's coordinates.
     pub home_ground: [f64; 2],
     /// Of level 0.
     pub scale: Scale,
-    /// Every 2ᴸ-th felt sample is felt.
+    /// Every 2ᴸ-th rendered sample is felt.
     pub level: u8,
-    /// Side of a felt cell of level 0 on the ground, m, where the file knows it.
+    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it.
     pub side_m: Option<f64>,
-    /// How many times higher than at its true proportions the terrain is, where the file
+    /// Height of the terrain, in its true proportions' height, where the file
     /// knows them.
     pub exaggeration: Option<f64>,
-    /// What is laid in front of the arm, from west, south to east, north, hand millimetres;
+    /// The part in front of the arm, from west, south to east, north, device millimetres;
     /// the whole terrain where only place and scale are stated.
     pub laid_mm: [f64; 4],
     /// Lowest and highest point of that in the hand, mm.
     pub heights_mm: [f64; 2],
-    /// What the arm gets to ([`Reach::sides_mm`]).
+    /// The arm's workspace ([`Reach::sides_mm`]).
     pub reach_mm: [f64; 4],
 }
 
-impl View {
+impl Placement {
     /// Lays a terrain in front of an arm.
     ///
     /// The grid is the target's own ([`Target::grid`]): its cells are square at the place.
@@ -111,7 +111,7 @@ impl View {
     pub fn new(
         grid: &HapticGrid<'_>,
         reach: &Reach,
-        options: &ViewOptions,
+        options: &PlacementOptions,
     ) -> Result<Self, PlaceError> {
         let wanted = Wanted::new(grid, options)?;
         match (options.target, options.sizing) {
@@ -139,25 +139,25 @@ impl View {
         }
     }
 
-    /// Ground metres a hand millimetre, where the file knows its size.
+    /// Ground metres a device millimetre, where the file knows its size.
     #[must_use]
     pub fn ground_m_per_mm(&self) -> Option<f64> {
         self.side_m.map(|side| side / self.scale.cell_mm())
     }
 
-    /// Ground metres a felt cell of the view's level, where the file knows its size.
+    /// Ground metres a haptic cell of the view's level, where the file knows its size.
     #[must_use]
     pub fn felt_cell_m(&self) -> Option<f64> {
         self.side_m.map(|side| side * f64::from(self.level).exp2())
     }
 
-    /// Hand millimetres a felt cell of the view's level.
+    /// Device millimetres a haptic cell of the view's level.
     #[must_use]
     pub fn felt_cell_mm(&self) -> f64 {
         self.scale.at_level(self.level).cell_mm()
     }
 
-    /// The felt cell within the arm's reach that is farthest from its true shape; of the
+    /// The haptic cell within the arm's reach that is farthest from its true shape; of the
     /// view's own grid. `None` where the file does not know how large its cells are.
     #[must_use]
     pub fn worst_reached(&self, grid: &HapticGrid<'_>) -> Option<Distortion> {
@@ -166,7 +166,7 @@ impl View {
         grid.worst_in([0, 1, 2, 3].map(cells))
     }
 
-    /// The same at another scale: hand millimetres a felt cell of level 0, and a vertical
+    /// The same at another scale: device millimetres a haptic cell of level 0, and a vertical
     /// unit. The place has yet to be [`Self::moved_to`].
     pub(super) fn scaled(self, cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, ScaleError> {
         let scale = Scale::new(cell_mm, height_mm_per_unit)?;
@@ -197,7 +197,7 @@ impl View {
         sides.map_or(1.0, |(there, here)| there / here)
     }
 
-    /// The same with another point under the tip in its home pose, hand millimetres, after
+    /// The same with another point under the tip in its home pose, device millimetres, after
     /// a view at another scale and of another grid.
     pub(super) fn moved_to(
         self,
@@ -244,11 +244,11 @@ impl View {
 /// What is asked for of a grid, its numbers checked.
 struct Wanted<'g> {
     grid: &'g HapticGrid<'g>,
-    options: ViewOptions,
+    options: PlacementOptions,
 }
 
 impl<'g> Wanted<'g> {
-    fn new(grid: &'g HapticGrid<'g>, options: &ViewOptions) -> Result<Self, PlaceError> {
+    fn new(grid: &'g HapticGrid<'g>, options: &PlacementOptions) -> Result<Self, PlaceError> {
         match options.sizing {
             Sizing::GroundMPerMm(scale) if !(scale.is_finite() && scale > 0.0) => {
                 return Err(PlaceError::GroundScale(scale));
@@ -270,7 +270,7 @@ impl<'g> Wanted<'g> {
         })
     }
 
-    /// Columns and rows of the last felt sample.
+    /// Columns and rows of the last rendered sample.
     fn last(&self) -> [f64; 2] {
         [self.grid.columns(), self.grid.rows()].map(|count| f64::from(count) - 1.0)
     }
@@ -290,7 +290,7 @@ impl<'g> Wanted<'g> {
         Ok(Scale::new(cell_mm, self.height_mm_per_unit(cell_mm, None))?)
     }
 
-    /// Hand millimetres a vertical unit with cells of a size in the hand; `relief` is that
+    /// Device millimetres a vertical unit with cells of a size in the hand; `relief` is that
     /// of what is fitted, in vertical units.
     fn height_mm_per_unit(&self, cell_mm: f64, relief: Option<f64>) -> f64 {
         let plain = match (self.grid.cells_per_vertical_unit(), relief) {
@@ -315,7 +315,7 @@ impl<'g> Wanted<'g> {
         scale: Scale,
         felt: [f64; 2],
         height: f64,
-    ) -> Result<View, PlaceError> {
+    ) -> Result<Placement, PlaceError> {
         let [east, north] = felt.map(|cells| cells * scale.cell_mm());
         // In the home pose the tip hangs in the air over its place.
         let up = height * scale.height_mm_per_unit() + ABOVE_MM;
@@ -330,7 +330,7 @@ impl<'g> Wanted<'g> {
         reach: &Reach,
         cells: [f64; 4],
         heights: [f64; 2],
-    ) -> Result<View, PlaceError> {
+    ) -> Result<Placement, PlaceError> {
         let [west, south, east, north] = cells;
         let relief = heights[1] - heights[0];
         let mm_per_unit = |cell_mm: f64| self.height_mm_per_unit(cell_mm, Some(relief));
@@ -359,10 +359,10 @@ impl<'g> Wanted<'g> {
         home_mm: [f64; 3],
         cells: [f64; 4],
         heights: [f64; 2],
-    ) -> View {
+    ) -> Placement {
         let felt = [home_mm[0], home_mm[1]].map(|mm| mm / scale.cell_mm());
         let true_height = self.grid.cells_per_vertical_unit();
-        View {
+        Placement {
             home_mm,
             home_ground: self.grid.to_ground(felt),
             scale,
@@ -409,5 +409,5 @@ fn rounded_down(x: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[path = "view_tests.rs"]
+#[path = "placement_tests.rs"]
 mod tests;

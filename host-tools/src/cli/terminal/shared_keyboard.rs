@@ -7,10 +7,10 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use super::device_console::DeviceConsole;
 use super::keyboard::keyboard;
 use super::raw_keys::{Pressed, RawMode};
-use super::speaker::Speaker;
-use super::voice::tell;
+use super::writer::tell;
 use crate::steering::keys::Key;
 
 /// Devices that can be chosen by one digit.
@@ -19,7 +19,7 @@ pub(in crate::cli) const MOST: usize = 9;
 const WAITING: usize = 64;
 
 /// The keyboard of several devices.
-struct Desk {
+struct SharedKeyboard {
     /// What each device's lines begin with.
     names: Vec<String>,
     state: Mutex<State>,
@@ -45,39 +45,42 @@ struct Inbox {
 }
 
 /// A device's place at the desk.
-pub(in crate::cli) struct Seat {
-    desk: Arc<Desk>,
+pub(in crate::cli) struct DeviceKeys {
+    shared_keyboard: Arc<SharedKeyboard>,
     index: usize,
 }
 
 /// Takes what is typed for these devices from now on, and keys one by one where the terminal
 /// gives them so. The first device is chosen.
-pub(in crate::cli) fn seats(speakers: &[Speaker]) -> Vec<Arc<Seat>> {
-    seats_at(speakers, RawMode::enter())
+pub(in crate::cli) fn share(consoles: &[DeviceConsole]) -> Vec<Arc<DeviceKeys>> {
+    share_from(consoles, RawMode::enter())
 }
 
-fn seats_at(speakers: &[Speaker], raw: Option<RawMode>) -> Vec<Arc<Seat>> {
-    let names = speakers.iter().map(Speaker::name);
+fn share_from(consoles: &[DeviceConsole], raw: Option<RawMode>) -> Vec<Arc<DeviceKeys>> {
+    let names = consoles.iter().map(DeviceConsole::name);
     let names: Vec<_> = names.map(|name| name.unwrap_or_default().into()).collect();
     let state = State {
         chosen: 0,
         named: None,
         inboxes: names.iter().map(|_| Inbox::default()).collect(),
     };
-    let desk = Arc::new(Desk {
+    let shared_keyboard = Arc::new(SharedKeyboard {
         names,
         state: Mutex::new(state),
         raw,
     });
-    (0..speakers.len())
+    (0..consoles.len())
         .map(|index| {
-            let desk = Arc::clone(&desk);
-            Arc::new(Seat { desk, index })
+            let shared_keyboard = Arc::clone(&shared_keyboard);
+            Arc::new(DeviceKeys {
+                shared_keyboard,
+                index,
+            })
         })
         .collect()
 }
 
-impl Desk {
+impl SharedKeyboard {
     fn state(&self) -> MutexGuard<'_, State> {
         // Nothing that panics runs while this is held.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
@@ -131,10 +134,10 @@ impl Desk {
     }
 }
 
-impl Seat {
-    /// Whether keys come one by one.
+impl DeviceKeys {
+    /// Returns true if keys come one by one.
     pub(in crate::cli) fn has_keys(&self) -> bool {
-        self.desk.raw.is_some()
+        self.shared_keyboard.raw.is_some()
     }
 
     /// What the user presses to answer a question of this device.
@@ -144,7 +147,7 @@ impl Seat {
 
     /// The keys besides Enter that were pressed for this device since the last look.
     pub(in crate::cli) fn keys(&self) -> Vec<Key> {
-        let mut state = self.desk.sort();
+        let mut state = self.shared_keyboard.sort();
         let inbox = state.inboxes.get_mut(self.index);
         inbox.map_or(vec![], |inbox| std::mem::take(&mut inbox.keys))
     }
@@ -152,12 +155,12 @@ impl Seat {
     /// Forgets what was pressed so far to answer a question of this device, also its digit
     /// without an Enter.
     pub(in crate::cli) fn forget(&self) {
-        drop(self.desk.sort());
+        drop(self.shared_keyboard.sort());
         self.forget_answers();
     }
 
     fn forget_answers(&self) {
-        let mut state = self.desk.state();
+        let mut state = self.shared_keyboard.state();
         if let Some(inbox) = state.inboxes.get_mut(self.index) {
             inbox.enters = 0;
         }
@@ -166,17 +169,17 @@ impl Seat {
         }
     }
 
-    /// How often Enter was pressed for this device since the last look.
+    /// Returns the number of times that Enter was pressed for this device since the last look.
     pub(in crate::cli) fn enters(&self) -> usize {
-        let mut state = self.desk.sort();
+        let mut state = self.shared_keyboard.sort();
         let inbox = state.inboxes.get_mut(self.index);
         inbox.map_or(0, |inbox| std::mem::take(&mut inbox.enters))
     }
 }
 
-impl Drop for Seat {
+impl Drop for DeviceKeys {
     fn drop(&mut self) {
-        if let Some(inbox) = self.desk.state().inboxes.get_mut(self.index) {
+        if let Some(inbox) = self.shared_keyboard.state().inboxes.get_mut(self.index) {
             inbox.is_closed = true;
         }
     }
@@ -186,21 +189,23 @@ impl Drop for Seat {
 mod tests {
     use super::*;
 
-    fn two() -> Vec<Arc<Seat>> {
-        seats_at(&Speaker::of_each(&["native", "usb:7"]), None)
+    fn two() -> Vec<Arc<DeviceKeys>> {
+        share_from(&DeviceConsole::of_each(&["native", "usb:7"]), None)
     }
 
-    fn press(seats: &[Arc<Seat>], pressed: &[Pressed]) -> Vec<String> {
-        let desk = &seats[0].desk;
-        let mut state = desk.state();
-        let told = pressed.iter().map(|key| desk.take(&mut state, *key));
+    fn press(device_keys: &[Arc<DeviceKeys>], pressed: &[Pressed]) -> Vec<String> {
+        let shared_keyboard = &device_keys[0].shared_keyboard;
+        let mut state = shared_keyboard.state();
+        let told = pressed
+            .iter()
+            .map(|key| shared_keyboard.take(&mut state, *key));
         told.collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
     /// What a device got, without a look at the real keyboard.
-    fn got(seat: &Seat) -> (Vec<Key>, usize) {
-        let mut state = seat.desk.state();
-        let inbox = std::mem::take(&mut state.inboxes[seat.index]);
+    fn got(device_keys: &DeviceKeys) -> (Vec<Key>, usize) {
+        let mut state = device_keys.shared_keyboard.state();
+        let inbox = std::mem::take(&mut state.inboxes[device_keys.index]);
         (inbox.keys, inbox.enters)
     }
 
@@ -209,56 +214,56 @@ mod tests {
     }
 
     #[test]
-    fn enter_goes_to_the_device_whose_number_was_pressed_right_before_it_and_else_to_none() {
-        let seats = two();
+    fn enter_reaches_only_the_device_named_right_before() {
+        let device_keys = two();
         let no_device = |told: Vec<String>| {
             let [.., line] = &told[..] else {
                 panic!("{told:?}");
             };
             assert!(line.contains("1 to 2, and then Enter"), "{line}");
         };
-        no_device(press(&seats, &[Pressed::Enter]));
-        assert_eq!(press(&seats, &[key('1'), Pressed::Enter]), [""; 0]);
-        assert_eq!(got(&seats[0]), (vec![], 1));
-        let told = press(&seats, &[key('2'), Pressed::Enter]);
+        no_device(press(&device_keys, &[Pressed::Enter]));
+        assert_eq!(press(&device_keys, &[key('1'), Pressed::Enter]), [""; 0]);
+        assert_eq!(got(&device_keys[0]), (vec![], 1));
+        let told = press(&device_keys, &[key('2'), Pressed::Enter]);
         assert_eq!(told, ["keys go to [2 usb:7]"]);
-        assert_eq!(got(&seats[1]), (vec![], 1));
+        assert_eq!(got(&device_keys[1]), (vec![], 1));
         // The second device is chosen still; this Enter may be the first one's user's.
-        no_device(press(&seats, &[Pressed::Enter]));
-        no_device(press(&seats, &[key('2'), key('+'), Pressed::Enter]));
-        assert_eq!(got(&seats[1]), (vec![Key::Char('+')], 0));
+        no_device(press(&device_keys, &[Pressed::Enter]));
+        no_device(press(&device_keys, &[key('2'), key('+'), Pressed::Enter]));
+        assert_eq!(got(&device_keys[1]), (vec![Key::Char('+')], 0));
         // A digit from before a question is no answer to it either, and one for another
         // device's is.
-        press(&seats, &[key('2')]);
-        seats[1].forget_answers();
-        no_device(press(&seats, &[Pressed::Enter]));
-        press(&seats, &[key('2')]);
-        seats[0].forget_answers();
-        assert_eq!(press(&seats, &[Pressed::Enter]), [""; 0]);
-        assert_eq!(got(&seats[1]), (vec![], 1));
-        assert_eq!(got(&seats[0]), (vec![], 0));
+        press(&device_keys, &[key('2')]);
+        device_keys[1].forget_answers();
+        no_device(press(&device_keys, &[Pressed::Enter]));
+        press(&device_keys, &[key('2')]);
+        device_keys[0].forget_answers();
+        assert_eq!(press(&device_keys, &[Pressed::Enter]), [""; 0]);
+        assert_eq!(got(&device_keys[1]), (vec![], 1));
+        assert_eq!(got(&device_keys[0]), (vec![], 0));
     }
 
     #[test]
     fn keys_go_to_the_device_that_was_chosen_last() {
-        let seats = two();
-        press(&seats, &[key('+'), key('2'), key('-')]);
+        let device_keys = two();
+        press(&device_keys, &[key('+'), key('2'), key('-')]);
         // There is no third device, and 0 is a key like others.
-        press(&seats, &[key('3'), key('0')]);
-        assert_eq!(got(&seats[0]), (vec![Key::Char('+')], 0));
+        press(&device_keys, &[key('3'), key('0')]);
+        assert_eq!(got(&device_keys[0]), (vec![Key::Char('+')], 0));
         let keys = ['-', '3', '0'].map(Key::Char).to_vec();
-        assert_eq!(got(&seats[1]), (keys, 0));
+        assert_eq!(got(&device_keys[1]), (keys, 0));
     }
 
     #[test]
     fn a_device_that_is_not_served_any_more_is_told_when_it_is_chosen() {
-        let mut seats = two();
-        drop(seats.pop());
-        let told = press(&seats, &[key('2'), Pressed::Enter]);
+        let mut device_keys = two();
+        drop(device_keys.pop());
+        let told = press(&device_keys, &[key('2'), Pressed::Enter]);
         assert_eq!(told, ["[2 usb:7] is not served any more"]);
-        assert_eq!(got(&seats[0]), (vec![], 0));
+        assert_eq!(got(&device_keys[0]), (vec![], 0));
         // However long keys are held for it.
-        press(&seats, &[key('+'); 10 * WAITING]);
-        assert!(seats[0].desk.state().inboxes[1].keys.len() <= WAITING);
+        press(&device_keys, &[key('+'); 10 * WAITING]);
+        assert!(device_keys[0].shared_keyboard.state().inboxes[1].keys.len() <= WAITING);
     }
 }

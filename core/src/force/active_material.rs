@@ -14,7 +14,7 @@ use crate::terrain::Window;
 
 /// The material that is felt.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MaterialInForce {
+pub(crate) struct ActiveMaterial {
     /// The one that is wanted.
     index: u8,
     /// What was felt when it began to be wanted, and which part of the change is done.
@@ -26,7 +26,7 @@ pub(crate) struct MaterialInForce {
     scale: f32,
     /// The law as it is felt. Its texture is the one whose share is felt.
     law: SurfaceParams,
-    /// How much of that texture is felt.
+    /// Share of that texture that is felt.
     texture_share: f32,
     cell_mm: f32,
     rate: TickRate,
@@ -34,7 +34,7 @@ pub(crate) struct MaterialInForce {
     was_felt: bool,
 }
 
-impl MaterialInForce {
+impl ActiveMaterial {
     /// Before anything is felt: the default.
     pub(crate) fn of(
         table: &MaterialTable,
@@ -71,7 +71,7 @@ impl MaterialInForce {
         self.law.friction
     }
 
-    /// How much of the texture is felt.
+    /// Returns the share of the texture that is felt.
     pub(crate) const fn texture_share(&self) -> f32 {
         self.texture_share
     }
@@ -94,8 +94,8 @@ impl MaterialInForce {
         match contact.output().state {
             ContactState::Touching => {}
             // What fades out does so as it was.
-            ContactState::Fading => return false,
-            ContactState::Waiting | ContactState::Free => {
+            ContactState::Releasing => return false,
+            ContactState::Unseeded | ContactState::Free => {
                 self.was_felt = false;
                 return false;
             }

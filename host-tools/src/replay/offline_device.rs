@@ -4,7 +4,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::{HipCommand, Source, TickRecord, View};
+use hapterra_core::scene::{HipCommand, SceneChange, Source, TickRecord};
 use hapterra_core::terrain::TILE_CELLS;
 use hapterra_core::wire::hello::DeviceHello;
 
@@ -88,7 +88,7 @@ impl<'t> OfflineDevice<'t> {
         let mut scene = terrain.scene(law, Source::Points, GridPoint::default());
         // One that comes again is another one.
         scene.epoch ^= self.nonce.rotate_left(8) ^ u32::from(self.view);
-        let view = View {
+        let view = SceneChange {
             number: self.view,
             scene,
             hip,
@@ -132,17 +132,17 @@ impl<'t> OfflineDevice<'t> {
         })
     }
 
-    /// What went over the link so far.
+    /// Returns the link's statistics so far.
     #[must_use]
     pub const fn tally(&self) -> &LinkStats {
         self.session.tally()
     }
 
-    /// What the loop feels with the HIP at `hip` next.
+    /// Steps the loop with the HIP at `hip` and returns its record.
     ///
     /// # Errors
     /// [`LinkError`]; the replay cannot go on after one.
-    pub fn feel(&mut self, hip: GridPoint) -> Result<TickRecord, LinkError> {
+    pub fn step(&mut self, hip: GridPoint) -> Result<TickRecord, LinkError> {
         self.last = Some(hip);
         let seq = self.seq;
         self.seq = seq.wrapping_add(1);
@@ -154,7 +154,7 @@ impl<'t> OfflineDevice<'t> {
                 ..sample
             });
         }
-        self.session.feel(HipCommand { seq, hip })?;
+        self.session.step(HipCommand { seq, hip })?;
         let deadline = Instant::now() + ANSWERS_A_POINT * self.session.patience().give_up;
         while Instant::now() < deadline {
             if let Some(sample) = self.answer(seq)? {
@@ -216,7 +216,7 @@ mod tests {
                 let again = terrain.clone();
                 replayer.put_view(again, law, hip).expect("taken");
             }
-            let sample = replayer.feel(hip).expect("felt");
+            let sample = replayer.step(hip).expect("felt");
             assert_eq!(u32::from(sample.view), view % 256);
             let epoch = replayer.session.scene().epoch;
             assert!(view == 0 || epoch != last, "view {view}");

@@ -30,12 +30,12 @@ const NAMES: [&str; NUMBERS.len() + 1] = {
 /// Values of [`NAMES`]; none of columns that there are not.
 type Values = [Option<f64>; NAMES.len()];
 
-/// What was felt in a row.
+/// Row of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordingRow {
     /// The view that it was felt in: [`super::Row::view`].
     pub view: u32,
-    /// What was felt. A trajectory tells a place alone: no contact, and the proxy at the HIP.
+    /// Its record. A trajectory has the HIP alone: no contact, and the proxy at the HIP.
     pub record: Record,
 }
 
@@ -53,7 +53,7 @@ pub struct RecordingRows {
 enum Form {
     Csv {
         reader: Box<csv::Reader<Bounded<File>>>,
-        /// Where each of [`NAMES`] stands.
+        /// Place where each of [`NAMES`] stands.
         columns: [Option<usize>; NAMES.len()],
         record: StringRecord,
     },

@@ -1,4 +1,4 @@
-//! What is written to the terminal while a board may be armed, and the log. Commands that
+//! Output to the terminal while a board may be armed, and the log. Commands that
 //! hold no device print (`say.rs`).
 //!
 //! One thread writes, and whoever speaks does not wait for it. A window that was closed,
@@ -33,7 +33,7 @@ enum Said {
 }
 
 /// The way to the thread that writes; none where there can be no such thread.
-static VOICE: OnceLock<Option<SyncSender<Said>>> = OnceLock::new();
+static WRITER: OnceLock<Option<SyncSender<Said>>> = OnceLock::new();
 
 /// Writes a line to standard output.
 pub(in crate::cli) fn say(line: impl Display) {
@@ -57,24 +57,24 @@ pub(in crate::cli) fn status(line: Option<String>) {
 
 /// Waits until everything is written that was said.
 pub(in crate::cli) fn finish() {
-    if let Some(Some(voice)) = VOICE.get() {
+    if let Some(Some(writer)) = WRITER.get() {
         let (done, is_done) = sync_channel(1);
         // Where the thread is gone there is nothing to wait for.
-        if voice.send(Said::Flush(done)).is_ok() {
+        if writer.send(Said::Flush(done)).is_ok() {
             let _ = is_done.recv();
         }
     }
 }
 
 fn speak(said: Said) {
-    let voice = VOICE.get_or_init(|| {
-        let (voice, said) = sync_channel(WAITING);
+    let writer = WRITER.get_or_init(|| {
+        let (writer, said) = sync_channel(WAITING);
         let thread = Builder::new().name("voice".into());
-        thread.spawn(move || write_all(said)).ok().map(|_| voice)
+        thread.spawn(move || write_all(said)).ok().map(|_| writer)
     });
-    match voice {
+    match writer {
         // Where nobody takes it, nobody can be told that either.
-        Some(voice) => drop(voice.try_send(said)),
+        Some(writer) => drop(writer.try_send(said)),
         None => write(said, &mut None),
     }
 }

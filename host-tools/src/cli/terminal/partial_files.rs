@@ -1,8 +1,8 @@
-//! What killed commands left of a file that is about to be written.
+//! Partial files of killed commands.
 
 use std::path::Path;
 
-use crate::output::left_behind;
+use crate::output::partial_files;
 
 /// Says on standard error what killed commands left of these files, and how to keep it.
 /// Nothing else in this program touches what is left.
@@ -14,7 +14,7 @@ pub fn tell<'p>(files: impl IntoIterator<Item = &'p Path>) {
 
 /// Two lines for each partial file of `file`.
 fn lines(file: &Path) -> Vec<String> {
-    let found = left_behind(file).into_iter().flat_map(|left| {
+    let found = partial_files(file).into_iter().flat_map(|left| {
         let (path, bytes) = (left.path.display(), left.bytes);
         [
             format!(

@@ -23,7 +23,7 @@ type Numbers = [f64; 5];
 
 /// What may be in force.
 #[derive(Clone, Debug)]
-pub(super) struct InForce {
+pub(super) struct ActiveMaterial {
     /// The class of the wanted one.
     wanted: u8,
     from: Numbers,
@@ -42,7 +42,7 @@ pub(super) struct InForce {
     was_felt: bool,
 }
 
-impl InForce {
+impl ActiveMaterial {
     /// Before anything is felt: the default.
     pub(super) fn default(materials: &Materials) -> Self {
         let numbers = numbers(materials, 0);
@@ -85,7 +85,7 @@ impl InForce {
         }
     }
 
-    /// Whether friction may hold the proxy in the next tick: it does as long as something is left of
+    /// Returns true if friction may hold the proxy in the next tick: it does as long as something is left of
     /// a change from it.
     pub(super) fn may_rub(&self) -> bool {
         let [_, was_static, was_dynamic, was_viscous, _] = self.from;
@@ -129,12 +129,12 @@ impl InForce {
         self.judge.as_ref().map(|judge| (judge, share))
     }
 
-    /// Whether nothing more will change on this material.
+    /// Returns true if nothing more will change on this material.
     pub(super) fn is_settled(&self) -> bool {
         self.done >= OVER && self.parts == FADE
     }
 
-    /// Whether it cannot be told from another one from now on.
+    /// Returns true if it cannot be told from another one from now on.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let told = |one: &Self| (one.wanted, one.done, one.parts, one.was_felt);
         let speed = |one: &Self| one.judge.as_ref().map_or(0.0, TextureJudge::speed);
@@ -162,8 +162,8 @@ impl InForce {
                 each.collect()
             }
             // What fades out does so as it was.
-            ContactState::Fading => vec![self.clone()],
-            ContactState::Waiting | ContactState::Free => vec![Self {
+            ContactState::Releasing => vec![self.clone()],
+            ContactState::Unseeded | ContactState::Free => vec![Self {
                 was_felt: false,
                 ..self.clone()
             }],

@@ -1,4 +1,4 @@
-//! What the samples of a run say of the ground under the hand.
+//! Counts of a run's ticks by the ground under the hand.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Limits;
@@ -6,7 +6,7 @@ use hapterra_core::scene::TickRecord;
 
 /// Counts of ticks. Every tick that the device tells of is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Felt {
+pub(super) struct TickCounts {
     /// Ticks of the hand's motion, in all of which the HIP is below the surface.
     pub(super) ticks: u32,
     /// Ticks whose terrain was not on the device yet, and nothing coarser either.
@@ -17,7 +17,7 @@ pub(super) struct Felt {
     pub(super) free: u32,
 }
 
-impl Felt {
+impl TickCounts {
     /// Counts a tick.
     pub(super) fn add(&mut self, sample: &TickRecord) {
         self.ticks += 1;
@@ -29,7 +29,7 @@ impl Felt {
     }
 }
 
-/// Whether terrain that might be felt was not on the device: a hole in what is felt.
+/// Returns true if terrain that might be felt was not on the device: a hole in what is felt.
 pub(super) fn lacks_terrain(sample: &TickRecord) -> bool {
     sample.limits.contains(Limits::TERRAIN_MISSING)
 }
@@ -45,7 +45,7 @@ mod tests {
             state,
             ..TickRecord::default()
         };
-        let mut felt = Felt::default();
+        let mut felt = TickCounts::default();
         let fading = Limits::BOUNDARY_FADING;
         felt.add(&sample(Limits::empty(), ContactState::Touching));
         felt.add(&sample(fading, ContactState::Touching));
@@ -56,7 +56,7 @@ mod tests {
         ));
         felt.add(&sample(Limits::TERRAIN_MISSING, ContactState::Free));
         felt.add(&sample(Limits::empty(), ContactState::Free));
-        let expected = Felt {
+        let expected = TickCounts {
             ticks: 6,
             missing: 2,
             coarse: 1,

@@ -1,4 +1,4 @@
-//! What was felt in one tick, as the tick itself reports it.
+//! Record of one tick, as the tick itself reports it.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::grid::GridPoint;
@@ -11,7 +11,7 @@ use crate::grid::Grid;
 
 /// A tick's report, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Felt {
+pub(super) struct EffectTick {
     /// Haptic interface point, cells.
     pub hip: Vector,
     /// Proxy, cells.
@@ -31,7 +31,7 @@ const LESS: Limits = Limits::FORCE_CLAMPED
     .union(Limits::TERRAIN_MISSING)
     .union(Limits::BOUNDARY_FADING);
 
-impl Felt {
+impl EffectTick {
     pub(super) fn of(sample: &TickRecord) -> Self {
         let touches = sample.state == ContactState::Touching;
         Self {

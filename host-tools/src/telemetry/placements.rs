@@ -7,7 +7,7 @@ use crate::place::Laid;
 use crate::terrain::Terrain;
 
 /// A view that is felt.
-pub struct FeltView<'t> {
+pub struct SessionPlacement<'t> {
     /// Its terrain.
     pub terrain: Terrain<'t>,
     /// Place, scale and law; none for the scene that was served first.
@@ -15,19 +15,19 @@ pub struct FeltView<'t> {
 }
 
 /// All views of a session, in their order.
-pub struct FeltViews<'t> {
-    views: Vec<FeltView<'t>>,
+pub struct Placements<'t> {
+    views: Vec<SessionPlacement<'t>>,
     /// Which of them a number means now. Numbers wrap, and count anew when a device does.
     of_number: [usize; 256],
 }
 
-impl<'t> FeltViews<'t> {
+impl<'t> Placements<'t> {
     /// The scene that is served first.
     #[must_use]
     pub fn new(terrain: Terrain<'t>) -> Self {
         let laid = None;
         Self {
-            views: vec![FeltView { terrain, laid }],
+            views: vec![SessionPlacement { terrain, laid }],
             of_number: [0; 256],
         }
     }
@@ -38,7 +38,7 @@ impl<'t> FeltViews<'t> {
             *index = self.views.len();
         }
         let laid = Some(laid);
-        self.views.push(FeltView { terrain, laid });
+        self.views.push(SessionPlacement { terrain, laid });
     }
 
     /// Takes what the device tells.
@@ -54,7 +54,7 @@ impl<'t> FeltViews<'t> {
         }
     }
 
-    /// How many there are.
+    /// Returns their number.
     #[must_use]
     pub fn count(&self) -> usize {
         self.views.len()
@@ -69,7 +69,7 @@ impl<'t> FeltViews<'t> {
 
     /// One of them; the last, where there are not so many.
     #[must_use]
-    pub fn get(&self, index: usize) -> &FeltView<'t> {
+    pub fn get(&self, index: usize) -> &SessionPlacement<'t> {
         &self.views[index.min(self.views.len() - 1)]
     }
 }
@@ -78,23 +78,23 @@ impl<'t> FeltViews<'t> {
 mod tests {
     use super::*;
     use crate::link::hello;
-    use crate::place::{Reach, ViewOptions};
+    use crate::place::{PlacementOptions, Reach};
     use hapterra_core::force::SurfaceParams;
     use hapterra_core::grid::GridPoint;
     use hapterra_core::phantom::Calibration;
-    use hapterra_core::scene::{Source, View};
+    use hapterra_core::scene::{SceneChange, Source};
     use heightfield::Raster;
 
-    fn with(look: impl for<'t> FnOnce(FeltViews<'t>, Terrain<'t>, Laid)) {
+    fn with(look: impl for<'t> FnOnce(Placements<'t>, Terrain<'t>, Laid)) {
         let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
-        let options = ViewOptions::default();
+        let options = PlacementOptions::default();
         let grid = options.target.grid(&raster, Default::default());
         let grid = grid.expect("a grid");
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
-        let view = crate::place::View::new(&grid, &reach, &options).expect("a view");
+        let view = crate::place::Placement::new(&grid, &reach, &options).expect("a view");
         let terrain = view.terrain(grid).expect("a terrain");
         let law = SurfaceParams::PREMIUM;
-        let views = FeltViews::new(terrain.clone());
+        let views = Placements::new(terrain.clone());
         look(views, terrain, Laid { view, law });
     }
 
@@ -126,7 +126,7 @@ mod tests {
             views.put(1, terrain.clone(), laid);
             let hip = GridPoint::default();
             let scene = terrain.scene(laid.law, Source::Encoders, hip);
-            let view = View {
+            let view = SceneChange {
                 number: 1,
                 scene,
                 hip,

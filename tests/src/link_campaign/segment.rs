@@ -15,18 +15,18 @@ use super::surface;
 use super::tap::{Moment, Tap};
 use crate::chance::Chance;
 
-/// How long what the user sees may differ from what is, on a line that works, ms; also
+/// Time for which what the user sees may differ from what is, on a line that works, ms; also
 /// where another program has taken the device, which the user is told.
 const STALE: u64 = 1_500;
-/// How long after the line stood still the device may still say what it had to say then,
+/// Time for which after the line stood still the device may still say what it had to say then,
 /// ms.
 const DRAINS: u64 = 50;
-/// How long an arm that was asked for may still come after its host is gone, ms: the
+/// Time for which an arm that was asked for may still come after its host is gone, ms: the
 /// switch was pressed just before.
 const LATE_ARM: u64 = 500;
 
 /// One device and what is around it.
-pub struct Stretch<'t> {
+pub struct Segment<'t> {
     /// The terrain that honest hosts serve.
     pub terrain: &'t Terrain<'t>,
     /// The scene that they put in force.
@@ -39,11 +39,11 @@ pub struct Stretch<'t> {
     pub to_device: Way,
     /// The direction to the host.
     pub to_host: Way,
-    /// What leaves the device, as the judge reads it.
+    /// Frames that leave the device, as the oracle reads them.
     pub tap: Tap,
     /// The honest host, if one runs.
     pub host: Option<Host<'t>>,
-    /// What goes wrong with the line now.
+    /// Present fault of the line.
     pub fault: Option<Fault>,
     /// Milliseconds so far.
     pub now: u64,
@@ -67,7 +67,7 @@ pub struct Stretch<'t> {
     pub touching: u64,
 }
 
-impl<'t> Stretch<'t> {
+impl<'t> Segment<'t> {
     /// A device that was just switched on, and nobody at the other end.
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, mut chance: Chance) -> Self {
@@ -152,7 +152,7 @@ impl<'t> Stretch<'t> {
         self.to_device.send(bytes, self.now, &mut self.chance);
     }
 
-    /// How long the line and its ends have been as they should be, ms.
+    /// Returns the time for which the line and its ends have been as they should be, ms.
     #[must_use]
     pub fn calm(&self) -> u64 {
         self.now - self.troubled

@@ -1,4 +1,4 @@
-//! What a device tells of its arm before it is given a terrain.
+//! Calibration of a device before it has a terrain.
 
 use hapterra_core::phantom::{Calibration, Model};
 
@@ -22,7 +22,7 @@ pub(super) fn calibration_of(
         None => {
             let model = dialogue.status()?.model.unwrap_or(Model::Premium15);
             tell(format!(
-                "the device has no calibration: the terrain is laid for a {model:?}"
+                "the device has no calibration: the terrain is placed for a {model:?}"
             ));
             model.preset()
         }
@@ -31,6 +31,6 @@ pub(super) fn calibration_of(
     calibration
         .validate()
         .map_err(|bad| format!("the device's calibration cannot be used: {bad}"))
-        .or_hint("measure it anew: hapterra calibrate")?;
+        .or_hint("measure it again: hapterra calibrate")?;
     Ok(calibration)
 }

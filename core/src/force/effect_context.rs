@@ -1,10 +1,10 @@
-//! What every effect of a scene depends on besides its law.
+//! Conditions of the effects of a scene besides its surface parameters.
 
 use crate::rate::TickRate;
 
 /// What a scene is felt with, besides its law.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FeltWith {
+pub(crate) struct EffectContext {
     pub(crate) cell_mm: f32,
     pub(crate) rate: TickRate,
     /// From the beginning of a tick until its force acts, s.

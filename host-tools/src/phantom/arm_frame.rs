@@ -1,4 +1,4 @@
-//! Where the terrain lies in front of the arm.
+//! Frame of the arm in the terrain.
 //!
 //! The user faces the device, so east is the device's +y, north is −x and up
 //! is +z.
@@ -9,7 +9,7 @@ use super::script::Script;
 
 /// Lays the terrain frame (mm) onto the device frame (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
+pub struct ArmFrame {
     /// The terrain point at the tip of the arm in its home pose `q = 0`, mm
     /// east, north, up.
     pub home_mm: [f64; 3],
@@ -28,7 +28,7 @@ pub struct OutOfReach {
     pub home_mm: [f64; 3],
 }
 
-impl Placement {
+impl ArmFrame {
     /// Terrain millimetres to device metres.
     #[must_use]
     pub fn to_device_m(&self, model: &PhantomModel, terrain_mm: [f64; 3]) -> [f64; 3] {
@@ -75,7 +75,7 @@ impl Placement {
             })
     }
 
-    /// Whether the arm gets to every point of a script.
+    /// Checks that the arm reaches every point of a script.
     ///
     /// # Errors
     /// [`OutOfReach`] names the first corner that it does not get to.
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn home_is_home_and_there_and_back_is_the_same() {
         let model = PhantomModel::premium_1_5();
-        let place = Placement {
+        let place = ArmFrame {
             home_mm: [600.0, 400.0, 35.0],
         };
         let tip = kinematics::tip(&model, [0.0; 3]);
@@ -112,18 +112,15 @@ mod tests {
 
     #[test]
     fn directions_turn_like_displacements() {
-        assert_eq!(
-            Placement::turn_to_terrain([1.0, 2.0, 3.0]),
-            [2.0, -1.0, 3.0]
-        );
-        let back = Placement::turn_to_device(Placement::turn_to_terrain([1.0, 2.0, 3.0]));
+        assert_eq!(ArmFrame::turn_to_terrain([1.0, 2.0, 3.0]), [2.0, -1.0, 3.0]);
+        let back = ArmFrame::turn_to_device(ArmFrame::turn_to_terrain([1.0, 2.0, 3.0]));
         assert_eq!(back, [1.0, 2.0, 3.0]);
     }
 
     #[test]
     fn reaches_a_hand_span_and_not_a_metre() {
         let model = PhantomModel::premium_1_5();
-        let place = Placement { home_mm: [0.0; 3] };
+        let place = ArmFrame { home_mm: [0.0; 3] };
         for corner in [
             [-90., -50., -40.],
             [90., -50., 40.],

@@ -101,30 +101,30 @@ fn reach() -> Reach {
 /// The view, and the grid that it is of.
 fn seen<'r>(
     raster: &'r Raster,
-    options: &ViewOptions,
-) -> Result<(HapticGrid<'r>, View), PlaceError> {
+    options: &PlacementOptions,
+) -> Result<(HapticGrid<'r>, Placement), PlaceError> {
     let grid = options.target.grid(raster, HapticCells::Square)?;
-    let view = View::new(&grid, &reach(), options)?;
+    let view = Placement::new(&grid, &reach(), options)?;
     Ok((grid, view))
 }
 
-fn at(place: [f64; 2], coordinates: Coordinates, sizing: Sizing) -> ViewOptions {
-    ViewOptions {
+fn at(place: [f64; 2], coordinates: Coordinates, sizing: Sizing) -> PlacementOptions {
+    PlacementOptions {
         target: Target::At(place, coordinates),
         sizing,
-        ..ViewOptions::default()
+        ..PlacementOptions::default()
     }
 }
 
-fn boxed(sides: [f64; 4], coordinates: Coordinates) -> ViewOptions {
-    ViewOptions {
+fn boxed(sides: [f64; 4], coordinates: Coordinates) -> PlacementOptions {
+    PlacementOptions {
         target: Target::Box(sides, coordinates),
-        ..ViewOptions::default()
+        ..PlacementOptions::default()
     }
 }
 
 /// The coordinates under the home position of the scene that a device would get.
-fn ground_at_home(grid: &HapticGrid<'_>, view: &View) -> [f64; 2] {
+fn ground_at_home(grid: &HapticGrid<'_>, view: &Placement) -> [f64; 2] {
     let terrain = view.terrain(*grid).expect("a terrain");
     let scene = view
         .scene(&terrain, SurfaceParams::PREMIUM)
@@ -141,7 +141,7 @@ fn what_is_asked_for_is_under_the_home_position() {
             let ground = file.transform().to_ground(sample);
             for level in [None, Some(0), Some(2)] {
                 for sizing in [Sizing::Fit, Sizing::CellMm(0.37), Sizing::CellMm(5.0)] {
-                    let options = ViewOptions {
+                    let options = PlacementOptions {
                         level,
                         ..at(ground, OWN, sizing)
                     };
@@ -181,11 +181,11 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
         for (name, raster, _) in made() {
             for times in [1.0, -2.0, 20.0] {
                 let grid = HapticGrid::new(&raster, HapticCells::Square);
-                let options = ViewOptions {
+                let options = PlacementOptions {
                     heights: Heights::Exaggerated(times),
-                    ..ViewOptions::default()
+                    ..PlacementOptions::default()
                 };
-                let view = View::new(&grid, &reach, &options).expect(name);
+                let view = Placement::new(&grid, &reach, &options).expect(name);
                 let around_home = |spare: f64| {
                     let (laid, heights) = (view.laid_mm, view.heights_mm);
                     let low = [laid[0], laid[1], heights[0] - spare];
@@ -221,10 +221,10 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
 #[test]
 fn suited_heights_are_true_to_scale_or_as_high_as_can_be_felt() {
     let metre = CellUnit::Length { metres: 1.0 };
-    let options = |sizing| ViewOptions {
+    let options = |sizing| PlacementOptions {
         heights: Heights::Suited,
         sizing,
-        ..ViewOptions::default()
+        ..PlacementOptions::default()
     };
     for side in [10.0, 1000.0, 1e5] {
         let raster = hills().with_cell(cell((side, side), metre, 0.0));
@@ -250,7 +250,7 @@ fn the_scale_is_said_as_it_is_at_the_place_and_level() {
     ] {
         let file = raster.georeference();
         let ground = file.transform().to_ground([20.0, 15.0]);
-        let options = ViewOptions {
+        let options = PlacementOptions {
             level: Some(2),
             ..at(ground, OWN, Sizing::GroundMPerMm(40.0))
         };
@@ -292,11 +292,13 @@ fn cells_are_square_at_the_place_that_is_felt() {
 }
 
 #[test]
-fn a_box_lies_in_the_middle_and_its_cells_are_not_finer_than_the_encoders_tell() {
+fn box_is_centred_and_no_finer_than_the_encoders() {
     let raster = Raster::from_fn(30_000, 60, |column, _| (column % 100) as f32).expect("raster");
     let ground = GroundTransform::new([5e5, 4e6], [1.0, 0.0], [0.0, 1.0]).expect("a plane");
     let raster = raster.with_ground(ground, Some(32612));
-    let whole = seen(&raster, &ViewOptions::default()).expect("whole").1;
+    let whole = seen(&raster, &PlacementOptions::default())
+        .expect("whole")
+        .1;
     let resolution = reach().resolution_mm();
     // Samples are finer than a count, pairs of them are not.
     assert!(whole.scale.cell_mm() < resolution, "{whole:?}");
@@ -442,7 +444,7 @@ fn what_cannot_be_placed_is_refused_with_the_bounds() {
         _ => 7.0,
     });
     let holes = holes.expect("raster");
-    let refused = |raster: &Raster, options: ViewOptions| {
+    let refused = |raster: &Raster, options: PlacementOptions| {
         let refused = seen(raster, &options).map(|_| ()).expect_err("refused");
         refused.to_string()
     };
@@ -499,9 +501,9 @@ fn what_cannot_be_placed_is_refused_with_the_bounds() {
         }
     }
     let sized = |sizing| {
-        let options = ViewOptions {
+        let options = PlacementOptions {
             sizing,
-            ..ViewOptions::default()
+            ..PlacementOptions::default()
         };
         seen(utm, &options).map(|_| ())
     };
@@ -515,15 +517,15 @@ fn what_cannot_be_placed_is_refused_with_the_bounds() {
             Err(PlaceError::Scale(_))
         ));
     }
-    let tall = ViewOptions {
+    let tall = PlacementOptions {
         heights: Heights::MmPerUnit(50.0),
-        ..ViewOptions::default()
+        ..PlacementOptions::default()
     };
     assert!(matches!(seen(utm, &tall), Err(PlaceError::TooTall { .. })));
     for times in [0.0, f64::NAN] {
-        let flat = ViewOptions {
+        let flat = PlacementOptions {
             heights: Heights::Exaggerated(times),
-            ..ViewOptions::default()
+            ..PlacementOptions::default()
         };
         assert!(matches!(seen(utm, &flat), Err(PlaceError::Exaggeration(_))));
     }
@@ -549,13 +551,13 @@ fn a_home_that_is_too_far_to_be_addressed_is_named() {
         .grid(&raster, HapticCells::default())
         .expect("a grid");
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
-    let view = View::new(&grid, &reach, &ViewOptions::default()).expect("a view");
+    let view = Placement::new(&grid, &reach, &PlacementOptions::default()).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
-    let far = View {
+    let far = Placement {
         home_mm: [1e15, 0.0, 0.0],
         ..view
     };
-    let scene = |view: &View| view.scene(&terrain, SurfaceParams::PREMIUM);
+    let scene = |view: &Placement| view.scene(&terrain, SurfaceParams::PREMIUM);
     assert!(scene(&view).is_ok());
     assert_eq!(scene(&far), Err(PlaceError::FarAway(far.home_mm)));
 }

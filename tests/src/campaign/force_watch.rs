@@ -1,4 +1,4 @@
-//! What has to hold of the force that is told, whatever effects it is made with, in each mode in which
+//! Invariants of the reported force under all effects, in each mode in which
 //! a current may flow.
 
 use hapterra_core::Vec3;
@@ -7,7 +7,7 @@ use hapterra_core::guard::{Limits, Mode, WORKING_SHARE};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::TickRecord;
 
-use super::ground::Felt;
+use super::ground::SceneSurfaces;
 use super::share::{Share, Shares};
 use super::swing::{MAX_TURNS, Swing};
 
@@ -35,8 +35,8 @@ const NO_SPRING: Limits = Limits::SPEED_LIMITED
     .union(Limits::BOUNDARY_FADING);
 
 /// Watches what one scene feels like.
-pub struct FeltWatch {
-    felt: Felt,
+pub struct ForceWatch {
+    felt: SceneSurfaces,
     cell_mm: f32,
     last: Option<TickRecord>,
     /// The force of the tick before that.
@@ -67,10 +67,10 @@ struct Touched {
     deepest_mm: f32,
 }
 
-impl FeltWatch {
+impl ForceWatch {
     /// Of a scene.
     #[must_use]
-    pub fn new(felt: Felt, cell_mm: f32) -> Self {
+    pub fn new(felt: SceneSurfaces, cell_mm: f32) -> Self {
         Self {
             felt,
             cell_mm,
@@ -89,7 +89,7 @@ impl FeltWatch {
     }
 
     /// Another scene is felt from now on.
-    pub fn feels(&mut self, felt: Felt) {
+    pub fn feels(&mut self, felt: SceneSurfaces) {
         self.felt = felt;
         (self.last, self.contact) = (None, None);
     }

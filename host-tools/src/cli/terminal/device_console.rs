@@ -3,11 +3,11 @@
 use std::fmt::Display;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::voice;
+use super::writer;
 
-/// Says what concerns one device, as [`voice`] does.
+/// Says what concerns one device, as [`writer`] does.
 #[derive(Clone, Default)]
-pub(in crate::cli) struct Speaker {
+pub(in crate::cli) struct DeviceConsole {
     /// None where there is one device.
     several: Option<Several>,
 }
@@ -32,7 +32,7 @@ impl Bottom {
     }
 }
 
-impl Speaker {
+impl DeviceConsole {
     /// One for each of these devices: where there are several, their lines begin with
     /// their number, counted from one, and their name.
     pub(in crate::cli) fn of_each(devices: &[impl Display]) -> Vec<Self> {
@@ -59,27 +59,27 @@ impl Speaker {
 
     /// Writes a line to standard output.
     pub(in crate::cli) fn say(&self, line: impl Display) {
-        voice::say(self.named(&line.to_string()));
+        writer::say(self.named(&line.to_string()));
     }
 
     /// Writes whole lines to standard output.
     pub(in crate::cli) fn show(&self, text: impl Display) {
         let text = text.to_string();
         match self.several {
-            None => voice::show(text),
-            Some(_) => voice::show(self.named(text.trim_end_matches('\n')) + "\n"),
+            None => writer::show(text),
+            Some(_) => writer::show(self.named(text.trim_end_matches('\n')) + "\n"),
         }
     }
 
     /// Writes lines to standard error.
     pub(in crate::cli) fn tell(&self, line: impl Display) {
-        voice::tell(self.named(&line.to_string()));
+        writer::tell(self.named(&line.to_string()));
     }
 
     /// Replaces this device's line at the bottom of the terminal, or takes it away.
     pub(in crate::cli) fn status(&self, line: Option<String>) {
         let Some(several) = &self.several else {
-            return voice::status(line);
+            return writer::status(line);
         };
         // Nothing that panics runs while this is held.
         let bottom = several.bottom.lock();
@@ -87,7 +87,7 @@ impl Speaker {
         if let Some(own) = bottom.0.get_mut(several.index) {
             *own = line.map(|line| self.named(&line));
         }
-        voice::status(bottom.text());
+        writer::status(bottom.text());
     }
 
     /// Each line of a text with the name before it.
@@ -108,17 +108,17 @@ mod tests {
 
     #[test]
     fn one_device_is_not_named_and_of_several_each_line_is() {
-        let alone = Speaker::of_each(&["usb"]);
+        let alone = DeviceConsole::of_each(&["usb"]);
         assert_eq!(alone[0].named("a\nb"), "a\nb");
         assert_eq!(alone[0].name(), None);
-        let two = Speaker::of_each(&["native", "tcp:h:1"]);
+        let two = DeviceConsole::of_each(&["native", "tcp:h:1"]);
         assert_eq!(two[0].named("a\nb"), "[1 native] a\n[1 native] b");
         assert_eq!(two[1].named("a"), "[2 tcp:h:1] a");
     }
 
     #[test]
     fn each_device_has_its_own_line_at_the_bottom() {
-        let two = Speaker::of_each(&["native", "usb:7"]);
+        let two = DeviceConsole::of_each(&["native", "usb:7"]);
         let bottom = || {
             let several = two[0].several.as_ref().expect("several");
             several.bottom.lock().expect("alone").text()

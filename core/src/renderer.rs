@@ -10,7 +10,7 @@
 use glam::Vec3;
 
 use crate::contact::{Contact, ContactSettings};
-use crate::force::{Effects, FeltWith, MaterialTable, Moment, Shares};
+use crate::force::{EffectContext, Effects, MaterialTable, Moment, Shares};
 use crate::grid::GridPoint;
 use crate::guard::Guard;
 use crate::phantom::{Kinematics, Pose, to_terrain_frame};
@@ -85,7 +85,7 @@ impl Mover<'_> {
 
 /// What a tick changes.
 #[derive(Clone)]
-struct Felt {
+struct RenderState {
     contact: Contact,
     /// What the scene adds to the spring's force, if anything.
     effects: Option<Effects>,
@@ -96,8 +96,8 @@ struct Felt {
 /// A replay's point that is not done.
 struct BegunPoint {
     /// The state before it.
-    before: Felt,
-    /// How often it lacked another tile.
+    before: RenderState,
+    /// Number of times that it lacked another tile.
     lacked: u32,
     /// The last tile that it lacked.
     tile: Option<TileIndex>,
@@ -115,8 +115,8 @@ pub(crate) enum Progress {
 }
 
 /// Contact and effects of the scene in force.
-pub(crate) struct Feel {
-    felt: Felt,
+pub(crate) struct Renderer {
+    state: RenderState,
     /// A replay's point that is not done.
     point: Option<BegunPoint>,
     progress: Progress,
@@ -128,11 +128,11 @@ pub(crate) struct Feel {
     materials_sum: u32,
 }
 
-impl Feel {
+impl Renderer {
     /// Without a scene.
     pub(crate) fn new(rate: TickRate, latency_s: f32) -> Self {
         Self {
-            felt: Felt {
+            state: RenderState {
                 contact: Contact::new(ContactSettings::AT_1_KHZ.at_rate(rate)),
                 effects: None,
                 before: None,
@@ -161,7 +161,7 @@ impl Feel {
     /// Takes a scene that it can take, or none. The one door for all effects. `landing` is the HIP of
     /// another view, and the displacement with which the proxy begins on its surface, cells.
     pub(crate) fn take(&mut self, scene: Option<&Scene>, landing: Option<(GridPoint, Vec3)>) {
-        self.felt.effects = scene.and_then(|scene| self.effects_of(scene));
+        self.state.effects = scene.and_then(|scene| self.effects_of(scene));
         self.begin(scene, landing);
     }
 
@@ -175,10 +175,10 @@ impl Feel {
             .at_rate(self.rate)
             .on_cells_of(scene.map_or(1.0, |scene| scene.cell_mm));
         (self.point, self.progress) = (None, Progress::Done(None));
-        self.felt.contact = match landing {
-            Some((hip, stretch)) => {
-                let at = GridPoint::new(hip.cell(), hip.frac() + stretch);
-                Contact::landing(settings, at, stretch)
+        self.state.contact = match landing {
+            Some((hip, displacement)) => {
+                let at = GridPoint::new(hip.cell(), hip.frac() + displacement);
+                Contact::landing(settings, at, displacement)
             }
             None => Contact::new(settings),
         };
@@ -186,20 +186,20 @@ impl Feel {
             if scene.materials.is_some() {
                 // A proxy that meets its first rough material has to know where it was before.
                 let friction = self.materials.some_friction();
-                self.felt.contact.feels_friction(friction);
+                self.state.contact.set_friction(friction);
             }
             let law = self
-                .felt
+                .state
                 .effects
                 .as_ref()
                 .map_or(&scene.law, |it| it.law(&scene.law));
-            self.felt.contact.feels_friction(law.friction);
+            self.state.contact.set_friction(law.friction);
         }
-        self.felt.before = None;
+        self.state.before = None;
     }
 
     fn effects_of(&self, scene: &Scene) -> Option<Effects> {
-        let felt = FeltWith {
+        let felt = EffectContext {
             cell_mm: scene.cell_mm,
             rate: self.rate,
             latency_s: self.latency_s,
@@ -220,7 +220,7 @@ impl Feel {
         hip: GridPoint,
         mover: &Mover<'_>,
     ) -> Vec3 {
-        self.felt.contact.step(window, &hip);
+        self.state.contact.step(window, &hip);
         self.force_n(window, scene, hip, mover)
     }
 
@@ -234,20 +234,20 @@ impl Feel {
         scene: &Scene,
         hip: GridPoint,
     ) -> Vec3 {
-        let felt = &self.felt;
+        let state = &self.state;
         let point = self.point.get_or_insert_with(|| BegunPoint {
-            before: felt.clone(),
+            before: state.clone(),
             lacked: 0,
             tile: None,
         });
         let (lacked, last) = (point.lacked, point.tile);
         // Where the HIP is follows from the point.
-        let _ = self.felt.contact.land(window);
-        let output = *self.felt.contact.step(window, &hip);
+        let _ = self.state.contact.land(window);
+        let output = *self.state.contact.step(window, &hip);
         let may_lack = lacked < TILES_PER_SLOT * (D * D) as u32;
         let missing = output.missing_tile.filter(|_| may_lack);
         if missing.is_none() && !output.converged {
-            self.felt.contact.resume(point.before.contact.output());
+            self.state.contact.resume(point.before.contact.output());
             self.progress = Progress::GoesOn;
             return Vec3::ZERO;
         }
@@ -263,7 +263,7 @@ impl Feel {
         if let Some(point) = &mut self.point {
             point.lacked += u32::from(self.progress != Progress::Lacks(tile));
             point.tile = Some(tile);
-            self.felt = point.before.clone();
+            self.state = point.before.clone();
         }
         self.progress = Progress::Lacks(tile);
         Vec3::ZERO
@@ -276,7 +276,7 @@ impl Feel {
         hip: GridPoint,
         mover: &Mover<'_>,
     ) -> Vec3 {
-        match self.felt.effects {
+        match self.state.effects {
             Some(_) => self.with_effects(window, scene, hip, mover),
             None => {
                 let displacement_mm = self.contact().output().displacement * scene.cell_mm;
@@ -295,11 +295,11 @@ impl Feel {
         hip: GridPoint,
         mover: &Mover<'_>,
     ) -> Vec3 {
-        let Felt {
+        let RenderState {
             contact,
             effects,
             before,
-        } = &mut self.felt;
+        } = &mut self.state;
         let Some(effects) = effects else {
             return Vec3::ZERO;
         };
@@ -308,7 +308,7 @@ impl Feel {
         let spring = effects.law(&scene.law).spring();
         let spring_n = spring.force_n(displacement_mm) * mover.clutch();
         if let Some(friction) = effects.friction() {
-            contact.feels_friction(friction);
+            contact.set_friction(friction);
         }
         let Some(damper) = &mut effects.damper else {
             return spring_n;
@@ -330,22 +330,22 @@ impl Feel {
 
     /// The contact of the last tick.
     pub(crate) const fn contact(&self) -> &Contact {
-        &self.felt.contact
+        &self.state.contact
     }
 
     /// The same, for the clutch and for tiles that move the surface.
     pub(crate) const fn contact_mut(&mut self) -> &mut Contact {
-        &mut self.felt.contact
+        &mut self.state.contact
     }
 
     /// Returns true if the scene adds something to the spring's force.
     pub(crate) const fn has_effects(&self) -> bool {
-        self.felt.effects.is_some()
+        self.state.effects.is_some()
     }
 
     /// A tile without which the last force is not that of the whole terrain, besides the contact's.
     fn missing(&self) -> Option<TileIndex> {
-        self.felt.effects.as_ref().and_then(Effects::missing)
+        self.state.effects.as_ref().and_then(Effects::missing)
     }
 
     /// The tile that the last tick lacked, of an arm or a point.
@@ -366,7 +366,7 @@ impl Feel {
 
     /// The energy that the ticks have created and that was not taken back yet, mJ.
     pub(crate) fn created_mj(&self) -> f32 {
-        let effects = self.felt.effects.as_ref();
+        let effects = self.state.effects.as_ref();
         let damper = effects.and_then(|it| it.damper.as_ref());
         damper.map_or(0.0, |damper| damper.created_mj())
     }

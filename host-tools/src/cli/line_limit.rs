@@ -2,19 +2,19 @@
 
 use std::time::{Duration, Instant};
 
-/// How long lines are counted together.
+/// Time for which lines are counted together.
 const WINDOW: Duration = Duration::from_secs(1);
 
 /// Lets so many lines through in a second, and counts the others.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sparing {
+pub(super) struct LineLimit {
     most: u32,
     /// When the present second began, and the lines let through in it.
     window: Option<(Instant, u32)>,
     left_out: u64,
 }
 
-impl Sparing {
+impl LineLimit {
     /// Lets `most` lines a second through.
     pub(super) const fn new(most: u32) -> Self {
         Self {
@@ -53,7 +53,7 @@ mod tests {
     fn beyond_so_many_a_second_lines_are_counted_and_the_count_is_told_once() {
         let began = Instant::now();
         let at = |ms: u64| began + Duration::from_millis(ms);
-        let mut one = Sparing::new(1);
+        let mut one = LineLimit::new(1);
         assert_eq!(one.admit(at(0)), Some(0));
         for ms in 1..1000 {
             assert_eq!(one.admit(at(ms)), None);
@@ -62,7 +62,7 @@ mod tests {
         assert_eq!(one.admit(at(1000)), Some(999));
         assert_eq!(one.admit(at(1001)), None);
         assert_eq!(one.admit(at(2500)), Some(1));
-        let mut three = Sparing::new(3);
+        let mut three = LineLimit::new(3);
         let said = (0..10).filter(|_| three.admit(at(5)).is_some()).count();
         assert_eq!((said, three.left_out()), (3, 7));
     }

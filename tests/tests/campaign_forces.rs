@@ -9,8 +9,8 @@ use hapterra_core::force::{
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
 use hapterra_core::scene::TickRecord;
-use hapterra_tests::campaign::felt::FeltWatch;
-use hapterra_tests::campaign::ground::Felt;
+use hapterra_tests::campaign::force_watch::ForceWatch;
+use hapterra_tests::campaign::ground::SceneSurfaces;
 
 const LAW: SurfaceParams = SurfaceParams {
     damping: Damping {
@@ -45,9 +45,9 @@ fn at(tick: u32, height: f32, force_n: Vec3) -> TickRecord {
     }
 }
 
-fn watch(law: &SurfaceParams, table: Option<&[Material]>) -> FeltWatch {
+fn watch(law: &SurfaceParams, table: Option<&[Material]>) -> ForceWatch {
     let table = table.map(|all| MaterialTable::new(all).expect("some"));
-    FeltWatch::new(Felt::of(law, table.as_ref()), 0.5)
+    ForceWatch::new(SceneSurfaces::of(law, table.as_ref()), 0.5)
 }
 
 /// What is said of one tick, 2 mm deep.

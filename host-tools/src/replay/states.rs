@@ -1,0 +1,24 @@
+//! Names of the proxy's states in recordings and events.
+
+use hapterra_core::contact::ContactState;
+
+/// Names that earlier versions wrote, and today's.
+const EARLIER: [(&str, &str); 2] = [("waiting", "unseeded"), ("letting go", "releasing")];
+
+/// A state's name in a recording.
+#[must_use]
+pub const fn state_name(state: ContactState) -> &'static str {
+    match state {
+        ContactState::Unseeded => "unseeded",
+        ContactState::Free => "free",
+        ContactState::Touching => "touching",
+        ContactState::Releasing => "releasing",
+    }
+}
+
+/// Replaces the name of an earlier version by today's.
+pub(super) fn update_name(name: &mut String) {
+    if let Some((_, now)) = EARLIER.iter().find(|(earlier, _)| earlier == name) {
+        *name = (*now).to_owned();
+    }
+}
