@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 
 use clap::builder::StyledStr;
 use clap::{Arg, ArgAction, Command, CommandFactory as _};
+use hapterra::replay::COLUMNS;
 use hapterra_core::guard::{Blockers, Fault, Limits};
 use hapterra_firmware::led::LedPattern;
 use hapterra_tests::repository;
@@ -14,13 +15,23 @@ use hapterra_tests::repository;
 const MAX_LINE: usize = 120;
 const MARK: &str = "<!-- Written by `cargo xtask docs --write`: change the texts in the code. -->";
 
+/// The text of a page of the reference.
+fn read(page: &str) -> String {
+    let path = repository().join("docs/reference").join(page);
+    std::fs::read_to_string(path).unwrap_or_default()
+}
+
+/// Stands before a table that the code writes.
+const TABLE: &str =
+    "<!-- Written by `cargo xtask docs --write`: change the meanings in the code. -->";
+
 /// Compares a page with the text that the code gives, or writes it.
 fn check(page: &str, text: &str) {
     let path = repository().join("docs/reference").join(page);
     if std::env::var_os("HAPTERRA_DOCS").is_some_and(|wanted| wanted == "write") {
         std::fs::write(&path, text).expect("written");
     }
-    let kept = std::fs::read_to_string(&path).unwrap_or_default();
+    let kept = read(page);
     let first = kept.lines().zip(text.lines()).find(|(old, new)| old != new);
     assert!(
         kept == text,
@@ -211,4 +222,21 @@ fn faults_are_those_of_the_code() {
         let _ = writeln!(page, "| {state} | {looks} |");
     }
     check("faults.md", &page);
+}
+
+#[test]
+fn columns_of_recordings_are_those_of_the_code() {
+    let page = read("recordings.md");
+    let (before, rest) = page.split_once(TABLE).expect("the table's mark");
+    let (_, after) = rest.split_once("\n\n").expect("text after the table");
+    let rows = COLUMNS.iter().map(|(names, meaning)| {
+        let names: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+        format!("| {} | {meaning} |", names.join(", "))
+    });
+    let rows: Vec<_> = rows.collect();
+    let head = "| column | meaning |\n| --- | --- |";
+    check(
+        "recordings.md",
+        &format!("{before}{TABLE}\n{head}\n{}\n\n{after}", rows.join("\n")),
+    );
 }

@@ -8,6 +8,7 @@ mod views;
 use std::path::Path;
 use std::process::Command;
 
+use hapterra::replay::COLUMNS;
 use hapterra::synth::Kind;
 use hapterra_tests::{UNCONTROLLED, hapterra_binary, terrain_file};
 
@@ -121,6 +122,17 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
     let [terrain, from, to] = [terrain, recording, "again.csv"].map(|name| folder.text(name));
     folder.runs(&["replay", &terrain, &from, "-o", &to]);
     let (live, again) = (folder.read(recording), folder.read("again.csv"));
+    let header = live.lines().find(|line| !line.starts_with('#'));
+    let documented: Vec<_> = COLUMNS
+        .iter()
+        .flat_map(|(names, _)| *names)
+        .copied()
+        .collect();
+    assert_eq!(
+        header,
+        Some(&*documented.join(",")),
+        "columns of the reference"
+    );
     let (live, again) = (rows(&live), rows(&again));
     assert_eq!(live.len(), again.len());
     let mut compared = 0;

@@ -3,6 +3,7 @@
 //! CSV, or Parquet where the file's name ends in `.parquet`. Both have the same columns
 //! and the same settings.
 
+mod columns;
 mod csv;
 mod parquet;
 
@@ -11,6 +12,8 @@ use std::path::Path;
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::scene::TickRecord;
+
+pub use columns::COLUMNS;
 
 use super::marks::Mark;
 use super::settings::{PlacementSettings, Settings};

@@ -1,0 +1,32 @@
+//! The columns of a recording of `run`, in their order, with their meanings for the reference.
+
+/// Columns that share a meaning, and the meaning.
+pub const COLUMNS: [(&[&str], &str); 12] = [
+    (&["t_s"], "time of the tick, s"),
+    (
+        &["x_mm", "y_mm", "z_mm"],
+        "the HIP (haptic interface point): east, north, up",
+    ),
+    (&["contact"], "1 in contact, else 0"),
+    (
+        &["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"],
+        "the proxy; the HIP without contact",
+    ),
+    (
+        &["force_x_n", "force_y_n", "force_z_n"],
+        "the force on the hand, N",
+    ),
+    (&["state"], "`free`, `touching`, `releasing`, or `unseeded`"),
+    (
+        &["tick", "work"],
+        "`run`: number of the tick; units of contact work",
+    ),
+    (&["cost"], "`run`: clock ticks of the tick before"),
+    (&["late"], "`run`: late ticks"),
+    (&["mode"], "`run`, `demo`: progress of arming"),
+    (
+        &["limits"],
+        "`run`, `demo`: what reduced the force, by name",
+    ),
+    (&["view"], "number of the [placement](#placements), from 0"),
+];
