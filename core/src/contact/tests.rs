@@ -607,7 +607,7 @@ fn bits(output: &ContactOutput) -> (ContactState, GridPoint, [u32; 3]) {
 #[test]
 fn the_shortcuts_change_no_bit() {
     let without = ContactSettings {
-        shortcuts: false,
+        fast_paths: false,
         ..ContactSettings::AT_1_KHZ
     };
     let (mut ticks, mut shorter) = (0, 0);

@@ -42,7 +42,7 @@ pub(super) const NEWTON_ERROR: f32 = 5e-8;
 pub(super) const LEVEL: f32 = 1e-5;
 
 /// Distance from a patch's border within which its neighbours may be asked, for a HIP
-/// that is not far (`boundary_fade::FAR`): `BESIDE` resolutions at 32 cells.
+/// that is not far (`edge_fade::FAR`): `BESIDE` resolutions at 32 cells.
 pub(super) const BESIDE_OF_NEAR_HIP: f32 = 4e-5;
 
 /// Rounding of a height relative to the four it is mixed from, and some more.

@@ -350,7 +350,7 @@ fn leads_off_beyond<const D: usize>(
 ) -> bool {
     match window.ground(entered.cell) {
         CellContent::Patch(corners) => passes_over(&view.patch(&corners), entered, way),
-        // At the border of the data the proxy is held; see `boundary_fade`.
+        // At the border of the data the proxy is held; see `edge_fade`.
         CellContent::Hole | CellContent::Missing => false,
     }
 }

@@ -80,7 +80,7 @@ impl Contact {
     /// The part of the last displacement that friction holds rather than the surface, cells.
     pub(crate) fn held_back(&self) -> Vec3 {
         match &self.rough {
-            Some(rough) => rough.held * -self.boundary_fade(),
+            Some(rough) => rough.held * -self.edge_fade(),
             None => Vec3::ZERO,
         }
     }

@@ -213,7 +213,7 @@ mod tests {
         let mut contact = Contact::new(ContactSettings::AT_1_KHZ.at_rate(rate));
         let mut step = |hip: GridPoint| {
             let felt = *contact.step(&field.window, &hip);
-            (felt.state, contact.boundary_fade())
+            (felt.state, contact.edge_fade())
         };
         let above = GridPoint::new([0; 3], Vec3::new(8.5, 10.5, 1.0));
         assert_eq!(step(above).0, ContactState::Free);
