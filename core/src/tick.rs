@@ -61,7 +61,7 @@ impl<const D: usize> Haptics<'_, D> {
         self.watch(sense, watchdog_live);
     }
 
-    /// Where the arm is, and what the guard makes of it.
+    /// Reads the pose of the arm and updates the guard.
     fn watch(&mut self, sense: &GuardInputs, watchdog_live: bool) -> Option<Pose> {
         let zero = self.zero.unwrap_or_default();
         let mechanism = self.mechanism.as_ref();

@@ -68,7 +68,7 @@ pub(super) const ON_BORDER: u32 = ARRIVAL + 4 * SLOPE;
 /// less this.
 pub const MAX_PIECE: u32 = ON_BORDER;
 
-/// What a tick has spent, and what it may; and the terrain that it had to do without.
+/// Work of a tick, its bound, and the missing terrain.
 #[derive(Debug)]
 pub(super) struct Budget {
     spent: u32,

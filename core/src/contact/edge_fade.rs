@@ -33,7 +33,7 @@ fn is_far(proxy: Cell, hip: Cell) -> bool {
     proxy.x.abs_diff(hip.x).max(proxy.y.abs_diff(hip.y)) >= FAR
 }
 
-/// What the boundary fade should come to, and what is not known about it.
+/// Target of the edge fade, and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Target {
     /// 1 over a patch, less beside one, 0 farther than [`REACH`] from any: continuous

@@ -22,7 +22,7 @@ use departures::Departures;
 use held_back::Rough;
 use landing::Landing;
 
-/// What the proxy does, with what has to be remembered while it does so.
+/// Phase of the proxy, with its memory.
 // The path is most of a contact's state, and there is no heap to put it on.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
@@ -71,7 +71,7 @@ struct Sweeping {
     /// The proxy had to wait for terrain, or the HIP has moved while the path was under way: the
     /// force of the contact that follows may not come at once.
     was_late: bool,
-    /// What a hop from the surface to the surface keeps.
+    /// Fade that a hop from the surface to the surface keeps.
     fade: f32,
     departures: Departures,
 }
@@ -88,7 +88,7 @@ struct OnSurface {
     follow: Option<Follow>,
 }
 
-/// What a tick's shortcut comes to.
+/// Outcome of a tick's fast path.
 enum FastPath {
     /// It has the answer.
     Taken,
@@ -98,7 +98,7 @@ enum FastPath {
     None,
 }
 
-/// Whether a tick goes on, or ends with an answer.
+/// Decision to continue a tick, or to end it with an answer.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
     GoesOn,
@@ -136,7 +136,7 @@ pub struct Contact {
     felt: Option<(GridPoint, Vec3)>,
     /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
     landing: Option<Landing>,
-    /// What friction remembers, where the surface is rough.
+    /// Memory of friction, where the surface has some.
     rough: Option<Rough>,
 }
 
@@ -214,7 +214,7 @@ impl Contact {
         self.redirect(window, self.hip, None, &mut Budget::new(0));
     }
 
-    /// How rough the surface is from the next step on. A proxy that was held is judged again.
+    /// Sets the friction from the next step on. A proxy that was held is tested again.
     pub(crate) fn set_friction(&mut self, friction: Friction) {
         if let Some(rough) = &mut self.rough {
             self.at_rest &= !rough.takes(friction);

@@ -234,7 +234,7 @@ impl Passivity {
     }
 }
 
-/// How the tip moves while a force acts.
+/// Motion of the tip while a force acts.
 pub(super) struct Motion {
     /// The force times the velocity, mJ/s.
     pub(super) along: f32,
@@ -250,7 +250,7 @@ pub(super) struct Takes {
     pub(super) across: f32,
 }
 
-/// What is kept of an energy, mJ: what is no number counts as none.
+/// Returns an energy within its bounds, mJ: one that is no number counts as none.
 fn within(mj: f32) -> f32 {
     smaller(larger(mj, 0.0), MAX_MJ)
 }

@@ -14,7 +14,7 @@ use crate::contact::sweep::Path;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::Window;
 
-/// How far a proxy on the surface has come in a tick.
+/// Progress of a proxy on the surface in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Came {
     /// Nothing is left to do.

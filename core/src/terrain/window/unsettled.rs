@@ -130,7 +130,7 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// How far the samples of a tile can be from the underlay, cells; `None` where that is not felt.
+    /// Returns the largest distance of a tile's samples from the coarse fallback, cells; `None` where that is not rendered.
     fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
         let [lowest, highest] = tile.range()?;
         let [low, high] = self.underlay.felt()?.range_over(index, tile.base())?;
@@ -138,7 +138,7 @@ impl<'t, const D: usize> Window<'t, D> {
         (far > 0.0).then_some(far)
     }
 
-    /// What lies in a cell of the field whose tile is not the surface.
+    /// Returns the content of a cell of the field whose tile is not the surface.
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_ground(&self, cell: Cell) -> CellContent {
