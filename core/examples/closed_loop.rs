@@ -32,10 +32,10 @@ impl Arm {
     const INERTIA: Vec3 = Vec3::new(0.02, 0.02, 0.015);
     /// Friction and the hand's damping, Nm·s/rad.
     const DAMPING: f32 = 0.15;
-    /// How stiffly the person holds on to where the hand should be, N/mm.
+    /// Stiffness of the person's hold at the hand's target, N/mm.
     const GRIP_N_PER_MM: f32 = 0.1;
 
-    /// What the encoders read.
+    /// Returns the encoders' counts.
     fn counts(&self) -> [i32; 3] {
         self.mechanism.counts(self.angles, [0; 3])
     }

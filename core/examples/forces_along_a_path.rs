@@ -23,7 +23,7 @@ fn hill(x: i32, y: i32) -> f32 {
     8.0 * (-(x * x + y * y) / 100.0).exp()
 }
 
-/// Where the HIP is after part `t` of the way, in cells: down to one cell above
+/// Returns the HIP after part `t` of the path, in cells: down to one cell above
 /// the plain, and from west to east right through the hill.
 fn path(t: f32) -> Vec3 {
     Vec3::new(5.0 + 50.0 * t, 20.3, (9.0 - 80.0 * t).max(1.0))

@@ -35,7 +35,7 @@ const MM: f32 = 5.0;
 const ICE: f32 = 160.0;
 const START: f32 = 460.0;
 
-/// What is seen of a tick: s, newtons along the surface, and mm from where it began.
+/// Observation of a tick: s, newtons along the surface, and mm from its start.
 struct Seen {
     time: f32,
     force: f32,

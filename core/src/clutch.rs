@@ -73,19 +73,19 @@ enum State {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clutch {
     state: State,
-    /// How the host holds it.
+    /// The host's use of it.
     host: ClutchHold,
     /// The board's clutch input is held: the terrain goes with the hand.
     input: bool,
     /// Since it was held the terrain was to go with the hand.
     carries: bool,
-    /// What the terrain has still to go back, relative to the tip, mm.
+    /// Remaining return of the terrain, relative to the tip, mm.
     owed_mm: Vec3,
     /// Share of the force that is let through to a driven arm.
     ramp: f32,
     /// Share that was let through in the last tick.
     share: f32,
-    /// What it says of the last tick.
+    /// Its limits of the last tick.
     limits: Limits,
     /// Most that it may change in a tick: out as when the arm is disarmed.
     out: f32,
@@ -166,7 +166,7 @@ impl Clutch {
         }
     }
 
-    /// How it limits the tick: not at all where it is closed.
+    /// Returns its limits of the tick: none where it is closed.
     #[inline]
     pub(crate) const fn limits(&self) -> Limits {
         self.limits

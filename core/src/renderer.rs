@@ -87,7 +87,7 @@ impl Mover<'_> {
 #[derive(Clone)]
 struct RenderState {
     contact: Contact,
-    /// What the scene adds to the spring's force, if anything.
+    /// Effects of the scene, if any.
     effects: Option<Effects>,
     /// The HIP of the last tick that was done and driven.
     before: Option<GridPoint>,
@@ -103,7 +103,7 @@ struct BegunPoint {
     tile: Option<TileIndex>,
 }
 
-/// How far a replay is with its point.
+/// Progress of a replay's point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Progress {
     /// The point was felt: without this tile where it needs more than the window holds.

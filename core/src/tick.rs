@@ -61,7 +61,7 @@ impl<const D: usize> Haptics<'_, D> {
         self.watch(sense, watchdog_live);
     }
 
-    /// Where the arm is, and what the guard makes of it.
+    /// Reads the pose of the arm and updates the guard.
     fn watch(&mut self, sense: &GuardInputs, watchdog_live: bool) -> Option<Pose> {
         let zero = self.zero.unwrap_or_default();
         let mechanism = self.mechanism.as_ref();
@@ -182,7 +182,7 @@ impl<const D: usize> Haptics<'_, D> {
         limits.set(Limits::TERRAIN_MISSING, sample.missing_tile.is_some());
         limits.set(
             Limits::BOUNDARY_FADING,
-            self.renderer.contact().boundary_fade() < 1.0,
+            self.renderer.contact().edge_fade() < 1.0,
         );
         limits |= self.clutch.limits();
         let is_coarse = self.is_over_coarse_ground(sample);

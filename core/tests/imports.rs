@@ -103,7 +103,7 @@ impl Sources {
         }
     }
 
-    /// What imports what, between the files and folders beside each other: by the folder, the
+    /// Returns the imports between files and folders beside each other: by the folder, the
     /// name in it that imports and the name that is imported; with an import that does so.
     fn imports(&self) -> BTreeMap<(Module, String, String), String> {
         let mut imports = BTreeMap::new();

@@ -99,9 +99,9 @@ pub struct Device<C, const D: usize> {
     /// link's task then runs, too.
     pub link: Link<'static, D>,
     monitor: &'static Monitor,
-    /// What the device remembers without power.
+    /// Stored calibration, kept without power.
     stored: Stored,
-    /// What the device's RAM keeps over a reset.
+    /// RAM that survives a reset.
     retained: Copies,
 }
 

@@ -57,7 +57,7 @@ mod tests {
         health
     }
 
-    /// What becomes of a request in tick 1,000 of a board at 1 kHz, with a report of the
+    /// Returns the outcome of a request in tick 1,000 of a board at 1 kHz, with a report of the
     /// switch every 100 ticks.
     fn decided(mut switch: impl FnMut(u32) -> bool) -> Option<(u32, Result<(), Refusal>)> {
         let mut wait = PressWait::new(1_000, 1);

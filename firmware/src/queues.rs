@@ -32,7 +32,7 @@ const HEALTH: usize = 2;
 /// One tick as the loop reports it to the link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct QueuedTick {
-    /// What the tick measured and computed.
+    /// Record of the tick.
     pub(crate) sample: TickRecord,
     /// The number of the point that this tick answers.
     pub(crate) answers: Option<u32>,

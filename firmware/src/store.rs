@@ -27,7 +27,7 @@ use hapterra_core::phantom::{Calibration, CalibrationError, RECORD_BYTES, Record
 const HEAD: usize = 8;
 /// The mark, a write of its own on every chip.
 const MARK: [u8; 32] = [0; 32];
-/// Where the mark is in a place: a multiple of 32, the largest write size of the chips.
+/// Offset of the mark in a place: a multiple of 32, the largest write size of the chips.
 const MARK_AT: usize = HEAD + RECORD_BYTES + 24;
 /// Bytes of a place.
 pub const PLACE: usize = MARK_AT + MARK.len();
@@ -35,7 +35,7 @@ pub const PLACE: usize = MARK_AT + MARK.len();
 /// take no more than a fraction of the watchdog's time.
 const MAX_PLACES: u32 = 8;
 
-/// What was found in the memory.
+/// Content found in the memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 // Read once, at start-up.
 #[allow(clippy::large_enum_variant)]
@@ -78,7 +78,7 @@ enum Place {
     Damaged,
 }
 
-/// What the two areas hold.
+/// Content of the two areas.
 #[derive(Default)]
 struct Contents {
     /// The newest record and its number.

@@ -11,7 +11,7 @@ pub enum Error {
     /// There is no libgdal on this machine, or not where it is looked for.
     #[error("no libgdal was found ({tried})")]
     NotFound {
-        /// What was tried last, and what the system said.
+        /// Last attempt, and the system's message.
         tried: String,
     },
     /// A library is there that this crate cannot use.
@@ -65,9 +65,9 @@ pub enum Error {
     /// A part of a raster that is not there.
     #[error("there is no {asked}: {there}")]
     NoSuchPart {
-        /// What was asked for.
+        /// The request.
         asked: String,
-        /// What there is.
+        /// The available ones.
         there: String,
     },
     /// A window or a buffer that does not fit.
@@ -75,7 +75,7 @@ pub enum Error {
     Window {
         /// First column and row, columns and rows.
         window: [u32; 4],
-        /// Why.
+        /// The reason.
         why: String,
     },
 }

@@ -151,7 +151,7 @@ fn found(named: Option<OsString>) -> Result<(libloading::Library, PathBuf), Erro
     Err(Error::NotFound { tried })
 }
 
-/// Where libgdal may be, in the order in which it is tried.
+/// Returns the possible paths of libgdal, in the order of attempts.
 fn candidates(conda: Option<OsString>) -> Vec<PathBuf> {
     let conda = conda.map(PathBuf::from);
     let mut paths = Vec::new();

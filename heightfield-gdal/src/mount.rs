@@ -17,7 +17,7 @@ use crate::vrt;
 #[derive(Clone)]
 pub struct Mount(pub(crate) Arc<Mounted>);
 
-/// What all clones share.
+/// State that all clones share.
 pub(crate) struct Mounted {
     number: u64,
     library: Arc<Loaded>,
@@ -28,7 +28,7 @@ pub(crate) struct Mounted {
 #[derive(Default)]
 struct State {
     fault: Option<io::Error>,
-    /// How deep VRTs lie in others, by their names.
+    /// Depths of VRTs in others, by their names.
     depths: HashMap<String, u32>,
     /// Threads that wait for a file now, and the time of the first of them.
     waiting: u32,

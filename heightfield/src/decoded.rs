@@ -13,7 +13,7 @@ use super::samples::{SampleValue, with_samples};
 use super::storage::Storage;
 use super::{Certainty, RasterError, VerticalDatum};
 
-/// What a decoder hands over: samples in file order and all that the file says
+/// Result of a decoder: samples in file order and all that the file says
 /// about them.
 #[derive(Clone, Debug)]
 pub(super) struct Decoded {
@@ -39,7 +39,7 @@ pub(super) struct Decoded {
     pub(super) system: Option<ReferenceSystem>,
     /// Source of that.
     pub(super) system_from: Certainty,
-    /// Where the samples lie, where the file knows it.
+    /// Place of the samples, where the file knows it.
     pub(super) place: Option<Place>,
     /// Size of a cell, where the file knows it.
     pub(super) cell: Option<CellSize>,
@@ -49,13 +49,13 @@ pub(super) struct Decoded {
     pub(super) metres_per_vertical_unit: Option<f64>,
     /// Source of that.
     pub(super) vertical_unit_from: Certainty,
-    /// What the heights count from, where the file says so.
+    /// Zero of the heights, where the file states it.
     pub(super) vertical_datum: Option<VerticalDatum>,
     /// Reason for which all samples are in memory, where the format could have left them in the file.
     pub(super) why_whole: Option<String>,
     /// Their layout in the file.
     pub(super) file_layout: FileLayout,
-    /// What the user should know.
+    /// Remarks for the user.
     pub(super) remarks: Vec<String>,
 }
 

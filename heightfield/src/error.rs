@@ -40,7 +40,7 @@ pub enum RasterError {
     /// The operating system does not let us read it.
     #[error("cannot read the file: {0}")]
     Unreadable(std::io::Error),
-    /// What is at a URL cannot be read, or not at present.
+    /// A URL that cannot be read, or not at present.
     #[error("cannot read what is there: {0}")]
     Remote(std::io::Error),
     /// It is on its way from elsewhere, and nobody may wait for it.
@@ -68,7 +68,7 @@ pub enum RasterError {
     Unsupported {
         /// Name of the format.
         format: &'static str,
-        /// What of it is missing.
+        /// The missing feature.
         feature: String,
     },
     /// Readable, but its samples are not heights.
@@ -80,7 +80,7 @@ pub enum RasterError {
     /// Several parts could hold the heights; none was chosen.
     #[error("several {kind}s may be the heights: {}", names.join(", "))]
     SeveralHeights {
-        /// What the file calls its parts.
+        /// The file's name for its parts.
         kind: &'static str,
         /// Their names.
         names: Vec<String>,
@@ -96,9 +96,9 @@ pub enum RasterError {
     /// The user chose a band or variable that is not there.
     #[error("there is no {asked}: {there}")]
     NoSuchPart {
-        /// What was asked for.
+        /// The request.
         asked: String,
-        /// What there is.
+        /// The available ones.
         there: String,
     },
     /// The user named a cell size, the file states another.
@@ -154,7 +154,7 @@ pub enum RasterError {
     /// Items of a STAC of which GDAL makes no terrain, but of their files it does.
     #[error("no terrain: {why}")]
     ToBuild {
-        /// What is wrong.
+        /// The fault.
         why: String,
         /// The files, as GDAL calls them.
         files: Vec<String>,
@@ -175,9 +175,9 @@ pub enum RasterError {
     TilesDiffer {
         /// The file that does not fit.
         file: PathBuf,
-        /// What it does not fit to.
+        /// The other file.
         other: PathBuf,
-        /// What differs.
+        /// The difference.
         why: String,
     },
     /// Two of many files have other heights on the same samples.
@@ -225,7 +225,7 @@ impl RasterError {
         }
     }
 
-    /// What went wrong with a file at a URL.
+    /// Makes the fault of a file at a URL.
     pub(super) fn elsewhere(error: std::io::Error) -> Self {
         match is_on_its_way(&error) {
             true => Self::NotYet,

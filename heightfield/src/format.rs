@@ -12,13 +12,13 @@ pub(super) struct Format {
     pub(super) begins: fn(head: &[u8]) -> bool,
     /// Extensions in lower case. Inside an archive, a file with one of them is a terrain.
     pub(super) extensions: &'static [(&'static str, Claim)],
-    /// What a file has several of, so that the user may choose.
+    /// Parts of a file, from which the user may choose.
     pub(super) parts: Parts,
     /// Reads the heights of a file.
     pub(super) decode: fn(&FileBytes, &OpenOptions) -> Result<Decoded, RasterError>,
 }
 
-/// What a file of a format has several of.
+/// Parts of a file of a format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Parts {
     /// Nothing: one field a file.
@@ -27,7 +27,7 @@ pub(super) enum Parts {
     Bands,
 }
 
-/// What an extension says about a file whose beginning says nothing.
+/// Claim of an extension on a file whose beginning says nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Claim {
     /// The file is of this format.
@@ -67,7 +67,7 @@ impl Format {
         }
     }
 
-    /// What an extension says, if it is one of this format's.
+    /// Returns the claim of an extension, if it is one of this format's.
     pub(super) fn claim(&self, extension: &str) -> Option<Claim> {
         let own = self.extensions.iter().find(|(own, _)| *own == extension);
         own.map(|(_, claim)| *claim)

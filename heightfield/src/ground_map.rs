@@ -92,7 +92,7 @@ impl GroundMap {
         Self::from_centre([x, along[0], up[0]], [y, along[1], up[1]])
     }
 
-    /// Where the samples themselves lie, which are in the middle of their cells; `None`
+    /// Returns the map of the samples themselves, which are in the middle of their cells; `None`
     /// where all of them lie in a line.
     pub(super) fn of_centres(&self) -> Option<GroundTransform> {
         let map = &self.0;

@@ -28,7 +28,7 @@ pub(super) struct FileBytes {
     elsewhere: RemoteFetcher,
 }
 
-/// Where the bytes are.
+/// Source of the bytes.
 pub(super) enum Data {
     /// In an open file at a path.
     File(File, PathBuf),
@@ -101,7 +101,7 @@ impl FileBytes {
         &self.name
     }
 
-    /// What follows the last dot of the name, in lower case.
+    /// Returns the part after the last dot of the name, in lower case.
     pub(super) fn extension(&self) -> &str {
         &self.extension
     }
@@ -111,7 +111,7 @@ impl FileBytes {
         self.len
     }
 
-    /// Where the bytes are, for decoders that read anywhere.
+    /// Returns the source of the bytes, for decoders that read anywhere.
     pub(super) fn data(&self) -> &Data {
         &self.data
     }
@@ -177,7 +177,7 @@ impl FileBytes {
         }))
     }
 
-    /// What tells the file in its present state from others; `None` where that is not known.
+    /// Returns the stamp of the file in its present state; `None` where it is not known.
     pub(super) fn stamp(&self) -> Option<FileStamp> {
         match &self.data {
             Data::File(file, path) => Some(FileStamp::of(path, &file.metadata().ok()?)),

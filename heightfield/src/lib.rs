@@ -496,7 +496,7 @@ impl Raster {
         self.source.bounds_lonlat()
     }
 
-    /// What the heights count from, where the file says so.
+    /// Zero of the heights, where the file states it.
     pub fn vertical_datum(&self) -> Option<&VerticalDatum> {
         self.source.vertical_datum.as_ref()
     }

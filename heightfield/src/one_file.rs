@@ -67,7 +67,7 @@ fn decode_here(
     decode_as(format, input, options)
 }
 
-/// What is not known or not supported here is given to GDAL.
+/// Opens by GDAL what is not known or not supported here.
 fn or_by_gdal(
     decoded: Result<Decoded, RasterError>,
     input: &FileBytes,

@@ -2,7 +2,7 @@
 
 use super::ground_map::GroundMap;
 
-/// Where a field lies.
+/// Place of a field.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// From columns and rows in file order.

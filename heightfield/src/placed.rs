@@ -56,7 +56,7 @@ impl GroundUnit {
 /// Angles below this are rounding, degrees.
 const STRAIGHT_DEGREES: f64 = 0.05;
 
-/// How a grid is rotated and sheared, where it is. It is felt along its own rows; only a
+/// Returns remarks on a rotated or sheared grid. It is rendered along its own rows; only a
 /// mirror image is turned.
 fn turned(map: &GroundMap) -> Vec<String> {
     let mut words = Vec::new();

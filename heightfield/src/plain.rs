@@ -32,7 +32,7 @@ const FEW_BYTES: u64 = 1 << 20;
 /// When a file that is not read as a whole is opened, so many places each way are looked at.
 const PLACES: u32 = 6;
 
-/// Where samples lie in a file, in bytes.
+/// Positions of samples in a file, in bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plain {
     pub(super) columns: u32,

@@ -62,7 +62,7 @@ impl Storage {
         }
     }
 
-    /// Where coarse samples are kept, before anything is read.
+    /// Sets the folder of coarse samples, before anything is read.
     pub(super) fn set_disk_cache(&mut self, disk: &DiskCache) {
         if let Self::Blocks(blocks) = self
             && let Some(blocks) = Arc::get_mut(blocks)

@@ -9,7 +9,7 @@ const STRAIGHT: f64 = 1e-6;
 /// Cells whose columns lean farther than this over their rows are no cells.
 const FLATTENED: f64 = 0.999;
 
-/// Where a unit of x and a unit of y lead on the ground at a place, metres: tangents of
+/// Vectors on the ground of a unit of x and of y at a place, metres: tangents of
 /// the globe, both in the same frame.
 ///
 /// They need be neither as long as each other nor perpendicular: most maps that are not

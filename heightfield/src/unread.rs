@@ -12,7 +12,7 @@ const MOST: usize = 1 << 16;
 /// After so many warnings one says that there are more.
 const WARNINGS: usize = 8;
 
-/// What of a file could not be read.
+/// Parts of a file that could not be read.
 #[derive(Debug)]
 pub(super) struct Unread {
     /// The file's name, for warnings.

@@ -43,7 +43,7 @@ pub struct Terrain {
     /// Largest difference of neighbouring heights, and the sample.
     pub(crate) step: Option<Steepest>,
     pub(crate) materials: Option<Arc<Array<u8>>>,
-    /// What touches it, if it is no point.
+    /// The ball that touches it, if it is no point.
     pub(crate) ball: Option<Ball>,
     tip_mm: f64,
     /// Heights are rounded to multiples of this, cells; 0 where they stay as they are.

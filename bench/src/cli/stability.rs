@@ -36,7 +36,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, value_parser = choice())]
     pub surface: Option<SurfaceChoice>,
 
-    /// Whether the passivity controller acts
+    /// Passivity controller: off, on or both
     #[arg(
         long,
         value_name = "off|on,…",
@@ -64,12 +64,12 @@ pub struct Args {
     pub picture: Option<PathBuf>,
 }
 
-/// Whether the passivity controller acts.
+/// Setting of the passivity controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Passivity {
-    /// It does not
+    /// Without it
     Off,
-    /// It does
+    /// With it
     On,
 }
 

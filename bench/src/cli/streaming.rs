@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "TIME,…", value_delimiter = ',', value_parser = parse_latency)]
     pub latency: Vec<u32>,
 
-    /// What a process of its own measures
+    /// Case that a process of its own measures
     #[arg(long, hide = true)]
     pub case: Option<String>,
 }

@@ -12,7 +12,7 @@ use hapterra::synth::{Grid, Kind, Synth, write};
 /// Arguments of `hapterra-lab synth`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// What the terrain looks like
+    /// Shape of the terrain
     #[arg(value_enum)]
     pub kind: Kind,
 

@@ -39,7 +39,7 @@ pub const fn work_per_tick(rate: TickRate) -> u32 {
 }
 
 /// Units for following the proxy within its patch by the shortcut.
-pub(super) const SHORTCUT: u32 = 2;
+pub(super) const FAST_PATH: u32 = 2;
 /// Units for arriving at a patch: its corners, and whether the way leads off.
 pub(super) const ARRIVAL: u32 = 6;
 /// Units for the closest point of a convex patch.
@@ -68,7 +68,7 @@ pub(super) const ON_BORDER: u32 = ARRIVAL + 4 * SLOPE;
 /// less this.
 pub const MAX_PIECE: u32 = ON_BORDER;
 
-/// What a tick has spent, and what it may; and the terrain that it had to do without.
+/// Work of a tick, its bound, and the missing terrain.
 #[derive(Debug)]
 pub(super) struct Budget {
     spent: u32,

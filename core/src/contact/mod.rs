@@ -3,21 +3,21 @@
 //!
 //! [`Contact::step`] takes the HIP of one tick and answers with the proxy. Read in
 //! this order: `proxy` (what a tick does), [`sweep`] (from free space to the
-//! surface), [`closest_point`] (over the surface), `friction` (what holds it back there), [`boundary_fade`] (at the border
+//! surface), [`closest_point`] (over the surface), `friction` (what holds it back there), [`edge_fade`] (at the border
 //! of the data); [`surface`] is what all of them speak of. `tolerance` says how exact
-//! each is and `budget` how much a tick may do; `shortcut` is what nearly every tick is.
+//! each is and `budget` how much a tick may do; `fast_path` is what nearly every tick is.
 
-pub mod boundary_fade;
 pub mod closest_point;
+pub mod edge_fade;
 pub mod surface;
 pub mod sweep;
 
 mod budget;
+mod fast_path;
 mod friction;
 mod output;
 mod proxy;
 mod settings;
-mod shortcut;
 mod straight_way;
 mod tolerance;
 

@@ -8,12 +8,12 @@ mod on_ground;
 
 use glam::Vec3;
 
-use super::budget::{Budget, SHORTCUT};
+use super::budget::{Budget, FAST_PATH};
 use super::closest_point::{Descent, Leave, Place};
+use super::fast_path::{self, Follow, Followed};
 use super::friction::Friction;
 use super::output::{ContactOutput, ContactState};
 use super::settings::ContactSettings;
-use super::shortcut::{self, Follow, Followed};
 use super::surface::{HipView, SurfacePoint};
 use super::sweep::Path;
 use crate::grid::{Cell, GridPoint};
@@ -22,7 +22,7 @@ use departures::Departures;
 use held_back::Rough;
 use landing::Landing;
 
-/// What the proxy does, with what has to be remembered while it does so.
+/// Phase of the proxy, with its memory.
 // The path is most of a contact's state, and there is no heap to put it on.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
@@ -71,7 +71,7 @@ struct Sweeping {
     /// The proxy had to wait for terrain, or the HIP has moved while the path was under way: the
     /// force of the contact that follows may not come at once.
     was_late: bool,
-    /// What a hop from the surface to the surface keeps.
+    /// Fade that a hop from the surface to the surface keeps.
     fade: f32,
     departures: Departures,
 }
@@ -88,8 +88,8 @@ struct OnSurface {
     follow: Option<Follow>,
 }
 
-/// What a tick's shortcut comes to.
-enum Shortcut {
+/// Outcome of a tick's fast path.
+enum FastPath {
     /// It has the answer.
     Taken,
     /// It has none, but knows the closest point of the patch that the proxy is on.
@@ -98,7 +98,7 @@ enum Shortcut {
     None,
 }
 
-/// Whether a tick goes on, or ends with an answer.
+/// Decision to continue a tick, or to end it with an answer.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
     GoesOn,
@@ -136,7 +136,7 @@ pub struct Contact {
     felt: Option<(GridPoint, Vec3)>,
     /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
     landing: Option<Landing>,
-    /// What friction remembers, where the surface is rough.
+    /// Memory of friction, where the surface has some.
     rough: Option<Rough>,
 }
 
@@ -149,7 +149,7 @@ impl Contact {
         Self {
             // A proxy that is held back does not follow the HIP.
             settings: ContactSettings {
-                shortcuts: settings.shortcuts && is_smooth,
+                fast_paths: settings.fast_paths && is_smooth,
                 ..settings
             },
             phase: Phase::Unseeded,
@@ -183,7 +183,7 @@ impl Contact {
     /// Share of the force: less than 1 where it fades at the edge of
     /// the surface, or comes in after a wait.
     #[must_use]
-    pub const fn boundary_fade(&self) -> f32 {
+    pub const fn edge_fade(&self) -> f32 {
         match &self.phase {
             Phase::Sweeping(Sweeping { fade, .. })
             | Phase::OnSurface(OnSurface { fade, .. })
@@ -214,14 +214,14 @@ impl Contact {
         self.redirect(window, self.hip, None, &mut Budget::new(0));
     }
 
-    /// How rough the surface is from the next step on. A proxy that was held is judged again.
+    /// Sets the friction from the next step on. A proxy that was held is tested again.
     pub(crate) fn set_friction(&mut self, friction: Friction) {
         if let Some(rough) = &mut self.rough {
             self.at_rest &= !rough.takes(friction);
         } else if !friction.is_none() {
             self.rough = Rough::on(friction);
             // A proxy that is held back does not follow the HIP.
-            self.settings.shortcuts = false;
+            self.settings.fast_paths = false;
             self.at_rest = false;
             if let Phase::OnSurface(on) = &mut self.phase
                 && let Some(follow) = on.follow.take()
@@ -267,30 +267,30 @@ impl Contact {
             self.output.work = 0;
             return &self.output;
         }
-        match self.take_shortcut(window, hip) {
-            Shortcut::Taken => self.hip = *hip,
-            Shortcut::Known(place) => self.step_in_full(window, *hip, Some(place)),
-            Shortcut::None => self.step_in_full(window, *hip, None),
+        match self.take_fast_path(window, hip) {
+            FastPath::Taken => self.hip = *hip,
+            FastPath::Known(place) => self.step_in_full(window, *hip, Some(place)),
+            FastPath::None => self.step_in_full(window, *hip, None),
         }
         &self.output
     }
 
     /// Answers as [`Self::step_in_full`] would, or changes nothing.
     #[inline]
-    fn take_shortcut<const D: usize>(
+    fn take_fast_path<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: &GridPoint,
-    ) -> Shortcut {
+    ) -> FastPath {
         match &mut self.phase {
-            Phase::Free if self.at_rest && self.settings.shortcuts => {
-                let is_free = shortcut::is_free(window, &self.hip, hip);
+            Phase::Free if self.at_rest && self.settings.fast_paths => {
+                let is_free = fast_path::is_free(window, &self.hip, hip);
                 if !is_free {
-                    return Shortcut::None;
+                    return FastPath::None;
                 }
                 self.output.proxy = *hip;
                 self.output.work = 0;
-                Shortcut::Taken
+                FastPath::Taken
             }
             Phase::OnSurface(OnSurface {
                 follow: Some(follow),
@@ -299,13 +299,13 @@ impl Contact {
                 Followed::Rests(proxy, displacement) => {
                     self.output.proxy = proxy;
                     self.output.displacement = displacement;
-                    self.output.work = SHORTCUT;
-                    Shortcut::Taken
+                    self.output.work = FAST_PATH;
+                    FastPath::Taken
                 }
-                Followed::InPatch(place) => Shortcut::Known(place),
-                Followed::Not => Shortcut::None,
+                Followed::InPatch(place) => FastPath::Known(place),
+                Followed::Not => FastPath::None,
             },
-            _ => Shortcut::None,
+            _ => FastPath::None,
         }
     }
 
@@ -348,9 +348,8 @@ impl Contact {
     fn ends(&mut self, budget: &Budget) {
         self.output.work = budget.spent();
         self.output.missing_tile = budget.missing();
-        self.at_rest = self.output.converged
-            && self.output.missing_tile.is_none()
-            && self.boundary_fade() == 1.0;
+        self.at_rest =
+            self.output.converged && self.output.missing_tile.is_none() && self.edge_fade() == 1.0;
     }
 
     #[inline]

@@ -19,7 +19,7 @@ pub struct ContactSettings {
     pub friction: Friction,
     /// True if the fast paths are taken: free as before, and sliding within a patch.
     /// Without them every answer has the same bits.
-    pub shortcuts: bool,
+    pub fast_paths: bool,
 }
 
 impl ContactSettings {
@@ -36,7 +36,7 @@ impl ContactSettings {
         work_per_tick: WORK_PER_TICK,
         sticks_below: Self::STICKS_BELOW_MM_S,
         friction: Friction::NONE,
-        shortcuts: true,
+        fast_paths: true,
     };
 
     /// The same on a rough surface.

@@ -47,7 +47,7 @@ impl StraightWay {
         Self { from, way, slope }
     }
 
-    /// Where it meets the borders eastward or westward, and northward or southward.
+    /// Returns where it meets the borders eastward or westward, and northward or southward.
     #[inline]
     pub(super) fn to_borders(&self) -> (f32, f32) {
         let along = |from: f32, way: f32| match way {

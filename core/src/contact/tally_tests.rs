@@ -6,7 +6,7 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
-use super::budget::SHORTCUT;
+use super::budget::FAST_PATH;
 use super::dice::{Dice, wander};
 use super::{Contact, ContactSettings, ContactState};
 use crate::cases::cases;
@@ -70,7 +70,7 @@ fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u3
         let felt = step(&hip);
         let searched = match SEARCHED.get() {
             // The shortcut: one evaluation.
-            [0, _] if felt.state == ContactState::Touching && felt.work == SHORTCUT => [1, 1],
+            [0, _] if felt.state == ContactState::Touching && felt.work == FAST_PATH => [1, 1],
             searched => searched,
         };
         if felt.state == state {

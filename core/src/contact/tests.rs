@@ -176,7 +176,7 @@ fn teleport(seed: u64, ticks: u32, mid: f64, span: f64) -> Vec<[f64; 3]> {
     path
 }
 
-/// Where the segment first goes below the surface, by looking at many points:
+/// Returns the first crossing of the segment with the surface, by looking at many points:
 /// none, or the point before and the point after.
 fn dense_crossing(truth: &Ground64, from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     const POINTS: u32 = cases(2000, 100);
@@ -456,7 +456,7 @@ fn holds_when_the_hip_jumps() {
     }
 }
 
-/// Where a way hardly moves sideways, the look along it knows poorly at which part of
+/// On a path that hardly moves sideways, the look along it knows poorly at which part of
 /// it the field begins; going on from beyond that, it would come from nowhere.
 #[test]
 fn steep_ways_in_over_the_border_cross_nothing() {
@@ -509,7 +509,7 @@ fn straight_down_onto_any_sample_meets_the_surface() {
     }
 }
 
-/// What is felt on a way that often lies on grid lines is felt on the mirrored way over
+/// Forces on a path that often lies on grid lines are those on the mirrored path over
 /// the mirrored field.
 #[test]
 fn a_mirrored_way_along_grid_lines_is_felt_mirrored() {
@@ -563,7 +563,7 @@ const GROUNDS: [TestGround; 7] = [
     (holes, 1.0, 1.5),
 ];
 
-/// What two contacts with other settings answer to the same path, tick by tick, each
+/// Returns the answers of two contacts with other settings to the same path, tick by tick, each
 /// as often as it takes.
 fn side_by_side(
     one: ContactSettings,
@@ -607,7 +607,7 @@ fn bits(output: &ContactOutput) -> (ContactState, GridPoint, [u32; 3]) {
 #[test]
 fn the_shortcuts_change_no_bit() {
     let without = ContactSettings {
-        shortcuts: false,
+        fast_paths: false,
         ..ContactSettings::AT_1_KHZ
     };
     let (mut ticks, mut shorter) = (0, 0);

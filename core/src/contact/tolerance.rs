@@ -16,7 +16,7 @@ pub(super) const DOUBTFUL_STEP: f32 = 1e-3;
 /// Distance from a patch's border within which a place counts as neither inside
 /// nor on it: ten times what the convex patch's closest point may be off.
 pub(super) const BORDER: f32 = 1e-6;
-/// How near to an edge, in multiples of what can be told apart, a place is beside
+/// Distance from an edge, in multiples of the resolution, at which a place is beside
 /// it and the patch beyond is asked, too.
 pub(super) const BESIDE: f32 = 4.0;
 /// A neighbouring patch must offer a way at least this long away from the shared
@@ -42,7 +42,7 @@ pub(super) const NEWTON_ERROR: f32 = 5e-8;
 pub(super) const LEVEL: f32 = 1e-5;
 
 /// Distance from a patch's border within which its neighbours may be asked, for a HIP
-/// that is not far (`boundary_fade::FAR`): `BESIDE` resolutions at 32 cells.
+/// that is not far (`edge_fade::FAR`): `BESIDE` resolutions at 32 cells.
 pub(super) const BESIDE_OF_NEAR_HIP: f32 = 4e-5;
 
 /// Rounding of a height relative to the four it is mixed from, and some more.

@@ -17,12 +17,12 @@ use crate::terrain::Window;
 pub(crate) struct ActiveMaterial {
     /// The one that is wanted.
     index: u8,
-    /// What was felt when it began to be wanted, and which part of the change is done.
+    /// Material when the change began, and the share of the change that is done.
     from: Material,
     done: f32,
     /// The part of a change in a tick.
     step: f32,
-    /// What multiplies the stiffness.
+    /// Factor of the stiffness.
     scale: f32,
     /// The law as it is felt. Its texture is the one whose share is felt.
     law: SurfaceParams,
@@ -66,7 +66,7 @@ impl ActiveMaterial {
         &self.law
     }
 
-    /// What holds the proxy back, from the next tick on.
+    /// Returns the friction from the next tick on.
     pub(crate) const fn friction(&self) -> Friction {
         self.law.friction
     }

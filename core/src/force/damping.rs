@@ -7,7 +7,7 @@ use super::passivity::{MAX_MJ, Moment, Motion, Passivity, Takes};
 use super::{EffectContext, SurfaceParams, clamp_length};
 use crate::scalar::{larger, smaller};
 
-/// What a shaded force may give on the way to an edge, and take beyond it, before it is turned
+/// Energy that a shaded force may give towards an edge, and take beyond it, before it is turned
 /// less, as a part of its size times a cell and the depth. An edge gives a quarter of its bend
 /// times the part of a cell on which the force turns ([`super::shading`]): this much at 23°,
 /// twice as much at 45°, the most.
@@ -158,7 +158,7 @@ impl Damper {
     }
 }
 
-/// What of a vector is beyond a length; nothing of one that is no number.
+/// Returns the part of a vector beyond a length; zero for one that is no number.
 fn beyond(v: Vec3, length: f32) -> Vec3 {
     let share = 1.0 - length / v.length();
     if share > 0.0 { v * share } else { Vec3::ZERO }

@@ -171,7 +171,7 @@ fn damping_is_that_of_the_spring_which_is_let_through() {
     }
 }
 
-/// How a tip taps on a level surface: along a sine, some 3 mm deep.
+/// Taps of a tip on a level surface: along a sine, some 3 mm deep.
 #[derive(Clone, Copy)]
 struct Taps {
     hz: u32,

@@ -4,11 +4,11 @@ use glam::Vec3;
 
 use crate::scalar::larger;
 
-/// How deep a tip is, and how it moves along the force.
+/// Depth of a tip, and its motion along the force.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Depth {
     pub(super) mm: f32,
-    /// How fast the depth becomes less.
+    /// Speed at which the depth decreases.
     pub(super) leaves_mm_s: f32,
 }
 
@@ -21,7 +21,7 @@ impl Depth {
         Self { mm, leaves_mm_s }
     }
 
-    /// What is left of it after a time in which the tip goes on as it does. Beyond the surface
+    /// Returns the rest of it after a time in which the tip moves on as it does. Beyond the surface
     /// there is none.
     pub(super) fn after_mm(&self, seconds: f32) -> f32 {
         larger(self.mm - self.leaves_mm_s * seconds, 0.0)

@@ -2,7 +2,7 @@
 
 use crate::rate::TickRate;
 
-/// What a scene is felt with, besides its law.
+/// Conditions of a scene's effects, besides its surface parameters.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EffectContext {
     pub(crate) cell_mm: f32,

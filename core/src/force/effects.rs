@@ -56,7 +56,7 @@ impl Effects {
         })
     }
 
-    /// What the spring stretches by after a tick of the contact, cells.
+    /// Returns the displacement of the spring after a tick of the contact, cells.
     pub(crate) fn displacement<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -130,7 +130,7 @@ impl Effects {
         self.material.as_ref().map_or(of_scene, ActiveMaterial::law)
     }
 
-    /// What holds the proxy back from the next tick on, in a scene with materials.
+    /// Returns the friction from the next tick on, in a scene with materials.
     pub(crate) fn friction(&self) -> Option<Friction> {
         self.material.as_ref().map(ActiveMaterial::friction)
     }

@@ -7,12 +7,12 @@ mod effect_context;
 mod effects;
 mod material;
 mod passivity;
+mod rate_limit_softening;
 mod relief;
 mod shading;
 mod slopes;
 mod texture;
 mod texturer;
-mod yielding;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -14,7 +14,7 @@
 use glam::Vec3;
 
 use super::depth::Depth;
-use super::yielding::RateLimitSoftening;
+use super::rate_limit_softening::RateLimitSoftening;
 use super::{EffectContext, Spring, SurfaceParams};
 use crate::scalar::{larger, smaller};
 
@@ -39,7 +39,7 @@ pub(super) struct Passivity {
     /// From the beginning of a tick until its force acts, s: so many ticks, and a part of one.
     latency_s: f32,
     late: (usize, f32),
-    yielding: RateLimitSoftening,
+    rate_limit_softening: RateLimitSoftening,
     created_mj: f32,
     /// The same when this tick's force has acted for a tick, all but the work of that force, for
     /// a force before the guard's share.
@@ -131,7 +131,7 @@ impl Passivity {
             tick_s,
             latency_s,
             late: (whole, late - whole as f32),
-            yielding: RateLimitSoftening::NONE,
+            rate_limit_softening: RateLimitSoftening::NONE,
             created_mj: 0.0,
             coming_mj: 0.0,
             stiffness_n_per_mm: 0.0,
@@ -142,7 +142,7 @@ impl Passivity {
 
     /// The share of the spring's force that is felt.
     pub(super) const fn share(&self) -> f32 {
-        self.yielding.share()
+        self.rate_limit_softening.share()
     }
 
     pub(super) const fn created_mj(&self) -> f32 {
@@ -151,7 +151,7 @@ impl Passivity {
 
     pub(super) const fn rest(&mut self) {
         (self.created_mj, self.coming_mj, self.before) = (0.0, 0.0, None);
-        (self.yielding, self.asked) = (RateLimitSoftening::NONE, Asked::NONE);
+        (self.rate_limit_softening, self.asked) = (RateLimitSoftening::NONE, Asked::NONE);
     }
 
     /// Books what happened since the tick before, and what is going to happen until this tick's
@@ -174,11 +174,12 @@ impl Passivity {
             stiffness_n_per_mm: ramp * stiffness_n_per_mm,
             max_force_n: ramp * max_force_n,
         };
-        self.yielding.observe(&ramped, &depth, self.tick_s);
+        self.rate_limit_softening
+            .observe(&ramped, &depth, self.tick_s);
         self.asked.add(now.asked_n);
         let (whole, part) = self.late;
         let (acting_n, before_n) = (self.asked.ago(whole), self.asked.ago(whole + 1));
-        let softening = self.yielding.share();
+        let softening = self.rate_limit_softening.share();
         let spring = Spring {
             stiffness_n_per_mm: softening * stiffness_n_per_mm,
             max_force_n,
@@ -233,7 +234,7 @@ impl Passivity {
     }
 }
 
-/// How the tip moves while a force acts.
+/// Motion of the tip while a force acts.
 pub(super) struct Motion {
     /// The force times the velocity, mJ/s.
     pub(super) along: f32,
@@ -249,7 +250,7 @@ pub(super) struct Takes {
     pub(super) across: f32,
 }
 
-/// What is kept of an energy, mJ: what is no number counts as none.
+/// Returns an energy within its bounds, mJ: one that is no number counts as none.
 fn within(mj: f32) -> f32 {
     smaller(larger(mj, 0.0), MAX_MJ)
 }

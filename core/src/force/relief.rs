@@ -22,7 +22,7 @@ pub(super) struct Relief {
     is_grain: bool,
 }
 
-/// How high a relief is at a place, and its slopes eastward and northward a cell.
+/// Height of a relief at a place, and its slopes eastward and northward a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rise {
     pub(super) height: f32,

@@ -9,12 +9,12 @@ use crate::grid::{Cell, GridPoint};
 use crate::terrain::testing::{Field, buffers};
 use crate::terrain::{FieldSize, TileKey};
 
-/// How deep the HIP is below the surface, cells: the proxy is all but over it.
+/// Depth of the HIP below the surface, cells: the proxy is all but over it.
 const DEPTH: f64 = 0.01;
 /// From one HIP to the next, cells.
 const STEP: f64 = 0.01;
 
-/// What a HIP felt: where the proxy was, without shading and with it.
+/// Answer to a HIP: the proxy, and the force without shading and with it.
 struct ShadedTick {
     proxy: GridPoint,
     plain: Vec3,
@@ -46,7 +46,7 @@ fn hip_over(height: Height, [x, y]: [f64; 2], above: f64) -> GridPoint {
     GridPoint::new([cell[0], cell[1], z.floor() as i32], Vec3::new(u, v, w))
 }
 
-/// What is felt along a way, after a landing at its first place.
+/// Returns the answers along a path, after contact onset at its first place.
 fn felt_along<const D: usize>(
     field: &Field<'_, D>,
     height: Height,
@@ -226,7 +226,7 @@ fn a_cliff_stays_a_cliff() {
     }
 }
 
-/// How far from a cliff its bend may be felt, cells.
+/// Distance from a cliff at which its bend may be rendered, cells.
 const NARROW_AT_MOST: f32 = 0.2;
 
 #[test]

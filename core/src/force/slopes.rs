@@ -24,7 +24,7 @@ const NARROW: f32 = 0.2;
 /// Slopes eastward and northward: ∂z/∂x and ∂z/∂y.
 pub(crate) type Slopes = [f32; 2];
 
-/// How the surface slopes at one of its points.
+/// Slopes of the surface at one of its points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SlopesAt {
     /// Least and largest slope eastward of the patches that meet there.

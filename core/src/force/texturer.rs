@@ -21,7 +21,7 @@ const GONE: f32 = 0.25;
 const DEEPEST: f32 = 1.0 / 48.0;
 /// Speed of a proxy that was elsewhere before, or nowhere, wavelengths a tick.
 const JUMP: f32 = 1.0;
-/// How fast the speed falls, 1/s: encoders tell a slow hand's speed in jumps.
+/// Decay of the speed, 1/s: encoders report a slow hand's speed in jumps.
 const FORGETS_PER_S: f32 = 100.0;
 
 /// The texture of one scene at one rate.
@@ -33,7 +33,7 @@ pub struct Texturer {
     /// Cells.
     deepest: f32,
     waves_per_cell: f32,
-    /// What a tick leaves of the speed that was above.
+    /// Share of a higher speed that a tick keeps.
     keeps: f32,
     /// The proxy's speed, wavelengths a tick.
     speed: f32,

@@ -30,7 +30,7 @@ pub struct Decision {
     pub refused: Blockers,
 }
 
-/// Where arming stands, and since when.
+/// State of arming, and its time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Arming {
     pub(super) mode: Mode,
@@ -187,7 +187,7 @@ impl Arming {
         }
     }
 
-    /// What the user and the host still have to do.
+    /// Returns the blockers that the user and the host can clear.
     pub(super) fn user_blockers(&self, dead_man: bool) -> Blockers {
         let host = match self.mode {
             Mode::Disarmed => Blockers::HOST_DISARMED,

@@ -48,7 +48,7 @@ pub(super) struct Feedback {
     before_a: Vec3,
     /// True if currents were measured in the last tick with the amplifiers off, or since.
     is_measured: bool,
-    /// What was measured in this tick, A, without its sign; zero where nothing was.
+    /// Currents measured in this tick, A, without their signs; zero where nothing was measured.
     measured_a: Vec3,
     /// Measured less commanded, averaged, A.
     error_a: Vec3,

@@ -9,7 +9,7 @@ use crate::rate::TickRate;
 /// Longest time for which outputs are held, s.
 pub const HOLD_S: u32 = 60;
 
-/// What the outputs are held at.
+/// Held outputs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hold {
     ticks_a_second: u32,

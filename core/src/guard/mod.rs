@@ -170,7 +170,7 @@ pub struct Guard {
     /// Most counts and newtons from one tick to the next.
     max_counts: u32,
     max_slew_n: f32,
-    /// Where joints may be, with [`LIMIT_MARGIN_RAD`].
+    /// Stops of the joints, with [`LIMIT_MARGIN_RAD`].
     stops: JointLimits,
     arming: Arming,
     fault: Option<Fault>,

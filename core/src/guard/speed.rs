@@ -32,7 +32,7 @@ pub(super) struct SpeedMonitor {
     pub(super) share: f32,
 }
 
-/// What a tick's check of the speed found.
+/// Result of a tick's check of the speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SpeedCheck {
     /// Between two readings.
@@ -107,7 +107,7 @@ impl SpeedMonitor {
         }
     }
 
-    /// How fast the tip is, device frame, mm/s.
+    /// Returns the tip's velocity, device frame, mm/s.
     pub(super) fn velocity_mm_s(&self, mechanism: &Kinematics, pose: &Pose) -> Vec3 {
         let counts = self.readings.velocity();
         pose.tip_velocity_mm_s(counts * self.hz * mechanism.radians_per_count())

@@ -25,9 +25,9 @@ const BAND: u32 = 1;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StallDetector {
     all_still: u32,
-    /// How far each joint is from where it began to stand.
+    /// Distance of each joint from where it began to stand.
     off: [i32; 3],
-    /// How far the other joints have travelled since.
+    /// Travel of the other joints since.
     others: [u32; 3],
 }
 

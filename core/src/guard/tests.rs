@@ -300,7 +300,7 @@ fn every_change_of_mode_is_one_that_the_mode_lists() {
     assert_eq!(seen.len(), listed, "ways that are listed and never taken");
 }
 
-/// What goes wrong while armed, and the fault it must latch within the tick.
+/// Failures while armed, and the faults that they must latch within the tick.
 #[test]
 fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
     type Case = (fn(&mut Bench), Fault);

@@ -96,9 +96,9 @@ pub struct Motors {
     /// Ticks between two steps of the temperatures.
     step_ticks: u32,
     thermal: Thermal,
-    /// What each axis may be given while it is cool, A.
+    /// Largest current of each axis while it is cool, A.
     pub(super) peak_a: Vec3,
-    /// What each axis may be given for ever, A.
+    /// Continuous current of each axis, A.
     pub(super) continuous_a: Vec3,
     at: Temperatures,
     /// Σ I² since the last step, A², and of how many ticks.

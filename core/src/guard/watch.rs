@@ -112,7 +112,7 @@ impl Guard {
         self.blockers = blockers | self.arming.user_blockers(sense.dead_man);
     }
 
-    /// What keeps the arm from being armed, besides what the user has to do.
+    /// Returns the blockers of arming, besides those of the user.
     fn find_blockers(&self, sense: &GuardInputs, around: &Surroundings<'_>) -> Blockers {
         let outside = around.arm.is_some_and(|(_, pose)| {
             let q = pose.angles();

@@ -2,7 +2,7 @@
 //!
 //! Read `calibration` (what is known of an arm), [`Kinematics`] (what follows
 //! from it, worked out outside the tick), [`Pose`] (tip and torques), and
-//! [`Readings`] (velocity). `presets`, `check`, `ceiling` and `record` are about
+//! [`Readings`] (velocity). `presets`, `check`, `absolute_limits` and `record` are about
 //! the calibration itself: records to begin with, checks, what no record can raise, and
 //! bytes in memory.
 //!
@@ -10,8 +10,8 @@
 //! away from the base toward the user, z up. The *terrain frame* is the user's
 //! view: x east (right), y north (away), z up. They differ by a quarter turn.
 
+mod absolute_limits;
 mod calibration;
-mod ceiling;
 mod check;
 mod inverse;
 mod kinematics;

@@ -20,7 +20,7 @@ pub const RECORD_BYTES: usize = 256;
 
 const MAGIC: [u8; 4] = *b"HAPC";
 
-/// What is written, before the check sum.
+/// Stored content, before the check sum.
 #[derive(Serialize, Deserialize)]
 struct Record {
     magic: [u8; 4],

@@ -19,7 +19,7 @@ use crate::scalar::{larger, smaller};
 
 /// Longest window: readings before the newest.
 pub const WINDOW: usize = 15;
-/// What two readings can be off by together, counts: half a count each.
+/// Largest error of two readings together, counts: half a count each.
 const NOISE: f32 = 1.0;
 /// Readings kept, a power of two.
 const KEPT: usize = WINDOW + 1;

@@ -78,7 +78,7 @@ impl CoarseTile {
         self.place(first).is_some() && self.place(last).is_some()
     }
 
-    /// Whether it reaches under a cell of the scene's level, and whether under one of its corners
+    /// Returns its reach under a cell of the scene's level, and under one of its corners
     /// at least.
     pub(super) fn reaches(&self, cell: Cell) -> [bool; 2] {
         let span = (TILE_CELLS as i32) << self.shift;
@@ -110,7 +110,7 @@ impl CoarseTile {
         Some([west_south, east_south, west_north, east_north])
     }
 
-    /// How far in its coarse cell a cell begins and ends, from 0 to 1.
+    /// Returns the begin and the end of a cell in its coarse cell, from 0 to 1.
     fn shares(&self, off: i32) -> [f32; 2] {
         let rest = off & (self.spacing() - 1);
         let per_cell = 1.0 / self.spacing() as f32;

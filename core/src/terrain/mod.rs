@@ -5,11 +5,11 @@ mod extent;
 mod index;
 mod max_pyramid;
 pub mod packed;
-mod settling;
 mod storage;
 #[cfg(test)]
 pub(crate) mod testing;
 mod tile;
+mod tile_blend;
 mod tile_requests;
 mod underlay;
 mod window;
@@ -17,9 +17,9 @@ mod window;
 pub use coarse_tile::CoarseTile;
 pub use extent::{CellBox, FieldSize};
 pub use index::{TILE_CELLS, TILE_SAMPLES, TILE_SHIFT, TileIndex, TileKey};
-pub use settling::SETTLING_MM_S;
 pub use storage::{FieldError, TileArena};
 pub use tile::{MAX_STEP_CELLS, Tile, TileError};
+pub use tile_blend::SETTLING_MM_S;
 pub use tile_requests::{
     HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, RETRY_TICKS, RequestHint, TileRequester,
 };

@@ -22,7 +22,7 @@ pub const MARGIN_CELLS: i32 = 12;
 pub const RETRY_TICKS: u32 = 250;
 /// Tiles asked for and not yet received, at most.
 pub const IN_FLIGHT: usize = 4;
-/// What an answer counts beside those before it, where it is told how soon answers come.
+/// Weight of an answer beside those before it, in the mean time of answers.
 const ANSWER_SHARE: f32 = 0.125;
 /// Places along the predicted path around which tiles are wanted.
 const LOOK_AHEAD: i32 = 8;

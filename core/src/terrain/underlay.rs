@@ -49,7 +49,7 @@ impl Underlay {
 
 /// The underlay of a window: where it lies, and the tiles of it that have come.
 pub(super) struct Laid<'t> {
-    /// Where it lies, if the scene has one.
+    /// Its place, if the scene has one.
     place: Option<Underlay>,
     /// The tiles, once they have come; or their buffers.
     tiles: [Option<&'t mut Tile>; PARTS],
@@ -83,7 +83,7 @@ impl<'t> Laid<'t> {
         })
     }
 
-    /// Where in it a tile of this name belongs, in a scene of this level.
+    /// Returns the place in it of a tile of this name, in a scene of this level.
     pub(super) fn part(&self, key: Option<TileKey>, level: u8) -> Option<usize> {
         let keys = self.place?.keys(level);
         key.and_then(|_| keys.into_iter().position(|part| part == key))

@@ -5,8 +5,8 @@ mod unsettled;
 use super::extent::{CellBox, FieldSize};
 use super::index::{BLOCK_SHIFT, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
-use super::settling::TileBlend;
 use super::tile::Tile;
+use super::tile_blend::TileBlend;
 use super::underlay::Laid;
 use crate::grid::{Altitude, Cell};
 
@@ -87,7 +87,7 @@ pub struct Window<'t, const D: usize> {
     pub(super) slots: [[&'t mut Tile; D]; D],
     pyramid: MaxPyramid<D>,
     pub(super) underlay: Laid<'t>,
-    pub(super) settling: TileBlend<D>,
+    pub(super) tile_blend: TileBlend<D>,
 }
 
 impl<'t, const D: usize> Window<'t, D> {
@@ -110,7 +110,7 @@ impl<'t, const D: usize> Window<'t, D> {
             size,
             top,
             underlay: Laid::NOTHING,
-            settling: TileBlend::NOTHING,
+            tile_blend: TileBlend::NOTHING,
         };
         for key in size.tiles() {
             window.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].become_surface();

@@ -80,7 +80,7 @@ impl<'t> Ground<'t> {
             .extend(self.haptics.accept(Command::Tile(tile)).expect("taken"));
     }
 
-    /// What is felt at a place, where a missing tile comes `late` ticks after it is missed.
+    /// Returns the record at a place, where a missing tile arrives `late` ticks after it is missed.
     fn at(&mut self, [x, y, z]: [f32; 3], late: u32) -> TickRecord {
         let seq = self.seq;
         self.seq += 1;
@@ -277,7 +277,7 @@ fn damping_is_that_of_the_material() {
     }
 }
 
-/// What points feel on the way over a tile's border and one of classes, where tiles come late.
+/// Returns the forces of points over a tile's border and one of classes, where tiles arrive late.
 fn felt(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) {
     let rough = Material {
         friction: Friction::coulomb(0.5),

@@ -9,7 +9,7 @@ use crate::terrain::TileIndex;
 /// Points at one place, until nothing is known any more of how they came there.
 const REST: u32 = 60;
 
-/// What points feel that go by a fifth of a wave a tick over two tiles, the second of which comes
+/// Returns the forces of points that move by a fifth of a wave a tick over two tiles, the second of which arrives
 /// `late` ticks after it is asked for; and how many ticks it took.
 fn felt(late: u32) -> (Vec<Vec3>, u32) {
     let mut tiles = std::vec![Tile::VACANT; 6];

@@ -13,7 +13,7 @@ const GENTLE_N: f32 = 0.0851;
 /// Counts of the axes for a tip some 5 mm in the plane.
 const DEEP: [i32; 3] = [0, -170, 0];
 
-/// What is watched in every tick: the arm stays armed, and the force makes no step.
+/// Watch over every tick: the arm stays armed, and the force makes no step.
 struct Watched<'t> {
     device: Device<'t, 4>,
     last: Outcome,

@@ -155,7 +155,7 @@ mod tests {
         core::array::from_fn(|i| of(i % TILE_SAMPLES, i / TILE_SAMPLES))
     }
 
-    /// What a tile has after it was filled.
+    /// Returns the content of a tile after it was filled.
     fn read(tile: &Tile) -> Vec<u8> {
         let at = |i: usize| {
             let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);

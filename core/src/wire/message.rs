@@ -142,7 +142,7 @@ pub enum ToHost {
     SessionClosed {
         /// The number of the hello that this answers.
         number: u8,
-        /// Why: [`SessionEnd::Replaced`] where another session was opened since,
+        /// Reason: [`SessionEnd::Replaced`] where another session was opened since,
         /// [`SessionEnd::HostSilent`] where none was.
         end: SessionEnd,
     },

@@ -11,7 +11,7 @@ use crate::clutch::ClutchHold;
 use crate::guard::{Blockers, Fault, Jog};
 use crate::phantom::{Calibration, CalibrationError};
 
-/// What a host asks a device to do. New kinds go to the end.
+/// Request of a host to a device. New kinds go to the end.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 // It is made on the stack and taken apart there; there is no heap to box it on.
 #[allow(clippy::large_enum_variant)]
@@ -57,7 +57,7 @@ pub enum Request {
     /// To hold the clutch, or to let it go: while it is held there is no force, and another
     /// view may be put in. It is let go when the session ends.
     Clutch {
-        /// How it is held from now on.
+        /// Its use from now on.
         hold: ClutchHold,
     },
     /// To mark a tick: the board's mark pin is high for

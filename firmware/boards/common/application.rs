@@ -20,10 +20,10 @@ pub(crate) type Loop = HapticLoop<'static, Encoders, Amplifiers, Clock, WINDOW>;
 
 static TILES: ConstStaticCell<TileBuffers<WINDOW>> = ConstStaticCell::new(TileBuffers::VACANT);
 static MEMORY: ConstStaticCell<WorkingMemory<'static>> = ConstStaticCell::new(WorkingMemory::new());
-/// Where the loop lives. Not in the interrupt's own variable: what has a value from the
+/// Memory of the loop. Not in the interrupt's own variable: what has a value from the
 /// start takes flash, too.
 static LOOP: StaticCell<Loop> = StaticCell::new();
-/// Where the link lives. In its task, it would be moved over the stack twice.
+/// Memory of the link. In its task, it would be moved over the stack twice.
 static LINK: StaticCell<Link<'static, WINDOW>> = StaticCell::new();
 /// Carries the loop to its interrupt: filled once, before that is enabled.
 static HANDOVER: Mutex<Cell<Option<&'static mut Loop>>> = Mutex::new(Cell::new(None));

@@ -109,7 +109,7 @@ fn Executor() {
 /// Polls of the link between two measurements of the stack.
 const STACK_POLLS: u32 = 1_000;
 
-/// What the link's task needs from this board.
+/// Board for the link's task.
 struct Emulated {
     monitor: &'static Monitor,
     polls: Cell<u32>,

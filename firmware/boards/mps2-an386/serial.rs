@@ -13,7 +13,7 @@ use embedded_io_async::{ErrorType, Read, Write};
 
 use crate::registers::Uart;
 
-/// What an interrupt handler and the two halves of one port share.
+/// State that an interrupt handler and the two halves of one port share.
 pub(crate) struct Serial {
     uart: fn() -> &'static Uart,
     received: Pipe<CriticalSectionRawMutex, 512>,

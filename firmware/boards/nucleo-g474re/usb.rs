@@ -55,7 +55,7 @@ impl EndpointHalt for EndpointHalts {
     }
 }
 
-/// What has to be written where `found` was read to put one direction's toggle at DATA0
+/// Returns the value to write after `found` was read to put one direction's toggle at DATA0
 /// and change nothing else: of a toggle's bit and of the status, ones invert; of the
 /// flags of completed transfers, zeros clear.
 fn to_data0(found: Epr, is_in: bool) -> Epr {

@@ -30,7 +30,7 @@ const POWER_UP: u16 = 0b1_0111;
 /// 10 to 7 that say of channels D to A that their output is overloaded. Bit 6 has no meaning.
 const RANGE_BITS: u16 = 0b111;
 const POWER_BITS: u16 = 0b111_1011_1111;
-/// What is read in turn: the ranges of A, B and C, the power register, the codes.
+/// Number of registers that are read in turn: the ranges of A, B and C, the power register, the codes.
 const REGISTERS: u8 = 7;
 /// Time that the part may take to power its outputs up, µs: twice what the data sheet asks
 /// for before the first code is written.
@@ -64,7 +64,7 @@ pub struct Ad5754<B> {
     codes: [u16; 3],
     /// The register that is read next, below [`REGISTERS`].
     turn: u8,
-    /// How many read back right in a row, up to [`REGISTERS`].
+    /// Number of right readings in a row, up to [`REGISTERS`].
     right: u8,
 }
 

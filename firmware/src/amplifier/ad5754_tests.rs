@@ -9,7 +9,7 @@ use crate::amplifier::tests::Pin;
 use crate::amplifier::{Off, On};
 use crate::board::{Amplifiers, EnabledAmplifiers};
 
-/// What is at the other end of the wires.
+/// The converter at the other end of the wires.
 #[derive(Default)]
 struct Part {
     /// The frames that were sent.
@@ -17,7 +17,7 @@ struct Part {
     range: [u16; 4],
     power: u16,
     data: [u16; 4],
-    /// What the last frame asked for.
+    /// Register that the last frame requested.
     asked: u16,
     /// Nothing comes back.
     is_silent: bool,

@@ -33,7 +33,7 @@ pub fn duty_code(fraction: f32, max: u16) -> u16 {
 mod tests {
     use super::*;
 
-    /// How wrong an ESCON reads a duty cycle, s.
+    /// Error of an ESCON's reading of a duty cycle, s.
     const ESCON_READS_S: f64 = 5e-6;
 
     #[test]

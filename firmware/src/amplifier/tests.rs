@@ -10,7 +10,7 @@ use embedded_hal::digital;
 
 use super::*;
 
-/// What was written, in order: "on" and "off" for the pin, numbers for duties.
+/// Writes in order: "on" and "off" for the pin, numbers for duties.
 type Log = Rc<RefCell<Vec<String>>>;
 
 /// An enable pin whose level and writes a test sees.

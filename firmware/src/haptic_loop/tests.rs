@@ -197,7 +197,7 @@ fn held_outputs_reach_the_amplifiers_and_leave_them_off() {
     }
 }
 
-/// What the clutch says in each of some ticks in which the input reads like this.
+/// Returns the clutch's state in each of some ticks with this reading of the input.
 fn clutched(haptic_loop: &mut Loop, ends: &mut LinkEnds<'_>, ticks: u32, reads: bool) -> Limits {
     for _ in 0..ticks {
         haptic_loop.encoders_mut().0.clutch = reads;

@@ -16,7 +16,7 @@ use super::session::Session;
 use crate::board::TickClock;
 use crate::press::PressWait;
 
-/// Where storing a calibration stands.
+/// Progress of storing a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Storing {
     No,
@@ -26,11 +26,11 @@ enum Storing {
     Wanted,
 }
 
-/// What the board knows of its arm when it starts.
+/// Knowledge of the arm at the board's start.
 pub(crate) struct KnownArm {
     /// The calibration in force.
     pub(crate) calibration: Option<Calibration>,
-    /// Where it comes from, or why there is none.
+    /// Its source, or the reason for which there is none.
     pub(crate) source: CalibrationSource,
     /// The current at the ends of the amplifiers' range, A.
     pub(crate) full_scale_a: f32,
@@ -38,7 +38,7 @@ pub(crate) struct KnownArm {
     pub(crate) latency_us: u16,
 }
 
-/// What the link knows of the device.
+/// The link's knowledge of the device.
 pub(crate) struct DeviceState {
     hello: DeviceHello,
     pub(super) boot: BootReport,
@@ -58,7 +58,7 @@ pub(crate) struct DeviceState {
     pub(super) arming: Option<u8>,
     /// Number of the latest mark.
     mark: u8,
-    /// What the host last asked for.
+    /// The host's latest request.
     pub(super) request: LatestRequest,
     /// The calibration waits for the board to store it.
     storing: Storing,
@@ -258,7 +258,7 @@ impl DeviceState {
         self.request.stored(result);
     }
 
-    /// What the host should be told next, once.
+    /// Returns the next message to the host, once.
     pub(super) fn next_message(&mut self) -> Option<ToHost> {
         self.look_at_decision();
         let answer = self.request.take_answer();

@@ -6,7 +6,7 @@ use hapterra_core::wire::request::Refusal;
 use super::Link;
 use super::commands::CommandRoom;
 
-/// Where the way into the loader stands.
+/// Progress towards the loader.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum LoaderEntry {
     /// The board has no loader.

@@ -8,7 +8,7 @@ use hapterra_core::wire::materials::{MaterialScene, TileMaterials};
 use super::Link;
 use super::commands::CommandRoom;
 
-/// What is remembered of a table that the loop was given.
+/// Memory of a table that the loop has.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KnownTable {
     sum: u32,

@@ -81,7 +81,7 @@ impl Buffers {
     }
 }
 
-/// Where the points of a replay stand.
+/// Progress of a replay's points.
 #[derive(Clone, Copy, Debug, Default)]
 struct ReplayProgress {
     /// The number of the point that the loop is rendering.
@@ -102,7 +102,7 @@ pub struct Link<'t, const D: usize> {
     looker: Option<SessionNumber>,
     /// The loop had taken every command when its reports were last read.
     commands_taken: bool,
-    /// What is known of arming, calibration and status.
+    /// Knowledge of arming, calibration and status.
     device: DeviceState,
     /// The way into the loader in the chip's ROM.
     loader: LoaderEntry,

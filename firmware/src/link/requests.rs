@@ -11,7 +11,7 @@ use super::Link;
 use super::commands::CommandRoom;
 use crate::queues::Marked;
 
-/// How far a request has come.
+/// Progress of a request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Progress {
     /// The loop decides about arming.
@@ -61,7 +61,7 @@ impl LatestRequest {
         self.latest = Some((number, progress));
     }
 
-    /// What was under way has come to its end; nothing where the latest request is
+    /// Records the end of what was under way; nothing where the latest request is
     /// another.
     fn ended(&mut self, was: Progress, result: Result<(), Refusal>) {
         if let Some((number, progress)) = self.latest.filter(|(_, progress)| *progress == was) {

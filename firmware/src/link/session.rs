@@ -14,7 +14,7 @@ const KNOWN: usize = 8;
 /// for so long, ms, is not there to see what the press does.
 const ABSENT_MS: u32 = 2_000;
 
-/// Where the conversation with a host stands. [`Session`] alone goes from one to another:
+/// State of the conversation with a host. [`Session`] alone changes it:
 ///
 /// | from | to | by |
 /// | --- | --- | --- |

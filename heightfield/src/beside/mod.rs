@@ -22,7 +22,7 @@ pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
 /// No neighbour that is text is longer; what is longer is something else.
 const MAX_TEXT: u64 = 1 << 20;
 
-/// How GDAL's notes begin.
+/// First bytes of GDAL's metadata files.
 const NOTES: &[u8] = b"<PAMDataset";
 
 /// Extensions of all neighbours that a format may ask for: [`find`] finds no others, so

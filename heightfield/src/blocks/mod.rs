@@ -122,7 +122,7 @@ impl Blocks {
         }
     }
 
-    /// Where coarse samples are kept, before anything is read.
+    /// Sets the folder of coarse samples, before anything is read.
     pub(super) fn set_disk_cache(&mut self, disk: &DiskCache) {
         if let Some(shared) = Arc::get_mut(&mut self.shared) {
             shared.disk = disk.clone();

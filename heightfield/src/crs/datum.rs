@@ -83,7 +83,7 @@ impl Datum {
         self.globe
     }
 
-    /// Where longitudes begin, degrees east of Greenwich.
+    /// Returns the prime meridian, degrees east of Greenwich.
     pub(super) const fn meridian(&self) -> f64 {
         self.meridian
     }

@@ -75,7 +75,7 @@ fn newer(code: u16) -> Option<ReferenceSystem> {
     Some(system.with_code(code).with_projection(projection))
 }
 
-/// What stands behind a code in a table.
+/// Returns the row of a code in a table.
 fn row<const N: usize>(table: &'static str, code: u16) -> Option<[&'static str; N]> {
     let code = code.to_string();
     let mut rows = table.lines().map(|line| line.split('|'));

@@ -18,10 +18,10 @@ pub(super) enum Shift {
     },
 }
 
-/// How far the datum of a modern system that counts as WGS 84 may be off, m: as far as
+/// Largest error of the datum of a modern system that counts as WGS 84, m: as far as
 /// plates have moved since.
 const SAME_WITHIN_M: f64 = 4.0;
-/// How far off nine of ten shifts by three and by seven parameters are at most, m, by
+/// Largest error of nine of ten shifts by three and by seven parameters, m, by
 /// `tests/data/shift_errors.py`.
 const THREE_WITHIN_M: f64 = 45.0;
 const SEVEN_WITHIN_M: f64 = 10.0;

@@ -15,7 +15,7 @@ const SENSIBLE: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
 /// Units that differ by less than this are one.
 const SAME_UNIT: f64 = 1e-9;
 
-/// How far from a place its scale is asked for, m: a projection's formulas end their
+/// Distance from a place at which its scale is computed, m: a projection's formulas end their
 /// rounds at 1e-10 rad, and its scale changes over kilometres.
 const STEP_M: f64 = 100.0;
 
@@ -117,7 +117,7 @@ impl ReferenceSystem {
         self
     }
 
-    /// What is said where coordinates are in another unit than the system's own.
+    /// Returns a remark where coordinates are in another unit than the system's own.
     pub(crate) fn other_unit(&self) -> Option<String> {
         let Unit::Length(Some(metres)) = self.unit else {
             return None;
@@ -238,7 +238,7 @@ impl ReferenceSystem {
         self.datum.as_ref().map_or(0.0, Datum::meridian)
     }
 
-    /// Where a unit of a projected system's x and y lead on the ground at a place in its
+    /// Returns the vectors on the ground of a unit of a projected system's x and y at a place in its
     /// units: a map's scale and its angles are true in few places. Its formulas are asked
     /// [`STEP_M`] to both sides.
     pub(crate) fn tangents(&self, (x, y): (f64, f64)) -> Option<Tangents> {

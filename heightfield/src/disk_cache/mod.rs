@@ -55,9 +55,9 @@ struct Folder {
     most_bytes: u64,
     /// Bytes that files without a name may take.
     unnamed: AtomicU64,
-    /// How much it holds; `None` once it could not be written.
+    /// Size of its content; `None` once it could not be written.
     room: Mutex<Option<Room>>,
-    /// Whether it was said that it is not used.
+    /// Set once a message has said that it is not used.
     warned: OnceLock<()>,
 }
 
@@ -102,7 +102,7 @@ impl DiskCache {
         self.0.is_some()
     }
 
-    /// What a record holds; `None` where there is none, or none that is whole.
+    /// Returns the content of a record; `None` where there is none, or none that is complete.
     pub(crate) fn get(&self, name: &Name) -> Option<Vec<u8>> {
         let folder = self.0.as_ref()?;
         let path = folder.path.join(name.path());

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use twox_hash::XxHash64;
 
-/// What a record is about, as a hash of 128 bits: nothing of a URL or path is to be seen in
+/// Name of a record, as a hash of 128 bits: nothing of a URL or path is to be seen in
 /// the folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Name([u64; 2]);

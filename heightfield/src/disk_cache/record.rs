@@ -24,7 +24,7 @@ pub(super) fn made(name: &Name, bytes: &[u8]) -> Vec<u8> {
     [BEGINS, &name.bytes()[..], &length, &sum, bytes].concat()
 }
 
-/// What a record of that name holds; `None` where it is another or is not whole.
+/// Returns the content of a record of that name; `None` where it is another or is not complete.
 pub(super) fn held(name: &Name, mut record: Vec<u8>) -> Option<Vec<u8>> {
     let head = record.get(..HEAD)?;
     let length = (record.len() - HEAD) as u64;

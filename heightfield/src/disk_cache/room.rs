@@ -6,15 +6,15 @@ use std::time::{Duration, SystemTime};
 
 /// A disk gives room in pieces of this size, bytes.
 const PIECE: u64 = 4096;
-/// How the name of a record begins that is not complete yet.
+/// Beginning of the name of an incomplete record.
 pub(super) const UNFINISHED: &str = ".new-";
 /// Nobody takes longer to write one: then its program was killed.
 const LEFT_BEHIND: Duration = Duration::from_secs(3600);
 
-/// What is known of a folder's room.
+/// Knowledge of a folder's size.
 pub(super) struct Room {
     most_bytes: u64,
-    /// What all records took when it was looked at, and what was written since; `None`
+    /// Size of all records at the last look, and of the writes since; `None`
     /// before the first look.
     used: Option<u64>,
     written: u64,

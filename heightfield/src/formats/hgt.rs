@@ -22,7 +22,7 @@ pub(super) const FORMAT: Format = Format {
     decode,
 };
 
-/// What SRTM writes where there is no height.
+/// SRTM's value for no height.
 const VOID: f64 = -32768.0;
 
 /// A tile covers one degree by one degree and shares its borders with the next.

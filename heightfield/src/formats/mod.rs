@@ -32,7 +32,7 @@ fn is_read_here(head: &[u8]) -> bool {
 /// Extensions of files that GDAL reads and that hold heights more often than not.
 const BY_GDAL: [&str; 9] = ["bag", "dem", "dt0", "dt1", "dt2", "grd", "img", "jp2", "nc"];
 
-/// What the extension of a file in a folder or archive says, the strongest claim of any format.
+/// Returns the strongest claim of any format on the extension of a file in a folder or archive.
 pub(super) fn claim_of(name: &str) -> Option<Claim> {
     let extension = name.rsplit_once('.')?.1.to_lowercase();
     let claims = FORMATS.iter().filter_map(|format| format.claim(&extension));

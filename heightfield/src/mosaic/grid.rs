@@ -14,7 +14,7 @@ const LARGEST: f64 = 2_147_483_647.0;
 /// The grid of the first file.
 pub(super) struct Grid {
     path: PathBuf,
-    /// What that file's header says.
+    /// Header of that file.
     pub(super) first: Decoded,
     /// Its south-west corner.
     corner: [f64; 2],

@@ -24,7 +24,7 @@ struct Tile {
     is_south_up: bool,
 }
 
-/// What is known of all files.
+/// Knowledge of all files.
 struct Index {
     grid: Grid,
     tiles: Vec<Tile>,
@@ -157,7 +157,7 @@ impl Index {
     }
 }
 
-/// What the header of a file says, which is to be small enough to be opened later.
+/// Reads the header of a file, which is to be small enough to be opened later.
 fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let outline = tile_file::outline(path, options)?;
     whole_bytes(&outline)?;

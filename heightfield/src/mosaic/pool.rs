@@ -18,9 +18,9 @@ use crate::remote::{is_url, without_key};
 
 /// No more files are open at once: each may have a mask and overviews beside it.
 const MAX_OPEN: usize = 32;
-/// What open files keep in memory, bytes; the one touched last may take more alone.
+/// Largest size of open files in memory, bytes; the one touched last may take more alone.
 const MAX_BYTES: usize = 64 << 20;
-/// What blocks of one file take of that, bytes.
+/// Share of one file's blocks of that, bytes.
 const SHARE_BYTES: usize = 16 << 20;
 /// A file that has no blocks is held as a whole, and has to fit, bytes.
 const MAX_WHOLE_BYTES: u64 = 64 << 20;
@@ -148,7 +148,7 @@ impl Pool {
     }
 }
 
-/// How files among others are opened: those that can be are read in blocks.
+/// Returns the options for files among others: those that can be are read in blocks.
 pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
     OpenOptions {
         most_in_memory_bytes: 0,

@@ -28,7 +28,7 @@ pub(super) struct Mosaic {
     images: Vec<BlockImage>,
     sample: SampleType,
     pool: Mutex<Pool>,
-    /// What the user says of the files that changes their samples.
+    /// Options of the user that change the files' samples.
     options: String,
 }
 

@@ -11,7 +11,7 @@ pub(super) fn decode(path: &Path, options: &OpenOptions) -> Result<Decoded, Rast
     one_file::decode(&FileBytes::open(path, &options.elsewhere)?, options)
 }
 
-/// What the header of one file of many says. A format that has no short way there
+/// Reads the header of one file of many. A format that has no short way there
 /// decodes the whole file.
 pub(super) fn outline(path: &Path, options: &OpenOptions) -> Result<Decoded, RasterError> {
     let input = FileBytes::open(path, &options.elsewhere)?;

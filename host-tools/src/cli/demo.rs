@@ -53,7 +53,7 @@ pub struct Args {
     #[command(flatten)]
     pub reading: ReadingOptions,
 
-    /// Where the loop runs: native, emulated or emulated:ELF
+    /// Device of the loop: native, emulated or emulated:ELF
     ///
     /// emulated: the Cortex-M4F board in QEMU, with the image ELF, else that of HAPTERRA_MPS2_ELF.
     /// [default: emulated if that variable names an image, else native]

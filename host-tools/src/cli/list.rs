@@ -12,7 +12,7 @@ use heightfield::shown::shown;
 /// Arguments of `hapterra list`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Where else to look for an emulated board's link
+    /// Further address of an emulated board's link
     #[arg(long = "tcp", value_name = "HOST:PORT", value_parser = tcp_address)]
     pub addresses: Vec<String>,
 }

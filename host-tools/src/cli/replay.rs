@@ -59,7 +59,7 @@ pub struct Args {
     #[arg(short, long, value_hint = ValueHint::FilePath)]
     pub out: PathBuf,
 
-    /// Where the loop runs: native, emulated or emulated:ELF
+    /// Device of the loop: native, emulated or emulated:ELF
     ///
     /// emulated: the Cortex-M4F board in QEMU, with the image ELF, else that of HAPTERRA_MPS2_ELF.
     #[arg(long, default_value = "native")]

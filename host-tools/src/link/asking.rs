@@ -8,7 +8,7 @@ use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::request::Request;
 
 use super::ask::Ask;
-use super::patience::Timeouts;
+use super::timeouts::Timeouts;
 
 /// What is under way.
 #[derive(Clone, Copy, Debug)]

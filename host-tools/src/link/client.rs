@@ -19,9 +19,9 @@ use super::ahead::{self, Ahead};
 use super::ask::Ask;
 use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
+use super::link_stats::LinkStats;
 use super::messages::{FromDevice, from_device, next_frame};
-use super::patience::Timeouts;
-use super::tally::LinkStats;
+use super::timeouts::Timeouts;
 use crate::materials::{MaterialBuffer, Materials};
 use crate::terrain::{Terrain, TileBuffer};
 

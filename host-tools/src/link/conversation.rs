@@ -16,7 +16,7 @@ use super::ask::Ask;
 use super::asking::Asking;
 use super::error::LinkError;
 use super::messages::append;
-use super::patience::Timeouts;
+use super::timeouts::Timeouts;
 
 /// State of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -17,7 +17,7 @@ use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
 use super::line::{LOOK, Line};
 use super::messages::{FromDevice, from_device, next_frame};
-use super::patience::Timeouts;
+use super::timeouts::Timeouts;
 use super::transport::Transport;
 
 /// In this time a device tells where it stands at least once.

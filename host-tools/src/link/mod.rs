@@ -30,13 +30,13 @@ mod dialogue;
 mod emulator;
 mod error;
 mod line;
+mod link_stats;
 mod messages;
 mod native;
-mod patience;
 mod plant_line;
 mod session;
-mod tally;
 mod tcp;
+mod timeouts;
 mod transport;
 mod usb;
 
@@ -54,12 +54,12 @@ pub use emulator::{
     QEMU_VARIABLE,
 };
 pub use error::LinkError;
+pub use link_stats::LinkStats;
 pub use native::{FaultInjector, HostClock, Native};
-pub use patience::Timeouts;
 pub use plant_line::{move_arm_while, serve_plant};
 pub use session::Session;
-pub use tally::LinkStats;
 pub use tcp::Tcp;
+pub use timeouts::Timeouts;
 pub use transport::Transport;
 pub use usb::{SystemPipes, Usb};
 pub(crate) use usb::{is_board, place_on_usb, usb_devices};

@@ -11,8 +11,8 @@ use super::client::{Arming, Client, Event};
 use super::conversation::State;
 use super::error::LinkError;
 use super::line::{LOOK, Line};
-use super::patience::Timeouts;
-use super::tally::LinkStats;
+use super::link_stats::LinkStats;
+use super::timeouts::Timeouts;
 use super::transport::Transport;
 use crate::terrain::Terrain;
 

@@ -1,7 +1,7 @@
 //! Invariants from one tick to the next.
 
 use hapterra_core::contact::ContactState;
-use hapterra_core::contact::boundary_fade::RATE;
+use hapterra_core::contact::edge_fade::RATE;
 
 use super::judge::{Judge, Verdict};
 use super::seen::Seen;
@@ -36,7 +36,7 @@ impl Judge<'_> {
             return Ok(()); // a new contact may come at once
         }
         let rate = f64::from(RATE) + 1e-3;
-        let broken = match (before.boundary_fade(), seen.boundary_fade()) {
+        let broken = match (before.edge_fade(), seen.edge_fade()) {
             (Some(was), Some(is)) => hopped < 2.0 * NEAR && (is - was).abs() > rate,
             // Let go: there was next to nothing left.
             (Some(was), None) => seen.felt.state == ContactState::Unseeded && was > rate,
@@ -45,8 +45,8 @@ impl Judge<'_> {
         if broken {
             let detail = format!(
                 "{:?} to {:?}: {before:?} then {seen:?}",
-                before.boundary_fade(),
-                seen.boundary_fade()
+                before.edge_fade(),
+                seen.edge_fade()
             );
             return self.fail(Invariant::Fade, detail);
         }

@@ -82,7 +82,7 @@ impl Seen {
     }
 
     /// What part of the spring is felt; `None` where it is too short to tell.
-    pub(super) fn boundary_fade(&self) -> Option<f64> {
+    pub(super) fn edge_fade(&self) -> Option<f64> {
         let whole = distance(self.proxy, self.hip);
         let felt = self.felt.displacement.as_dvec3().length();
         (self.is_touching() && whole > SHORT).then(|| felt / whole)

@@ -49,7 +49,7 @@ pub struct Scene {
     /// Materials of its ground, in a scene that is replayed on materials besides.
     pub materials: Option<Materials>,
     /// True if the contact takes its shortcuts.
-    pub shortcuts: bool,
+    pub fast_paths: bool,
     /// Units of work of a tick: what it has at 1 kHz, or at 10 kHz.
     pub(super) work_per_tick: u32,
     /// Which of the twins are run beside it.
@@ -181,7 +181,7 @@ impl Scene {
             shading: [Shading::None, Shading::Smooth][(number / 2 % 2) as usize],
             texture: texture(mixed),
             materials,
-            shortcuts: true,
+            fast_paths: true,
             twins: Twins::One(chance.below(6)),
             // By number, as the path.
             work_per_tick: [WORK_PER_TICK, LEAST_WORK_PER_TICK][(number / 4 % 2) as usize],
@@ -219,7 +219,7 @@ impl Scene {
             shading: Shading::Smooth,
             texture: GRATING,
             materials: None,
-            shortcuts: true,
+            fast_paths: true,
             twins: Twins::All,
             work_per_tick: LEAST_WORK_PER_TICK,
             seed: 1,
@@ -231,7 +231,7 @@ impl Scene {
     pub const fn settings(&self) -> ContactSettings {
         ContactSettings {
             friction: self.friction,
-            shortcuts: self.shortcuts,
+            fast_paths: self.fast_paths,
             work_per_tick: self.work_per_tick,
             ..ContactSettings::AT_1_KHZ
         }

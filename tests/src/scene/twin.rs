@@ -24,7 +24,7 @@ type Compared = Result<bool, Violation>;
 /// Where they differ.
 pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Compared {
     let scene = Scene {
-        shortcuts: false,
+        fast_paths: false,
         ..scene.clone()
     };
     let again = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()))?;

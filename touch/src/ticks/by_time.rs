@@ -19,7 +19,7 @@ pub(super) struct Timed {
     is_felt: bool,
 }
 
-/// What follows on a row.
+/// Continuation after a row.
 enum Next {
     /// A later row.
     Row(Timed),
@@ -176,7 +176,7 @@ where
         Ok(Next::Row(row))
     }
 
-    /// What contradicts the rate of a recording, if anything does.
+    /// Returns the fault that contradicts the rate of a recording, if any.
     fn off_tick(&self, from: f64, to: f64) -> Option<TimeFault> {
         let late = self.due.late(to);
         let is_tick = late >= -ON_TICK && (late - libm::round(late)).abs() <= ON_TICK;

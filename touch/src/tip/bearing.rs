@@ -104,7 +104,7 @@ impl Samples {
     }
 }
 
-/// What of a block bears a ball.
+/// Part of a block that bears a ball.
 pub(super) struct Bearing {
     pub(super) columns: usize,
     /// True if the patch north-east of a sample has four samples.

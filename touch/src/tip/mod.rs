@@ -40,7 +40,7 @@ pub const FINEST_MM: f64 = 1.0 / 64.0;
 /// Heights of the centre are rounded to multiples of this, haptic cells: slopes stay true to a
 /// thousandth, and tiles take half the bytes.
 pub const CENTRE_STEP: f64 = 1.0 / (1 << 10) as f64;
-/// What the ball may rest too low for want of a line, as a part of its radius.
+/// Largest sag of the ball for want of a line, as a part of its radius.
 const SAG: f64 = 5e-3;
 
 /// A radius that no ball over cells of a size has.
@@ -196,7 +196,7 @@ impl Ball {
         Some(height).filter(|height| !height.is_nan())
     }
 
-    /// Where the ball rests on a sample.
+    /// Returns the height of the ball on a sample.
     fn on_samples(
         &self,
         (block, bearing): (&Samples, &Bearing),
@@ -228,7 +228,7 @@ impl Ball {
         }
     }
 
-    /// Where the ball rests within a stretch of a line along an axis.
+    /// Returns the height of the ball within a segment of a line along an axis.
     fn on_lines(
         &self,
         (block, bearing): (&Samples, &Bearing),

@@ -133,7 +133,7 @@ impl Rest {
         self.centres[row * self.side + column]
     }
 
-    /// Where a node is, in cells from the sample at zero.
+    /// Returns the position of a node, in cells from the sample at zero.
     fn place(&self, node: [usize; 2]) -> [f64; 2] {
         node.map(|node| node as f64 / self.parts as f64)
     }

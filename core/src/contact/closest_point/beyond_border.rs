@@ -15,7 +15,7 @@ use crate::contact::tolerance::{
 use crate::scalar::{larger, smaller};
 use crate::terrain::{CellContent, Window};
 
-/// Where downhill goes on from the closest point of a patch.
+/// Continuation of the descent from the closest point of a patch.
 pub(super) enum Onward {
     /// Into a neighbouring patch, as [`Asking::best`] has it.
     Into,
@@ -27,7 +27,7 @@ pub(super) enum Onward {
     Nowhere,
 }
 
-/// What a neighbouring patch has to offer.
+/// Offer of a neighbouring patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Offer {
     /// Place where the way enters the neighbour.
@@ -40,7 +40,7 @@ pub(super) struct Offer {
     noise: f32,
     /// True if it gets less by more than the last places of both points may be off.
     pub(super) is_surely_nearer: bool,
-    /// How far the HIP is that way, cells: of two ways as good as each other
+    /// Distance of the HIP in that direction, cells: of two equal directions
     /// the one toward it is taken, however the scene is turned.
     toward: f32,
     /// Slope of the distance into the neighbour, of half the squared distance,
@@ -80,7 +80,7 @@ pub(super) struct Asking {
     pub(super) best: Option<Offer>,
 }
 
-/// Where the asking begins: the closest point of a patch.
+/// Start of the search: the closest point of a patch.
 pub(super) struct Start<'d> {
     pub(super) at: &'d SurfacePoint,
     pub(super) here: &'d Nearest,
@@ -238,7 +238,7 @@ impl Asking {
     }
 }
 
-/// How steeply the distance falls from a point of a patch's border into the
+/// Returns the steepness of the distance from a point of a patch's border into the
 /// patch: the squared slope of half the squared distance, cells²; 0 where
 /// rounding hides it; `None` where it does not fall. `side` is the way in.
 ///
@@ -287,7 +287,7 @@ fn fall_into(
     }
 }
 
-/// What a neighbour has to offer, whose closest point to a HIP at `hip`, in its
+/// Returns the offer of a neighbour, whose closest point to a HIP at `hip`, in its
 /// coordinates, is this one; `None` if nothing.
 fn offer(next: &Neighbour, hip: (f32, f32), here: &Nearest, closest: Nearest) -> Option<Offer> {
     let Neighbour {
@@ -378,7 +378,7 @@ pub(super) fn to_steepest_patch<const D: usize>(
     }
 }
 
-/// How steeply the distance to a HIP at `(p, q)` falls from a point on a border of a
+/// Returns the steepness of the distance to a HIP at `(p, q)` from a point on a border of a
 /// patch in the patch's own directions: the squared slope of half the squared distance,
 /// cells².
 fn steepness_at(patch: &Patch, (p, q): (f32, f32), at: &SurfacePoint, border: Side) -> f32 {

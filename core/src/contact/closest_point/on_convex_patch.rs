@@ -16,7 +16,7 @@ use crate::contact::tolerance::{CONVEX, LEVEL, NEWTON_ERROR, SHALLOW, STEEPEST_C
 /// Newton steps at most where the first two were not exact enough.
 const STEPS: u32 = 4;
 
-/// What makes a patch one over which Newton's method may be used. It depends on
+/// Conditions for Newton's method on a patch. They depend on
 /// the patch's shape alone, not on its height above the HIP.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Convexity {
@@ -79,7 +79,7 @@ impl Convexity {
         self.twist * (to.z + rise) <= CONVEX
     }
 
-    /// Where the patch, and what it would be beyond its borders, is closest to a shallow
+    /// Returns the closest point of the patch, continued beyond its borders, to a shallow
     /// HIP at `hip`, in patch coordinates, and whether that is exact; `None` if the HIP
     /// is not shallow.
     #[inline]
@@ -138,7 +138,7 @@ impl Convexity {
         }
     }
 
-    /// Where the patch, and what it would be beyond its borders, is closest to the
+    /// Returns the closest point of the patch, continued beyond its borders, to the
     /// HIP, by two steps with one Hessian; and whether the error is within
     /// [`NEWTON_ERROR`].
     #[inline(always)]

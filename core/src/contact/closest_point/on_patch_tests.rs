@@ -52,7 +52,7 @@ fn minimum64(patch: &Patch, hip: (f64, f64), from: f64) -> (f64, f64) {
     (ruling64(patch, hip, high).0, high)
 }
 
-/// How strongly F curves at its minimum: the error of a flat minimum is the
+/// Returns the curvature of F at its minimum: the error of a flat minimum is the
 /// rounding of F′ over this.
 fn conditioning(patch: &Patch, hip: (f64, f64), v: f64) -> f64 {
     let h = 1e-5;

@@ -37,7 +37,7 @@ pub(super) struct Ruling {
     pub(super) at_end: bool,
 }
 
-/// What rounding may make of a ruling.
+/// Rounding noise of a ruling.
 pub(super) struct Noise {
     /// Of F(v), the squared distance from the HIP, cells².
     pub(super) f: f32,
@@ -109,7 +109,7 @@ impl Ruling {
             + (other.z - self.z) * (other.z + self.z)
     }
 
-    /// What rounding makes of it, for a HIP `p` east.
+    /// Returns its rounding noise, for a HIP `p` east.
     ///
     /// A ruling's ends and its slope are mixed from the corners and may cancel; of
     /// a place only the way to the nearer end counts.

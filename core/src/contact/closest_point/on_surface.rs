@@ -31,7 +31,7 @@ pub(in crate::contact) enum Ended {
     Lost,
 }
 
-/// Where a proxy may leave the surface.
+/// Places at which a proxy may leave the surface.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum Leave {
     /// Anywhere.
@@ -61,7 +61,7 @@ impl Leave {
 /// and the HIP.
 #[derive(Clone, Debug)]
 pub(in crate::contact) struct Descent {
-    /// Where the patch was entered; where its closest point is, once that is known.
+    /// Point of entry into the patch; its closest point, once that is known.
     at: SurfacePoint,
     stage: Stage,
     /// The patch's closest point, in the stages that know it.
@@ -71,7 +71,7 @@ pub(in crate::contact) struct Descent {
     idle: Option<(GridPoint, u32)>,
 }
 
-/// What the descent does next in a patch. What it needs for that is beside it in
+/// Next stage of the descent in a patch. Its data are beside it in
 /// [`Descent`]: writing it anew with every patch would cost more than the search.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
@@ -119,7 +119,7 @@ impl Descent {
         self.knows_here();
     }
 
-    /// Where it begins, or has come to by entering patches.
+    /// Returns its start, or the last point of entry into a patch.
     pub(in crate::contact) const fn entry(&self) -> SurfacePoint {
         self.at
     }
@@ -350,7 +350,7 @@ fn leads_off_beyond<const D: usize>(
 ) -> bool {
     match window.ground(entered.cell) {
         CellContent::Patch(corners) => passes_over(&view.patch(&corners), entered, way),
-        // At the border of the data the proxy is held; see `boundary_fade`.
+        // At the border of the data the proxy is held; see `edge_fade`.
         CellContent::Hole | CellContent::Missing => false,
     }
 }

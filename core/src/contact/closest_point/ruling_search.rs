@@ -29,7 +29,7 @@ pub(super) struct Rulings<'p> {
     pub(super) hip: (f32, f32),
     /// How many.
     pub(super) looked: u32,
-    /// How many there may be.
+    /// Their largest number.
     pub(super) most: u32,
 }
 

@@ -28,7 +28,7 @@ pub(in crate::contact) struct Pull {
     pub(in crate::contact) presses: f32,
     /// True if the HIP is above the tangent plane: nothing presses then.
     pub(in crate::contact) is_above: bool,
-    /// What rounding may make of the pull, cells.
+    /// Rounding error of the pull, cells.
     rounding: f32,
 }
 
@@ -67,7 +67,7 @@ impl Pull {
     }
 }
 
-/// How far a height is off for each cell that the place is, on this side of a patch.
+/// Returns the error of a height for each cell of error of the place, on this side of a patch.
 fn off(slope: f32, side: i32) -> f32 {
     if side == 0 { slope.abs() } else { 0.0 }
 }

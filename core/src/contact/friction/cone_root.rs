@@ -35,7 +35,7 @@ impl ConeRoot {
         self.next
     }
 
-    /// Where a way ends whose looks are used up: the farthest place at which the proxy is still
+    /// Returns the end of a path whose evaluations are used up: the farthest place at which the proxy is still
     /// pulled, from which the next way goes on; only where that is the start, the nearest place
     /// at which the cone holds.
     pub(super) fn so_far(&self) -> Option<f32> {

@@ -282,7 +282,7 @@ fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
     );
 }
 
-/// How far friction held a proxy back is known to the last place of that way. Times the ticks that
+/// The distance that friction held a proxy back is known to the last place of the path. Times the ticks that
 /// the proxy trails by it was more than the friction that the proxy was judged by, and one of
 /// seven went for the HIP itself.
 #[test]

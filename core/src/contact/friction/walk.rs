@@ -42,7 +42,7 @@ pub(in crate::contact) enum Walked {
     Suspended,
 }
 
-/// What is known where a walk is: the steepest pull, and the patch that offers it.
+/// Knowledge at a walk's place: the steepest pull, and its patch.
 struct Asked {
     pull: Pull,
     at: SurfacePoint,
@@ -71,7 +71,7 @@ impl Asked {
     }
 }
 
-/// What becomes of a proxy from which the straight path to the HIP leads off the surface.
+/// Returns the outcome for a proxy from which the straight path to the HIP leads off the surface.
 /// Where it has just come down from such a path, it is on the ground.
 fn off(leave: &Leave, point: &SurfacePoint) -> Option<Walked> {
     match leave {
@@ -92,7 +92,7 @@ pub(in crate::contact) struct Walk {
     pub(in crate::contact) ways: u32,
     /// Of these, the last ones that ended inside of one patch.
     pub(in crate::contact) inside: u32,
-    /// What friction held where the last straight way ended, cells.
+    /// Limit of friction at the end of the last straight path, cells.
     pub(in crate::contact) held: Vec3,
 }
 
@@ -167,7 +167,7 @@ fn newton(at: &Asked, view: &HipView) -> Option<(f32, f32)> {
 
 /// The end of one straight way.
 struct End {
-    /// What friction holds there, cells.
+    /// Limit of friction there, cells.
     held: Vec3,
     /// True if the cone holds there.
     rests: bool,

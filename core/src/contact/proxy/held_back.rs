@@ -16,13 +16,13 @@ use crate::terrain::Window;
 /// a slow hand waits for its next encoder count.
 const STICKS_AFTER_S: f32 = 0.02;
 
-/// What a contact with friction remembers.
+/// Memory of a contact with friction.
 #[derive(Clone, Debug)]
 pub(super) struct Rough {
     friction: Friction,
     motion: Motion,
     stage: Stage,
-    /// Where the proxy was when the tick began, or met the surface in it.
+    /// The proxy at the start of the tick, or where it met the surface in it.
     from: GridPoint,
     /// The part of the displacement that friction held when the proxy last moved, cells.
     held: Vec3,
@@ -37,14 +37,14 @@ enum Motion {
     Slides { still: u32 },
 }
 
-/// How far the walk of a tick is.
+/// Stage of a tick's walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     /// The proxy has not moved in this tick: the cone at rest decides.
     Begins,
     /// It has, on so many straight ways, the last ones of them inside of one patch.
     GoesOn { ways: u32, inside: u32 },
-    /// What remains is not friction's business: the proxy goes to the closest point.
+    /// Descent without friction: the proxy moves to the closest point.
     Descends,
 }
 
@@ -80,7 +80,7 @@ impl Contact {
     /// The part of the last displacement that friction holds rather than the surface, cells.
     pub(crate) fn held_back(&self) -> Vec3 {
         match &self.rough {
-            Some(rough) => rough.held * -self.boundary_fade(),
+            Some(rough) => rough.held * -self.edge_fade(),
             None => Vec3::ZERO,
         }
     }

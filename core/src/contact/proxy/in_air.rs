@@ -113,7 +113,7 @@ impl Contact {
         self.arrives(window, hip, swept, (departures, fade), budget)
     }
 
-    /// What a path that ended comes to: on the surface the tick goes on.
+    /// Returns the outcome of a path's end: on the surface the tick continues.
     fn arrives<const D: usize>(
         &mut self,
         window: &Window<'_, D>,

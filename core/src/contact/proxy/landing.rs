@@ -12,7 +12,7 @@ use crate::contact::surface::SurfacePoint;
 use crate::grid::GridPoint;
 use crate::terrain::{CellContent, Window};
 
-/// Where a contact is to begin.
+/// Start of a contact.
 #[derive(Clone, Debug)]
 pub(super) struct Landing {
     /// Over or under the place of the surface; the height does not count.

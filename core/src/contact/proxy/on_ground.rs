@@ -4,17 +4,17 @@ use glam::Vec3;
 
 use super::departures::count_departure;
 use super::{Contact, Phase, Sweeping, Turn};
-use crate::contact::boundary_fade::{self, approach};
 use crate::contact::budget::Budget;
 use crate::contact::closest_point::{Ended, position_on};
+use crate::contact::edge_fade::{self, approach};
+use crate::contact::fast_path::Follow;
 use crate::contact::output::{ContactOutput, ContactState};
-use crate::contact::shortcut::Follow;
 use crate::contact::surface::{HipView, SurfacePoint};
 use crate::contact::sweep::Path;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::Window;
 
-/// How far a proxy on the surface has come in a tick.
+/// Progress of a proxy on the surface in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Came {
     /// Nothing is left to do.
@@ -119,15 +119,15 @@ impl Contact {
         came: Came,
         budget: &mut Budget,
     ) -> Turn {
-        let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
+        let most = edge_fade::RATE_PER_S * self.settings.rate.tick_s();
         let Phase::OnSurface(on) = &mut self.phase else {
             return Turn::Ends;
         };
         let point = felt.point;
-        let mut may_follow = self.settings.shortcuts;
+        let mut may_follow = self.settings.fast_paths;
         // What is left over of a tick is no tick of its own.
         if came != Came::AsFarAsWork {
-            let target = boundary_fade::target(window, &hip, point.cell, budget);
+            let target = edge_fade::target(window, &hip, point.cell, budget);
             may_follow &= target.over_patch;
             on.fade = approach(on.fade, target.fade, most);
             if on.fade == 0.0 && target.fade == 0.0 {
@@ -181,7 +181,7 @@ impl Contact {
         hip: GridPoint,
         budget: &mut Budget,
     ) -> Turn {
-        let most = boundary_fade::RATE_PER_S * self.settings.rate.tick_s();
+        let most = edge_fade::RATE_PER_S * self.settings.rate.tick_s();
         if let Phase::Releasing {
             proxy,
             displacement,

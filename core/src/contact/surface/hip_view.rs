@@ -89,7 +89,7 @@ impl HipView {
         Vec3::new(point.u - p, point.v - q, z)
     }
 
-    /// Whether one position is nearer to the HIP than another, by more than the
+    /// Returns true if one position is nearer to the HIP than another, by more than the
     /// last places of the two may be off: of a far HIP the squared distances
     /// themselves would not tell.
     // A call: five copies of it would be a kilobyte.

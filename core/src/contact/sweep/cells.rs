@@ -10,7 +10,7 @@ use crate::terrain::{CellContent, Window};
 /// The part of a path over one cell.
 pub(super) struct Step {
     pub(super) cell: Cell,
-    /// Where the part begins and ends in it, `[0, 1]`.
+    /// Begin and end of the part in it, `[0, 1]`.
     from: (f32, f32),
     to: (f32, f32),
     /// Heights above the start of the path, cells.
@@ -44,7 +44,7 @@ impl Step {
         Side::sharing(self.to.0, self.to.1)
     }
 
-    /// What of this part lies on the border of the cell on that side, as that has it: all
+    /// Returns the part on the border of the cell on that side, as that has it: all
     /// of the part, or only where it ends.
     pub(super) fn on_border_of(&self, side: Side) -> Self {
         let runs_along =
@@ -79,7 +79,7 @@ impl Step {
     }
 }
 
-/// What a step over a hole meets: a patch on whose border it is, or the hole.
+/// Returns the content beside a step over no data: a patch on whose border it is, or no data.
 #[inline(never)]
 pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, CellContent) {
     for place in 0..3 {

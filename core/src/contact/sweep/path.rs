@@ -101,7 +101,7 @@ impl Path {
         }
     }
 
-    /// How far the path is known to be free.
+    /// Returns the end of the part of the path that is known to be free.
     pub(in crate::contact) const fn at(&self) -> GridPoint {
         self.at
     }

@@ -11,7 +11,7 @@ const SLOWNESS: u32 = 4;
 /// Bits after the first of a run's length, at most: more than a tile's samples need.
 const MAX_RUN_BITS: u32 = 15;
 
-/// Where the parameter is.
+/// Position of the parameter.
 pub(super) struct Rice {
     /// Sixteen times the mean.
     sum: u32,

@@ -5,8 +5,8 @@ use super::{CellContent, Corners, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::scalar::larger;
 use crate::terrain::index::{TILE_CELLS, TileIndex};
-use crate::terrain::settling::{Allowance, TileBlend, within};
 use crate::terrain::tile::Tile;
+use crate::terrain::tile_blend::{Allowance, TileBlend, within};
 use crate::terrain::underlay::Underlay;
 
 /// A height that is felt at a sample, and whether it is a tile's.
@@ -22,7 +22,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// ([`Self::take_spare`]).
     pub fn lay(&mut self, underlay: Option<Underlay>) {
         self.underlay.lay(underlay);
-        self.settling = TileBlend::NOTHING;
+        self.tile_blend = TileBlend::NOTHING;
         for row in 0..D {
             for col in 0..D {
                 self.slots[row][col].become_surface();
@@ -54,7 +54,7 @@ impl<'t, const D: usize> Window<'t, D> {
             return Some(self.install(tile));
         }
         if let Some(part) = self.underlay.part(tile.key(), self.level()) {
-            self.settling.has_changed = true;
+            self.tile_blend.has_changed = true;
             return self.underlay.put(part, tile);
         }
         let depends = |cell: Cell, index: TileIndex| {
@@ -78,8 +78,8 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Moves the surface on to the tiles that have come, by `step` cells at most. Returns
     /// whether it may be another than in the tick before.
     pub fn settle(&mut self, step: f32) -> bool {
-        let has_changed = core::mem::take(&mut self.settling.has_changed);
-        if self.settling.count == 0 {
+        let has_changed = core::mem::take(&mut self.tile_blend.has_changed);
+        if self.tile_blend.count == 0 {
             return has_changed;
         }
         self.settle_each(step);
@@ -88,10 +88,10 @@ impl<'t, const D: usize> Window<'t, D> {
 
     #[inline(never)]
     fn settle_each(&mut self, step: f32) {
-        let mut left = self.settling.count;
+        let mut left = self.tile_blend.count;
         for slot in 0..D * D {
             let (row, col) = (slot / D, slot % D);
-            let Allowance { now, far } = &mut self.settling.slots[row][col];
+            let Allowance { now, far } = &mut self.tile_blend.slots[row][col];
             if *now == f32::INFINITY {
                 continue;
             }
@@ -101,7 +101,7 @@ impl<'t, const D: usize> Window<'t, D> {
                 tile.become_surface();
                 let (key, top) = (tile.key(), tile.top());
                 if let Some(key) = key {
-                    self.settling.begin(key.index, None);
+                    self.tile_blend.begin(key.index, None);
                     self.renew_maxima(key.index, top);
                 }
             }
@@ -116,21 +116,21 @@ impl<'t, const D: usize> Window<'t, D> {
     /// there. One that was there before goes on as it was.
     pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
         let (row, col) = TileBlend::<D>::slot(index);
-        self.settling.has_changed = self.underlay.is_wanted();
-        if was_here && self.settling.allowed(index) < f32::INFINITY {
+        self.tile_blend.has_changed = self.underlay.is_wanted();
+        if was_here && self.tile_blend.allowed(index) < f32::INFINITY {
             return;
         }
         let far = match settles && !was_here {
             true => self.far(self.slots[row][col], index),
             false => None,
         };
-        self.settling.begin(index, far);
+        self.tile_blend.begin(index, far);
         if far.is_none() {
             self.slots[row][col].become_surface();
         }
     }
 
-    /// How far the samples of a tile can be from the underlay, cells; `None` where that is not felt.
+    /// Returns the largest distance of a tile's samples from the coarse fallback, cells; `None` where that is not rendered.
     fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
         let [lowest, highest] = tile.range()?;
         let [low, high] = self.underlay.felt()?.range_over(index, tile.base())?;
@@ -138,7 +138,7 @@ impl<'t, const D: usize> Window<'t, D> {
         (far > 0.0).then_some(far)
     }
 
-    /// What lies in a cell of the field whose tile is not the surface.
+    /// Returns the content of a cell of the field whose tile is not the surface.
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_ground(&self, cell: Cell) -> CellContent {
@@ -152,7 +152,7 @@ impl<'t, const D: usize> Window<'t, D> {
         // As far as no other tile has the same samples.
         let alone = match own {
             Some(tile) => {
-                let (own, allowed) = (tile.corners(cell), self.settling.allowed(index));
+                let (own, allowed) = (tile.corners(cell), self.tile_blend.allowed(index));
                 let felt = |corner: usize| within(own[corner], coarse[corner], allowed);
                 [felt(0), felt(1), felt(2), felt(3)]
             }
@@ -211,7 +211,7 @@ impl<'t, const D: usize> Window<'t, D> {
         for west in 0..=i32::from(is_on_border(sample.x)) {
             for south in 0..=i32::from(is_on_border(sample.y)) {
                 let index = TileIndex::holding(sample.offset(-west, -south));
-                let allowed = self.settling.allowed(index);
+                let allowed = self.tile_blend.allowed(index);
                 if allowed <= most {
                     continue;
                 }

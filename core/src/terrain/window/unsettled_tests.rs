@@ -40,7 +40,7 @@ fn hills(x: i32, y: i32) -> f64 {
     20.0 + 6.0 * (u.sin() + v.cos()) + rough
 }
 
-/// What the underlay has at a sample of the field.
+/// Returns the coarse fallback's height at a sample of the field.
 fn coarse(x: i32, y: i32) -> Option<f64> {
     let hills = |x, y| f64::from(hills(x, y) as f32);
     through(NEAR, x, y, &near_sample).or_else(|| through(WIDE, x, y, &hills))
@@ -55,7 +55,7 @@ fn near_sample(x: i32, y: i32) -> f64 {
     }
 }
 
-/// What a coarse tile has at a sample of the field.
+/// Returns a coarse tile's height at a sample of the field.
 fn through(tile: CoarseTile, x: i32, y: i32, sample: &dyn Fn(i32, i32) -> f64) -> Option<f64> {
     let side = f64::from(tile.spacing());
     let along = |at: i32, first: i32| {

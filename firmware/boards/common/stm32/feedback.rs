@@ -68,7 +68,7 @@ impl Monitors {
         Self { _adc: adc }
     }
 
-    /// What was converted since the last call, if all of it was; starts anew.
+    /// Takes the conversions since the last call, if all are complete; starts again.
     fn read(&self) -> Option<[u16; 3]> {
         let codes = SEQUENCE.read();
         SEQUENCE.start();

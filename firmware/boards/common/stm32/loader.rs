@@ -17,7 +17,7 @@ use cortex_m::peripheral::SCB;
 use crate::chip::{amplifiers_off, fill_memories, write_back};
 use crate::usb::{LOADER, USB_OSCILLATOR};
 
-/// What says that the loader is wanted, and its complement behind it. RAM that was
+/// Mark of a wanted loader, and its complement behind it. RAM that was
 /// without power holds both once in 2⁶⁴ starts; the loader would then wait, with the
 /// amplifiers off, for the next reset.
 const WANTED: u32 = 0x6F4C_6164;

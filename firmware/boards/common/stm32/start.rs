@@ -31,7 +31,7 @@ const WATCHDOG_US: u32 = 45_000;
 static DESCRIPTORS: ConstStaticCell<DescriptorBuffers> =
     ConstStaticCell::new(DescriptorBuffers::EMPTY);
 
-/// What the haptic interrupt does; `slot` is its own variable.
+/// Runs the haptic interrupt; `slot` is its own variable.
 pub(crate) fn on_haptic_interrupt(slot: &mut Option<&'static mut Loop>) {
     if let Some((haptic_loop, drive)) = application::tick(slot) {
         heartbeat::beat(&drive);

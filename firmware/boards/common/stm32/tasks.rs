@@ -23,19 +23,19 @@ use crate::application::TICK_DONE;
 use crate::chip::{self, UsbDriver, WINDOW, WatchdogTimer};
 use crate::usb::EndpointHalts;
 
-/// How often parts check in and the supervisor looks, milliseconds.
+/// Interval of check-ins and of the supervisor, milliseconds.
 const CHECK_MS: u32 = 10;
-/// How often the stack and the oscillator of USB are measured, milliseconds.
+/// Interval of measurements of the stack and the oscillator of USB, milliseconds.
 const MEASURE_MS: u32 = 1_000;
 
 /// Time for which the host has to fetch the answer before the board enters its loader.
 const FAREWELL: Duration = Duration::from_millis(50);
 
-/// What the LED shows: the link sets it, the supervisor shows it.
+/// Pattern of the LED: the link sets it, the supervisor shows it.
 static LED: CriticalSectionMutex<Cell<LedPattern>> =
     CriticalSectionMutex::new(Cell::new(LedPattern::Disarmed));
 
-/// What the link's task needs from the board. A real board goes on ticking whatever
+/// Board for the link's task. A real board goes on ticking whatever
 /// the link does.
 struct Board {
     memory: CalibrationMemory,

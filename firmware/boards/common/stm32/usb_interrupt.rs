@@ -16,7 +16,7 @@ use crate::chip::{USB_INTERRUPT, UsbInterrupt, UsbWork};
 /// The line is closed, and the task has something to do.
 static RAISED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// What the vector does.
+/// Runs the interrupt's vector.
 pub(crate) fn raised() {
     NVIC::mask(USB_INTERRUPT);
     RAISED.signal(());

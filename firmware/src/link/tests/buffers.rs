@@ -83,7 +83,7 @@ fn tiles_handed_over(loop_ends: &mut LoopEnds<'static>) -> Vec<&'static mut Tile
     tiles
 }
 
-/// What the loop says when the HIP is `column` tiles east of the first.
+/// Returns the loop's record with the HIP `column` tiles east of the first.
 fn at(column: i32) -> QueuedTick {
     let mut record = QueuedTick::default();
     let cell = [column * 32 + 16, 100, 5];

@@ -15,7 +15,7 @@ use hapterra_core::wire::version::VersionCheck;
 
 use super::rig::{FIRST, HELLO, Rig, asked, frame, framed, point, scene, tile};
 
-/// What the points of a descent feel like; nothing about ticks and costs.
+/// Returns the forces of a descent's points; nothing about ticks and costs.
 fn forces(felt: &[(u32, TickRecord)]) -> Vec<(u32, hapterra_core::Vec3)> {
     felt.iter().map(|(seq, s)| (*seq, s.force_n)).collect()
 }

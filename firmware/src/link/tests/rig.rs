@@ -26,7 +26,7 @@ use crate::store::Stored;
 /// Tiles along the window's side in these tests.
 pub(super) const D: usize = 4;
 
-/// What a host of this protocol says first.
+/// First message of a host of this protocol.
 pub(super) const HELLO: HostHello = HostHello {
     protocol: PROTOCOL,
     number: 1,
@@ -74,7 +74,7 @@ pub(super) fn frame(message: &ToDevice<'_>) -> Vec<u8> {
     framed(FIRST, message)
 }
 
-/// What a host says to learn whether the device speaks its protocol.
+/// Returns a host's query whether the device speaks its protocol.
 pub(super) fn asked(protocol: u16) -> Vec<u8> {
     let asked = VersionCheck::Asked { protocol };
     encode(&asked, &mut [0; 16]).unwrap().to_vec()
@@ -121,7 +121,7 @@ pub(super) struct Rig {
     /// The session of a host that only looks, and what that has heard.
     pub(super) looker: Option<SessionNumber>,
     pub(super) looked_at: Vec<ToHost>,
-    /// What the hosts of sessions before have heard.
+    /// Messages to the hosts of sessions before.
     pub(super) heard_before: Vec<(SessionNumber, ToHost)>,
     /// The session that is spoken in, and the number of its last request.
     pub(super) session: SessionNumber,
@@ -132,7 +132,7 @@ pub(super) struct Rig {
     pub(super) refused: Vec<VersionCheck>,
     /// True if tiles asked for are answered.
     pub(super) answers_tiles: bool,
-    /// What the answer to a tile becomes on the way.
+    /// Damage of the answer with a tile.
     pub(super) damage: fn(&mut Vec<u8>),
     pub(super) sense: GuardInputs,
 }
@@ -334,7 +334,7 @@ impl Rig {
         self.heard.iter().filter_map(telemetry).collect()
     }
 
-    /// What was last told of the guard.
+    /// Returns the last report of the guard.
     pub(super) fn report(&self) -> Option<Report> {
         let guard = |m: &ToHost| match m {
             ToHost::Guard(report) => Some(*report),

@@ -16,7 +16,7 @@ use crate::link::Link;
 use crate::link::task::{LinkBoard, run};
 use crate::store::Stored;
 
-/// What a host has sent before it went deaf.
+/// Bytes that a host has sent before it stopped reading.
 struct Sent(Vec<u8>);
 
 impl ErrorType for Sent {
@@ -76,7 +76,7 @@ impl LinkBoard for Board {
     }
 }
 
-/// What the board does after a poll, which is to set the LED, goes on.
+/// The board sets the LED after each poll.
 #[test]
 fn board_polls_the_link_while_the_host_does_not_read() {
     let mut device = device(Stored::Missing, BootReport::default());

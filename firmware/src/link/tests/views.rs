@@ -33,7 +33,7 @@ fn latest(rig: &Rig) -> TickRecord {
     *last.expect("samples")
 }
 
-/// Whether views were taken, in the order of the answers, from the first view on.
+/// Returns the outcomes of scene changes, in the order of the answers, from the first on.
 fn taken(rig: &Rig) -> Vec<(u32, bool)> {
     let answer = |message: &ToHost| match message {
         ToHost::SceneAck { epoch, accepted } => Some((*epoch, *accepted)),

@@ -9,14 +9,14 @@ use crate::numbers::number;
 
 /// The key of the value that means no data.
 const NO_DATA: &str = "nodata";
-/// What Esri takes for no data where the header does not say.
+/// Esri's default for no data.
 const DEFAULT_NO_DATA: f64 = -9999.0;
 
 /// The header's numbers, unchecked, each under the first of its key's spellings.
 #[derive(Debug, Default)]
 pub(super) struct Header {
     numbers: HashMap<&'static str, f64>,
-    /// What it has for no data, where that is no number: samples have it, too.
+    /// Its word for no data, where that is no number: samples have it, too.
     pub(super) no_data_word: Option<String>,
 }
 

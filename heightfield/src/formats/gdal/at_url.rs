@@ -33,7 +33,7 @@ pub(super) struct Served {
     elsewhere: RemoteFetcher,
     /// As `https://host/`.
     root: String,
-    /// What follows the path of each URL, which may be a key.
+    /// Query of each URL, which may be a key.
     rest: String,
     roots: Arc<[String]>,
 }
@@ -94,7 +94,7 @@ fn io_error(fault: RasterError) -> io::Error {
     }
 }
 
-/// What went wrong with a file that GDAL read through this program.
+/// Returns the fault of a file that GDAL read through this program.
 pub(super) fn fault(error: io::Error) -> RasterError {
     match error.kind() {
         // A refusal of its content, and not of its server.

@@ -32,10 +32,10 @@ pub(super) const fn held(stored: Stored) -> SampleType {
     }
 }
 
-/// What of a file is open, and how it is opened again.
+/// Open dataset of a file, and how it is opened again.
 pub(super) struct Source {
     pub(super) place: Arc<Place>,
-    /// What GDAL calls it.
+    /// GDAL's name for it.
     pub(super) name: String,
     pub(super) options: Vec<String>,
 }

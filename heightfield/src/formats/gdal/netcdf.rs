@@ -10,11 +10,11 @@ use crate::decoded::Decoded;
 use crate::geometry::metres_in;
 use crate::{RasterError, ReferenceSystem};
 
-/// What people call the variable with the heights.
+/// Usual names of the variable with the heights.
 pub(super) const HEIGHT_NAMES: &str = "z elevation elev topo topography height altitude dem relief \
                                        bedrock surface band1";
 
-/// What a file says of its heights and axes.
+/// Statements of a file about its heights and axes.
 #[derive(Default)]
 pub(super) struct Conventions {
     /// The `standard_name` of the variable.
@@ -35,7 +35,7 @@ pub(super) fn variable(dataset: &Dataset) -> Option<String> {
 }
 
 impl Conventions {
-    /// What the attributes of a NetCDF variable say; nothing in a file of another format.
+    /// Returns the statements of a NetCDF variable's attributes; none in a file of another format.
     pub(super) fn of(
         library: &Library,
         path: &Path,
@@ -63,7 +63,7 @@ impl Conventions {
         Ok(found)
     }
 
-    /// Where the samples lie, by axes in the unit of the reference system.
+    /// Returns the place of the samples, by axes in the unit of the reference system.
     pub(super) fn placed(
         &self,
         map: Option<[f64; 6]>,

@@ -21,7 +21,7 @@ const MAX_ENTRIES: usize = 1 << 14;
 const MAX_TRIED: usize = 64;
 /// Place where a tar file says that it is one.
 const TAR_SIGN: usize = 257;
-/// How files are packed.
+/// Packing of files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Packing {
     Zip,
@@ -56,7 +56,7 @@ impl Packing {
         }
     }
 
-    /// What GDAL calls the raster in an archive, and the options that are left for it.
+    /// Returns GDAL's name of the raster in an archive, and the options that are left for it.
     ///
     /// # Errors
     /// [`RasterError::SeveralHeights`] where none of several is chosen by `--input variable=NAME`.

@@ -13,9 +13,9 @@ use crate::remote::{RemoteFetcher, is_url, without_key};
 /// A file here or at a URL.
 pub(super) struct Place {
     library: Library,
-    /// What the user calls it.
+    /// The user's name for it.
     pub(super) source: PathBuf,
-    /// What GDAL calls it.
+    /// GDAL's name for it.
     pub(super) path: PathBuf,
     served: Option<(Served, Mount)>,
     /// A copy of what is at a URL, or another name of an archive.

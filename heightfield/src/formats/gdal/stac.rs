@@ -18,7 +18,7 @@ use crate::{OpenOptions, RasterError, file_name};
 const MAX_BYTES: u64 = 4 << 20;
 /// A file lies where its item says within this share of a cell.
 const TOLERANCE: f64 = 0.05;
-/// What files of heights are.
+/// Media types of files of heights.
 const MEDIA: [&str; 3] = ["tif", "jp2", "netcdf"];
 
 /// An item, and of its assets those that may be heights.
@@ -229,7 +229,7 @@ fn is_raster(asset: &Value) -> bool {
     is_one_of("type") || (asset["type"].is_null() && is_one_of("href"))
 }
 
-/// What GDAL calls a file that an item names.
+/// Returns GDAL's name of a file that an item names.
 fn file(href: &str, folder: &Path) -> String {
     match href.split_once("://") {
         Some(("s3", rest)) => format!("/vsis3/{rest}"),

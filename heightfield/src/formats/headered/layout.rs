@@ -4,7 +4,7 @@ use crate::plain::Plain;
 use crate::read::Stored;
 use crate::{Endian, RasterError};
 
-/// How the samples of several bands are interleaved.
+/// Interleaving of several bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interleave {
     /// A row of each band after another.
@@ -15,7 +15,7 @@ pub(super) enum Interleave {
     Sequential,
 }
 
-/// How the samples lie: all lengths in bytes.
+/// Layout of the samples: all lengths in bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     pub(super) columns: u32,
@@ -35,7 +35,7 @@ pub(super) struct Layout {
     pub(super) band_gap: u64,
 }
 
-/// Where a band's samples are, in bytes.
+/// Positions of a band's samples, in bytes.
 struct Steps {
     first: u64,
     row: u64,

@@ -50,7 +50,7 @@ pub(crate) fn is_of_another_kind(head: &[u8]) -> bool {
 /// Sets what a header says besides the layout of the samples.
 type Describe = Box<dyn FnOnce(&mut Decoded) -> Result<(), RasterError>>;
 
-/// What a header says.
+/// Content of a header.
 struct Header {
     format: &'static str,
     layout: Layout,

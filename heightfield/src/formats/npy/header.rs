@@ -10,7 +10,7 @@ const MAX_BYTES: u64 = 1 << 16;
 /// Dimensions of an array.
 const MAX_SIDES: usize = 32;
 
-/// What a header says.
+/// Content of a header.
 #[derive(Debug, PartialEq)]
 pub(super) struct Header {
     /// Byte order, kind and bytes of a sample, as `<f4`.
@@ -89,7 +89,7 @@ fn unfamiliar(what: &str) -> RasterError {
     RasterError::NotAHeightField(format!("an array whose header has {what}"))
 }
 
-/// What is left of a header.
+/// Rest of a header.
 struct Rest<'t>(&'t str);
 
 impl<'t> Rest<'t> {

@@ -19,7 +19,7 @@ pub(super) const FORMAT: Format = Format {
     decode: |input, options| Array::in_file(input)?.heights(input, options),
 };
 
-/// Where an array's samples are.
+/// Place of an array's samples.
 struct Array {
     shape: Vec<u64>,
     stored: Stored,

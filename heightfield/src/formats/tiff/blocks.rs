@@ -106,7 +106,7 @@ pub(super) type Opened = (Arc<TiffFile>, Option<Arc<RemoteFile>>);
 /// The main file, and one of overviews beside it.
 const MAIN: usize = 0;
 
-/// What is known of a file before its blocks are read.
+/// Knowledge of a file before its blocks are read.
 #[derive(Clone, Copy)]
 pub(super) struct Known<'k> {
     /// Its name in warnings.
@@ -115,7 +115,7 @@ pub(super) struct Known<'k> {
     pub(super) wanted: Wanted,
     /// The file of a mask beside it.
     pub(super) mask: Option<&'k Arc<TiffFile>>,
-    /// Where large strips and tiles may be unpacked, or why they may not.
+    /// Folder for unpacking large strips and tiles, or the reason against it.
     pub(super) disk: Result<&'k DiskCache, &'k str>,
 }
 
@@ -300,7 +300,7 @@ impl TiffBlocks {
         Ok(all)
     }
 
-    /// What can be read of a piece; `None`, with a warning the first time, where it cannot.
+    /// Reads a piece; `None`, with a warning the first time, where it cannot be read.
     fn try_read<T>(
         &self,
         image: usize,

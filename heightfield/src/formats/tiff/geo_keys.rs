@@ -75,7 +75,7 @@ impl GeoKeys {
         metres.filter(|metres| metres.is_finite() && *metres > 0.0)
     }
 
-    /// Whether coordinates are lengths on a map, or angles.
+    /// Returns true for lengths on a map, false for angles.
     pub(super) fn is_projected(&self) -> Option<bool> {
         match self.code(GT_MODEL_TYPE) {
             Some(PROJECTED) => Some(true),

@@ -24,7 +24,7 @@ impl Directory {
         &self.file
     }
 
-    /// What the file says of it.
+    /// Returns its directory.
     pub(super) fn ifd(&self) -> &Ifd {
         &self.file.ifds()[self.number]
     }
@@ -75,7 +75,7 @@ pub(super) fn overviews(file: &Arc<TiffFile>) -> Vec<Directory> {
     reduced
 }
 
-/// Whether an image is reduced or a mask, as a set of bits.
+/// Returns the bits for a reduced image and a mask.
 fn kind(image: &Ifd) -> u32 {
     let bits = image.tag(NEW_SUBFILE_TYPE);
     bits.and_then(|tag| tag.value.as_u32()).unwrap_or(0) & (REDUCED | MASK)

@@ -46,12 +46,12 @@ impl<'f> Index<'f> {
         Some((place, if place == 0 { 0 } else { bytes }))
     }
 
-    /// Where a strip or tile lies, also one that has no size.
+    /// Returns the offset of a strip or tile, also of one without a size.
     pub(super) fn place(&self, index: usize) -> Option<u64> {
         number(self.places, index)
     }
 
-    /// What the lists take in memory.
+    /// Returns the size of the lists in memory.
     pub(super) fn held_bytes(&self) -> usize {
         let held = |list: &TagValue| match list {
             TagValue::Byte(all) => all.len(),

@@ -17,7 +17,7 @@ use crate::{RasterError, SampleType};
 /// Larger chunks are not decoded as a whole where that can be helped, bytes.
 pub(super) const MAX_DECODED: u64 = 1 << 20;
 
-/// How an image's samples are stored.
+/// Storage of an image's samples.
 pub(super) struct Layout {
     /// The image.
     pub(super) directory: Directory,
@@ -69,7 +69,7 @@ impl Wanted {
     }
 }
 
-/// What the bits of a sample mean.
+/// Meaning of a sample's bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SampleFormat {
     Unsigned,
@@ -228,7 +228,7 @@ impl Layout {
         bits.saturating_mul(first.into()) / 8..self.bytes_of(first.saturating_add(columns))
     }
 
-    /// How a sample lies in the file, and in which type it is held.
+    /// Returns the type of a sample in the file, and in memory.
     pub(super) const fn sample(&self) -> Stored {
         use SampleFormat::{Float, Signed, Unsigned};
         match self.stored {
@@ -311,13 +311,13 @@ impl Layout {
         u64::from(self.chunks_across()) * u64::from(self.rows.div_ceil(self.chunk.1))
     }
 
-    /// Where all chunks lie, those of all bands.
+    /// Returns the offsets of all chunks, those of all bands.
     pub(super) fn places(&self) -> impl Iterator<Item = u64> {
         let index = self.index();
         (0..).map_while(move |number| index.as_ref()?.place(number))
     }
 
-    /// What its lists take in memory.
+    /// Returns the size of its lists in memory.
     pub(super) fn index_bytes(&self) -> usize {
         self.index().map_or(0, |index| index.held_bytes())
     }

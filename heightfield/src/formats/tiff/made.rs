@@ -16,7 +16,7 @@ pub(super) fn value([column, row]: [u32; 2], band: u32) -> i64 {
     i64::from((column * 7 + row * 13 + band * 29) % 101)
 }
 
-/// How a type of samples is written.
+/// Writer of a type of samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kind {
     pub(super) bits: u16,
@@ -50,7 +50,7 @@ const fn kind(bits: u16, format: u16, bytes: fn(i64) -> Vec<u8>) -> Kind {
     }
 }
 
-/// How a file is laid out.
+/// Layout of a file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Made {
     pub(super) kind: Kind,
@@ -67,7 +67,7 @@ pub(super) struct Made {
     pub(super) packing: Packing,
 }
 
-/// How samples are packed.
+/// Packing of samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Packing {
     pub(super) code: u16,

@@ -11,7 +11,7 @@ const GDAL_NODATA: u16 = 42113;
 /// The file's own notes are short; what is not, is no such note.
 const MAX_NOTE: usize = 1 << 20;
 
-/// What GDAL notes beside a band's samples.
+/// GDAL's metadata beside a band's samples.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Metadata {
     pub(super) no_data: Option<f64>,

@@ -115,7 +115,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     Ok(decoded)
 }
 
-/// What the user is told of where the samples are.
+/// Remark on where the samples are.
 enum Told {
     /// A remark on how they are read.
     Remark(String),
@@ -193,7 +193,7 @@ fn stored(
     Ok((storage, told.into_iter().collect()))
 }
 
-/// What is said of the memory that is taken while a file is read as a whole, where that is more
+/// Returns a remark on the memory while a file is read as a whole, where that is more
 /// than its samples take.
 fn at_once(layout: &Layout) -> &'static str {
     let all = Part::whole(layout.columns, layout.rows);
@@ -203,7 +203,7 @@ fn at_once(layout: &Layout) -> &'static str {
     }
 }
 
-/// What is said of strips or tiles that are unpacked on disk, if some are.
+/// Returns a remark on strips or tiles that are unpacked on disk, if some are.
 fn unpacked_told(image: &Image) -> Option<Told> {
     let megabytes = image.unpacked_bytes().div_ceil(1_000_000);
     let whose = match &image.layout.unpacked {

@@ -49,7 +49,7 @@ pub(super) fn read(layout: &Layout, band: usize, part: &Part) -> Result<Samples,
     }
 }
 
-/// Where the rows of a strip or tile that are in a part lie, counted from its first byte.
+/// Returns the offsets of the rows of a strip or tile in a part, counted from its first byte.
 pub(super) fn rows(
     layout: &Layout,
     chunk: &Chunk,

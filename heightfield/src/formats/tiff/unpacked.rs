@@ -30,7 +30,7 @@ pub(super) struct Unpacked {
     turn: Mutex<()>,
 }
 
-/// What is in the file.
+/// Content of the file.
 struct Kept {
     /// The strip or tile at each place of the file.
     slots: Vec<Option<Slot>>,
@@ -40,7 +40,7 @@ struct Kept {
 
 /// A strip or tile that was unpacked.
 struct Slot {
-    /// Where it lies in the TIFF, and how many rows of it are wanted.
+    /// Its offset in the TIFF, and the number of wanted rows.
     is_of: (u64, u32),
     /// Number of bytes that are here, and what is wrong with the others.
     bytes: u64,

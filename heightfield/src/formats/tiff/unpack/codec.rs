@@ -13,7 +13,7 @@ pub(super) const fn is_known(code: u16) -> bool {
     matches!(code, 1 | 5 | 8 | 32773 | 32946 | 50000)
 }
 
-/// What was packed with the compression of a code.
+/// Unpacks bytes of a compression's code.
 pub(super) fn unpacked<'f>(code: u16, packed: impl BufRead + 'f) -> io::Result<Box<dyn Read + 'f>> {
     Ok(match code {
         1 => Box::new(packed),
@@ -70,7 +70,7 @@ struct PackBits<R> {
     run: Run,
 }
 
-/// What is left of a run.
+/// Rest of a run.
 enum Run {
     Of(usize),
     Equal(usize, u8),

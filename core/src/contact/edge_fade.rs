@@ -33,7 +33,7 @@ fn is_far(proxy: Cell, hip: Cell) -> bool {
     proxy.x.abs_diff(hip.x).max(proxy.y.abs_diff(hip.y)) >= FAR
 }
 
-/// What the boundary fade should come to, and what is not known about it.
+/// Target of the edge fade, and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Target {
     /// 1 over a patch, less beside one, 0 farther than [`REACH`] from any: continuous
@@ -213,7 +213,7 @@ mod tests {
         let mut contact = Contact::new(ContactSettings::AT_1_KHZ.at_rate(rate));
         let mut step = |hip: GridPoint| {
             let felt = *contact.step(&field.window, &hip);
-            (felt.state, contact.boundary_fade())
+            (felt.state, contact.edge_fade())
         };
         let above = GridPoint::new([0; 3], Vec3::new(8.5, 10.5, 1.0));
         assert_eq!(step(above).0, ContactState::Free);

@@ -24,11 +24,11 @@ use super::index::{TileIndex, wrap};
 /// guard lets 1,000 N/s through.
 pub const SETTLING_MM_S: f32 = 50.0;
 
-/// How far the tiles of a window may be from the underlay.
+/// Largest distance of a window's tiles from the coarse fallback.
 pub(super) struct TileBlend<const D: usize> {
     /// By slot: how far now, and from how far on the tile is the surface as it is; cells.
     pub(super) slots: [[Allowance; D]; D],
-    /// How many tiles settle.
+    /// Number of tiles that blend in.
     pub(super) count: u16,
     /// True if the surface may have changed otherwise since the last tick.
     pub(super) has_changed: bool,

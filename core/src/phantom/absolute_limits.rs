@@ -24,7 +24,7 @@ const LEVERAGE_SHARE: f32 = 0.5;
 /// Links may be longer than the preset's by this: a longer link of the record's is a smaller
 /// force for a torque, so the true force would be larger than the one that is clamped.
 const LINK_SHARE: f32 = 1.15;
-/// What the counts of a radian may be of the preset's. More of them under-read every angle
+/// Range of the counts of a radian, as shares of the preset's. More of them under-read every angle
 /// and speed by as much; half of them is what another encoder has.
 const COUNTS_SHARE: (f32, f32) = (0.5, 1.25);
 /// The same where the preset's ratios are a guess.

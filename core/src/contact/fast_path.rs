@@ -92,7 +92,7 @@ impl Follow {
     }
 }
 
-/// What following a proxy within its patch comes to.
+/// Outcome of following a proxy within its patch.
 pub(super) enum Followed {
     /// It rests: its position, and the displacement from the HIP to it, cells.
     Rests(GridPoint, Vec3),
