@@ -12,9 +12,7 @@ fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
     match pointer {
         pointer if pointer.is_null() => Err(HapterraStatus::NullPointer),
         pointer if !pointer.is_aligned() => Err(HapterraStatus::Pointer),
-        _ if bytes.is_none_or(|bytes| bytes > isize::MAX as usize) => {
-            Err(HapterraStatus::Pointer)
-        }
+        _ if bytes.is_none_or(|bytes| bytes > isize::MAX as usize) => Err(HapterraStatus::Pointer),
         _ => Ok(()),
     }
 }
