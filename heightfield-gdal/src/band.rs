@@ -6,6 +6,7 @@ use std::marker::PhantomData;
 use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::functions::Handle;
+use crate::in_time::Call;
 use crate::library::Loaded;
 use crate::text::from_c;
 
@@ -263,7 +264,7 @@ impl<'d> Band<'d> {
         Self::of(self.loaded, handle, self.dataset)
     }
 
-    /// Reads a window, row after row, each `samples` of it once.
+    /// ReadTracker a window, row after row, each `samples` of it once.
     ///
     /// # Errors
     /// [`Error::Window`] where it is not inside of the band, or `samples` has another size;
@@ -295,6 +296,7 @@ impl<'d> Band<'d> {
         let [x, y, width, height] = [column, row, columns, rows].map(|count| count as c_int);
         let buffer = samples.as_mut_ptr().cast::<c_void>();
         self.loaded.prepare_thread();
+        let _call = Call::begin();
         let functions = &self.loaded.functions;
         // SAFETY: the buffer holds as many samples of that type as the window has, without gaps.
         let said = unsafe {

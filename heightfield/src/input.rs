@@ -53,7 +53,7 @@ impl FileBytes {
     }
 
     fn at_url(url: &str, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
-        let file = elsewhere.open(url).map_err(RasterError::elsewhere)?;
+        let file = elsewhere.open(url).map_err(RasterError::Remote)?;
         let (len, data) = (file.len(), Data::Remote(file, url.to_owned()));
         Ok(Self::new(file_name(url), len, data))
     }
@@ -250,13 +250,13 @@ impl FileBytes {
     }
 }
 
-/// Reads bytes at a place, whatever others read of the same file meanwhile.
+/// ReadTracker bytes at a place, whatever others read of the same file meanwhile.
 #[cfg(unix)]
 pub(super) fn read_exact_at(file: &File, into: &mut [u8], at: u64) -> std::io::Result<()> {
     std::os::unix::fs::FileExt::read_exact_at(file, into, at)
 }
 
-/// Reads bytes at a place, whatever others read of the same file meanwhile.
+/// ReadTracker bytes at a place, whatever others read of the same file meanwhile.
 #[cfg(windows)]
 pub(super) fn read_exact_at(file: &File, mut into: &mut [u8], mut at: u64) -> std::io::Result<()> {
     while !into.is_empty() {
