@@ -4,7 +4,7 @@ use std::path::Path;
 
 use hapterra::synth::{Kind, Synth};
 use hapterra::terrain::{HapticCells, HapticGrid};
-use heightfield::Raster;
+use heightfield::{Raster, Wait};
 
 /// Most samples along a side; a larger field is cut to its middle.
 pub const MAX_SIDE: u32 = 4097;
@@ -68,7 +68,9 @@ impl Grid {
         let mut grid = Self::from_fn(&name.to_string_lossy(), size, |x, y| {
             if row_of.0 != y as u32 {
                 row_of.0 = y as u32;
-                raster.copy_row(0, first[1] + y as u32, first[0], &mut row_of.1);
+                let row = first[1] + y as u32;
+                // What a server did not send is filled, too.
+                let _ = raster.read_row(0, row, first[0], &mut row_of.1, Wait::UntilRead);
             }
             let height = row_of.1[x];
             filled += u64::from(height.is_nan());

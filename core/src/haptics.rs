@@ -124,7 +124,7 @@ pub struct Board {
 /// let mut sample = Default::default();
 /// for (seq, height) in [(0, 5.0), (1, 1.0)] {
 ///     let hip = GridPoint::new([10, 10, 0], Vec3::new(0.5, 0.5, height));
-///     haptics.accept(Command::Hip(Point { seq, hip }))?;
+///     haptics.accept(Command::Hip(HipCommand { seq, hip }))?;
 ///     let outcome = haptics.tick(&GuardInputs::default(), true);
 ///     assert_eq!(outcome.answers, Some(seq));
 ///     sample = outcome.sample;

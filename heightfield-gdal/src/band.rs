@@ -4,6 +4,7 @@ use std::ffi::{c_int, c_void};
 
 use crate::error::Error;
 use crate::functions::Handle;
+use crate::in_time::Call;
 use crate::loaded::Loaded;
 use crate::text::from_c;
 
@@ -284,6 +285,7 @@ impl<'d> Band<'d> {
         let [x, y, width, height] = [column, row, columns, rows].map(|count| count as c_int);
         let buffer = samples.as_mut_ptr().cast::<c_void>();
         self.loaded.prepare_thread();
+        let _call = Call::begin();
         let functions = &self.loaded.functions;
         // SAFETY: the buffer holds as many samples of that type as the window has, without gaps.
         let said = unsafe {

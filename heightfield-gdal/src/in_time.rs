@@ -22,8 +22,24 @@ const WAIT_WITHIN: Duration = Duration::from_secs(120);
 /// Between two looks at the time that is not counted.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Calls of GDAL that were given up and have not returned.
-static STUCK: AtomicUsize = AtomicUsize::new(0);
+/// Calls of GDAL that have not returned.
+static CALLS: AtomicUsize = AtomicUsize::new(0);
+
+/// A call of GDAL, until it is dropped.
+pub(crate) struct Call(());
+
+impl Call {
+    pub(crate) fn begin() -> Self {
+        CALLS.fetch_add(1, Ordering::AcqRel);
+        Self(())
+    }
+}
+
+impl Drop for Call {
+    fn drop(&mut self) {
+        CALLS.fetch_sub(1, Ordering::AcqRel);
+    }
+}
 
 unsafe extern "C" {
     /// Ends the process without what libraries do at its end.
@@ -33,7 +49,7 @@ unsafe extern "C" {
 /// Ends the process with an exit code if a call of GDAL has not returned: GDAL's own end would wait
 /// for it. Else does nothing.
 pub fn exit_if_stuck(code: u8) {
-    if STUCK.load(Ordering::Acquire) > 0 {
+    if CALLS.load(Ordering::Acquire) > 0 {
         // Nobody is left who could be told.
         let _ = (std::io::stdout().flush(), std::io::stderr().flush());
         // SAFETY: it does not return, and nothing of this process is used after it.
@@ -54,13 +70,12 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
     let (send, opened) = sync_channel(1);
     let (loaded, own) = (loaded.clone(), path.to_owned());
     let options: Vec<String> = options.iter().map(|&option| option.to_owned()).collect();
+    let call = Call::begin();
     let open = move || {
+        let _call = call;
         let options: Vec<&str> = options.iter().map(String::as_str).collect();
-        let opened = Dataset::open(loaded, &own, &options);
-        // Given up: then it has returned after all.
-        if send.send(opened).is_err() {
-            STUCK.fetch_sub(1, Ordering::AcqRel);
-        }
+        // The caller may have given up.
+        let _ = send.send(Dataset::open(loaded, &own, &options));
     };
     let thread = Builder::new().name("GDAL opens a file".into());
     thread.spawn(open).map_err(|_| slow())?;
@@ -77,7 +92,6 @@ pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Resul
             Err(_) => break,
         }
     }
-    STUCK.fetch_add(1, Ordering::AcqRel);
     Err(slow())
 }
 

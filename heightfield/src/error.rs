@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::options::Encoding;
-use crate::remote::{is_lost, is_missing, is_on_its_way, is_outage, without_key};
+use crate::remote::{is_lost, is_missing, is_outage, without_key};
 use crate::shown::shown;
 
 /// A file that could not be opened as a height field: what is wrong with which file.
@@ -43,9 +43,6 @@ pub enum RasterError {
     /// A URL that cannot be read, or not at present.
     #[error("cannot read what is there: {0}")]
     Remote(std::io::Error),
-    /// It is on its way from elsewhere, and nobody may wait for it.
-    #[error("it has not come yet")]
-    NotYet,
     /// Neither content nor extension say what it is.
     #[error("unknown file format")]
     UnknownFormat,
@@ -225,20 +222,11 @@ impl RasterError {
         }
     }
 
-    /// Makes the fault of a file at a URL.
-    pub(super) fn elsewhere(error: std::io::Error) -> Self {
-        match is_on_its_way(&error) {
-            true => Self::NotYet,
-            false => Self::Remote(error),
-        }
-    }
-
     /// Returns true if another try may find more: nothing is known of the file's samples.
     pub(super) fn is_of_the_line(&self) -> bool {
         match self {
             Self::Remote(error) => !is_missing(error),
             Self::InTile { fault, .. } => fault.is_of_the_line(),
-            Self::NotYet => true,
             _ => false,
         }
     }
@@ -252,9 +240,7 @@ impl RasterError {
             std::io::ErrorKind::InvalidData | std::io::ErrorKind::InvalidInput => {
                 Self::Unfamiliar(format!("{during}: {error}"))
             }
-            _ if is_outage(&error) || is_lost(&error) || is_on_its_way(&error) => {
-                Self::elsewhere(error)
-            }
+            _ if is_outage(&error) || is_lost(&error) => Self::Remote(error),
             _ => Self::Unreadable(error),
         }
     }

@@ -53,7 +53,7 @@ impl FileBytes {
     }
 
     fn at_url(url: &str, elsewhere: &RemoteFetcher) -> Result<Self, RasterError> {
-        let file = elsewhere.open(url).map_err(RasterError::elsewhere)?;
+        let file = elsewhere.open(url).map_err(RasterError::Remote)?;
         let (len, data) = (file.len(), Data::Remote(file, url.to_owned()));
         Ok(Self::new(file_name(url), len, data))
     }

@@ -16,6 +16,21 @@
 //! decode (`input`, `read`) into `decoded`; [`Raster`] answers from that. A folder or a pattern
 //! of names is many files as one terrain (`mosaic`).
 //!
+//! A window of a DEM:
+//!
+//! ```no_run
+//! use heightfield::{OpenOptions, Raster, Wait, Window};
+//!
+//! let dem = Raster::open("dem.tif", &OpenOptions::default())?;
+//! let window = Window { column: 200, row: 100, columns: 64, rows: 64 };
+//! let mut heights = vec![0.0; 64 * 64];
+//! if !dem.read_window(0, window, &mut heights, Wait::UntilRead).is_complete() {
+//!     dem.check_complete()?;
+//! }
+//! println!("{} × {} m a unit", heights[0], dem.metres_per_vertical_unit());
+//! # Ok::<(), heightfield::Error>(())
+//! ```
+//!
 //! **Places.** A format hands over its map from columns and rows to coordinates
 //! (`ground_map`) and its reference system (`crs`); what follows from these is worked out
 //! once for all (`placed`), as are places of samples for the rest of the program
@@ -55,6 +70,7 @@ mod place;
 mod placed;
 mod plain;
 mod read;
+mod read_status;
 pub mod regular_file;
 mod remote;
 mod samples;
@@ -86,6 +102,7 @@ pub use ground_map::Bounds;
 pub use height_summary::HeightSummary;
 pub use mosaic::files_read_with;
 pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
+pub use read_status::{ReadStatus, ReadTracker, Wait};
 pub use remote::{RemoteFetcher, file_name, is_url, without_key};
 pub use samples::{Endian, SampleType, Samples};
 
@@ -108,6 +125,19 @@ pub fn own_formats() -> impl Iterator<Item = &'static str> {
     formats::FORMATS.iter().map(|format| format.name)
 }
 
+/// A rectangle of a level's samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Its westernmost column.
+    pub column: u32,
+    /// Its southernmost row.
+    pub row: u32,
+    /// Samples from west to east.
+    pub columns: u32,
+    /// Samples from south to north.
+    pub rows: u32,
+}
+
 /// A height field held once, in the compact type of its file.
 ///
 /// Column 0 is the westernmost, row 0 the **southernmost**, whatever the file's
@@ -116,7 +146,6 @@ pub fn own_formats() -> impl Iterator<Item = &'static str> {
 pub struct Raster {
     source: Decoded,
     survey: Survey,
-    elsewhere: RemoteFetcher,
     /// Empty where it was made in memory.
     path: PathBuf,
 }
@@ -170,7 +199,6 @@ impl Raster {
             .inspect(|_| options.elsewhere.touch())
             .map(|raster| Self {
                 path: path.to_owned(),
-                elsewhere: options.elsewhere.clone(),
                 ..raster
             })
             .map_err(|fault| Error::new(path, fault))
@@ -214,24 +242,12 @@ impl Raster {
         Ok(Self {
             source,
             survey,
-            elsewhere: RemoteFetcher::default(),
             path: PathBuf::new(),
         })
     }
 
-    /// From now on nothing waits for what is fetched from elsewhere, nor for coarse levels that
-    /// are made of many blocks of the file: what is not here yet is a hole for the moment, and
-    /// [`Raster::not_yet`] counts it.
-    pub fn stop_waiting(&self) {
-        self.elsewhere.stop_waiting(true);
-        if let Storage::Blocks(blocks) = &self.source.storage {
-            blocks.stop_waiting();
-        }
-    }
-
-    /// Has what is not here yet of a level read, where that is not waited for any more
-    /// ([`Raster::stop_waiting`]): between two columns and between two rows of level 0, all of
-    /// them included. Waits for nothing, and asks for 16 blocks at most.
+    /// Has what is not here yet of a level read in the background: between two columns and between
+    /// two rows of level 0, all of them included. Waits for nothing, and asks for 16 blocks at most.
     pub fn prefetch(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
         let Storage::Blocks(blocks) = &self.source.storage else {
             return;
@@ -264,7 +280,7 @@ impl Raster {
     }
 
     /// Whether a block of the file is being read in the background, or is going to be
-    /// ([`Raster::stop_waiting`]). Coarse samples that are made of the file do not count.
+    /// ([`Wait::Never`]). Coarse samples that are made of the file do not count.
     pub fn is_reading(&self) -> bool {
         match &self.source.storage {
             Storage::Held { .. } => false,
@@ -272,21 +288,11 @@ impl Raster {
         }
     }
 
-    /// How often this thread asked for heights that were not here yet. Where it grows while
-    /// the thread reads heights, some of their holes are none.
-    pub fn not_yet(&self) -> u64 {
-        match &self.source.storage {
-            Storage::Held { .. } => 0,
-            Storage::Blocks(_) => blocks::not_yet(),
-        }
-    }
-
-    /// Whether all that was asked for so far has come: what is planned with holes that are
-    /// none is planned wrongly.
+    /// Checks that every read so far that waited was complete: a plan over pending heights is wrong.
     ///
     /// # Errors
-    /// Why something did not come.
-    pub fn check_came(&self) -> Result<(), Error> {
+    /// The reason why a height could not be read.
+    pub fn check_complete(&self) -> Result<(), Error> {
         let outage = match &self.source.storage {
             Storage::Held { .. } => None,
             Storage::Blocks(blocks) => blocks.take_outage(),
@@ -304,23 +310,65 @@ impl Raster {
         self.source.rows
     }
 
-    /// The height at a sample in the file's vertical unit; NaN in a hole and
-    /// outside the field. Row 0 is the southernmost.
+    /// The height at a sample in the file's vertical unit; NaN in a hole, outside the field, and
+    /// where it cannot be read at present ([`Raster::check_complete`]). Row 0 is the southernmost.
     pub fn height(&self, column: u32, row: u32) -> f64 {
-        self.sample(column, row)
+        self.sample(column, row, Wait::UntilRead).0
     }
 
-    /// Copies heights of a row from `first_column` eastwards, one for each place in
-    /// `heights`: the same values as [`Raster::height`].
+    /// The height at a sample as [`Raster::height`] returns it, and whether it is known.
+    pub fn read_height(&self, column: u32, row: u32, wait: Wait) -> (f64, ReadStatus) {
+        self.sample(column, row, wait)
+    }
+
+    /// Copies the heights of a window of level *L*, row after row, its southernmost row first, as
+    /// [`Raster::read_row`] does.
+    ///
+    /// # Panics
+    /// If `heights` has not exactly as many places as the window has samples.
+    pub fn read_window(
+        &self,
+        level: u8,
+        window: Window,
+        heights: &mut [f32],
+        wait: Wait,
+    ) -> ReadStatus {
+        let columns = window.columns as usize;
+        assert_eq!(
+            heights.len(),
+            columns * window.rows as usize,
+            "room for the window"
+        );
+        let reads = ReadTracker::default();
+        let mut line = vec![0.0; columns];
+        for (row, heights) in (window.row..).zip(heights.chunks_exact_mut(columns.max(1))) {
+            reads.add(self.read_row(level, row, window.column, &mut line, wait));
+            for (height, read) in heights.iter_mut().zip(&line) {
+                *height = *read as f32;
+            }
+        }
+        reads.status()
+    }
+
+    /// Copies heights of a row of level *L* from `first_column` eastwards, one for each place in
+    /// `heights`.
     ///
     /// Level *L* is the field with every 2ᴸ-th sample, or what an overview in the file has there
     /// ([`Raster::surface`]); row and column count in it.
-    pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
+    pub fn read_row(
+        &self,
+        level: u8,
+        row: u32,
+        first_column: u32,
+        heights: &mut [f64],
+        wait: Wait,
+    ) -> ReadStatus {
         heights.fill(f64::NAN);
         let step = 1_u64.checked_shl(level.into()).unwrap_or(u64::MAX);
         let row = u64::from(row).saturating_mul(step);
+        let reads = ReadTracker::default();
         if row >= u64::from(self.rows()) {
-            return;
+            return reads.status();
         }
         let columns = (u64::from(first_column)..).map(|column| column.saturating_mul(step));
         let columns = columns.take_while(|column| *column < u64::from(self.columns()));
@@ -328,11 +376,12 @@ impl Raster {
         let each = columns.map(|column| column as u32).zip(heights);
         let image = self.image_of(level);
         for (column, height) in each {
-            *height = match image {
-                0 => self.sample(column, row as u32),
-                _ => self.surface_of(image, [f64::from(column), row as f64]),
-            };
+            *height = reads.record(match image {
+                0 => self.sample(column, row as u32, wait),
+                _ => self.surface_of(image, [f64::from(column), row as f64], wait),
+            });
         }
+        reads.status()
     }
 
     /// The height between samples, linear along rows and columns, at a place in
@@ -343,14 +392,19 @@ impl Raster {
     /// heights of level *L* from the coarsest overview that is no coarser than it; of a file
     /// without overviews, where *L* is at least 3, from every 8th, 64th or 512th sample.
     pub fn surface(&self, level: u8, place: [f64; 2]) -> f64 {
-        self.surface_of(self.image_of(level), place)
+        self.read_surface(level, place, Wait::UntilRead).0
+    }
+
+    /// The height between samples as [`Raster::surface`] returns it, and whether it is known.
+    pub fn read_surface(&self, level: u8, place: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
+        self.surface_of(self.image_of(level), place, wait)
     }
 
     /// The same of an image of the file.
-    fn surface_of(&self, image: usize, [column, row]: [f64; 2]) -> f64 {
+    fn surface_of(&self, image: usize, [column, row]: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
         let last = [self.columns(), self.rows()].map(|count| f64::from(count) - 1.0);
         if !(0.0..=last[0]).contains(&column) || !(0.0..=last[1]).contains(&row) {
-            return f64::NAN;
+            return (f64::NAN, ReadStatus::Complete);
         }
         match &self.source.storage {
             Storage::Blocks(blocks) if image > 0 => {
@@ -365,9 +419,15 @@ impl Raster {
                     last[1] - row
                 };
                 let height = |stored| self.source.height_in_file(stored);
-                blocks.between(image, [column, row], height)
+                blocks.between(image, [column, row], wait, height)
             }
-            _ => bilinear::at([column, row], |column, row| self.sample(column, row)),
+            _ => {
+                let reads = ReadTracker::default();
+                let height = bilinear::at([column, row], |column, row| {
+                    reads.record(self.sample(column, row, wait))
+                });
+                (height, reads.status())
+            }
         }
     }
 
@@ -389,23 +449,27 @@ impl Raster {
     }
 
     /// The height at a sample of the full image.
-    fn sample(&self, column: u32, row: u32) -> f64 {
+    fn sample(&self, column: u32, row: u32, wait: Wait) -> (f64, ReadStatus) {
         if column >= self.columns() || row >= self.rows() {
-            return f64::NAN;
+            return (f64::NAN, ReadStatus::Complete);
         }
         let (column, row) = (self.file_column(column), self.file_row(row));
         match &self.source.storage {
             Storage::Held { samples, mask } => {
                 let index =
                     (u64::from(row) * u64::from(self.columns()) + u64::from(column)) as usize;
-                match mask.as_ref().is_some_and(|mask| mask.contains(index)) {
+                let height = match mask.as_ref().is_some_and(|mask| mask.contains(index)) {
                     true => f64::NAN,
                     false => with_samples!(samples, values => {
                         self.source.height_of(values[index].widen())
                     }),
-                }
+                };
+                (height, ReadStatus::Complete)
             }
-            Storage::Blocks(blocks) => self.source.height_in_file(blocks.stored(0, column, row)),
+            Storage::Blocks(blocks) => match blocks.stored(0, column, row, wait) {
+                Ok(stored) => (self.source.height_in_file(stored), ReadStatus::Complete),
+                Err(_) => (f64::NAN, ReadStatus::Pending),
+            },
         }
     }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::input::FileBytes;
-use crate::{Raster, RawLayout, RemoteFetcher};
+use crate::{Raster, RawLayout, RemoteFetcher, Wait};
 
 const SIZE: [u32; 2] = [1100, 700];
 
@@ -143,8 +143,15 @@ fn what_stays_in_its_file_is_the_same_on_all_levels() {
         let count = ((SIZE[0] - 1) >> level) + 1;
         let mut rows = [vec![0.0; count as usize], vec![0.0; count as usize]];
         for row in (0..SIZE[1] >> level).step_by(7) {
-            held.copy_row(level, row, 0, &mut rows[0]);
-            blocks.copy_row(level, row, 0, &mut rows[1]);
+            assert!(
+                held.read_row(level, row, 0, &mut rows[0], Wait::UntilRead)
+                    .is_complete()
+            );
+            assert!(
+                blocks
+                    .read_row(level, row, 0, &mut rows[1], Wait::UntilRead)
+                    .is_complete()
+            );
             assert_eq!(rows[0], rows[1], "{level} {row}");
         }
     }
@@ -183,8 +190,15 @@ fn levels_count_from_the_south_and_west_whatever_the_files_order() {
         orders.insert((blocks.source.south_up, blocks.source.east_first));
         let mut rows = [[0.0; 60], [0.0; 60]];
         for (level, row) in [(0, 3), (1, 200), (2, 100), (4, 30)] {
-            held.copy_row(level, row, 1, &mut rows[0]);
-            blocks.copy_row(level, row, 1, &mut rows[1]);
+            assert!(
+                held.read_row(level, row, 1, &mut rows[0], Wait::UntilRead)
+                    .is_complete()
+            );
+            assert!(
+                blocks
+                    .read_row(level, row, 1, &mut rows[1], Wait::UntilRead)
+                    .is_complete()
+            );
             assert!(
                 rows[0][0] == rows[1][0] && rows[0][30] == rows[1][30],
                 "{level} {east} {down}"

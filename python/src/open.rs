@@ -12,7 +12,7 @@ use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, Plac
 use hapterra::terrain::{HapticCells, INTERPOLATED_STEP, Terrain as Laid};
 use hapterra_core::phantom::Calibration;
 use hapterra_touch::{Block, Heights, Terrain as Touched, Unread};
-use heightfield::{Error, Raster, RasterError};
+use heightfield::{Error, Raster, RasterError, ReadTracker};
 use pyo3::exceptions::{PyFileNotFoundError, PyOSError};
 use pyo3::{PyErr, PyResult};
 use self_cell::self_cell;
@@ -130,7 +130,7 @@ impl Opened {
             Ok::<_, Failure>(view.terrain(grid)?)
         });
         // What has not come is no hole.
-        let over = over.map_err(|failure| match read.check_came() {
+        let over = over.map_err(|failure| match read.check_complete() {
             Err(error) => unread(error),
             Ok(()) => failed(failure),
         })?;
@@ -243,21 +243,20 @@ impl Heights for Part {
     fn read(&self, block: Block, heights: &mut [f64]) -> Result<(), Unread> {
         let opened = &*self.0;
         let (terrain, [west, south]) = (opened.terrain(), opened.first);
-        let raster = terrain.raster();
-        let before = raster.not_yet();
+        let (raster, reads) = (terrain.raster(), ReadTracker::default());
         let lines = heights.chunks_exact_mut(block.columns.max(1) as usize);
         for (row, line) in (south + block.row..).zip(lines) {
-            terrain.grid().copy_row(0, row, west + block.column, line);
+            reads.add(terrain.grid().read_row(0, row, west + block.column, line));
         }
-        if raster.not_yet() == before {
+        if reads.status().is_complete() {
             return Ok(());
         }
         // A line that is down is not asked each time: the reason stays.
         let (count, why) = &mut *opened.lock();
         *count += 1;
-        match raster.check_came() {
+        match raster.check_complete() {
             Err(error) => *why = text(&error.into()),
-            Ok(()) if why.is_empty() => *why = "the heights have not come: try again".to_owned(),
+            Ok(()) if why.is_empty() => *why = "the heights are not here yet: try again".to_owned(),
             Ok(()) => {}
         }
         Err(Unread(0))
@@ -305,7 +304,7 @@ fn unread(error: Error) -> PyErr {
         RasterError::Unreadable(io) if io.kind() == std::io::ErrorKind::NotFound => {
             PyFileNotFoundError::new_err
         }
-        RasterError::Unreadable(_) | RasterError::Remote(_) | RasterError::NotYet => {
+        RasterError::Unreadable(_) | RasterError::Remote(_) => {
             PyOSError::new_err
         }
         _ => pyo3::exceptions::PyValueError::new_err,

@@ -48,7 +48,7 @@ fn made_tiles(terrain: &Terrain<'_>) -> (f64, f64) {
     let bytes: usize = (0..TILES as i32)
         .map(|at| {
             let key = TileKey::new(0, first[0] + at % 8, first[1] + at / 8 % 8);
-            match terrain.tile(key, &mut buffer) {
+            match terrain.tile(key, &mut buffer).map(|(heights, _)| heights) {
                 Some(Heights::Packed { bytes, .. } | Heights::Samples { bytes, .. }) => bytes.len(),
                 _ => 0,
             }

@@ -13,7 +13,7 @@ use hapterra_core::force::SurfaceParams;
 use hapterra_tests::timeouts::{set_age, set_just_changed};
 use hapterra_tests::{hapterra_binary, terrain_file};
 use heightfield::disk_cache::DiskCache;
-use heightfield::{OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, Wait};
 
 /// A level whose samples lie in many blocks.
 const LEVEL: u8 = 6;
@@ -43,7 +43,11 @@ fn heights(raster: &Raster, level: u8) -> Vec<u64> {
     let mut row_of = vec![0.0; columns as usize];
     let mut all = vec![];
     for row in 0..rows {
-        raster.copy_row(level, row, 0, &mut row_of);
+        assert!(
+            raster
+                .read_row(level, row, 0, &mut row_of, Wait::UntilRead)
+                .is_complete()
+        );
         let bits = |height: &f64| if height.is_nan() { 0 } else { height.to_bits() };
         all.extend(row_of.iter().map(bits));
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use hapterra_tests::{bounded, hapterra_binary};
-use heightfield::{OpenOptions, Raster, files_read_with, gdal};
+use heightfield::{OpenOptions, Raster, Wait, files_read_with, gdal};
 
 fn has_gdal() -> bool {
     let runs = Command::new("gdalbuildvrt").arg("--version").output();
@@ -81,8 +81,14 @@ fn assert_same(many: &Raster, one: &Raster) -> usize {
     let mut heights = 0;
     for level in 0..=6 {
         for row in 0..one.rows() >> level {
-            many.copy_row(level, row, 0, &mut rows[0]);
-            one.copy_row(level, row, 0, &mut rows[1]);
+            assert!(
+                many.read_row(level, row, 0, &mut rows[0], Wait::UntilRead)
+                    .is_complete()
+            );
+            assert!(
+                one.read_row(level, row, 0, &mut rows[1], Wait::UntilRead)
+                    .is_complete()
+            );
             for (column, (many, one)) in rows[0].iter().zip(&rows[1]).enumerate() {
                 let same = many == one || (many.is_nan() && one.is_nan());
                 assert!(

@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use heightfield::{OpenOptions, Raster, RasterError, gdal};
+use heightfield::{OpenOptions, Raster, RasterError, Wait, gdal};
 
 const SIZE: (u32, u32) = (90, 70);
 const HOLE: (u32, u32) = (3, 4);
@@ -65,7 +65,11 @@ fn samples(raster: &Raster, level: u8) -> Vec<Vec<f64>> {
     let (columns, rows) = (SIZE.0.div_ceil(step), SIZE.1.div_ceil(step));
     let row = |row| {
         let mut heights = vec![0.0; columns as usize];
-        raster.copy_row(level, row, 0, &mut heights);
+        assert!(
+            raster
+                .read_row(level, row, 0, &mut heights, Wait::UntilRead)
+                .is_complete()
+        );
         heights
     };
     (0..rows).map(row).collect()

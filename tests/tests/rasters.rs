@@ -9,7 +9,7 @@ use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
 use hapterra_tests::readers::Reader;
 use hapterra_tests::shared;
-use heightfield::{CellUnit, OpenOptions, PngChannel, Raster, RasterError, gdal};
+use heightfield::{CellUnit, OpenOptions, PngChannel, Raster, RasterError, Wait, gdal};
 
 const COLUMNS: usize = 512;
 const ROWS: usize = 400;
@@ -336,7 +336,11 @@ fn a_large_file_is_held_once_in_its_own_type() {
         .fold(0.0, f64::max);
     assert_eq!(highest, 8752.0);
     let mut row = vec![0.0; 8];
-    raster.copy_row(0, 3358, 10_796, &mut row);
+    assert!(
+        raster
+            .read_row(0, 3358, 10_796, &mut row, Wait::UntilRead)
+            .is_complete()
+    );
     assert_eq!(row[3], raster.height(10_799, 3358));
     assert!(
         row[4..].iter().all(|height| height.is_nan()),
@@ -394,8 +398,15 @@ fn every_tiff_reads_the_same_in_blocks_as_at_once() {
             assert_eq!(held.bounds(), blocks.bounds(), "{name}");
             let mut rows = [(); 2].map(|()| vec![0.0; held.columns() as usize + 3]);
             for row in 0..=held.rows() {
-                held.copy_row(0, row, 0, &mut rows[0]);
-                blocks.copy_row(0, row, 0, &mut rows[1]);
+                assert!(
+                    held.read_row(0, row, 0, &mut rows[0], Wait::UntilRead)
+                        .is_complete()
+                );
+                assert!(
+                    blocks
+                        .read_row(0, row, 0, &mut rows[1], Wait::UntilRead)
+                        .is_complete()
+                );
                 let same = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
                 assert!(rows[0].iter().zip(&rows[1]).all(same), "{name}: row {row}");
             }

@@ -14,7 +14,7 @@ use hapterra_tests::scene::run::{Execution, Scene};
 use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
 use hapterra_tests::shared;
-use heightfield::{OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, Wait};
 
 /// What the second opinion found in a scene.
 #[derive(Debug, Default)]
@@ -214,7 +214,11 @@ fn cut(raster: &Raster, steepness: f64) -> Terrain {
     let rows: Vec<Vec<f64>> = (0..height)
         .map(|row| {
             let mut heights = vec![0.0; width as usize];
-            raster.copy_row(0, first[1] + row, first[0], &mut heights);
+            assert!(
+                raster
+                    .read_row(0, first[1] + row, first[0], &mut heights, Wait::UntilRead)
+                    .is_complete()
+            );
             heights
         })
         .collect();

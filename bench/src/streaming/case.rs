@@ -140,6 +140,7 @@ impl Bench<'_> {
         let began = Instant::now();
         let terrain = terrain(&raster)?;
         let scene = self.hand.scene(&terrain, Late::Underlay)?;
+        let terrain = terrain.non_blocking();
         let pace = case.pace(Pace::Real);
         let mut chain = Chain::new(&terrain, scene, board, self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, &self.ways.straight)?;
@@ -221,6 +222,7 @@ impl Bench<'_> {
         let raster = self.case.open()?;
         let terrain = terrain(&raster)?;
         let scene = self.hand.scene(&terrain, late)?;
+        let terrain = terrain.non_blocking();
         let pace = self.case.pace(Pace::Virtual);
         let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, way)?;

@@ -73,7 +73,6 @@ pub(super) struct Chain<'t> {
     line: Line,
     pace: Pace,
     now: u64,
-    not_yet: u64,
     began: Instant,
     reader: Box<FrameReader<MAX_FRAME>>,
     /// Tiles so far.
@@ -83,8 +82,8 @@ pub(super) struct Chain<'t> {
 }
 
 impl<'t> Chain<'t> {
-    /// A session about a scene of a terrain that begins with the next tick, over a line that
-    /// carries so many bytes a tick each way.
+    /// A session that begins with the next tick: a scene of a terrain whose reads do not wait, over
+    /// a line that carries `bytes_a_tick` each way.
     pub(super) fn new(
         terrain: &'t Terrain<'t>,
         scene: Scene,
@@ -92,8 +91,6 @@ impl<'t> Chain<'t> {
         bytes_a_tick: usize,
         pace: Pace,
     ) -> Self {
-        // Whoever holds the arm waits for no server.
-        terrain.raster().stop_waiting();
         let mut client = Client::numbered(terrain, scene, None, Timeouts::REAL_TIME, 1);
         let (mut line, mut out) = (Line::new(bytes_a_tick), vec![]);
         client.greet(Duration::ZERO, &mut out);
@@ -105,7 +102,6 @@ impl<'t> Chain<'t> {
             line,
             pace,
             now: 0,
-            not_yet: terrain.raster().not_yet(),
             began: Instant::now(),
             reader: Box::default(),
             tiles: vec![],
@@ -202,13 +198,12 @@ impl<'t> Chain<'t> {
 
     /// Lets a tick last a millisecond, where it has to.
     fn wait(&mut self) {
-        let not_yet = self.terrain.raster().not_yet();
-        let awaits = std::mem::replace(&mut self.not_yet, not_yet) != not_yet;
+        let is_reading = || self.terrain.raster().is_reading();
         if self.pace == Pace::Standing {
-            while self.terrain.raster().is_reading() {
+            while is_reading() {
                 std::thread::sleep(LOOK);
             }
-        } else if awaits || self.pace == Pace::Real {
+        } else if self.pace == Pace::Real || is_reading() {
             std::thread::sleep(TICK.saturating_sub(self.began.elapsed()));
         }
         self.began = Instant::now();

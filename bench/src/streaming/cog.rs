@@ -172,7 +172,7 @@ mod tests {
     use super::*;
     use crate::streaming::relief::PERIOD;
     use hapterra::terrain::{HapticCells, HapticGrid};
-    use heightfield::{OpenOptions, Raster};
+    use heightfield::{OpenOptions, Raster, Wait};
 
     #[test]
     fn every_place_of_a_terrain_has_the_relief_of_the_square_that_repeats() {
@@ -200,7 +200,11 @@ mod tests {
         // An overview, and no hole in it.
         for (column, row) in [(1, 1), (55, 55), (110, 3)] {
             let mut heights = [f64::NAN];
-            raster.copy_row(6, row, column, &mut heights);
+            assert!(
+                raster
+                    .read_row(6, row, column, &mut heights, Wait::UntilRead)
+                    .is_complete()
+            );
             assert!((0.0..600.0).contains(&heights[0]), "{heights:?}");
         }
     }

@@ -51,7 +51,7 @@ impl Corners {
 /// ```
 /// use hapterra_core::grid::{Altitude, Cell};
 /// use hapterra_core::terrain::{
-///     CellBox, FieldSize, TileArena, Ground, Tile, TileKey, Window,
+///     CellBox, CellContent, FieldSize, Tile, TileArena, TileKey, Window,
 /// };
 ///
 /// // A field far larger than the window, no sample of which exceeds 5 cells.

@@ -3,6 +3,7 @@
 
 use std::collections::{HashSet, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use super::cache::Key;
 
@@ -42,21 +43,23 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has something done before what was wanted already.
-    pub(super) fn want_first(&self, job: Job) {
+    /// Has something done before what was wanted already. Returns true if it is new.
+    pub(super) fn want_first(&self, job: Job) -> bool {
         let mut state = self.state();
-        if !state.is_over && state.waiting.len() < MOST && state.known.insert(job) {
+        let is_new = !state.is_over && state.waiting.len() < MOST && state.known.insert(job);
+        if is_new {
             state.waiting.push_front(job);
             drop(state);
             self.wake.notify_all();
         }
+        is_new
     }
 
-    /// Has something done, after what was wanted before.
-    pub(super) fn want(&self, job: Job) {
+    /// Has something done, after what was wanted before. Returns true if it is new.
+    pub(super) fn want(&self, job: Job) -> bool {
         let mut state = self.state();
         if state.is_over || !state.known.insert(job) {
-            return;
+            return false;
         }
         if state.waiting.len() >= MOST
             && let Some(left_out) = state.waiting.pop_front()
@@ -66,6 +69,7 @@ impl Queue {
         state.waiting.push_back(job);
         drop(state);
         self.wake.notify_all();
+        true
     }
 
     /// The next job; `None` where none waits.
@@ -90,6 +94,7 @@ impl Queue {
     /// A job is done.
     pub(super) fn done(&self, job: &Job) {
         self.state().known.remove(job);
+        self.wake.notify_all();
     }
 
     /// Whether no job waits or is being done.
@@ -105,10 +110,17 @@ impl Queue {
         !state.unwrap_or_else(PoisonError::into_inner).is_over
     }
 
-    /// Ends it: no job is begun any more.
-    pub(super) fn end(&self) {
-        self.state().is_over = true;
+    /// Ends it: no job is begun any more. Returns true if the present one is done within a time.
+    pub(super) fn end(&self, within: Duration) -> bool {
+        let mut state = self.state();
+        state.is_over = true;
+        for left_out in std::mem::take(&mut state.waiting) {
+            state.known.remove(&left_out);
+        }
         self.wake.notify_all();
+        let is_busy = |state: &mut State| !state.known.is_empty();
+        let ended = self.wake.wait_timeout_while(state, within, is_busy);
+        !ended.unwrap_or_else(PoisonError::into_inner).1.timed_out()
     }
 }
 
@@ -143,7 +155,7 @@ mod tests {
             last = Some(job);
         }
         assert_eq!(last, Some(Job::Pass([0, 0])));
-        queue.end();
+        assert!(!queue.end(Duration::ZERO), "some are being done");
         queue.want(Job::Pass([9, 9]));
         assert!(queue.next().is_none() && !queue.wait());
     }

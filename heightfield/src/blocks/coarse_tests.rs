@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use super::coarse::STEPS;
 use super::*;
-use crate::Raster;
 use crate::decoded::Decoded;
 use crate::storage::Storage;
 use crate::timeouts::{pass, wait_for, wait_until};
+use crate::{Raster, Window};
 
 const SIZE: [u32; 2] = [2101, 1250];
 const BLOCK: [u32; 2] = [64, 48];
@@ -88,7 +88,7 @@ impl BlockReader for Full {
             return Err(RasterError::Damaged("test".into()));
         }
         if at == LATE && self.seen.is_late.load(Ordering::Relaxed) {
-            return Err(RasterError::NotYet);
+            return Err(RasterError::Remote(crate::remote::outage()));
         }
         let rows = part.row..part.row + part.rows;
         let samples: Vec<f64> = rows
@@ -159,7 +159,11 @@ fn check(raster: &Raster, level: u8, order: [bool; 2]) {
     let count = SIZE.map(|count| ((count - 1) >> level) + 1);
     let mut heights = vec![0.0; count[0] as usize];
     for row in 0..count[1] {
-        raster.copy_row(level, row, 0, &mut heights);
+        assert!(
+            raster
+                .read_row(level, row, 0, &mut heights, Wait::UntilRead)
+                .is_complete()
+        );
         for (column, found) in (0..).zip(&heights) {
             let expected = height(column << level, row << level, order);
             let is_same = found.to_bits() == expected.to_bits();
@@ -221,17 +225,17 @@ fn between_coarse_samples_a_surface_is_linear() {
 }
 
 /// The level's row at which a tile would look, with what comes of it.
-fn look(raster: &Raster, level: u8) -> Option<Vec<f64>> {
-    let before = raster.not_yet();
+fn look(raster: &Raster, level: u8, wait: Wait) -> Option<Vec<f64>> {
+    let reads = ReadTracker::default();
     let mut heights = vec![0.0; 9 * 7];
     for (row, heights) in (0..).zip(heights.chunks_exact_mut(9)) {
-        raster.copy_row(level, row, 0, heights);
+        reads.add(raster.read_row(level, row, 0, heights, wait));
     }
-    (raster.not_yet() == before).then_some(heights)
+    reads.status().is_complete().then_some(heights)
 }
 
 fn comes(raster: &Raster, level: u8) -> Vec<f64> {
-    wait_for("the level", || look(raster, level))
+    wait_for("the level", || look(raster, level, Wait::Never))
 }
 
 fn same(one: &[f64], other: &[f64]) {
@@ -247,12 +251,11 @@ fn same(one: &[f64], other: &[f64]) {
 #[test]
 fn whoever_is_served_waits_for_no_coarse_level_and_gets_it_later() {
     let seen = Seen::new("");
-    let waited = look(&raster(&seen, &DiskCache::off(), USUAL), 8).expect("here");
+    let waited = look(&raster(&seen, &DiskCache::off(), USUAL), 8, Wait::UntilRead).expect("here");
     let raster = raster(&seen, &DiskCache::off(), USUAL);
     seen.threads.lock().expect("alone").clear();
-    raster.stop_waiting();
     assert_eq!(
-        look(&raster, 8),
+        look(&raster, 8, Wait::Never),
         None,
         "nothing is known yet, and nobody waits"
     );
@@ -266,17 +269,15 @@ fn whoever_is_served_waits_for_no_coarse_level_and_gets_it_later() {
 fn whoever_is_served_reads_no_fine_block() {
     let seen = Seen::new("");
     let raster = raster(&seen, &DiskCache::off(), USUAL);
-    let there = |column| (raster.height(column, 1000) > 0.0, raster.not_yet());
-    assert!(there(300).0, "whoever may wait does");
-    raster.stop_waiting();
+    let there = |column| raster.read_height(column, 1000, Wait::Never);
+    assert!(raster.height(300, 1000) > 0.0, "a read that may wait does");
     seen.threads.lock().expect("alone").clear();
-    let before = raster.not_yet();
     let mut columns = 1000..1010;
     let far = columns.find(|column| height(*column, 1000, USUAL) > 0.0);
     let far = far.expect("no hole");
-    assert_eq!(there(far), (false, before + 1));
-    assert!(there(300).0, "it is in memory");
-    wait_until("the block", || there(far).0);
+    assert_eq!(there(far).1, ReadStatus::Pending);
+    assert!(there(300).0 > 0.0, "it is in memory");
+    wait_until("the block", || there(far).0 > 0.0);
     let threads = seen.threads.lock().expect("alone").clone();
     assert!(threads.len() == 1 && threads[0] != thread::current().id());
 }
@@ -290,12 +291,11 @@ fn what_has_not_come_is_no_hole_and_what_cannot_be_read_is_none_for_long() {
     seen.is_damaged.store(true, Ordering::Relaxed);
     {
         let raster = raster(&seen, &disk, [true, false]);
-        raster.stop_waiting();
         // Level 3 there: the late block has columns 448 to 511, rows 288 to 335.
         let late = |raster: &Raster| {
-            let (mut heights, before) = ([0.0; 8], raster.not_yet());
-            raster.copy_row(3, 37, 56, &mut heights);
-            (raster.not_yet() == before).then_some(heights)
+            let mut heights = [0.0; 8];
+            let status = raster.read_row(3, 37, 56, &mut heights, Wait::Never);
+            status.is_complete().then_some(heights)
         };
         for _ in 0..20 {
             assert_eq!(late(&raster), None);
@@ -310,9 +310,9 @@ fn what_has_not_come_is_no_hole_and_what_cannot_be_read_is_none_for_long() {
         // The damaged one has columns 320 to 383, rows 192 to 239.
         let mut bad = [0.0; 8];
         wait_until("the damaged block", || {
-            let before = raster.not_yet();
-            raster.copy_row(3, 25, 40, &mut bad);
-            raster.not_yet() == before
+            raster
+                .read_row(3, 25, 40, &mut bad, Wait::Never)
+                .is_complete()
         });
         assert!(bad.iter().all(|height| height.is_nan()), "{bad:?}");
     }
@@ -398,7 +398,7 @@ fn the_memory_of_coarse_samples_is_bounded_and_what_gives_way_is_kept_on_disk() 
         })
     };
     for [column, row] in places() {
-        first.stored(image, column, row);
+        let _ = first.stored(image, column, row, Wait::UntilRead);
     }
     let reads = seen.reads();
     assert_eq!(reads, 32 * 32);
@@ -406,7 +406,8 @@ fn the_memory_of_coarse_samples_is_bounded_and_what_gives_way_is_kept_on_disk() 
     drop(first);
     let again = blocks();
     for [column, row] in places() {
-        let found = again.stored(image, column, row);
+        let found = again.stored(image, column, row, Wait::UntilRead);
+        let found = found.expect("complete");
         let expected = value(column * step, row * step);
         let is_same = found.is_some_and(|found| found.to_bits() == expected.to_bits());
         assert!(is_same || expected.is_nan());
@@ -420,15 +421,16 @@ fn what_lies_ahead_is_read_in_the_background_and_too_much_is_not() {
         let seen = Seen::new("");
         let raster = raster(&seen, &DiskCache::off(), order);
         seen.threads.lock().expect("alone").clear();
-        raster.prefetch(0, [1000, 1100], [600, 650]);
-        raster.stop_waiting();
-        assert_eq!(seen.reads(), 0, "who may wait reads nothing ahead");
         raster.prefetch(0, [0, 2100], [0, 1249]);
         raster.prefetch(0, [1000, 1100], [600, 650]);
         let there = |raster: &Raster| {
             let mut heights = [0.0; 101];
             let is_all = |row: u32, heights: &mut [f64; 101]| {
-                raster.copy_row(0, row, 1000, heights);
+                assert!(
+                    raster
+                        .read_row(0, row, 1000, heights, Wait::UntilRead)
+                        .is_complete()
+                );
                 (1000..).zip(&*heights).all(|(column, found)| {
                     let expected = height(column, row, order);
                     found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan()
@@ -446,5 +448,29 @@ fn what_lies_ahead_is_read_in_the_background_and_too_much_is_not() {
         assert_eq!(seen.reads(), 6);
         let this = thread::current().id();
         assert!(!seen.threads.lock().expect("alone").contains(&this));
+    }
+}
+
+#[test]
+fn windows_hold_their_rows_and_report_pending_heights() {
+    let raster = raster(&Seen::new(""), &DiskCache::off(), USUAL);
+    let window = Window {
+        column: 700,
+        row: 500,
+        columns: 5,
+        rows: 3,
+    };
+    let mut heights = [0.0_f32; 15];
+    let status = raster.read_window(0, window, &mut heights, Wait::Never);
+    assert_eq!(status, ReadStatus::Pending);
+    assert!(heights.iter().all(|height| height.is_nan()));
+    let status = raster.read_window(0, window, &mut heights, Wait::UntilRead);
+    assert_eq!(status, ReadStatus::Complete);
+    for (index, found) in (0..).zip(heights) {
+        let expected = height(700 + index % 5, 500 + index / 5, USUAL) as f32;
+        assert!(
+            found == expected || found.is_nan() && expected.is_nan(),
+            "{index}"
+        );
     }
 }

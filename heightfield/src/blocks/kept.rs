@@ -1,37 +1,18 @@
 //! What is known of blocks without reading: those in memory, those that are not here yet, and
 //! what went wrong.
 
-use std::cell::Cell;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::super::RasterError;
-use super::Block;
 use super::cache::{Cache, Key};
+use super::{Block, NotHere};
 
 /// A block that was not here yet is looked for again after so long.
 const AGAIN: Duration = Duration::from_millis(20);
 /// Blocks that are known to be on their way, at most.
 const MAX_AWAITED: usize = 1024;
-
-thread_local! {
-    /// How often this thread asked for something that is not here yet.
-    static NOT_YET: Cell<u64> = const { Cell::new(0) };
-}
-
-/// How often this thread asked for something, of any file, that is not here yet. What another
-/// thread misses says nothing of what this one has read: of two devices on one terrain, one
-/// over what has come is not held up by one over what has not
-/// (`what_one_thread_misses_is_not_counted_for_another`).
-pub(crate) fn not_yet() -> u64 {
-    NOT_YET.get()
-}
-
-/// Counts something that is not here yet.
-pub(super) fn count_not_yet() {
-    NOT_YET.set(NOT_YET.get().wrapping_add(1));
-}
 
 /// What is known of the blocks of a file.
 pub(super) struct Kept {
@@ -61,15 +42,14 @@ impl Kept {
     }
 
     /// What is known of a block: it is in memory, or it is not here yet, and was looked for a
-    /// moment ago, which is counted.
-    pub(super) fn known(&mut self, key: &Key) -> Option<Option<Arc<Block>>> {
+    /// moment ago.
+    pub(super) fn known(&mut self, key: &Key) -> Option<Result<Option<Arc<Block>>, NotHere>> {
         if let Some(block) = self.cache.get(key) {
-            return Some(block);
+            return Some(Ok(block));
         }
         let looked = self.awaited.get(key);
         looked.filter(|looked| looked.elapsed() < AGAIN)?;
-        count_not_yet();
-        Some(None)
+        Some(Err(NotHere))
     }
 
     /// Keeps a block that was read; `None` where there is no sample.

@@ -9,9 +9,9 @@
 //!
 //! A block that cannot be read is a hole, with a warning: what is wrong in one place of a
 //! file that is larger than memory is no reason to feel nothing of it. What has not come yet
-//! from elsewhere is not known: it is counted, and asked for again. So is everything that is not in
-//! memory, once somebody is served who must not wait: one thread makes what is coarse, another
-//! reads what is fine (`background`). However long a file takes, nobody who is served waits for it.
+//! from elsewhere is not known ([`NotHere`]), and asked for again. So is everything that is not in
+//! memory, for a reader who must not wait ([`Wait::Never`]): one thread makes what is coarse, another
+//! reads what is fine (`background`), and both wait for what they read.
 //!
 //! Several threads may share the blocks, as those of several devices on one terrain do. Of them one
 //! reads at a time, besides the threads in the background, so the bound of the memory does not grow with
@@ -30,24 +30,26 @@ mod survey;
 use std::fmt;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use super::samples::SampleType;
-use super::{RasterError, bilinear};
+use super::{RasterError, ReadStatus, ReadTracker, Wait, bilinear};
 use crate::disk_cache::DiskCache;
 use crate::remote::without_key;
 use background::{Job, Queue};
 use cache::Key;
 use coarse::{Coarse, Found};
-pub(super) use kept::not_yet;
-use kept::{Kept, count_not_yet};
+use kept::Kept;
 pub(super) use reader::{Block, BlockImage, BlockReader, Part, usual_block};
 pub(super) use survey::{Looks, Survey, stored_parts};
 
 /// Blocks of a larger size than this are not read one by one, bytes.
 pub(super) const MAX_BLOCK_BYTES: u64 = 32 << 20;
+/// Time in which a block that is being read may end when the file is closed.
+const END_WITHIN: Duration = Duration::from_secs(1);
 /// An image serves a level that is coarser than it, or as coarse to this share: overviews
 /// of a field whose size is odd are coarser than a power of two by up to a sample.
 const AS_COARSE: f64 = 1.01;
@@ -55,8 +57,8 @@ const AS_COARSE: f64 = 1.01;
 /// The blocks of a file, those touched last in memory.
 pub(super) struct Blocks {
     shared: Arc<Shared>,
-    /// Do the jobs, once nobody waits any more.
-    threads: Mutex<Vec<JoinHandle<()>>>,
+    /// Read for those who do not wait; none if the system starts no thread.
+    threads: OnceLock<Option<[JoinHandle<()>; 2]>>,
 }
 
 /// What the one who reads and the threads in the background share.
@@ -74,15 +76,18 @@ pub(super) struct Shared {
     queue: Queue,
     /// What is fine, which is wanted at once.
     fine: Queue,
-    has_stopped_waiting: AtomicBool,
     /// Blocks that were read from the file.
     read: AtomicU64,
     /// The file, for warnings.
     path: OnceLock<PathBuf>,
 }
 
-/// What was asked for is elsewhere.
-struct NotHere;
+/// A sample that is not in memory yet, or cannot be read at present.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct NotHere;
+
+/// A stored sample; `None` in a hole that no value marks.
+pub(super) type Stored = Result<Option<f64>, NotHere>;
 
 impl Blocks {
     /// Nothing is read yet.
@@ -96,13 +101,12 @@ impl Blocks {
             disk: DiskCache::off(),
             queue: Queue::default(),
             fine: Queue::default(),
-            has_stopped_waiting: AtomicBool::new(false),
             read: AtomicU64::new(0),
             path: OnceLock::new(),
         };
         Self {
             shared: Arc::new(shared),
-            threads: Mutex::new(vec![]),
+            threads: OnceLock::new(),
         }
     }
 
@@ -129,29 +133,58 @@ impl Blocks {
         }
     }
 
-    /// From now on nobody waits for what is not in memory: it is read in the background, and
-    /// counted until then.
-    pub(super) fn stop_waiting(&self) {
-        let mut threads = self.threads.lock().unwrap_or_else(PoisonError::into_inner);
-        if !threads.is_empty() {
-            return;
-        }
+    /// Starts the threads for reads that do not wait. Without threads such a read has to wait.
+    fn possible(&self, wait: Wait) -> Wait {
         let start = |name: &str, queue: fn(&Shared) -> &Queue| {
             let shared = self.shared.clone();
             let builder = thread::Builder::new().name(name.into());
             builder.spawn(move || shared.work(queue(&shared)))
         };
-        let coarse = start("coarse samples", |shared| &shared.queue);
-        let fine = start("fine samples", |shared| &shared.fine);
-        let are_both = coarse.is_ok() && fine.is_ok();
-        for started in [coarse, fine] {
-            match started {
-                Ok(thread) => threads.push(thread),
-                // Then they are waited for.
-                Err(error) => tracing::warn!("no thread for samples: {error}"),
+        let start_both = || {
+            let coarse = start("coarse samples", |shared| &shared.queue);
+            let fine = start("fine samples", |shared| &shared.fine);
+            match (coarse, fine) {
+                (Ok(coarse), Ok(fine)) => Some([coarse, fine]),
+                (Err(error), _) | (_, Err(error)) => {
+                    tracing::warn!(
+                        "no thread to read samples in the background, so reads wait: {error}"
+                    );
+                    None
+                }
             }
+        };
+        match wait == Wait::Never && self.threads.get_or_init(start_both).is_some() {
+            true => Wait::Never,
+            false => Wait::UntilRead,
         }
-        self.has_stopped_waiting.store(are_both, Ordering::Release);
+    }
+
+    /// A stored sample at a column and row of an image, in the file's order.
+    pub(super) fn stored(&self, image: usize, column: u32, row: u32, wait: Wait) -> Stored {
+        self.shared
+            .sample(image, [column, row], self.possible(wait))
+    }
+
+    /// A stored sample between the samples of an image, linear along rows and columns, at a
+    /// place in columns and rows of the full one; every corner that counts must have
+    /// a height. `height` makes one of a stored value.
+    pub(super) fn between(
+        &self,
+        image: usize,
+        place: [f64; 2],
+        wait: Wait,
+        height: impl Fn(Option<f64>) -> f64,
+    ) -> (f64, ReadStatus) {
+        let wait = self.possible(wait);
+        self.shared.between(image, place, wait, height)
+    }
+
+    /// Has blocks read in the background: those of the image that serves a level, between two
+    /// columns and two rows of the full one.
+    pub(super) fn prefetch_full(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
+        if self.possible(Wait::Never) == Wait::Never {
+            self.shared.prefetch_full(level, columns, rows);
+        }
     }
 }
 
@@ -165,12 +198,13 @@ impl Deref for Blocks {
 
 impl Drop for Blocks {
     fn drop(&mut self) {
-        self.queue.end();
-        self.fine.end();
-        let threads = self.threads.get_mut();
-        for thread in threads.unwrap_or_else(PoisonError::into_inner).drain(..) {
-            // It ends after its present job.
-            let _ = thread.join();
+        // A thread that waits for a server ends when the server answers.
+        let are_done = [&self.shared.queue, &self.shared.fine].map(|queue| queue.end(END_WITHIN));
+        let threads = self.threads.take().flatten().into_iter().flatten();
+        for (thread, is_done) in threads.zip(are_done) {
+            if is_done {
+                let _ = thread.join();
+            }
         }
         let new = self.coarse().take_new();
         self.keep(new);
@@ -230,10 +264,6 @@ impl Shared {
         self.coarse.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn waits(&self) -> bool {
-        !self.has_stopped_waiting.load(Ordering::Acquire)
-    }
-
     /// Type in which samples are held.
     pub(super) fn sample_type(&self) -> SampleType {
         self.reader.sample_type()
@@ -268,34 +298,40 @@ impl Shared {
         if every.is_some() { 0 } else { image }
     }
 
-    /// A stored sample at a column and row of an image, in the file's order; `None` in a
-    /// hole that no value marks.
-    pub(super) fn stored(&self, image: usize, column: u32, row: u32) -> Option<f64> {
+    /// A stored sample at a column and row of an image, in the file's order.
+    fn sample(&self, image: usize, [column, row]: [u32; 2], wait: Wait) -> Stored {
         if image >= self.reader.images().len() {
-            return self.coarse_sample(image, [column, row]);
+            return self.coarse_sample(image, [column, row], wait);
         }
-        let of = self.images.get(image)?;
+        let Some(of) = self.images.get(image) else {
+            return Ok(None);
+        };
         let [across, down] = of.block;
-        let block = self.block(image, [column / across, row / down])?;
+        let Some(block) = self.block(image, [column / across, row / down], wait)? else {
+            return Ok(None);
+        };
         let columns = of.part([column / across, row / down]).columns as usize;
         let index = (row % down) as usize * columns + (column % across) as usize;
-        block.stored(index)
+        Ok(block.stored(index))
     }
 
     /// A stored sample of an image that is made.
-    fn coarse_sample(&self, image: usize, at: [u32; 2]) -> Option<f64> {
-        let of = self.images.get(image)?;
+    fn coarse_sample(&self, image: usize, at: [u32; 2], wait: Wait) -> Stored {
+        let Some(of) = self.images.get(image) else {
+            return Ok(None);
+        };
         let key = coarse::place(image, at).0;
         let mut found = self.coarse().sample(image, at);
         if found == (Found::Nothing { was_sought: false }) && self.disk.is_on() {
-            if !self.waits() {
-                return self.later(Job::Seek(key));
+            if wait == Wait::Never {
+                self.queue.want(Job::Seek(key));
+                return Err(NotHere);
             }
             self.seek(key);
             found = self.coarse().sample(image, at);
         }
         if let Found::Value(value) = found {
-            return Some(value);
+            return Ok(Some(value));
         }
         let every = of.every.unwrap_or(1);
         let [column, row] = [0, 1].map(|axis| of.first[axis] + at[axis] * every);
@@ -304,36 +340,29 @@ impl Shared {
         let part = full.part(block);
         if !self.reader.is_stored(0, &part) {
             self.coarse().leave(&part, None, false);
-            return None;
+            return Ok(None);
         }
         let is_here = self.kept().cache.get(&Key {
             image: 0,
             at: block,
         });
-        match self.waits() || is_here.is_some() {
-            true => self.stored(0, column, row),
-            false => self.later(Job::Pass(block)),
+        if wait == Wait::UntilRead || is_here.is_some() {
+            return self.sample(0, [column, row], wait);
         }
+        self.queue.want(Job::Pass(block));
+        Err(NotHere)
     }
 
-    /// Has something done in the background, and counts that it is not done yet.
-    fn later(&self, job: Job) -> Option<f64> {
-        self.queue.want(job);
-        count_not_yet();
-        None
-    }
-
-    /// A stored sample between the samples of an image, linear along rows and columns, at a
-    /// place in columns and rows of the full one; every corner that counts must have
-    /// a height. `height` makes one of a stored value.
-    pub(super) fn between(
+    /// [`Blocks::between`].
+    fn between(
         &self,
         image: usize,
         [column, row]: [f64; 2],
+        wait: Wait,
         height: impl Fn(Option<f64>) -> f64,
-    ) -> f64 {
+    ) -> (f64, ReadStatus) {
         let Some(of) = self.images.get(image) else {
-            return f64::NAN;
+            return (f64::NAN, ReadStatus::Complete);
         };
         // A sample is the middle of its cell, and the edges of the images are the same.
         let times = self.coarseness(of);
@@ -345,12 +374,18 @@ impl Shared {
             place(column - f64::from(of.first[0]), times[0], of.columns),
             place(row - f64::from(of.first[1]), times[1], of.rows),
         ];
-        bilinear::at(place, |column, row| height(self.stored(image, column, row)))
+        let reads = ReadTracker::default();
+        let height = bilinear::at(place, |column, row| {
+            reads.record(match self.sample(image, [column, row], wait) {
+                Ok(stored) => (height(stored), ReadStatus::Complete),
+                Err(NotHere) => (f64::NAN, ReadStatus::Pending),
+            })
+        });
+        (height, reads.status())
     }
 
-    /// [`Shared::prefetch`] of the image that serves a level, between two columns and two rows
-    /// of the full one.
-    pub(super) fn prefetch_full(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
+    /// [`Blocks::prefetch_full`].
+    fn prefetch_full(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
         let image = self.image_of(level);
         let Some(of) = self.images.get(image) else {
             return;

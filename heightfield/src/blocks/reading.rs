@@ -8,8 +8,7 @@ use super::super::guard::guarded;
 use super::background::{Job, Queue};
 use super::cache::Key;
 use super::coarse::Piece;
-use super::kept::count_not_yet;
-use super::{Block, NotHere, Part, Shared, lasting};
+use super::{Block, NotHere, Part, Shared, Wait, lasting};
 use crate::remote::without_key;
 
 /// After so many warnings of blocks that cannot be read one says that there are more.
@@ -30,19 +29,33 @@ pub(super) struct Read {
 
 impl Shared {
     /// A block, read if it is not in memory; `None` where there is no sample.
-    pub(super) fn block(&self, image: usize, at: [u32; 2]) -> Option<Arc<Block>> {
+    ///
+    /// # Errors
+    /// [`NotHere`] if it is not in memory and `wait` is [`Wait::Never`], or if it cannot be read at
+    /// present.
+    pub(super) fn block(
+        &self,
+        image: usize,
+        at: [u32; 2],
+        wait: Wait,
+    ) -> Result<Option<Arc<Block>>, NotHere> {
         let key = Key { image, at };
         if let Some(known) = self.kept().known(&key) {
             return known;
         }
-        let of = self.images.get(image)?;
-        if !self.waits() {
-            match lasting::is_coarse(of) {
+        let Some(of) = self.images.get(image) else {
+            return Ok(None);
+        };
+        if wait == Wait::Never {
+            let is_new = match lasting::is_coarse(of) {
                 true => self.queue.want(Job::Fetch(key)),
                 false => self.fine.want_first(Job::Fetch(key)),
+            };
+            if is_new {
+                // Blocks are decoded one after the other, and fetched together.
+                self.reader.want(image, &[of.part(at)]);
             }
-            count_not_yet();
-            return None;
+            return Err(NotHere);
         }
         // Nothing that panics runs while this is held but decoders, whose panics are caught.
         let turn = self.turn.lock();
@@ -51,12 +64,12 @@ impl Shared {
         if let Some(known) = self.kept().known(&key) {
             return known;
         }
-        if let Ok(block) = self.fetch(key) {
-            return block;
+        let fetched = self.fetch(key);
+        match fetched {
+            Ok(_) => self.keep_due(),
+            Err(NotHere) => self.kept().wait_for(key),
         }
-        count_not_yet();
-        self.kept().wait_for(key);
-        None
+        fetched
     }
 
     /// Reads a block and keeps it.
@@ -93,10 +106,9 @@ impl Shared {
     }
 
     /// Has the blocks of a part of an image read that are not in memory. Waits for
-    /// nothing, and does nothing before nobody waits any more, nor for a part of more than
-    /// [`MAX_PREFETCHED`] blocks.
+    /// nothing, and does nothing for a part of more than [`MAX_PREFETCHED`] blocks.
     pub(super) fn prefetch(&self, image: usize, part: &Part) {
-        let Some(of) = self.images.get(image).filter(|_| !self.waits()) else {
+        let Some(of) = self.images.get(image) else {
             return;
         };
         if image >= self.reader.images().len() || part.columns == 0 || part.rows == 0 {
@@ -130,11 +142,12 @@ impl Shared {
     fn leave(&self, part: &Part, read: &Read) {
         let mut coarse = self.coarse();
         coarse.leave(part, read.block.as_deref(), read.is_lacking);
-        if self.waits() {
-            let due = coarse.take_due();
-            drop(coarse);
-            self.keep(due);
-        }
+    }
+
+    /// Keeps coarse samples on disk, from time to time.
+    fn keep_due(&self) {
+        let due = self.coarse().take_due();
+        self.keep(due);
     }
 
     /// A part of an image; `None` where there is no sample.
@@ -196,8 +209,7 @@ impl Shared {
                     }
                 }
                 queue.done(&job);
-                let due = self.coarse().take_due();
-                self.keep(due);
+                self.keep_due();
             }
             if !queue.wait() {
                 return;

@@ -6,6 +6,7 @@ use twox_hash::XxHash64;
 
 use super::super::HeightSummary;
 use super::{BlockImage, Part, Shared};
+use crate::Wait;
 use crate::remote::without_key;
 
 /// Of an image with at most so many samples all are looked at.
@@ -122,7 +123,8 @@ impl Shared {
     fn look_at_block(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
         for row in part.row..part.row + part.rows {
             for column in part.column..part.column + part.columns {
-                add(self.stored(image, column, row));
+                let stored = self.sample(image, [column, row], Wait::UntilRead);
+                add(stored.ok().flatten());
             }
         }
     }

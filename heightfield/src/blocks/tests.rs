@@ -157,7 +157,11 @@ fn coarse_levels_come_from_the_overview_in_their_place_whatever_the_files_order(
         };
         for level in [2, 3, 5] {
             let mut heights = [0.0; 5];
-            raster.copy_row(level, 3, 2, &mut heights);
+            assert!(
+                raster
+                    .read_row(level, 3, 2, &mut heights, Wait::UntilRead)
+                    .is_complete()
+            );
             for (index, found) in (2..).zip(heights) {
                 let expected = height(index << level, 3 << level);
                 assert!(
@@ -187,9 +191,13 @@ fn the_memory_that_blocks_take_is_bounded() {
     field.images = vec![image([20_000, 20_000])];
     let blocks = Blocks::new(Box::new(field));
     for block in 0..20_000 / 64 {
-        assert!(blocks.stored(0, block * 64, 4800).is_some());
+        assert!(
+            blocks
+                .stored(0, block * 64, 4800, Wait::UntilRead)
+                .is_ok_and(|stored| stored.is_some())
+        );
         for row in 1..20 {
-            blocks.stored(0, block * 64, 4800 + row * 480);
+            let _ = blocks.stored(0, block * 64, 4800 + row * 480, Wait::UntilRead);
         }
     }
     let kept = blocks.kept.lock().expect("alone");
@@ -199,7 +207,7 @@ fn the_memory_that_blocks_take_is_bounded() {
     drop(kept);
     // The one touched last is still there.
     let before = read.load(Ordering::Relaxed);
-    blocks.stored(0, (20_000 / 64 - 1) * 64, 4800 + 19 * 480);
+    let _ = blocks.stored(0, (20_000 / 64 - 1) * 64, 4800 + 19 * 480, Wait::UntilRead);
     assert_eq!(read.load(Ordering::Relaxed), before);
 }
 
@@ -265,7 +273,7 @@ impl BlockReader for Slow {
     fn read(&self, _: usize, part: &Part) -> Result<Block, RasterError> {
         if part.column == BLOCK[0] {
             if self.elsewhere {
-                return Err(RasterError::NotYet);
+                return Err(RasterError::Remote(crate::remote::outage()));
             }
             self.begun.wait();
             self.go_on.wait();
@@ -298,35 +306,30 @@ fn whoever_touches_what_is_in_memory_does_not_wait_for_a_block_that_is_being_rea
     let field = slow(false);
     let (begun, go_on) = (field.begun.clone(), field.go_on.clone());
     let blocks = Blocks::new(Box::new(field));
-    assert_eq!(blocks.stored(0, 0, 0), Some(1.0));
+    assert_eq!(blocks.stored(0, 0, 0, Wait::UntilRead), Ok(Some(1.0)));
     std::thread::scope(|scope| {
-        scope.spawn(|| assert_eq!(blocks.stored(0, BLOCK[0], 0), Some(1.0)));
+        scope.spawn(|| {
+            assert_eq!(
+                blocks.stored(0, BLOCK[0], 0, Wait::UntilRead),
+                Ok(Some(1.0))
+            )
+        });
         begun.wait();
         // The other thread reads until it is told to go on.
         let is_free = blocks.kept.try_lock().is_ok();
-        let sample = is_free.then(|| blocks.stored(0, 1, 1));
+        let sample = is_free.then(|| blocks.stored(0, 1, 1, Wait::UntilRead));
         go_on.wait();
-        assert_eq!(sample, Some(Some(1.0)));
+        assert_eq!(sample, Some(Ok(Some(1.0))));
     });
 }
 
 #[test]
-fn what_one_thread_misses_is_not_counted_for_another() {
+fn a_missing_block_is_reported_at_each_read() {
     let blocks = Blocks::new(Box::new(slow(true)));
-    std::thread::scope(|scope| {
-        let other = scope.spawn(|| {
-            let before = not_yet();
-            // The second time it is known without a look.
-            for times in 1..=2 {
-                assert_eq!(blocks.stored(0, BLOCK[0], 0), None);
-                assert_eq!(not_yet(), before + times);
-            }
-        });
-        let before = not_yet();
-        other.join().expect("it counts");
-        assert_eq!(blocks.stored(0, 0, 0), Some(1.0));
-        assert_eq!(not_yet(), before);
-    });
+    let missing = || blocks.stored(0, BLOCK[0], 0, Wait::UntilRead);
+    // The second time it is known without a look.
+    assert_eq!((missing(), missing()), (Err(NotHere), Err(NotHere)));
+    assert_eq!(blocks.stored(0, 0, 0, Wait::UntilRead), Ok(Some(1.0)));
 }
 
 #[test]

@@ -99,7 +99,7 @@ impl Mosaic {
                 let place = sources[index].place([column, row]);
                 opened[index].height(0, place)
             };
-            let Some((one, other)) = height(0).zip(height(1)) else {
+            let Some((one, other)) = height(0)?.zip(height(1)?) else {
                 continue;
             };
             let (apart, size) = ((one - other).abs(), one.abs().max(other.abs()));

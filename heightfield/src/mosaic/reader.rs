@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use fixedbitset::FixedBitSet;
 use twox_hash::XxHash64;
 
-use super::super::blocks::{Block, BlockImage, BlockReader, Looks, Part, not_yet};
+use super::super::blocks::{Block, BlockImage, BlockReader, Looks, Part};
 use super::super::{OpenOptions, RasterError, SampleType};
 use super::pool::Pool;
 use super::source::{Opened, Source};
@@ -135,16 +135,26 @@ impl<'p> Filling<'p> {
     }
 
     /// Fills places from a file.
-    fn fill(&mut self, level: u8, source: &Source, opened: &Opened, places: &[[u32; 3]]) {
+    ///
+    /// # Errors
+    /// The reason why a height is not known.
+    fn fill(
+        &mut self,
+        level: u8,
+        source: &Source,
+        opened: &Opened,
+        places: &[[u32; 3]],
+    ) -> Result<(), RasterError> {
         for &[column, row, index] in places {
             // Both fit: they are inside the terrain.
             let place = source.place([column, row].map(|index| index << level));
-            if let Some(height) = opened.height(level, place) {
+            if let Some(height) = opened.height(level, place)? {
                 self.values[index as usize] = height;
                 self.done.insert(index as usize);
                 self.left -= 1;
             }
         }
+        Ok(())
     }
 }
 
@@ -183,11 +193,7 @@ impl BlockReader for Mosaic {
             // Only while it is opened: whoever else reads does not wait for all of this.
             let opened = self.opened(number, source)?;
             if let Some(opened) = &opened {
-                let before = not_yet();
-                filling.fill(image as u8, source, opened, &places);
-                if not_yet() != before {
-                    return Err(RasterError::NotYet);
-                }
+                filling.fill(image as u8, source, opened, &places)?;
             }
             is_lacking |= opened.is_none_or(|opened| opened.share().1 > 0);
             self.pool().make_room(0);

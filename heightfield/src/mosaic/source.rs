@@ -8,7 +8,8 @@ use super::super::decoded::Decoded;
 use super::super::samples::{SampleValue, with_samples};
 use super::super::storage::Storage;
 use crate::disk_cache::FileStamp;
-use crate::remote::is_url;
+use crate::remote::{is_url, outage};
+use crate::{RasterError, ReadStatus, Wait};
 
 /// A file and its part of the terrain.
 #[derive(Clone, Debug)]
@@ -97,12 +98,27 @@ impl Opened {
     }
 
     /// The height at a place of the file for a level of detail; `None` in a hole.
-    pub(super) fn height(&self, level: u8, [column, row]: [u32; 2]) -> Option<f64> {
-        let height = self.decoded.height_in_file(self.stored(level, column, row));
-        Some(height).filter(|height| !height.is_nan())
+    ///
+    /// # Errors
+    /// The reason why it is not known.
+    pub(super) fn height(
+        &self,
+        level: u8,
+        [column, row]: [u32; 2],
+    ) -> Result<Option<f64>, RasterError> {
+        let (stored, status) = self.stored(level, column, row);
+        match (&self.decoded.storage, status) {
+            (Storage::Blocks(blocks), ReadStatus::Pending) => Err(blocks
+                .take_outage()
+                .unwrap_or_else(|| RasterError::Remote(outage()))),
+            _ => {
+                let height = self.decoded.height_in_file(stored);
+                Ok(Some(height).filter(|height| !height.is_nan()))
+            }
+        }
     }
 
-    fn stored(&self, level: u8, column: u32, row: u32) -> Option<f64> {
+    fn stored(&self, level: u8, column: u32, row: u32) -> (Option<f64>, ReadStatus) {
         match &self.decoded.storage {
             Storage::Held { samples, mask } => {
                 let index = row as usize * self.decoded.columns as usize + column as usize;
@@ -110,18 +126,21 @@ impl Opened {
                 let value = with_samples!(samples, values => {
                     values.get(index).map(|value| value.widen())
                 });
-                value.filter(|_| !hole)
+                (value.filter(|_| !hole), ReadStatus::Complete)
             }
             Storage::Blocks(blocks) => match blocks.overview_of(level) {
-                0 => blocks.stored(0, column, row),
+                0 => match blocks.stored(0, column, row, Wait::UntilRead) {
+                    Ok(stored) => (stored, ReadStatus::Complete),
+                    Err(_) => (None, ReadStatus::Pending),
+                },
                 image => {
                     let place = [f64::from(column), f64::from(row)];
                     let known = |stored: Option<f64>| {
                         let is_hole = |value: &f64| self.decoded.no_data == Some(*value);
                         stored.filter(|value| !is_hole(value)).unwrap_or(f64::NAN)
                     };
-                    let value = blocks.between(image, place, known);
-                    Some(value).filter(|value| !value.is_nan())
+                    let (value, status) = blocks.between(image, place, Wait::UntilRead, known);
+                    (Some(value).filter(|value| !value.is_nan()), status)
                 }
             },
         }

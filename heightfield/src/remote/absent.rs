@@ -15,10 +15,6 @@ pub struct RemoteFetcher(());
 pub(crate) enum RemoteFile {}
 
 impl RemoteFetcher {
-    pub(crate) fn waiting(&self) -> Self {
-        self.clone()
-    }
-
     /// Always an error.
     pub(crate) fn open(&self, _: &str) -> Result<Arc<RemoteFile>> {
         Err(Error::new(
@@ -35,9 +31,6 @@ impl RemoteFetcher {
 
     /// Nothing goes wrong.
     pub(crate) fn touch(&self) {}
-
-    /// Nothing waits.
-    pub(crate) fn stop_waiting(&self, _: bool) {}
 }
 
 impl RemoteFile {
@@ -58,10 +51,6 @@ impl RemoteFile {
     }
 
     pub(crate) fn read_at(&self, _: u64, _: usize) -> Result<Vec<u8>> {
-        match *self {}
-    }
-
-    pub(crate) fn read_waiting(&self, _: u64, _: usize) -> Result<Vec<u8>> {
         match *self {}
     }
 }

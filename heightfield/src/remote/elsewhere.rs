@@ -18,16 +18,12 @@ use crate::disk_cache::DiskCache;
 
 /// Files that are known at once: open, missing or on their way.
 const MAX_FILES: NonZeroUsize = NonZeroUsize::new(256).unwrap();
-/// A server that did not answer is asked again after so long, where nobody waits.
+/// A server that did not answer is asked again after so long.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
 
 /// Files at URLs, open or being opened. Clones are of the same.
 #[derive(Clone)]
-pub struct RemoteFetcher {
-    shared: Arc<Shared>,
-    /// Whoever has this clone waits, whatever the others do.
-    always_waits: bool,
-}
+pub struct RemoteFetcher(Arc<Shared>);
 
 struct Shared {
     line: Arc<Line>,
@@ -46,53 +42,36 @@ enum Known {
 
 impl Default for RemoteFetcher {
     fn default() -> Self {
-        Self {
-            shared: Arc::new(Shared {
-                line: Arc::default(),
-                files: Mutex::new(LruCache::new(MAX_FILES)),
-                answered: Condvar::new(),
-            }),
-            always_waits: false,
-        }
+        Self(Arc::new(Shared {
+            line: Arc::default(),
+            files: Mutex::new(LruCache::new(MAX_FILES)),
+            answered: Condvar::new(),
+        }))
     }
 }
 
 impl RemoteFetcher {
-    /// The same files for a thread that may wait.
-    pub(crate) fn waiting(&self) -> Self {
-        Self {
-            always_waits: true,
-            ..self.clone()
-        }
-    }
-
     /// The file at a URL. A file that is open is not opened again, and one that is missing
     /// is not looked for again.
     ///
     /// # Errors
-    /// [`ErrorKind::WouldBlock`] where it is on its way and nobody may wait;
     /// [`super::is_missing`], [`super::is_outage`], or what is wrong with the URL.
     pub(crate) fn open(&self, url: &str) -> Result<Arc<RemoteFile>> {
         let background = background()?;
         let mut has_asked = false;
         let mut files = self.files();
         loop {
-            let waits = self.always_waits || self.shared.line.waits();
             match files.get(url).cloned() {
                 Some(Known::Open(file)) => return Ok(file),
-                Some(Known::OnItsWay) if !waits => return Err(ErrorKind::WouldBlock.into()),
                 Some(Known::OnItsWay) => {
                     has_asked = true;
-                    let waited = self.shared.answered.wait(files);
+                    let waited = self.0.answered.wait(files);
                     files = waited.unwrap_or_else(PoisonError::into_inner);
                 }
                 Some(Known::Failed(at, kind, why)) => {
                     let error = Error::new(kind, why);
-                    if !is_outage(&error) || waits && has_asked {
+                    if !is_outage(&error) || has_asked || at.elapsed() < BETWEEN_TRIES {
                         return Err(error);
-                    }
-                    if !waits && at.elapsed() < BETWEEN_TRIES {
-                        return Err(ErrorKind::WouldBlock.into());
                     }
                     self.ask(background, &mut files, url);
                 }
@@ -116,32 +95,24 @@ impl RemoteFetcher {
         }
     }
 
-    /// From now on nobody waits, or everybody does again.
-    pub(crate) fn stop_waiting(&self, stop: bool) {
-        self.shared.line.stop_waiting(stop);
-    }
-
     /// Has pages of files kept for another run; the first folder that is named counts.
     pub(crate) fn set_disk_cache(&self, disk: &DiskCache) {
-        self.shared.line.set_disk_cache(disk);
+        self.0.line.set_disk_cache(disk);
     }
 
     /// The terrain is open: from now on what goes wrong is told.
     pub(crate) fn touch(&self) {
-        self.shared.line.touch();
+        self.0.line.touch();
     }
 
     fn files(&self) -> MutexGuard<'_, LruCache<String, Known>> {
         // Nothing that panics runs while this is held.
-        self.shared
-            .files
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        self.0.files.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn ask(&self, background: &'static Runtime, files: &mut LruCache<String, Known>, url: &str) {
         files.put(url.to_owned(), Known::OnItsWay);
-        let (line, asked) = (self.shared.line.clone(), url.to_owned());
+        let (line, asked) = (self.0.line.clone(), url.to_owned());
         let work = async move {
             let _turn = line.turn().await;
             store::open(&asked).await
@@ -155,13 +126,13 @@ impl RemoteFetcher {
     fn answered(&self, background: &'static Runtime, url: String, opened: Result<Opened>) {
         let known = match opened {
             Ok(opened) => {
-                let file = RemoteFile::new(&in_text(&url), &self.shared.line, background, opened);
+                let file = RemoteFile::new(&in_text(&url), &self.0.line, background, opened);
                 Known::Open(Arc::new(file))
             }
             Err(error) => Known::Failed(Instant::now(), error.kind(), error.to_string()),
         };
         self.files().put(url, known);
-        self.shared.answered.notify_all();
+        self.0.answered.notify_all();
     }
 }
 

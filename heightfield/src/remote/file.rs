@@ -140,18 +140,8 @@ impl RemoteFile {
     /// Bytes of the file, all of them inside of it.
     ///
     /// # Errors
-    /// [`ErrorKind::WouldBlock`] where they are on their way and nobody may wait;
     /// [`is_outage`]; that the file was changed.
     pub(crate) fn read_at(self: &Arc<Self>, offset: u64, count: usize) -> Result<Vec<u8>> {
-        self.read(offset, count, self.line.waits())
-    }
-
-    /// The same for a thread that may wait.
-    pub(crate) fn read_waiting(self: &Arc<Self>, offset: u64, count: usize) -> Result<Vec<u8>> {
-        self.read(offset, count, true)
-    }
-
-    fn read(self: &Arc<Self>, offset: u64, count: usize, waits: bool) -> Result<Vec<u8>> {
         let end = offset.checked_add(count as u64);
         let Some(end) = end.filter(|end| *end <= self.len()) else {
             return Err(ErrorKind::UnexpectedEof.into());
@@ -163,7 +153,7 @@ impl RemoteFile {
         self.want(once(wanted.clone()));
         let mut bytes = Vec::with_capacity(count);
         for number in pages::of(&wanted, self.len()) {
-            let page = self.page(number, waits)?;
+            let page = self.page(number)?;
             let first = number * pages::PAGE;
             let from = offset.saturating_sub(first) as usize;
             let to = (end - first).min(page.len() as u64) as usize;
@@ -172,17 +162,14 @@ impl RemoteFile {
         Ok(bytes)
     }
 
-    /// A page; waited for where that may be.
-    fn page(self: &Arc<Self>, number: u64, waits: bool) -> Result<Arc<[u8]>> {
+    /// A page, which is waited for.
+    fn page(self: &Arc<Self>, number: u64) -> Result<Arc<[u8]>> {
         let key = (self.number, number);
         let mut has_waited = false;
         loop {
             let mut held = self.line.held();
             if let Some(page) = held.pages.get(key) {
                 return Ok(page);
-            }
-            if !waits {
-                return Err(ErrorKind::WouldBlock.into());
             }
             match held.troubles.get(&self.number) {
                 Some(Trouble::Lost(why)) => return Err(Error::new(LOST, why.clone())),

@@ -1,5 +1,4 @@
-//! What all remote files of a terrain share: the pages, the turns of their requests, and
-//! whether anybody waits.
+//! What all remote files of a terrain share: the pages and the turns of their requests.
 
 use std::collections::HashMap;
 use std::io::{Error, Result};
@@ -19,7 +18,6 @@ const AT_ONCE: usize = 16;
 
 /// Shared by the files of a terrain.
 pub(super) struct Line {
-    has_stopped_waiting: AtomicBool,
     is_touched: AtomicBool,
     requests: Semaphore,
     files: AtomicU64,
@@ -48,7 +46,6 @@ pub(super) enum Trouble {
 impl Default for Line {
     fn default() -> Self {
         Self {
-            has_stopped_waiting: AtomicBool::new(false),
             is_touched: AtomicBool::new(false),
             requests: Semaphore::new(AT_ONCE),
             files: AtomicU64::new(0),
@@ -79,16 +76,6 @@ impl Line {
     /// Where pages are kept for another run, where they are.
     pub(super) fn disk(&self) -> Option<&DiskCache> {
         self.disk.get().filter(|disk| disk.is_on())
-    }
-
-    /// From now on nobody waits, or everybody does again.
-    pub(super) fn stop_waiting(&self, stop: bool) {
-        self.has_stopped_waiting.store(stop, Ordering::Release);
-    }
-
-    /// Whether whoever reads waits for what is not here yet.
-    pub(super) fn waits(&self) -> bool {
-        !self.has_stopped_waiting.load(Ordering::Acquire)
     }
 
     /// The terrain is open: from now on what goes wrong is told.

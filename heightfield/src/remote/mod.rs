@@ -5,9 +5,8 @@
 //! ```
 //!
 //! A file is cut into pages. Pages that are wanted are fetched in the background, several
-//! that follow each other with one request, and those touched last are kept. Whoever reads
-//! waits for them, until somebody is served who must not ([`RemoteFetcher::stop_waiting`]):
-//! then what is not here yet is [`std::io::ErrorKind::WouldBlock`], and comes later.
+//! that follow each other with one request, and those touched last are kept. Every read
+//! waits for them; where a caller must not wait, a thread of the blocks reads ([`crate::Wait`]).
 //!
 //! Pages are kept on disk for another run (`kept`), where the server says by a tag or a time
 //! which state of the file they are of.
@@ -68,14 +67,14 @@ pub(crate) fn is_lost(error: &Error) -> bool {
     error.kind() == LOST
 }
 
+/// Bytes that were not received, if the reason is not known any more.
+pub(crate) fn outage() -> Error {
+    Error::new(OUTAGE, "it was not received: try again")
+}
+
 /// Whether an error is one of the line or the server.
 pub(crate) fn is_outage(error: &Error) -> bool {
     error.kind() == OUTAGE
-}
-
-/// Whether an error says that what was asked for is on its way.
-pub(crate) fn is_on_its_way(error: &Error) -> bool {
-    error.kind() == ErrorKind::WouldBlock
 }
 
 /// Whether an error says that there is no such file. Who may not list a folder is told of

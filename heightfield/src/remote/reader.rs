@@ -1,4 +1,4 @@
-//! A remote file read from its beginning to its end, by a thread that may wait.
+//! A remote file read from its beginning to its end.
 
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 use std::iter::once;
@@ -42,7 +42,7 @@ impl Read for RemoteReader {
         if self.at > 0 {
             self.file.want(once(self.at..self.at.saturating_add(AHEAD)));
         }
-        let bytes = self.file.read_waiting(self.at, count)?;
+        let bytes = self.file.read_at(self.at, count)?;
         into[..count].copy_from_slice(&bytes);
         self.at += count as u64;
         Ok(count)

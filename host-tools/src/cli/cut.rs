@@ -73,7 +73,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let _folder = OutputFolder::create(&args.out).or_hint(HINT)?;
     written(&heights, |out| write_npy(out, &grid, level, size(level))).or_hint(HINT)?;
-    raster.check_came()?;
+    raster.check_complete()?;
     written(&args.out.join(ABOUT), |out| {
         Ok(serde_json::to_writer_pretty(out, &about)?)
     })
@@ -113,7 +113,8 @@ fn write_npy(
     writeln!(out, "{shape:117}")?;
     let mut row = vec![0.0; columns as usize];
     for south in (0..rows).rev() {
-        grid.copy_row(level, south, 0, &mut row);
+        // `check_complete` reports what could not be read.
+        let _ = grid.read_row(level, south, 0, &mut row);
         let bytes: Vec<u8> = row.iter().flat_map(|h| (*h as f32).to_le_bytes()).collect();
         out.write_all(&bytes)?;
     }

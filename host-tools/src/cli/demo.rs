@@ -202,7 +202,7 @@ fn show(
     interrupt::listen();
     let viewer = args.viewing.program()?;
     let shown = viewer.map(|program| ToBeShown::new(program, terrain, view, name));
-    terrain.check_came()?;
+    terrain.check_complete()?;
     let tour = Tour {
         placed,
         stop_s,

@@ -182,13 +182,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .map_err(|failure| failure.about(device.device_console.name()))
     })?;
     // The coarse levels are read before anything is armed. A viewer shows one device.
-    let mut shown = viewer
+    let shown = viewer
         .zip(placed.first())
         .map(|(program, of)| ToBeShown::new(program, of.terrain, &of.view, &name));
-    raster.check_came()?;
+    raster.check_complete()?;
     materials
         .as_ref()
-        .map_or(Ok(()), |it| it.classes().check_came())?;
+        .map_or(Ok(()), |it| it.classes().check_complete())?;
+    // While an arm may be armed no read of terrain waits.
+    let mut shown = shown.map(ToBeShown::non_blocking);
+    let terrains: Vec<_> = placed.iter().map(|of| of.terrain.non_blocking()).collect();
+    let placed: Vec<_> = (placed.into_iter().zip(&terrains))
+        .map(|(placed, terrain)| Placed { terrain, ..placed })
+        .collect();
     let mut device_keys = share_keyboard(args, &devices).into_iter();
     let each = devices.iter().zip(&placed).zip(met);
     let servings = each.zip(recordings.into_iter().zip(commands));

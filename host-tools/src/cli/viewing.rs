@@ -88,6 +88,14 @@ impl<'t> ToBeShown<'t> {
         }
     }
 
+    /// The same, whose further reads of the terrain do not wait.
+    pub(in crate::cli) fn non_blocking(self) -> Self {
+        Self {
+            prepared: self.prepared.non_blocking(),
+            ..self
+        }
+    }
+
     /// Starts it. A viewer that does not start is told, and ends nothing.
     pub(in crate::cli) fn start(
         self,

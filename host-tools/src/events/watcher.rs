@@ -9,6 +9,7 @@ use super::line::{At, Event, Line, Place};
 use super::server::Sender;
 use crate::replay::{Mark, Record, mode_name, state_name};
 use crate::terrain::Terrain;
+use heightfield::ReadStatus;
 
 /// Between two places that are told, s of the device's time.
 const PLACE_EVERY_S: f64 = 0.1;
@@ -217,8 +218,12 @@ impl Watcher {
         if !at_once && record.t_s < self.told.material_due_s {
             return;
         }
+        let ground = ground_of(record, terrain);
+        let (index, ReadStatus::Complete) = materials.index_at(terrain.grid(), ground) else {
+            // It is reported when it is known.
+            return;
+        };
         self.told.material_due_s = record.t_s + MATERIAL_EVERY_S;
-        let index = materials.index_at(terrain.raster(), ground_of(record, terrain));
         let class = usize::from(index).checked_sub(1);
         let class = class.and_then(|at| materials.looks().class.get(at));
         let number = class.map(|class| class.class);

@@ -536,8 +536,7 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
-        let before = self.terrain.not_yet();
-        let Some(heights) = self.terrain.tile_of(&self.scene, key, &mut self.tile) else {
+        let Some((heights, status)) = self.terrain.tile_of(&self.scene, key, &mut self.tile) else {
             return self.on_no_tile(now, key);
         };
         // The underlay comes without.
@@ -545,8 +544,8 @@ impl<'t> Client<'t> {
             true => self.terrain.materials_of(key, &mut self.materials),
             false => None,
         };
-        if self.terrain.not_yet() != before {
-            // Some of its holes are none.
+        let of_materials = materials.as_ref().map(|(_, status)| *status);
+        if !status.and(of_materials.unwrap_or_default()).is_complete() {
             return self.wait_for(now, key);
         }
         let tile = TileMessage {
@@ -555,7 +554,7 @@ impl<'t> Client<'t> {
             heights,
         };
         let message = match materials {
-            Some(materials) => ToDevice::MaterialTile(MaterialTile { tile, materials }),
+            Some((materials, _)) => ToDevice::MaterialTile(MaterialTile { tile, materials }),
             None => ToDevice::Tile(tile),
         };
         let before = out.len();

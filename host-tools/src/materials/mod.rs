@@ -20,7 +20,7 @@ use twox_hash::XxHash64;
 
 use crate::terrain::{HapticGrid, fingerprint};
 pub use ground::GroundError;
-use heightfield::{Raster, ReferenceSystem};
+use heightfield::{Raster, ReadStatus, ReadTracker, ReferenceSystem};
 use heightfield::{is_url, without_key};
 use pixels::Pixels;
 
@@ -152,21 +152,23 @@ impl Materials {
         self.looks.default.law(law)
     }
 
-    /// The index in the table of the material at a place in the coordinates of the terrain's
-    /// file.
-    #[must_use]
-    pub fn index_at(&self, terrain: &Raster, ground: [f64; 2]) -> u8 {
-        self.looks.index(self.pixels.at(terrain, ground))
+    /// The index in the table of the material at a place of a grid, in the coordinates of its file,
+    /// and whether it is known.
+    pub fn index_at(&self, grid: &HapticGrid<'_>, ground: [f64; 2]) -> (u8, ReadStatus) {
+        let on_terrain = grid.raster().georeference();
+        let (value, status) = self.pixels.from(&on_terrain).value(ground, grid.wait());
+        (self.looks.index(value), status)
     }
 
     /// The materials of a tile over a grid, whose samples are `step` of the grid's cells apart, as they
-    /// go on the link. Beyond the field they go on as it ends there.
+    /// go on the link. Beyond the field they go on as it ends there. And whether they are complete.
     pub(crate) fn tile<'b>(
         &self,
         (grid, last, step): (&HapticGrid<'_>, [i32; 2], f64),
         index: TileIndex,
         buffer: &'b mut MaterialBuffer,
-    ) -> TileMaterials<'b> {
+    ) -> (TileMaterials<'b>, ReadStatus) {
+        let reads = ReadTracker::default();
         let (first, terrain) = (index.first_cell(), grid.raster());
         let place = |first: i32, i: usize, last: i32| {
             let sample = first.saturating_add(i as i32).clamp(0, last);
@@ -178,9 +180,13 @@ impl Materials {
             let column = place(first.x, i % TILE_SAMPLES, last[0]);
             let row = place(first.y, i / TILE_SAMPLES, last[1]);
             let ground = grid.to_ground([column, row]);
-            *index = self.looks.index(from_terrain.value(ground));
+            let value = reads.record(from_terrain.value(ground, grid.wait()));
+            *index = self.looks.index(value);
         }
-        TileMaterials::pack(&buffer.indices, &mut buffer.bytes)
+        (
+            TileMaterials::pack(&buffer.indices, &mut buffer.bytes),
+            reads.status(),
+        )
     }
 
     /// What the ground of a terrain is made of, for a line to be read: the materials that were found at
@@ -188,9 +194,10 @@ impl Materials {
     /// fetched for it.
     #[must_use]
     pub fn told(&self, grid: &HapticGrid<'_>) -> String {
+        let count = self.looks.class.len();
+        let unread = format!("{count} classes in the table; the file is read where it is touched");
         if is_url(&self.file) {
-            let count = self.looks.class.len();
-            return format!("{count} classes in the table; the file is read where it is touched");
+            return unread;
         }
         let mut found = [0_u32; MaterialTable::MOST];
         let place =
@@ -198,8 +205,9 @@ impl Materials {
         for i in 0..LOOKED_AT * LOOKED_AT {
             let (column, row) = (i % LOOKED_AT, i / LOOKED_AT);
             let ground = grid.to_ground([place(column, grid.columns()), place(row, grid.rows())]);
-            let index = self.index_at(grid.raster(), ground);
-            found[usize::from(index)] += 1;
+            if let (index, ReadStatus::Complete) = self.index_at(grid, ground) {
+                found[usize::from(index)] += 1;
+            }
         }
         let named = self.looks.class.iter().zip(&found[1..]);
         let mut named: Vec<_> = named.filter(|(_, count)| **count > 0).collect();
@@ -209,7 +217,10 @@ impl Materials {
             None => format!("class {}", class.class),
         });
         let names = names.collect::<Vec<_>>().join(", ");
-        let places = LOOKED_AT * LOOKED_AT;
+        let places: u32 = found.iter().sum();
+        if places == 0 {
+            return unread;
+        }
         let percent = 100.0 * f64::from(found[0]) / f64::from(places);
         match (names.is_empty(), found[0]) {
             (true, _) => {

@@ -1,7 +1,7 @@
 //! The pixel of a raster of classes in which a place of a terrain lies.
 
 use super::ground::{GroundError, place_of};
-use heightfield::{Georeference, LonLat, Raster};
+use heightfield::{Georeference, LonLat, Raster, ReadStatus, Wait};
 
 /// Places along each side of a raster that are tried to find whether two overlap.
 const TRIED: u32 = 33;
@@ -96,13 +96,13 @@ pub(super) struct From<'p> {
 
 impl From<'_> {
     /// What the file has in the pixel of a place in the terrain's coordinates; NaN in a hole and
-    /// beyond the file.
-    pub(super) fn value(&self, ground: [f64; 2]) -> f64 {
+    /// beyond the file. And whether it is known.
+    pub(super) fn value(&self, ground: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
         let there = self.pixels.way.lead(self.terrain, &self.classes, ground);
         let place = there.map(|at| self.classes.transform().to_samples(at));
         match place.and_then(|place| pixel(&self.pixels.raster, place)) {
-            Some([column, row]) => self.pixels.raster.height(column, row),
-            None => f64::NAN,
+            Some([column, row]) => self.pixels.raster.read_height(column, row, wait),
+            None => (f64::NAN, ReadStatus::Complete),
         }
     }
 }
@@ -138,10 +138,6 @@ impl Pixels {
             terrain,
             classes: self.raster.georeference(),
         }
-    }
-
-    pub(super) fn at(&self, terrain: &Raster, ground: [f64; 2]) -> f64 {
-        self.from(&terrain.georeference()).value(ground)
     }
 }
 

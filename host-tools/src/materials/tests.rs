@@ -39,6 +39,14 @@ fn over(terrain: &Raster, classes: Raster, looks: Looks) -> Result<Materials, Gr
     Materials::over(("t.tif", terrain), ("c.tif", classes), looks)
 }
 
+/// The index of the material at a place, which is in memory.
+fn index_at(materials: &Materials, terrain: &Raster, ground: [f64; 2]) -> u8 {
+    let grid = HapticGrid::new(terrain, HapticCells::Stored);
+    let (index, status) = materials.index_at(&grid, ground);
+    assert!(status.is_complete());
+    index
+}
+
 #[test]
 fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
     let utm = Some(32632);
@@ -61,16 +69,16 @@ fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
         } else {
             0
         };
-        let index = materials.index_at(&terrain, [500_000.0 + x, 5_000_000.0 + y]);
+        let index = index_at(&materials, &terrain, [500_000.0 + x, 5_000_000.0 + y]);
         assert_eq!(index, wanted, "{x} {y}");
     }
     // Beyond the pixels, and where nothing is known, is the default.
-    assert_eq!(materials.index_at(&terrain, [500_400.0, 5_000_100.0]), 0);
+    assert_eq!(index_at(&materials, &terrain, [500_400.0, 5_000_100.0]), 0);
     let holes = raster((9, 9), [500_000.0, 5_000_000.0], 37.0, utm, |column, _| {
         if column == 4 { f32::NAN } else { 30.0 }
     });
     let materials = over(&terrain, holes, looks(&[10, 30])).expect("they overlap");
-    let at = |x: f64| materials.index_at(&terrain, [500_000.0 + x, 5_000_100.0]);
+    let at = |x: f64| index_at(&materials, &terrain, [500_000.0 + x, 5_000_100.0]);
     assert_eq!([at(100.0), at(148.0), at(190.0)], [2, 0, 2]);
 }
 
@@ -90,7 +98,7 @@ fn classes_in_another_system_lie_where_they_are_on_the_globe() {
         if column < 100 { 10.0 } else { 20.0 }
     });
     let materials = over(&terrain, classes, looks(&[10, 20])).expect("they overlap");
-    let at = |x: f64| materials.index_at(&terrain, [x, 5_000_400.0]);
+    let at = |x: f64| index_at(&materials, &terrain, [x, 5_000_400.0]);
     assert_eq!([at(499_999.0), at(500_001.0)], [1, 2]);
     assert_eq!([at(499_900.0), at(500_100.0)], [1, 2]);
     let grid = HapticGrid::new(&terrain, HapticCells::Square).with_materials(Some(&materials));
@@ -114,7 +122,7 @@ fn a_tile_has_the_classes_of_its_level() {
         let scale = Scale::new(1.0, 1.0).expect("valid");
         let felt = Terrain::over(grid, scale, level).expect("terrain");
         let key = TileKey::new(level, 1, 0);
-        let packed = felt.materials_of(key, &mut buffer).expect("it has some");
+        let (packed, _) = felt.materials_of(key, &mut buffer).expect("it has some");
         let mut tile = Box::new(Tile::VACANT);
         tile.fill(key, 0, |_, _| 0.0).expect("in range");
         packed.fill(&mut tile, 3).expect("of the table");

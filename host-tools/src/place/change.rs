@@ -156,7 +156,7 @@ pub struct Changed<'r> {
     pub hip_mm: [f64; 3],
     /// Whether the heights that this follows from have been read. If not, the HIP has the
     /// height of before, and the same changes give the right one when they have come.
-    pub ground_came: bool,
+    pub ground_is_known: bool,
 }
 
 impl Bounds {
@@ -190,14 +190,14 @@ impl Bounds {
             None => finest_level(&grid, self.resolution_mm, &laid.view.scale),
         };
         let terrain_after = terrain.relaid(grid, laid.view.scale, laid.view.level)?;
-        let (hip_mm, ground_came) = hip_after((terrain, &terrain_after), hand, at_mm, at);
+        let (hip_mm, ground_is_known) = hip_after((terrain, &terrain_after), hand, at_mm, at);
         let moved = |axis: usize| before.view.home_mm[axis] + hip_mm[axis] - hand.hip_mm[axis];
         let home_mm = [moved(0), moved(1), moved(2)];
         let was = (before.view.scale, terrain.grid());
         laid.view = laid.view.moved_to(&grid, home_mm, was);
         Ok(Changed {
             laid,
-            ground_came,
+            ground_is_known,
             terrain: terrain_after,
             hip_mm,
         })
@@ -266,7 +266,7 @@ impl Bounds {
 }
 
 /// The HIP in the view that comes after: beside the place under the hand as far as before,
-/// and as high over its ground, or as deep; and whether that ground has been read.
+/// and as high over its ground, or as deep; and whether both grounds are known.
 fn hip_after(
     (before, after): (&Terrain<'_>, &Terrain<'_>),
     hand: &Hand,
@@ -276,34 +276,32 @@ fn hip_after(
     let cell_mm = after.scale_of_level_0().cell_mm();
     let [east, north] = at.map(|cells| cells * cell_mm);
     let beside = |axis: usize| hand.hip_mm[axis] - at_mm[axis];
-    let ground_before = match hand.proxy_mm {
-        Some(proxy) => Some(proxy[2]),
-        None => before.height_mm(at_mm[0], at_mm[1]),
+    let cell_before_mm = before.scale_of_level_0().cell_mm();
+    let place_before = [0, 1].map(|axis| at_mm[axis] / cell_before_mm);
+    let (ground_before, before_is_known) = match hand.proxy_mm {
+        Some(proxy) => (Some(proxy[2]), true),
+        None => ground_of(before, [at_mm[0], at_mm[1]], place_before),
     };
-    let (ground_after, came) = ground_of(after, [east, north], at);
+    let (ground_after, after_is_known) = ground_of(after, [east, north], at);
     // Over a hole the height stays what it is.
     let risen = ground_before
         .zip(ground_after)
         .map_or(0.0, |(before, after)| after - before);
     let hip_mm = [east + beside(0), north + beside(1), hand.hip_mm[2] + risen];
-    (hip_mm, came)
+    (hip_mm, before_is_known && after_is_known)
 }
 
 /// The ground at a place, in millimetres and in felt cells of level 0. Where the terrain's level
-/// is coarse and not here yet it is that of the finest level. And whether that has been read: a
-/// hole has.
+/// is coarse and not here yet it is that of the finest level. And whether it is known: no-data is.
 fn ground_of(terrain: &Terrain<'_>, [east, north]: [f64; 2], at: [f64; 2]) -> (Option<f64>, bool) {
-    let not_yet = || terrain.raster().not_yet();
-    let before = not_yet();
-    let ground = terrain.height_mm(east, north);
-    if ground.is_some() || not_yet() == before {
+    let (ground, status) = terrain.read_height_mm(east, north);
+    if ground.is_some() || status.is_complete() {
         return (ground, true);
     }
-    let before = not_yet();
-    let height = terrain.grid().surface(at);
-    let came = height.is_some() || not_yet() == before;
+    let (height, status) = terrain.grid().read_surface(at);
     let per_unit = terrain.scale().height_mm_per_unit();
-    (height.map(|height| height * per_unit), came)
+    let ground = height.map(|height| height * per_unit);
+    (ground, ground.is_some() || status.is_complete())
 }
 
 fn factor_of(factor: f64) -> Result<f64, ChangeError> {

@@ -21,7 +21,7 @@ pub type Connect<'s, 't> = Box<dyn FnMut() -> Result<Box<dyn Transport + 't>, Li
 
 /// What is served, to which device, and for how long.
 pub struct Service<'s, 't> {
-    /// The terrain.
+    /// The terrain, whose reads do not wait ([`Terrain::non_blocking`]) where an arm may be armed.
     pub terrain: &'t Terrain<'t>,
     /// How it lies under the arm and feels.
     pub scene: Scene,
@@ -79,8 +79,6 @@ impl<'s, 't> Service<'s, 't> {
         mut self,
         check: impl FnOnce(&mut dyn Transport) -> Result<(), E>,
     ) -> Result<(Served<'s, 't>, DeviceHello), E> {
-        // Whoever holds the arm waits for no server.
-        self.terrain.stop_waiting();
         let mut line = (self.connect)()?;
         let checked = check(&mut *line);
         let (scene, arming) = (self.scene, Some(self.arming));

@@ -293,9 +293,9 @@ impl<'r> Steering<'r> {
             laid,
             terrain,
             hip_mm,
-            ground_came,
+            ground_is_known,
         } = changed.map_err(|why| why.to_string())?;
-        if waits && !ground_came {
+        if waits && !ground_is_known {
             return Ok(None);
         }
         let on_grid = |mm| {

@@ -8,7 +8,7 @@ use std::hash::{Hash, Hasher};
 
 use super::{Scale, ScaleError};
 use crate::materials::Materials;
-use heightfield::{CellSize, Raster, Sides, around, bilinear};
+use heightfield::{CellSize, Raster, ReadStatus, ReadTracker, Sides, Wait, around, bilinear};
 
 /// Cells whose sides differ by less than this share count as square, and keep
 /// their exact samples.
@@ -60,6 +60,8 @@ pub struct HapticGrid<'r> {
     materials: Option<&'r Materials>,
     /// Radius of the ball that feels it, hand millimetres; 0 for a point.
     tip_mm: f64,
+    /// Whether reads wait.
+    wait: Wait,
 }
 
 /// Place of felt sample (u, v) in the file: column `first + u · column_step + v · lean`,
@@ -96,7 +98,19 @@ impl<'r> HapticGrid<'r> {
         Self { materials, ..self }
     }
 
-    /// The same ground, rendered with a ball of a radius in hand millimetres; 0 for a point.
+    /// The same ground, whose reads wait or do not wait.
+    #[must_use]
+    pub const fn with_wait(self, wait: Wait) -> Self {
+        Self { wait, ..self }
+    }
+
+    /// Behaviour of its reads.
+    #[must_use]
+    pub const fn wait(&self) -> Wait {
+        self.wait
+    }
+
+    /// The same ground, rendered with a ball of a radius in device millimetres; 0 for a point.
     #[must_use]
     pub const fn with_tip(self, tip_mm: f64) -> Self {
         Self { tip_mm, ..self }
@@ -131,6 +145,7 @@ impl<'r> HapticGrid<'r> {
         }
         let anew = Self::at(self.raster, self.cells, ground);
         let anew = anew.with_materials(self.materials).with_tip(self.tip_mm);
+        let anew = anew.with_wait(self.wait);
         (self.cells == HapticCells::Stored || !anew.is_distorted()).then_some(anew)
     }
 
@@ -177,6 +192,7 @@ impl<'r> HapticGrid<'r> {
             resampling: None,
             materials: None,
             tip_mm: 0.0,
+            wait: Wait::UntilRead,
         };
         match (cells, cell) {
             (HapticCells::Square, Some(cell)) if is_square(&cell) => {
@@ -343,8 +359,19 @@ impl<'r> HapticGrid<'r> {
     /// unit; `None` in a hole and off the field.
     #[must_use]
     pub fn surface(&self, place: [f64; 2]) -> Option<f64> {
-        let height = bilinear::at(place, |column, row| self.height(column, row));
-        Some(height).filter(|height| !height.is_nan())
+        self.read_surface(place).0
+    }
+
+    /// The height of [`HapticGrid::surface`], and whether it is known.
+    pub fn read_surface(&self, place: [f64; 2]) -> (Option<f64>, ReadStatus) {
+        let reads = ReadTracker::default();
+        let height = bilinear::at(place, |column, row| {
+            reads.record(self.read_height(0, column, row))
+        });
+        (
+            Some(height).filter(|height| !height.is_nan()),
+            reads.status(),
+        )
     }
 
     /// The height at a felt sample in the file's vertical unit; NaN in a hole and
@@ -358,26 +385,31 @@ impl<'r> HapticGrid<'r> {
     /// count in it.
     #[must_use]
     pub fn height_of_level(&self, level: u8, column: u32, row: u32) -> f64 {
+        self.read_height(level, column, row).0
+    }
+
+    /// The height of [`HapticGrid::height_of_level`], and whether it is known.
+    pub fn read_height(&self, level: u8, column: u32, row: u32) -> (f64, ReadStatus) {
         let whole = |index: u32| u64::from(index).checked_mul(1_u64.checked_shl(level.into())?);
         let (Some(column), Some(row)) = (whole(column), whole(row)) else {
-            return f64::NAN;
+            return (f64::NAN, ReadStatus::Complete);
         };
         // Both are below 2^32, or beyond the field.
         self.height_seen(level, [column as f64, row as f64])
     }
 
     /// The height at a place in felt cells, as the file has it at a level of detail; NaN in a hole
-    /// and outside the field.
-    pub(super) fn height_seen(&self, level: u8, [u, v]: [f64; 2]) -> f64 {
+    /// and outside the field. And whether it is known.
+    pub(super) fn height_seen(&self, level: u8, [u, v]: [f64; 2]) -> (f64, ReadStatus) {
         let [last_column, last_row] = self.last();
         if u > last_column || v > last_row {
-            return f64::NAN;
+            return (f64::NAN, ReadStatus::Complete);
         }
         let place = match &self.resampling {
             None => [u, v],
             Some(places) => places.in_file(u, v),
         };
-        self.raster.surface(level, place)
+        self.raster.read_surface(level, place, self.wait)
     }
 
     /// Has the samples between two places of level *L* read that are not here yet, both
@@ -403,13 +435,22 @@ impl<'r> HapticGrid<'r> {
 
     /// Copies heights of a row from `first_column` eastwards, one for each place in
     /// `heights`: the same values as [`HapticGrid::height_of_level`].
-    pub fn copy_row(&self, level: u8, row: u32, first_column: u32, heights: &mut [f64]) {
+    pub fn read_row(
+        &self,
+        level: u8,
+        row: u32,
+        first_column: u32,
+        heights: &mut [f64],
+    ) -> ReadStatus {
         if self.resampling.is_none() {
-            return self.raster.copy_row(level, row, first_column, heights);
+            let raster = self.raster;
+            return raster.read_row(level, row, first_column, heights, self.wait);
         }
+        let reads = ReadTracker::default();
         for (column, height) in (first_column..).zip(heights) {
-            *height = self.height_of_level(level, column, row);
+            *height = reads.record(self.read_height(level, column, row));
         }
+        reads.status()
     }
 }
 
@@ -558,13 +599,13 @@ pub(super) mod tests {
         // Row 5 of 10 m is the file's row 2 of 25 m.
         assert_eq!(grid.height(7, 5), raster.height(7, 2));
         let mut heights = [0.0; 12];
-        grid.copy_row(2, 3, 1, &mut heights);
+        let _ = grid.read_row(2, 3, 1, &mut heights);
         for (column, height) in (1..).zip(heights) {
             let single = grid.height(4 * column, 12);
             assert!(height == single || (height.is_nan() && single.is_nan()));
         }
         assert!(heights[10].is_nan(), "east of the field");
-        grid.copy_row(40, 1, 0, &mut heights);
+        let _ = grid.read_row(40, 1, 0, &mut heights);
         assert!(heights.iter().all(|height| height.is_nan()));
     }
 

@@ -6,7 +6,7 @@ use hapterra_core::scene::Scene;
 use twox_hash::XxHash64;
 
 use super::{HapticGrid, Scale};
-use heightfield::Raster;
+use heightfield::{Raster, Wait};
 
 /// Hash of all heights from south-west to north-east, after the numbers of columns and
 /// rows: two files with the same content are the same terrain, and a file that was
@@ -29,7 +29,8 @@ pub(crate) fn fingerprint(raster: &Raster) -> u64 {
     let mut heights = vec![0.0; raster.columns() as usize];
     let mut bytes = vec![0; 8 * heights.len()];
     for row in 0..raster.rows() {
-        raster.copy_row(0, row, 0, &mut heights);
+        // All samples are in memory.
+        let _ = raster.read_row(0, row, 0, &mut heights, Wait::UntilRead);
         for (to, height) in bytes.chunks_exact_mut(8).zip(&heights) {
             // One bit pattern for all holes.
             let height = if height.is_nan() { f64::NAN } else { *height };

@@ -16,7 +16,7 @@ use hapterra_touch::tip::{self, Ball, CENTRE_STEP, Nodes, Samples, TipError};
 use super::steps::{BinaryUnit, steps};
 use super::{HapticCells, HapticGrid, Scale, ScaleError, identity};
 use crate::materials::MaterialBuffer;
-use heightfield::Raster;
+use heightfield::{Raster, ReadStatus, ReadTracker, Wait};
 
 /// Heights that the file does not hold but are interpolated are rounded to multiples of this, cells.
 /// Single precision is as coarse 64 cells above a tile's base, and the floats of what is not
@@ -228,8 +228,18 @@ impl<'r> Terrain<'r> {
         Ok(Self {
             // Of the same heights.
             fingerprint: self.fingerprint.clone(),
-            ..Self::over(grid, scale, level)?
+            ..Self::over(grid.with_wait(self.grid.wait()), scale, level)?
         })
+    }
+
+    /// The same terrain, whose reads do not wait: a height that is not in memory is read in the
+    /// background, and is [`ReadStatus::Pending`] until then.
+    #[must_use]
+    pub fn non_blocking(&self) -> Self {
+        Self {
+            grid: self.grid.with_wait(Wait::Never),
+            ..self.clone()
+        }
     }
 
     /// Whether another terrain of the same raster has the same tiles: the same samples at
@@ -340,13 +350,24 @@ impl<'r> Terrain<'r> {
     /// at samples. `None` in a hole and off the data.
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
+        self.read_height_mm(east_mm, north_mm).0
+    }
+
+    /// The height of [`Terrain::height_mm`], and whether it is known.
+    pub fn read_height_mm(&self, east_mm: f64, north_mm: f64) -> (Option<f64>, ReadStatus) {
+        let reads = ReadTracker::default();
+        let height = self.height_by([east_mm, north_mm], &reads);
+        (height, reads.status())
+    }
+
+    fn height_by(&self, [east_mm, north_mm]: [f64; 2], reads: &ReadTracker) -> Option<f64> {
         let Some(ball) = &self.ball else {
-            return self.ground_mm(self.level, [east_mm, north_mm]);
+            return self.ground_mm(self.level, [east_mm, north_mm], reads);
         };
         let cell_mm = self.scale.cell_mm();
         let (column, u) = tiles::place(east_mm / cell_mm, self.size[0])?;
         let (row, v) = tiles::place(north_mm / cell_mm, self.size[1])?;
-        let (samples, nodes) = self.samples(ball, [column, row], tip::PATCH);
+        let (samples, nodes) = self.samples(ball, [column, row], tip::PATCH, reads);
         let height = ball.between(&samples, nodes, [u, v])?;
         Some(height * cell_mm)
     }
@@ -357,7 +378,7 @@ impl<'r> Terrain<'r> {
     pub fn seen_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
         let cells = apart_mm / self.scale_of_level_0().cell_mm();
         let level = self.raster().level_for(cells).max(self.level);
-        self.ground_mm(level, [east_mm, north_mm])
+        self.ground_mm(level, [east_mm, north_mm], &ReadTracker::default())
     }
 
     /// Height of the surface where a hand plans its path, by places so far apart, mm: of a raster in
@@ -373,7 +394,12 @@ impl<'r> Terrain<'r> {
     }
 
     /// The bilinear ground at a place.
-    fn ground_mm(&self, level: u8, [east_mm, north_mm]: [f64; 2]) -> Option<f64> {
+    fn ground_mm(
+        &self,
+        level: u8,
+        [east_mm, north_mm]: [f64; 2],
+        reads: &ReadTracker,
+    ) -> Option<f64> {
         let coarser = level - self.level;
         let cell_mm = self.scale_of_level_0.at_level(level).cell_mm();
         let size = self
@@ -382,7 +408,7 @@ impl<'r> Terrain<'r> {
         let (column, u) = tiles::place(east_mm / cell_mm, size[0])?;
         let (row, v) = tiles::place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
-            let height = self.grid.height_of_level(level, column + dx, row + dy);
+            let height = reads.record(self.grid.read_height(level, column + dx, row + dy));
             height * self.scale.height_mm_per_unit()
         };
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
@@ -401,14 +427,30 @@ impl<'r> Terrain<'r> {
             && (0..=last[1]).contains(&key.index.row)
     }
 
-    /// The heights of a tile, as they go on the link; `None` if there is no
-    /// such tile. The samples go to `buffer`.
+    /// The heights of a tile as they are sent, with samples in `buffer`; `None` if there is no such
+    /// tile.
     #[must_use]
-    pub fn tile<'b>(&self, key: TileKey, buffer: &'b mut TileBuffer) -> Option<Heights<'b>> {
+    pub fn tile<'b>(
+        &self,
+        key: TileKey,
+        buffer: &'b mut TileBuffer,
+    ) -> Option<(Heights<'b>, ReadStatus)> {
+        let reads = ReadTracker::default();
+        let heights = self.heights_of(key, buffer, &reads)?;
+        Some((heights, reads.status()))
+    }
+
+    /// The heights of a tile, by tracked reads.
+    pub(super) fn heights_of<'b>(
+        &self,
+        key: TileKey,
+        buffer: &'b mut TileBuffer,
+        reads: &ReadTracker,
+    ) -> Option<Heights<'b>> {
         if !self.has(key) {
             return None;
         }
-        let unit = self.read(key, &mut buffer.heights);
+        let unit = self.read(key, &mut buffer.heights, reads);
         if let Some(step) = steep_step(&buffer.heights) {
             self.warn_of_step(key, step);
             return Some(Heights::Hole);
@@ -446,56 +488,39 @@ impl<'r> Terrain<'r> {
     }
 
     /// The materials of a tile of a terrain that has some, as they go on the link; `None` where
-    /// there is no such tile, or it comes without.
+    /// there is no such tile, or it has none. And whether they are complete.
     #[must_use]
     pub fn materials_of<'b>(
         &self,
         key: TileKey,
         buffer: &'b mut MaterialBuffer,
-    ) -> Option<TileMaterials<'b>> {
+    ) -> Option<(TileMaterials<'b>, ReadStatus)> {
         let materials = self.grid.materials().filter(|_| self.has(key))?;
         let felt = (&self.grid, self.size, self.cells_of_grid());
         Some(materials.tile(felt, key.index, buffer))
     }
 
-    /// How often this thread asked for heights or classes that were not here yet
-    /// ([`Raster::not_yet`]).
-    #[must_use]
-    pub fn not_yet(&self) -> u64 {
-        let of_classes = (self.grid.materials()).map_or(0, |classes| classes.classes().not_yet());
-        // Each counts all that this thread asked for.
-        self.raster().not_yet().max(of_classes)
-    }
-
-    /// From now on nothing waits for what is elsewhere ([`Raster::stop_waiting`]).
-    pub fn stop_waiting(&self) {
-        self.raster().stop_waiting();
-        if let Some(materials) = self.grid.materials() {
-            materials.classes().stop_waiting();
-        }
-    }
-
-    /// Whether all that was asked for so far has come ([`Raster::check_came`]).
+    /// Checks that every read so far that waited was complete ([`Raster::check_complete`]).
     ///
     /// # Errors
-    /// Why something did not come.
-    pub fn check_came(&self) -> Result<(), heightfield::Error> {
-        self.raster().check_came()?;
+    /// The reason why a height or class could not be read.
+    pub fn check_complete(&self) -> Result<(), heightfield::Error> {
+        self.raster().check_complete()?;
         let of_classes = self.grid.materials().map(|materials| materials.classes());
-        of_classes.map_or(Ok(()), Raster::check_came)
+        of_classes.map_or(Ok(()), Raster::check_complete)
     }
 
     /// The height of the ground at a felt sample, in the file's vertical unit, as the file has it at
-    /// a level of detail; NaN where there is none.
-    pub(crate) fn ground_seen(&self, level: u8, [column, row]: [u32; 2]) -> f64 {
+    /// a level of detail; NaN where there is none. And whether it is known.
+    pub(crate) fn ground_seen(&self, level: u8, [column, row]: [u32; 2]) -> (f64, ReadStatus) {
         let place = [column, row].map(|index| f64::from(index) * self.cells_of_grid());
         self.grid.height_seen(level, place)
     }
 
     /// The same in cells, or the height of a ball's centre on flat ground there; NaN where there is
     /// none that can be felt.
-    pub(super) fn cells_at(&self, level: u8, felt: [u32; 2]) -> f64 {
-        let height = self.ground_seen(level, felt);
+    pub(super) fn cells_at(&self, level: u8, felt: [u32; 2], reads: &ReadTracker) -> f64 {
+        let height = reads.record(self.ground_seen(level, felt));
         self.within(self.scale.height_cells(height)) + self.tip_cells()
     }
 
@@ -528,11 +553,16 @@ impl<'r> Terrain<'r> {
 
     /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what the heights
     /// are multiples of in the file's vertical unit.
-    fn read(&self, key: TileKey, heights: &mut [f64; TILE_SAMPLES * TILE_SAMPLES]) -> BinaryUnit {
+    fn read(
+        &self,
+        key: TileKey,
+        heights: &mut [f64; TILE_SAMPLES * TILE_SAMPLES],
+        reads: &ReadTracker,
+    ) -> BinaryUnit {
         let first = |index: i32| index as u32 * TILE_CELLS as u32;
         let (west, south) = (first(key.index.col), first(key.index.row));
         if let Some(ball) = &self.ball {
-            let (samples, nodes) = self.samples(ball, [west, south], TILE_SAMPLES);
+            let (samples, nodes) = self.samples(ball, [west, south], TILE_SAMPLES, reads);
             for (height, centre) in heights.iter_mut().zip(ball.centres(&samples, nodes)) {
                 *height = self.rounded(self.within(centre));
             }
@@ -540,7 +570,7 @@ impl<'r> Terrain<'r> {
         }
         let mut unit = BinaryUnit::ANY;
         for (row, line) in (south..).zip(heights.chunks_exact_mut(TILE_SAMPLES)) {
-            self.grid.copy_row(self.level, row, west, line);
+            reads.add(self.grid.read_row(self.level, row, west, line));
             for height in line {
                 unit = unit.with(*height);
                 // Where not all heights were read before, one may leave what can be said.
@@ -552,7 +582,13 @@ impl<'r> Terrain<'r> {
 
     /// Samples of the level that a ball's nodes depend on, `side` of them each way from a felt sample
     /// on, in felt cells, NaN in holes and off the data; and where the nodes are.
-    fn samples(&self, ball: &Ball, first: [u32; 2], side: usize) -> (Samples, Nodes) {
+    fn samples(
+        &self,
+        ball: &Ball,
+        first: [u32; 2],
+        side: usize,
+        reads: &ReadTracker,
+    ) -> (Samples, Nodes) {
         let ([west, south], along, nodes) = ball.around(first, side);
         let mut heights = vec![f64::NAN; along * along];
         // West of the field there are no columns to ask for.
@@ -561,8 +597,8 @@ impl<'r> Terrain<'r> {
             let (Ok(row), Some(line)) = (u32::try_from(row), line.get_mut(beside..)) else {
                 continue;
             };
-            self.grid
-                .copy_row(self.level, row, west.max(0) as u32, line);
+            let west = west.max(0) as u32;
+            reads.add(self.grid.read_row(self.level, row, west, line));
             for height in line {
                 *height = self.within(self.scale.height_cells(*height));
             }

@@ -18,7 +18,7 @@ fn unit() -> Scale {
 /// The samples of a tile as the device would hold them, in cells.
 fn samples(terrain: &Terrain<'_>, key: TileKey) -> Vec<f64> {
     let mut buffer = TileBuffer::default();
-    let heights = terrain.tile(key, &mut buffer).expect("a tile");
+    let (heights, _) = terrain.tile(key, &mut buffer).expect("a tile");
     sent(key, heights)
 }
 
@@ -82,10 +82,13 @@ fn a_constant_tile_is_one_number_even_at_the_border() {
     for (col, row) in [(0, 0), (1, 1)] {
         assert_eq!(
             terrain.tile(key(0, col, row), &mut buffer),
-            Some(Heights::Flat {
-                base: 7,
-                height: 0.25
-            })
+            Some((
+                Heights::Flat {
+                    base: 7,
+                    height: 0.25
+                },
+                ReadStatus::Complete
+            ))
         );
     }
     for (col, row) in [(2, 0), (0, 2), (-1, 0)] {
@@ -109,7 +112,8 @@ fn holes_stay_holes_and_an_empty_tile_says_so() {
     assert!(tile[4 * TILE_SAMPLES + 3].is_nan() && tile[32].is_nan());
     assert_eq!(tile[4 * TILE_SAMPLES + 4], 5.0);
     let mut buffer = TileBuffer::default();
-    assert_eq!(terrain.tile(key(0, 2, 0), &mut buffer), Some(Heights::Hole));
+    let (heights, _) = terrain.tile(key(0, 2, 0), &mut buffer).expect("a tile");
+    assert_eq!(heights, Heights::Hole);
     assert_eq!(terrain.height_mm(3.5, 4.5), None);
     assert_eq!(terrain.height_mm(10.5, 4.5), Some(5.0));
     assert_eq!(terrain.height_mm(10.5, 32.1), None);
@@ -176,9 +180,9 @@ fn tile_with_too_steep_step_is_a_hole() {
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let mut buffer = TileBuffer::default();
-        let steep = terrain.tile(key(0, 1, 0), &mut buffer).expect("a tile");
+        let (steep, _) = terrain.tile(key(0, 1, 0), &mut buffer).expect("a tile");
         assert_eq!(steep == Heights::Hole, is_hole, "{height}");
-        let flat = terrain.tile(key(0, 0, 0), &mut buffer).expect("a tile");
+        let (flat, _) = terrain.tile(key(0, 0, 0), &mut buffer).expect("a tile");
         assert_ne!(flat, Heights::Hole);
     }
 }

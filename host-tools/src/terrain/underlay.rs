@@ -8,6 +8,7 @@ use hapterra_core::grid::Cell;
 use hapterra_core::scene::Scene;
 use hapterra_core::terrain::{CoarseTile, TILE_CELLS, TILE_SAMPLES, TileKey, Underlay};
 use hapterra_core::wire::message::Heights;
+use heightfield::{ReadStatus, ReadTracker};
 
 use super::tiler::range;
 use super::{Terrain, TileBuffer, identity};
@@ -69,33 +70,46 @@ impl Terrain<'_> {
     }
 
     /// The heights of a tile that a device with this scene asks for, as they go on the link: of the
-    /// scene's level, or of its underlay. `None` if there is no such tile.
+    /// scene's level, or of its underlay. `None` if there is no such tile. And whether they are
+    /// complete.
     #[must_use]
     pub fn tile_of<'b>(
         &self,
         scene: &Scene,
         key: TileKey,
         buffer: &'b mut TileBuffer,
+    ) -> Option<(Heights<'b>, ReadStatus)> {
+        let reads = ReadTracker::default();
+        let heights = self.heights_of_scene(scene, key, buffer, &reads)?;
+        Some((heights, reads.status()))
+    }
+
+    fn heights_of_scene<'b>(
+        &self,
+        scene: &Scene,
+        key: TileKey,
+        buffer: &'b mut TileBuffer,
+        reads: &ReadTracker,
     ) -> Option<Heights<'b>> {
         let Some(Underlay { wide, near }) = &scene.underlay else {
-            return self.tile(key, buffer);
+            return self.heights_of(key, buffer, reads);
         };
         let coarse = |tile: &CoarseTile| key == tile.key(scene.level);
         match near.as_ref().filter(|near| coarse(near)) {
             Some(near) => {
-                let sample = |col, row| self.near_sample(wide, near, [col, row]);
+                let sample = |col, row| self.near_sample(wide, near, [col, row], reads);
                 Some(coarse_tile(buffer, sample))
             }
             None if coarse(wide) => {
-                let sample = |col, row| self.coarse_sample(wide, [col, row]);
+                let sample = |col, row| self.coarse_sample(wide, [col, row], reads);
                 Some(coarse_tile(buffer, sample))
             }
-            None => self.tile(key, buffer),
+            None => self.heights_of(key, buffer, reads),
         }
     }
 
     /// The height of a coarse tile's sample, in cells. Beyond the field it goes on as it ends there.
-    fn coarse_sample(&self, tile: &CoarseTile, place: [usize; 2]) -> f64 {
+    fn coarse_sample(&self, tile: &CoarseTile, place: [usize; 2], reads: &ReadTracker) -> f64 {
         let size = self.size();
         let sample = |first: i32, place: usize, last: i32| {
             let at = i64::from(first) + ((place as i64) << tile.shift);
@@ -106,22 +120,34 @@ impl Terrain<'_> {
         let level = self.level().saturating_add(shift);
         let column = sample(tile.first.x, place[0], size[0]);
         let row = sample(tile.first.y, place[1], size[1]);
-        self.cells_at(level, [column, row])
+        self.cells_at(level, [column, row], reads)
     }
 
     /// A sample of the near tile: on its border the height that the wide one has there, so that the
     /// surface goes on evenly. Where that has none, its own.
-    fn near_sample(&self, wide: &CoarseTile, near: &CoarseTile, place: [usize; 2]) -> f64 {
+    fn near_sample(
+        &self,
+        wide: &CoarseTile,
+        near: &CoarseTile,
+        place: [usize; 2],
+        reads: &ReadTracker,
+    ) -> f64 {
         let is_on_border = place.iter().any(|at| [0, TILE_CELLS].contains(at));
-        let between = is_on_border.then(|| self.between_samples(wide, near, place));
+        let between = is_on_border.then(|| self.between_samples(wide, near, place, reads));
         match between {
             Some(height) if !height.is_nan() => height,
-            _ => self.coarse_sample(near, place),
+            _ => self.coarse_sample(near, place, reads),
         }
     }
 
     /// The height of the wide tile at a sample of the near one, in cells; NaN at a hole.
-    fn between_samples(&self, wide: &CoarseTile, near: &CoarseTile, place: [usize; 2]) -> f64 {
+    fn between_samples(
+        &self,
+        wide: &CoarseTile,
+        near: &CoarseTile,
+        place: [usize; 2],
+        reads: &ReadTracker,
+    ) -> f64 {
         let from = |wide_first: i32, near_first: i32, place: usize| {
             let off = near_first - wide_first + place as i32 * near.spacing();
             let cell = (off / wide.spacing()).clamp(0, TILE_CELLS as i32 - 1);
@@ -135,7 +161,7 @@ impl Terrain<'_> {
             let weight = along(east, right) * along(north, up);
             // A corner without weight does not count, also where it is a hole.
             match weight > 0.0 {
-                true => weight * self.coarse_sample(wide, [col + right, row + up]),
+                true => weight * self.coarse_sample(wide, [col + right, row + up], reads),
                 false => 0.0,
             }
         });

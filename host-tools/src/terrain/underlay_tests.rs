@@ -36,7 +36,7 @@ impl Felt {
     fn of(terrain: &Terrain<'_>, scene: &Scene, place: CoarseTile) -> Self {
         let key = place.key(scene.level);
         let mut buffer = TileBuffer::default();
-        let heights = terrain.tile_of(scene, key, &mut buffer).expect("a tile");
+        let (heights, _) = terrain.tile_of(scene, key, &mut buffer).expect("a tile");
         Self(place, sent(key, heights))
     }
 

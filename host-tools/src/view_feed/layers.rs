@@ -115,9 +115,8 @@ impl Reading {
         let mut line = vec![f64::NAN; layer.columns as usize];
         for _ in 0..rows.min(self.rows - layer.rows) {
             let grid = terrain.grid();
-            let before = terrain.raster().not_yet();
-            grid.copy_row(level, south + layer.rows, west, &mut line);
-            if terrain.raster().not_yet() != before {
+            let status = grid.read_row(level, south + layer.rows, west, &mut line);
+            if !status.is_complete() {
                 // It is on its way from elsewhere: another look finds it.
                 return true;
             }
@@ -158,7 +157,8 @@ pub(super) fn tile(terrain: &Terrain<'_>, index: TileIndex, slot: u32) -> Tile {
         line.fill(f64::NAN);
         let column = (first.x - AROUND as i32 / 2).max(0) as u32;
         if let (Ok(row), Some(rest)) = (u32::try_from(row), line.get_mut(skipped..)) {
-            terrain.grid().copy_row(terrain.level(), row, column, rest);
+            // A pending height is drawn when its tile is sent again.
+            let _ = terrain.grid().read_row(terrain.level(), row, column, rest);
         }
         heights_mm.extend(line.map(|height| (height * per_unit) as f32));
     }

@@ -34,6 +34,15 @@ pub struct Prepared<'t> {
 }
 
 impl Prepared<'_> {
+    /// The same, whose further reads of the terrain do not wait.
+    #[must_use]
+    pub fn non_blocking(self) -> Self {
+        Self {
+            terrain: self.terrain.non_blocking(),
+            ..self
+        }
+    }
+
     /// The beginning of the stream: greeting, scene and layers.
     pub(super) fn into_messages(self) -> Vec<Message> {
         let hello = Hello {

@@ -4,7 +4,7 @@ use hapterra_tests::timeouts::wait_for;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::has_gdal;
 use hapterra_url_tests::http::{Fault, Server};
-use heightfield::{OpenOptions, Raster, RasterError};
+use heightfield::{OpenOptions, Raster, RasterError, Wait};
 
 const SIZE: [u32; 2] = [2500, 2100];
 
@@ -95,8 +95,8 @@ fn bytes_that_were_not_asked_for_are_not_taken() {
         server.fail(Fault::None, 0);
         let raster = open(&server, "hills.tif").expect("a right answer");
         server.fail(fault, usize::MAX);
-        assert!(raster.height(1200, 700).is_nan(), "{fault:?}");
-        assert!(raster.not_yet() > 0);
+        let (height, status) = raster.read_height(1200, 700, Wait::UntilRead);
+        assert!(height.is_nan() && !status.is_complete(), "{fault:?}");
         server.fail(Fault::None, 0);
         let known = comes(&raster, 1200, 700);
         assert_eq!(known, expected(1200, 700), "{fault:?}");
@@ -139,7 +139,7 @@ fn a_page_for_every_name_is_no_neighbour() {
 fn what_did_not_come_is_told_before_anything_is_armed() {
     let (_folder, server) = hills();
     let raster = open(&server, "hills.tif").expect("opens");
-    assert!(raster.check_came().is_ok());
+    assert!(raster.check_complete().is_ok());
     server.fail(Fault::Error500, usize::MAX);
     let (requests, _) = server.seen();
     for column in (0..SIZE[0]).step_by(100) {
@@ -150,9 +150,9 @@ fn what_did_not_come_is_told_before_anything_is_armed() {
         asked < 40,
         "{asked} requests to a server that does not answer"
     );
-    let told = raster.check_came().expect_err("it did not come");
+    let told = raster.check_complete().expect_err("it did not come");
     assert!(matches!(told.fault(), RasterError::Remote(_)), "{told}");
-    assert!(raster.check_came().is_ok(), "and nothing since");
+    assert!(raster.check_complete().is_ok(), "and nothing since");
 }
 
 #[test]
@@ -187,9 +187,11 @@ fn a_source_of_a_vrt_that_is_not_there_is_a_hole_and_the_others_are_felt() {
     };
     let raster = Raster::open(&url, &in_blocks).expect("one of two");
     assert_eq!(raster.height(1200, 700), expected(1200, 700));
-    let before = raster.not_yet();
-    assert!(raster.height(3700, 700).is_nan());
-    assert_eq!(raster.not_yet(), before, "it is known that it is not there");
+    let (height, status) = raster.read_height(3700, 700, Wait::UntilRead);
+    assert!(
+        height.is_nan() && status.is_complete(),
+        "it is known that it is not there"
+    );
 }
 
 #[test]
@@ -206,13 +208,16 @@ fn a_file_that_was_changed_meanwhile_is_not_mixed_with_what_is_held() {
     let raster = open(&server, "hills.tif").expect("opens");
     assert_eq!(raster.height(100, 2000), expected(100, 2000));
     server.change();
-    assert!(raster.height(2400, 100).is_nan());
+    let (height, status) = raster.read_height(2400, 100, Wait::UntilRead);
+    assert!(
+        height.is_nan() && !status.is_complete(),
+        "no hole, but not known"
+    );
     assert_eq!(
         raster.height(100, 2000),
         expected(100, 2000),
         "what is held"
     );
-    assert!(raster.not_yet() > 0, "no hole, but not known");
     let again = open(&server, "hills.tif").expect("the file as it is now");
     assert_eq!(again.height(2400, 100), expected(2400, 100));
 }

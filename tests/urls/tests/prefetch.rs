@@ -34,15 +34,15 @@ fn hills() -> (tempfile::TempDir, Raster, Server) {
 
 /// Returns true if all of a tile is here.
 fn is_here(terrain: &Terrain<'_>, key: TileKey) -> bool {
-    let before = terrain.raster().not_yet();
     let mut buffer = TileBuffer::default();
-    assert!(terrain.tile(key, &mut buffer).is_some());
-    terrain.raster().not_yet() == before
+    let (_, status) = terrain.tile(key, &mut buffer).expect("there is one");
+    status.is_complete()
 }
 
 fn terrain(raster: &Raster) -> Terrain<'_> {
     let scale = Scale::new(1.0, 0.05).expect("a scale");
-    Terrain::new(raster, scale, 0).expect("a terrain")
+    let terrain = Terrain::new(raster, scale, 0).expect("a terrain");
+    terrain.non_blocking()
 }
 
 /// Requests so far.
@@ -61,11 +61,7 @@ fn tiles_read_ahead_need_no_request() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
     let keys = [TileKey::new(0, 60, 20), TileKey::new(0, 61, 20)];
-    // As long as whoever reads waits, nothing is read ahead.
     let opened = requests(&server);
-    terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
-    assert_eq!(requests_later(&server), opened);
-    raster.stop_waiting();
     // It waits for nothing: the server holds its answers back for ever.
     server.hold(true);
     terrain.grid().prefetch(0, [1920, 640], [1984, 672]);
@@ -92,7 +88,6 @@ fn a_view_that_is_put_in_has_the_ground_around_its_hip_fetched() {
     let at = |east| GridPoint::new([east, 640, 100], Vec3::ZERO);
     let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, at(640));
     let mut client = Client::numbered(&terrain, scene, None, Timeouts::REAL_TIME, 1);
-    raster.stop_waiting();
     let before = requests(&server);
     server.hold(true);
     let view = SceneChange {
@@ -126,7 +121,6 @@ fn looks_without_a_tile_at_100_ms() {
             let (_folder, raster, server) = hills();
             let terrain = terrain(&raster);
             server.set_latency(Duration::from_millis(100));
-            raster.stop_waiting();
             let looks = 3000 * 100 / speed;
             let cells = |look: i32| 40 + look * speed / 100;
             let missing = (0..looks).filter(|look| {

@@ -6,7 +6,7 @@ use hapterra_tests::timeouts::wait_until;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::http::Server;
 use heightfield::disk_cache::DiskCache;
-use heightfield::{OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, Wait};
 
 /// Pages of what [`Bed::look`] looks at.
 const PAGES: usize = 50;
@@ -49,7 +49,17 @@ impl Bed {
         let mut heights = vec![0.0; 500];
         for (number, heights) in heights.chunks_exact_mut(50).enumerate() {
             let number = number as u32;
-            raster.copy_row((number % 3) as u8, 31 * number, 17 * number, heights);
+            assert!(
+                raster
+                    .read_row(
+                        (number % 3) as u8,
+                        31 * number,
+                        17 * number,
+                        heights,
+                        Wait::UntilRead
+                    )
+                    .is_complete()
+            );
         }
         (heights, self.server.seen().0.len() - before)
     }

@@ -16,7 +16,7 @@ use hapterra_tests::timeouts::{pass, wait_for, wait_until};
 use hapterra_url_tests::cog::{cog, in_tiles};
 use hapterra_url_tests::has_gdal;
 use hapterra_url_tests::http::{Fault, Server};
-use heightfield::{OpenOptions, Raster};
+use heightfield::{OpenOptions, Raster, Wait};
 
 fn height(column: u32, row: u32) -> f32 {
     (column % 100) as f32 + 0.5 * (row % 64) as f32
@@ -33,20 +33,17 @@ fn hills() -> (tempfile::TempDir, Raster, Server) {
 
 fn terrain(raster: &Raster) -> Terrain<'_> {
     let scale = Scale::new(1.0, 0.05).expect("a scale");
-    Terrain::new(raster, scale, 0).expect("a terrain")
+    let terrain = Terrain::new(raster, scale, 0).expect("a terrain");
+    terrain.non_blocking()
 }
 
 const KEY: TileKey = TileKey::new(0, 20, 20);
 
 /// Bytes of the tile, where all of it has come.
 fn tile(terrain: &Terrain<'_>) -> Option<String> {
-    let before = terrain.raster().not_yet();
     let mut buffer = TileBuffer::default();
-    let heights = format!(
-        "{:?}",
-        terrain.tile(KEY, &mut buffer).expect("there is one")
-    );
-    (terrain.raster().not_yet() == before).then_some(heights)
+    let (heights, status) = terrain.tile(KEY, &mut buffer).expect("there is one");
+    status.is_complete().then(|| format!("{heights:?}"))
 }
 
 fn comes(terrain: &Terrain<'_>) -> String {
@@ -57,7 +54,6 @@ fn comes(terrain: &Terrain<'_>) -> String {
 fn what_is_not_here_yet_is_asked_for_and_comes_later() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
-    raster.stop_waiting();
     // Who waited would wait for ever.
     server.hold(true);
     for _ in 0..5 {
@@ -74,7 +70,6 @@ fn what_is_not_here_yet_is_asked_for_and_comes_later() {
 fn a_server_that_is_gone_for_a_while_is_asked_again_and_nothing_becomes_a_hole() {
     let (_folder, raster, server) = hills();
     let terrain = terrain(&raster);
-    raster.stop_waiting();
     server.fail(Fault::Error500, usize::MAX);
     for _ in 0..100 {
         assert_eq!(tile(&terrain), None);
@@ -93,10 +88,9 @@ fn all_that_a_touch_needs_is_asked_for_at_once() {
     let server = Server::of(folder.path());
     let raster = Raster::open(server.url("hills.tif"), &OpenOptions::default());
     let raster = raster.expect("opens");
-    raster.stop_waiting();
     server.hold(true);
     let before = server.seen().0.len();
-    assert!(raster.height(1500, 500).is_nan());
+    assert!(raster.read_height(1500, 500, Wait::Never).0.is_nan());
     wait_until("requests for four rows of chunks", || {
         server.seen().0.len() >= before + 4
     });
@@ -172,19 +166,18 @@ fn a_source_of_a_vrt_that_has_not_come_is_no_hole() {
     std::fs::write(folder.path().join("hills.vrt"), vrt).expect("written");
     let raster = Raster::open(server.url("hills.vrt"), &OpenOptions::default());
     let raster = raster.expect("opens");
-    raster.stop_waiting();
     server.hold(true);
     // Of each a place that was not looked at: some are open, and some are not.
     let places = (0..SOURCES).map(|number| (2200 * number + 20, 20));
     let places: Vec<(u32, u32)> = places.collect();
     for (column, row) in &places {
-        let before = raster.not_yet();
-        assert!(raster.height(*column, *row).is_nan());
-        assert!(raster.not_yet() > before, "no hole");
+        let (height, status) = raster.read_height(*column, *row, Wait::Never);
+        assert!(height.is_nan() && !status.is_complete(), "no hole");
     }
     server.hold(false);
     for (column, row) in places {
-        wait_until("the height", || !raster.height(column, row).is_nan());
+        let read = || raster.read_height(column, row, Wait::Never);
+        wait_until("the height", || !read().0.is_nan());
         let expected = f64::from(height(column % 2200, 1799 - row));
         assert_eq!(raster.height(column, row), expected);
     }
@@ -225,7 +218,6 @@ fn a_device_gets_its_tiles_when_they_have_come_and_no_holes_before() {
         device: &mut device,
         is_mute: Rc::clone(&is_mute),
     };
-    raster.stop_waiting();
     server.hold(true);
     let (mut session, _) =
         Session::open(&terrain, scene, None, Box::new(line), Timeouts::REAL_TIME)

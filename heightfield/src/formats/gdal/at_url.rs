@@ -43,7 +43,7 @@ impl Served {
     pub(super) fn of(url: &str, elsewhere: &RemoteFetcher) -> (Self, String) {
         let [root, name, rest] = parts(url);
         let served = Self {
-            elsewhere: elsewhere.waiting(),
+            elsewhere: elsewhere.clone(),
             root: root.to_owned(),
             rest: rest.to_owned(),
             roots: gdal_names(root).into(),
@@ -74,7 +74,7 @@ impl FileSystem for Served {
     }
 }
 
-/// An open file at a URL, read by a thread that may wait.
+/// An open file at a URL.
 struct Remote(Arc<RemoteFile>);
 
 impl ReadAt for Remote {
@@ -83,7 +83,7 @@ impl ReadAt for Remote {
     }
 
     fn read_at(&self, at: u64, count: usize) -> io::Result<Vec<u8>> {
-        self.0.read_waiting(at, count)
+        self.0.read_at(at, count)
     }
 }
 
@@ -99,7 +99,7 @@ pub(super) fn fault(error: io::Error) -> RasterError {
     match error.kind() {
         // A refusal of its content, and not of its server.
         io::ErrorKind::Other => RasterError::Unreadable(error),
-        _ => RasterError::elsewhere(error),
+        _ => RasterError::Remote(error),
     }
 }
 

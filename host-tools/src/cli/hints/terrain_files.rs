@@ -126,7 +126,6 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         }
         RasterError::Unreadable(_) => "check the path and that you may read the file",
         RasterError::Remote(error) => elsewhere(path, error),
-        RasterError::NotYet => "try again",
         RasterError::RawSizeMissing => "say how the samples lie: --input raw=WxH:i16:le",
         RasterError::AmbiguousChannels(_) => {
             "say which channel holds the height: --input channel=red|green|blue|alpha|grey"

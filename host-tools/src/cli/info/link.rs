@@ -6,6 +6,7 @@ use hapterra_core::terrain::{MARGIN_CELLS, TILE_CELLS, TILE_SAMPLES, TileKey};
 use hapterra_core::wire::frame::{MAX_FRAME, encode};
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice};
 use hapterra_core::wire::session::{InSession, SessionNumber};
+use heightfield::ReadStatus;
 
 use crate::terrain::{HapticGrid, Terrain, TerrainError, TileBuffer};
 
@@ -55,8 +56,10 @@ impl LinkFigures {
         for at in (0..columns * rows).step_by(stride) {
             let key = TileKey::new(0, (at % columns) as i32, (at / columns) as i32);
             match terrain.tile(key, &mut buffer) {
-                None | Some(Heights::Hole | Heights::Flat { .. }) => others += 1,
-                Some(heights) => {
+                // A tile that a server did not send says nothing of the others.
+                Some((_, ReadStatus::Pending)) => {}
+                None | Some((Heights::Hole | Heights::Flat { .. }, _)) => others += 1,
+                Some((heights, _)) => {
                     let bytes = frame_bytes(key, heights);
                     (tiles, sum, worst) = (tiles + 1, sum + bytes, worst.max(bytes));
                 }
