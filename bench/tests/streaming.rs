@@ -115,7 +115,7 @@ fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
     );
     assert!(done, "{said}");
     assert!(
-        said.contains("small.asc: 90 × 90 samples; the ways need 460"),
+        said.contains("small.asc: 90 × 90 samples; the paths need 460"),
         "{said}"
     );
     let rows = rows(&csv);

@@ -13,7 +13,7 @@
 #include <stdint.h>
 
 /**
- * What a function returns: 0, or which error.
+ * Result of a function: 0, or an error.
  */
 enum HapterraStatus
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L

@@ -8,7 +8,9 @@ use clap::Parser;
 use hapterra::cli::Failure;
 use hapterra::cli::options::exaggeration::Exaggeration;
 use hapterra::cli::options::terrain_file::{ReadingOptions, assumed_unit};
-use hapterra::place::{self, Coordinates, PlaceError, Reach, Sizing, Target, Placement, PlacementOptions};
+use hapterra::place::{
+    self, Coordinates, PlaceError, Placement, PlacementOptions, Reach, Sizing, Target,
+};
 use hapterra::terrain::{HapticCells, INTERPOLATED_STEP, Terrain as Laid};
 use hapterra_core::phantom::Calibration;
 use hapterra_touch::{Block, Heights, Terrain as Touched, Unread};

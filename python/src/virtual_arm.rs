@@ -1,6 +1,6 @@
 //! A virtual arm in a hand, in a closed loop with a contact.
 
-use hapterra::phantom::{HandModel, PhantomModel, ArmFrame, Plant};
+use hapterra::phantom::{ArmFrame, HandModel, PhantomModel, Plant};
 use hapterra_core::Vec3;
 use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_touch::{Contact as Touched, StepError};

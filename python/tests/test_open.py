@@ -130,7 +130,7 @@ def test_damaged_parts_are_holes_and_warnings(tmp_path):
     content = bytearray(file.read_bytes())
     content[4064:8000] = bytes(8000 - 4064)
     file.write_bytes(content)
-    with pytest.warns(UserWarning, match="cannot be read and are a hole"):
+    with pytest.warns(UserWarning, match="cannot be read and count as no data"):
         assert Terrain.open(file, in_memory=0).height_mm(30, 230) is None
 
 
@@ -147,7 +147,7 @@ def test_parts_that_have_gone_meanwhile_are_warnings(tmp_path, touch):
     file = huge(tmp_path)
     terrain = Terrain.open(file, raw=f"{SIDE}x{SIDE}", cell="1m")
     os.truncate(file, 1000)
-    with pytest.warns(UserWarning, match="cannot be read and are a hole"):
+    with pytest.warns(UserWarning, match="cannot be read and count as no data"):
         touch(terrain, (1000.5, 1000.5))
 
 
@@ -259,7 +259,7 @@ def test_places_that_cannot_be_are_errors(tmp_path):
     terrain = Terrain.open(written(tmp_path / "hills.tif", heights))
     for at, size, text in [
         ((0, 0), (9, 9), "outside of the terrain, which covers"),
-        ((501_500, 3_998_500), (9, 9), "it is a hole"),
+        ((501_500, 3_998_500), (9, 9), "there is no data at"),
         ((500_100, 3_999_000), (0, 9), "size_mm is"),
         ((500_100, 3_999_000), (9, np.nan), "size_mm is"),
         ((500_100,), (9, 9), "at has 1 numbers: give 2"),

@@ -190,7 +190,10 @@ fn a_packed_strip_is_felt_in_the_memory_of_a_terrain() {
     write(&packed[..packed.len() / 10 * 9]);
     let (code, told) = info(&["--cache", cache]);
     assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains("cannot be read and are a hole"), "{told}");
+    assert!(
+        told.contains("cannot be read and count as no data"),
+        "{told}"
+    );
     // One of which nothing can be unpacked.
     let mut damaged = packed.clone();
     damaged[0] = 0;

@@ -216,7 +216,7 @@ fn an_overview_whose_tiles_are_not_there_leaves_the_full_image() {
         assert_eq!(raster.surface(1, [200.0, 3.0]), f64::from(OTHER), "{what}");
         let (is_open, told) = ends_well(what, &path, &[]);
         assert!(
-            is_open && told.contains("cannot be read and are a hole") == warns,
+            is_open && told.contains("cannot be read and count as no data") == warns,
             "{what}: {told}"
         );
     }

@@ -207,7 +207,7 @@ mod tests {
         let raster = raster.expect("a field");
         let terrain = Terrain::new(&raster, Scale::new(CELL_MM, 1.0).expect("valid"), 0);
         let why = Ways::over(&terrain.expect("a terrain"), false).expect_err("a hole");
-        assert!(why.to_string().contains("a hole at column"), "{why}");
+        assert!(why.to_string().contains("no data at column"), "{why}");
     }
 
     #[test]

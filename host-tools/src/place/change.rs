@@ -250,7 +250,7 @@ impl Bounds {
                 }
             }
             PlacementChange::Surface(change) => {
-                *law = change.of(law, grid.materials().is_some())?
+                *law = change.of(law, grid.materials().is_some())?;
             }
             PlacementChange::Reset => {
                 let first = &self.first.view;

@@ -633,7 +633,7 @@ fn odd_outputs_and_options_are_told() {
     assert!(told.contains("2 rows are below ground"), "{told}");
     // And the recording tells it from a HIP that is free.
     let felt = std::fs::read_to_string(folder.path("felt.csv")).expect("written");
-    assert_eq!(felt.matches(",waiting").count(), 2, "{felt}");
+    assert_eq!(felt.matches(",unseeded").count(), 2, "{felt}");
     assert!(!felt.contains(",free"), "{felt}");
 }
 

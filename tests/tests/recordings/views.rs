@@ -149,7 +149,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
     };
     let told = refused("demo/hills.csv", &["--scale", "3mm/cell"]);
     assert!(
-        told.contains("5 views") && told.contains("--ignore-settings"),
+        told.contains("5 placements") && told.contains("--ignore-settings"),
         "{told}"
     );
     // One of the views is not described.
