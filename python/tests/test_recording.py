@@ -77,7 +77,7 @@ def test_replay_with_changes_is_another(recorded):
     assert not np.array_equal(smooth.steps["force_x_n"], recording.steps["force_x_n"])
     with pytest.raises(CommandError, match="friction") as failed:
         recording.replay(friction=-1)
-    assert failed.value.hint.startswith("--friction from 0")
+    assert failed.value.hint.startswith("friction from 0")
 
 
 def test_replay_is_on_the_terrain_that_was_recorded(recorded, tmp_path):

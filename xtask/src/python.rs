@@ -6,7 +6,9 @@ use std::process::Command;
 use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
-use crate::run::{cargo, output, program, root, run, run_quietly, say, target_dir, timed};
+use crate::run::{
+    cargo, output, program, root, run, run_quietly, say, target_dir, timed, without_own_variables,
+};
 use crate::{demo, deny};
 
 /// How the wheel is built that is handed out, and the one that is tested: most crates of the registry
@@ -145,6 +147,7 @@ fn wheel(python: &Path, how: &[&str]) -> Result<PathBuf> {
         .arg(&wheels)
         .current_dir(root().join("python"))
         .env("CARGO_TARGET_DIR", target_dir());
+    without_own_variables(&mut maturin);
     run_quietly(&mut maturin)?;
     let mut made = std::fs::read_dir(&wheels).context("maturin has made no folder of wheels")?;
     let wheel = made.next().context("maturin has made no wheel")??;

@@ -49,10 +49,16 @@ pub(crate) fn cargo() -> Command {
         .current_dir(root())
         .env("CARGO_TARGET_DIR", target_dir())
         .env_remove("CARGO_BUILD_TARGET");
+    without_own_variables(&mut command);
+    command
+}
+
+/// Takes away the variables that cargo sets for this program: a build script that reads them would
+/// run again.
+pub(crate) fn without_own_variables(command: &mut Command) {
     for variable in OF_THIS_PROGRAM {
         command.env_remove(variable);
     }
-    command
 }
 
 /// Builds the program of the package of that name, and returns its path.
