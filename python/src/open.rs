@@ -306,9 +306,7 @@ fn unread(error: Error) -> PyErr {
         RasterError::Unreadable(io) if io.kind() == std::io::ErrorKind::NotFound => {
             PyFileNotFoundError::new_err
         }
-        RasterError::Unreadable(_) | RasterError::Remote(_) => {
-            PyOSError::new_err
-        }
+        RasterError::Unreadable(_) | RasterError::Remote(_) => PyOSError::new_err,
         _ => pyo3::exceptions::PyValueError::new_err,
     };
     raised(text(&error.into()))
