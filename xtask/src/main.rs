@@ -109,6 +109,11 @@ fn command() -> Result<ExitCode> {
         Value(name) => name.string()?,
         other => return Err(other.unexpected().into()),
     };
+    let is_help = |word: &std::ffi::OsStr| word == "-h" || word == "--help";
+    let name = match words.raw_args()?.peek().is_some_and(is_help) {
+        true => "help".into(),
+        false => name,
+    };
     match name.as_str() {
         "demo" => {
             let request = demo_words(&mut words)?;
@@ -250,7 +255,13 @@ fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
             Some(Value(file)) if request.file.is_none() => request.file = Some(file),
             Some(other) => {
                 let what = other.unexpected();
-                bail!("{what}; options of the run come after `--`");
+                match request.touch {
+                    true => bail!(
+                        "{what}; the surface is chosen on the page; options of `hapterra cut`, as \
+                         --input, come after `--`"
+                    ),
+                    false => bail!("{what}; options of the run come after `--`"),
+                }
             }
             None => return Ok(request),
         }

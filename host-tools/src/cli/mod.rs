@@ -43,6 +43,7 @@ use std::ffi::OsString;
 use std::io::Write as _;
 use std::process::ExitCode;
 
+use clap::error::ContextKind;
 use clap::{ArgAction, Parser, Subcommand};
 
 pub use failure::{Failure, OrHint};
@@ -149,12 +150,17 @@ pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result
     if let Some(line) = line.filter(|_| !guardian::is_worker()) {
         eprintln!("{line}");
     }
-    P::try_parse_from(&words).map_err(|error| {
+    P::try_parse_from(&words).map_err(|mut error| {
         match error.use_stderr() {
             // It repeats what was typed, which need not be of the user's making.
             true => {
                 let option = || old_options::hint(&words, &error);
                 let moved = moved::hint(&error).or_else(option).unwrap_or_default();
+                if !moved.is_empty() {
+                    // The parser's guess would contradict it.
+                    error.remove(ContextKind::Suggested);
+                    error.remove(ContextKind::SuggestedArg);
+                }
                 writer::put(std::io::stderr(), &format!("{}{moved}", error.render()));
             }
             // A reader who goes away has seen enough of the help.
