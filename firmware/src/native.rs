@@ -172,7 +172,7 @@ impl<C: TickClock, const D: usize> Device<C, D> {
         }
     }
 
-    /// What the device would find in its memory if it were restarted now.
+    /// Returns the memory that the device would find after a restart.
     #[must_use]
     pub const fn memory(&self) -> &Stored {
         &self.stored

@@ -279,7 +279,7 @@ impl Raster {
         }
     }
 
-    /// Whether a block of the file is being read in the background, or is going to be
+    /// Returns true if a block of the file is being read in the background, or is going to be
     /// ([`Wait::Never`]). Coarse samples that are made of the file do not count.
     pub fn is_reading(&self) -> bool {
         match &self.source.storage {
@@ -499,7 +499,7 @@ impl Raster {
         self.source.storage.held()
     }
 
-    /// Whether all samples were looked at: those in memory always are.
+    /// Returns true if all samples were looked at: those in memory always are.
     pub fn is_known_whole(&self) -> bool {
         self.samples().is_some()
     }
@@ -543,7 +543,7 @@ impl Raster {
         self.source.system.as_ref()
     }
 
-    /// Where the reference system comes from.
+    /// Returns the source of the reference system.
     pub fn reference_system_from(&self) -> Certainty {
         self.source.system_from
     }
@@ -565,7 +565,7 @@ impl Raster {
         self.source.vertical_datum.as_ref()
     }
 
-    /// Where the vertical unit comes from.
+    /// Returns the source of the vertical unit.
     pub fn vertical_unit_from(&self) -> Certainty {
         match self.source.metres_per_vertical_unit {
             Some(_) => self.source.vertical_unit_from,
@@ -573,7 +573,7 @@ impl Raster {
         }
     }
 
-    /// Where the samples lie in the coordinates of the file's reference system.
+    /// Returns the place of the samples in the coordinates of the file's reference system.
     pub fn georeference(&self) -> Georeference<'_> {
         let source = &self.source;
         let last = [source.columns, source.rows].map(|count| f64::from(count) - 1.0);
@@ -616,7 +616,7 @@ impl Raster {
         self.stated_metres_per_vertical_unit().unwrap_or(1.0)
     }
 
-    /// What the user should know about how the file was read, one sentence each.
+    /// Returns remarks on how the file was read, one sentence each.
     pub fn remarks(&self) -> &[String] {
         &self.source.remarks
     }

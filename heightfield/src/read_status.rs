@@ -1,4 +1,4 @@
-//! Whether a read waits for heights that are not in memory, and whether it returned all of them.
+//! The choice to wait for heights that are not in memory, and the completeness of a read.
 
 use std::cell::Cell;
 

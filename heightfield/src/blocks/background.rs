@@ -97,7 +97,7 @@ impl Queue {
         self.wake.notify_all();
     }
 
-    /// Whether no job waits or is being done.
+    /// Returns true if no job waits or is being done.
     pub(super) fn is_idle(&self) -> bool {
         self.state().known.is_empty()
     }

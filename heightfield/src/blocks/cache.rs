@@ -43,7 +43,7 @@ impl Cache {
         self.blocks.get(key).cloned()
     }
 
-    /// Whether a block is kept.
+    /// Returns true if a block is kept.
     pub(super) fn has(&self, key: &Key) -> bool {
         self.blocks.contains(key)
     }

@@ -63,9 +63,9 @@ struct Held {
     piece: Piece,
     /// Samples that count as holes for now, because their block cannot be read.
     lacking: FixedBitSet,
-    /// Whether it was looked for on disk.
+    /// True if it was looked for on disk.
     was_sought: bool,
-    /// Whether it knows more than the disk.
+    /// True if it knows more than the disk.
     is_new: bool,
 }
 

@@ -12,7 +12,7 @@ use crate::disk_cache::{DiskCache, Name};
 /// Native images at least so coarse are kept: what is finer lies together in the file.
 const COARSE: u32 = 8;
 
-/// Whether blocks of an image are kept on disk, and made in the background.
+/// Returns true if blocks of an image are kept on disk, and made in the background.
 pub(super) fn is_coarse(image: &BlockImage) -> bool {
     image.every.is_some_and(|every| every >= COARSE)
 }

@@ -244,7 +244,7 @@ impl Shared {
         counts.map(u64::from).iter().product()
     }
 
-    /// Whether a block of the file is being read in the background, or is going to be.
+    /// Returns true if a block of the file is being read in the background, or is going to be.
     pub(super) fn is_reading(&self) -> bool {
         !self.fine.is_idle()
     }

@@ -1,4 +1,4 @@
-//! What a format hands over that can read a part of an image without the rest.
+//! Interface of a format that can read a part of an image without the rest.
 
 use super::super::RasterError;
 use super::super::samples::{HoleMask, SampleType, SampleValue, Samples, with_samples};
@@ -19,7 +19,7 @@ pub(crate) trait BlockReader: Send + Sync {
     /// Type in which samples are held.
     fn sample_type(&self) -> SampleType;
 
-    /// Whether the file stores samples there; where it does not, there is a hole.
+    /// Returns true if the file stores samples there; where it does not, there is a hole.
     fn is_stored(&self, image: usize, part: &Part) -> bool;
 
     /// The samples of a part of an image, row after row.
@@ -99,7 +99,7 @@ pub(crate) struct Block {
     pub(crate) samples: Samples,
     /// Holes that no value marks.
     pub(crate) holes: Option<HoleMask>,
-    /// Whether some of its holes are there only because a part of the file could not be read.
+    /// True if some of its holes are there only because a part of the file could not be read.
     pub(crate) is_lacking: bool,
 }
 

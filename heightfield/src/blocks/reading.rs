@@ -23,7 +23,7 @@ const MAX_PREFETCHED: usize = 16;
 pub(super) struct Read {
     /// `None` where there is no sample.
     pub(super) block: Option<Arc<Block>>,
-    /// Whether some of its holes are there only because something could not be read.
+    /// True if some of its holes are there only because something could not be read.
     is_lacking: bool,
 }
 

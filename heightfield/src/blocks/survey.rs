@@ -1,4 +1,4 @@
-//! What is known of a file without reading all of it.
+//! Knowledge of a file without reading all of it.
 
 use std::hash::Hasher;
 

@@ -36,7 +36,7 @@ struct Shared {
 enum Known {
     OnItsWay,
     Open(Arc<RemoteFile>),
-    /// Why not, and since when.
+    /// Reason for the refusal, and its time.
     Failed(Instant, ErrorKind, String),
 }
 

@@ -22,7 +22,7 @@ pub(super) struct Line {
     requests: Semaphore,
     files: AtomicU64,
     held: Mutex<Held>,
-    /// Where pages are kept for another run.
+    /// Place where pages are kept for another run.
     disk: OnceLock<DiskCache>,
     pub(super) arrived: Condvar,
 }
@@ -35,11 +35,11 @@ pub(super) struct Held {
     pub(super) troubles: HashMap<u64, Trouble>,
 }
 
-/// What is wrong with a file.
+/// Fault of a file.
 pub(super) enum Trouble {
     /// Its last request failed, then, and why; another may go well.
     Outage(Instant, String),
-    /// Why no request can go well any more.
+    /// Reason for which no request can go well any more.
     Lost(String),
 }
 
@@ -83,7 +83,7 @@ impl Line {
         self.is_touched.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the terrain is open.
+    /// Returns true if the terrain is open.
     pub(super) fn is_touched(&self) -> bool {
         self.is_touched.load(Ordering::Relaxed)
     }

@@ -62,7 +62,7 @@ const OUTAGE: ErrorKind = ErrorKind::ConnectionAborted;
 /// A file that cannot be read on: it was changed, or may not be read any more.
 const LOST: ErrorKind = ErrorKind::StaleNetworkFileHandle;
 
-/// Whether an error says that nothing more comes of a file that was opened.
+/// Returns true if an error says that nothing more comes of a file that was opened.
 pub(crate) fn is_lost(error: &Error) -> bool {
     error.kind() == LOST
 }
@@ -72,12 +72,12 @@ pub(crate) fn outage() -> Error {
     Error::new(OUTAGE, "it was not received: try again")
 }
 
-/// Whether an error is one of the line or the server.
+/// Returns true if an error is one of the line or the server.
 pub(crate) fn is_outage(error: &Error) -> bool {
     error.kind() == OUTAGE
 }
 
-/// Whether an error says that there is no such file. Who may not list a folder is told of
+/// Returns true if an error says that there is no such file. Who may not list a folder is told of
 /// a missing file that it is forbidden.
 pub(crate) fn is_missing(error: &Error) -> bool {
     matches!(

@@ -42,7 +42,7 @@ impl Pages {
         self.here.get(&key).cloned()
     }
 
-    /// Whether a page is on its way.
+    /// Returns true if a page is on its way.
     pub(super) fn is_coming(&self, key: Key) -> bool {
         self.coming.contains(&key)
     }

@@ -17,7 +17,7 @@ const WITHOUT_KEY: [&str; 9] = [
     "user-agent",
 ];
 
-/// Why a redirect is not followed.
+/// Reason for which a redirect is not followed.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum RedirectError {
     #[error(

@@ -126,7 +126,7 @@ impl Requests {
     }
 }
 
-/// Where a request goes on to.
+/// Returns the target of a redirect.
 fn next(request: &HttpRequest, location: &str) -> Result<Url, RedirectError> {
     let from = Url::parse(&request.uri().to_string()).map_err(|_| RedirectError::NoUrl)?;
     let has_key = redirects::has_key(&from, request.headers());

@@ -27,7 +27,7 @@ pub(super) struct Opened {
     pub(super) object: Object,
     /// The first page, or all of the file where it is shorter or cannot be read in ranges.
     pub(super) first: Vec<u8>,
-    /// Whether that is all of it.
+    /// True if that is all of it.
     pub(super) is_all: bool,
 }
 

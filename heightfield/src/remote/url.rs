@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// Whether a name is a URL.
+/// Returns true if a name is a URL.
 pub fn is_url(name: &str) -> bool {
     let Some((scheme, rest)) = name.split_once("://") else {
         return false;

@@ -1,8 +1,8 @@
-//! Why classes cannot be laid over a terrain.
+//! Reason for which classes cannot be placed on a terrain.
 
 use heightfield::{Raster, Sides, System};
 
-/// Why classes cannot be laid over a terrain.
+/// Reason for which classes cannot be placed on a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GroundError {
     /// One of the two says where it lies, and the other does not.
@@ -40,9 +40,9 @@ pub enum GroundError {
         classes: String,
         /// The terrain.
         terrain: String,
-        /// Where the classes lie.
+        /// Place where the classes lie.
         there: String,
-        /// Where the terrain lies.
+        /// Place where the terrain lies.
         here: String,
     },
     /// More materials than a device has room for.

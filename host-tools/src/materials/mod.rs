@@ -29,22 +29,22 @@ const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 /// Places along each side of a terrain that are looked at to tell which classes it has.
 const LOOKED_AT: u32 = 24;
 
-/// What a class of the file feels like.
+/// Material of a class of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClassMaterial {
     /// The number of the class in the file.
     pub class: i64,
-    /// What the user calls it.
+    /// The user's name for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// What it feels like.
+    /// Its surface.
     pub material: Material,
 }
 
 /// The materials of a scene, as a file of classes and a table say.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Looks {
-    /// Where the file knows no class, or one that is not named.
+    /// Material where the file has no class, or one without a name.
     pub default: Material,
     /// The classes that are named, at most 15.
     #[serde(default)]
@@ -115,7 +115,7 @@ impl Materials {
         self.pixels.raster()
     }
 
-    /// What the classes feel like.
+    /// Surfaces of the classes.
     #[must_use]
     pub const fn looks(&self) -> &Looks {
         &self.looks
@@ -189,7 +189,7 @@ impl Materials {
         )
     }
 
-    /// What the ground of a terrain is made of, for a line to be read: the materials that were found at
+    /// Returns the materials of a terrain's ground, for a line to be read: those that were found at
     /// some hundred places, and how many of these have the default. Of a file at a URL nothing is
     /// fetched for it.
     #[must_use]

@@ -141,7 +141,7 @@ impl Pixels {
     }
 }
 
-/// Whether one of many places of a raster lies on another.
+/// Returns true if one of many places of a raster lies on another.
 fn has_place_on(
     way: Way,
     (from, of): (&Georeference<'_>, &Raster),

@@ -17,7 +17,7 @@ pub const STIFFEST_N_PER_MM: f32 = 1.0;
 /// Less is not felt, N/mm.
 const SOFTEST_N_PER_MM: f32 = 0.005;
 
-/// What may be changed of a view while it is felt.
+/// Change of a placement during a session.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlacementChange {
     /// Another place under the hand: so many hand millimetres farther east and north.
@@ -46,7 +46,7 @@ pub enum PlacementChange {
     Reset,
 }
 
-/// Why a view cannot be changed as it is asked for. The view stays as it is.
+/// Reason for which a placement cannot be changed. It stays as it is.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ChangeError {
     /// A place beyond the samples.
@@ -104,18 +104,18 @@ pub struct Laid {
     pub law: SurfaceParams,
 }
 
-/// What does not change while views do.
+/// Bounds of all placements of a session.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     /// The view of the beginning.
     pub first: Laid,
-    /// What one count of the encoders is at the tip, mm.
+    /// Resolution of the encoders at the tip, mm.
     pub resolution_mm: f64,
     /// A level that the user has stated.
     pub level: Option<u8>,
 }
 
-/// Where the HIP is, and what of the terrain it is about to be changed at: hand
+/// The HIP, and the place of the terrain about which the placement changes: device
 /// millimetres of the view in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hand {
@@ -131,7 +131,7 @@ impl Hand {
         self.proxy_mm.unwrap_or(self.hip_mm)
     }
 
-    /// Whether the cells of a terrain at this place are others than they are felt
+    /// Returns true if the cells of a terrain at this place are others than they are felt
     /// ([`HapticGrid::measured_anew`]).
     #[must_use]
     pub fn is_far_from_measure(&self, terrain: &Terrain<'_>) -> bool {
@@ -154,7 +154,7 @@ pub struct Changed<'r> {
     /// The HIP, hand millimetres of the new view. Its height over the place under
     /// the hand is what it was.
     pub hip_mm: [f64; 3],
-    /// Whether the heights that this follows from have been read. If not, the HIP has the
+    /// True if the heights that this follows from have been read. If not, the HIP has the
     /// height of before, and the same changes give the right one when they have come.
     pub ground_is_known: bool,
 }

@@ -19,15 +19,15 @@ const WAS_SILENT: &str = "before this the device had heard nothing from its host
 /// Makes a line to the device.
 pub type Connect<'s, 't> = Box<dyn FnMut() -> Result<Box<dyn Transport + 't>, LinkError> + 's>;
 
-/// What is served, to which device, and for how long.
+/// Service of a terrain to a device for a time.
 pub struct Service<'s, 't> {
     /// The terrain, whose reads do not wait ([`Terrain::non_blocking`]) where an arm may be armed.
     pub terrain: &'t Terrain<'t>,
-    /// How it lies under the arm and feels.
+    /// Placement and surface.
     pub scene: Scene,
-    /// How the arm is armed.
+    /// Arming.
     pub arming: Arming,
-    /// How long is waited for what.
+    /// Time-outs.
     pub patience: Timeouts,
     /// Makes a line to the device. There is one line at a time: the one before is closed
     /// when this is called.
@@ -36,7 +36,7 @@ pub struct Service<'s, 't> {
     pub device: String,
     /// Between two tries to find a device that is gone.
     pub retry: Duration,
-    /// Whether the user wants it to go on.
+    /// True if the user wants it to go on.
     pub goes_on: &'t dyn Fn() -> bool,
     /// Tells the user what has to be told whatever else happens.
     pub tell: &'s dyn Fn(&str),
@@ -55,12 +55,12 @@ pub struct Served<'s, 't> {
     is_left: bool,
 }
 
-/// How serving has ended.
+/// End of a service.
 #[derive(Debug)]
 pub struct End {
     /// The error that ended it, where one did.
     pub why: Result<(), LinkError>,
-    /// Whether the device has confirmed that it is disarmed:
+    /// Confirmation of the device that it is disarmed:
     /// [`LinkError::NotConfirmed`] where not, and [`LinkError::Taken`] where that says in
     /// answer that it has another host. Another host's arm is not this one's to disarm:
     /// where [`End::why`] is [`LinkError::Taken`] this is no error.
@@ -221,7 +221,7 @@ impl Drop for Served<'_, '_> {
     }
 }
 
-/// What became of the arm where its host before was silent for too long.
+/// Returns a line on the arm's last end if its host was silent for too long.
 #[must_use]
 pub fn told_of_last_end(device: &DeviceHello) -> Option<&'static str> {
     (device.last.end == SessionEnd::HostSilent).then_some(WAS_SILENT)

@@ -54,7 +54,7 @@ pub struct HapticGrid<'r> {
     rows: u32,
     /// Side of a felt cell on the ground, metres, where the file knows it.
     side_m: Option<f64>,
-    /// Where the samples lie in the file; `None` where they are the file's own.
+    /// Place where the samples lie in the file; `None` where they are the file's own.
     resampling: Option<Resampling>,
     /// What the ground is made of, where that is not the same everywhere.
     materials: Option<&'r Materials>,
@@ -149,7 +149,7 @@ impl<'r> HapticGrid<'r> {
         (self.cells == HapticCells::Stored || !anew.is_distorted()).then_some(anew)
     }
 
-    /// Whether its samples are those of another grid over the same raster.
+    /// Returns true if its samples are those of another grid over the same raster.
     #[must_use]
     pub fn has_samples_of(&self, other: &Self) -> bool {
         let what = |grid: &Self| (grid.columns, grid.rows, grid.resampling);
@@ -253,7 +253,7 @@ impl<'r> HapticGrid<'r> {
         self.cells
     }
 
-    /// Whether cells that are not square on the ground are felt as squares, which is not
+    /// Returns true if cells that are not square on the ground are felt as squares, which is not
     /// their true shape.
     #[must_use]
     pub fn is_distorted(&self) -> bool {
@@ -279,7 +279,7 @@ impl<'r> HapticGrid<'r> {
         self.rows
     }
 
-    /// Whether heights are interpolated because the file's cells are not square.
+    /// Returns true if heights are interpolated because the file's cells are not square.
     #[must_use]
     pub const fn is_resampled(&self) -> bool {
         self.resampling.is_some()
@@ -486,7 +486,7 @@ impl Resampling {
     }
 }
 
-/// Whether two cells are as large as each other and lean alike, to [`MEASURED`].
+/// Returns true if two cells are as large as each other and lean alike, to [`MEASURED`].
 fn is_alike(one: &CellSize, other: &CellSize) -> bool {
     let (a, b) = (one.ground_metres(), other.ground_metres());
     let is_near = |a: f64, b: f64| (a - b).abs() <= MEASURED * a;

@@ -47,7 +47,7 @@ pub struct Terrain<'r> {
     steep: OnceLock<()>,
 }
 
-/// Why a raster cannot be felt at a scale.
+/// Reason for which a raster cannot be felt at a scale.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TerrainError {
     /// The scale itself.
@@ -242,7 +242,7 @@ impl<'r> Terrain<'r> {
         }
     }
 
-    /// Whether another terrain of the same raster has the same tiles: the same samples at
+    /// Returns true if another terrain of the same raster has the same tiles: the same samples at
     /// the same heights in cells.
     #[must_use]
     pub fn has_tiles_of(&self, other: &Self) -> bool {
@@ -418,7 +418,7 @@ impl<'r> Terrain<'r> {
         (!holes).then(|| mix([mix(south, u), mix(north, u)], v))
     }
 
-    /// Whether there is such a tile.
+    /// Returns true if there is such a tile.
     #[must_use]
     pub fn has(&self, key: TileKey) -> bool {
         let last = self.size.map(|s| (s - 1) / TILE_CELLS as i32);

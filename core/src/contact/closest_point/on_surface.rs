@@ -15,7 +15,7 @@ use crate::terrain::{CellContent, Window};
 /// taken to be at its end: up a wall rounding may send it to and fro.
 const IDLE: u32 = 16;
 
-/// How a descent ended.
+/// End of a descent.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum Ended {
     /// No direction on the surface leads closer to the HIP, which is below; or patches

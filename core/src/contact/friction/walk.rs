@@ -27,7 +27,7 @@ const WAYS: u32 = 1_024;
 /// the bent valley of a twisted patch the pull leads across rather than along.
 const ACROSS: u32 = 3;
 
-/// How a walk ended.
+/// End of a walk.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum Walked {
     /// Friction holds the proxy, or no straight way brings it nearer.

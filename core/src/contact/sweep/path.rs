@@ -27,7 +27,7 @@ const WALK_HEIGHT: u32 = 16;
 /// longer pieces.
 const DEPTH: usize = 12;
 
-/// How a sweep ended.
+/// End of a sweep.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum Swept {
     /// The whole path is free.
