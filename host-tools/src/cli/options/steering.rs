@@ -11,7 +11,7 @@ use super::placing::{self, scale_in_words, short};
 use crate::cli::failure::{Failure, OrHint};
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::keyboard::keyboard;
-use crate::cli::terminal::raw_keys::RawMode;
+use crate::cli::terminal::raw_mode::RawMode;
 use crate::cli::terminal::shared_keyboard::DeviceKeys;
 use crate::link::{Ask, Event};
 use crate::place::{Bounds, Laid, Reach};

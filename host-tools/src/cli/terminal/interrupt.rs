@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use std::thread::Builder;
 use std::time::Duration;
 
-use super::raw_keys;
+use super::raw_mode;
 use super::writer::put;
 use crate::cli::guardian::{self, News};
 use crate::link::DeviceAddress;
@@ -115,7 +115,7 @@ pub(in crate::cli) fn input_ended() {
 fn press() {
     REQUESTED.store(true, Ordering::Relaxed);
     if PRESSED.swap(true, Ordering::Relaxed) {
-        raw_keys::put_back();
+        raw_mode::put_back();
         if let Some(line) = not_confirmed(&may_be_armed()) {
             say(line);
         }

@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use super::interrupt;
 use super::raw_keys::{self, Pressed};
+use super::raw_mode;
 use crate::steering::keys::Key;
 
 /// Lines that wait to be taken.
@@ -44,7 +45,7 @@ impl Keyboard {
         let (typed, lines) = sync_channel(WAITING);
         let (press, pressed) = sync_channel(WAITING);
         let is_typed = io::stdin().is_terminal();
-        let reads_keys = raw_keys::is_raw();
+        let reads_keys = raw_mode::is_raw();
         std::thread::spawn(move || {
             if reads_keys {
                 raw_keys::read(&press);

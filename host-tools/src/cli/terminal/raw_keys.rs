@@ -1,20 +1,11 @@
-//! Keys one by one, without waiting for Enter.
-//!
-//! The terminal gives them so in raw mode. It is put back on every way out: when this is
-//! dropped, also in a panic, and before a program that is interrupted twice exits
-//! ([`put_back`]). In raw mode Ctrl-C is a key like others, and means what it always does.
+//! Keys one by one, without waiting for Enter. In raw mode Ctrl-C is a key like others, and means
+//! what it always does.
 
-use std::io::{self, IsTerminal, Read};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::io::{self, Read};
 use std::sync::mpsc::SyncSender;
 
-use crossterm::terminal::{disable_raw_mode, enable_raw_mode};
-
-use super::interrupt;
+use super::{interrupt, raw_mode};
 use crate::steering::keys::Key;
-
-/// True if the terminal is in raw mode: lines then end in CR LF.
-static IS_RAW: AtomicBool = AtomicBool::new(false);
 
 /// What the thread at the keyboard has read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,40 +14,6 @@ pub(super) enum Pressed {
     Enter,
     /// A key that may change the view.
     Key(Key),
-}
-
-/// The terminal in raw mode, until this is dropped.
-pub(in crate::cli) struct RawMode(());
-
-impl RawMode {
-    /// Puts the terminal into raw mode; none where standard input is no terminal, or it
-    /// cannot be.
-    pub(in crate::cli) fn enter() -> Option<Self> {
-        if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
-            return None;
-        }
-        enable_raw_mode().ok()?;
-        IS_RAW.store(true, Ordering::Relaxed);
-        Some(Self(()))
-    }
-}
-
-impl Drop for RawMode {
-    fn drop(&mut self) {
-        put_back();
-    }
-}
-
-/// Puts the terminal back as it was, where it is in raw mode.
-pub(in crate::cli) fn put_back() {
-    if IS_RAW.swap(false, Ordering::Relaxed) {
-        let _ = disable_raw_mode();
-    }
-}
-
-/// Returns true if the terminal is in raw mode.
-pub(super) fn is_raw() -> bool {
-    IS_RAW.load(Ordering::Relaxed)
 }
 
 /// Reads keys until the terminal is gone.
@@ -72,7 +29,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
             }
         }
     }
-    put_back();
+    raw_mode::put_back();
 }
 
 /// What a byte, or the last of some, comes to.

@@ -9,7 +9,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::device_console::DeviceConsole;
 use super::keyboard::keyboard;
-use super::raw_keys::{Pressed, RawMode};
+use super::raw_keys::Pressed;
+use super::raw_mode::RawMode;
 use super::writer::tell;
 use crate::steering::keys::Key;
 

@@ -14,7 +14,7 @@ use std::thread::Builder;
 
 use indicatif::ProgressBar;
 
-use super::raw_keys;
+use super::raw_mode;
 use heightfield::shown::shown_lines;
 
 /// Lines that wait to be written; beyond them, lines are left out.
@@ -118,7 +118,7 @@ fn above(bottom: &Option<ProgressBar>, put: impl FnOnce()) {
 /// back to the first column by itself.
 pub(in crate::cli) fn put(mut to: impl Write, text: &str) {
     let mut text = shown_lines(text);
-    if raw_keys::is_raw() {
+    if raw_mode::is_raw() {
         text = text.replace('\n', "\r\n");
     }
     let _ = to.write_all(text.as_bytes()).and_then(|()| to.flush());
