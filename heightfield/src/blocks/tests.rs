@@ -312,7 +312,7 @@ fn whoever_touches_what_is_in_memory_does_not_wait_for_a_block_that_is_being_rea
             assert_eq!(
                 blocks.stored(0, BLOCK[0], 0, Wait::UntilRead),
                 Ok(Some(1.0))
-            )
+            );
         });
         begun.wait();
         // The other thread reads until it is told to go on.
