@@ -7,7 +7,7 @@
 //!                                   host ── terrain
 //! ```
 //!
-//! In every tick [`watch`] and [`felt`] hold the device to its bounds; after every mishap
+//! In every tick [`watch`] and [`force_watch`] hold the device to its bounds; after every mishap
 //! [`tally`] holds it to what [`kind`] expects. A segment depends on the seed
 //! and its own number alone, so a violation is repeated by itself.
 

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! A *run* is one host from its hello to its end, with one fault in it ([`fault`]) that
-//! begins in one of the run's steps ([`play`]). In every tick [`segment`] judges what is
+//! begins in one of the run's steps ([`play`]). In every tick [`segment`](mod@segment) judges what is
 //! felt: force and currents ([`crate::campaign::watch`]), the proxy against the bilinear
 //! surface ([`surface`]), amplifiers that nobody asked for, a user who sees something
 //! else than what is. At the end of a run [`play`] judges what the host said of it:
