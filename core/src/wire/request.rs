@@ -104,7 +104,7 @@ pub enum Refusal {
     #[error("this device has no loader in a ROM")]
     NoLoader,
     /// A jog with more current or time than a jog may have, or of no axis.
-    #[error("no jog is as strong or as long as that, or there is no such axis")]
+    #[error("the jog exceeds the largest current or time, or the axis does not exist")]
     NoSuchJog,
 }
 

@@ -21,7 +21,7 @@ const WITHOUT_KEY: [&str; 9] = [
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum RedirectError {
     #[error(
-        "its server redirects from https to http at {0}, where others on the line could change it: name its URL there if that is meant"
+        "its server redirects from https to http at {0}, an unencrypted connection: name the http URL itself to allow it"
     )]
     LeavesHttps(String),
     #[error(

@@ -62,7 +62,7 @@ impl Hint for GroundError {
                 "name the classes of this ground with --materials".into()
             }
             Self::TooMany(_) => {
-                "leave the classes out of the table that may use the default".into()
+                "remove the classes that may use the default from the table".into()
             }
         }
     }

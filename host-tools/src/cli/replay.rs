@@ -246,8 +246,10 @@ impl<'t> Inputs<'t> {
 /// not be read twice.
 fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
     if !args.trajectory.is_file() {
-        return Err("a recording that is no file: its settings are read before its path")
-            .or_hint("write it to a file first, or take the path alone with --ignore-settings");
+        return Err(
+            "the recording is no regular file: it is read twice, its settings before its path",
+        )
+        .or_hint("write it to a file first, or take the path alone with --ignore-settings");
     }
     let cells = args.terrain.reading.cells();
     let lines = differences(&args.rendering, cells, (&args.trajectory, recorded));

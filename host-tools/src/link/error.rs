@@ -54,7 +54,7 @@ pub enum LinkError {
     #[error("the device was restarted and has forgotten what it was doing")]
     Restarted,
     /// A point of a replay is never answered.
-    #[error("the device does not come to an end with point {0} of the trajectory")]
+    #[error("the device did not finish point {0} of the trajectory")]
     Stuck(u32),
 }
 

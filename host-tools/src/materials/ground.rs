@@ -17,7 +17,7 @@ pub enum GroundError {
     },
     /// Their reference systems differ, and there is no way from one to the other.
     #[error(
-        "{file} is in a reference system whose longitudes and latitudes cannot be worked out, and not in that of {other}"
+        "{file} is in a reference system without known longitudes and latitudes, which is not that of {other}"
     )]
     NoWay {
         /// The file in that system.

@@ -58,7 +58,7 @@ pub enum ChangeError {
     )]
     NoGroundSize,
     /// A factor that is none.
-    #[error("{0} is no factor: it must be above zero, and finite")]
+    #[error("{0} is not a valid factor: it must be above zero, and finite")]
     Factor(f64),
     /// Larger than there is detail.
     #[error(

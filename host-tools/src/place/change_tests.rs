@@ -183,9 +183,9 @@ fn what_cannot_be_had_is_said_and_names_the_bound() {
         for (change, says) in [
             (PlacementChange::Zoom(2000.0), "no more detail"),
             (PlacementChange::Zoom(1e-3), "mm wide"),
-            (PlacementChange::Zoom(-1.0), "no factor"),
-            (PlacementChange::Zoom(f64::NAN), "no factor"),
-            (PlacementChange::Exaggerate(0.0), "no factor"),
+            (PlacementChange::Zoom(-1.0), "not a valid factor"),
+            (PlacementChange::Zoom(f64::NAN), "not a valid factor"),
+            (PlacementChange::Exaggerate(0.0), "not a valid factor"),
             (PlacementChange::Exaggerate(1e12), "can be rendered"),
             (PlacementChange::Stiffness(3.0), "1 N/mm"),
             (PlacementChange::Stiffness(1e-4), "0.005"),

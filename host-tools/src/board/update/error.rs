@@ -71,7 +71,7 @@ pub enum UpdateError {
         state: u8,
     },
     /// The loader never comes to an end.
-    #[error("the loader does not come to an end with: {0}")]
+    #[error("the loader did not finish: {0}")]
     Endless(&'static str),
     /// What is read back is not what was written.
     #[error("flash at {0:#010x} does not read back as it was written")]

@@ -29,7 +29,7 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
             return Err(Failure::new(format!(
                 "{board} {serial} was not brought up with this version of its firmware and this calibration: step {number} ({title}) is not passed"
             ))
-            .hint("type hapterra bringup; or, if you know what you do, say --unchecked"));
+            .hint("type hapterra bringup; or, at your own risk, --unchecked"));
         }
     }
     Ok(dialogue.end()?)

@@ -146,7 +146,7 @@ fn calibrate(
     let measure = args.measure;
     if !measure.ratios && !measure.takes_guessed_ratios && begin.has_guessed_ratios() {
         return Err("the cable ratios of this model are a guess, and were never measured").or_hint(
-            "measure them, too; or agree with guessed-ratios, as --measure zero,gravity,guessed-ratios",
+            "measure them, too; or accept guesses: --measure zero,gravity,guessed-ratios",
         );
     }
     if dialogue.status()?.health.report.mode.drives() {

@@ -158,15 +158,15 @@ fn elsewhere(path: &Path, error: &std::io::Error) -> &'static str {
     let [key, server] = match scheme {
         Some("s3" | "s3a") => [
             "set what the server wants: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_SKIP_SIGNATURE=true for a public bucket; AWS_REGION; AWS_ENDPOINT_URL where it is not Amazon's (and AWS_ALLOW_HTTP=true for http)",
-            "check the line, and AWS_ENDPOINT_URL where the server is not Amazon's; and try again",
+            "check the network, and AWS_ENDPOINT_URL where the server is not Amazon's; and try again",
         ],
         Some("gs") => [
             "set what the server wants: GOOGLE_APPLICATION_CREDENTIALS to the key file of an account that may read it, or GOOGLE_SKIP_SIGNATURE=true for a public bucket; GOOGLE_BASE_URL where it is not Google's",
-            "check the line, and GOOGLE_BASE_URL where the server is not Google's; and try again",
+            "check the network, and GOOGLE_BASE_URL where the server is not Google's; and try again",
         ],
         Some("az" | "azure" | "abfs" | "abfss" | "adl") => [
             "set what the server wants: AZURE_STORAGE_ACCOUNT_NAME; AZURE_STORAGE_ACCOUNT_KEY, AZURE_STORAGE_SAS_TOKEN, or AZURE_SKIP_SIGNATURE=true for a public container; AZURE_STORAGE_ENDPOINT where it is not Microsoft's (and AZURE_ALLOW_HTTP=true for http)",
-            "check the line, AZURE_STORAGE_ACCOUNT_NAME, and AZURE_STORAGE_ENDPOINT where the server is not Microsoft's; and try again",
+            "check the network, AZURE_STORAGE_ACCOUNT_NAME, and AZURE_STORAGE_ENDPOINT where the server is not Microsoft's; and try again",
         ],
         _ => [
             "check the URL; a key goes behind it, as ?KEY=VALUE",

@@ -128,7 +128,8 @@ fn check(args: &Args) -> Result<(), Failure> {
         );
     }
     if args.commands.are_typed() && std::io::IsTerminal::is_terminal(&std::io::stdin()) {
-        let error = "with several devices `--commands -` takes no lines from a terminal, whose Enter arms an arm";
+        let error =
+            "with several devices `--commands -` needs a pipe: Enter in a terminal arms a device";
         return Err(Failure::new(error).hint("leave --commands out and use keys, or name a file or send lines through a pipe: `on 2 zoom 2` is for the second device"));
     }
     Ok(())

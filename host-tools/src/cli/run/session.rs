@@ -164,7 +164,7 @@ impl<'t> Serving<'_, 't> {
 fn came(stood_still: bool) -> Result<(), Failure> {
     match stood_still {
         false => Ok(()),
-        true => Err("the virtual arm has waited a minute for terrain that did not come").or_hint(
+        true => Err("the virtual arm has waited a minute for terrain that did not arrive").or_hint(
             "try again when its server answers; what went wrong with the file is said above",
         ),
     }

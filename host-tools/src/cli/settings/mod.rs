@@ -254,7 +254,7 @@ fn words_of(
             (true, Some("true")) => format!("--{name}").into(),
             (true, Some("false")) => continue,
             (true, _) => {
-                return Err(format!("{}: {name} is true or false", setting.place))
+                return Err(format!("{}: {name} must be true or false", setting.place))
                     .or_hint("write it without quotation marks");
             }
             (false, _) => {

@@ -213,7 +213,7 @@ fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
     assert!(told.contains("Connection refused"), "{told}");
     assert!(
         told.contains(
-            "hint: check the line, AZURE_STORAGE_ACCOUNT_NAME, and AZURE_STORAGE_ENDPOINT"
+            "hint: check the network, AZURE_STORAGE_ACCOUNT_NAME, and AZURE_STORAGE_ENDPOINT"
         ),
         "{told}"
     );

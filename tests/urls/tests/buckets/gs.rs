@@ -129,7 +129,7 @@ fn a_server_that_is_not_there_is_told_with_the_cause_and_where_to_look() {
     let told = said(&url(), &nowhere);
     assert!(told.contains("Connection refused"), "{told}");
     assert!(
-        told.contains("hint: check the line, and GOOGLE_BASE_URL"),
+        told.contains("hint: check the network, and GOOGLE_BASE_URL"),
         "{told}"
     );
 }

@@ -131,7 +131,7 @@ impl SurfaceOptions {
         check(&Material::of(law)).map_err(|why| told(&why))?;
         let limit = law.max_force_n;
         if !(limit.is_finite() && limit >= 0.0) {
-            return Err(format!("a largest force of {limit} N"))
+            return Err(format!("a largest force of {limit} N is not valid"))
                 .or_hint("--max-force finite and not below 0; 8.5 N without it");
         }
         Ok(surface)
@@ -170,7 +170,7 @@ impl SurfaceOptions {
         }
         if default.stiffness_n_per_mm == 0.0 {
             return Err(
-                "a default without stiffness: views make all materials as much stiffer as it",
+                "[default] has no stiffness, and a placement scales all stiffnesses by it: state it in [default]",
             )
             .or_hint("state stiffness in [default]");
         }
