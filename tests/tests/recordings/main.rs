@@ -123,16 +123,17 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
     folder.runs(&["replay", &terrain, &from, "-o", &to]);
     let (live, again) = (folder.read(recording), folder.read("again.csv"));
     let header = live.lines().find(|line| !line.starts_with('#'));
-    let documented: Vec<_> = COLUMNS
+    let columns: Vec<_> = header.expect("a header").split(',').collect();
+    let mut documented: Vec<_> = COLUMNS
         .iter()
         .flat_map(|(names, _)| *names)
         .copied()
         .collect();
-    assert_eq!(
-        header,
-        Some(&*documented.join(",")),
-        "columns of the reference"
-    );
+    if !columns.contains(&"tick") {
+        // Of `demo`, which has no board.
+        documented.retain(|name| !["tick", "work", "cost", "late"].contains(name));
+    }
+    assert_eq!(columns, documented, "columns of the reference");
     let (live, again) = (rows(&live), rows(&again));
     assert_eq!(live.len(), again.len());
     let mut compared = 0;
