@@ -30,7 +30,7 @@ const ALLOWED: [(&str, &str, &[&str]); 11] = [
         &["UNIX_EPOCH"],
     ),
     (
-        "host-tools/src/cli/sparing.rs",
+        "host-tools/src/cli/line_limit.rs",
         "the tested type takes moments, which the test makes up from any first one",
         &["Instant"],
     ),
