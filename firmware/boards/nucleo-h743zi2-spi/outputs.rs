@@ -18,7 +18,7 @@ pub(crate) const BOARD: &str = "nucleo-h743zi2-spi";
 /// From the beginning of a tick until the motors have its current, at most, µs: 125 to the
 /// outputs (docs/reference/hardware.md), 15 until the converter has all frames, 10 until it settles, and the
 /// amplifiers' own time.
-pub(crate) const LATENCY_US: u16 = 126 + 15 + 10 + CURRENT_LOOP_US;
+pub(crate) const LATENCY_US: u16 = 125 + 15 + 10 + CURRENT_LOOP_US;
 /// The bus's 114 MHz make 7.1 MHz of it, of which half a clock is 70 ns. What the converter sends is valid 40 ns after the
 /// rising edge and is read at the falling one, with wires of a hand's length. A frame is
 /// 3.4 µs long.
