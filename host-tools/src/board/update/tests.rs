@@ -260,7 +260,7 @@ fn what_the_loader_refuses_is_told_in_words_and_ends() {
         never_done: true,
         ..Faults::default()
     });
-    assert!(said.contains("does not come to an end"), "{said}");
+    assert!(said.contains("did not finish"), "{said}");
 }
 
 /// Nothing was erased or written.

@@ -169,10 +169,8 @@ impl SurfaceOptions {
             default.friction = rubbed(&default.friction, mu);
         }
         if default.stiffness_n_per_mm == 0.0 {
-            return Err(
-                "[default] has no stiffness, and a placement scales all stiffnesses by it: state it in [default]",
-            )
-            .or_hint("state stiffness in [default]");
+            return Err("[default] has no stiffness, and a placement scales all stiffnesses by it")
+                .or_hint("state stiffness in [default]");
         }
         let classes = table.classes.iter().map(|(class, line, look)| {
             let what = format!("class {class}");

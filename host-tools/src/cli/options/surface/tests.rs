@@ -60,7 +60,7 @@ fn numbers_that_no_surface_has_are_refused_with_class_and_line() {
             "[default]\nstiffness = nan",
             "line 1, the default: a stiffness",
         ),
-        ("[default]\nstiffness = 0", "a default without stiffness"),
+        ("[default]\nstiffness = 0", "[default] has no stiffness"),
         (
             "[class.7]\ndamping = 21",
             "line 1, class 7: a damping of 21",
