@@ -2,9 +2,9 @@
 
 use std::ffi::{c_int, c_void};
 
+use crate::calls::Call;
 use crate::error::Error;
 use crate::functions::Handle;
-use crate::in_time::Call;
 use crate::loaded::Loaded;
 use crate::text::from_c;
 

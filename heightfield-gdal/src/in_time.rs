@@ -1,14 +1,12 @@
 //! A bound on the time that GDAL takes to open a file: some files lead a driver round in circles.
 
-use std::ffi::c_int;
-use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
+use crate::calls::Call;
 use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::loaded::Loaded;
@@ -21,41 +19,6 @@ const OPEN_WITHIN: Duration = Duration::from_secs(6);
 const WAIT_WITHIN: Duration = Duration::from_secs(120);
 /// Between two looks at the time that is not counted.
 const LOOK: Duration = Duration::from_millis(50);
-
-/// Calls of GDAL that have not returned.
-static CALLS: AtomicUsize = AtomicUsize::new(0);
-
-/// A call of GDAL, until it is dropped.
-pub(crate) struct Call(());
-
-impl Call {
-    pub(crate) fn begin() -> Self {
-        CALLS.fetch_add(1, Ordering::AcqRel);
-        Self(())
-    }
-}
-
-impl Drop for Call {
-    fn drop(&mut self) {
-        CALLS.fetch_sub(1, Ordering::AcqRel);
-    }
-}
-
-unsafe extern "C" {
-    /// Ends the process without what libraries do at its end.
-    fn _exit(code: c_int) -> !;
-}
-
-/// Ends the process with an exit code if a call of GDAL has not returned: GDAL's own end would wait
-/// for it. Else does nothing.
-pub fn exit_if_stuck(code: u8) {
-    if CALLS.load(Ordering::Acquire) > 0 {
-        // Nobody is left who could be told.
-        let _ = (std::io::stdout().flush(), std::io::stderr().flush());
-        // SAFETY: it does not return, and nothing of this process is used after it.
-        unsafe { _exit(code.into()) }
-    }
-}
 
 /// Opens a raster in a thread of its own, which is left behind where it does not come to an end.
 ///
