@@ -69,7 +69,7 @@ impl Grid {
             if row_of.0 != y as u32 {
                 row_of.0 = y as u32;
                 let row = first[1] + y as u32;
-                // What a server did not send is filled, too.
+                // Heights that a server did not send are filled, too.
                 let _ = raster.read_row(0, row, first[0], &mut row_of.1, Wait::UntilRead);
             }
             let height = row_of.1[x];

@@ -143,7 +143,7 @@ impl Clutch {
         self.open_if_held();
     }
 
-    /// Returns true if anybody holds it.
+    /// Returns true if it is held.
     const fn is_held(&self) -> bool {
         self.input || !matches!(self.host, ClutchHold::LetGo)
     }

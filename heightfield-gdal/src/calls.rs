@@ -32,7 +32,7 @@ unsafe extern "C" {
 /// for it. Else does nothing.
 pub fn exit_if_stuck(code: u8) {
     if CALLS.load(Ordering::Acquire) > 0 {
-        // Nobody is left who could be told.
+        // The process ends: an error here has no reader.
         let _ = (std::io::stdout().flush(), std::io::stderr().flush());
         // SAFETY: it does not return, and nothing of this process is used after it.
         unsafe { _exit(code.into()) }

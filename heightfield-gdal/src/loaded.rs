@@ -86,7 +86,7 @@ impl Loaded {
         // SAFETY: the text stays until the next call on this thread, and is copied.
         let said = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };
         let said = said.unwrap_or_else(|| otherwise.to_owned());
-        // What a file says comes along: it must not steer a terminal.
+        // The text may quote the file: it must not steer a terminal.
         let plain = |c: char| match c {
             '\n' | '\t' => ' ',
             c if c.is_control() => '\u{fffd}',

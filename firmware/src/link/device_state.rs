@@ -139,7 +139,7 @@ impl DeviceState {
         !self.drives() && self.arming.is_none() && !self.waits_for_press()
     }
 
-    /// Returns true if a calibration is stored when somebody presses the dead-man switch.
+    /// Returns true if a dead-man press will store a calibration.
     pub(super) const fn waits_for_press(&self) -> bool {
         matches!(self.storing, Storing::Waiting(_))
     }

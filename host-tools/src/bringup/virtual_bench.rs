@@ -148,7 +148,7 @@ impl VirtualBench {
         self.stop_wire_off || !closed
     }
 
-    /// Returns true if a ready input is high: pulled up, and nobody pulls it down.
+    /// Returns true if a ready input is high: pulled up, and not pulled down from outside.
     fn not_ready(&self) -> bool {
         (0..3).any(|axis| {
             let silent = self.mistakes.amplifier_missing[axis] || self.ready_wire_off[axis];

@@ -17,7 +17,7 @@ use crate::terrain::{
 const RELIEF_MM: f64 = 25.0;
 /// Relief that can be felt well, mm.
 pub(crate) const FELT_MM: f64 = 15.0;
-/// Device millimetres a haptic cell at a place whose scale nobody states.
+/// Device millimetres a haptic cell at a place without a stated scale.
 const CELL_MM: f64 = 1.0;
 
 /// Requested size of the terrain.

@@ -97,7 +97,7 @@ impl Rulings<'_> {
         newest
     }
 
-    /// Returns true if a ruling is one where F has its minimum, as far as can be told.
+    /// Returns true if F has its minimum on a ruling, within rounding.
     fn is_settled(&self, ruling: &Ruling) -> bool {
         let step = ruling.slope / ruling.curvature;
         ruling.curvature > 0.0

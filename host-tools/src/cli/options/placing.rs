@@ -123,7 +123,7 @@ pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     text
 }
 
-/// How far the shape of haptic cells is off at worst.
+/// Largest error of the shape of haptic cells.
 pub(in crate::cli) fn off_in_words(worst: &Distortion) -> String {
     let percent = 100.0 * worst.share;
     format!("slopes and lengths are off by up to {percent:.2} %")
