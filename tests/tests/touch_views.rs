@@ -102,6 +102,7 @@ fn pressed_at<T>(
         first: Laid { view, law },
         resolution_mm: RESOLUTION_MM,
         level: None,
+        tip_mm: 0.0,
     };
     let mut touching = Touching {
         session: opened.expect("opened").0,
@@ -371,6 +372,32 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
         let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
         assert_eq!(touching.steering.now().law, SurfaceParams::PREMIUM);
+        judge(&touching.samples[began..], GENTLE_N);
+    });
+}
+
+#[test]
+fn a_tip_set_while_it_presses_makes_no_step() {
+    let raster = hills();
+    pressed(&raster, 60.0, |touching| {
+        let first = touching.change(PlacementChange::Zoom(64.0));
+        let began = touching.samples.len();
+        let tip = |touching: &Touching<'_>| {
+            let terrain = touching.steering.terrain();
+            (terrain.grid().tip_mm(), terrain.tip_cells() > 0.0)
+        };
+        for (wanted_mm, is_ball) in [(2.0, true), (0.5, true), (0.0, false), (1.0, true)] {
+            let sample = touching.change(PlacementChange::Tip(wanted_mm));
+            assert_pressed(&sample, &first, &format!("by a tip of {wanted_mm} mm"));
+            assert_eq!(tip(touching), (wanted_mm, is_ball), "{:?}", touching.said);
+        }
+        assert_eq!(touching.said, [""; 0]);
+        touching.change(PlacementChange::Tip(-1.0));
+        assert!(touching.said[0].contains("a tip of -1 mm: from 0 to 100 mm"));
+        assert_eq!(tip(touching), (1.0, true), "it stays as it was");
+        let reset = touching.change(PlacementChange::Reset);
+        assert_pressed(&reset, &first, "by a point again");
+        assert_eq!(tip(touching), (0.0, false));
         judge(&touching.samples[began..], GENTLE_N);
     });
 }

@@ -16,6 +16,8 @@ const SMALLEST_TERRAIN_MM: f64 = 5.0;
 pub const STIFFEST_N_PER_MM: f32 = 1.0;
 /// Less is not felt, N/mm.
 const SOFTEST_N_PER_MM: f32 = 0.005;
+/// Smallest and largest radius of a ball at the tip, device millimetres; 0 is a point.
+pub const TIPS_MM: [f64; 2] = [0.0, 100.0];
 
 /// Change of a placement during a session.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +44,9 @@ pub enum PlacementChange {
     Stiffness(f64),
     /// Something else of the surface.
     Surface(SurfaceChange),
-    /// Scale, heights and surface of the beginning, at the place under the hand.
+    /// A ball of another radius in device millimetres at the tip; 0 for a point.
+    Tip(f64),
+    /// Scale, heights, surface and tip of the beginning, at the place under the hand.
     Reset,
 }
 
@@ -87,6 +91,9 @@ pub enum ChangeError {
     /// Something of the surface that cannot be had.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
+    /// A ball that no tip can have.
+    #[error("a tip of {0} mm: from {least} to {most} mm can be had", least = TIPS_MM[0], most = TIPS_MM[1])]
+    Tip(f64),
     /// Numbers that no terrain can be felt at.
     #[error(transparent)]
     Terrain(#[from] TerrainError),
@@ -113,6 +120,8 @@ pub struct Bounds {
     pub resolution_mm: f64,
     /// A level that the user has stated.
     pub level: Option<u8>,
+    /// Radius of the ball of the beginning, device millimetres; 0 for a point.
+    pub tip_mm: f64,
 }
 
 /// The HIP, and the place of the terrain about which the placement changes: device
@@ -176,10 +185,11 @@ impl Bounds {
         let cell_mm = before.view.scale.cell_mm();
         let mut laid = *before;
         let mut at = [at_mm[0] / cell_mm, at_mm[1] / cell_mm];
-        for change in changes {
-            (laid, at) = self.step(terrain.grid(), laid, at, change)?;
-        }
         let mut grid = *terrain.grid();
+        for change in changes {
+            (laid, at) = self.step(&grid, laid, at, change)?;
+            grid = grid.with_tip(self.tip_after(grid.tip_mm(), change)?);
+        }
         if let Some(anew) = grid.measured_anew(at) {
             at = anew.of_ground(grid.to_ground(at));
             laid.view = laid.view.measured_as(&anew)?;
@@ -201,6 +211,18 @@ impl Bounds {
             terrain: terrain_after,
             hip_mm,
         })
+    }
+
+    /// The radius of the tip after a change.
+    fn tip_after(&self, tip_mm: f64, change: &PlacementChange) -> Result<f64, ChangeError> {
+        match *change {
+            PlacementChange::Tip(mm) if !(TIPS_MM[0]..=TIPS_MM[1]).contains(&mm) => {
+                Err(ChangeError::Tip(mm))
+            }
+            PlacementChange::Tip(mm) => Ok(mm),
+            PlacementChange::Reset => Ok(self.tip_mm),
+            _ => Ok(tip_mm),
+        }
     }
 
     /// One change, at a place in felt cells of level 0.
@@ -252,6 +274,7 @@ impl Bounds {
             PlacementChange::Surface(change) => {
                 *law = change.of(law, grid.materials().is_some())?;
             }
+            PlacementChange::Tip(_) => {}
             PlacementChange::Reset => {
                 let first = &self.first.view;
                 let cell_mm = first.scale.cell_mm() * first.as_large_as_in(grid);

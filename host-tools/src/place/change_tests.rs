@@ -44,6 +44,7 @@ impl Bench {
             },
             resolution_mm: reach.resolution_mm(),
             level: self.level,
+            tip_mm: 0.0,
         };
         look(&terrain, bounds)
     }

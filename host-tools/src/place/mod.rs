@@ -16,7 +16,9 @@ mod surface_change;
 mod target;
 mod words;
 
-pub use change::{Bounds, ChangeError, Changed, Hand, Laid, PlacementChange, STIFFEST_N_PER_MM};
+pub use change::{
+    Bounds, ChangeError, Changed, Hand, Laid, PlacementChange, STIFFEST_N_PER_MM, TIPS_MM,
+};
 pub use coordinates::Coordinates;
 pub use error::PlaceError;
 pub(crate) use placement::FELT_MM;

@@ -158,10 +158,10 @@ pub fn terrain_of<'t>(
 ) -> Result<Terrain<'t>, ReplayError> {
     let grid = match view.measured_at {
         Some(ground) => HapticGrid::at(first.raster(), first.grid().cells(), ground)
-            .with_materials(first.grid().materials())
-            .with_tip(first.grid().tip_mm()),
+            .with_materials(first.grid().materials()),
         None => *first.grid(),
     };
+    let grid = grid.with_tip(view.tip_mm.unwrap_or(first.grid().tip_mm()));
     let number = view.number;
     let cannot = |why| ReplayError::Placement { number, why };
     let scale = view.scale().map_err(|why| cannot(why.into()))?;

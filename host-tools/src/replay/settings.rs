@@ -75,6 +75,10 @@ pub struct PlacementSettings {
     pub cell_mm: f64,
     /// Device millimetres a vertical unit of the file.
     pub height_mm_per_unit: f64,
+    /// Radius of the ball at the tip, device millimetres; 0 for a point. None in recordings of earlier
+    /// versions, whose tip is that of the beginning.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tip_mm: Option<f64>,
     /// Times that heights are higher than true to scale, where the file knows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
@@ -117,6 +121,7 @@ impl PlacementSettings {
             level: terrain.level(),
             cell_mm: scale.cell_mm(),
             height_mm_per_unit: scale.height_mm_per_unit(),
+            tip_mm: Some(grid.tip_mm()),
             exaggeration: grid.exaggeration(&scale),
             home_mm: laid.view.home_mm,
             stiffness_n_per_mm: laid.law.stiffness_n_per_mm,

@@ -11,7 +11,7 @@ use heightfield::shown::shown;
 /// The known commands, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
      exaggerate TIMES, surface ice|sand|rock, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
-     shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
+     tip RADIUS (mm), shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
      clutch on, clutch off, mark TEXT, enter QUESTION; `at SECONDS` before any of them, and before that \
      `on NUMBER` for one device of several";
 
@@ -119,11 +119,14 @@ fn read(words: &[&str]) -> Result<Steer, &'static str> {
             "surface" | "friction" | "viscous-friction" | "damping" | "shading" | "texture",
             ..,
         ] => change(PlacementChange::Surface(surface(words)?)),
+        ["tip", radius] => change(PlacementChange::Tip(number(
+            radius.strip_suffix("mm").unwrap_or(radius),
+        )?)),
         ["reset"] => change(PlacementChange::Reset),
         ["clutch", "on"] => Ok(Steer::Clutch(true)),
         ["clutch", "off"] => Ok(Steer::Clutch(false)),
         ["pan" | "pan-m", ..] => Err("it takes two numbers"),
-        ["zoom" | "exaggerate" | "stiffness", ..] => Err("it takes one number"),
+        ["zoom" | "exaggerate" | "stiffness" | "tip", ..] => Err("it takes one number"),
         ["clutch", ..] => Err("it is on or off"),
         [] => Err("a command is missing"),
         _ => Err("no such word"),
@@ -256,6 +259,8 @@ mod tests {
                 None,
                 of_surface(SurfaceChange::ViscousFriction(0.01)),
             ),
+            ("tip 2", None, Steer::Change(PlacementChange::Tip(2.0))),
+            ("tip .5mm", None, Steer::Change(PlacementChange::Tip(0.5))),
             ("damping 2", None, of_surface(SurfaceChange::Damping(2.0))),
             (
                 "shading smooth",

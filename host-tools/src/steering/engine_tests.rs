@@ -33,6 +33,7 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
         first: Laid { view, law },
         resolution_mm: reach.resolution_mm(),
         level: None,
+        tip_mm: 0.0,
     };
     look(&mut Steering::new(bounds, terrain.clone()))
 }

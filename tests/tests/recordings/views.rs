@@ -23,7 +23,8 @@ pub(super) fn comments(text: &str) -> String {
 }
 
 const COMMANDS: &str = "# while a scripted hand slides\nat 3.8 zoom 1.5\nat 4.7 exaggerate 1.25\n\
-    spin 3\nat 5.5 pan 2 1\nat 6.5 stiffness 0.8\nat 7.5 clutch on\nat 8 clutch off\n";
+    spin 3\nat 5.5 pan 2 1\nat 6.5 stiffness 0.8\nat 7.5 clutch on\nat 8 clutch off\n\
+    at 8.7 tip 3mm\n";
 
 /// What a demo with these commands wrote; what it said.
 fn demo(folder: &Folder) -> String {
@@ -57,8 +58,8 @@ fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
         .expect("read")
         .expect("settings");
     let numbers: Vec<_> = settings.views.iter().map(|view| view.number).collect();
-    assert_eq!(numbers, [1, 2, 3, 4]);
-    let [zoomed, higher, panned, softer] = settings.views[..] else {
+    assert_eq!(numbers, [1, 2, 3, 4, 5]);
+    let [zoomed, higher, panned, softer, sharper] = settings.views[..] else {
         panic!("{:?}", settings.views);
     };
     let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
@@ -72,6 +73,8 @@ fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
         (zoomed.cell_mm, zoomed.level)
     );
     assert_eq!(softer.stiffness_n_per_mm, 0.4);
+    let tips = [softer, sharper].map(|view| view.tip_mm);
+    assert_eq!(tips, [Some(settings.felt.tip_mm), Some(3.0)]);
     // Rows name their views, in their order, and there are some of each.
     let live = rows(&text);
     let views: Vec<u32> = live
@@ -79,7 +82,7 @@ fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
         .map(|row| row["view"].parse().expect("a view"))
         .collect();
     assert!(views.is_sorted());
-    for view in 0..=4 {
+    for view in 0..=5 {
         let count = views.iter().filter(|of_row| **of_row == view).count();
         assert!(count > 100, "view {view}: {count} rows");
     }
@@ -107,7 +110,7 @@ fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
     let again_text = folder.read("again.csv");
     let again = rows(&again_text);
     assert_eq!(live.len(), again.len());
-    let mut compared = [0; 5];
+    let mut compared = [0; 6];
     for (live, again) in live.iter().zip(&again) {
         for column in ["t_s", "x_mm", "y_mm", "z_mm", "view"] {
             assert_eq!(live[column], again[column]);

@@ -5,15 +5,13 @@ use super::quantity::LENGTH;
 use super::scale::MapScale;
 use super::surface::SurfaceOptions;
 use crate::cli::failure::{Failure, OrHint};
-use crate::place::suited_height;
+use crate::place::{TIPS_MM, suited_height};
 use crate::terrain::{HapticCells, HapticGrid, MAX_TIP_CELLS, Scale, Terrain};
 use heightfield::Raster;
 
 /// Radius of the ball at the tip of an arm unless another is stated, mm: with a friction of 0.4 no
 /// ground that was tried stops it (docs/explanation/tip.md).
 const HAND_MM: f64 = 7.0;
-/// Radii that can be asked for, mm.
-const RADII_MM: [f64; 2] = [0.0, 100.0];
 
 /// Rendering of the terrain.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -45,7 +43,7 @@ pub struct Rendering {
     /// [default: 7 mm; replay 0] The HIP is the ball's centre; 0 is a point, the default with --level. The level is such that the
     /// radius is at most 8 cells.
     #[arg(long, value_name = "MM", allow_negative_numbers = true,
-          value_parser = |text: &str| LENGTH.read_within(text, RADII_MM))]
+          value_parser = |text: &str| LENGTH.read_within(text, TIPS_MM))]
     pub tip: Option<f64>,
 
     /// Its surface.

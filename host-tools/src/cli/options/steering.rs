@@ -28,8 +28,8 @@ pub struct Commands {
     /// File with commands, a line each, or - for standard input
     ///
     /// As `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `surface sand`, `stiffness 0.5`, `friction 0.4`,
-    /// `damping 2`, `shading smooth`, `texture grain 0.1 1`, `clutch on`, `clutch off`, `reset`,
-    /// `mark TEXT`.
+    /// `damping 2`, `tip 3`, `shading smooth`, `texture grain 0.1 1`, `clutch on`, `clutch off`,
+    /// `reset`, `mark TEXT`.
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub commands: Option<Origin>,
 
@@ -147,6 +147,7 @@ impl<'t> PlacementControl<'t> {
             first: laid,
             resolution_mm: Reach::of(arm).resolution_mm(),
             level,
+            tip_mm: terrain.grid().tip_mm(),
         };
         Self {
             steering: Steering::new(bounds, terrain.clone()),
@@ -298,9 +299,13 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
 pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     format!(
-        "view {number}: {}; {}; {} under the home position",
+        "view {number}: {}; {}; {}; {} under the home position",
         scale_in_words(&laid.view),
         surface_in_words(&laid.law),
+        match terrain.grid().tip_mm() {
+            0.0 => "a point".to_owned(),
+            mm => format!("a ball of {} mm", short(mm)),
+        },
         crate::place::place_in_words(&file, laid.view.home_ground)
     )
 }
