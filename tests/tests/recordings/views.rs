@@ -152,7 +152,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
     };
     let told = refused("demo/hills.csv", &["--scale", "3mm/cell"]);
     assert!(
-        told.contains("5 placements") && told.contains("--ignore-settings"),
+        told.contains("6 placements") && told.contains("--ignore-settings"),
         "{told}"
     );
     // One of the views is not described.
@@ -166,7 +166,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
     folder.write("wrong.csv", &text.replace(row, &wrong));
     let told = refused("wrong.csv", &[]);
     assert!(
-        told.contains("column view") && told.contains("4x"),
+        told.contains("column view") && told.contains("5x"),
         "{told}"
     );
     // The path alone is what it says.
