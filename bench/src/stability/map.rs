@@ -252,7 +252,7 @@ impl Map {
         for column @ (rate, damping, part) in self.columns() {
             let limits = Grasp::ALL.map(|grasp| {
                 let limit = |verdict| told(self.up_to(column, grasp, verdict));
-                let (still, held) = (limit(Verdict::Still), limit(Verdict::Hum));
+                let (still, held) = (limit(Verdict::Still), limit(Verdict::LimitCycle));
                 let enters = told(self.enters_up_to(column, grasp));
                 format!("{} {still} / {held} / {enters}", grasp.name())
             });

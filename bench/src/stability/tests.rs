@@ -301,7 +301,13 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
         ["0.5", "6"].map(|stiffness| format!("1000,0.0,false,{},{stiffness}", grasp.name()))
     });
     assert_eq!(begins, wanted.concat());
-    let limit = |grasp| map.up_to((TickRate::DEFAULT, UNDAMPED, 1.0), grasp, Verdict::Hum);
+    let limit = |grasp| {
+        map.up_to(
+            (TickRate::DEFAULT, UNDAMPED, 1.0),
+            grasp,
+            Verdict::LimitCycle,
+        )
+    };
     assert_eq!(
         (limit(Grasp::Light), limit(Grasp::Firm)),
         (Some(0.5), Some(6.0))

@@ -88,31 +88,6 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Disarms where the host has been silent for too long, and ends its session. What waits
-    /// for a press of the dead-man switch waits no longer than the host is there.
-    fn watch_host(&mut self) {
-        let now = self.ends.monitor.ticks();
-        let waits = self.device.is_being_armed() || self.device.waits_for_press();
-        if waits
-            && let Some(room) = self.room_for_command()
-            && self.session.is_absent(now, self.device.ticks_per_ms())
-        {
-            log::forsaken();
-            self.device.give_up_press();
-            self.command(room, Command::Disarm);
-        }
-        if !self.session.is_forsaken(now) || !self.device.may_drive {
-            return;
-        }
-        if let Some(room) = self.room_for_command() {
-            log::forsaken();
-            self.command(room, Command::Disarm);
-            self.forget_conversation();
-            self.forsake_clutch();
-            self.session.end_silent();
-        }
-    }
-
     /// Says goodbye once nothing is driven and everything else was said.
     fn say_goodbye(&mut self) {
         let leaves = self.session.is_leaving();
