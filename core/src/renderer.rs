@@ -21,7 +21,7 @@ use crate::terrain::{TileIndex, Window};
 /// Tiles that one point of a replay may ask for, for each that the window holds.
 const TILES_PER_SLOT: u32 = 4;
 
-/// What moves the HIP.
+/// Source of the HIP's motion.
 #[derive(Clone, Copy)]
 pub(crate) enum Mover<'a> {
     /// The host's points, each felt with all of the terrain that it needs.
@@ -83,7 +83,7 @@ impl Mover<'_> {
     }
 }
 
-/// What a tick changes.
+/// State that a tick changes.
 #[derive(Clone)]
 struct RenderState {
     contact: Contact,
@@ -158,8 +158,8 @@ impl Renderer {
         scene.is_valid() && scene.materials.is_none_or(is_here)
     }
 
-    /// Takes a scene that it can take, or none. The one door for all effects. `landing` is the HIP of
-    /// another view, and the displacement with which the proxy begins on its surface, cells.
+    /// Takes a scene that it can take, or none. The one door for all effects. `landing` is the HIP
+    /// of another view, and the displacement with which the proxy begins on its surface, cells.
     pub(crate) fn take(&mut self, scene: Option<&Scene>, landing: Option<(GridPoint, Vec3)>) {
         self.state.effects = scene.and_then(|scene| self.effects_of(scene));
         self.begin(scene, landing);

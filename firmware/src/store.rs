@@ -67,7 +67,7 @@ pub enum StoreError {
     Write,
 }
 
-/// What a place holds.
+/// Content of a place.
 enum Place {
     Blank,
     /// A record and its number; why it cannot be worked with, if so.

@@ -85,7 +85,7 @@ pub enum RasterError {
     /// A colour image whose bands could each be the height; none was chosen.
     #[error("not a height field: {what}")]
     ColourBands {
-        /// What it is.
+        /// Its name.
         what: String,
         /// Number of bands.
         bands: u16,

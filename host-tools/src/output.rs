@@ -30,10 +30,10 @@ pub struct OutputError {
 pub struct Output {
     path: PathBuf,
     writer: BufWriter<File>,
-    /// Where it is written, beside the file that it will replace; none for a
+    /// Temporary file beside the one that it will replace; none for a
     /// pipe, a device and standard output, where there is nothing to replace.
     beside: Option<TempPath>,
-    /// What is written stays where it cannot be written on.
+    /// True if the written part stays after a write error.
     is_recording: bool,
     /// Bytes that it may still have.
     room: u64,
@@ -258,8 +258,8 @@ pub struct PartialFile {
     pub bytes: u64,
 }
 
-/// Returns the partial files that killed processes left beside `path`, by name. Nothing here touches
-/// it.
+/// Returns the partial files that killed processes left beside `path`, by name. Nothing here
+/// touches it.
 #[must_use]
 pub fn partial_files(path: &Path) -> Vec<PartialFile> {
     let beginning = beginning_of_partial(path);
@@ -285,7 +285,7 @@ const SUFFIX: &str = ".partial";
 /// names at 255.
 const OWN_NAME: usize = 200;
 
-/// What the name of a partial file of `path` begins with.
+/// Returns the beginning of the name of a partial file of `path`.
 fn beginning_of_partial(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let cut = name.floor_char_boundary(OWN_NAME);

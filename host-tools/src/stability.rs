@@ -1,4 +1,5 @@
-//! Limits of stiffness that trials on the virtual arm found, and the warnings of a surface above them.
+//! Limits of stiffness that trials on the virtual arm found, and the warnings of a surface above
+//! them.
 //!
 //! `hapterra-lab stability` makes the trials; its tests hold these tables to them.
 
@@ -26,9 +27,9 @@ pub const STILL_LATE_N_PER_MM: StillUpTo = [
     (10_000, 1.5, 3.0),
 ];
 
-/// Stiffness up to which force comes in well on an arm with a tenth of the model's friction, with the
-/// controller, N/mm (`Entered::is_good` of the trials), by ticks a second: in the
-/// ramp, and while the clutch closes. Tried again in the tests.
+/// Stiffness up to which force comes in well on an arm with a tenth of the model's friction, with
+/// the controller, N/mm (`Entered::is_good` of the trials), by ticks a second: in the ramp, and
+/// while the clutch closes. Tried again in the tests.
 pub const ENTERS_N_PER_MM: [(u32, f32); 4] =
     [(1_000, 1.0), (2_000, 2.0), (4_000, 2.0), (10_000, 2.0)];
 
@@ -98,7 +99,7 @@ fn warnings_of(
     told
 }
 
-/// What has to be said of a texture so fine that a slow hand does not feel it in whole.
+/// Returns the warning about a texture too fine for a slow hand.
 fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
     let (wavelength, shortest) = (texture.wavelength_mm, Texture::shortest_mm(rate));
     let hz = rate.hz();
@@ -110,7 +111,7 @@ fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
     })
 }
 
-/// What has to be said of a surface at a device's rate and latency; `None` where every hand on the
+/// Returns the warning about a surface at a device's rate and latency; `None` if every hand on the
 /// virtual arm holds it still, and theory does not speak against it.
 #[must_use]
 fn warning(params: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<String> {

@@ -13,7 +13,7 @@ const LIKE: SurfaceParams = SurfaceParams::PREMIUM;
 const WAVELENGTH_MM: f32 = 1.0;
 const MAX_AMPLITUDE_MM: f32 = 0.2;
 
-/// How a surface is rendered. All parameters are by keyword, and checked.
+/// The parameters of a surface, by keyword and checked.
 ///
 /// Parameters
 /// ----------
@@ -111,25 +111,25 @@ impl Surface {
     /// there, and how many materials there are.
     fn params<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let params = self.surface.params();
-        let params = PyDict::new(py);
-        params.set_item("stiffness", params.stiffness_n_per_mm)?;
-        params.set_item("max_force", params.max_force_n)?;
-        params.set_item("friction", params.friction.dynamic_mu)?;
-        params.set_item("static_friction", params.friction.static_mu)?;
-        params.set_item("viscous_friction", params.friction.viscous_s)?;
-        params.set_item("damping", params.damping.ns_per_m)?;
-        params.set_item("shading", name(SHADINGS, params.shading))?;
-        params.set_item("texture", name(PATTERNS, params.texture.pattern))?;
+        let dict = PyDict::new(py);
+        dict.set_item("stiffness", params.stiffness_n_per_mm)?;
+        dict.set_item("max_force", params.max_force_n)?;
+        dict.set_item("friction", params.friction.dynamic_mu)?;
+        dict.set_item("static_friction", params.friction.static_mu)?;
+        dict.set_item("viscous_friction", params.friction.viscous_s)?;
+        dict.set_item("damping", params.damping.ns_per_m)?;
+        dict.set_item("shading", name(SHADINGS, params.shading))?;
+        dict.set_item("texture", name(PATTERNS, params.texture.pattern))?;
         if !params.texture.is_none() {
-            params.set_item("texture_amplitude", params.texture.amplitude_mm)?;
-            params.set_item("texture_wavelength", params.texture.wavelength_mm)?;
-            params.set_item("texture_seed", params.texture.seed)?;
+            dict.set_item("texture_amplitude", params.texture.amplitude_mm)?;
+            dict.set_item("texture_wavelength", params.texture.wavelength_mm)?;
+            dict.set_item("texture_seed", params.texture.seed)?;
         }
         if params.texture.pattern == Pattern::Grating {
-            params.set_item("texture_direction", params.texture.direction_deg)?;
+            dict.set_item("texture_direction", params.texture.direction_deg)?;
         }
-        params.set_item("materials", self.others)?;
-        Ok(params)
+        dict.set_item("materials", self.others)?;
+        Ok(dict)
     }
 
     fn __repr__(&self) -> String {

@@ -7,7 +7,7 @@ use super::NotMeasured;
 /// Requests or reads, and bytes that they brought.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Traffic {
-    /// How many.
+    /// The number.
     pub(super) requests: u64,
     /// What came.
     pub(super) bytes: u64,

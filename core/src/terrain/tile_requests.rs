@@ -158,7 +158,7 @@ impl<const D: usize> TileRequester<D> {
         }
     }
 
-    /// Whether a tile of the fallback is held.
+    /// Returns the flag of a tile of the fallback: true if the tile is held.
     fn part_is_held(&mut self, key: TileKey) -> Option<&mut bool> {
         let mut parts = self.fallback.iter_mut().flatten();
         parts.find_map(|(part, is_held)| (*part == key).then_some(is_held))
@@ -257,7 +257,7 @@ impl<const D: usize> TileRequester<D> {
         (wanted && self.size.has_tile(index)).then_some(key)
     }
 
-    /// Whether a tile is among those around the centre that all have their own place in the
+    /// Returns true if a tile is among those around the centre that all have their own slot in the
     /// torus: nearer than half of it.
     fn reaches(centre: TileIndex, TileIndex { col, row }: TileIndex) -> bool {
         let reach = (D as i32 - 1) / 2;

@@ -265,7 +265,7 @@ impl DeviceState {
         answer.or_else(|| self.guard_changed().map(ToHost::Guard))
     }
 
-    /// Whether the loop has decided about the arm command that waits.
+    /// Reads the loop's decision on the pending arm command.
     fn look_at_decision(&mut self) {
         let decision = self.health.report.decision;
         if self.arming.is_none_or(|before| before == decision.count) {

@@ -1,4 +1,4 @@
-//! What is made or read while somebody is served who must not wait: a queue of what is wanted,
+//! Work in the background for readers that must not wait: a queue of requests,
 //! for one thread.
 
 use std::collections::{HashSet, VecDeque};

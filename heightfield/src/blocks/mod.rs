@@ -61,7 +61,7 @@ pub(super) struct Blocks {
     threads: OnceLock<Option<[JoinHandle<()>; 2]>>,
 }
 
-/// What the one who reads and the threads in the background share.
+/// State that the reader and the threads in the background share.
 pub(super) struct Shared {
     reader: Box<dyn BlockReader>,
     /// The reader's images, and coarse ones that are made of them.
@@ -72,9 +72,9 @@ pub(super) struct Shared {
     turn: Mutex<()>,
     coarse: Mutex<Coarse>,
     disk: DiskCache,
-    /// What is coarse.
+    /// Queue for coarse samples.
     queue: Queue,
-    /// What is fine, which is wanted at once.
+    /// Queue for fine samples, which are needed at once.
     fine: Queue,
     /// Blocks that were read from the file.
     read: AtomicU64,
@@ -249,7 +249,7 @@ impl Shared {
         !self.fine.is_idle()
     }
 
-    /// What the line said last, where something did not come.
+    /// Returns the last error of the connection, if a block is missing.
     pub(super) fn take_outage(&self) -> Option<RasterError> {
         self.kept().outage.take()
     }

@@ -31,7 +31,7 @@ struct Shared {
     answered: Condvar,
 }
 
-/// What is known of a URL.
+/// State of a URL.
 #[derive(Clone)]
 enum Known {
     OnItsWay,

@@ -73,7 +73,7 @@ impl RemoteFile {
         }
     }
 
-    /// What tells the file in the state in which it was opened from others; `None` where its
+    /// Returns the stamp of the file in the state in which it was opened; `None` where its
     /// server tells neither tag nor time.
     pub(crate) fn stamp(&self) -> Option<FileStamp> {
         self.object.stamp().map(FileStamp::of_text)

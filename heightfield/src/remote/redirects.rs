@@ -42,7 +42,7 @@ pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
     in_url || headers.keys().any(may_be_key)
 }
 
-/// Where a redirect leads to.
+/// Returns the target of a redirect.
 ///
 /// # Errors
 /// Why it is not followed.

@@ -61,7 +61,7 @@ pub enum FlashError {
     Probe {
         /// The probe.
         name: String,
-        /// Why.
+        /// The reason.
         #[source]
         source: DebugProbeError,
     },
@@ -72,7 +72,7 @@ pub enum FlashError {
         name: String,
         /// The chip.
         chip: String,
-        /// Why.
+        /// The reason.
         #[source]
         source: Box<probe_rs::Error>,
     },
@@ -81,7 +81,7 @@ pub enum FlashError {
     Write {
         /// The chip.
         chip: String,
-        /// Why.
+        /// The reason.
         #[source]
         source: Box<WriteError>,
     },

@@ -45,7 +45,7 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
-    /// How it introduced itself.
+    /// Returns its introduction.
     #[must_use]
     pub(super) fn device(&self) -> &DeviceHello {
         self.dialogue.device()

@@ -99,17 +99,17 @@ pub enum LogError {
     /// It cannot be read.
     #[error("cannot read the log {path}: {source}")]
     Unreadable {
-        /// Where.
+        /// The place.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: io::Error,
     },
     /// It is no log.
     #[error("{path} is no log of a first power-up: {source}")]
     NoLog {
-        /// Where.
+        /// The place.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: Box<toml::de::Error>,
     },
     /// It cannot be put into words.

@@ -15,7 +15,7 @@ use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::native::StoppedClock;
 use hapterra_firmware::store::Stored;
 
-/// How far below the tip a hand aims that pushes into the soft plane, m.
+/// Distance below the tip at which a hand aims to push into the soft plane, m.
 const PUSH_M: f64 = 0.035;
 /// The virtual user feels an upward push from this force on, N.
 const FELT_N: f64 = 0.1;
@@ -25,7 +25,7 @@ const LOOK_MS: u32 = 25;
 /// Does as it is told at a virtual bench, and reads off the truth.
 pub struct VirtualUser {
     bench: Rc<RefCell<VirtualBench>>,
-    /// Where the tip was before it was last moved along the ruler, m.
+    /// Position of the tip before its last move along the ruler, m.
     before_m: DVec3,
     /// The direction of the scale, and what it read when it was called out, grams.
     scale: (DVec3, f64),

@@ -38,7 +38,7 @@ use heightfield::{Raster, files_read_with};
 
 /// Samples along the side of the terrain that the demo makes itself.
 const OWN_SIZE: u32 = 1024;
-/// What that terrain is called in a recording: how to make it as a file.
+/// Name of that terrain in a recording: how to make it as a file.
 pub(super) const OWN_TERRAIN: &str = "hapterra synth fractal --size 1024 --seed 1";
 
 /// Arguments of `hapterra demo`.
@@ -142,7 +142,7 @@ pub(super) fn own_terrain() -> Result<Raster, Failure> {
     raster.map_err(Failure::new)
 }
 
-/// What to do where a file of the demo cannot be written.
+/// Hint for a file of the demo that cannot be written.
 const OTHER_FOLDER: &str = "name another folder with --out";
 
 /// The files that the demo writes.
@@ -247,7 +247,7 @@ fn show(
     }
 }
 
-/// Where the loop runs: as stated, else on the emulated board where there is one.
+/// Returns the device of the loop: as stated, otherwise the emulated board if there is one.
 fn device(args: &Args) -> VirtualDevice {
     match &args.device {
         Some(device) => device.clone(),
@@ -261,7 +261,7 @@ fn device(args: &Args) -> VirtualDevice {
     }
 }
 
-/// What keys and commands change.
+/// Returns the steering by keys and commands.
 fn control<'t>(
     args: &Args,
     placed: &PlacedTerrain<'t>,
@@ -334,7 +334,7 @@ struct Tour<'p, 't> {
     placed: &'p PlacedTerrain<'t>,
     stop_s: f64,
     control: &'p mut PlacementControl<'t>,
-    /// What shows it.
+    /// Its viewer.
     shown: Option<ToBeShown<'t>>,
     events: Option<Watcher>,
 }

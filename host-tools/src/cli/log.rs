@@ -85,8 +85,8 @@ impl<W: Write> Log<W> {
         }
     }
 
-    /// How many lines of this kind were left out before the one at `now`; none where this
-    /// one is left out, too.
+    /// Returns the number of lines of this kind that were left out before the one at `now`; none if
+    /// this one is left out, too.
     fn admit(&self, about: &Metadata<'_>, now: Instant) -> Option<u64> {
         if !about.target().starts_with(BY_DEVICE) {
             return Some(0);
@@ -158,7 +158,7 @@ impl<W: Write> Write for Line<W> {
 mod tests {
     use super::*;
 
-    /// What is written, for whoever holds a copy.
+    /// A log that its copies share.
     #[derive(Clone, Default)]
     struct Page(Arc<Mutex<Vec<u8>>>);
 
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    /// What is written while `say` speaks, and after the end.
+    /// Returns the log during `say` and at the end.
     fn written(say: impl FnOnce()) -> String {
         let page = Page::default();
         let copy = page.clone();

@@ -187,7 +187,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is felt, and how.
+/// Inputs of a replay.
 struct Inputs<'t> {
     terrain: &'t Terrain<'t>,
     params: (SurfaceParams, Rule),
@@ -199,11 +199,11 @@ struct Inputs<'t> {
     marks: Vec<Mark>,
     /// The terrain file, as it was named.
     file: String,
-    /// What the viewer calls it.
+    /// Its title in the viewer.
     title: String,
-    /// Where the arm's home position was, where a recording says so.
+    /// Home position of the arm, if a recording states it.
     home_mm: Option<[f64; 3]>,
-    /// What shows it.
+    /// Its viewer.
     viewer: Option<Program>,
 }
 

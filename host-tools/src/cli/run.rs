@@ -50,7 +50,7 @@ use together::serve_each;
 /// The stiffest surface that `hapterra-lab stability` tries by itself.
 const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
 
-/// What to do where the recording cannot be written.
+/// Hint for a recording that cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
 
 /// Arguments of `hapterra run`.

@@ -21,7 +21,7 @@ const LOOK: Duration = Duration::from_millis(20);
 /// For how long readers may take what is left at the end.
 const AT_THE_END: Duration = Duration::from_secs(1);
 
-/// What the senders and the thread share.
+/// State that the senders and the thread share.
 #[derive(Debug, Default)]
 struct Shared {
     readers: AtomicUsize,

@@ -18,7 +18,7 @@ const MATERIAL_EVERY_S: f64 = 0.01;
 /// The HIP's speed is known from samples no farther apart than this, s.
 const SPEED_WITHIN_S: f64 = 0.005;
 
-/// What was told last.
+/// Last reported state.
 #[derive(Debug, Default)]
 struct Told {
     view: Option<usize>,

@@ -45,8 +45,8 @@ pub enum Event<'e> {
         /// HIP, proxy, force and state at the point.
         sample: &'e TickRecord,
     },
-    /// Where the device's guard stands; told at the beginning of a session,
-    /// whenever it changes, and twice a second.
+    /// State of the device's guard; sent at the beginning of a session, at each change, and twice a
+    /// second.
     Guard(&'e Report),
     /// A view was put in ([`Client::put_view`]), or was not: the device refuses it, does
     /// not answer, or was restarted meanwhile.
@@ -60,11 +60,11 @@ pub enum Event<'e> {
     Status(&'e Status),
     /// The calibration in force.
     Calibration(Option<&'e Calibration>),
-    /// What came of a request.
+    /// Result of a request.
     Answered {
-        /// What was asked for.
+        /// The request.
         request: &'e Request,
-        /// Whether it was done; why not.
+        /// Success, or the reason of the refusal.
         result: Result<(), Refusal>,
     },
     /// A tick was marked, as was asked for by [`Request::Mark`].
@@ -74,7 +74,7 @@ pub enum Event<'e> {
     },
     /// A tile of the scene's level was said to the device, which may lose it and ask again.
     TileSent(TileKey),
-    /// What was asked for was given up: the device does not answer it, or was
+    /// A request was given up: the device does not answer it, or was
     /// restarted meanwhile. Whether it was done is not known.
     Unanswered(&'e Ask),
 }
@@ -136,7 +136,7 @@ pub struct Client<'t> {
     sent: Vec<TileKey>,
     /// Tiles whose heights have not come yet from elsewhere, and when they were asked for.
     awaited: Vec<(TileKey, Duration)>,
-    /// What lies before the HIP.
+    /// Ground ahead of the HIP.
     ahead: Ahead,
     zeroing: bool,
     /// The point of a replay that is to be felt, and when it was said.

@@ -10,7 +10,7 @@ use super::*;
 use crate::terrain::Scale;
 use heightfield::Raster;
 
-/// How a device introduces itself.
+/// Returns the introduction of a device.
 pub(crate) fn hello() -> DeviceHello {
     DeviceHello {
         protocol: PROTOCOL,
@@ -35,7 +35,7 @@ struct Bench<'t> {
     out: Vec<u8>,
     opened: u32,
     unanswered: Vec<Ask>,
-    /// What was told of the calibration.
+    /// Reported calibrations.
     told: Vec<Option<Calibration>>,
     /// Views and whether they were taken.
     viewed: Vec<(u8, bool)>,
@@ -137,7 +137,7 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// What was said since this was last asked.
+    /// Returns the lines since the last call.
     fn said(&mut self) -> Vec<String> {
         let mut reader = FrameReader::<MAX_FRAME>::new();
         let out = std::mem::take(&mut self.out);

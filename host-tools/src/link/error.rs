@@ -11,9 +11,9 @@ pub enum LinkError {
     /// Nothing there to talk to.
     #[error("no device: looked for {looked_for}: {why}")]
     Absent {
-        /// What was looked for and where.
+        /// Sought device and place.
         looked_for: String,
-        /// What was found instead.
+        /// Finding in its place.
         why: String,
     },
     /// Several devices could be meant.

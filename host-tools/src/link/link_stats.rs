@@ -50,7 +50,7 @@ pub struct LinkStats {
 struct Numbering {
     /// Number that the next sample should have.
     expected: u32,
-    /// What the device says that it has sent and dropped.
+    /// Device's counts of sent and dropped samples.
     told: SampleCount,
 }
 
@@ -73,7 +73,7 @@ impl Numbering {
     }
 }
 
-/// How far `later` is ahead of `earlier`; zero where it is behind.
+/// Returns the lead of `later` over `earlier`; zero if it is behind.
 fn ahead(earlier: u32, later: u32) -> u32 {
     match later.wrapping_sub(earlier) {
         behind if behind > u32::MAX / 2 => 0,

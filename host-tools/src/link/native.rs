@@ -78,7 +78,7 @@ pub struct Native<C: TickClock = StoppedClock> {
     /// Ticks run while waiting for the device to say something, at most.
     ticks_a_call: u32,
     ticks: u64,
-    /// What the device said while it was told something.
+    /// Bytes from the device that arrived during a send.
     pending: VecDeque<u8>,
 }
 

@@ -22,7 +22,7 @@ pub struct HeldPhantom {
     /// When the script begins, s.
     begin_s: f64,
     t_s: f64,
-    /// What the current monitors read a step ago: a board reads what was converted in
+    /// Readings of the current monitors a step ago: a board reads what was converted in
     /// the tick before.
     measured_ma: [i16; 3],
 }

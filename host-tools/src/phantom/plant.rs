@@ -240,7 +240,7 @@ impl Plant {
     }
 }
 
-/// What does not change while only velocities do.
+/// Terms that do not depend on velocities.
 struct Fixed {
     pose: Pose,
     inverse_mass: DMat3,

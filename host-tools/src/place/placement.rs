@@ -190,8 +190,8 @@ impl Placement {
         })
     }
 
-    /// How many times larger a grid's cells are on the ground than the view's; once where
-    /// nobody knows.
+    /// Returns the ratio of a grid's cell size on the ground to that of the placement; 1 if it is
+    /// unknown.
     pub(super) fn as_large_as_in(&self, grid: &HapticGrid<'_>) -> f64 {
         let sides = grid.side_m().zip(self.side_m);
         sides.map_or(1.0, |(there, here)| there / here)
@@ -241,7 +241,7 @@ impl Placement {
     }
 }
 
-/// What is asked for of a grid, its numbers checked.
+/// Checked request for a grid.
 struct Wanted<'g> {
     grid: &'g HapticGrid<'g>,
     options: PlacementOptions,

@@ -55,12 +55,12 @@ pub enum SurfaceError {
         most = Texture::MAX_AMPLITUDE_MM
     )]
     Texture {
-        /// How far it reaches above and below the surface.
+        /// Height above and below the surface.
         amplitude_mm: f32,
         /// From ridge to ridge.
         wavelength_mm: f32,
     },
-    /// What each material has by itself.
+    /// A quantity of each material.
     #[error(
         "each material of the scene has its own: change the table and begin anew, or begin without --materials"
     )]

@@ -14,7 +14,7 @@ pub trait Onlooker<'t> {
     /// Is told what becomes of the line, in words for the user.
     fn hear(&mut self, line: &str);
 
-    /// What is to be asked of the device now; taken after each look at the line.
+    /// Returns the requests to the device; read after each poll of the line.
     fn asks(&mut self) -> Vec<Ask>;
 
     /// Another view that is to be put in now, with its terrain; taken after each look at

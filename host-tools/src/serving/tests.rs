@@ -122,7 +122,7 @@ impl Bench {
         }
     }
 
-    /// How the last session ended, as the next host hears it.
+    /// Returns the end of the last session, as reported to the next host.
     fn last_end(&self) -> SessionEnd {
         self.deaf.set(false);
         let line = Box::new(self.line());

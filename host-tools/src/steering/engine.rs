@@ -32,7 +32,7 @@ pub struct Put<'r> {
     pub laid: Laid,
 }
 
-/// Where a change stands.
+/// Stage of a change.
 enum Stage<'r> {
     /// The clutch is closed, as far as this host knows.
     Idle,
@@ -62,7 +62,7 @@ pub struct Steering<'r> {
     by_input: bool,
     /// The user took the clutch, and may have gone far since the cells were measured.
     measures: bool,
-    /// How the device was asked to hold it.
+    /// Requested hold of the clutch.
     asked: ClutchHold,
     /// Since when the ground of another view has been awaited.
     awaits: Option<Instant>,
@@ -269,7 +269,7 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// Where a sample has the hand, in the view in force.
+    /// Returns the position of the hand in a sample, in the placement in force.
     fn hand(&self, sample: &TickRecord) -> Hand {
         let scale = self.terrain.scale();
         let touches = sample.state == ContactState::Touching;

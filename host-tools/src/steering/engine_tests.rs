@@ -46,7 +46,7 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
     (0..count).for_each(|_| steering.on_event(&Event::Sample(&sample)));
 }
 
-/// What was asked of the clutch last.
+/// Returns the last request to the clutch.
 fn asked(steering: &mut Steering<'_>) -> Option<ClutchHold> {
     steering.asks().into_iter().rev().find_map(|ask| match ask {
         Ask::Request(Request::Clutch { hold }) => Some(hold),

@@ -58,8 +58,8 @@ impl HapticGrid<'_> {
         off.max_by(|one, other| one.share.total_cmp(&other.share))
     }
 
-    /// How far the longest and the shortest step of a haptic cell's side in any direction are
-    /// from that side, as a share, where the file's cells are of a size.
+    /// Returns the deviation of the longest and the shortest side of a haptic cell in any
+    /// direction, as a share, for file cells of a size.
     fn off_by(&self, cell: &CellSize) -> Option<f64> {
         let side = self.side_m()?;
         let ((long, high), cosine) = (cell.ground_metres(), cell.lean);

@@ -13,7 +13,8 @@ use heightfield::{ReadStatus, ReadTracker};
 use super::tiler::range;
 use super::{Terrain, TileBuffer, identity};
 
-/// How much finer the near tile is, as a power of two: it reaches a quarter as far as the wide one.
+/// Ratio of the near tile's spacing to the wide one's, as a power of two: it reaches a quarter as
+/// far as the wide one.
 const NEAR_IS_FINER: u8 = 2;
 
 impl Terrain<'_> {
@@ -108,7 +109,8 @@ impl Terrain<'_> {
         }
     }
 
-    /// The height of a coarse tile's sample, in cells. Beyond the field it goes on as it ends there.
+    /// The height of a coarse tile's sample, in cells. Beyond the field it goes on as it ends
+    /// there.
     fn coarse_sample(&self, tile: &CoarseTile, place: [usize; 2], reads: &ReadTracker) -> f64 {
         let size = self.size();
         let sample = |first: i32, place: usize, last: i32| {

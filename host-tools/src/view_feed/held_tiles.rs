@@ -29,7 +29,8 @@ impl HeldTiles {
         }
     }
 
-    /// A felt tile was sent: the tile of the level that is shown for it, and the slot that this takes.
+    /// A felt tile was sent: the tile of the level that is shown for it, and the slot that this
+    /// takes.
     pub(super) fn sent(&mut self, key: TileKey) -> (u32, TileKey) {
         let index = self.of_level(key.index);
         let slot = self.slot(index);
@@ -38,7 +39,7 @@ impl HeldTiles {
         (slot, TileKey { index, ..key })
     }
 
-    /// What the loop lacks now.
+    /// Sets the tile that the loop lacks now.
     pub(super) fn lacks(&mut self, tile: Option<TileIndex>) {
         let tile = tile.map(|tile| self.of_level(tile));
         self.has_changed |= self.awaited != tile;

@@ -103,7 +103,7 @@ impl<'t> Picture<'_, 't> {
     }
 }
 
-/// How a device tells the cost of its ticks.
+/// Returns the unit in which a device reports the cost of its ticks.
 pub(super) fn tick_cost(device: &DeviceHello) -> TickCost {
     let hz = f64::from(device.clock_hz.max(1));
     let (per_count, unit) = match device.board.as_str() {

@@ -32,8 +32,8 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Of a device with an empty window of `side` × `side` tiles, with so many haptic cells a cell of
-    /// the level.
+    /// Of a device with an empty window of `side` × `side` tiles, with so many haptic cells a cell
+    /// of the level.
     pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {
             held: HeldTiles::new(side, parts),
@@ -43,7 +43,7 @@ impl Tiles {
         }
     }
 
-    /// What the loop lacks now.
+    /// Sets the tile that the loop lacks now.
     pub(super) fn lacks(&mut self, tile: Option<TileIndex>) {
         self.held.lacks(tile);
     }

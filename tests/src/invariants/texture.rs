@@ -1,4 +1,5 @@
-//! The force with texture, by the formulas of docs/explanation/effects.md, in f64 and whole numbers.
+//! The force with texture, by the formulas of docs/explanation/effects.md, in f64 and whole
+//! numbers.
 
 use glam::DVec3;
 use hapterra_core::force::{Pattern, Texture};
@@ -44,7 +45,7 @@ pub(super) struct Added {
 /// A texture as it is felt, cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TextureBounds {
-    /// How far it reaches above and below the surface.
+    /// Height above and below the surface.
     pub(super) amplitude: f64,
     /// What it adds to the depth.
     pub(super) rise: f64,

@@ -17,7 +17,7 @@ const STILL_MM: f32 = 0.1;
 /// So many looks (a tenth of a second each) that may take.
 const LOOKS: usize = 600;
 
-/// What was felt of the plane.
+/// Contact with the plane.
 #[derive(Default)]
 struct PlaneContact {
     /// Deepest HIP below the proxy, mm, and the force up there, N.
@@ -75,7 +75,7 @@ pub(super) fn soft_plane(
     ))
 }
 
-/// Whether a move has come to its end.
+/// Condition for the end of a move.
 type IsDone = fn(&PlaneContact) -> bool;
 
 /// Lets the tip be lowered until it is deep enough, and lifted until nothing is felt.

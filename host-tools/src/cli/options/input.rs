@@ -44,7 +44,7 @@ enum InputValue {
     CellM(f64),
     /// Metres in a unit of height.
     HeightUnitM(f64),
-    /// How colours encode heights.
+    /// Encoding of heights as colours.
     Encoding(Encoding),
     /// The channel of a PNG that holds the height.
     Channel(PngChannel),

@@ -48,8 +48,7 @@ pub(in crate::cli) struct Asked<'r> {
 }
 
 impl Placing {
-    /// What is asked for of a raster. What is wrong with the place itself is found here,
-    /// before any device is spoken to.
+    /// Checks the placement on a raster, before any device is contacted.
     ///
     /// # Errors
     /// No such place.
@@ -84,7 +83,7 @@ impl Placing {
 }
 
 impl Asked<'_> {
-    /// What lies where in front of an arm with a calibration.
+    /// Returns the placement in front of an arm with a calibration.
     ///
     /// # Errors
     /// Heights that the arm does not reach.
@@ -93,7 +92,7 @@ impl Asked<'_> {
     }
 }
 
-/// Where a terrain lies and how large it is, in lines as `run` and `demo` print them.
+/// Returns the place and size of a terrain, in lines as `run` and `demo` print them.
 pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(

@@ -115,7 +115,7 @@ pub(in crate::cli) struct PlacementControl<'t> {
     entered: Option<u32>,
 }
 
-/// Where keys come from.
+/// Source of keys.
 enum Typing {
     /// Nobody types, or what is typed are lines.
     Nobody,
@@ -258,7 +258,7 @@ impl<'t> PlacementControl<'t> {
     }
 }
 
-/// What a surface feels like, without what it has not.
+/// Describes a surface by the effects that it has.
 fn surface_in_words(params: &SurfaceParams) -> String {
     let number = |number: f32| placing::short(f64::from(number));
     let (friction, texture) = (&params.friction, &params.texture);
@@ -283,7 +283,7 @@ fn surface_in_words(params: &SurfaceParams) -> String {
     words.join(", ")
 }
 
-/// What was marked, in a line.
+/// Describes a mark in a line.
 pub(in crate::cli) fn marked(mark: &Mark) -> String {
     let Mark { text, t_s, .. } = mark;
     match mark.tick {
@@ -294,7 +294,7 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
     }
 }
 
-/// What a view that was put in is, in a line.
+/// Describes a placement that took effect, in a line.
 pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     format!(

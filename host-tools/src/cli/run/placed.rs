@@ -12,7 +12,7 @@ use crate::phantom::PlacedTerrain;
 use crate::place::Placement;
 use crate::terrain::Terrain;
 
-/// What lies where in front of an arm.
+/// Terrain placed in front of an arm.
 pub(super) struct InReach<'r> {
     view: Placement,
     terrain: Terrain<'r>,

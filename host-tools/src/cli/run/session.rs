@@ -47,7 +47,7 @@ pub(super) struct Serving<'p, 't> {
     pub(super) args: &'p Args,
     pub(super) device: &'p OneDevice,
     pub(super) placed: &'p Placed<'t>,
-    /// Whether the device has told its calibration. If not, it is said goodbye to: the
+    /// Success of the query for the calibration. After a failure the session is closed: the
     /// arm may be armed from before.
     pub(super) met: Result<(), Failure>,
     pub(super) recording: Option<Recording>,
@@ -206,7 +206,7 @@ fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Re
     }
 }
 
-/// What is served, and to which device.
+/// Returns the service of a terrain to a device.
 fn service<'s, 't: 's>(
     args: &'s Args,
     (device, placed): (&'s OneDevice, &'s Placed<'t>),
@@ -233,7 +233,7 @@ fn service<'s, 't: 's>(
     }
 }
 
-/// How it ended, as a failure; where two things went wrong, the first is told here.
+/// Returns the failure of the session; of two, the first is reported here.
 fn told(
     why: Result<(), LinkError>,
     disarmed: Result<(), LinkError>,

@@ -29,7 +29,7 @@ const STANDS_STILL: Duration = Duration::from_secs(60);
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(2);
 
-/// What is seen and recorded of a session while it goes on.
+/// Observation and recording of a running session.
 pub(super) struct Watch<'t> {
     log: SampleLog<'t>,
     stop_s: f64,
@@ -49,7 +49,7 @@ pub(super) struct Watch<'t> {
     device_console: DeviceConsole,
 }
 
-/// What was seen in all.
+/// Result of the observation.
 pub(super) struct Seen<'t> {
     /// Ticks run since the scene was taken.
     pub(super) ticks: u64,
@@ -58,7 +58,7 @@ pub(super) struct Seen<'t> {
     pub(super) stood_still: bool,
     /// The way to the viewer, where there is one.
     pub(super) shown: Option<Shown<'t>>,
-    /// Whether the recording, where there is one, is complete and in its place.
+    /// Success of the recording, if there is one: complete and in its place.
     pub(super) kept: Result<(), OutputError>,
 }
 

@@ -123,7 +123,7 @@ fn press() {
     }
 }
 
-/// What is said where a program ends that may leave these boards armed.
+/// Returns the message at the end of a program that may leave these boards armed.
 pub(in crate::cli) fn not_confirmed(boards: &BTreeSet<String>) -> Option<String> {
     let names: Vec<&str> = boards.iter().map(String::as_str).collect();
     let (who, is) = match &names[..] {

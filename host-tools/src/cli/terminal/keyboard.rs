@@ -77,8 +77,8 @@ impl Keyboard {
         mem::take(&mut self.keys)
     }
 
-    /// What was pressed since the last look, in its order; a line that holds nothing but a
-    /// digit is that key, and each line ends in Enter. Nothing where nobody types.
+    /// Returns the keys since the last call, in order; a line of a single digit is that key, and
+    /// each line ends in Enter. Nothing without a keyboard.
     pub(super) fn pressed(&mut self) -> Vec<Pressed> {
         let mut pressed: Vec<_> = self.pressed.try_iter().collect();
         if self.is_typed {

@@ -7,7 +7,7 @@ use std::sync::mpsc::SyncSender;
 use super::{interrupt, raw_mode};
 use crate::steering::keys::Key;
 
-/// What the thread at the keyboard has read.
+/// Input that the thread at the keyboard has read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pressed {
     /// Enter.
@@ -32,7 +32,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
     raw_mode::put_back();
 }
 
-/// What a byte, or the last of some, comes to.
+/// Meaning of a byte, or of the last of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Typed {
     /// Ctrl-C, or Ctrl-\.

@@ -20,7 +20,7 @@ use heightfield::shown::shown_lines;
 /// Lines that wait to be written; beyond them, lines are left out.
 const WAITING: usize = 512;
 
-/// What is to be written.
+/// Text to write.
 enum Said {
     /// To standard output, as it is.
     Out(String),

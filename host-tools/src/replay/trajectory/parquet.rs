@@ -21,7 +21,7 @@ pub(super) struct Rows {
     next_group: usize,
     /// The columns that are read.
     names: &'static [&'static str],
-    /// What reads the columns of the present group.
+    /// Readers of the columns of the present group.
     columns: Vec<ColumnReaderImpl<DoubleType>>,
     /// Which column tells the view, where there is one; what reads it, and what it read.
     view_column: Option<usize>,

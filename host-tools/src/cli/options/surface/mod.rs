@@ -228,7 +228,8 @@ impl Surface {
         }
     }
 
-    /// The materials of a terrain: its classes from the file of the options, as this surface has them.
+    /// The materials of a terrain: its classes from the file of the options, as this surface has
+    /// them.
     ///
     /// # Errors
     /// What is wrong with the file of classes or its place; one of file and classes alone.
@@ -257,8 +258,8 @@ impl Surface {
     }
 }
 
-/// What went wrong with a file of classes: hints for heights work out numbers between those of the
-/// file, and between classes there are none.
+/// Returns the failure of a file of classes: hints for heights work out numbers between those of
+/// the file, and between classes there are none.
 fn of_classes(error: heightfield::Error) -> Failure {
     let hint = error.hint().replace("-r bilinear", "-r near");
     let hint = hint.replace("-r average", "-r mode");
