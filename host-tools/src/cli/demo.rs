@@ -17,7 +17,7 @@ use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::run::duration;
 use super::session_summary::{self, SessionSummary};
 use super::settings::SettingsOption;
-use super::terminal::waiting::shown_reading;
+use super::terminal::waiting::shown_planning;
 use super::terminal::{interrupt, partial_files, progress, writer};
 use super::viewing::{Shown, ToBeShown, Viewing};
 use crate::events::{Event as Told, Watcher};
@@ -117,8 +117,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     // The virtual Phantom is one.
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
     let terrain = view.terrain(asked.grid)?;
-    let placed = shown_reading(&name, &raster, || {
-        PlacedTerrain::in_view(&terrain, view.home_mm, params)
+    let placed = shown_planning(&name, &raster, || {
+        PlacedTerrain::in_view(&terrain, view.home_mm, params, &|| !interrupt::requested())
     })?;
     let placed = placed.repeated(args.rounds);
     show(args, (&placed, &view), &name, &outputs)

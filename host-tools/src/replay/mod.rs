@@ -21,7 +21,7 @@ mod trajectory;
 pub use loop_columns::{LoopColumns, mode_name};
 pub use marks::Mark;
 pub use offline_device::OfflineDevice;
-pub use recording::{COLUMNS, Column, Record, Recording, Value};
+pub use recording::{COLUMNS, Column, Record, Recording, TICK_COLUMNS, Value};
 pub use settings::{Rule, Settings};
 pub use states::state_name;
 pub use ticks::{Pace, Tick, Ticks};

@@ -8,7 +8,7 @@ mod views;
 use std::path::Path;
 use std::process::Command;
 
-use hapterra::replay::COLUMNS;
+use hapterra::replay::{COLUMNS, TICK_COLUMNS};
 use hapterra::synth::Kind;
 use hapterra_tests::{UNCONTROLLED, hapterra_binary, terrain_file};
 
@@ -131,7 +131,7 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
         .collect();
     if !columns.contains(&"tick") {
         // Of `demo`, which has no board.
-        documented.retain(|name| !["tick", "work", "cost", "late"].contains(name));
+        documented.retain(|name| !TICK_COLUMNS.contains(name));
     }
     assert_eq!(columns, documented, "columns of the reference");
     let (live, again) = (rows(&live), rows(&again));

@@ -7,7 +7,8 @@ use hapterra_core::scene::Scene;
 use super::devices::OneDevice;
 use crate::cli::failure::Failure;
 use crate::cli::options::placing::Asked;
-use crate::cli::terminal::waiting::shown_reading;
+use crate::cli::terminal::interrupt;
+use crate::cli::terminal::waiting::shown_planning;
 use crate::phantom::PlacedTerrain;
 use crate::place::Placement;
 use crate::terrain::Terrain;
@@ -53,8 +54,8 @@ impl<'t> Placed<'t> {
     ) -> Result<Self, Failure> {
         let (view, terrain) = (laid.view, &laid.terrain);
         let tour = match device.is_scripted() {
-            true => Some(shown_reading(name, terrain.raster(), || {
-                PlacedTerrain::in_view(terrain, view.home_mm, params)
+            true => Some(shown_planning(name, terrain.raster(), || {
+                PlacedTerrain::in_view(terrain, view.home_mm, params, &|| !interrupt::requested())
             })?),
             false => None,
         };

@@ -28,7 +28,7 @@ use crate::output::{Output, folder_of};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::Laid;
 use crate::replay::settings::Device;
-use crate::replay::{Column, LoopColumns, Recording, Rule, Settings};
+use crate::replay::{Column, LoopColumns, Recording, Rule, Settings, TICK_COLUMNS};
 use crate::serving::{Service, told_of_last_end};
 use crate::stability;
 use crate::steering::CommandQueue;
@@ -38,6 +38,9 @@ use heightfield::without_key;
 const RETRY: Duration = Duration::from_millis(500);
 /// For how long the virtual arm stays after the session has ended.
 const LINGER: Duration = Duration::from_secs(2);
+
+/// Remark at the end of a virtual arm's session without contact.
+const UNTOUCHED: &str = "the virtual hand never touched the ground: choose another place with --at, or a longer --duration";
 
 /// Bytes that a recording may have on any disk: a day of CSV at 1 kHz.
 const MAX_RECORDED: u64 = 16 << 30;
@@ -150,6 +153,9 @@ impl<'t> Serving<'_, 't> {
             tally: end.tally,
         };
         device_console.show(summary.text());
+        if placed.tour.is_some() && summary.figures.force_n.count() == 0 {
+            device_console.tell(UNTOUCHED);
+        }
         if let (Ok(()), Some(path)) = (&kept, &device.record) {
             device_console.say(format!("recording      {}", path.display()));
         }
@@ -254,7 +260,7 @@ fn told(
 /// A file that cannot be written.
 pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure> {
     let [state, mode, limits, view] = LoopColumns::COLUMNS;
-    let [tick, work, cost, late] = ["tick", "work", "cost", "late"].map(Column::Count);
+    let [tick, work, cost, late] = TICK_COLUMNS.map(Column::Count);
     let columns = [state, tick, work, cost, late, mode, limits, view];
     let recording = device.record.as_deref().map(|path| {
         let output = Output::create(path)?.of_recording(most_recorded(path));

@@ -13,7 +13,7 @@ use std::path::Path;
 use hapterra_core::contact::ContactState;
 use hapterra_core::scene::TickRecord;
 
-pub use columns::COLUMNS;
+pub use columns::{COLUMNS, TICK_COLUMNS};
 
 use super::marks::Mark;
 use super::settings::{PlacementSettings, Settings};
