@@ -43,7 +43,7 @@ const RECORD: usize = 13;
 pub struct CountingBoard {
     qemu: PathBuf,
     image: PathBuf,
-    /// What follows the image's instructions in its folder, for the cycles of each tick.
+    /// Follower of the image's instructions in its folder, for the cycles of each tick.
     follow: Option<Follow>,
 }
 
@@ -284,7 +284,8 @@ impl CountingBoard {
     }
 }
 
-/// Adds the cycles of each tick. Those without a record are the first ones, in which the arm is armed.
+/// Adds the cycles of each tick. Those without a record are the first ones, in which the arm is
+/// armed.
 ///
 /// # Panics
 /// If what was followed is not what was counted, but for the call and the return of each tick.
@@ -300,7 +301,7 @@ fn add_cycles(counted: &mut [Counted], followed: &[Cycles]) {
     }
 }
 
-/// What the image left of it.
+/// Returns the records that the image wrote.
 fn records(folder: &Path, name: &str) -> Vec<Counted> {
     let bytes = std::fs::read(folder.join(name)).expect("the image left its records");
     let words = bytes.as_chunks::<4>().0.iter();

@@ -50,7 +50,7 @@ fn watch(params: &SurfaceParams, table: Option<&[Material]>) -> ForceWatch {
     ForceWatch::new(SceneSurfaces::of(params, table.as_ref()), 0.5)
 }
 
-/// What is said of one tick, 2 mm deep.
+/// Returns the verdict on one tick, 2 mm deep.
 fn said(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
     let sample = TickRecord {
         limits,
@@ -155,8 +155,8 @@ fn a_contact_that_gives_is_told_with_the_controller_on() {
     assert!(told && given > 0.344, "{given}");
 }
 
-/// A press of 2 mm at rest while the ramp lets force in, from the confirmation on, and then `more` times
-/// the force that it may have.
+/// A press of 2 mm at rest while the ramp lets force in, from the confirmation on, and then `more`
+/// times the force that it may have.
 fn ramped(times: f32) -> Result<(), String> {
     let mut watch = watch(&PARAMS, None);
     let mut look = |tick: u32, mode: Mode, force_n: f32, limits: Limits| {

@@ -26,7 +26,7 @@ use heightfield::{OpenOptions, Raster};
 /// Millimetres of the hand a cell: 2,000 cells a second are 200 mm/s.
 const CELL_MM: f64 = 0.1;
 const SPEED_MM_S: f64 = 200.0;
-/// What the line carries in a tick, which is a millisecond: 200 kB/s.
+/// Bytes on the line in a tick of a millisecond: 200 kB/s.
 const BYTES_A_TICK: usize = 200;
 /// The same over real ground, whose tiles take fewer bytes: 100 kB/s.
 const REAL_BYTES_A_TICK: usize = 100;
@@ -37,7 +37,7 @@ const AWAY_MM: f64 = 60.0;
 /// The guard changes the force by at most so much in a tick of a millisecond, N.
 const SLEW_N: f32 = 1.0;
 
-/// Where the hand slides: around the middle of a terrain.
+/// Slide of a hand around the middle of a terrain.
 struct Slide<'t> {
     terrain: &'t Terrain<'t>,
     home_mm: [f64; 3],
@@ -188,7 +188,7 @@ fn is_on_border(tile: &CoarseTile, column: i32, row: i32) -> bool {
     [0, side].contains(&(column - tile.first.x)) || [0, side].contains(&(row - tile.first.y))
 }
 
-/// What was felt of the ground: ticks in contact, those over a hole for want of a tile, those over
+/// Ground under the ticks: ticks in contact, those over a hole for want of a tile, those over
 /// coarse ground, and how far the proxy was from the terrain at most, mm.
 #[derive(Debug, Default)]
 struct Ground {

@@ -19,7 +19,7 @@ const SCENES: u64 = 200;
 
 type Counts = BTreeMap<&'static str, u64>;
 
-/// What a tick is, by all the names that fit.
+/// Returns all names that fit a tick.
 fn names(terrain: &Terrain, before: Option<&Seen>, now: &Seen) -> Vec<&'static str> {
     let mut names = Vec::new();
     let mut is = |name, true_of: bool| {
@@ -71,7 +71,7 @@ fn names(terrain: &Terrain, before: Option<&Seen>, now: &Seen) -> Vec<&'static s
     names
 }
 
-/// What samples there are on a ground that was touched.
+/// Counts the samples of a ground that was touched.
 fn samples(terrain: &Terrain, counts: &mut Counts) {
     let all = (0..=terrain.size[1])
         .flat_map(|y| (0..=terrain.size[0]).map(move |x| (x, y)))

@@ -240,7 +240,7 @@ fn a_device_that_restarts_ends_a_replay_with_a_word() {
     assert!(matches!(error, Some(LinkError::Restarted)), "{error:?}");
 }
 
-/// What a device answers to bytes that belong to no session.
+/// Returns the answer of a device to bytes that belong to no session.
 fn refusal(device: &mut Native, bytes: &[u8]) -> Option<VersionCheck> {
     device.send(bytes).expect("in memory");
     let mut chunk = [0; 512];

@@ -19,7 +19,7 @@ use heightfield::Raster;
 
 const UTM_32: &str = r#"PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#;
 const LONLAT: &str = r#"GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]]"#;
-/// Where the terrain's first column is, east of its zone's origin, m: 9° east lies between two
+/// Position of the terrain's first column, east of its zone's origin, m: 9° east lies between two
 /// columns.
 const FIRST_COLUMN: f64 = 499_503.0;
 /// Metres from column to column; a column is a millimetre in the hand.
@@ -93,7 +93,7 @@ impl Folder {
         std::fs::read_to_string(self.0.path().join(name)).expect("there")
     }
 
-    /// Whether the command went well, and what it said.
+    /// Returns the success of the command, and its output.
     fn hapterra(&self, args: &[&str]) -> (bool, String) {
         let run = Command::new(hapterra_binary())
             .current_dir(self.0.path())

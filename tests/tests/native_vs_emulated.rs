@@ -18,8 +18,8 @@ use hapterra_tests::timeouts::pass;
 use hapterra_tests::walk::wander;
 use heightfield::Raster;
 
-/// What has to be the same: all but the work and the time it took, which
-/// depend on when a tile came.
+/// The compared part of an answer: all but the work and the time it took, which depend on when a
+/// tile came.
 type Answer = (
     [i32; 3],
     [u32; 3],

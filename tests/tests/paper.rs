@@ -7,7 +7,7 @@ use hapterra_core::contact::surface::patch::Patch;
 use hapterra_core::force::SurfaceParams;
 use hapterra_tests::field::{FieldContact, position};
 
-/// What a rule says of a HIP: whether there is contact, and the proxy.
+/// Answer of a rule to a HIP: contact or not, and the proxy.
 type Answer = (bool, [f64; 3]);
 
 /// A field as wide as a test's, made by a function.

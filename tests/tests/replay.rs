@@ -18,10 +18,9 @@ const ON_SURFACE: f64 = 2e-5;
 /// By how much some other point near the proxy may be closer to the HIP,
 /// cells.
 const CLOSEST: f64 = 1e-6;
-/// How far that other point is looked for, cells, and not past the border of
-/// the patch that the proxy is in: on rough ground there is often another local
-/// closest point beyond a hump at the border. A proxy that is wrong by a
-/// hundredth of its distance is found out.
+/// Range of the search for the other point, cells, and not past the border of the patch that the
+/// proxy is in: on rough ground there is often another local closest point beyond a hump at the
+/// border. A proxy that is wrong by a hundredth of its distance is found out.
 const NEARBY: f64 = 2e-4;
 /// A proxy this close to a border is on it, cells.
 const ON_BORDER: f64 = 1e-6;

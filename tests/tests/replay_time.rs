@@ -72,7 +72,7 @@ impl Folder {
         replay(&terrain, &from, &to, more)
     }
 
-    /// What was felt of `in.csv`, in `out.csv`, and what was said.
+    /// Returns the replay of `in.csv` in `out.csv`, and its messages.
     fn felt(&self, path: &str, more: &[&str]) -> (Vec<Row>, String) {
         self.write("in.csv", path);
         let run = self.replay("in.csv", "out.csv", more);
@@ -81,7 +81,7 @@ impl Folder {
         (rows(&self.read("out.csv")), said)
     }
 
-    /// What a replay of `in.csv` that fails says.
+    /// Returns the messages of a replay of `in.csv` that fails.
     fn fails(&self, path: &str, more: &[&str]) -> String {
         self.write("in.csv", path);
         let run = self.replay("in.csv", "out.csv", more);

@@ -50,9 +50,9 @@ fn rasters() -> Vec<(&'static str, Raster)> {
     all
 }
 
-/// What a HIP feels on a circle, half a millimetre deep, that sets out from the air. In the middle
-/// it lifts twice and goes fast for some time. A cell is a millimetre, so that the force is half of
-/// the displacement, to the bit.
+/// Returns the samples of a HIP on a circle, half a millimetre deep, that sets out from the air. In
+/// the middle it lifts twice and goes fast for some time. A cell is a millimetre, so that the force
+/// is half of the displacement, to the bit.
 fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
     let mut replayer = on_native(terrain, params).expect("opened");
     let size = terrain.size_mm();

@@ -154,7 +154,7 @@ fn a_ball_touches_real_ground_a_radius_away() {
     }
 }
 
-/// Whether a sample by column and row is another than those around.
+/// Predicate by column and row: true for a sample that differs from those around.
 type Shape<'s> = &'s dyn Fn(u32, u32) -> bool;
 
 #[test]
@@ -176,8 +176,9 @@ fn a_ball_touches_poles_walls_and_pits_a_radius_away() {
     }
 }
 
-/// Of 20 passes over a pole of one sample, 20 cells high, at half of its height, beside it by at most
-/// a part of the radius, those in which it is felt, by speed in cells a tick. Cells are a millimetre.
+/// Of 20 passes over a pole of one sample, 20 cells high, at half of its height, beside it by at
+/// most a part of the radius, those in which it is felt, by speed in cells a tick. Cells are a
+/// millimetre.
 fn passes_touching(radius: f64, speed: f64, (most_beside, friction): (f64, f32)) -> usize {
     let pole = |x: u32, y: u32| if (x, y) == (60, 30) { 20.0 } else { 0.0 };
     let raster = Raster::from_fn(120, 60, pole).expect("raster");
@@ -310,7 +311,7 @@ fn samples_without_data_have_none_under_a_ball() {
     }
 }
 
-/// What a command said on standard error; it succeeds.
+/// Returns the standard error of a command that succeeds.
 fn runs(folder: &std::path::Path, words: &[&str]) -> String {
     let mut command = Command::new(hapterra_binary());
     let run = command
@@ -463,7 +464,7 @@ fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
     }
 }
 
-/// What a demo's recording has of a hand on the ground.
+/// Contact of a hand in a demo's recording.
 struct Touched {
     /// Distances from HIP to proxy in contact, sorted, mm.
     penetration_mm: Vec<f64>,

@@ -228,14 +228,14 @@ fn assert_felt(sample: &TickRecord, what: &str) {
     assert_eq!(others, Limits::empty(), "{what}");
 }
 
-/// How much of its force a press has with a spring, N/mm, of what it has with another. The hand
-/// is a spring, too, whose end stays where it is.
+/// Returns the ratio of the forces of a press with two springs, N/mm. The hand is a spring, too,
+/// whose end stays where it is.
 fn in_series(with: f32, of: f32) -> f32 {
     let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
     (give + 1.0 / of) / (give + 1.0 / with)
 }
 
-/// What a press has left when the ground went with the hand to where that wants to be.
+/// Returns the force that a press has left when the ground has moved to the hand's target.
 fn all_the_way() -> f32 {
     let give = 1_000.0 * HandModel::default().give_m_per_n() as f32;
     (1.0 / STIFFNESS) / (give + 1.0 / STIFFNESS)
@@ -499,7 +499,7 @@ fn slope_of_degrees(axis: usize) -> Raster {
     Raster::open(path, &OpenOptions::default()).expect("opens")
 }
 
-/// How steep a pressing hand feels the ground, to the east and to the north.
+/// Returns the slope of the force of a pressing hand, to the east and to the north.
 fn slope_of_force(sample: &TickRecord) -> [f64; 2] {
     let [x, y, z] = sample.force_n.to_array().map(f64::from);
     [-x / z, -y / z]

@@ -81,8 +81,8 @@ fn show(options: &Options) -> Result<()> {
     ended.rrd
 }
 
-/// Whether `hapterra` is gone: it holds the pipe open after the stream's end, for as long as
-/// it runs.
+/// Watches whether `hapterra` is gone: it holds the pipe open after the stream's end, for as long
+/// as it runs.
 fn watched(has_ended: bool) -> Arc<AtomicBool> {
     let is_gone = Arc::new(AtomicBool::new(!has_ended));
     let told = Arc::clone(&is_gone);

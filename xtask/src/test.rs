@@ -27,10 +27,11 @@ const QUICK: [&str; 4] = [
 /// it, too.
 const WITH_PROBES: [&str; 2] = ["--features", "hapterra/probe"];
 
-/// What is to be tested.
+/// Request of a test run.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Request {
-    /// Neither the boards that are not emulated nor the dependencies, the page and the Python package.
+    /// Neither the boards that are not emulated nor the dependencies, the page and the Python
+    /// package.
     pub(crate) quick: bool,
     /// Arguments of `cargo test`, which select programs and tests; all where there are none.
     pub(crate) only: Vec<OsString>,
@@ -108,8 +109,8 @@ pub(crate) fn test(request: &Request) -> Result<()> {
     )
 }
 
-/// Checks the dependencies of the workspaces that are tested here. Returns what was not checked, for
-/// the end.
+/// Checks the dependencies of the workspaces that are tested here. Returns what was not checked,
+/// for the end.
 fn dependencies() -> Result<Option<String>> {
     let _of_all = deny::check("Cargo.toml")?;
     deny::check("fuzz/Cargo.toml").map(Advisories::not_checked)

@@ -14,7 +14,7 @@ use crate::haptics::{Answer, Hip};
 use crate::path::{over, way_in};
 use crate::product::{buffers, empty, fill};
 
-/// Where the HIP begins to slide, cells before the next tile.
+/// Start of the slide, cells before the next tile.
 const BEFORE: f64 = 1.0;
 /// Cells that the surface moves in a tick from the fallback to a tile that has come: at 1 kHz, a
 /// cell a millimetre.
@@ -61,7 +61,7 @@ fn coarse(grid: &Grid, fallback: &Fallback) -> Tile {
     tile
 }
 
-/// What is felt from where the HIP begins to slide.
+/// Returns the answers from the start of the slide on.
 fn felt(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
     let grid = Grid::from_fn("two tiles", [2 * TILE_CELLS, TILE_CELLS], |x, y| {
         (1.5 * (0.2 * x as f64).sin() * (0.17 * y as f64).cos()) as f32

@@ -17,7 +17,8 @@ use crate::grid::Grid;
 use crate::haptics::Hip;
 use crate::path::Dice;
 
-/// Reason for which nothing can be measured on a terrain: it is too small, or the arm does not reach it.
+/// Reason for which nothing can be measured on a terrain: it is too small, or the arm does not
+/// reach it.
 #[derive(Clone, Debug)]
 pub struct NotMeasured(pub(crate) String);
 
@@ -57,7 +58,7 @@ pub(super) struct Place {
 pub(super) struct Way {
     pub(super) name: &'static str,
     pub(super) down: Vec<Place>,
-    /// What is looked at.
+    /// The compared places.
     pub(super) there: Vec<Place>,
 }
 

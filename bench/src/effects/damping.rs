@@ -17,7 +17,7 @@ use crate::grid::Grid;
 const HZ: f64 = 1000.0;
 /// Readings that FOAW looks at.
 const READINGS: usize = 16;
-/// What rounding may do, mN.
+/// Tolerance of rounding, mN.
 const ROUNDING: f64 = 0.01;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
@@ -36,7 +36,8 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
     Ok(errors)
 }
 
-/// How far each force is from the documented one, mN, with the nearest of some velocities.
+/// Returns the difference of each force from the documented one, mN, with the nearest of some
+/// velocities.
 fn off_mn(
     params: &SurfaceParams,
     felt: &[EffectTick],
@@ -67,7 +68,7 @@ fn damped_n(params: &SurfaceParams, spring_mm: Vector, velocity_mm_s: Vector) ->
     along.map(|x| x * force_n)
 }
 
-/// How much each force pulls at the tip, mN.
+/// Returns the pull of each force at the tip, mN.
 fn pulls_mn(felt: &[EffectTick]) -> Vec<f64> {
     let whole = felt.iter().filter(|felt| felt.whole);
     let pulls = whole.map(|felt| {

@@ -22,7 +22,7 @@ pub(super) struct EffectTick {
     pub whole: bool,
 }
 
-/// What makes a force another one than the scene asks for.
+/// Limits that change the scene's force.
 const LESS: Limits = Limits::FORCE_CLAMPED
     .union(Limits::SLEW_LIMITED)
     .union(Limits::SPEED_LIMITED)

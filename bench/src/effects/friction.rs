@@ -14,7 +14,7 @@ use crate::path::{self, Dice};
 /// Cells a tick, 10 mm/s at 1 kHz, and depth.
 const STEP: f64 = 0.01;
 const DEPTH: f64 = 0.3;
-/// What docs/explanation/effects.md states for that speed, percent of the coefficient.
+/// Error that docs/explanation/effects.md states for that speed, percent of the coefficient.
 const MAX_ABOVE: f64 = 3.1;
 const MAX_BELOW: f64 = 5.0;
 /// Places where the tip is held, and ticks at each.
@@ -22,8 +22,8 @@ const PLACES: usize = 40;
 const HELD: usize = 200;
 /// Ticks after which a proxy that has slid sticks: more than 20 ms.
 const SETTLING: usize = 30;
-/// How deep, and how far the HIP trembles along each axis: within the cone of a static coefficient
-/// of 0.5, whose radius is 0.05 there.
+/// Depth, and amplitude of the HIP's tremor along each axis: within the cone of a static
+/// coefficient of 0.5, whose radius is 0.05 there.
 const HELD_DEPTH: f64 = 0.1;
 const TREMBLE: f64 = 0.025;
 
@@ -64,8 +64,8 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     rows.into_iter().flatten().collect()
 }
 
-/// How far the tangential over the normal force is from a coefficient, percent of that, in each
-/// tick in which the proxy slid within a patch.
+/// Returns the difference of the tangential over the normal force from a coefficient, percent of
+/// that, in each tick in which the proxy slid within a patch.
 fn off_percent(grid: &Grid, mu: f64, felt: &[EffectTick]) -> Vec<f64> {
     let slid = felt.windows(2).filter(|pair| {
         let both = pair[0].whole && pair[1].whole;

@@ -13,7 +13,7 @@ use crate::path;
 /// Cells from one HIP to the next, and depth.
 const STEP: f64 = 0.01;
 const DEPTH: f64 = 0.02;
-/// What rounding may do to a direction, degrees: that of the soak's judge.
+/// Tolerance of a direction by rounding, degrees: that of the stress test's oracle.
 const ROUNDING: f64 = 0.06;
 /// A shaded force turns by so much at most where an unshaded one turns by 60°, degrees.
 const MAX_TURN: f64 = 6.0;
@@ -42,7 +42,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     rows.into_iter().flatten().collect()
 }
 
-/// How far each force is from where it should point, degrees.
+/// Returns the angle of each force to its expected direction, degrees.
 fn off(grid: &Grid, felt: &[EffectTick]) -> Vec<f64> {
     let off = felt.iter().filter(|felt| felt.whole).filter_map(|felt| {
         let own = normal(felt.slopes(grid)?);

@@ -22,7 +22,7 @@ const DEPTH: f64 = 0.3;
 const MAX_HIGH: f64 = 0.06;
 /// Percent of the steepest slope's force: that of the soak's judge.
 const MAX_ALONG: f64 = 1.0;
-/// What a tick of a millisecond leaves of a speed that was above.
+/// Part of an earlier, higher speed that a tick of a millisecond keeps.
 const KEEPS: f64 = 0.9;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
@@ -42,8 +42,8 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     errors
 }
 
-/// How far what is felt is from the formula, tick by tick: along the force without texture,
-/// percent of the amplitude, and across it, percent of what the steepest slope does.
+/// Returns the difference of the force from the formula, tick by tick: along the force without
+/// texture, percent of the amplitude, and across it, percent of what the steepest slope does.
 fn off_percent(params: &SurfaceParams, felt: &[EffectTick]) -> Vec<[f64; 2]> {
     let texture = &params.texture;
     let (amplitude, stiffness) = (
@@ -73,7 +73,7 @@ fn deepest(texture: &Texture) -> f64 {
     f64::from(texture.wavelength_mm).powi(2) / (48.0 * f64::from(texture.amplitude_mm))
 }
 
-/// What a texture adds to the spring's stretch at a proxy, mm.
+/// Returns the addition of a texture to the spring's stretch at a proxy, mm.
 fn wanted(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vector {
     let amplitude = f64::from(texture.amplitude_mm);
     let (height, [east, north]) = rise(texture, [proxy[0], proxy[1]]);

@@ -278,7 +278,7 @@ const fn is_controlled(damping: Damping) -> bool {
     matches!(damping.controller, Controller::On)
 }
 
-/// What a texture is called.
+/// Returns the name of a texture.
 const fn pattern(texture: Texture) -> &'static str {
     match texture.pattern {
         Pattern::None => "none",
@@ -287,7 +287,7 @@ const fn pattern(texture: Texture) -> &'static str {
     }
 }
 
-/// What a damping is called.
+/// Returns the name of a damping.
 pub(super) fn name(damping: Damping) -> String {
     let ns_per_m = damping.ns_per_m;
     match (ns_per_m > 0.0, is_controlled(damping)) {

@@ -19,7 +19,7 @@ const WIDTH_PX: i32 = 1600;
 const HEADER_PX: i32 = 110;
 const CHART_PX: i32 = 420;
 const MARGIN_PX: i32 = 30;
-/// What is drawn of given energy, mJ: what is smaller or larger lies on the edge.
+/// Range of energy in the drawing, mJ: what is smaller or larger lies on the edge.
 const GIVEN_MJ: std::ops::Range<f64> = 0.01..100.0;
 /// The speed of the taps that are drawn: the place in [`TAP_SPEEDS_M_S`].
 const DRAWN: usize = 1;

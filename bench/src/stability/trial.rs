@@ -183,7 +183,8 @@ impl Setting {
     }
 }
 
-/// How far and how often places of a second go to and fro along the axis where they do most.
+/// Returns the amplitude and frequency of the places of a second along the axis of the largest
+/// swing.
 fn swings(places_mm: &[[f64; 3]]) -> Press {
     let along = |axis: usize| {
         let coordinates = places_mm.iter().map(move |place| place[axis]);

@@ -16,7 +16,7 @@ const DEPTH: f64 = 10.0;
 /// Height of the HIP above the surface before the first contact, cells.
 const ABOVE: f64 = 30.0;
 
-/// What is felt where a tile is late.
+/// Substitute for a late tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Late {
     /// Nothing: there is a hole.
@@ -67,7 +67,7 @@ impl Hand {
         })
     }
 
-    /// What the encoders read with the HIP below a place on the surface.
+    /// Returns the inputs with the HIP below a place on the surface.
     ///
     /// # Errors
     /// When the arm does not reach it.

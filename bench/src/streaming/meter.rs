@@ -9,11 +9,11 @@ use super::NotMeasured;
 pub(super) struct Traffic {
     /// The number.
     pub(super) requests: u64,
-    /// What came.
+    /// Received bytes.
     pub(super) bytes: u64,
 }
 
-/// What is asked on standard output, and answered on standard input.
+/// Query on standard output, which is answered on standard input.
 pub(super) const QUESTION: &str = "seen?";
 
 /// Who counts what is read.
@@ -26,7 +26,7 @@ pub(super) enum Meter {
 }
 
 impl Meter {
-    /// What was read so far; `None` where nobody tells.
+    /// Returns the traffic of reads; `None` if it is unknown.
     ///
     /// # Errors
     /// When the process that started this one does not answer.

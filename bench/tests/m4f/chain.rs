@@ -23,8 +23,8 @@ const APPROACH: usize = 50;
 
 /// Tiles that settle come before this tick.
 const LATE: Option<usize> = Some(APPROACH);
-/// How far the fallback is above the tiles, by how much a tick moves the surface, and how
-/// long tiles settle, ticks.
+/// Height of the fallback above the tiles, by how much a tick moves the surface, and how long tiles
+/// settle, ticks.
 const UNDER_MM: f64 = 3.0;
 const STEP_MM: f64 = 0.05;
 const SETTLES: usize = 60;
@@ -314,8 +314,8 @@ impl<'g> Arm<'g> {
         }
     }
 
-    /// The materials of these surface parameters, in squares of five samples: sliding, one is nearly always on
-    /// its way in.
+    /// The materials of these surface parameters, in squares of five samples: sliding, one is
+    /// nearly always on its way in.
     fn classes(&self, all_params: &[SurfaceParams]) -> Materials {
         let table: Vec<Material> = all_params.iter().map(Material::of).collect();
         let size = [self.grid.columns as i32, self.grid.rows as i32];
@@ -323,8 +323,7 @@ impl<'g> Arm<'g> {
         Materials::from_fn(&table, size, |x, y| ((x / 5 + y / 5) % count) as u8)
     }
 
-    /// What the encoders read with the tip `above` mm over the surface, `off` mm
-    /// from home.
+    /// Returns the counts with the tip `above` mm over the surface, `off` mm from home.
     fn counts(&self, off: [f64; 2], above: f64) -> [i32; 3] {
         let home = self.placement.home_mm;
         let (x, y) = (home[0] + off[0], home[1] + off[1]);

@@ -14,8 +14,8 @@ use super::swing::{MAX_TURNS, Swing};
 /// From the beginning of a tick until its force acts, as a part of it
 /// ([`hapterra_firmware::amplifier::CURRENT_LOOP_US`]).
 const LATE: f32 = 0.11;
-/// What a contact may have given with the controller on, mJ: a hundredth of what a tap gives without
-/// (docs/explanation/effects.md).
+/// Energy that a contact may give with the controller on, mJ: a hundredth of what a tap gives
+/// without (docs/explanation/effects.md).
 const GIVEN_MJ: f32 = 0.05;
 /// What shaded ground may have given more, whose force is turned less and less until then
 /// (docs/explanation/effects.md): so much, and so large a part of the largest force times a cell and the depth,
@@ -59,7 +59,7 @@ pub struct ForceWatch {
     pub most_turns: usize,
 }
 
-/// What a contact did so far.
+/// Record of a contact.
 #[derive(Clone, Copy, Debug, Default)]
 struct Touched {
     /// The work of its force at the tip, mJ, less what a spring gets that becomes stiffer.
@@ -148,8 +148,8 @@ impl ForceWatch {
         }
     }
 
-    /// The energy that the spring which is let through holds at a depth, mJ: the guard clamps what the
-    /// clutch leaves, and the ramp takes its share of that.
+    /// The energy that the spring which is let through holds at a depth, mJ: the guard clamps what
+    /// the clutch leaves, and the ramp takes its share of that.
     fn holds_mj(&self, depth_mm: f32, shares: Shares) -> f32 {
         if shares.clutch == 0.0 {
             return 0.0;
@@ -164,9 +164,9 @@ impl ForceWatch {
         gives_mj.min(SHADED_MOST_MJ)
     }
 
-    /// With the controller on no contact has given more than it got, at any time, and the tip does not
-    /// swing; but for what shading and a texture may. `shares` are those of the tick before and of
-    /// this one.
+    /// With the controller on no contact has given more than it got, at any time, and the tip does
+    /// not swing; but for what shading and a texture may. `shares` are those of the tick before and
+    /// of this one.
     fn gives_nothing(
         &mut self,
         last: Option<&TickRecord>,

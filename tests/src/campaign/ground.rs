@@ -15,7 +15,7 @@ pub enum Ground {
     /// The spring alone.
     #[default]
     Ice,
-    /// What the segment's number draws: friction, shading, texture, damping, the controller,
+    /// Surface drawn by the segment's number: friction, shading, texture, damping, the controller,
     /// materials.
     Drawn,
 }
@@ -213,7 +213,8 @@ impl SceneSurfaces {
         self.hardest.is_controlled()
     }
 
-    /// The energy that the stiffest of them holds at a depth, mJ, where the guard lets `most_n` through.
+    /// The energy that the stiffest of them holds at a depth, mJ, where the guard lets `most_n`
+    /// through.
     #[must_use]
     pub fn stored_mj(&self, depth_mm: f32, most_n: f32) -> f32 {
         let stiffness = self.stiffest_n_per_mm();

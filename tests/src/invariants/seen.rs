@@ -81,7 +81,7 @@ impl Seen {
         self.is_touching() && before.is_touching() && self.felt.proxy == before.felt.proxy
     }
 
-    /// What part of the spring is felt; `None` where it is too short to tell.
+    /// Returns the rendered share of the spring; `None` if the spring is too short.
     pub(super) fn edge_fade(&self) -> Option<f64> {
         let whole = distance(self.proxy, self.hip);
         let felt = self.felt.displacement.as_dvec3().length();
@@ -98,8 +98,8 @@ impl Seen {
         ERROR.max(4.0 * f64::from(f32::EPSILON) * largest)
     }
 
-    /// What four units in the last place of the corners of the proxy's patches
-    /// are, in height above the HIP: they are coordinates, too.
+    /// Returns the four units in the last place of the corners of the proxy's patches, as height
+    /// above the HIP: they are coordinates, too.
     pub(super) fn rounding_of_corners(&self, terrain: &Terrain) -> f64 {
         let [x, y, _] = self.proxy;
         let corners = patches_at(terrain, x, y).flat_map(|patch| patch.corners());

@@ -273,7 +273,7 @@ impl<'t> Segment<'t> {
         }
     }
 
-    /// What the user sees is what is, a moment after the line works again.
+    /// Checks that the user sees the true state, a moment after the line works again.
     fn judge_view(&mut self) -> Result<(), String> {
         let is_on = self.board.drive.enabled;
         let sees = |host: &Host<'_>| {

@@ -99,7 +99,7 @@ fn a_recording_of_another_terrain_is_refused() {
     );
 }
 
-/// What the terrain and the path decide alone; the path comes first.
+/// Columns that only the terrain and the path determine; the path comes first.
 const FELT: [&str; 9] = [
     "t_s",
     "x_mm",
@@ -380,8 +380,8 @@ fn no_command_writes_over_its_own_input() {
     exists_as_before(&folder.path("arm.toml"), &record);
 }
 
-/// What lies beside a terrain and is read with it: header, reference system, world file,
-/// mask, overviews.
+/// Files beside a terrain that are read with it: header, reference system, world file, mask,
+/// overviews.
 #[test]
 fn no_command_writes_over_a_file_beside_its_input() {
     let folder = Folder::new();

@@ -69,7 +69,7 @@ pub struct MaterialJudge<'g> {
     kind: Kind,
     shading: Shading,
     shift: [i32; 3],
-    /// What may be in force; none where nobody knows.
+    /// Materials that may be in force; none if they are unknown.
     courses: Vec<ActiveMaterial>,
     before: Option<Replied>,
     point: usize,
@@ -108,7 +108,7 @@ impl<'g> MaterialJudge<'g> {
         Ok(())
     }
 
-    /// What holds of every force: its limit, and none without a contact.
+    /// Checks every force: its limit, and none without a contact.
     fn is_bounded(&self, replied: &Replied) -> Verdict {
         let (force, state) = (replied.sample.force_n.as_dvec3(), replied.sample.state);
         let most = f64::from(self.materials.params.max_force_n);
