@@ -128,9 +128,9 @@ pub struct TickRecord {
     pub work: u32,
     /// Cost of the tick before this one, clock ticks.
     pub cost: u32,
-    /// The costliest tick so far, in clock ticks.
+    /// Maximum cost of a tick, clock ticks.
     pub worst_cost: u32,
-    /// Ticks so far that began or ended too late.
+    /// Number of ticks that began or ended too late.
     pub late: u32,
 }
 

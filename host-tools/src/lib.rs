@@ -19,7 +19,7 @@
 //! - [`telemetry`]: what a device reports while it is touched, in numbers;
 //! - [`events`]: contacts, materials and marks as lines of JSON on a local socket;
 //! - [`picture`]: what was felt, as PNG files;
-//! - [`view_feed`]: the same, live, to a viewer that nobody waits for;
+//! - [`view_feed`]: the same, live, to a viewer that never delays the loop;
 //! - [`board`]: boards, probes, and images onto chips;
 //! - [`calibrate`]: from ruler and scale to a calibration record;
 //! - [`bringup`]: the first power-up of a board and its arm, step by step;

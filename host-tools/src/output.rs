@@ -3,7 +3,7 @@
 //!
 //! A file `OUT` grows as `OUT.XXXXXX.partial` beside its place, with a lock that the
 //! system lets go when the process ends, however it ends. A partial file without a
-//! lock is therefore one that nobody will complete.
+//! lock is therefore one that will never be completed.
 
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
@@ -92,7 +92,7 @@ impl Output {
         })
     }
 
-    /// The same of a recording: as nobody can make it again, its partial file stays where it
+    /// The same of a recording: as it cannot be made again, its partial file stays where it
     /// cannot be written to the end. It takes `most` bytes at most, because a device decides how
     /// fast it grows.
     #[must_use]
@@ -314,7 +314,7 @@ fn temporary(path: &Path) -> io::Result<(File, TempPath)> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let (file, place) = builder.tempfile_in(folder_of(path))?.into_parts();
-    // A file system without locks has files that look as if nobody wrote them: they are
+    // A file system without locks has files that look as if they were not in use: they are
     // named to the user, and nothing more.
     let _ = file.try_lock();
     Ok((file, place))

@@ -16,9 +16,9 @@ use hapterra_view::server::Server;
 
 /// More options, separated by spaces: `hapterra` starts this program.
 const OPTIONS: &str = "HAPTERRA_VIEW_OPTIONS";
-/// Time for which the page stays after the session's end, once nobody looks.
+/// Time for which the page stays after the session's end, once no page is open.
 const LINGER: Duration = Duration::from_secs(15);
-/// Between two looks at whether somebody looks.
+/// Between two checks for an open page.
 const LOOK: Duration = Duration::from_millis(100);
 
 fn main() -> ExitCode {
@@ -132,11 +132,11 @@ fn open(url: &str) {
         .stdout(null())
         .stderr(null())
         .spawn();
-    // Whoever has no browser has read where the page is.
+    // Users without a browser have read where the page is.
     drop(started);
 }
 
-/// Says a line, and goes on where nobody listens.
+/// Says a line, and goes on without a reader.
 fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -419,7 +419,7 @@ fn killed(who: Killed, says: &str) {
             "{told}"
         );
     }
-    // Nobody looks any more.
+    // No page is open any more.
     let until = Instant::now() + HANG;
     while memory_of(viewer) > 0 {
         assert!(Instant::now() < until, "the viewer does not end");

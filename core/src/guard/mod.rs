@@ -310,7 +310,7 @@ impl Guard {
         self.stop();
     }
 
-    /// Clears the fault as [`Self::clear`] does if it is the one that somebody has seen.
+    /// Clears the fault as [`Self::clear`] does if it is the one that the user has seen.
     pub fn clear_seen(&mut self, seen: Option<Fault>) {
         if self.fault.is_none() || self.fault == seen {
             self.clear();

@@ -161,7 +161,7 @@ pub enum ToHost {
 pub struct Telemetry {
     /// Number of the first sample.
     pub first: u32,
-    /// Samples of this session that the device itself dropped so far because the
+    /// Samples of this session that the device itself dropped because the
     /// link was slow.
     pub dropped: u32,
     /// The samples.

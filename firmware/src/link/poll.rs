@@ -72,7 +72,7 @@ impl<const D: usize> Link<'_, D> {
             self.device.take_health(health, self.ends.monitor.ticks());
             self.device.may_drive &= !(follows && health.report.mode == Mode::Disarmed);
             let is_refused = self.scene.is_some_and(|scene| Some(scene.epoch) != epoch);
-            // A scene that this link took and the loop did not is nobody's.
+            // A scene that the link accepted and the loop refused is dropped.
             if follows
                 && is_refused
                 && let Some(room) = self.room_for_command()

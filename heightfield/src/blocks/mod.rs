@@ -68,7 +68,7 @@ pub(super) struct Shared {
     images: Vec<BlockImage>,
     /// Is not held while a block is read.
     kept: Mutex<Kept>,
-    /// Is held by whoever reads a block for somebody who waits for it.
+    /// Held by a thread that reads a block for a waiting reader.
     turn: Mutex<()>,
     coarse: Mutex<Coarse>,
     disk: DiskCache,
@@ -233,7 +233,7 @@ impl Shared {
         (kept.cache.bytes(), kept.unread)
     }
 
-    /// Blocks that were read from the file so far.
+    /// Number of blocks that were read from the file.
     pub(super) fn blocks_read(&self) -> u64 {
         self.read.load(Ordering::Relaxed)
     }

@@ -164,7 +164,7 @@ fn with_cause(error: &StoreError) -> String {
     }
 }
 
-/// On one line, without keys, and not more of it than somebody reads.
+/// On one line, without keys, and not more of it than a user reads.
 fn in_short(text: &str) -> String {
     // The library's name for a server, of which the user has a URL.
     let named = text.strip_prefix("Generic ");

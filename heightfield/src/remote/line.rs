@@ -78,7 +78,7 @@ impl Line {
         self.disk.get().filter(|disk| disk.is_on())
     }
 
-    /// The terrain is open: from now on what goes wrong is told.
+    /// The terrain is open: from now on errors are reported.
     pub(super) fn touch(&self) {
         self.is_touched.store(true, Ordering::Relaxed);
     }

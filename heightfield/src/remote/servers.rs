@@ -73,7 +73,7 @@ fn made(url: &str) -> Result<Server> {
     use ClientConfigKey::{AllowHttp, ConnectTimeout, ReadTimeout, Timeout};
     static CHOSEN: Once = Once::new();
     CHOSEN.call_once(|| {
-        // Somebody else's choice is as good.
+        // Another thread's choice is as good.
         let _ = rustls::crypto::ring::default_provider().install_default();
     });
     let retry = RetryConfig {

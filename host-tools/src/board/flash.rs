@@ -18,7 +18,7 @@ pub struct Flashed {
     pub bytes: usize,
 }
 
-/// Progress of writing, bytes over all phases so far.
+/// Progress of writing, bytes over all phases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Bytes done.

@@ -6,7 +6,7 @@ use crate::calibrate::Direction;
 
 /// Who connects, turns, presses, measures and looks.
 pub trait Attendant {
-    /// Is told something.
+    /// Receives a message.
     fn hear(&mut self, line: &str);
 
     /// Is asked to do something that the board sees by itself.
@@ -39,7 +39,7 @@ pub trait Attendant {
     /// board itself is `board_ms`.
     fn time_s(&self, board_ms: f64) -> f64;
 
-    /// Is told that the arm may be armed from now on, or is known to be disarmed.
+    /// Receives a change: the arm may be armed from now on, or is known to be disarmed.
     fn may_be_armed(&mut self, _may: bool) {}
 }
 

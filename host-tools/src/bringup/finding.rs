@@ -129,7 +129,7 @@ pub enum Finding {
         /// The current, A.
         current_a: f32,
     },
-    /// It cannot be told from the hand's own motion which way a motor turns.
+    /// The hand's own motion hides the direction of a motor.
     #[error(
         "the direction of motor {motor} cannot be determined: the hand moved more than the motor"
     )]

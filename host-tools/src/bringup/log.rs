@@ -85,7 +85,7 @@ pub struct Log {
     /// The board and record that it is about.
     #[serde(flatten)]
     pub identity: Identity,
-    /// The steps so far, in order, each once.
+    /// The completed steps, in order, each once.
     #[serde(default, rename = "entry")]
     pub entries: Vec<Entry>,
 }

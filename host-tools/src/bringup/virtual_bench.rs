@@ -47,7 +47,7 @@ pub(super) enum Grip {
 pub struct BenchMistakes {
     /// A command at its amplifier's input is off by so many volts.
     pub output_off_v: [f64; 3],
-    /// The enable line has no pull-down: it is high when nobody drives it.
+    /// The enable line has no pull-down: it is high if it is not driven.
     pub enable_floats: bool,
     /// The stop is a normally open one: pressed it closes its contact, and so does no wire.
     pub stop_normally_open: bool,

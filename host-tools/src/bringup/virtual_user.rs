@@ -22,7 +22,7 @@ const FELT_N: f64 = 0.1;
 /// So often the virtual device lets its host look around, ms.
 const LOOK_MS: u32 = 25;
 
-/// Does as it is told at a virtual bench, and reads off the truth.
+/// Follows the instructions at a virtual bench, and reads off the truth.
 pub struct VirtualUser {
     bench: Rc<RefCell<VirtualBench>>,
     /// Position of the tip before its last move along the ruler, m.

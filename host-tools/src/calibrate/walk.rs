@@ -17,7 +17,7 @@ const POSES: usize = 4;
 
 /// Who moves the arm and reads ruler and scale.
 pub trait Attendant {
-    /// Is told something.
+    /// Receives a message.
     fn hear(&mut self, line: &str);
 
     /// Puts the arm into its zero pose and holds it there.

@@ -414,7 +414,7 @@ impl<'t> Tour<'_, 't> {
         marks.extend(control.marks(&log, true));
         let figures = log.figures();
         let ticks = log.ticks();
-        // However the tour ended, the board is told; what it felt after the tour's end
+        // However the tour ended, the board is notified; what it felt after the tour's end
         // is not shown.
         let left = session.say_goodbye(&mut |_| {});
         if let Some(events) = &events {

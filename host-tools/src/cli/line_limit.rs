@@ -1,4 +1,4 @@
-//! Lines that somebody else can cause, kept to so many a second.
+//! A rate limit for lines that another program can cause.
 
 use std::time::{Duration, Instant};
 

@@ -39,7 +39,7 @@ pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
         // A colour is a control sequence, and of those no line has any.
         .with_ansi(false)
         .without_time()
-        // Where standard error is closed there is nobody to tell.
+        // If standard error is closed there is no reader.
         .log_internal_errors(false)
         .init();
     log
@@ -102,7 +102,7 @@ impl<W: Write> Log<W> {
         let kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
         let left_out: u64 = kinds.values().map(LineLimit::left_out).sum();
         if left_out > 0 {
-            // There is nobody to tell that nobody can be told.
+            // There is no channel left to report this.
             let _ = writeln!((self.open)(), "{}", left_out_text(left_out));
         }
     }

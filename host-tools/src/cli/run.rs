@@ -11,7 +11,7 @@
 //! There is one [`Raster`](heightfield::Raster), with one reader and one bounded cache, and it
 //! is lent to all devices. Everything else is a device's own: its calibration, the view of the
 //! terrain in its reach, its session and thread, its arming, its recording. The terrain is laid for all
-//! devices before any is armed, because from then on nobody waits for what is elsewhere.
+//! devices before any is armed, because from then on no read waits.
 
 pub mod devices;
 mod placed;
@@ -144,9 +144,9 @@ fn silence(text: &str) -> Result<u16, String> {
 /// until each has ended.
 ///
 /// # Errors
-/// What is wrong with the file, or no device there at the beginning. A device
-/// that goes later is waited for. Of several devices one that fails is told at once, the others
-/// go on, and the error at the end names each that failed.
+/// A fault of the file, or a missing device at the beginning. A device that disappears later is
+/// waited for. Of several devices a failure is reported at once, the others go on, and the error
+/// at the end names each that failed.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let devices = devices::of(args)?;
     let outputs: Vec<_> = devices.iter().filter_map(|d| d.record.clone()).collect();
@@ -240,8 +240,8 @@ fn of_each<T, U>(
     each.into_iter().map(make).collect()
 }
 
-/// The places of several devices at the keyboard; none where there is one device, or nobody
-/// types.
+/// The places of several devices at the keyboard; none if there is one device, or no
+/// keyboard.
 fn share_keyboard(args: &Args, devices: &[OneDevice]) -> Vec<Arc<DeviceKeys>> {
     if devices.len() == 1 || args.commands.are_typed() || !io::stdin().is_terminal() {
         return vec![];

@@ -96,7 +96,7 @@ impl<'t> ToBeShown<'t> {
         }
     }
 
-    /// Starts it. A viewer that does not start is told, and ends nothing.
+    /// Starts it. A viewer that does not start is reported, and ends nothing.
     pub(in crate::cli) fn start(
         self,
         device: &DeviceHello,

@@ -25,9 +25,9 @@ const AT_THE_END: Duration = Duration::from_secs(1);
 #[derive(Debug, Default)]
 struct Shared {
     readers: AtomicUsize,
-    /// Readers that have come so far.
+    /// Number of readers that have connected.
     joined: AtomicU64,
-    /// Lines that no reader was told, because the queue was full.
+    /// Lines lost because the queue was full.
     dropped: AtomicU64,
 }
 
@@ -39,7 +39,7 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// Returns the number of readers that have come so far; none where nobody reads now.
+    /// Returns the number of readers that have connected; none if there is no reader now.
     pub(super) fn readers_so_far(&self) -> Option<u64> {
         let reads = self.shared.readers.load(Ordering::Acquire) > 0;
         reads.then(|| self.shared.joined.load(Ordering::Acquire))
@@ -112,7 +112,7 @@ impl Server {
     }
 }
 
-/// A reader, and what it has yet to be told.
+/// A reader, and its pending lines.
 struct Reader {
     stream: TcpStream,
     waiting: Vec<u8>,

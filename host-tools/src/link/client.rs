@@ -25,7 +25,7 @@ use super::timeouts::Timeouts;
 use crate::materials::{MaterialBuffer, Materials};
 use crate::terrain::{Terrain, TileBuffer};
 
-/// A message from the device, as it concerns whoever uses the session.
+/// A message from the device, for the user of the session.
 #[derive(Debug)]
 pub enum Event<'e> {
     /// The scene is in force. `resumed` tells whether the device held it
@@ -216,7 +216,7 @@ impl<'t> Client<'t> {
         &self.scene
     }
 
-    /// Counts of what went over the link so far.
+    /// Statistics of the link.
     #[must_use]
     pub const fn tally(&self) -> &LinkStats {
         &self.tally

@@ -204,7 +204,7 @@ impl Conversation {
         }
     }
 
-    /// A view that nobody answers, once.
+    /// An unanswered placement, once.
     pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<SceneChange> {
         let give_up = self.patience.give_up;
         let is_lost = |since: Duration| now.saturating_sub(since) >= give_up;
@@ -246,7 +246,7 @@ impl Conversation {
         self.asking.ask(ask);
     }
 
-    /// Nobody has listened for a while: silence counts from now.
+    /// The line was not read for a while: silence counts from now.
     pub(super) fn listen_from(&mut self, now: Duration) {
         self.heard = now;
         self.alive_said = now;

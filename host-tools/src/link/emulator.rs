@@ -1,6 +1,6 @@
 //! The emulated board: QEMU as a child of this program.
 //!
-//! The image may be anybody's. QEMU runs without semihosting, through which an image
+//! The image may be from any source. QEMU runs without semihosting, through which an image
 //! could read and write every file that its user can: what it has to say goes over
 //! three serial lines, and a reset is its end.
 
@@ -38,7 +38,7 @@ pub const INSTRUCTIONS_PER_COUNT: f64 = 5.0;
 /// Reason for which the board cannot be emulated.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
-    /// Nobody said where the image is.
+    /// The image was not stated.
     #[error("no image of the emulated board was named")]
     NoImage,
     /// The image cannot be read.

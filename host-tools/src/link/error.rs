@@ -22,7 +22,7 @@ pub enum LinkError {
     /// The transport broke while the device was in use.
     #[error("the device is gone")]
     Gone(#[source] io::Error),
-    /// The transport stands, but nobody answers.
+    /// The transport stands, but there is no answer.
     #[error("the device has not answered for {0:.1?}")]
     Silent(Duration),
     /// The device has another host.

@@ -41,7 +41,7 @@ pub struct LinkStats {
     /// Samples lost before the last one that was received, and in sessions that ended.
     gaps: u64,
     now: Numbering,
-    /// The session before, until the device has told how it ended.
+    /// The session before, until the device has reported its end.
     before: Option<Numbering>,
 }
 

@@ -55,7 +55,7 @@ impl Timeouts {
         silence_s: DEFAULT_SILENCE_S,
     };
 
-    /// So long an answer may take: somebody has to press a switch before a calibration is
+    /// Time-out of an answer: the user has to press a switch before a calibration is
     /// stored.
     pub(super) fn with(&self, ask: &Ask) -> Duration {
         const PRESS: Duration = Duration::from_millis(PRESS_MS as u64);

@@ -1,4 +1,4 @@
-//! A virtual Phantom in somebody's hand: all that a device has outside of
+//! A virtual Phantom in a hand: all that a device has outside of
 //! itself. A hand follows a script, and the terrain lies in front of both.
 
 use hapterra_core::guard::GuardInputs;

@@ -70,7 +70,7 @@ pub struct PlacementOptions {
     pub sizing: Sizing,
     /// Its height.
     pub heights: Heights,
-    /// Level of detail; chosen by what the encoders tell where nobody states it.
+    /// Level of detail; chosen by the encoders' resolution if it is not stated.
     pub level: Option<u8>,
 }
 

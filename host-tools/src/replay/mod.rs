@@ -83,7 +83,7 @@ pub struct Summary {
 /// there are several.
 const MORE: [Column; 2] = [Column::Text("state"), Column::Count("view")];
 
-/// Is told each sample and its row, and the number of its view with its terrain.
+/// Receives each sample and its row, and the number of its view with its terrain.
 pub type OnFelt<'f, 't> = dyn FnMut(&TickRecord, &Record, (u32, &Terrain<'t>)) + 'f;
 
 /// Runs a trajectory through a device and writes what was felt to an output, which

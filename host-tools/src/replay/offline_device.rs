@@ -132,7 +132,7 @@ impl<'t> OfflineDevice<'t> {
         })
     }
 
-    /// Returns the link's statistics so far.
+    /// Returns the link's statistics.
     #[must_use]
     pub const fn tally(&self) -> &LinkStats {
         self.session.tally()

@@ -42,7 +42,7 @@ pub struct Service<'s, 't> {
     pub tell: &'s dyn Fn(&str),
 }
 
-/// A session under way. Whoever drops it, also in a panic, says goodbye.
+/// A session under way. Dropping it, also in a panic, closes it.
 pub struct Served<'s, 't> {
     session: Session<'t>,
     connect: Connect<'s, 't>,

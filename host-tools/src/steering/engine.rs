@@ -43,7 +43,7 @@ enum Stage<'r> {
     Open,
     /// This view was said, of this terrain.
     Putting(Box<(Laid, Terrain<'r>)>),
-    /// The clutch was let go, and is still told to be open.
+    /// The clutch was released, and is still reported open.
     Closing,
 }
 

@@ -502,7 +502,7 @@ impl<'r> Terrain<'r> {
         Some(materials.tile(felt, key.index, buffer))
     }
 
-    /// Checks that every read so far that waited was complete ([`Raster::check_complete`]).
+    /// Checks that every earlier read that waited was complete ([`Raster::check_complete`]).
     ///
     /// # Errors
     /// The reason why a height or class could not be read.

@@ -85,7 +85,7 @@ impl HeldTiles {
         })
     }
 
-    /// The viewer has not been told: the change is there again.
+    /// The change was not sent to the viewer: it is pending again.
     pub(super) fn not_told(&mut self) {
         self.has_changed = true;
     }

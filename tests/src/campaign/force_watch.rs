@@ -17,9 +17,9 @@ const LATE: f32 = 0.11;
 /// Energy that a contact may give with the controller on, mJ: a hundredth of what a tap gives
 /// without (docs/explanation/effects.md).
 const GIVEN_MJ: f32 = 0.05;
-/// What shaded ground may have given more, whose force is turned less and less until then
-/// (docs/explanation/effects.md): so much, and so large a part of the largest force times a cell and the depth,
-/// and no more than the most; mJ.
+/// Additional energy that shaded ground may give, until its force is no longer turned
+/// (docs/explanation/effects.md), mJ: a constant, a part of the largest force times a cell and the depth,
+/// and the bound of both.
 const SHADED_MJ: f32 = 0.2;
 const SHADED_PART: f32 = 0.2;
 const SHADED_MOST_MJ: f32 = 2.0;

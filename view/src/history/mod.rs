@@ -87,7 +87,7 @@ pub struct Kept {
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // Whoever panicked held no half-made state: every change is one assignment or push.
+    // A panicked thread held no half-made state: every change is one assignment or push.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -246,7 +246,7 @@ fn encoded<'m>(messages: impl IntoIterator<Item = &'m LogMsg>) -> Result<Blob> {
     let (version, options) = encoding();
     let mut encoder =
         Encoder::new_eager(version, options, Vec::new()).context("encoding for the page")?;
-    // An index of the file's end, which nobody looks for in a piece of a stream.
+    // An index of the file's end, which no reader needs in a piece of a stream.
     encoder.do_not_emit_footer();
     for message in messages {
         encoder.append(message).context("encoding for the page")?;

@@ -123,7 +123,7 @@ impl<'t> Bed<'t> {
         self.spare.extend(spent);
     }
 
-    /// A tile comes while somebody is in that cell.
+    /// A tile arrives while the HIP is in that cell.
     fn comes(&mut self, col: i32, row: i32, felt: Cell) {
         let key = TileKey::new(0, col, row);
         let tile = self.spare.pop().expect("a buffer");

@@ -26,7 +26,7 @@ pub(super) struct Unpacked {
     /// Bytes that one takes.
     each: u64,
     kept: Mutex<Kept>,
-    /// Is held by whoever unpacks something.
+    /// Held during an unpacking.
     turn: Mutex<()>,
 }
 

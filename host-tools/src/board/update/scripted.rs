@@ -80,7 +80,7 @@ pub(super) struct Faults {
     pub(super) stuck_page: Option<u64>,
     /// It is protected against reading.
     pub(super) protected: bool,
-    /// It never has done what it was told.
+    /// It never carries out a command.
     pub(super) never_done: bool,
 }
 

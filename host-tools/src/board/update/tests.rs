@@ -46,7 +46,7 @@ fn image(rom: &Rom) -> Image {
         });
     Image {
         memories: memories(rom),
-        // In an order in which nobody writes.
+        // In an order that is never written.
         parts: parts.rev().collect(),
         placed: vec![],
     }

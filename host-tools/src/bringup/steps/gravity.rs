@@ -29,7 +29,7 @@ struct TipMotion {
     ticks_per_ms: u32,
     /// The latest samples: their ticks, and where the tip was, mm.
     latest: VecDeque<(u32, DVec3)>,
-    /// The fastest so far, mm/s.
+    /// Maximum speed, mm/s.
     fastest_mm_s: f64,
 }
 

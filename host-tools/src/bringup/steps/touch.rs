@@ -26,7 +26,7 @@ struct PlaneContact {
     most_n: f32,
     /// The latest force, N.
     now_n: f32,
-    /// The deepest so far when the tip was looked at last, mm.
+    /// Maximum depth at the last sample, mm.
     looked_mm: f32,
 }
 

@@ -243,7 +243,7 @@ fn converted(path: &Path, options: &str) -> String {
 
 /// The command that makes a VRT of files.
 fn built(path: &Path, files: &[String]) -> String {
-    /// More names make no command that somebody reads.
+    /// More names make an unreadable command.
     const SHOWN: usize = 20;
     let each: Vec<_> = files.iter().take(SHOWN).map(|file| quoted(file)).collect();
     let more = match files.len() {

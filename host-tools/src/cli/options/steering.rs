@@ -117,7 +117,7 @@ pub(in crate::cli) struct PlacementControl<'t> {
 
 /// Source of keys.
 enum Typing {
-    /// Nobody types, or what is typed are lines.
+    /// No keyboard, or input by lines.
     Nobody,
     /// The terminal, in raw mode until this is dropped.
     Terminal(RawMode),

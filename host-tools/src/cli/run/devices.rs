@@ -188,7 +188,7 @@ fn is_same_socket(first: &str, second: &str) -> bool {
     if port(first) != port(second) {
         return false;
     }
-    // A name that is not known is told when a line is made.
+    // An unknown name is reported when a line is made.
     let of = |text: &str| text.to_socket_addrs().map(Vec::from_iter);
     match (of(first), of(second)) {
         (Ok(first), Ok(second)) => first.iter().any(|address| second.contains(address)),
@@ -224,7 +224,7 @@ fn same_plant(plant: &str) -> Failure {
 
 /// Returns the file of the recording of a device, as `felt-2.csv` for `felt.csv`.
 fn of_device(path: &Path, number: usize) -> PathBuf {
-    // What stands for standard output, or is a folder, is told as that.
+    // What stands for standard output, or is a folder, is reported as that.
     let Some(stem) = path.file_stem().filter(|stem| *stem != "-") else {
         return path.to_owned();
     };

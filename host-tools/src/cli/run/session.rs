@@ -94,7 +94,7 @@ impl<'t> Serving<'_, 't> {
         may_be_armed(true);
         let met = self.met;
         let opened = service.open(|line| met.and_then(|()| fit_to_serve(args, device, line)));
-        // Where it could not be opened, what has to be told is told.
+        // After a failure to open, pending messages are shown.
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
         device_console.say(format!("terrain        {}: {how}", args.terrain.name()));
@@ -122,7 +122,7 @@ impl<'t> Serving<'_, 't> {
             (&placed.arm, args.rendering.level),
             self.commands,
         );
-        // Before anybody else asks the keyboard for anything.
+        // Before any other reader uses the keyboard.
         match &self.device_keys {
             Some(device_keys) => control.use_keys(device_keys),
             None if device_console.name().is_some() => {}
@@ -205,7 +205,7 @@ fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Re
     match (&device.plant, &device.address) {
         (_, DeviceAddress::Native) => Ok(()),
         // Whatever else is said: its zero pose would be taken for known, and its lines for
-        // an arm that hurts nobody.
+        // a harmless virtual arm.
         (Some(_), _) => drives_no_arm(line),
         (None, _) if args.unchecked => Ok(()),
         (None, _) => brought_up(line),

@@ -33,13 +33,13 @@ const LINE_EVERY: Duration = Duration::from_secs(2);
 pub(super) struct Watch<'t> {
     log: SampleLog<'t>,
     stop_s: f64,
-    /// When the last tick of a virtual arm was told of.
+    /// Time of the last reported tick of a virtual arm.
     ticked: Option<Instant>,
     /// The latest sample and its row.
     latest: Option<(TickRecord, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
-    /// Number of views that the recording has been told of.
+    /// Number of placements in the recording.
     described: usize,
     control: PlacementControl<'t>,
     prompts: ArmingPrompts,
@@ -92,12 +92,12 @@ impl<'t> Watch<'t> {
         }
     }
 
-    /// The same, and a viewer is told what is felt.
+    /// The same, with samples to a viewer.
     pub(super) fn shown(self, shown: Option<Shown<'t>>) -> Self {
         Self { shown, ..self }
     }
 
-    /// The same, and readers of events are told what happens.
+    /// The same, with events to their readers.
     pub(super) fn with_events(self, events: Option<Watcher>) -> Self {
         Self { events, ..self }
     }

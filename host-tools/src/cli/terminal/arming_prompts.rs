@@ -39,7 +39,7 @@ struct Line {
 
 /// Source of Enter.
 trait Enter {
-    /// Forgets what was pressed so far.
+    /// Forgets the keys pressed before.
     fn forget(&mut self);
 
     /// Returns true if Enter was pressed since the last look.
@@ -104,7 +104,7 @@ pub(in crate::cli) struct ArmingPrompts {
 }
 
 impl ArmingPrompts {
-    /// For a virtual hand: only what is wrong is told.
+    /// For a virtual hand: only errors are shown.
     pub(in crate::cli) fn for_a_script() -> Self {
         Self {
             leads: false,
@@ -274,7 +274,7 @@ impl ArmingPrompts {
 
     fn on_enter(&mut self, question: Question) {
         let fault = self.report.and_then(|report| report.fault);
-        // Nobody has read of a fault that came after the question.
+        // The user has not read of a fault after the question.
         if fault.is_some() && fault != question.fault {
             let blockers = self.report.unwrap_or_default().blockers;
             return self.ask_for_enter(blockers);

@@ -23,7 +23,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
         for byte in chunk.iter().take(n) {
             match keys.take(*byte) {
                 Some(Typed::Interrupt) => interrupt::press_key(),
-                // Whoever types ahead so far is not heeded.
+                // Earlier input is ignored.
                 Some(Typed::Pressed(key)) => drop(pressed.try_send(key)),
                 None => {}
             }

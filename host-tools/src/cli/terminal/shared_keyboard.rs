@@ -1,6 +1,6 @@
 //! One keyboard for several devices. A digit chooses a device, and keys go to the device that was
 //! chosen last. Enter goes to a device whose digit was pressed right before it, and else to none:
-//! nobody arms another user's arm by an Enter for one's own.
+//! an Enter for one arm never arms another user's arm.
 //!
 //! Where the terminal gives whole lines, a line that is the number of a device is that digit and
 //! Enter.

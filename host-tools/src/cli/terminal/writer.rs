@@ -73,7 +73,7 @@ fn speak(said: Said) {
         thread.spawn(move || write_all(said)).ok().map(|_| writer)
     });
     match writer {
-        // Where nobody takes it, nobody can be told that either.
+        // Without a reader this cannot be reported either.
         Some(writer) => drop(writer.try_send(said)),
         None => write(said, &mut None),
     }

@@ -27,10 +27,10 @@ pub(super) struct Rows {
     view_column: Option<usize>,
     view: Option<ColumnReaderImpl<Int64Type>>,
     views: Vec<i64>,
-    /// Rows that were read, and are not told yet from `next` on.
+    /// Rows that were read; those from `next` on are pending.
     read: Vec<Vec<f64>>,
     next: usize,
-    /// Rows told so far.
+    /// Number of rows handed out.
     told: u64,
 }
 
