@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
 use crate::image;
-use crate::run::{cargo, root, run, say, shown, target_dir, timed};
+use crate::run::{hapterra, root, say, shown, timed};
 use crate::setup::{gdal, qemu, toolchain};
 use crate::view;
 
@@ -47,19 +47,7 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
     {
         gdal::ready_or_say_why();
     }
-    timed("building the hapterra command", || {
-        let words = [
-            "build",
-            "--release",
-            "--package",
-            "hapterra",
-            "--bin",
-            "hapterra",
-        ];
-        run(cargo().args(words).args(request.features()))
-    })?;
-    let program = format!("hapterra{}", std::env::consts::EXE_SUFFIX);
-    let mut command = Command::new(target_dir().join("release").join(program));
+    let mut command = Command::new(hapterra(request.features())?);
     command.args(request.words(emulation.is_some()));
     if let Some(Emulation { image, qemu }) = &emulation {
         command.env("HAPTERRA_MPS2_ELF", image);

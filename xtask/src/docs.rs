@@ -4,28 +4,21 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::run::{cargo, on_path, root, run, say, timed};
+use crate::run::{OF_TESTS, cargo, on_path, root, run, say, timed};
 
 /// Programs that test the pages.
-const TESTS: [&str; 6] = [
-    "--test",
-    "reference",
-    "--test",
-    "docs",
-    "--test",
-    "command_lines",
-];
+const TESTS: [&str; 4] = ["--test", "reference", "--test", "docs"];
 
-/// Compares the generated pages with the code, or writes them; checks figures, links, tables and
-/// command lines of all pages; builds the book where mdBook is installed.
+/// Compares the generated pages with the code, or writes them; checks figures, links and tables of
+/// all pages; builds the book where mdBook is installed. Command lines are run by `cargo xtask test`.
 ///
 /// # Errors
 /// What differs.
 pub(crate) fn docs(write: bool) -> Result<()> {
     let mut tests = cargo();
-    // Of the whole workspace, with the features of `cargo xtask test`, so that nothing is built twice.
     tests
-        .args(["test", "--workspace", "--features", "hapterra/probe"])
+        .arg("test")
+        .args(OF_TESTS)
         .args(TESTS)
         .env("HAPTERRA_DOCS", if write { "write" } else { "check" });
     timed("checking the pages", || run(&mut tests))?;

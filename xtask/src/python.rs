@@ -7,7 +7,8 @@ use anyhow::{Context, Result};
 
 use crate::board::EMULATED;
 use crate::run::{
-    cargo, output, program, root, run, run_quietly, say, target_dir, timed, without_own_variables,
+    cargo, output, root, run, run_quietly, say, target_dir, tested_programs, timed,
+    without_own_variables,
 };
 use crate::{demo, deny};
 
@@ -56,10 +57,11 @@ pub(crate) fn test() -> Result<()> {
     // The version stays the same while one works on it.
     let again = ["--force-reinstall", "--no-deps", &wheel.to_string_lossy()];
     install(&python, &again)?;
+    let [_, lab] = tested_programs()?;
     let mut tests = Command::new(&python);
     tests
         .args(["-m", "pytest"])
-        .env("HAPTERRA_LAB", program("hapterra-lab", &[])?)
+        .env("HAPTERRA_LAB", lab)
         .current_dir(root().join("python"));
     match demo::emulation() {
         Ok(board) => {

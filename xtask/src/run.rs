@@ -52,14 +52,44 @@ pub(crate) fn without_own_variables(command: &mut Command) {
     }
 }
 
-/// Builds the program of the package of that name, and returns its path.
-pub(crate) fn program(name: &str, features: &[&str]) -> Result<PathBuf> {
+/// What cargo builds for all tests: with other packages or features it would build dependencies anew.
+/// The image tests need probe-rs anyway, and the command is tested with it, too.
+pub(crate) const OF_TESTS: [&str; 3] = ["--workspace", "--features", "hapterra/probe"];
+
+/// Builds `hapterra` for a user, and returns its path.
+pub(crate) fn hapterra(features: &[&str]) -> Result<PathBuf> {
     let mut build = cargo();
-    build.args(["build", "--package", name, "--bin", name]);
-    build.args(features);
-    timed(&format!("building {name}"), || run(&mut build))?;
+    build.args([
+        "build",
+        "--release",
+        "--package",
+        "hapterra",
+        "--bin",
+        "hapterra",
+    ]);
+    timed(
+        "building the hapterra command",
+        || run(build.args(features)),
+    )?;
+    Ok(built("release", "hapterra"))
+}
+
+/// Builds `hapterra` and `hapterra-lab` as the workspace's tests do, and returns their paths.
+pub(crate) fn tested_programs() -> Result<[PathBuf; 2]> {
+    let names = ["hapterra", "hapterra-lab"];
+    let mut build = cargo();
+    build.arg("build").args(OF_TESTS);
+    build.args(names.map(|name| ["--bin", name]).as_flattened());
+    // With a test among the targets cargo gives dependencies the features that tests need.
+    build.args(["--test", "page"]);
+    timed("building the tested programs", || run(&mut build))?;
+    Ok(names.map(|name| built("debug", name)))
+}
+
+/// Returns the path of a program that cargo has built.
+pub(crate) fn built(profile: &str, name: &str) -> PathBuf {
     let program = format!("{name}{}", std::env::consts::EXE_SUFFIX);
-    Ok(target_dir().join("debug").join(program))
+    target_dir().join(profile).join(program)
 }
 
 /// Runs `command` to its end; an unhappy end is an error naming the command.

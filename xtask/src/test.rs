@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::board::{BOARDS, Board};
 use crate::deny::Advisories;
-use crate::run::{cargo, say, shown, timed};
+use crate::run::{OF_TESTS, cargo, say, shown, timed};
 use crate::setup::{emulator, gdal, qemu, toolchain};
 use crate::{counts, deny, image, page, panics, python, size};
 
@@ -17,15 +17,13 @@ use crate::{counts, deny, image, page, panics, python, size};
 pub(crate) type Image = (&'static Board, PathBuf);
 
 /// `quick` has no images of the real boards, and builds neither what runs them nor servers.
-const QUICK: [&str; 4] = [
+const QUICK: [&str; 5] = [
+    "--workspace",
     "--exclude",
     "hapterra-image-tests",
     "--exclude",
     "hapterra-url-tests",
 ];
-/// Otherwise the image tests need probe-rs anyway, and the command is tested with
-/// it, too.
-const WITH_PROBES: [&str; 2] = ["--features", "hapterra/probe"];
 
 /// Request of a test run.
 #[derive(Debug, Default, PartialEq)]
@@ -70,12 +68,8 @@ pub(crate) fn test(request: &Request) -> Result<()> {
     }
     let mut command = cargo();
     command
-        .args(["test", "--workspace", "--no-fail-fast"])
-        .args(if request.quick {
-            &QUICK[..]
-        } else {
-            &WITH_PROBES
-        })
+        .args(["test", "--no-fail-fast"])
+        .args(if request.quick { &QUICK[..] } else { &OF_TESTS })
         .args(&request.only)
         .env("HAPTERRA_QEMU", qemu)
         .env(image::COUNTS_VARIABLE, &counts);

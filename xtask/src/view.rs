@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::board::EMULATED;
 use crate::demo::emulation;
 use crate::deny;
-use crate::run::{cargo, on_path, program, root, run, say, target_dir, timed};
+use crate::run::{built, cargo, on_path, root, run, say, tested_programs, timed};
 use crate::setup::packages::{self, found_or_installed};
 
 /// Names the browser that the page is tested with.
@@ -35,8 +35,7 @@ pub(crate) fn build() -> Result<PathBuf> {
         "building the viewer (some ten minutes the first time)",
         || run(&mut viewers(&["build", "--release", "--locked"])),
     )?;
-    let program = format!("hapterra-view{}", std::env::consts::EXE_SUFFIX);
-    Ok(target_dir().join("release").join(program))
+    Ok(built("release", "hapterra-view"))
 }
 
 /// Lints the viewer, holds its dependencies to `deny.toml`, and runs its tests with
@@ -48,8 +47,6 @@ pub(crate) fn test() -> Result<()> {
         deny::check("view/Cargo.toml")
     })?
     .say();
-    // Before the tests: they start it.
-    build()?;
     let mut tests = tests()?;
     match browser() {
         Ok(browser) => drop(tests.env(BROWSER, browser)),
@@ -68,7 +65,6 @@ pub(crate) fn test() -> Result<()> {
 
 /// Takes the documentation's pictures of the live view, of the demo's own terrain.
 pub(crate) fn pictures() -> Result<()> {
-    build()?;
     let mut tests = tests()?;
     tests
         .args(["--test", "pictures", "--", "--ignored"])
@@ -80,8 +76,8 @@ pub(crate) fn pictures() -> Result<()> {
 /// The viewer's tests, with `hapterra` and `hapterra-lab` beside them.
 fn tests() -> Result<Command> {
     let mut tests = viewers(&["test", "--release", "--locked"]);
-    tests.env("HAPTERRA", program("hapterra", &[])?);
-    tests.env("HAPTERRA_LAB", program("hapterra-lab", &[])?);
+    let [hapterra, lab] = tested_programs()?;
+    tests.env("HAPTERRA", hapterra).env("HAPTERRA_LAB", lab);
     Ok(tests)
 }
 

@@ -75,7 +75,7 @@ impl TourPlan<'_> {
             let limit = |i: usize| f64::min(HALF_MM[i], 0.5 * INSIDE * self.size_mm[i]);
             let half = [0, 1].map(|i| shrink * limit(i));
             let line = winding(self.best_place(half), half);
-            let (known, tour) = (self.known(&line), self.at(&line));
+            let (known, tour) = (known(&self.heights(&line)), self.at(&line));
             match tour.placement.check(&self.model, &tour.script) {
                 Ok(()) if best.as_ref().is_none_or(|best| known > best.0) => {
                     best = Some((known, tour));
@@ -94,10 +94,9 @@ impl TourPlan<'_> {
             }))
     }
 
-    /// Share of a line that lies on known ground.
-    fn known(&self, line: &[[f64; 2]]) -> f64 {
-        let known = line.iter().filter(|p| (self.surface)(p[0], p[1]).is_some());
-        known.count() as f64 / line.len() as f64
+    /// Heights along a line. Each may take a ball's whole surroundings: a line asks once.
+    fn heights(&self, line: &[[f64; 2]]) -> Vec<Option<f64>> {
+        line.iter().map(|p| (self.surface)(p[0], p[1])).collect()
     }
 
     fn at(&self, line: &[[f64; 2]]) -> Tour {
@@ -141,37 +140,41 @@ impl TourPlan<'_> {
     }
 
     /// Share of a line that the arm cannot get to from a settled home.
-    fn beyond(&self, line: &[[f64; 2]]) -> f64 {
+    fn beyond(&self, line: &[[f64; 2]], heights: &[Option<f64>]) -> f64 {
         let Some(home_mm) = self.home_mm else {
             return 0.0;
         };
         let place = ArmFrame { home_mm };
-        let beyond = |point: &&[f64; 2]| {
-            let [x, y] = **point;
-            let ground = (self.surface)(x, y);
-            ground.is_some_and(|z| place.joints_at(&self.model, [x, y, z]).is_err())
-        };
-        line.iter().filter(beyond).count() as f64 / line.len() as f64
+        let beyond = line.iter().zip(heights).filter(|(at, height)| {
+            height.is_some_and(|z| place.joints_at(&self.model, [at[0], at[1], z]).is_err())
+        });
+        beyond.count() as f64 / line.len() as f64
     }
 
     /// Returns the value of a place: known ground counts most, then relief up to what
     /// is enough, then being central.
     fn worth(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
         let line = winding(place, half);
+        let heights = self.heights(&line);
         let (mut low, mut high) = (f64::MAX, f64::MIN);
-        for height in line.iter().filter_map(|p| (self.surface)(p[0], p[1])) {
-            (low, high) = (low.min(height), high.max(height));
+        for height in heights.iter().flatten() {
+            (low, high) = (low.min(*height), high.max(*height));
         }
         let relief = (high - low).clamp(0.0, ENOUGH_RELIEF_MM) / ENOUGH_RELIEF_MM;
         let off = |axis: usize| (2.0 * place[axis] / self.size_mm[axis] - 1.0).abs();
         // It comes down at one end and taps at the other.
-        let ends = [line[0], line[line.len() - 1]];
-        let holes = ends.iter().filter(|p| (self.surface)(p[0], p[1]).is_none());
-        10.0 * self.known(&line) + relief
+        let ends = [heights.first(), heights.last()];
+        let holes = ends.iter().flatten().filter(|height| height.is_none());
+        10.0 * known(&heights) + relief
             - 0.2 * off(0).max(off(1))
             - 4.0 * holes.count() as f64
-            - 30.0 * self.beyond(&line)
+            - 30.0 * self.beyond(&line, &heights)
     }
+}
+
+/// Share of a line that lies on known ground.
+fn known(heights: &[Option<f64>]) -> f64 {
+    heights.iter().flatten().count() as f64 / heights.len() as f64
 }
 
 /// The middle of the box around a script.

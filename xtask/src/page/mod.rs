@@ -10,7 +10,10 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::run::{cargo, on_path, program, root, run, run_quietly, say, target_dir, timed};
+use crate::run::{
+    OF_TESTS, cargo, hapterra, on_path, root, run, run_quietly, say, target_dir, tested_programs,
+    timed,
+};
 use crate::setup::{packages, toolchain};
 use crate::view;
 use server::Server;
@@ -38,7 +41,7 @@ pub(crate) fn demo(
             true => &["--features", "remote"],
             false => &[],
         };
-        let mut cut = Command::new(program("hapterra", features)?);
+        let mut cut = Command::new(hapterra(features)?);
         cut.arg("cut").arg(file).arg("--out").arg(&folder);
         run(cut.args(extra))?;
     }
@@ -71,11 +74,14 @@ pub(crate) fn test() -> Result<()> {
     }
     let folder = target_dir().join("page-test");
     build(&folder)?;
+    let [hapterra, lab] = tested_programs()?;
     let mut tests = cargo();
     tests
-        .args(["test", "--package", "xtask", "--test", "page"])
-        .env("HAPTERRA", program("hapterra", &[])?)
-        .env("HAPTERRA_LAB", program("hapterra-lab", &[])?)
+        .arg("test")
+        .args(OF_TESTS)
+        .args(["--test", "page"])
+        .env("HAPTERRA", hapterra)
+        .env("HAPTERRA_LAB", lab)
         .env("HAPTERRA_PAGE", folder);
     match view::browser() {
         Ok(browser) => drop(tests.env(view::BROWSER, browser)),
