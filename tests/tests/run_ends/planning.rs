@@ -12,7 +12,7 @@ use hapterra_tests::timeouts::end_of;
 
 use super::terminal::shows;
 
-/// Waves with a hole in every second cell: each size of the plan is tried, with a large ball.
+/// Ground with so many holes that each size of the plan is tried.
 fn ground_of_holes() -> String {
     let mut text = String::from("ncols 200\nnrows 200\ncellsize 1\nnodata_value -9999\n");
     for row in 0..200_u32 {
@@ -34,7 +34,9 @@ fn ctrl_c_ends_the_planning_of_a_path() {
     let terrain = folder.path().join("holes.asc");
     std::fs::write(&terrain, ground_of_holes()).expect("written");
     let mut child = Command::new(hapterra_binary())
-        .args(["run", "--device", "native", "--tip", "8mm", "--level", "0"])
+        .args(["run", "--tip", "8mm", "--level", "0"])
+        // One path after the other is planned: much more than a signal's time.
+        .args(["--device", "native"].repeat(8))
         .args(["--scale", "1mm/cell", "--exaggeration", "0.05mm/unit"])
         .arg(&terrain)
         .current_dir(folder.path())
