@@ -53,10 +53,7 @@ fn ctrl_c_ends_the_planning_of_a_path() {
     let mut rest = String::new();
     stderr.read_to_string(&mut rest).expect("text");
     assert_eq!(output.status.code(), Some(1), "{rest}");
-    assert!(
-        rest.contains("error: interrupted\nhint: start again"),
-        "{rest}"
-    );
+    assert!(rest.contains("interrupted\nhint: start again"), "{rest}");
     // Otherwise a line follows every three seconds until the plan is complete.
     assert!(rest.matches("planning").count() <= 1, "{rest}");
 }
