@@ -93,7 +93,7 @@ pub trait Haptics {
         watch.elapsed()
     }
 
-    /// What is felt along a path, from nothing.
+    /// Returns the answers along a path, from nothing.
     fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
         self.forget();
         path.iter().map(|hip| self.tick(hip)).collect()

@@ -25,7 +25,7 @@ struct Case {
     grid: Grid,
     corners: [f32; 4],
     hip: [f64; 3],
-    /// Where the last tick's answer was, for a HIP 0.01 cell away.
+    /// Answer of the last tick, for a HIP 0.01 cell away.
     last: (f32, f32),
 }
 
@@ -70,7 +70,7 @@ impl Case {
         newton(self.corners.map(f64::from), self.hip, iterations)
     }
 
-    /// How far a place is from the local closest point below it.
+    /// Returns the distance of a place from the local closest point below it.
     fn judge(&self, (u, v): (f64, f64)) -> Option<Verdict> {
         // The upper borders belong to this patch: there is no other.
         let inside = |x: f64| x.clamp(0.0, 1.0 - f64::EPSILON);

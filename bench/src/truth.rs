@@ -39,9 +39,9 @@ pub fn judge(grid: &Grid, hip: &Hip, answer: &Answer) -> Option<Verdict> {
         .min_by(|a, b| a.error.total_cmp(&b.error))
 }
 
-/// Where to begin for a proxy at `x`: there, and on both sides of a border of
-/// patches that single precision cannot tell it from. On a sharp ridge the two
-/// sides lead to different valleys, and rounding is not to choose.
+/// Returns the starts for a proxy at `x`: there, and on both sides of a border of patches that
+/// single precision cannot tell it from. On a sharp ridge the two sides lead to different valleys,
+/// and rounding is not to choose.
 fn sides(x: f64) -> [f64; 3] {
     const ROUNDING: f64 = 1e-6;
     let border = x.round();

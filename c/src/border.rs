@@ -20,7 +20,7 @@ fn check<T>(pointer: *const T, count: usize) -> Result<(), HapterraStatus> {
 /// A caller's array.
 ///
 /// # Safety
-/// At `pointer` are `count` values that nobody changes during the call.
+/// At `pointer` are `count` values that no other thread changes during the call.
 pub(crate) unsafe fn array<'a, T>(
     pointer: *const T,
     count: usize,
@@ -34,7 +34,7 @@ pub(crate) unsafe fn array<'a, T>(
 /// A caller's room for an array, whatever it holds.
 ///
 /// # Safety
-/// At `pointer` is room for `count` values that nobody else uses during the call.
+/// At `pointer` is room for `count` values that no other thread uses during the call.
 pub(crate) unsafe fn room<'a, T>(
     pointer: *mut T,
     count: usize,

@@ -73,7 +73,7 @@ pub struct Hardware<E, A, C> {
     pub full_scale_a: f32,
     /// From the beginning of a tick until the motors have its current, at most, µs: what the
     /// tick takes, the outputs, the amplifiers' reading of them, and the lag of their current
-    /// loops. The passivity controller counts on it, and the host is told.
+    /// loops. The passivity controller counts on it, and the host receives it.
     pub latency_us: u16,
     /// The Phantom's calibration record, as the board's memory has it.
     pub calibration: Stored,
@@ -97,7 +97,7 @@ pub struct Application<'t, E, A: Amplifiers, C, const D: usize> {
 }
 
 /// The arm of the stored calibration, if this firmware and this board can work with it,
-/// and what the host is told of it.
+/// and what is reported to the host.
 fn usable(stored: &Stored, full_scale_a: f32) -> (Option<Kinematics>, CalibrationSource) {
     let bad = match stored {
         Stored::Found(calibration) => {

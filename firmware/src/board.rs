@@ -26,7 +26,7 @@ pub trait Amplifiers: Sized {
 
     /// A tick with the power stages off: puts these shares of full scale, each cut to
     /// -1..=1, onto the outputs and keeps the outputs ready. The enable line stays low.
-    /// Zero unless somebody measures the outputs
+    /// Zero unless the user measures the outputs
     /// ([`Guard::hold`](hapterra_core::guard::Guard::hold)).
     fn rest(&mut self, held: [f32; 3]);
 }

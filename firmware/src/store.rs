@@ -47,7 +47,7 @@ pub enum Stored {
     Found(Calibration),
     /// A whole record that this firmware does not work with, because a number of it makes
     /// no sense or is above what the model or the board may have. No older record is taken
-    /// instead: somebody wanted this one.
+    /// instead: the user has stored this one.
     Refused(CalibrationError),
     /// Something, but no record that could be read.
     Damaged,
@@ -67,7 +67,7 @@ pub enum StoreError {
     Write,
 }
 
-/// What a place holds.
+/// Content of a place.
 enum Place {
     Blank,
     /// A record and its number; why it cannot be worked with, if so.

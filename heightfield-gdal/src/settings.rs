@@ -48,7 +48,7 @@ pub(crate) fn is_fetching_allowed() -> bool {
 impl Settings {
     /// Sets them, before drivers are registered.
     pub(crate) fn apply(self, functions: &Functions) -> Result<(), Error> {
-        // No address ends so: nobody knows the number.
+        // No address ends so: the number is random.
         let number = RandomState::new().build_hasher().finish();
         let nothing = format!(".nothing-is-fetched-{number:016x}");
         let cache = format!("{}MB", (self.cache_bytes >> 20).max(1));

@@ -1,4 +1,4 @@
-//! What is in archives, as files of GDAL's own file systems.
+//! Contents of archives, as files of GDAL's own file systems.
 
 use std::path::Path;
 

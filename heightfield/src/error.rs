@@ -85,7 +85,7 @@ pub enum RasterError {
     /// A colour image whose bands could each be the height; none was chosen.
     #[error("not a height field: {what}")]
     ColourBands {
-        /// What it is.
+        /// Its name.
         what: String,
         /// Number of bands.
         bands: u16,
@@ -198,10 +198,10 @@ pub enum RasterError {
     /// The file contradicts itself or its format.
     #[error("damaged file: {0}")]
     Damaged(String),
-    /// A decoder of somebody else's does not understand it.
+    /// A third-party decoder does not understand it.
     #[error("not understood: {0}; the file is damaged, or of a kind that is not known here")]
     Unfamiliar(String),
-    /// A decoder of somebody else's panicked.
+    /// A third-party decoder panicked.
     #[error(
         "the {0} decoder failed on this file, which is damaged, or of a kind that is not known here"
     )]

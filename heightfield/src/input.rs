@@ -159,7 +159,7 @@ impl FileBytes {
         })
     }
 
-    /// The same bytes for somebody who keeps them; `None` where they are in memory.
+    /// The same bytes for a caller that keeps them; `None` where they are in memory.
     pub(super) fn again(&self) -> Result<Option<Self>, RasterError> {
         let data = match &self.data {
             Data::File(file, path) => {

@@ -263,7 +263,7 @@ impl Raster {
         blocks.prefetch_full(level, columns, rows);
     }
 
-    /// Blocks that were read from the file so far; none where all samples are in memory.
+    /// Number of blocks that were read from the file; none where all samples are in memory.
     pub fn blocks_read(&self) -> u64 {
         match &self.source.storage {
             Storage::Held { .. } => 0,
@@ -288,7 +288,7 @@ impl Raster {
         }
     }
 
-    /// Checks that every read so far that waited was complete: a plan over pending heights is wrong.
+    /// Checks that every earlier read that waited was complete: a plan over pending heights is wrong.
     ///
     /// # Errors
     /// The reason why a height could not be read.

@@ -54,7 +54,7 @@ impl ReadTracker {
         read
     }
 
-    /// Returns the status of all reads so far.
+    /// Returns the status of all earlier reads.
     pub const fn status(&self) -> ReadStatus {
         self.0.get()
     }

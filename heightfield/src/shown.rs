@@ -1,6 +1,6 @@
 //! Texts of files, servers, devices and users, as a terminal, a log or a page may show them.
 //!
-//! Whoever made a file chose the names in it. A terminal obeys control sequences, and characters
+//! The author of a file chose the names in it. A terminal obeys control sequences, and characters
 //! that turn the direction of writing hide what a line says, so a name could clear the screen or
 //! write over what was said before. All output goes through here: what is written to the terminal
 //! (`say`, `cli::terminal::voice`, `cli::report`, errors), to the log (`cli::log`), to readers of

@@ -6,7 +6,8 @@
 //! - [`heightfield`], a crate of its own: terrain files become one [`heightfield::Raster`];
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
-//! - [`materials`]: classes of ground over a terrain, and what they feel like;
+//! - [`surface`]: surfaces with a name, and their tables;
+//! - [`materials`]: classes of ground over a terrain, each with its surface;
 //! - [`link`]: the terrain served to a device, tile by tile;
 //! - [`serving`]: that session from its first line to an end that is known;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
@@ -16,8 +17,9 @@
 //! - [`place`]: where a terrain lies in front of the arm, and how large;
 //! - [`steering`]: another view of the terrain while it is touched;
 //! - [`telemetry`]: what a device reports while it is touched, in numbers;
+//! - [`events`]: contacts, materials and marks as lines of JSON on a local socket;
 //! - [`picture`]: what was felt, as PNG files;
-//! - [`view_feed`]: the same, live, to a viewer that nobody waits for;
+//! - [`view_feed`]: the same, live, to a viewer that never delays the loop;
 //! - [`board`]: boards, probes, and images onto chips;
 //! - [`calibrate`]: from ruler and scale to a calibration record;
 //! - [`bringup`]: the first power-up of a board and its arm, step by step;

@@ -3,7 +3,7 @@
 //!
 //! A file `OUT` grows as `OUT.XXXXXX.partial` beside its place, with a lock that the
 //! system lets go when the process ends, however it ends. A partial file without a
-//! lock is therefore one that nobody will complete.
+//! lock is therefore one that will never be completed.
 
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
@@ -30,10 +30,10 @@ pub struct OutputError {
 pub struct Output {
     path: PathBuf,
     writer: BufWriter<File>,
-    /// Where it is written, beside the file that it will replace; none for a
+    /// Temporary file beside the one that it will replace; none for a
     /// pipe, a device and standard output, where there is nothing to replace.
     beside: Option<TempPath>,
-    /// What is written stays where it cannot be written on.
+    /// True if the written part stays after a write error.
     is_recording: bool,
     /// Bytes that it may still have.
     room: u64,
@@ -92,7 +92,7 @@ impl Output {
         })
     }
 
-    /// The same of a recording: as nobody can make it again, its partial file stays where it
+    /// The same of a recording: as it cannot be made again, its partial file stays where it
     /// cannot be written to the end. It takes `most` bytes at most, because a device decides how
     /// fast it grows.
     #[must_use]
@@ -258,8 +258,8 @@ pub struct PartialFile {
     pub bytes: u64,
 }
 
-/// Returns the partial files that killed processes left beside `path`, by name. Nothing here touches
-/// it.
+/// Returns the partial files that killed processes left beside `path`, by name. Nothing here
+/// touches it.
 #[must_use]
 pub fn partial_files(path: &Path) -> Vec<PartialFile> {
     let beginning = beginning_of_partial(path);
@@ -285,7 +285,7 @@ const SUFFIX: &str = ".partial";
 /// names at 255.
 const OWN_NAME: usize = 200;
 
-/// What the name of a partial file of `path` begins with.
+/// Returns the beginning of the name of a partial file of `path`.
 fn beginning_of_partial(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let cut = name.floor_char_boundary(OWN_NAME);
@@ -314,7 +314,7 @@ fn temporary(path: &Path) -> io::Result<(File, TempPath)> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let (file, place) = builder.tempfile_in(folder_of(path))?.into_parts();
-    // A file system without locks has files that look as if nobody wrote them: they are
+    // A file system without locks has files that look as if they were not in use: they are
     // named to the user, and nothing more.
     let _ = file.try_lock();
     Ok((file, place))

@@ -1,5 +1,5 @@
 //! `print!`, `println!`, `eprint!` and `eprintln!` of this crate, under the names of the
-//! standard library's. Those panic where nobody reads any more: `hapterra list | head
+//! standard library's. Those panic if the reader is gone: `hapterra list | head
 //! -1` would end in a crash, and `hapterra run FILE | head -1` without letting go of the
 //! arm. These go on in silence.
 //!
@@ -15,7 +15,7 @@
 macro_rules! print {
     ($($what:tt)*) => {{
         use std::io::Write as _;
-        // Whoever closed it does not want to know.
+        // The reader has closed it.
         let _ = std::io::stdout().lock().write_all(heightfield::shown::shown_lines(&format!($($what)*)).as_bytes());
     }};
 }

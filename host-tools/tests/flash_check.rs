@@ -45,7 +45,7 @@ fn an_image_fits_its_board_and_no_other() {
     }
 }
 
-/// What a stranger has left around the working folder is not built, which would run it.
+/// A foreign checkout around the working folder is not built, because a build runs its code.
 #[cfg(unix)]
 #[test]
 fn own_checkout_is_built_wherever_it_is_run() {

@@ -22,7 +22,7 @@ pub(crate) const UNINTERRUPTED: usize = 4096;
 #[pyclass(frozen, module = "hapterra._native")]
 pub(crate) struct Contact {
     contact: Mutex<Touched>,
-    /// What its terrain is read from, where that is a file.
+    /// File of its terrain, if there is one.
     opened: Option<Arc<Opened>>,
     pub(crate) rate_hz: u32,
 }

@@ -21,7 +21,7 @@ use self_cell::self_cell;
 
 use crate::{notes, refused};
 
-/// What is said of a terrain in words, by the command's own definitions.
+/// Descriptions of a terrain, by the command's own definitions.
 #[derive(Parser)]
 #[command(name = "open", no_binary_name = true, disable_help_flag = true)]
 struct Words {
@@ -192,7 +192,7 @@ impl Opened {
         })
     }
 
-    /// What the file states about itself, in words.
+    /// Returns the statements of the file about itself.
     pub(crate) fn stated(&self) -> Vec<(&'static str, String)> {
         let raster = self.terrain().raster();
         let crs = raster.reference_system().map(|system| match system.code() {
@@ -217,7 +217,7 @@ impl Opened {
             .collect()
     }
 
-    /// What is worked out with heights, if all of them were read.
+    /// Returns the result of `of` if all heights were read.
     pub(crate) fn check<T>(&self, of: impl FnOnce() -> T) -> PyResult<T> {
         let before = self.lock().0;
         let value = of();
@@ -238,7 +238,7 @@ impl Opened {
     }
 }
 
-/// What is read of an opened terrain.
+/// Part of an opened terrain that is read.
 struct Part(Arc<Opened>);
 
 impl Heights for Part {
@@ -289,7 +289,7 @@ fn parsed(words: Vec<OsString>) -> PyResult<Words> {
     })
 }
 
-/// What the command says, as the text of an exception.
+/// Returns the failure of the command, as the text of an exception.
 fn text(failure: &Failure) -> String {
     let text = failure.text();
     text.strip_prefix("error: ").unwrap_or(&text).to_owned()

@@ -133,7 +133,7 @@ impl Terrain {
         Ok(self.opened()?.ground_at(mm, coordinates(lonlat))?.into())
     }
 
-    /// What the file states, as pairs of a name and a text.
+    /// Returns the statements of the file, as pairs of a name and a text.
     fn stated(&self) -> PyResult<Vec<(&'static str, String)>> {
         Ok(self.opened()?.stated())
     }

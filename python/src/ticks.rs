@@ -52,7 +52,7 @@ impl Ticks {
     }
 }
 
-/// What is odd about times, a sentence each.
+/// Returns the remarks on times, a sentence each.
 fn remarks(counts: &Counts) -> Vec<String> {
     let (odd, between, rows) = (counts.odd_moves, counts.passed_over, counts.rows);
     let repeated = counts.repeated;

@@ -63,19 +63,9 @@ pub fn shared(path: &str) -> Option<PathBuf> {
     None
 }
 
-/// What cargo sets for a test program. With it, build scripts that read it would run again, and the
-/// binary would be built again for the tests of each package.
-const OF_THIS_TEST: [&str; 9] = [
-    "CARGO_MANIFEST_DIR",
-    "CARGO_MANIFEST_LINKS",
-    "CARGO_MANIFEST_PATH",
-    "CARGO_PKG_NAME",
-    "CARGO_PKG_VERSION",
-    "CARGO_PKG_VERSION_MAJOR",
-    "CARGO_PKG_VERSION_MINOR",
-    "CARGO_PKG_VERSION_PATCH",
-    "CARGO_PKG_VERSION_PRE",
-];
+/// Variables that cargo sets for a test program, one a line. With them, build scripts that read them
+/// would run again, and the binary would be built again for the tests of each package.
+const OF_CARGO: &str = include_str!("cargo_variables.txt");
 
 /// Path of the real `hapterra` binary, built first when need be.
 ///
@@ -88,8 +78,8 @@ pub fn hapterra_binary() -> &'static Path {
         // where it was most likely built already.
         let this = std::env::current_exe().expect("this program has a path");
         let target = this.ancestors().nth(3).expect("it is in a target folder");
-        let build = OF_THIS_TEST
-            .iter()
+        let build = OF_CARGO
+            .lines()
             .fold(escargot::CargoBuild::new(), |build, variable| {
                 build.env_remove(variable)
             });

@@ -1,5 +1,5 @@
-//! Who reads a terrain file: this program, and GDAL where there is a libgdal. The same tests hold for
-//! both.
+//! Who reads a terrain file: this program, and GDAL where there is a libgdal. The same tests hold
+//! for both.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use heightfield::{Error, OpenOptions, Raster, gdal};
 /// A reader of terrain files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reader {
-    /// What `hapterra` reads by itself.
+    /// A format that `hapterra` reads by itself.
     Own,
     /// GDAL, asked for a file that `hapterra` reads by itself.
     Gdal,
@@ -37,7 +37,8 @@ impl Reader {
         }
     }
 
-    /// Returns true if it reads a file: GDAL knows no NumPy, and `hapterra` leaves to GDAL what is rare.
+    /// Returns true if it reads a file: GDAL knows no NumPy, and `hapterra` leaves to GDAL what is
+    /// rare.
     #[must_use]
     pub fn knows(self, file: &str) -> bool {
         let foreign: &[&str] = match self {

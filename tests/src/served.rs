@@ -29,7 +29,7 @@ pub struct Served {
     seen: Arc<Seen>,
 }
 
-/// What a test may wait for.
+/// Events for which a test may wait.
 #[derive(Default)]
 struct Seen {
     /// Ticks of the device.

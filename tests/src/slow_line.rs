@@ -79,7 +79,7 @@ pub trait Stepped {
 pub struct InMemory {
     device: Device<StoppedClock, WINDOW>,
     arm: HeldPhantom,
-    /// What the device takes after a tick only.
+    /// Bytes that the device takes after a tick only.
     unread: Vec<u8>,
 }
 
@@ -161,7 +161,7 @@ impl OnBoard {
         }
     }
 
-    /// What comes next over the link.
+    /// Returns the next bytes of the link.
     fn read(&mut self) -> Vec<u8> {
         let mut chunk = [0; 4096];
         let n = self

@@ -18,12 +18,12 @@ use hapterra_firmware::native::StoppedClock;
 use hapterra_tests::timeouts::HANG;
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
-/// What the guard may be late or wrong by: two counts in a millisecond, and what a
-/// motor's torque adds until its current is gone.
+/// Tolerance of the guard's delay and error: two counts in a millisecond, and what a motor's torque
+/// adds until its current is gone.
 const LATE_RAD_S: f64 = 0.3;
 
 thread_local! {
-    /// What was said, a line each.
+    /// Messages, a line each.
     static SAID: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
@@ -69,7 +69,7 @@ fn walked_once(
     walk(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
 }
 
-/// What the command says to a user without mistakes, as the documentation has it.
+/// Returns the transcript for a user without mistakes, as the documentation has it.
 fn transcript() -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bring-up-transcript.txt");
     std::fs::read_to_string(file).expect("a transcript")
@@ -148,9 +148,9 @@ fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
 /// A user who does and answers some things in another way.
 struct Another {
     user: VirtualUser,
-    /// What is done where a task is asked for.
+    /// Response to a task.
     does: fn(Task) -> Task,
-    /// What is answered whatever is there.
+    /// Fixed answer to a question.
     answers: fn(Question) -> Option<bool>,
 }
 

@@ -244,7 +244,7 @@ fn sample(tick: u32, force_n: Vec3) -> TickRecord {
     }
 }
 
-/// What is said of the last of these samples; the others pass.
+/// Returns the verdict on the last of these samples; the others pass.
 fn told(samples: &[TickRecord]) -> Result<(), String> {
     let mut watch = Watch::new(Calibration::PREMIUM_1_5, PhantomModel::premium_1_5());
     let (last, before) = samples.split_last().expect("one");

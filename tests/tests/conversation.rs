@@ -6,7 +6,7 @@ use hapterra_tests::conversation::{
     Direction, End, Harm, Interruption, Plan, Report, check, frames,
 };
 
-/// What may happen to a frame.
+/// Damage to a frame.
 const HARMS: [Harm; 5] = [
     Harm::Lose,
     Harm::Repeat(3),
@@ -180,7 +180,7 @@ fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
     }
 }
 
-/// What happened before a moment, with everything that may come again after it.
+/// Returns the histories before a moment, with everything that may be repeated after it.
 fn histories() -> Vec<Vec<(u64, Interruption)>> {
     let ticks = agree(&Plan::default()).ticks;
     // While it opens, while it feels, and when everything but the end of the end was said.

@@ -458,7 +458,7 @@ fn points_become_a_grid_by_the_hint() {
     }
 }
 
-/// What GDAL does not read is not sent to GDAL.
+/// Files that GDAL does not read get no hint to GDAL.
 #[test]
 fn no_hint_names_a_converter_that_cannot_read_the_file() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -23,7 +23,7 @@ fn send(uart: u32, bytes: &[u8]) -> Vec<(u32, u32)> {
     on.into_iter().chain(data).collect()
 }
 
-/// Where the code begins, behind the vectors.
+/// Start of the code, behind the vectors.
 const CODE: usize = 0x40;
 /// Bytes of the code of one store: three instructions, a branch over its literals, and
 /// two literals.

@@ -13,20 +13,20 @@ use hapterra_tests::invariants::surface::distance;
 use hapterra_tests::real_ground::{self, terrain};
 use heightfield::Raster;
 
-fn law(friction: Friction) -> SurfaceParams {
+fn params(friction: Friction) -> SurfaceParams {
     SurfaceParams {
         friction,
         ..SurfaceParams::PREMIUM
     }
 }
 
-/// How far a proxy trails, mm, that does not come after the hand any more.
+/// Distance at which a proxy no longer follows the hand, mm.
 const CAUGHT_MM: f64 = 20.0;
 
-/// What a HIP feels that slides around the middle of a terrain on an ellipse, `depth` mm
+/// Returns the forces on a HIP that slides around the middle of a terrain on an ellipse, `depth` mm
 /// deep, so many millimetres a tick. A hand that the edge of a hole has caught lifts for a tick.
-fn slide(terrain: &Terrain<'_>, law: SurfaceParams, depth: f64, speed: f64) -> Vec<TickRecord> {
-    let mut replayer = on_native(terrain, law).expect("opened");
+fn slide(terrain: &Terrain<'_>, params: SurfaceParams, depth: f64, speed: f64) -> Vec<TickRecord> {
+    let mut replayer = on_native(terrain, params).expect("opened");
     let size = terrain.size_mm();
     let radius = size[0].min(size[1]) / 3.0;
     let mut felt = vec![];
@@ -68,8 +68,9 @@ fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
     Some(distance(along, [0.0; 3]) / pressed)
 }
 
-/// Returns true if the straight way to a HIP leads through the air, or over a hole, from a place on a
-/// proxy's way: there it leaves the surface and comes down elsewhere, and may be held where it does.
+/// Returns true if the straight way to a HIP leads through the air, or over a hole, from a place on
+/// a proxy's way: there it leaves the surface and comes down elsewhere, and may be held where it
+/// does.
 fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
     let [from, to] = way;
     let between = |from: [f64; 3], to: [f64; 3]| {
@@ -88,10 +89,10 @@ fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
     })
 }
 
-/// The ratios of the forces of all slides around a terrain, so many millimetres a tick. One that is off
-/// by more than `off` of μ is left out if the proxy flew.
+/// The ratios of the forces of all slides around a terrain, so many millimetres a tick. One that is
+/// off by more than `off` of μ is left out if the proxy flew.
 fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> Vec<f64> {
-    let felt = slide(terrain, law(Friction::coulomb(mu as f32)), depth, speed);
+    let felt = slide(terrain, params(Friction::coulomb(mu as f32)), depth, speed);
     // The proxy that has just come out of the air has not slid yet, and one that a wall has held, far
     // behind the HIP, comes over many cells at once.
     let trails = 2.0 * depth * (1.0 + mu * mu).sqrt() + 3.0 * speed;
@@ -118,7 +119,8 @@ const ON_REAL_GROUND: [(f64, f64, usize); 4] = [
     (0.8, 1.0, 700),
     (0.8, 0.3, 700),
 ];
-/// The same of ground that is as good as sticky, where a proxy rests on many lines of the grid, too.
+/// The same of ground that is as good as sticky, where a proxy rests on many lines of the grid,
+/// too.
 const ON_STICKY_GROUND: [(f64, f64, usize); 2] = [(1.25, 0.3, 350), (2.0, 1.0, 200)];
 
 #[test]
@@ -152,11 +154,11 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
     let raster =
         Raster::from_fn(64, 64, |x, y| ((x * 7 + y * 3) % 11) as f32 * 0.03).expect("made");
     let terrain = terrain(&raster);
-    let law = law(Friction::coulomb(0.8));
+    let params = params(Friction::coulomb(0.8));
     let mut chance = Chance::new(5);
     // Inside a patch, on an edge, on a vertex.
     for at in [[20.3, 30.6], [25.0, 30.4], [41.0, 17.0]] {
-        let mut replayer = on_native(&terrain, law).expect("opened");
+        let mut replayer = on_native(&terrain, params).expect("opened");
         let ground = terrain.height_mm(at[0], at[1]).expect("inside");
         let mut step = |off: [f64; 3]| {
             let hip = [at[0] + off[0], at[1] + off[1], ground + off[2]];
@@ -176,7 +178,8 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
 /// Cells of a millimetre of the hand, and ticks a second.
 const CELLS_MM: [f64; 3] = [0.1, 0.3, 1.0];
 
-/// Contact ticks, and those that left work over, of a hand of 30 mm/s, 0.1 to 1 mm deep, over a square of 256 cells.
+/// Contact ticks, and those that left work over, of a hand of 30 mm/s, 0.1 to 1 mm deep, over a
+/// square of 256 cells.
 fn live(
     height: &dyn Fn(f64, f64) -> Option<f64>,
     cell_mm: f64,
@@ -247,8 +250,8 @@ fn a_live_tick_ends_where_friction_holds() {
     all_end("made ground", &hills, [Friction::coulomb(0.4), viscous]);
 }
 
-/// At 1 kHz all ticks but two of 1,000 end, at 10 kHz all but eight. The others are those in which a
-/// crease lets a proxy go: it comes over tens of cells, in as many ticks as its work takes.
+/// At 1 kHz all ticks but two of 1,000 end, at 10 kHz all but eight. The others are those in which
+/// a crease lets a proxy go: it comes over tens of cells, in as many ticks as its work takes.
 fn all_end(name: &str, height: &dyn Fn(f64, f64) -> Option<f64>, frictions: [Friction; 2]) {
     for friction in frictions {
         for cell_mm in CELLS_MM {

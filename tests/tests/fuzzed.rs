@@ -121,8 +121,7 @@ fn no_bytes_break_the_tick_on_materials() {
     }
 }
 
-/// What the fuzz target looks at is shown to be looked at: a tick is changed in one
-/// way, and refused.
+/// Each check of the fuzz target is tried: a tick is changed in one way, and refused.
 #[test]
 fn a_tick_that_may_not_be_is_refused() {
     let refuses = |change: fn(&mut Outcome)| {

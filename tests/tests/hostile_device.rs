@@ -56,7 +56,7 @@ fn rename(hello: &mut DeviceHello) {
     hello.version = NAME.try_into().expect("fits");
 }
 
-/// What the device says instead of what it said in a frame.
+/// Returns the substitute for a frame of the device.
 fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let mut has_samples = false;
     let said = wire::changed(frame, |message| match message {

@@ -19,7 +19,7 @@ const SCENES: u64 = 200;
 
 type Counts = BTreeMap<&'static str, u64>;
 
-/// What a tick is, by all the names that fit.
+/// Returns all names that fit a tick.
 fn names(terrain: &Terrain, before: Option<&Seen>, now: &Seen) -> Vec<&'static str> {
     let mut names = Vec::new();
     let mut is = |name, true_of: bool| {
@@ -71,7 +71,7 @@ fn names(terrain: &Terrain, before: Option<&Seen>, now: &Seen) -> Vec<&'static s
     names
 }
 
-/// What samples there are on a ground that was touched.
+/// Counts the samples of a ground that was touched.
 fn samples(terrain: &Terrain, counts: &mut Counts) {
     let all = (0..=terrain.size[1])
         .flat_map(|y| (0..=terrain.size[0]).map(move |x| (x, y)))
@@ -195,7 +195,7 @@ fn all_that_is_promised_of_materials_is_drawn() {
             "one a hundred times as stiff as another",
             most > 100.0 * least,
         );
-        let own = materials.law.stiffness_n_per_mm;
+        let own = materials.params.stiffness_n_per_mm;
         is(
             "a scene softer or stiffer than its default",
             own != table[0].stiffness_n_per_mm,

@@ -184,7 +184,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     );
 }
 
-/// How far a proxy slid in a tick tells what the viscous part holds.
+/// The slide of a proxy in a tick determines the hold of the viscous part.
 #[test]
 fn a_proxy_that_trails_by_more_than_it_slid_is_found() {
     let friction = Friction {
@@ -320,7 +320,7 @@ const ABOVE: [f64; 3] = [10.5, 10.5, 3.0];
 const BELOW: [f64; 3] = [10.5, 10.5, 1.5];
 const ON: [f64; 3] = [10.5, 10.5, 2.0];
 
-/// What one answer says by itself.
+/// Checks of a single answer.
 #[test]
 fn an_answer_that_is_no_answer_is_found() {
     use Invariant::{Clamp, Consistent, Finite, Work};
@@ -338,7 +338,7 @@ fn an_answer_that_is_no_answer_is_found() {
         (Consistent, with(honest, |f| f.displacement.z = -0.5)),
         (Consistent, with(honest, |f| f.displacement.z = 0.501)),
         (Consistent, with(waiting(BELOW), |f| f.displacement.z = 0.1)),
-        // The law's forces: too long, of another spring, the other way, no number.
+        // Forces: too long, of another spring, in the other direction, no number.
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, z * 1.000_01])),
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, -z])),
         (Clamp, forces(honest, |_| [0.0, 0.0, 8.500_01])),
@@ -442,8 +442,7 @@ fn friction_at_a_holes_edge_may_hold_a_hip_above_the_ground_beyond_it() {
     }
 }
 
-/// What a patch's corners cost in single precision is allowed where they are
-/// mixed, and not at the foot of one.
+/// The rounding of a patch's corners is allowed where they are mixed, and not at the foot of one.
 #[test]
 fn a_spike_at_one_corner_excuses_nothing_at_the_others() {
     let spike = Terrain::from_fn(Kind::Spikes, SIZE, |x, y| {

@@ -31,7 +31,7 @@ const GRATING: Texture = Texture {
     ..Texture::NONE
 };
 
-/// What was found, and at which point.
+/// Violated invariant, and the point.
 type Found = (Invariant, usize);
 
 /// A way over flat ground, whose samples from column 20 on are of the second material: down 1.5
@@ -63,7 +63,7 @@ impl Way {
         }
     }
 
-    /// What the judge says where one point was felt otherwise, and of which point, and what it
+    /// Returns the verdict of the judge if one point is changed, and of which point, and what it
     /// learned.
     fn with(&self, at: usize, change: impl Fn(&mut Replied)) -> (Option<Found>, Judged) {
         let mut judge = MaterialJudge::new(&self.scene, &self.materials, [0; 3]);
@@ -85,7 +85,7 @@ impl Way {
         judged
     }
 
-    /// What it says of another force, at once.
+    /// Returns the verdict on another force, at once.
     fn force(&self, at: usize, change: impl Fn(Vec3) -> Vec3) -> Option<Invariant> {
         let changed = |felt: &mut Replied| felt.sample.force_n = change(felt.sample.force_n);
         self.at_once(at, changed)
@@ -111,7 +111,7 @@ impl Way {
     }
 }
 
-/// Where a way begins, and its step.
+/// Start of a path, and its step.
 const SLOW: [f64; 2] = [18.51, 0.02];
 /// The first point of it beyond the border at 19.5; the first of all is above the ground.
 const BORDER: usize = 51;

@@ -125,7 +125,7 @@ fn a_mask_in_one_large_strip_is_read_row_by_row() {
     }
 }
 
-/// Where there is no place to unpack it, all is in memory, and it is said why.
+/// Without a place to unpack it, all is in memory, and the reason is reported.
 #[test]
 fn a_packed_mask_in_one_large_strip_is_unpacked_on_disk_or_it_is_named() {
     let mask = zstd_bomb((MASKED * MASKED).div_ceil(128 * 1024) as usize);
@@ -265,7 +265,8 @@ fn a_strip_of_4_gb_is_felt_in_the_memory_of_a_terrain() {
     }
 }
 
-/// All of it is looked at for a height: that takes no memory, and it is said, because it takes long.
+/// All of it is looked at for a height: that takes no memory, and it is said, because it takes
+/// long.
 #[test]
 fn a_file_of_nothing_is_looked_through_and_it_says_so() {
     const WIDE: u32 = 12_000;

@@ -112,7 +112,7 @@ fn assert_same(many: &Raster, one: &Raster) -> usize {
     heights
 }
 
-/// How the tiles of [`tiles`] are packed, each another way.
+/// Packings of the tiles of [`tiles`].
 const PACKINGS: [&str; 6] = [
     "-co COMPRESS=NONE",
     "-co COMPRESS=LZW -co PREDICTOR=2",

@@ -73,7 +73,7 @@ fn assert_heights(raster: &Raster, truth: &[f64], name: &str) {
     assert_eq!(raster.summary().holes, holes as u64, "{name}: holes");
 }
 
-/// What a variant must decode to, from its name and its line in the manifest.
+/// Returns the expected heights of a variant, from its name and its line in the manifest.
 fn expected(folder: &Path, name: &str, description: &str) -> Option<Vec<f64>> {
     let whole = || truth_i16(folder, "tujunga_i16.raw");
     let holes = || truth_i16(folder, "tujunga_i16_holes.raw");
@@ -456,7 +456,7 @@ fn files_too_small_for_a_surface_are_refused() {
     assert_eq!(open(&folder.join("odd_2x2.tif")).columns(), 2);
 }
 
-/// What of the third-party collection is a height field opens; colours do not.
+/// Height fields of the third-party collection open; colours do not.
 #[test]
 fn third_party_tiffs_are_read_or_refused_for_what_they_are() {
     let Some(folder) = shared("dem/tiff_ok") else {

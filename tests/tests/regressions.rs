@@ -92,8 +92,8 @@ fn a_minimum_just_beyond_an_edge_is_found() {
     run(terrain, &path, Execution::RealTime, Supply::Held).expect("holds");
 }
 
-/// What faded away was not the last slide's force but the one of the last tick
-/// that had to be searched for: a tile came between the two.
+/// The force that fades is not the last slide's but that of the last tick that had to be searched
+/// for: a tile came between the two.
 #[test]
 fn a_contact_lost_after_a_late_tile_fades_from_what_was_felt_last() {
     let terrain = field([128, 20], |x, _| match x {

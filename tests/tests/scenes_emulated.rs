@@ -30,7 +30,7 @@ fn scenes_on_materials_give_the_same_bits_on_the_emulated_processor() {
     assert!(forces > 3_000, "{forces} ticks with a force");
 }
 
-/// What the board answers, which is what was answered here.
+/// Returns the answers of the board, which must equal those here.
 fn replayed(board: &CountingBoard, scenes: &[(u64, Recorded)]) -> Vec<Vec<Counted>> {
     let replays: Vec<_> = scenes.iter().map(|(_, scene)| scene.replay()).collect();
     let there = board.contact(&replays);

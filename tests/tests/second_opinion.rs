@@ -16,7 +16,7 @@ use hapterra_tests::scene::terrain::{Kind, Terrain};
 use hapterra_tests::shared;
 use heightfield::{OpenOptions, Raster, Wait};
 
-/// What the second opinion found in a scene.
+/// Findings of the second opinion in a scene.
 #[derive(Debug, Default)]
 struct Found {
     /// Proxies at rest that were looked at.
@@ -65,8 +65,8 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
     found
 }
 
-/// Whether a proxy at rest is at a local closest point, by the bound that the
-/// judge has, too; `None` where there is nothing to be said.
+/// Returns true if a proxy at rest is at a local closest point, by the bound that the judge has,
+/// too; `None` where there is nothing to be said.
 fn rests_right(terrain: &Terrain, seen: &Seen) -> Option<bool> {
     let displacement = distance(seen.proxy, seen.hip);
     let rests = seen.felt.state == ContactState::Touching && seen.felt.converged;

@@ -27,18 +27,18 @@ struct Circle<'c> {
     middle: [f64; 2],
     /// Of the angle at each step.
     step: f64,
-    /// How deep the HIP is by the angle, mm.
+    /// Depth of the HIP by the angle, mm.
     depth: &'c dyn Fn(f64) -> f64,
 }
 
 impl Circle<'_> {
-    /// What a HIP feels that goes round once, where it touches.
+    /// Returns the samples in contact of one round of a HIP.
     fn felt(&self, terrain: &Terrain<'_>, shading: Shading) -> Vec<TickRecord> {
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             shading,
             ..SurfaceParams::PREMIUM
         };
-        let mut replayer = on_native(terrain, law).expect("opened");
+        let mut replayer = on_native(terrain, params).expect("opened");
         let size = terrain.size_mm();
         let radius = ROUND / std::f64::consts::TAU;
         let felt = (0..=self.steps()).filter_map(|tick| {
@@ -61,7 +61,7 @@ impl Circle<'_> {
         (ROUND / self.step.abs()).round() as u32
     }
 
-    /// What a shaded round gives, mJ; none where a hole breaks it.
+    /// Returns the energy of a shaded round, mJ; none where a hole breaks it.
     fn given(&self, terrain: &Terrain<'_>) -> Option<f64> {
         let felt = self.felt(terrain, Shading::Smooth);
         let is_whole = felt.len() + 2 >= self.steps() as usize;
@@ -82,7 +82,7 @@ fn largest_turn(felt: &[TickRecord], farthest: f32) -> f32 {
     turns.fold(0.0, f32::max)
 }
 
-/// What the force gives to a HIP on its way, mJ.
+/// Returns the work of the force on a HIP along its path, mJ.
 fn given_mj(felt: &[TickRecord]) -> f64 {
     let gives = felt.windows(2).map(|pair| {
         let force = 0.5 * (pair[0].force_n + pair[1].force_n).as_dvec3();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hapterra_tests::repository;
 
-/// What reads the wall clock, or waits by it.
+/// Names that read the wall clock, or wait by it.
 const CLOCKS: [&str; 10] = [
     "Instant",
     "SystemTime",

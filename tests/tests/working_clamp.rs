@@ -9,7 +9,7 @@ use hapterra_firmware::amplifier::offset_code;
 use hapterra_tests::campaign::extremes::OFF_COUNTS;
 use hapterra_tests::campaign::levers::{force, is_near_singular};
 
-/// What an encoder is off by, counts.
+/// Error of an encoder, counts.
 const OFF: i32 = OFF_COUNTS as i32;
 /// No current and full scale of the coarsest converter of the boards, codes.
 const MIDDLE: f64 = 2_048.0;
@@ -34,7 +34,7 @@ fn directions() -> impl Iterator<Item = Vec3> {
     all.filter(|v| *v != Vec3::ZERO).map(Vec3::normalize)
 }
 
-/// What a converter makes of a current.
+/// Returns the conversion of a current.
 fn converted(current_a: f32) -> f64 {
     let code = f64::from(offset_code(current_a / FULL_SCALE_A));
     (code - MIDDLE) / SPAN * f64::from(FULL_SCALE_A)

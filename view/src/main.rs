@@ -16,9 +16,9 @@ use hapterra_view::server::Server;
 
 /// More options, separated by spaces: `hapterra` starts this program.
 const OPTIONS: &str = "HAPTERRA_VIEW_OPTIONS";
-/// Time for which the page stays after the session's end, once nobody looks.
+/// Time for which the page stays after the session's end, once no page is open.
 const LINGER: Duration = Duration::from_secs(15);
-/// Between two looks at whether somebody looks.
+/// Between two checks for an open page.
 const LOOK: Duration = Duration::from_millis(100);
 
 fn main() -> ExitCode {
@@ -81,8 +81,8 @@ fn show(options: &Options) -> Result<()> {
     ended.rrd
 }
 
-/// Whether `hapterra` is gone: it holds the pipe open after the stream's end, for as long as
-/// it runs.
+/// Watches whether `hapterra` is gone: it holds the pipe open after the stream's end, for as long
+/// as it runs.
 fn watched(has_ended: bool) -> Arc<AtomicBool> {
     let is_gone = Arc::new(AtomicBool::new(!has_ended));
     let told = Arc::clone(&is_gone);
@@ -132,11 +132,11 @@ fn open(url: &str) {
         .stdout(null())
         .stderr(null())
         .spawn();
-    // Whoever has no browser has read where the page is.
+    // Users without a browser have read where the page is.
     drop(started);
 }
 
-/// Says a line, and goes on where nobody listens.
+/// Says a line, and goes on without a reader.
 fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -104,7 +104,7 @@ fn browser_in(folder: &Path) -> Option<Browser> {
     program.map(|program| Browser::start(&program, folder))
 }
 
-/// What pages asked of other machines than the one at an address.
+/// Returns the requests of pages to other machines than the one at an address.
 fn foreign<'b>(browser: &'b Browser, address: &str) -> Vec<&'b String> {
     let requests = browser.requests.iter();
     requests
@@ -255,8 +255,8 @@ fn the_page_shows_what_the_emulated_board_feels_while_it_is_touched() {
     remove(&folder);
 }
 
-/// How far pictures may differ of the same, and how far they have to of something else:
-/// means over all pixels and colours, of 255.
+/// Bounds of the difference of equal pictures, and of different ones: means over all pixels and
+/// colours, of 255.
 const SAME: f64 = 0.5;
 const OTHER: f64 = 4.0;
 
@@ -419,7 +419,7 @@ fn killed(who: Killed, says: &str) {
             "{told}"
         );
     }
-    // Nobody looks any more.
+    // No page is open any more.
     let until = Instant::now() + HANG;
     while memory_of(viewer) > 0 {
         assert!(Instant::now() < until, "the viewer does not end");

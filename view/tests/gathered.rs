@@ -16,13 +16,13 @@ use common::scene::{batch, greeting, layer, scene};
 const TICKS: u64 = 10_300;
 const BATCH: u64 = 16;
 
-/// What a page was told: entries that happened, and their rows by entity and number.
+/// Messages to a page: entries that happened, and their rows by entity and number.
 #[derive(Default)]
 struct Told {
     entries: usize,
     most_ns: u64,
     rows: BTreeMap<(String, String), (i64, String)>,
-    /// What stands, by entity and part.
+    /// Standing entries, by entity and part.
     standing: BTreeMap<(String, BTreeSet<String>), Vec<String>>,
 }
 

@@ -14,16 +14,16 @@ use std::time::{Duration, Instant};
 use common::browser::{Browser, Page, program};
 use common::{Running, emulated, folder, hapterra, memory_of, signal, started_by};
 
-/// What the viewer may take: the history is full after some minutes, and the rest is noise
-/// of the allocator.
+/// Memory bound of the viewer: the history is full after some minutes, and the rest is noise of the
+/// allocator.
 const VIEWER_BYTES: u64 = 300 << 20;
-/// What `hapterra` may take: its terrain, its queue, and the rows of ten minutes that a demo
+/// Memory bound of `hapterra`: its terrain, its queue, and the rows of ten minutes that a demo
 /// keeps for its picture.
 const HOST_BYTES: u64 = 300 << 20;
-/// What a page may take: from 1 GB on it begins anew, with the next piece that it is told.
+/// Memory bound of a page: from 1 GB on it begins anew, with the next piece that it is told.
 const PAGE_BYTES: u64 = 5 << 28;
 
-/// What a page takes, and what it was told.
+/// Memory of a page, and its messages.
 #[derive(Clone, Copy, Debug, Default)]
 struct OfPage {
     bytes: u64,
@@ -56,8 +56,8 @@ fn touching(into: &Path) -> Option<Command> {
     Some(demo)
 }
 
-/// What a session's summary says of late ticks, of lost samples, and of tiles that were asked
-/// for and did not come.
+/// Returns the lines of a session's summary about late ticks, of lost samples, and of tiles that
+/// were asked for and did not come.
 fn harm(told: &str) -> Vec<&str> {
     let good = [
         ("ticks ", " run, 0 late"),

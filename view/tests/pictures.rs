@@ -20,7 +20,7 @@ const MARKS: [[u8; 3]; 2] = [[255, 230, 60], [255, 170, 90]];
 /// Pixels of them: arrow and trace are long enough to be seen.
 const ARROW: usize = 120;
 const TRACE: usize = 400;
-/// What is typed for the zoomed picture.
+/// Commands for the zoomed picture.
 const ZOOM: &str = "zoom 1.6\nzoom 1.6\n";
 
 /// A page of a demo that goes on.

@@ -42,7 +42,7 @@ pub(crate) struct Exception {
 pub(crate) struct Board {
     /// Name of the binary; its cargo feature is this behind `board-`.
     pub(crate) name: &'static str,
-    /// What probe-rs calls the chip; none for the emulated board.
+    /// Name of the chip in probe-rs; none for the emulated board.
     pub(crate) chip: Option<&'static str>,
     /// Environment variable that tells tests where the image is.
     pub(crate) elf_variable: &'static str,
@@ -66,7 +66,7 @@ const G474_CALLS: &[Exception] = &[queue(&["TIM7_DAC"]), queue(&["HapticLoop"]),
 
 const H743_CALLS: &[Exception] = &[queue(&["TIM7"]), queue(&["HapticLoop"]), TIMER_QUEUE];
 
-/// What no board with amplifiers has: serial ports, and a frame to the virtual arm as the last
+/// Exceptions for emulated boards only: serial ports, and a frame to the virtual arm as the last
 /// thing that a failed program sends.
 const EMULATED_CALLS: &[Exception] = &[
     queue(&["HapticTick"]),
@@ -103,7 +103,7 @@ const TIMER_QUEUE: Exception = Exception {
               them; they hold this interrupt back, so it finds no borrow",
 };
 
-/// What tells a task that something has happened.
+/// Calls that wake a task.
 const WAKERS: &[Exception] = &[
     waker(&["TIM6_DAC"]),
     waker(&["TIM5"]),

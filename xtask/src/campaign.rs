@@ -33,7 +33,7 @@ pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
     })
 }
 
-/// What the source is, if git knows: the report says so.
+/// Returns the commit of the source, if git knows it, for the report.
 fn commit() -> Option<String> {
     let git = |words: &[&str]| output(Command::new("git").args(words).current_dir(root()));
     let commit = git(&["rev-parse", "--short", "HEAD"])?;

@@ -12,7 +12,7 @@ use crate::run::{hapterra, root, say, shown, timed};
 use crate::setup::{gdal, qemu, toolchain};
 use crate::view;
 
-/// What the user asked for.
+/// Request of the user.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Request {
     /// Terrain file; none for one that the demo makes itself.
@@ -101,12 +101,12 @@ impl Request {
         })
     }
 
-    /// Where the user wants the loop to run, if that was said.
+    /// Returns the device that the user has stated, if any.
     fn device(&self) -> Option<String> {
         self.value("--device")
     }
 
-    /// What a build has to have for the file.
+    /// Returns the features of the build for the file.
     fn features(&self) -> &'static [&'static str] {
         let file = self.file.as_ref().map(|file| file.to_string_lossy());
         match file.is_some_and(|file| file.contains("://")) {

@@ -15,7 +15,7 @@ const WORKSPACES: [&str; 4] = [
     "view/Cargo.toml",
 ];
 
-/// Whether dependencies were held against the database of advisories.
+/// Result of the check against the database of advisories.
 #[must_use]
 pub(crate) enum Advisories {
     /// No advisory is about them.

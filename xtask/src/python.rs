@@ -12,8 +12,8 @@ use crate::run::{
 };
 use crate::{demo, deny};
 
-/// How the wheel is built that is handed out, and the one that is tested: most crates of the registry
-/// are those of the workspace's tests, since versions, features and profile are the same.
+/// Options for the published wheel and the tested one: most crates of the registry are those of the
+/// workspace's tests, since versions, features and profile are the same.
 const RELEASE: &[&str] = &["--release"];
 const TESTED: &[&str] = &["--profile", "dev", "--features", "remote"];
 /// Names the interpreter to use.

@@ -27,19 +27,10 @@ pub(crate) fn target_dir() -> PathBuf {
     }
 }
 
-/// What cargo sets for this program. Build scripts of packages that read it would run again, and what
-/// depends on them would be built again, with each program that calls cargo.
-const OF_THIS_PROGRAM: [&str; 9] = [
-    "CARGO_MANIFEST_DIR",
-    "CARGO_MANIFEST_LINKS",
-    "CARGO_MANIFEST_PATH",
-    "CARGO_PKG_NAME",
-    "CARGO_PKG_VERSION",
-    "CARGO_PKG_VERSION_MAJOR",
-    "CARGO_PKG_VERSION_MINOR",
-    "CARGO_PKG_VERSION_PATCH",
-    "CARGO_PKG_VERSION_PRE",
-];
+/// Variables that cargo sets for a program that it runs, one a line. Build scripts of packages that
+/// read them would run again, and what depends on them would be built again, with each program that
+/// calls cargo.
+const OF_CARGO: &str = include_str!("../../tests/src/cargo_variables.txt");
 
 /// The cargo that runs this program, in the workspace root, building for the host.
 pub(crate) fn cargo() -> Command {
@@ -56,7 +47,7 @@ pub(crate) fn cargo() -> Command {
 /// Takes away the variables that cargo sets for this program: a build script that reads them would
 /// run again.
 pub(crate) fn without_own_variables(command: &mut Command) {
-    for variable in OF_THIS_PROGRAM {
+    for variable in OF_CARGO.lines() {
         command.env_remove(variable);
     }
 }

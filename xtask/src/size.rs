@@ -9,7 +9,7 @@ use object::read::elf::{FileHeader, ProgramHeader};
 
 use crate::board::{Board, Memory};
 
-/// What an image takes of one memory.
+/// Use of one memory by an image.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Use {
     memory: Memory,

@@ -25,10 +25,11 @@ const QUICK: [&str; 5] = [
     "hapterra-url-tests",
 ];
 
-/// What is to be tested.
+/// Request of a test run.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Request {
-    /// Neither the boards that are not emulated nor the dependencies, the page and the Python package.
+    /// Neither the boards that are not emulated nor the dependencies, the page and the Python
+    /// package.
     pub(crate) quick: bool,
     /// Arguments of `cargo test`, which select programs and tests; all where there are none.
     pub(crate) only: Vec<OsString>,
@@ -102,8 +103,8 @@ pub(crate) fn test(request: &Request) -> Result<()> {
     )
 }
 
-/// Checks the dependencies of the workspaces that are tested here. Returns what was not checked, for
-/// the end.
+/// Checks the dependencies of the workspaces that are tested here. Returns what was not checked,
+/// for the end.
 fn dependencies() -> Result<Option<String>> {
     let _of_all = deny::check("Cargo.toml")?;
     deny::check("fuzz/Cargo.toml").map(Advisories::not_checked)
@@ -179,16 +180,16 @@ mod tests {
     #[test]
     fn failed_target_is_repeated_by_its_kind() {
         let said = [
-            "     Running tests/underlay.rs (target/debug/deps/underlay-1)",
-            "error: test failed, to rerun pass `-p hapterra-tests --test underlay`",
+            "     Running tests/fallback.rs (target/debug/deps/fallback-1)",
+            "error: test failed, to rerun pass `-p hapterra-tests --test fallback`",
             "error: 2 targets failed:",
-            "    `-p hapterra-tests --test underlay`",
+            "    `-p hapterra-tests --test fallback`",
             "    `-p hapterra-core --doc`",
         ];
         let failed = said.iter().filter_map(|line| listed_target(line));
         let commands: Vec<_> = failed.map(|target| repeat(target, false)).collect();
         let expected = [
-            "cargo xtask test -- --test underlay    # hapterra-tests",
+            "cargo xtask test -- --test fallback    # hapterra-tests",
             "cargo xtask test -- --doc    # hapterra-core",
         ];
         assert_eq!(commands, expected);

@@ -13,7 +13,7 @@ use crate::setup::packages::{self, found_or_installed};
 
 /// Names the browser that the page is tested with.
 pub(crate) const BROWSER: &str = "HAPTERRA_BROWSER";
-/// What browsers that can be driven are called.
+/// Names of browsers that can be driven.
 const BROWSERS: [&str; 5] = [
     "chromium-headless-shell",
     "chromium",

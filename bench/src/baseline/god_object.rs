@@ -163,7 +163,7 @@ fn nearest_on(planes: &[Plane], hip: &[f64; 3]) -> [f64; 3] {
     }
 }
 
-/// How many normals away from the plane the HIP is.
+/// Returns the distance of the HIP from the plane, in normals.
 #[inline]
 fn push(plane: &Plane, hip: &[f64; 3]) -> f64 {
     let normal = plane.normal();

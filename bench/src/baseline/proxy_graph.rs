@@ -14,7 +14,7 @@ const MOVES: u32 = 4096;
 struct Node {
     /// Sample at the start of the edge.
     post: [i32; 2],
-    /// Where the edge leads: east, north or north-west, or the way back.
+    /// Direction of the edge: east, north or north-west, or back.
     to: [i32; 2],
     /// Place on it, `[0, 1]`.
     t: f64,
@@ -115,7 +115,7 @@ impl<'g> ProxyGraph<'g> {
         node
     }
 
-    /// How far the triangles lie above the HIP.
+    /// Returns the height of the triangles above the HIP.
     #[inline]
     fn depth(&self, hip: &[f64; 3]) -> Option<f64> {
         let facet = Facet::under(hip[0], hip[1]);

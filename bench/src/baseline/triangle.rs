@@ -47,7 +47,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// How far the plane lies above a point, along z.
+    /// Returns the height of the plane above a point, along z.
     #[inline]
     pub(super) fn above(&self, [x, y, z]: &[f64; 3]) -> f64 {
         self.level + self.east * x + self.north * y - z

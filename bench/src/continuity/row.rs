@@ -27,7 +27,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// What is felt in ticks that follow one another, in pieces.
+    /// Returns the row of successive ticks, in pieces.
     pub(super) fn of(ground: &'static str, label: Label, pieces: &[&[Answer]]) -> Self {
         let changes: Vec<f64> = pieces
             .iter()

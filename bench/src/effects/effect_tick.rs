@@ -22,14 +22,14 @@ pub(super) struct EffectTick {
     pub whole: bool,
 }
 
-/// What makes a force another one than the scene asks for.
+/// Limits that change the scene's force.
 const LESS: Limits = Limits::FORCE_CLAMPED
     .union(Limits::SLEW_LIMITED)
     .union(Limits::SPEED_LIMITED)
     .union(Limits::RAMPING)
     .union(Limits::FADING)
     .union(Limits::TERRAIN_MISSING)
-    .union(Limits::BOUNDARY_FADING);
+    .union(Limits::EDGE_FADING);
 
 impl EffectTick {
     pub(super) fn of(sample: &TickRecord) -> Self {

@@ -3,12 +3,12 @@
 
 /// Longest window: readings before the newest.
 const WINDOW: usize = 15;
-/// What two readings are off by together, counts.
+/// Error of two readings together, counts.
 const NOISE: f64 = 1.0;
-/// Whether a slope that is just as far off as allowed still counts is a matter of rounding.
+/// Tolerance of the bound for a slope, by rounding.
 const TIE: f64 = 1e-5;
 
-/// How fast a count changes, counts a reading, by readings of which the last is the newest: with
+/// Returns the rates of change, counts a reading, by readings of which the last is the newest: with
 /// ties let in, and not.
 pub(super) fn slopes(readings: &[f64]) -> [f64; 2] {
     [TIE, -TIE].map(|tie| slope(readings, NOISE + tie))

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use hapterra_core::force::{Pattern, Texture};
 
-/// How high a relief of the height 1 is at a place, and its slopes eastward and northward a
+/// Returns the height of a relief of height 1 at a place, and its slopes eastward and northward a
 /// millimetre.
 pub(super) fn rise(texture: &Texture, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
     match texture.pattern {
@@ -55,7 +55,7 @@ fn scrambled(x: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::law::texture;
+    use crate::effects::effect::texture;
 
     #[test]
     fn the_slopes_are_those_of_the_heights() {

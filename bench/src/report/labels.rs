@@ -20,8 +20,8 @@ impl Named {
         [x - r, y - r, x + r, y + r]
     }
 
-    /// Where the name might stand: right of the mark, left of it, and beside it
-    /// ever farther down and up.
+    /// Returns the possible places of the name: right of the mark, left of it, and beside it ever
+    /// farther down and up.
     fn places(&self, gap: i32) -> impl Iterator<Item = Rect> + use<> {
         let ((x, y), (width, height)) = (self.at, self.size);
         let aside = self.radius + gap;

@@ -15,20 +15,20 @@ use crate::streaming::{RATES, Reading, Row, SPEEDS};
 
 /// Radius of a point, finished pixels.
 const DOT_PX: i32 = 5;
-/// Where something is nothing, it is drawn here: logarithms have no zero.
+/// Place of a zero in the drawing: logarithms have no zero.
 const FLOOR: f64 = 0.1;
 /// Samples along the axis.
 const SAMPLES: std::ops::Range<f64> = 5e5..2e10;
 
-/// What a panel shows.
+/// Content of a panel.
 struct Panel {
     y: String,
     range: std::ops::Range<f64>,
     figure: fn(&Row) -> Option<f64>,
 }
 
-/// Draws a panel for each figure against the samples, and a line for each latency; what is read as a
-/// whole has a line of its own. All at the faster link.
+/// Draws a panel for each figure against the samples, and a line for each latency; what is read as
+/// a whole has a line of its own. All at the faster link.
 ///
 /// # Errors
 /// When the picture cannot be laid out or written.

@@ -27,20 +27,20 @@ pub(super) const HOME: ArmFrame = ArmFrame {
 /// Largest force, N: that of every other scene.
 const MAX_N: f32 = SurfaceParams::PREMIUM.max_force_n;
 
-/// What happened in one tick.
+/// Record of one tick.
 pub(super) struct Step {
-    /// What the tick reported.
+    /// Report of the tick.
     pub(super) sample: TickRecord,
     /// Height of the tip by its encoders at the beginning of it, mm.
     pub(super) read_up_mm: f64,
     /// True place of the tip after it, east, north and up, mm.
     pub(super) tip_mm: [f64; 3],
-    /// What the surface gave to the arm meanwhile, mJ: the work of its part of the motors'
+    /// Energy from the surface to the arm meanwhile, mJ: the work of its part of the motors'
     /// torques.
     pub(super) given_mj: f64,
 }
 
-/// What is felt, and by which loop.
+/// Settings of a loop and its surface.
 pub(super) struct LoopSettings {
     pub(super) rate: TickRate,
     pub(super) stiffness_n_per_mm: f64,
@@ -52,8 +52,8 @@ pub(super) struct LoopSettings {
     pub(super) clutch_s: Option<[f64; 2]>,
 }
 
-/// Runs an arm in an arming hand until its script ends, and shows every tick with the time since the script
-/// began, s. Ends early where `look` says so.
+/// Runs an arm in an arming hand until its script ends, and shows every tick with the time since
+/// the script began, s. Ends early where `look` says so.
 pub(super) fn run(
     felt: &LoopSettings,
     mut arm: HeldPhantom,
@@ -140,7 +140,7 @@ pub(super) fn run(
     }
 }
 
-/// What a tick sends to the motors, A.
+/// Currents from a tick to the motors, A.
 #[derive(Clone, Copy, Default)]
 struct Sent {
     currents_a: [f64; 3],
@@ -193,10 +193,10 @@ fn scene(felt: &LoopSettings) -> Scene {
         level: 0,
         size: FieldSize::new(CELLS, CELLS),
         top: 64,
-        underlay: None,
+        fallback: None,
         cell_mm: CELL_MM as f32,
         home: GridPoint::new([east as i32, north as i32, up as i32], Vec3::ZERO),
-        law: SurfaceParams {
+        params: SurfaceParams {
             stiffness_n_per_mm: felt.stiffness_n_per_mm as f32,
             max_force_n: MAX_N,
             damping: felt.damping,

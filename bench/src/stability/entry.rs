@@ -17,7 +17,7 @@ use hapterra::phantom::{HeldPhantom, OutOfReach, Script};
 
 /// The press, N.
 const PRESS_N: f64 = 1.0;
-/// How fast the hand begins to press, mm/s.
+/// Speed at which the hand begins to press, mm/s.
 const BEGIN_MM_S: f64 = 60.0;
 /// The tip begins so far above the surface, mm.
 const ABOVE_MM: f64 = 0.2;
@@ -209,7 +209,7 @@ struct Block {
     ticks: u32,
     low_mm: [f64; 3],
     high_mm: [f64; 3],
-    /// How far it went back in.
+    /// Depth of its return.
     fell_mm: f64,
 }
 

@@ -252,7 +252,7 @@ impl Map {
         for column @ (rate, damping, part) in self.columns() {
             let limits = Grasp::ALL.map(|grasp| {
                 let limit = |verdict| told(self.up_to(column, grasp, verdict));
-                let (still, held) = (limit(Verdict::Still), limit(Verdict::Hum));
+                let (still, held) = (limit(Verdict::Still), limit(Verdict::LimitCycle));
                 let enters = told(self.enters_up_to(column, grasp));
                 format!("{} {still} / {held} / {enters}", grasp.name())
             });
@@ -278,7 +278,7 @@ const fn is_controlled(damping: Damping) -> bool {
     matches!(damping.controller, Controller::On)
 }
 
-/// What a texture is called.
+/// Returns the name of a texture.
 const fn pattern(texture: Texture) -> &'static str {
     match texture.pattern {
         Pattern::None => "none",
@@ -287,7 +287,7 @@ const fn pattern(texture: Texture) -> &'static str {
     }
 }
 
-/// What a damping is called.
+/// Returns the name of a damping.
 pub(super) fn name(damping: Damping) -> String {
     let ns_per_m = damping.ns_per_m;
     match (ns_per_m > 0.0, is_controlled(damping)) {

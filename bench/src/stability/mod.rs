@@ -6,14 +6,14 @@
 //! - `contact_loop`: the tick and the arm, step by step;
 //! - `surface_work`: the energy that the surface gives;
 //! - [`tap`]: taps at a stated speed;
-//! - [`trial`]: what a press and taps show: hum, and energy that the surface gave;
+//! - [`trial`]: results of a press and of taps: limit cycle, and energy from the surface;
 //! - [`entry`]: presses while force comes in;
 //! - [`bounds`]: stiffness that theory says is passive;
 //! - [`map`]: many trials, and the table of them;
 //! - [`picture`]: the table as a picture.
 //!
-//! Friction of the surface is left out: a hand that is held back hums less. What the trials found is
-//! what `hapterra run` warns by: [`hapterra::stability`].
+//! Friction of the surface is left out: it reduces limit cycles. `hapterra run` warns by the
+//! results of the trials: [`hapterra::stability`].
 
 pub mod bounds;
 mod contact_loop;

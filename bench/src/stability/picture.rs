@@ -19,7 +19,7 @@ const WIDTH_PX: i32 = 1600;
 const HEADER_PX: i32 = 110;
 const CHART_PX: i32 = 420;
 const MARGIN_PX: i32 = 30;
-/// What is drawn of given energy, mJ: what is smaller or larger lies on the edge.
+/// Range of energy in the drawing, mJ: what is smaller or larger lies on the edge.
 const GIVEN_MJ: std::ops::Range<f64> = 0.01..100.0;
 /// The speed of the taps that are drawn: the place in [`TAP_SPEEDS_M_S`].
 const DRAWN: usize = 1;
@@ -65,7 +65,7 @@ fn header(area: &Area<'_>) -> Result<(), PictureError> {
     let name = "How stiff a surface may be: energy that it gives to a tapping hand";
     axes::write(area, name, (0, px(34)), title, HPos::Left)?;
     let lines = format!(
-        "taps at {} m/s; dot: a press with 1 N is still, ring: it hums, cross: unstable; grey: 2b/T (Colgate & Schenkel) and 2fc/Δ (Abbott & Okamura) of the arm alone",
+        "taps at {} m/s; dot: a press with 1 N is still, ring: limit cycle, cross: unstable; grey: 2b/T (Colgate & Schenkel) and 2fc/Δ (Abbott & Okamura) of the arm alone",
         TAP_SPEEDS_M_S[DRAWN]
     );
     axes::write(area, &lines, (0, px(68)), text, HPos::Left)?;
@@ -122,7 +122,7 @@ fn chart(
             let (ring, dot) = (stroke(&colour, 2.0), colour.filled());
             match trial.press.verdict(map.at_tip.count_mm) {
                 Verdict::Still => drop(chart.draw_series([Circle::new(at, px(4), dot)])?),
-                Verdict::Hum => drop(chart.draw_series([Circle::new(at, px(6), ring)])?),
+                Verdict::LimitCycle => drop(chart.draw_series([Circle::new(at, px(6), ring)])?),
                 Verdict::Unstable => drop(chart.draw_series([Cross::new(at, px(7), ring)])?),
             }
         }

@@ -31,7 +31,7 @@ pub struct Taps {
 }
 
 impl Grasp {
-    /// How fast a hand has to aim for its tip to touch the surface at a speed, one of
+    /// Returns the speed of a hand's target at which its tip touches the surface at a speed, one of
     /// [`TAP_SPEEDS_M_S`].
     ///
     /// A normal or firm hand moves as it aims, but for the last of the three: it slows down

@@ -78,7 +78,7 @@ fn set(hz: u32, stiffness_n_per_mm: f64, grasp: Grasp, delay_s: f64, damping: Da
     }
 }
 
-/// What taps at a speed showed.
+/// Returns the results of taps at a speed.
 fn tapped(setting: Setting, speed_m_s: f64) -> Taps {
     let taps = setting.taps(speed_m_s).expect("in reach");
     taps.expect("it is held")
@@ -301,7 +301,13 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
         ["0.5", "6"].map(|stiffness| format!("1000,0.0,false,{},{stiffness}", grasp.name()))
     });
     assert_eq!(begins, wanted.concat());
-    let limit = |grasp| map.up_to((TickRate::DEFAULT, UNDAMPED, 1.0), grasp, Verdict::Hum);
+    let limit = |grasp| {
+        map.up_to(
+            (TickRate::DEFAULT, UNDAMPED, 1.0),
+            grasp,
+            Verdict::LimitCycle,
+        )
+    };
     assert_eq!(
         (limit(Grasp::Light), limit(Grasp::Firm)),
         (Some(0.5), Some(6.0))
@@ -313,8 +319,8 @@ fn a_table_has_every_trial_once_and_its_limits_are_the_last_that_held() {
 /// Stiffnesses that are tried while force comes in, N/mm.
 const ENTERED_N_PER_MM: [f64; 5] = [0.5, 1.0, 2.0, 3.0, 4.0];
 
-/// Holds every stiffness, in the ramp and while the clutch closes, to a table: ticks a second, and up
-/// to which stiffness force comes in well in the ramp, and through the clutch, N/mm.
+/// Holds every stiffness, in the ramp and while the clutch closes, to a table: ticks a second, and
+/// up to which stiffness force comes in well in the ramp, and through the clutch, N/mm.
 fn enters_up_to(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 4]) {
     for (hz, ramp, clutch) in table {
         for stiffness in ENTERED_N_PER_MM {

@@ -71,8 +71,8 @@ pub struct Trial {
 pub enum Verdict {
     /// The tip swings by no more than an encoder count.
     Still,
-    /// It swings: a hum.
-    Hum,
+    /// It swings: a limit cycle.
+    LimitCycle,
     /// It swings by more than a millimetre, or the guard has switched the force off.
     Unstable,
 }
@@ -83,7 +83,7 @@ impl Verdict {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Still => "still",
-            Self::Hum => "hum",
+            Self::LimitCycle => "limit cycle",
             Self::Unstable => "unstable",
         }
     }
@@ -95,7 +95,7 @@ impl Press {
     pub fn verdict(&self, count_mm: f64) -> Verdict {
         match *self {
             Self::Held { swing_mm, .. } if swing_mm <= count_mm => Verdict::Still,
-            Self::Held { swing_mm, .. } if swing_mm <= UNSTABLE_MM => Verdict::Hum,
+            Self::Held { swing_mm, .. } if swing_mm <= UNSTABLE_MM => Verdict::LimitCycle,
             Self::Held { .. } | Self::Tripped(_) => Verdict::Unstable,
         }
     }
@@ -183,7 +183,8 @@ impl Setting {
     }
 }
 
-/// How far and how often places of a second go to and fro along the axis where they do most.
+/// Returns the amplitude and frequency of the places of a second along the axis of the largest
+/// swing.
 fn swings(places_mm: &[[f64; 3]]) -> Press {
     let along = |axis: usize| {
         let coordinates = places_mm.iter().map(move |place| place[axis]);

@@ -17,7 +17,7 @@ use super::tick_counts::TickCounts;
 use super::way::{Way, Ways};
 use super::{CELL_MM, NotMeasured, RATES, SPEEDS, USUAL};
 
-/// What to measure.
+/// Case of a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Case {
     /// Name of the terrain.
@@ -26,9 +26,9 @@ pub(super) struct Case {
     pub(super) source: String,
     /// Place where the ways of the HIP are written down.
     pub(super) ways: String,
-    /// How the file is read.
+    /// Reading of the file.
     pub(super) reading: Reading,
-    /// What the server waits, ms.
+    /// Delay of the server, ms.
     pub(super) latency_ms: u32,
     /// Halvings in the search for the fastest speed.
     pub(super) halvings: u32,
@@ -37,7 +37,7 @@ pub(super) struct Case {
 }
 
 impl Case {
-    /// How a terrain is opened.
+    /// Returns the options of a terrain.
     pub(super) fn options(reading: Reading) -> OpenOptions {
         OpenOptions {
             most_in_memory_bytes: match reading {
@@ -123,8 +123,8 @@ struct Motion {
 }
 
 impl Bench<'_> {
-    /// Opens the file, touches it in real time, and where it is read in blocks moves over the straight
-    /// way once: what the row says of times, memory and traffic.
+    /// Opens the file, touches it in real time, and where it is read in blocks moves over the
+    /// straight way once: what the row says of times, memory and traffic.
     fn first(&self) -> Result<Row, NotMeasured> {
         let case = self.case;
         let meter = match case.is_remote() {
@@ -139,7 +139,7 @@ impl Bench<'_> {
         let opened = meter.traffic()?;
         let began = Instant::now();
         let terrain = terrain(&raster)?;
-        let scene = self.hand.scene(&terrain, Late::Underlay)?;
+        let scene = self.hand.scene(&terrain, Late::Fallback)?;
         let terrain = terrain.non_blocking();
         let pace = case.pace(Pace::Real);
         let mut chain = Chain::new(&terrain, scene, board, self.bytes_a_tick(), pace);
@@ -157,7 +157,7 @@ impl Bench<'_> {
         Ok(row)
     }
 
-    /// What is held, and what is missing.
+    /// Measures held and missing tiles.
     fn motions(&self, row: &mut Row) -> Result<(), NotMeasured> {
         let Ways { straight, turning } = self.ways;
         row.straight_cells = Some(straight.cells() as u32);
@@ -186,13 +186,13 @@ impl Bench<'_> {
         self.underlaid(row)
     }
 
-    /// What is coarse over an underlay, and whether it leaves a hole.
+    /// Measures ticks over a fallback, and holes.
     fn underlaid(&self, row: &mut Row) -> Result<(), NotMeasured> {
         let Ways { straight, turning } = self.ways;
-        let fastest = self.motion(straight, run::SPEEDS[1], Late::Underlay, false)?;
+        let fastest = self.motion(straight, run::SPEEDS[1], Late::Fallback, false)?;
         let mut holes = fastest.felt.missing;
         let mut coarse = |way, speed: u32| {
-            let felt = self.motion(way, speed.into(), Late::Underlay, false)?.felt;
+            let felt = self.motion(way, speed.into(), Late::Fallback, false)?.felt;
             holes += felt.missing;
             Ok::<_, NotMeasured>(Some(felt.coarse))
         };
@@ -206,7 +206,7 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// What the link carries in a tick of a millisecond.
+    /// Returns the bytes on the link in a tick of a millisecond.
     const fn bytes_a_tick(&self) -> usize {
         self.kb_per_s as usize
     }

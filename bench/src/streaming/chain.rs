@@ -44,7 +44,7 @@ pub(super) fn board() -> Board {
     )
 }
 
-/// A tile of the field that was sent; the one of its underlay does not count.
+/// A tile of the field that was sent; the one of its fallback does not count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SentTile {
     /// The tick in which the host put it onto the line.
@@ -53,7 +53,7 @@ pub(super) struct SentTile {
     pub(super) bytes: usize,
 }
 
-/// How fast ticks follow each other.
+/// Pace of the ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pace {
     /// No faster than a thousand a second.
@@ -77,7 +77,7 @@ pub(super) struct Chain<'t> {
     reader: Box<FrameReader<MAX_FRAME>>,
     /// Tiles so far.
     pub(super) tiles: Vec<SentTile>,
-    /// What the host spent on answering receptions that asked for tiles.
+    /// Time of the host for answers to requests for tiles.
     pub(super) host: Vec<Duration>,
 }
 
@@ -109,7 +109,7 @@ impl<'t> Chain<'t> {
         }
     }
 
-    /// How fast ticks follow each other from now on.
+    /// Sets the pace of the ticks from now on.
     pub(super) const fn set_pace(&mut self, pace: Pace) {
         self.pace = pace;
     }
@@ -119,7 +119,7 @@ impl<'t> Chain<'t> {
         self.now
     }
 
-    /// What went over the link so far.
+    /// Returns the statistics of the link.
     pub(super) const fn tally(&self) -> &LinkStats {
         self.client.tally()
     }
@@ -158,7 +158,7 @@ impl<'t> Chain<'t> {
         Ok(())
     }
 
-    /// What the device says in a tick.
+    /// Returns the bytes from the device in a tick.
     fn hear(&mut self) -> Vec<u8> {
         let mut heard = vec![0; self.line.bytes_a_tick()];
         let mut length = 0;

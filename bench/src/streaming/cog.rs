@@ -14,7 +14,7 @@ const DIRECTORY: u32 = 2 + 12 * TAGS as u32 + 4;
 /// Bytes before the first directory: the head, and the place on the ground.
 const HEAD: u32 = 8 + 9 * 8 + 20 * 2;
 
-/// Where each block is in the file, and how long.
+/// Position and length of each block in the file.
 type Stored = BTreeMap<Place, [u32; 2]>;
 
 /// An image of the file.
@@ -107,7 +107,7 @@ const GEO_KEYS: [u16; 20] = [
     1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32767, 3076, 0, 1, 9001,
 ];
 
-/// What precedes the directories; all of them say that the place is here.
+/// Returns the head before the directories; all of them say that the place is here.
 fn head() -> Vec<u8> {
     let mut bytes = b"II*\0".to_vec();
     bytes.extend(HEAD.to_le_bytes());

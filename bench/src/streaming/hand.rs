@@ -16,13 +16,13 @@ const DEPTH: f64 = 10.0;
 /// Height of the HIP above the surface before the first contact, cells.
 const ABOVE: f64 = 30.0;
 
-/// What is felt where a tile is late.
+/// Substitute for a late tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Late {
     /// Nothing: there is a hole.
     Hole,
-    /// The underlay of all that the arm reaches.
-    Underlay,
+    /// The fallback of all that the arm reaches.
+    Fallback,
 }
 
 /// A Premium 1.5 whose tip is led exactly where it is to be.
@@ -60,14 +60,14 @@ impl Hand {
         };
         Ok(match late {
             Late::Hole => scene,
-            Late::Underlay => {
+            Late::Fallback => {
                 let reach = Reach::of(&Calibration::PREMIUM_1_5);
                 terrain.underlaid(scene, reach.sides_mm())
             }
         })
     }
 
-    /// What the encoders read with the HIP below a place on the surface.
+    /// Returns the inputs with the HIP below a place on the surface.
     ///
     /// # Errors
     /// When the arm does not reach it.

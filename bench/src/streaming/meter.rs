@@ -7,13 +7,13 @@ use super::NotMeasured;
 /// Requests or reads, and bytes that they brought.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Traffic {
-    /// How many.
+    /// The number.
     pub(super) requests: u64,
-    /// What came.
+    /// Received bytes.
     pub(super) bytes: u64,
 }
 
-/// What is asked on standard output, and answered on standard input.
+/// Query on standard output, which is answered on standard input.
 pub(super) const QUESTION: &str = "seen?";
 
 /// Who counts what is read.
@@ -26,7 +26,7 @@ pub(super) enum Meter {
 }
 
 impl Meter {
-    /// What was read so far; `None` where nobody tells.
+    /// Returns the traffic of reads; `None` if it is unknown.
     ///
     /// # Errors
     /// When the process that started this one does not answer.

@@ -18,9 +18,9 @@ use super::server::Server;
 
 /// A file with no more samples than this is measured as a whole, too: 800 MB of them.
 const MAX_WHOLE: u64 = 200_000_000;
-/// What precedes a row on standard output of a case's process.
+/// Prefix of a row on standard output of a case's process.
 const ROW: &str = "row ";
-/// What precedes the reason why it ends.
+/// Prefix of the reason for its end.
 const WHY: &str = "why ";
 
 /// A terrain that is measured.
@@ -85,7 +85,8 @@ pub fn measure(
 /// The exponent of ten of the smallest made terrain.
 const SIDES_FROM: u32 = 6;
 
-/// Checks that the disk has room for a made terrain. Where the system does not tell, writing decides.
+/// Checks that the disk has room for a made terrain. Where the system does not tell, writing
+/// decides.
 fn room_for(path: &Path, side: u32) -> Result<(), NotMeasured> {
     let needed = cog::most_bytes(side);
     let folder = path.parent().unwrap_or(path);
@@ -229,7 +230,8 @@ fn answer(to: Option<&mut ChildStdin>, seen: Traffic) -> std::io::Result<()> {
     writeln!(to, "{} {}", seen.requests, seen.bytes)
 }
 
-/// Measures the case that a process was started for, and writes what comes of it to standard output.
+/// Measures the case that a process was started for, and writes what comes of it to standard
+/// output.
 ///
 /// # Errors
 /// When the case is not understood; what goes wrong with it is written.

@@ -20,7 +20,7 @@ const LEAST: u32 = 200;
 /// The turning way turns by a right angle after so many cells: less than what a HIP of 2,000
 /// cells a second covers in the time that the device looks ahead.
 const LEG: u32 = 150;
-/// What the ways are called where they are written down.
+/// Names of the paths in files.
 const NAMES: [&str; 2] = ["straight", "turning"];
 
 /// Places on the surface, a cell apart along the way.

@@ -12,8 +12,8 @@ const TABLE: &str = "bench/instructions-m4f.csv";
 /// [`LEEWAY`] instructions: another compiler may take a few.
 const TOLERANCE: f64 = 0.05;
 const LEEWAY: f64 = 10.0;
-/// What a unit of work costs is told over ticks that spent at least so many: in
-/// shorter ones what every tick takes would count as much as the units.
+/// Minimum work of the ticks from which the cost of a unit is computed: in shorter ones what every
+/// tick takes would count as much as the units.
 const UNITS: u32 = 8;
 /// The shares of the ticks that take no more.
 const SHARES: [f64; 3] = [0.5, 0.99, 1.0];
@@ -34,7 +34,7 @@ const COLUMNS: [&str; 12] = [
     "tick of worst",
 ];
 
-/// What was set as a target, instructions a tick.
+/// Target, instructions a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Target {
     /// For the usual tick.
@@ -45,7 +45,7 @@ pub(crate) struct Target {
     pub(crate) max: Option<u32>,
 }
 
-/// What one tick cost.
+/// Cost of one tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick {
     /// Instructions, the call and the return included.
@@ -66,7 +66,7 @@ pub(crate) struct Row {
     pub(crate) state: String,
     /// Instructions: median, 99th percentile, most.
     pub(crate) counts: [u32; 3],
-    /// What they were meant to be.
+    /// Targets.
     target: [Option<u32>; 3],
     /// The ticks with the least and the most instructions a unit of work.
     per_unit: Option<[Tick; 2]>,

@@ -114,7 +114,7 @@ impl Budget {
         self.limit.saturating_sub(self.spent) / 4 * 3
     }
 
-    /// Units spent so far.
+    /// Spent units.
     pub(super) const fn spent(&self) -> u32 {
         self.spent
     }

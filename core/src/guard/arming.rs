@@ -21,7 +21,7 @@ pub(crate) const FADE_MS: u32 = 100;
 /// The force that counts as small, N.
 pub const SMALL_FORCE_N: f32 = 0.2;
 
-/// Outcome of the arm commands so far.
+/// Outcome of the arm commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Decision {
     /// Arm commands decided, wrapping.

@@ -1,4 +1,4 @@
-//! Outputs held at given values with the amplifiers off, so that somebody with a meter
+//! Outputs held at given values with the amplifiers off, so that a user with a meter
 //! can see what a board puts out before anything can move.
 
 use glam::Vec3;

@@ -98,7 +98,7 @@ impl Guard {
             let excess = (load / allowed_a).max_element();
             (wanted_a / excess).clamp(-allowed_a, allowed_a)
         };
-        // An amplifier may give more than it was told to, which only a monitor tells.
+        // An amplifier may give more than its command, which only a monitor shows.
         self.motors.heat(match self.feedback.has_monitors() {
             true => self.currents_a.abs().max(self.feedback.measured_a()),
             false => self.currents_a,

@@ -10,6 +10,7 @@
 //! be armed. The steps from off to on and back are in [`Mode`].
 
 mod arming;
+mod checks;
 mod fault;
 mod feedback;
 mod flags;
@@ -20,7 +21,6 @@ mod mode;
 mod speed;
 mod stall;
 pub mod thermal;
-mod watch;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -310,7 +310,7 @@ impl Guard {
         self.stop();
     }
 
-    /// Clears the fault as [`Self::clear`] does if it is the one that somebody has seen.
+    /// Clears the fault as [`Self::clear`] does if it is the one that the user has seen.
     pub fn clear_seen(&mut self, seen: Option<Fault>) {
         if self.fault.is_none() || self.fault == seen {
             self.clear();

@@ -8,7 +8,7 @@ use std::vec::Vec;
 use super::*;
 use crate::phantom::Calibration;
 
-/// A guard and what it is told.
+/// A guard and its inputs.
 struct Bench {
     guard: Guard,
     mechanism: Kinematics,

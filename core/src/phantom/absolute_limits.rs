@@ -4,7 +4,7 @@
 //! motor that bears 20 A or that never warms, and the protection would be gone. So the
 //! numbers on which a person's hand and the motors depend are held to those of the
 //! model's preset, on the side that is dangerous. A record may be more careful, never
-//! less. Somebody whose motors bear more changes the presets and builds the firmware.
+//! less. Users of stronger motors change the presets and build the firmware.
 //!
 //! [`Calibration::validate`] asks for all of it but the board's, so it holds wherever a
 //! record is taken, stored or found.
@@ -36,7 +36,7 @@ const ROUNDING: f32 = 1e-4;
 
 impl Calibration {
     /// Checks that the record stays within its model's ceilings.
-    pub(super) fn check_ceilings(&self) -> Result<(), CalibrationError> {
+    pub(super) fn check_absolute_limits(&self) -> Result<(), CalibrationError> {
         let preset = self.model.preset();
         let (mine, theirs) = (&self.thermal, &preset.thermal);
         let (peak, continuous) = (self.peak_current_a, self.continuous_current_a);

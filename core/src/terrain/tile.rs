@@ -28,7 +28,7 @@ pub enum TileError {
     Step,
 }
 
-/// What a buffer holds.
+/// Content of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Content {
     /// No tile.

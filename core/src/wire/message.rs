@@ -40,7 +40,7 @@ pub enum ToDevice<'a> {
     Request {
         /// Tells requests of a session apart: one more than the last, wrapping.
         number: u8,
-        /// What is to be done.
+        /// The requested action.
         request: Request,
     },
     /// Asks for a [`ToHost::Status`].
@@ -111,7 +111,7 @@ pub enum ToHost {
     Status {
         /// The question's number.
         number: u8,
-        /// How the device is.
+        /// Status of the device.
         status: Status,
     },
     /// Answers [`ToDevice::GetCalibration`].
@@ -161,7 +161,7 @@ pub enum ToHost {
 pub struct Telemetry {
     /// Number of the first sample.
     pub first: u32,
-    /// Samples of this session that the device itself dropped so far because the
+    /// Samples of this session that the device itself dropped because the
     /// link was slow.
     pub dropped: u32,
     /// The samples.

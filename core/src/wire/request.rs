@@ -31,7 +31,7 @@ pub enum Request {
         /// The record.
         calibration: Calibration,
     },
-    /// To store the calibration in force in the device's memory, once somebody has
+    /// To store the calibration in force in the device's memory, once the user has
     /// pressed the dead-man switch, which no host can. Only while disarmed. Answered when
     /// it is stored.
     StoreCalibration,
@@ -90,7 +90,7 @@ pub enum Refusal {
     /// The device still works on the last request of this kind.
     #[error("the device is still busy with the last request of this kind")]
     Busy,
-    /// Nobody pressed the dead-man switch within [`PRESS_MS`].
+    /// The user did not press the dead-man switch within [`PRESS_MS`].
     ///
     /// [`PRESS_MS`]: super::status::PRESS_MS
     #[error("the dead-man switch was not pressed: the calibration is in use but not stored")]

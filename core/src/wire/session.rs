@@ -37,7 +37,7 @@ pub struct InSession<M> {
 /// Number of samples in a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleCount {
-    /// Samples that were put into messages and given to the line so far.
+    /// Number of samples that were put into messages and given to the line.
     pub sent: u32,
     /// Samples that the device itself dropped because the line was slow.
     pub dropped: u32,

@@ -131,7 +131,7 @@ pub struct TickFigures {
     pub run: u32,
     /// The last tick's cost.
     pub cost: u32,
-    /// The costliest so far.
+    /// Maximum cost.
     pub worst_cost: u32,
     /// Ticks that began or ended too late.
     pub late: u32,
@@ -142,7 +142,7 @@ pub struct TickFigures {
 pub struct StackFigures {
     /// Its size.
     pub size: u32,
-    /// Largest use so far.
+    /// Maximum use.
     pub high_water: u32,
 }
 

@@ -1,4 +1,4 @@
-//! The end of the program, told to the host through semihosting.
+//! The end of the program, reported to the host through semihosting.
 
 use core::fmt;
 

@@ -1,5 +1,5 @@
 //! The end of the program. The chip resets itself, and QEMU ends there (`-no-reboot`).
-//! What went wrong is told on UART2 before; after a good end nothing was.
+//! What went wrong is reported on UART2 before; after a good end nothing was.
 //!
 //! Semihosting could end the program, too, with an exit code. It could as well read and
 //! write every file of the host, so QEMU runs without it.
@@ -19,7 +19,7 @@ pub(crate) fn done() -> ! {
 pub(crate) fn failed(why: fmt::Arguments<'_>) -> ! {
     let uart = report_uart();
     uart.enable(Uart::ENABLE);
-    // Where nobody listens the program ends all the same.
+    // Without a reader the program ends all the same.
     let _ = writeln!(Report(uart), "{why}");
     SCB::sys_reset()
 }

@@ -43,7 +43,7 @@ impl Uart {
     pub(crate) const RX_INTERRUPT: u32 = 1 << 3;
     pub(crate) const SENT: u32 = 1 << 0;
     pub(crate) const RECEIVED: u32 = 1 << 1;
-    /// Register reads that a byte may take; then nobody is listening.
+    /// Register reads that a byte may take; then there is no reader.
     const PATIENCE: u32 = 1_000_000;
 
     /// Turns the port on, with what `control` says of halves and interrupts.
@@ -53,7 +53,7 @@ impl Uart {
         self.control.set(control);
     }
 
-    /// Sends a byte without any interrupt, or gives up where nobody takes it.
+    /// Sends a byte without any interrupt, or gives up if it is not read.
     pub(crate) fn send(&self, byte: u8) {
         for _ in 0..Self::PATIENCE {
             if self.state.get() & Self::TX_FULL == 0 {

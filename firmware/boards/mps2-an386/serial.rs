@@ -57,7 +57,7 @@ impl Serial {
         self.sent.signal(());
     }
 
-    /// Whether the receive interrupt is let through.
+    /// Enables or disables the receive interrupt.
     fn listen(&self, on: bool) {
         let control = &(self.uart)().control;
         let others = control.get() & !Uart::RX_INTERRUPT;

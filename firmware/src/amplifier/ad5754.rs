@@ -45,7 +45,7 @@ pub trait FrameBus {
     /// (mode 1), at 30 MHz at most; what it sends is valid 40 ns after the rising edge,
     /// so a frame has 10 MHz at most.
     ///
-    /// A failure is not told here: the bus reports it through
+    /// A failure is not reported here: the bus reports it through
     /// [`GuardInputs::hardware_failed`](crate::board::GuardInputs), which switches off.
     fn send(&mut self, frame: [u8; 3]) -> [u8; 3];
 

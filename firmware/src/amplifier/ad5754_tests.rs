@@ -21,7 +21,7 @@ struct Part {
     asked: u16,
     /// Nothing comes back.
     is_silent: bool,
-    /// What was told last.
+    /// Last reported state.
     as_set: bool,
     paused_us: u32,
 }

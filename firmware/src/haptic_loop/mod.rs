@@ -88,7 +88,7 @@ where
         }
     }
 
-    /// Gives access to the board's encoders, for whoever sets them from outside.
+    /// Gives access to the board's encoders, for a caller that sets them.
     pub fn encoders_mut(&mut self) -> &mut E {
         &mut self.encoders
     }

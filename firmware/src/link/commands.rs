@@ -34,7 +34,7 @@ impl<'t, const D: usize> Link<'t, D> {
                 | Command::Trip(_)
         );
         self.commands_taken = false;
-        // It finds its place: nobody else fills the queue, and each place is found once.
+        // There is room: this is the queue's only producer, and each place is found once.
         let taken = self.ends.commands.enqueue(command);
         debug_assert!(taken.is_ok());
     }

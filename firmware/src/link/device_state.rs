@@ -1,5 +1,5 @@
 //! The link's knowledge of the device (its arm, calibration and last start), and
-//! what of it the host has yet to be told.
+//! the parts that are not reported yet.
 
 use hapterra_core::guard::{Blockers, Fault, Limits, Mode, Report};
 use hapterra_core::phantom::{Calibration, Kinematics};
@@ -20,7 +20,7 @@ use crate::press::PressWait;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Storing {
     No,
-    /// Somebody has to press the dead-man switch.
+    /// The user has to press the dead-man switch.
     Waiting(PressWait),
     /// The calibration waits for the board.
     Wanted,
@@ -49,7 +49,7 @@ pub(crate) struct DeviceState {
     full_scale_a: f32,
     /// The loop's latest report.
     pub(super) health: Health,
-    /// The guard's report that the host was last told.
+    /// The last report of the guard to the host.
     told: Option<Report>,
     /// The loop was given a command that may lead to driving, and has not reported
     /// since that it is disarmed.
@@ -101,7 +101,7 @@ impl DeviceState {
         }
     }
 
-    /// A session begins: its host has been told nothing.
+    /// A session begins: nothing is reported to its host yet.
     pub(super) fn session_opened(&mut self) {
         self.told = None;
         self.arming = None;
@@ -265,7 +265,7 @@ impl DeviceState {
         answer.or_else(|| self.guard_changed().map(ToHost::Guard))
     }
 
-    /// Whether the loop has decided about the arm command that waits.
+    /// Reads the loop's decision on the pending arm command.
     fn look_at_decision(&mut self) {
         let decision = self.health.report.decision;
         if self.arming.is_none_or(|before| before == decision.count) {

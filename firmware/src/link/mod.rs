@@ -23,6 +23,7 @@
 
 mod commands;
 mod device_state;
+mod host_timeout;
 mod loader;
 mod log;
 mod materials;

@@ -72,7 +72,7 @@ impl<const D: usize> Link<'_, D> {
             self.device.take_health(health, self.ends.monitor.ticks());
             self.device.may_drive &= !(follows && health.report.mode == Mode::Disarmed);
             let is_refused = self.scene.is_some_and(|scene| Some(scene.epoch) != epoch);
-            // A scene that this link took and the loop did not is nobody's.
+            // A scene that the link accepted and the loop refused is dropped.
             if follows
                 && is_refused
                 && let Some(room) = self.room_for_command()
@@ -85,31 +85,6 @@ impl<const D: usize> Link<'_, D> {
                 return;
             };
             self.say(&message);
-        }
-    }
-
-    /// Disarms where the host has been silent for too long, and ends its session. What waits
-    /// for a press of the dead-man switch waits no longer than the host is there.
-    fn watch_host(&mut self) {
-        let now = self.ends.monitor.ticks();
-        let waits = self.device.is_being_armed() || self.device.waits_for_press();
-        if waits
-            && let Some(room) = self.room_for_command()
-            && self.session.is_absent(now, self.device.ticks_per_ms())
-        {
-            log::forsaken();
-            self.device.give_up_press();
-            self.command(room, Command::Disarm);
-        }
-        if !self.session.is_forsaken(now) || !self.device.may_drive {
-            return;
-        }
-        if let Some(room) = self.room_for_command() {
-            log::forsaken();
-            self.command(room, Command::Disarm);
-            self.forget_conversation();
-            self.forsake_clutch();
-            self.session.end_silent();
         }
     }
 

@@ -118,7 +118,7 @@ impl<const D: usize> Link<'_, D> {
         Progress::Done(match *request {
             Request::EnterLoader => self.want_loader(room),
             _ if self.is_leaving() => Err(Refusal::Busy),
-            // While the board stores, nobody polls this link.
+            // While the board stores, this link is not polled.
             Request::Arm | Request::Jog(_) if self.to_store().is_some() => Err(Refusal::Busy),
             Request::Arm => {
                 self.device.arming = Some(self.device.health.report.decision.count);

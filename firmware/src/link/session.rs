@@ -40,7 +40,7 @@ pub(super) enum SessionState {
     Gone,
 }
 
-/// What a hello means.
+/// Meaning of a hello.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Greeting {
     /// A session begins.

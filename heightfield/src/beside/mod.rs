@@ -107,7 +107,7 @@ fn on_disk(
     found.map(open).transpose()
 }
 
-/// The first of some URLs at which there is a file. Where that cannot be told, the file that
+/// The first of some URLs at which there is a file. If that cannot be determined, the file that
 /// has them as neighbours cannot be read: a mask that is not known of would be felt.
 fn elsewhere(
     own: &str,

@@ -1,4 +1,4 @@
-//! What is made or read while somebody is served who must not wait: a queue of what is wanted,
+//! Work in the background for readers that must not wait: a queue of requests,
 //! for one thread.
 
 use std::collections::{HashSet, VecDeque};
@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::cache::Key;
 
 /// Jobs that wait, at most: more than the blocks that a coarse tile touches (33 × 33). The
-/// one that waits longest goes, and is wanted again by whoever still needs it.
+/// one that waits longest goes, and is requested again if it is still needed.
 const MOST: usize = 2048;
 
 /// Something to be done in the background.

@@ -8,7 +8,7 @@ use super::Block;
 
 /// Blocks of a terrain are kept until they take more than this, bytes.
 pub(super) const MAX_BYTES: usize = 64 << 20;
-/// What a hole takes, and a block besides its samples, bytes: about.
+/// Memory of a hole, and of a block besides its samples, bytes: about.
 const ENTRY_BYTES: usize = 128;
 
 /// Names a block of a file.

@@ -80,7 +80,7 @@ impl Held {
     }
 }
 
-/// What is known of a coarse sample.
+/// State of a coarse sample.
 #[derive(Debug, PartialEq)]
 pub(super) enum Found {
     /// Its stored value; NaN in a hole.
@@ -143,7 +143,7 @@ impl Coarse {
         &self.images
     }
 
-    /// What is known of a sample of an image.
+    /// Returns the state of a sample of an image.
     pub(super) fn sample(&mut self, image: usize, [column, row]: [u32; 2]) -> Found {
         let (key, index) = place(image, [column, row]);
         match self.pieces.get(&key) {

@@ -28,7 +28,7 @@ fn value(column: u32, row: u32) -> f64 {
     }
 }
 
-/// What is known of the reader from outside.
+/// State of the reader, visible from outside.
 #[derive(Clone)]
 struct Seen {
     reads: Arc<AtomicU64>,

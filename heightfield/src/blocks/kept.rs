@@ -1,5 +1,4 @@
-//! What is known of blocks without reading: those in memory, those that are not here yet, and
-//! what went wrong.
+//! State of blocks without reading: those in memory, those that are not here yet, and errors.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -14,14 +13,14 @@ const AGAIN: Duration = Duration::from_millis(20);
 /// Blocks that are known to be on their way, at most.
 const MAX_AWAITED: usize = 1024;
 
-/// What is known of the blocks of a file.
+/// State of the blocks of a file.
 pub(super) struct Kept {
     pub(super) cache: Cache,
     /// Blocks that could not be read.
     pub(super) unread: u32,
     /// Blocks that are not here yet, and when they were looked for.
     awaited: HashMap<Key, Instant>,
-    /// What the line said last.
+    /// Last error of the connection.
     pub(super) outage: Option<RasterError>,
 }
 
@@ -41,7 +40,7 @@ impl Kept {
         Self { unread, ..self }
     }
 
-    /// What is known of a block: it is in memory, or it is not here yet, and was looked for a
+    /// Returns the state of a block: it is in memory, or it is not here yet, and was looked for a
     /// moment ago.
     pub(super) fn known(&mut self, key: &Key) -> Option<Result<Option<Arc<Block>>, NotHere>> {
         if let Some(block) = self.cache.get(key) {

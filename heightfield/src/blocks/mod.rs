@@ -61,20 +61,20 @@ pub(super) struct Blocks {
     threads: OnceLock<Option<[JoinHandle<()>; 2]>>,
 }
 
-/// What the one who reads and the threads in the background share.
+/// State that the reader and the threads in the background share.
 pub(super) struct Shared {
     reader: Box<dyn BlockReader>,
     /// The reader's images, and coarse ones that are made of them.
     images: Vec<BlockImage>,
     /// Is not held while a block is read.
     kept: Mutex<Kept>,
-    /// Is held by whoever reads a block for somebody who waits for it.
+    /// Held by a thread that reads a block for a waiting reader.
     turn: Mutex<()>,
     coarse: Mutex<Coarse>,
     disk: DiskCache,
-    /// What is coarse.
+    /// Queue for coarse samples.
     queue: Queue,
-    /// What is fine, which is wanted at once.
+    /// Queue for fine samples, which are needed at once.
     fine: Queue,
     /// Blocks that were read from the file.
     read: AtomicU64,
@@ -233,7 +233,7 @@ impl Shared {
         (kept.cache.bytes(), kept.unread)
     }
 
-    /// Blocks that were read from the file so far.
+    /// Number of blocks that were read from the file.
     pub(super) fn blocks_read(&self) -> u64 {
         self.read.load(Ordering::Relaxed)
     }
@@ -249,7 +249,7 @@ impl Shared {
         !self.fine.is_idle()
     }
 
-    /// What the line said last, where something did not come.
+    /// Returns the last error of the connection, if a block is missing.
     pub(super) fn take_outage(&self) -> Option<RasterError> {
         self.kept().outage.take()
     }

@@ -43,14 +43,14 @@ pub(crate) trait BlockReader: Send + Sync {
     /// A hash of the file's index: where each block is stored and in how many bytes.
     fn index(&self) -> u64;
 
-    /// What is looked at when the raster is opened; `None` for its coarsest image.
+    /// Returns the places that are read when the raster is opened; `None` for its coarsest image.
     fn looks(&self) -> Option<Looks> {
         None
     }
 
-    /// What tells the samples of a part from those of every other file, and of the same file
-    /// in another state: what is kept on disk is named by it. `None` where that is not known,
-    /// or the file was written a moment ago; nothing is kept then.
+    /// Returns the stamp of the samples of a part, which names them in the disk cache: it differs
+    /// for every other file, and for another state of the same file. `None` if that is unknown, or
+    /// the file was written a moment ago; nothing is cached then.
     fn stamp(&self, image: usize, part: &Part) -> Option<String> {
         let _ = (image, part);
         None
@@ -122,7 +122,7 @@ impl Part {
         }
     }
 
-    /// What of it is within another part, of which it has something.
+    /// Returns the intersection with another part, which must not be empty.
     pub(crate) fn within(&self, other: &Self) -> Self {
         let cut = |first: u32, count: u32, from: u32, most: u32| {
             let begin = first.max(from);
@@ -146,7 +146,7 @@ impl BlockImage {
         [self.columns.div_ceil(across), self.rows.div_ceil(down)]
     }
 
-    /// What a block covers.
+    /// Returns the part that a block covers.
     pub(crate) fn part(&self, [across, down]: [u32; 2]) -> Part {
         let [column, row] = [across * self.block[0], down * self.block[1]];
         Part {

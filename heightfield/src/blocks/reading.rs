@@ -19,7 +19,7 @@ const AHEAD: usize = 16;
 /// Blocks that are read ahead of the hand at once, at most.
 const MAX_PREFETCHED: usize = 16;
 
-/// What came of reading a part of an image.
+/// Result of reading a part of an image.
 pub(super) struct Read {
     /// `None` where there is no sample.
     pub(super) block: Option<Arc<Block>>,

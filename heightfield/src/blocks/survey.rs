@@ -38,7 +38,7 @@ impl Survey {
     }
 }
 
-/// What of a raster is looked at when it is opened.
+/// Places of a raster that are read when it is opened.
 #[derive(Debug)]
 pub(crate) struct Looks {
     /// The image to look at.
@@ -47,7 +47,7 @@ pub(crate) struct Looks {
     pub(crate) parts: Vec<Part>,
 }
 
-/// What was looked at so far.
+/// Places that have been read.
 struct Seen {
     hasher: XxHash64,
     summary: HeightSummary,

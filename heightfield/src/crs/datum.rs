@@ -88,7 +88,7 @@ impl Datum {
         self.meridian
     }
 
-    /// What longitudes and latitudes are.
+    /// Returns the kind of longitudes and latitudes.
     pub(super) fn lonlat(&self) -> LonLat<'_> {
         let name = self.name.as_str();
         match &self.shift {

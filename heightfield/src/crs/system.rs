@@ -8,8 +8,7 @@ use super::wkt::Node;
 use super::{Globe, Vertical, by_gdal, definition};
 use crate::tangents::Tangents;
 
-/// Where a map's units are shorter or longer than this on the ground, the place is
-/// outside of what the projection is for.
+/// Lengths of a map's unit on the ground within the area of the projection.
 const SENSIBLE: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
 
 /// Units that differ by less than this are one.
@@ -238,8 +237,8 @@ impl ReferenceSystem {
         self.datum.as_ref().map_or(0.0, Datum::meridian)
     }
 
-    /// Returns the vectors on the ground of a unit of a projected system's x and y at a place in its
-    /// units: a map's scale and its angles are true in few places. Its formulas are asked
+    /// Returns the vectors on the ground of a unit of a projected system's x and y at a place in
+    /// its units: a map's scale and its angles are true in few places. Its formulas are asked
     /// [`STEP_M`] to both sides.
     pub(crate) fn tangents(&self, (x, y): (f64, f64)) -> Option<Tangents> {
         let Unit::Length(metres) = self.unit else {

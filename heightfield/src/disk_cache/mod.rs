@@ -62,7 +62,7 @@ struct Folder {
 }
 
 impl DiskCache {
-    /// Bytes that all records take at most unless somebody states it, in units of 2²⁰.
+    /// Bytes that all records take at most unless the user states it, in units of 2²⁰.
     pub const MAX_MB: u32 = 1024;
 
     /// Keeps nothing.

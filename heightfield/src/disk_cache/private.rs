@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{Error, Result};
 use std::path::Path;
 
-/// Makes a folder, and those above it, in which nobody else may look: a file of a server may have
+/// Makes a folder, and those above it, in which other users may not look: a file of a server may have
 /// been opened with a key.
 pub(super) fn make(folder: &Path) -> Result<()> {
     let mut builder = fs::DirBuilder::new();
@@ -15,7 +15,7 @@ pub(super) fn make(folder: &Path) -> Result<()> {
     builder.create(folder)
 }
 
-/// Checks that a folder is the user's own, is no link, and that nobody else may write in it.
+/// Checks that a folder is the user's own, is no link, and that other users may not write in it.
 ///
 /// # Errors
 /// There is none ([`std::io::ErrorKind::NotFound`]), or what is wrong with it and what to do.

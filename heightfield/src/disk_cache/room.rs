@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 const PIECE: u64 = 4096;
 /// Beginning of the name of an incomplete record.
 pub(super) const UNFINISHED: &str = ".new-";
-/// Nobody takes longer to write one: then its program was killed.
+/// No program takes longer to write one: then it was killed.
 const LEFT_BEHIND: Duration = Duration::from_secs(3600);
 
 /// Knowledge of a folder's size.

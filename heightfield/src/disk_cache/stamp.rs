@@ -48,7 +48,7 @@ impl FileStamp {
     }
 }
 
-/// When the file's entry was changed, which nobody sets, and where it is on which disk.
+/// When the file's entry was changed, which no program sets, and where it is on which disk.
 #[cfg(unix)]
 fn numbers(metadata: &Metadata) -> String {
     use std::os::unix::fs::MetadataExt;

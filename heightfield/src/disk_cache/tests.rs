@@ -134,7 +134,7 @@ fn two_that_write_and_read_the_same_records_at_once_see_whole_ones() {
                         assert_eq!(found, bytes((round + 20) % 40));
                     }
                     if round % 100 == 99 {
-                        // Somebody deletes it meanwhile.
+                        // Another program deletes it meanwhile.
                         let _ = fs::remove_dir_all(folder.path().join(FORM));
                     }
                 }

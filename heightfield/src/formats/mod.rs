@@ -13,7 +13,7 @@ mod tiff;
 
 use super::format::{Claim, Format};
 
-/// All formats that are told by their content or their extension; the first that
+/// All formats that are recognised by their content or their extension; the first that
 /// fits decides. Raw samples are not among them: only the user knows those.
 pub(super) const FORMATS: [Format; 6] = [
     tiff::FORMAT,

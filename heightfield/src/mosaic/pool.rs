@@ -156,7 +156,7 @@ pub(super) fn options_for_tiles(options: &OpenOptions) -> OpenOptions {
     }
 }
 
-/// Opens a file in a thread of its own, which nobody waits for any more after a time: a disk of
+/// Opens a file in a thread of its own, which is abandoned after a time: a disk of
 /// another computer may never answer. Requests to servers have times of their own.
 fn in_time<T: Send + 'static>(
     source: &Source,

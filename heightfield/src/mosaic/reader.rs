@@ -190,7 +190,7 @@ impl BlockReader for Mosaic {
             if places.is_empty() {
                 continue;
             }
-            // Only while it is opened: whoever else reads does not wait for all of this.
+            // Only while it is opened: other readers do not wait for all of this.
             let opened = self.opened(number, source)?;
             if let Some(opened) = &opened {
                 filling.fill(image as u8, source, opened, &places)?;

@@ -1,4 +1,4 @@
-//! What stands for remote files where they are left out of the build.
+//! Substitute for remote files in a build without them.
 
 use std::io::{Error, ErrorKind, Result};
 use std::ops::Range;

@@ -31,7 +31,7 @@ struct Shared {
     answered: Condvar,
 }
 
-/// What is known of a URL.
+/// State of a URL.
 #[derive(Clone)]
 enum Known {
     OnItsWay,
@@ -100,7 +100,7 @@ impl RemoteFetcher {
         self.0.line.set_disk_cache(disk);
     }
 
-    /// The terrain is open: from now on what goes wrong is told.
+    /// The terrain is open: from now on errors are reported.
     pub(crate) fn touch(&self) {
         self.0.line.touch();
     }

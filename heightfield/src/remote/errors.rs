@@ -1,4 +1,4 @@
-//! What an error of `object_store`'s means, in a line that a user can act on.
+//! Messages for errors of `object_store`, in a line that a user can act on.
 
 use std::io::{Error, ErrorKind};
 
@@ -12,8 +12,8 @@ use crate::shown::shown;
 /// No answer of a server is shown at more length than this, characters.
 const SHOWN: usize = 300;
 
-/// Where a computer of Amazon's, Google's or Microsoft's asks for a key of its own: parts of
-/// URLs. There is nobody on other computers.
+/// Parts of the URLs at which a virtual machine of Amazon, Google or Microsoft requests its own
+/// key. Other computers have no such server.
 const KEYS_OF_COMPUTERS: [&str; 4] = [
     "/latest/api/token",
     "/latest/meta-data/",
@@ -33,7 +33,7 @@ pub(super) fn is_without_ranges(error: &StoreError) -> bool {
     text.contains("Range request not supported") || text.contains("non-partial response")
 }
 
-/// What is wrong with a URL or with what the environment says.
+/// Returns the error for a wrong URL or a wrong environment variable.
 pub(super) fn wrong(error: &dyn std::error::Error) -> Error {
     let text = error.to_string();
     let why = match text.contains("Account must be specified") {
@@ -43,8 +43,8 @@ pub(super) fn wrong(error: &dyn std::error::Error) -> Error {
     Error::new(ErrorKind::InvalidInput, why)
 }
 
-/// What a server's answer means where a file is opened: what the environment lacks shows
-/// here first.
+/// Returns the error for a server's answer at opening: missing environment variables show here
+/// first.
 pub(super) fn at_opening(error: &StoreError) -> Error {
     let wrong = |why: String| Error::new(ErrorKind::InvalidInput, why);
     let text = match error {
@@ -72,7 +72,7 @@ pub(super) fn at_opening(error: &StoreError) -> Error {
     told(error)
 }
 
-/// What a server's answer means.
+/// Returns the error for a server's answer.
 pub(super) fn told(error: &StoreError) -> Error {
     if let Some(why) = redirect_error(error) {
         return Error::new(ErrorKind::Unsupported, why.to_string());
@@ -164,7 +164,7 @@ fn with_cause(error: &StoreError) -> String {
     }
 }
 
-/// On one line, without keys, and not more of it than somebody reads.
+/// On one line, without keys, and not more of it than a user reads.
 fn in_short(text: &str) -> String {
     // The library's name for a server, of which the user has a URL.
     let named = text.strip_prefix("Generic ");

@@ -73,7 +73,7 @@ impl RemoteFile {
         }
     }
 
-    /// What tells the file in the state in which it was opened from others; `None` where its
+    /// Returns the stamp of the file in the state in which it was opened; `None` where its
     /// server tells neither tag nor time.
     pub(crate) fn stamp(&self) -> Option<FileStamp> {
         self.object.stamp().map(FileStamp::of_text)
@@ -110,7 +110,7 @@ impl RemoteFile {
         let bytes = self.fetched(pages.clone()).await?;
         let run = joined(&found, &gap, &bytes);
         let disk = kept.clone();
-        // Nobody waits for that.
+        // No reader waits for that.
         self.background
             .spawn_blocking(move || disk.put(pages, &bytes));
         Ok(run)
@@ -216,7 +216,7 @@ impl RemoteFile {
         self.line.arrived.notify_all();
     }
 
-    /// Notes what is wrong, and tells the user where nobody else does: while a
+    /// Notes what is wrong, and reports it if the caller does not: while a
     /// terrain is opened, whoever opens it does.
     fn note(&self, held: &mut Held, why: &Error) {
         let name = &self.name;

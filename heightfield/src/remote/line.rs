@@ -1,4 +1,4 @@
-//! What all remote files of a terrain share: the pages and the turns of their requests.
+//! State that all remote files of a terrain share: the pages and the turns of their requests.
 
 use std::collections::HashMap;
 use std::io::{Error, Result};
@@ -27,11 +27,11 @@ pub(super) struct Line {
     pub(super) arrived: Condvar,
 }
 
-/// What is here of all files.
+/// Pages of all files in memory.
 #[derive(Default)]
 pub(super) struct Held {
     pub(super) pages: Pages,
-    /// What is wrong with files, by their numbers.
+    /// Errors of files, by their numbers.
     pub(super) troubles: HashMap<u64, Trouble>,
 }
 
@@ -62,7 +62,7 @@ impl Line {
         self.files.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// What is here.
+    /// Returns the pages in memory.
     pub(super) fn held(&self) -> MutexGuard<'_, Held> {
         // Nothing that panics runs while this is held.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
@@ -73,12 +73,12 @@ impl Line {
         let _ = self.disk.set(disk.clone());
     }
 
-    /// Where pages are kept for another run, where they are.
+    /// Returns the disk cache of pages, if there is one.
     pub(super) fn disk(&self) -> Option<&DiskCache> {
         self.disk.get().filter(|disk| disk.is_on())
     }
 
-    /// The terrain is open: from now on what goes wrong is told.
+    /// The terrain is open: from now on errors are reported.
     pub(super) fn touch(&self) {
         self.is_touched.store(true, Ordering::Relaxed);
     }
@@ -94,7 +94,7 @@ impl Line {
     }
 }
 
-/// What fetches, for the whole program and as long as that runs.
+/// Returns the runtime that fetches, for the whole program and its lifetime.
 ///
 /// # Errors
 /// Where the system has no thread for it.

@@ -34,7 +34,7 @@ pub(super) enum RedirectError {
     TooMany,
 }
 
-/// Returns true if a request opens more than anybody could: by a header, a password, or what
+/// Returns true if a request opens more than a public one could: by a header, a password, or what
 /// follows the path of its URL.
 pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
     let may_be_key = |name: &HeaderName| !WITHOUT_KEY.contains(&name.as_str());
@@ -42,7 +42,7 @@ pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
     in_url || headers.keys().any(may_be_key)
 }
 
-/// Where a redirect leads to.
+/// Returns the target of a redirect.
 ///
 /// # Errors
 /// Why it is not followed.

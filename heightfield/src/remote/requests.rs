@@ -1,4 +1,4 @@
-//! How requests are made: redirects are followed by the rules of `redirects`, and answers that are
+//! Requests: redirects are followed by the rules of `redirects`, and answers that are
 //! no files are cut, because the library would keep an endless error page until memory ends.
 
 use std::future::Future;

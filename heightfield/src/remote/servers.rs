@@ -48,7 +48,7 @@ pub(super) fn at(url: &str) -> Result<(Server, Path)> {
     Ok((made, path))
 }
 
-/// What of a URL is the server's, with the key that stands behind the path, and the path.
+/// Returns the parts of a URL: the server, with the key after the path, and the path.
 fn parts(url: &str) -> Result<(String, Path)> {
     let (scheme, rest) = url.split_once("://").unwrap_or_default();
     let scheme = scheme.to_ascii_lowercase();
@@ -73,7 +73,7 @@ fn made(url: &str) -> Result<Server> {
     use ClientConfigKey::{AllowHttp, ConnectTimeout, ReadTimeout, Timeout};
     static CHOSEN: Once = Once::new();
     CHOSEN.call_once(|| {
-        // Somebody else's choice is as good.
+        // Another thread's choice is as good.
         let _ = rustls::crypto::ring::default_provider().install_default();
     });
     let retry = RetryConfig {
@@ -118,8 +118,8 @@ fn made(url: &str) -> Result<Server> {
     })
 }
 
-/// What the environment says of Microsoft's servers, also by the names that only
-/// Microsoft's own command knows.
+/// Returns the settings of Microsoft's servers from the environment, also by the names that only
+/// Microsoft's own command uses.
 fn microsofts() -> MicrosoftAzureBuilder {
     let names = [
         ("AZURE_STORAGE_ACCOUNT", AzureConfigKey::AccountName),

@@ -91,7 +91,7 @@ impl Object {
         self.was.size
     }
 
-    /// What tells the file in the state in which it was opened from others; `None` where the
+    /// Returns the stamp of the file in the state in which it was opened; `None` where the
     /// server tells neither tag nor time.
     pub(super) fn stamp(&self) -> Option<String> {
         let was = &self.was;

@@ -11,7 +11,7 @@ pub fn is_url(name: &str) -> bool {
     scheme.len() > 1 && scheme.chars().all(is_word) && !rest.is_empty()
 }
 
-/// A path or URL as it is told to the user: without a key.
+/// A path or URL as it is shown to the user: without a key.
 pub fn without_key(path: &Path) -> String {
     let text = path.display().to_string();
     match is_url(&text) {

@@ -18,9 +18,9 @@ pub enum BuildError {
     /// Cargo cannot be started.
     #[error("cannot start {program}")]
     Start {
-        /// What was to be started.
+        /// Program to start.
         program: String,
-        /// Why.
+        /// The reason.
         #[source]
         source: io::Error,
     },

@@ -18,7 +18,7 @@ pub struct Flashed {
     pub bytes: usize,
 }
 
-/// Progress of writing, bytes over all phases so far.
+/// Progress of writing, bytes over all phases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Bytes done.
@@ -61,7 +61,7 @@ pub enum FlashError {
     Probe {
         /// The probe.
         name: String,
-        /// Why.
+        /// The reason.
         #[source]
         source: DebugProbeError,
     },
@@ -72,7 +72,7 @@ pub enum FlashError {
         name: String,
         /// The chip.
         chip: String,
-        /// Why.
+        /// The reason.
         #[source]
         source: Box<probe_rs::Error>,
     },
@@ -81,7 +81,7 @@ pub enum FlashError {
     Write {
         /// The chip.
         chip: String,
-        /// Why.
+        /// The reason.
         #[source]
         source: Box<WriteError>,
     },

@@ -20,7 +20,7 @@ const MAX_BYTES: u64 = 256 << 20;
 #[derive(Debug)]
 pub struct Image {
     pub(super) memories: Memories,
-    /// What goes into the chip's flash.
+    /// Parts for the chip's flash.
     pub(super) parts: Vec<Part>,
     /// Its memories, for people.
     pub placed: Vec<Placed>,
@@ -55,7 +55,7 @@ pub enum ImageError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         #[source]
         source: io::Error,
     },
@@ -64,7 +64,7 @@ pub enum ImageError {
     NoImage {
         /// The file.
         path: PathBuf,
-        /// What is wrong with the file.
+        /// Fault of the file.
         why: String,
     },
     /// Part of it would lie where the chip has no memory of that kind.
@@ -79,7 +79,7 @@ pub enum ImageError {
         chip: String,
         /// Place where the part begins.
         address: u64,
-        /// How long the part is, bytes.
+        /// Length of the part, bytes.
         bytes: u64,
         /// Flash or RAM.
         memory: &'static str,
@@ -142,11 +142,11 @@ impl Image {
     }
 }
 
-/// What the symbol begins with that `firmware/build.rs` gives an image, and goes
+/// Beginning of the symbol's name that `firmware/build.rs` gives an image, and goes
 /// on with the board's name, its dashes as underscores.
 const MARK: &str = "hapterra.board.";
 
-/// What an ELF holds of interest.
+/// Contents of an ELF.
 struct Contents {
     segments: Vec<Segment>,
     /// The board that it says it is for.

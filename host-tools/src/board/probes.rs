@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn probes_are_told_from_other_devices() {
         assert_eq!(kind(0x0483, 0x374e, None), Some("ST-LINK"));
-        // ST's virtual serial port of somebody's own firmware.
+        // ST's virtual serial port of a user's own firmware.
         assert_eq!(kind(0x0483, 0x5740, Some("STM32 Virtual ComPort")), None);
         let pico = Some("Debug Probe (CMSIS-DAP)");
         assert_eq!(kind(0x2e8a, 0x000c, pico), Some("CMSIS-DAP"));

@@ -6,7 +6,7 @@ use crate::calibrate::Direction;
 
 /// Who connects, turns, presses, measures and looks.
 pub trait Attendant {
-    /// Is told something.
+    /// Receives a message.
     fn hear(&mut self, line: &str);
 
     /// Is asked to do something that the board sees by itself.
@@ -39,7 +39,7 @@ pub trait Attendant {
     /// board itself is `board_ms`.
     fn time_s(&self, board_ms: f64) -> f64;
 
-    /// Is told that the arm may be armed from now on, or is known to be disarmed.
+    /// Receives a change: the arm may be armed from now on, or is known to be disarmed.
     fn may_be_armed(&mut self, _may: bool) {}
 }
 
@@ -154,9 +154,9 @@ pub enum Reading {
         /// In which unit it is read.
         unit: &'static str,
     },
-    /// How far the tip went along the ruler, mm.
+    /// Path of the tip along the ruler, mm.
     MovedMm(Direction, u16),
-    /// What the scale reads, grams; at rest, or at the moment that was called out.
+    /// Reading of the scale, grams; at rest, or at the moment that was called out.
     ScaleGrams {
         /// True if the motor pushed.
         pushed: bool,
@@ -209,11 +209,11 @@ impl fmt::Display for Reading {
 /// Something to say yes or no to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Question {
-    /// Whether the amplifiers' ready outputs are wired to the board.
+    /// Question whether the amplifiers' ready outputs are wired to the board.
     ReadyIsWired,
-    /// Whether the pressed stop takes the power from the amplifiers.
+    /// Question whether the pressed stop takes the power from the amplifiers.
     StopTakesPower,
-    /// Whether the floor pushed the tip back up.
+    /// Question whether the floor pushed the tip back up.
     PushedBack,
 }
 

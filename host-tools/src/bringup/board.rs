@@ -19,7 +19,7 @@ use crate::link::{Dialogue, LinkError};
 const LOOK_MS: u32 = 100;
 /// Time for which the board looks out for what the user was asked to do, in looks.
 const LOOKS: usize = 600;
-/// Looks within which a board that was told to disarm has let the force out.
+/// Checks within which a board that received a disarm command has let the force out.
 const LOOKS_TO_DISARM: usize = 20;
 /// Encoders that move by more than this between two looks are not still.
 const STILL_COUNTS: u32 = 3;
@@ -45,7 +45,7 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
-    /// How it introduced itself.
+    /// Returns its introduction.
     #[must_use]
     pub(super) fn device(&self) -> &DeviceHello {
         self.dialogue.device()
@@ -165,7 +165,7 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
-    /// Asks for something that drives the arm, once somebody presses the switch.
+    /// Asks for something that drives the arm, once the user presses the switch.
     ///
     /// # Errors
     /// As [`Board::ask`].
@@ -242,7 +242,7 @@ impl<'d, 't> Board<'d, 't> {
         Ok(())
     }
 
-    /// Checks that the board says that it is disarmed, once it was told to.
+    /// Checks that the board says that it is disarmed, after the command.
     fn disarm(&mut self) -> Result<bool, LinkError> {
         let answer = self.dialogue.request(&Request::Disarm)?;
         for _ in 0..LOOKS_TO_DISARM {

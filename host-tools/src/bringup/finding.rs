@@ -22,7 +22,7 @@ pub enum Finding {
     WrongTickRate {
         /// Counted.
         hz: f64,
-        /// What the board says.
+        /// Statement of the board.
         stated_hz: f64,
     },
     /// The oscillator of USB does not follow the host's.
@@ -31,7 +31,7 @@ pub enum Finding {
     /// The board does not do what it is asked for.
     #[error("the board refuses: {0}")]
     Refused(Refusal),
-    /// What the user was to do was not seen.
+    /// The user's action was not detected.
     #[error("the board did not see it: {0}")]
     NotSeen(Task),
     /// The enable line is not low.
@@ -42,9 +42,9 @@ pub enum Finding {
     Output {
         /// Which.
         axis: usize,
-        /// What was measured.
+        /// Measured value.
         found: f64,
-        /// What it should be.
+        /// Expected value.
         expected: f64,
         /// In which unit.
         unit: &'static str,
@@ -54,7 +54,7 @@ pub enum Finding {
     DeadEncoder {
         /// The joint.
         joint: usize,
-        /// What it counted.
+        /// Counts.
         counts: i32,
     },
     /// Another encoder counted.
@@ -100,7 +100,7 @@ pub enum Finding {
         joint: usize,
         /// The record's.
         record: f64,
-        /// What the ruler says.
+        /// Distance by the ruler.
         found: f64,
     },
     /// A motor turned another joint than its own.
@@ -129,7 +129,7 @@ pub enum Finding {
         /// The current, A.
         current_a: f32,
     },
-    /// It cannot be told from the hand's own motion which way a motor turns.
+    /// The hand's own motion hides the direction of a motor.
     #[error(
         "the direction of motor {motor} cannot be determined: the hand moved more than the motor"
     )]
@@ -150,7 +150,7 @@ pub enum Finding {
     /// The arm does not stay where it is left.
     #[error("the arm drifts: {mm:.0} mm within {seconds:.1} s after it was let go")]
     Drifts {
-        /// How far, mm.
+        /// Distance, mm.
         mm: f64,
         /// In which time, s.
         seconds: f64,
@@ -158,7 +158,7 @@ pub enum Finding {
     /// The arm moves when it is left to itself.
     #[error("the arm moves by itself: its tip had {mm_s:.0} mm/s when it was let go")]
     MovesByItself {
-        /// How fast, mm/s.
+        /// Speed, mm/s.
         mm_s: f64,
     },
     /// The pressed stop leaves the amplifiers their power.

@@ -85,7 +85,7 @@ pub struct Log {
     /// The board and record that it is about.
     #[serde(flatten)]
     pub identity: Identity,
-    /// The steps so far, in order, each once.
+    /// The completed steps, in order, each once.
     #[serde(default, rename = "entry")]
     pub entries: Vec<Entry>,
 }
@@ -99,17 +99,17 @@ pub enum LogError {
     /// It cannot be read.
     #[error("cannot read the log {path}: {source}")]
     Unreadable {
-        /// Where.
+        /// The place.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: io::Error,
     },
     /// It is no log.
     #[error("{path} is no log of a first power-up: {source}")]
     NoLog {
-        /// Where.
+        /// The place.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: Box<toml::de::Error>,
     },
     /// It cannot be put into words.

@@ -7,7 +7,7 @@ use hapterra_core::wire::status::UsbClock;
 use crate::calibrate::N_PER_GRAM;
 use crate::phantom::{HandModel, PhantomModel, Plant, Wiring, kinematics};
 
-/// How fast a hand leads the tip, m/s, and how fast it feels its way.
+/// Speed at which a hand leads the tip, m/s; and of a hand that searches for the surface.
 const LEAD_M_S: f64 = 0.1;
 const SLOW_M_S: f64 = 0.02;
 /// Length of a tick, s.
@@ -31,7 +31,7 @@ const SCALE: HandModel = HandModel {
     ..FIRM
 };
 
-/// How the tip is held.
+/// Grip of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Grip {
     /// By fingers that lead it.
@@ -47,7 +47,7 @@ pub(super) enum Grip {
 pub struct BenchMistakes {
     /// A command at its amplifier's input is off by so many volts.
     pub output_off_v: [f64; 3],
-    /// The enable line has no pull-down: it is high when nobody drives it.
+    /// The enable line has no pull-down: it is high if it is not driven.
     pub enable_floats: bool,
     /// The stop is a normally open one: pressed it closes its contact, and so does no wire.
     pub stop_normally_open: bool,
@@ -67,7 +67,7 @@ pub struct BenchMistakes {
 pub struct VirtualBench {
     plant: Plant,
     wiring: Wiring,
-    /// Where the hand is led to, and where it is led now, m.
+    /// Goal of the hand, and its present target, m.
     goal_m: DVec3,
     at_m: DVec3,
     speed_m_s: f64,
@@ -142,7 +142,7 @@ impl VirtualBench {
         }
     }
 
-    /// What the board sees of the stop: an open contact.
+    /// Returns true if the board reads the stop as pressed: an open contact.
     fn stop_reads_pressed(&self) -> bool {
         let closed = self.stop == self.mistakes.stop_normally_open;
         self.stop_wire_off || !closed
@@ -189,12 +189,12 @@ impl VirtualBench {
         }
     }
 
-    /// Where the tip is, m, device frame.
+    /// Returns the position of the tip, m, device frame.
     pub(super) fn tip_m(&self) -> DVec3 {
         DVec3::from(self.plant.tip_m())
     }
 
-    /// Where the tip is in the zero pose, m, device frame.
+    /// Returns the position of the tip in the zero pose, m, device frame.
     pub(super) fn home_m(&self) -> DVec3 {
         DVec3::from(kinematics::tip(self.plant.model(), [0.0; 3]))
     }
@@ -226,17 +226,17 @@ impl VirtualBench {
         self.plant = self.plant.let_go();
     }
 
-    /// What a scale reads that pulls against a push along `direction`, grams.
+    /// Returns the reading of a scale that pulls against a push along `direction`, grams.
     pub(super) fn scale_grams(&self, direction: DVec3) -> f64 {
         -DVec3::from(self.plant.hand_force_n()).dot(direction) / N_PER_GRAM
     }
 
-    /// What a meter shows at an output, V.
+    /// Returns the voltage of an output, V.
     pub(super) fn output_v(&self, axis: usize) -> f64 {
         FULL_V * f64::from(self.drive.held[axis]) + self.mistakes.output_off_v[axis]
     }
 
-    /// What a meter shows at the enable line, V, where the board drives it or not.
+    /// Returns the voltage of the enable line, V, driven by the board or not.
     pub(super) fn enable_v(&self, driven: bool) -> f64 {
         let high = if driven {
             self.drive.enabled

@@ -15,22 +15,22 @@ use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::native::StoppedClock;
 use hapterra_firmware::store::Stored;
 
-/// How far below the tip a hand aims that pushes into the soft plane, m.
+/// Distance below the tip at which a hand aims to push into the soft plane, m.
 const PUSH_M: f64 = 0.035;
 /// The virtual user feels an upward push from this force on, N.
 const FELT_N: f64 = 0.1;
 /// So often the virtual device lets its host look around, ms.
 const LOOK_MS: u32 = 25;
 
-/// Does as it is told at a virtual bench, and reads off the truth.
+/// Follows the instructions at a virtual bench, and reads off the truth.
 pub struct VirtualUser {
     bench: Rc<RefCell<VirtualBench>>,
-    /// Where the tip was before it was last moved along the ruler, m.
+    /// Position of the tip before its last move along the ruler, m.
     before_m: DVec3,
     /// The direction of the scale, and what it read when it was called out, grams.
     scale: (DVec3, f64),
     /// The largest push up while the tip was lowered, N.
-    felt_n: f64,
+    force_n: f64,
     /// Takes what is said, a line at a time.
     pub says: fn(&str),
 }
@@ -49,7 +49,7 @@ impl VirtualUser {
             before_m: bench.tip_m(),
             bench: Rc::new(RefCell::new(bench)),
             scale: (DVec3::ZERO, 0.0),
-            felt_n: 0.0,
+            force_n: 0.0,
             says: |line| tracing::info!("{line}"),
         }
     }
@@ -110,7 +110,7 @@ impl VirtualUser {
             }
             Task::LiftTip => {
                 // Against the push of the hand, the floor's is what is left over.
-                self.felt_n = bench.scale_grams(DVec3::Z) * crate::calibrate::N_PER_GRAM;
+                self.force_n = bench.scale_grams(DVec3::Z) * crate::calibrate::N_PER_GRAM;
                 bench.step(self.before_m);
             }
         }
@@ -162,7 +162,7 @@ impl Attendant for VirtualUser {
         let yes = match question {
             Question::ReadyIsWired => true,
             Question::StopTakesPower => !self.bench.borrow().has_power(),
-            Question::PushedBack => self.felt_n > FELT_N,
+            Question::PushedBack => self.force_n > FELT_N,
         };
         (self.says)(&format!(
             "  ? {question} {}",

@@ -26,7 +26,7 @@ pub enum BringupError {
     Found {
         /// The step.
         step: Step,
-        /// What is wrong.
+        /// The fault.
         finding: Finding,
     },
     /// The attendant stopped, or the device is gone.

@@ -19,7 +19,7 @@ const MAX_BYTES: u64 = 1 << 20;
 
 /// Version of the file's format.
 const FORMAT: u32 = 1;
-/// What the binary files of earlier versions begin with.
+/// First bytes of the binary files of earlier versions.
 const BINARY: &[u8] = b"HAPC";
 
 /// Models by the names that files and the command line give them.

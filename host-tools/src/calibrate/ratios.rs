@@ -82,7 +82,7 @@ impl RatioFit {
 const ENOUGH_COUNTS: u32 = 400;
 /// More than this left over is no fit, mm: a ruler is read to one.
 const ENOUGH_MM: f64 = 4.0;
-/// How much a move across its direction counts: it is led by hand.
+/// Weight of the part of a move across its direction: a hand leads it.
 const ACROSS: f64 = 0.25;
 /// Gauss-Newton steps; it takes three or four.
 const STEPS: usize = 20;
@@ -159,7 +159,7 @@ fn descend(arm: &Arm, checks: &[Check], start: DVec3) -> (DVec3, f64) {
     (at, squares.sum())
 }
 
-/// What the move by the encoders and the move by the ruler differ in, mm; what
+/// Returns the difference of the move by the encoders and the move by the ruler, mm; what
 /// lies across the ruler counts less.
 fn left_over(arm: &Arm, check: &Check, rad_per_count: DVec3) -> DVec3 {
     let tip = |counts| arm.tip_mm(arm.angles(rad_per_count, counts));

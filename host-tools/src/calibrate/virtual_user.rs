@@ -14,7 +14,7 @@ use crate::phantom::{HandModel, PhantomModel, Plant, kinematics};
 
 /// Time for which a pose is held until everything is still, s.
 const SETTLE_S: f64 = 4.0;
-/// Where the weight is measured: from the zero pose, mm, device frame.
+/// Places at which the weight is measured: from the zero pose, mm, device frame.
 const POSES_MM: [[f64; 3]; 4] = [
     [30.0, 0.0, 40.0],
     [60.0, 0.0, 0.0],
@@ -25,7 +25,7 @@ const POSES_MM: [[f64; 3]; 4] = [
 /// Moves a virtual Phantom, and reads ruler and scale off the truth.
 pub struct VirtualUser {
     plant: Plant,
-    /// What the encoders read, for whoever feeds the device.
+    /// Encoder counts, shared with the device's driver.
     counts: Rc<Cell<[i32; 3]>>,
     /// Error of every reading of the ruler, mm.
     pub ruler_off_mm: f64,

@@ -8,7 +8,7 @@ use super::gravity::{Still, fit_gravity};
 use super::ratios::{Check, Direction, fit_ratios};
 use super::review::Review;
 
-/// How far the tip is to be moved along the ruler, mm.
+/// Distance of the move along the ruler, mm.
 const ABOUT_MM: f64 = 80.0;
 /// Encoders that move by more than this between two looks are not still.
 const STILL_COUNTS: u32 = 3;
@@ -17,7 +17,7 @@ const POSES: usize = 4;
 
 /// Who moves the arm and reads ruler and scale.
 pub trait Attendant {
-    /// Is told something.
+    /// Receives a message.
     fn hear(&mut self, line: &str);
 
     /// Puts the arm into its zero pose and holds it there.

@@ -15,7 +15,7 @@ use crate::terrain::HapticGrid;
 const HEIGHTS: &str = "terrain.npy";
 const ABOUT: &str = "terrain.json";
 
-/// What to do where the folder cannot be written to.
+/// Hint for a folder that cannot be written to.
 const HINT: &str = "name another folder with -o";
 
 /// Arguments of `hapterra cut`.
@@ -34,13 +34,13 @@ pub struct Args {
     pub most_samples: u64,
 }
 
-/// What is said of the heights; the fields' names are those of the JSON.
+/// Description of the heights; the fields' names are those of the JSON.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 struct About {
     /// The file with the heights, beside this one.
     file: &'static str,
-    /// What the terrain is called.
+    /// Name of the terrain.
     name: String,
     /// Rendered samples before some were left out, west to east and south to north.
     of: [u32; 2],

@@ -17,7 +17,7 @@ use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::run::duration;
 use super::session_summary::{self, SessionSummary};
 use super::settings::SettingsOption;
-use super::terminal::waiting::shown_reading;
+use super::terminal::waiting::shown_planning;
 use super::terminal::{interrupt, partial_files, progress, writer};
 use super::viewing::{Shown, ToBeShown, Viewing};
 use crate::events::{Event as Told, Watcher};
@@ -38,7 +38,7 @@ use heightfield::{Raster, files_read_with};
 
 /// Samples along the side of the terrain that the demo makes itself.
 const OWN_SIZE: u32 = 1024;
-/// What that terrain is called in a recording: how to make it as a file.
+/// Name of that terrain in a recording: how to make it as a file.
 pub(super) const OWN_TERRAIN: &str = "hapterra synth fractal --size 1024 --seed 1";
 
 /// Arguments of `hapterra demo`.
@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     outputs.keep_apart(args)?;
     let options = &args.rendering.surface;
     let surface = options.load()?;
-    let law = surface.law;
+    let params = surface.params;
     let materials = surface.materials(options, (&name, &raster), &args.reading)?;
     let cells = args.reading.cells();
     let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
@@ -117,8 +117,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     // The virtual Phantom is one.
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
     let terrain = view.terrain(asked.grid)?;
-    let placed = shown_reading(&name, &raster, || {
-        PlacedTerrain::in_view(&terrain, view.home_mm, law)
+    let placed = shown_planning(&name, &raster, || {
+        PlacedTerrain::in_view(&terrain, view.home_mm, params, &|| !interrupt::requested())
     })?;
     let placed = placed.repeated(args.rounds);
     show(args, (&placed, &view), &name, &outputs)
@@ -142,7 +142,7 @@ pub(super) fn own_terrain() -> Result<Raster, Failure> {
     raster.map_err(Failure::new)
 }
 
-/// What to do where a file of the demo cannot be written.
+/// Hint for a file of the demo that cannot be written.
 const OTHER_FOLDER: &str = "name another folder with --out";
 
 /// The files that the demo writes.
@@ -226,8 +226,8 @@ fn show(
     let file = args.file.as_ref();
     let file = file.map_or(OWN_TERRAIN.into(), |file| without_key(file));
     let device = Device::of(&toured.summary.device);
-    let law = (placed.law(), Rule::Swept);
-    let settings = Settings::new(&file, terrain, law, Some(placed.home_mm()), device);
+    let params = (placed.params(), Rule::Swept);
+    let settings = Settings::new(&file, terrain, params, Some(placed.home_mm()), device);
     write(&toured, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;
     let summary = &toured.summary;
     print!("{}", summary.text());
@@ -247,7 +247,7 @@ fn show(
     }
 }
 
-/// Where the loop runs: as stated, else on the emulated board where there is one.
+/// Returns the device of the loop: as stated, otherwise the emulated board if there is one.
 fn device(args: &Args) -> VirtualDevice {
     match &args.device {
         Some(device) => device.clone(),
@@ -261,15 +261,15 @@ fn device(args: &Args) -> VirtualDevice {
     }
 }
 
-/// What keys and commands change.
+/// Returns the steering by keys and commands.
 fn control<'t>(
     args: &Args,
     placed: &PlacedTerrain<'t>,
     view: &Placement,
 ) -> Result<PlacementControl<'t>, Failure> {
-    let (law, view) = (placed.law(), *view);
+    let (params, view) = (placed.params(), *view);
     let arm = (&Calibration::PREMIUM_1_5, args.rendering.level);
-    let served = (placed.terrain(), Laid { view, law });
+    let served = (placed.terrain(), Laid { view, params });
     Ok(PlacementControl::new(served, arm, args.commands.open()?))
 }
 
@@ -334,7 +334,7 @@ struct Tour<'p, 't> {
     placed: &'p PlacedTerrain<'t>,
     stop_s: f64,
     control: &'p mut PlacementControl<'t>,
-    /// What shows it.
+    /// Its viewer.
     shown: Option<ToBeShown<'t>>,
     events: Option<Watcher>,
 }
@@ -353,7 +353,7 @@ impl<'t> Tour<'_, 't> {
         let line = format!("device         {}\n", session_summary::device(&device));
         writer::put(std::io::stdout(), &line);
         let materials = terrain.grid().materials();
-        stability::warn_of(&scene.law, materials.map(Materials::table), &device);
+        stability::warn_of(&scene.params, materials.map(Materials::table), &device);
         let tell = |line: String| writer::put(std::io::stderr(), &(line + "\n"));
         let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;
@@ -414,7 +414,7 @@ impl<'t> Tour<'_, 't> {
         marks.extend(control.marks(&log, true));
         let figures = log.figures();
         let ticks = log.ticks();
-        // However the tour ended, the board is told; what it felt after the tour's end
+        // However the tour ended, the board is notified; what it felt after the tour's end
         // is not shown.
         let left = session.say_goodbye(&mut |_| {});
         if let Some(events) = &events {

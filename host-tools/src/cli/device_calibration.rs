@@ -6,7 +6,7 @@ use super::bringup::PATIENCE;
 use super::failure::{Failure, OrHint};
 use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
 
-/// Asks a device for its calibration, and takes nothing from whoever serves it; the preset
+/// Asks a device for its calibration, and leaves its host in place; the preset
 /// of its model where it has none, which is told.
 ///
 /// # Errors

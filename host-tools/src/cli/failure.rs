@@ -13,13 +13,13 @@ type AnyError = Box<dyn Error + Send + Sync>;
 pub struct Failure {
     error: AnyError,
     hint: Option<String>,
-    /// What the error is about, where that is one thing of several.
+    /// Subject of the error, if it is one of several.
     about: Option<String>,
 }
 
 /// An error that tells by itself what to do next; `?` makes a [`Failure`] of it.
 pub trait Hint {
-    /// What to do next, in the imperative.
+    /// Returns the next step, in the imperative.
     fn hint(&self) -> String;
 }
 

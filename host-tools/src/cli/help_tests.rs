@@ -6,7 +6,7 @@ use clap::{CommandFactory as _, Parser as _};
 
 use super::Cli;
 
-/// What `hapterra run -h` prints at 100 columns.
+/// Output of `hapterra run -h` at 100 columns.
 const RUN: &str = include_str!("run_help.txt");
 
 #[test]

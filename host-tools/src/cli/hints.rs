@@ -70,7 +70,12 @@ impl Hint for GroundError {
 
 impl Hint for PlacingError {
     fn hint(&self) -> String {
-        "choose another place with --at, a smaller --exaggeration or another --scale".into()
+        match self {
+            Self::Interrupted => LinkError::Interrupted.hint(),
+            Self::OutOfReach(_) | Self::FarAway(_) => {
+                "choose another place with --at, a smaller --exaggeration or another --scale".into()
+            }
+        }
     }
 }
 

@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// What is shown; the fields' names are those of the JSON.
+/// Output of the command; the fields' names are those of the JSON.
 #[derive(Serialize)]
 struct FileReport {
     file: String,
@@ -126,7 +126,7 @@ struct FileReport {
     block: Option<[u32; 2]>,
     /// Columns and rows of each overview.
     overviews: Vec<[u32; 2]>,
-    /// Whether a sample stands for an `area` or a `point`, where the file states it.
+    /// `area` or `point`: the meaning of a sample, if the file states it.
     samples_are: Option<&'static str>,
     /// Samples that range and number of holes are from: all, or fewer where the raster
     /// stays in its file.
@@ -148,20 +148,20 @@ struct Cell {
     unit: &'static str,
     /// True if the file states the unit; metres or degrees are assumed if not.
     unit_stated: bool,
-    /// Where the unit comes from: the `file`, the `code` of its reference system, an
+    /// Source of the unit: the `file`, the `code` of its reference system, an
     /// `option` of this command, or it is `assumed`.
     unit_from: &'static str,
     /// Ground length of both sides in metres.
     east_m: f64,
     north_m: f64,
     /// Side of the square cell that is felt, m on the ground.
-    felt_m: f64,
+    haptic_cell_m: f64,
     /// True if heights are interpolated for that, as the stored cells are not square.
     resampled: bool,
     /// True if stored cells that are not square are felt as squares.
     distorted: bool,
-    /// How far slopes and lengths are off at worst somewhere in the field, as a share, where
-    /// cells are felt as they are in its middle.
+    /// Worst error of slopes and lengths in the field, as a share, if all cells are rendered like
+    /// the middle one.
     worst_share: Option<f64>,
     /// Its place, in the file's coordinates.
     worst_at: Option<[f64; 2]>,
@@ -287,7 +287,7 @@ impl FileReport {
         text
     }
 
-    /// How the file stores its samples.
+    /// Returns the storage of the samples in the file.
     fn stored(&self) -> [(&'static str, String); 4] {
         let sides = |[columns, rows]: [u32; 2]| format!("{columns} × {rows}");
         let no_data = self
@@ -355,7 +355,7 @@ impl Cell {
             unit_from: from(cell.certainty),
             east_m,
             north_m,
-            felt_m: grid.side_m().unwrap_or_default(),
+            haptic_cell_m: grid.side_m().unwrap_or_default(),
             resampled: grid.is_resampled(),
             distorted: grid.is_distorted(),
             worst_share: worst.map(|worst| worst.share),
@@ -373,7 +373,7 @@ impl Cell {
     }
 
     fn text(&self) -> String {
-        let (east_m, north_m, felt_m) = (self.east_m, self.north_m, self.felt_m);
+        let (east_m, north_m, haptic_cell_m) = (self.east_m, self.north_m, self.haptic_cell_m);
         let stored = format!(
             "{} × {} {} ({}), {east_m:.3} east × {north_m:.3} north m on the ground",
             self.east,
@@ -387,7 +387,7 @@ impl Cell {
         };
         match self.resampled || self.distorted {
             false => stored,
-            true => format!("{stored}, rendered as {felt_m:.3} m squares{hint}"),
+            true => format!("{stored}, rendered as {haptic_cell_m:.3} m squares{hint}"),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Lines that somebody else can cause, kept to so many a second.
+//! A rate limit for lines that another program can cause.
 
 use std::time::{Duration, Instant};
 
@@ -24,8 +24,8 @@ impl LineLimit {
         }
     }
 
-    /// Whether a line at `now` may be said: then how many were left out since the last
-    /// one that was.
+    /// Returns the number of lines that were left out since the last one, if a line at `now` is
+    /// allowed.
     pub(super) fn admit(&mut self, now: Instant) -> Option<u64> {
         let open = self
             .window
@@ -39,7 +39,7 @@ impl LineLimit {
         Some(std::mem::take(&mut self.left_out))
     }
 
-    /// How many were left out since the last one that was said.
+    /// Returns the number of lines that were left out since the last one.
     pub(super) const fn left_out(&self) -> u64 {
         self.left_out
     }

@@ -17,7 +17,7 @@ pub struct Args {
     pub addresses: Vec<String>,
 }
 
-/// Place where the link of an emulated board is looked for without being told.
+/// Place where the link of an emulated board is looked for by default.
 const USUAL_ADDRESS: &str = "localhost:4000";
 /// Time that a board may take to say who it is.
 const PATIENCE: Duration = Duration::from_millis(1500);

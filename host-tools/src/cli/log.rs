@@ -39,7 +39,7 @@ pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
         // A colour is a control sequence, and of those no line has any.
         .with_ansi(false)
         .without_time()
-        // Where standard error is closed there is nobody to tell.
+        // If standard error is closed there is no reader.
         .log_internal_errors(false)
         .init();
     log
@@ -85,8 +85,8 @@ impl<W: Write> Log<W> {
         }
     }
 
-    /// How many lines of this kind were left out before the one at `now`; none where this
-    /// one is left out, too.
+    /// Returns the number of lines of this kind that were left out before the one at `now`; none if
+    /// this one is left out, too.
     fn admit(&self, about: &Metadata<'_>, now: Instant) -> Option<u64> {
         if !about.target().starts_with(BY_DEVICE) {
             return Some(0);
@@ -102,7 +102,7 @@ impl<W: Write> Log<W> {
         let kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
         let left_out: u64 = kinds.values().map(LineLimit::left_out).sum();
         if left_out > 0 {
-            // There is nobody to tell that nobody can be told.
+            // There is no channel left to report this.
             let _ = writeln!((self.open)(), "{}", left_out_text(left_out));
         }
     }
@@ -158,7 +158,7 @@ impl<W: Write> Write for Line<W> {
 mod tests {
     use super::*;
 
-    /// What is written, for whoever holds a copy.
+    /// A log that its copies share.
     #[derive(Clone, Default)]
     struct Page(Arc<Mutex<Vec<u8>>>);
 
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    /// What is written while `say` speaks, and after the end.
+    /// Returns the log during `say` and at the end.
     fn written(say: impl FnOnce()) -> String {
         let page = Page::default();
         let copy = page.clone();

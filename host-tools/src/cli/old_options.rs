@@ -10,9 +10,9 @@ struct Old {
     commands: &'static [&'static str],
     /// Its name.
     name: &'static str,
-    /// What to type now.
+    /// Present spelling.
     now: &'static str,
-    /// Where that goes on, as a key of a file.
+    /// Rest of the spelling, as a key of a file.
     within: &'static str,
 }
 

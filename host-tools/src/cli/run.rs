@@ -11,7 +11,7 @@
 //! There is one [`Raster`](heightfield::Raster), with one reader and one bounded cache, and it
 //! is lent to all devices. Everything else is a device's own: its calibration, the view of the
 //! terrain in its reach, its session and thread, its arming, its recording. The terrain is laid for all
-//! devices before any is armed, because from then on nobody waits for what is elsewhere.
+//! devices before any is armed, because from then on no read waits.
 
 pub mod devices;
 mod placed;
@@ -50,7 +50,7 @@ use together::serve_each;
 /// The stiffest surface that `hapterra-lab stability` tries by itself.
 const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
 
-/// What to do where the recording cannot be written.
+/// Hint for a recording that cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
 
 /// Arguments of `hapterra run`.
@@ -81,8 +81,8 @@ pub struct Args {
 
     /// Disarm after this time without a message from here, as 10s
     ///
-    /// The device does so by itself; a number alone is in seconds.
-    #[arg(long, value_name = "TIME", default_value_t = Timeouts::REAL_SILENCE_S, value_parser = silence)]
+    /// The device does so by itself.
+    #[arg(long, value_name = "TIME", default_value = Timeouts::REAL_SILENCE, value_parser = silence)]
     pub silence: u16,
 
     /// Serve a real board without a complete log of hapterra bringup
@@ -144,9 +144,9 @@ fn silence(text: &str) -> Result<u16, String> {
 /// until each has ended.
 ///
 /// # Errors
-/// What is wrong with the file, or no device there at the beginning. A device
-/// that goes later is waited for. Of several devices one that fails is told at once, the others
-/// go on, and the error at the end names each that failed.
+/// A fault of the file, or a missing device at the beginning. A device that disappears later is
+/// waited for. Of several devices a failure is reported at once, the others go on, and the error
+/// at the end names each that failed.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let devices = devices::of(args)?;
     let outputs: Vec<_> = devices.iter().filter_map(|d| d.record.clone()).collect();
@@ -162,8 +162,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let name = args.terrain.name();
     let (options, reading) = (&args.rendering.surface, &args.terrain.reading);
     let surface = options.load()?;
-    let law = surface.law;
-    check_stiffness(law.stiffness_n_per_mm)?;
+    let params = surface.params;
+    check_stiffness(params.stiffness_n_per_mm)?;
     let materials = surface.materials(options, (&name, &raster), reading)?;
     let cells = reading.cells();
     let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
@@ -178,7 +178,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         InReach::of(&asked, arm).map_err(|failure| failure.about(device.device_console.name()))
     })?;
     let placed = of_each(devices.iter().zip(&laid), |(device, laid)| {
-        Placed::new(device, (&name, laid), law)
+        Placed::new(device, (&name, laid), params)
             .map_err(|failure| failure.about(device.device_console.name()))
     })?;
     // The coarse levels are read before anything is armed. A viewer shows one device.
@@ -240,8 +240,8 @@ fn of_each<T, U>(
     each.into_iter().map(make).collect()
 }
 
-/// The places of several devices at the keyboard; none where there is one device, or nobody
-/// types.
+/// The places of several devices at the keyboard; none if there is one device, or no
+/// keyboard.
 fn share_keyboard(args: &Args, devices: &[OneDevice]) -> Vec<Arc<DeviceKeys>> {
     if devices.len() == 1 || args.commands.are_typed() || !io::stdin().is_terminal() {
         return vec![];

@@ -201,7 +201,7 @@ fn kind_of_device(hello: &DeviceHello) -> String {
     format!("{board} {version}, window of {w} × {w} tiles, {hz} ticks a second")
 }
 
-/// What the ground is made of, where that is not the same everywhere.
+/// Returns the materials of the ground, if there are several.
 pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
     let grid = terrain.grid();
     let materials = grid.materials()?;

@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
-/// What an emulated board says that nobody has given anything to do.
+/// Status of an emulated board without a host.
 const NO_TICK: &str = "arm            no tick has run yet: the time of an emulated board stands still until it has a scene\n";
 
 /// The status as it is printed: a name and what there is to say, a line each.
@@ -149,7 +149,7 @@ fn crashed(crash: &Crash) -> String {
     format!("crashed before {what}; pc {pc:#010x}, lr {lr:#010x}, tick {tick}: please report it\n")
 }
 
-/// Where the guard stands, what blocks it, its fault and its limits.
+/// Returns the state of the guard, its blockers, fault and limits.
 fn guard(status: &Status) -> String {
     let report = &status.health.report;
     let on = if report.mode.drives() { "on" } else { "off" };
@@ -172,7 +172,7 @@ fn guard(status: &Status) -> String {
     text
 }
 
-/// What encoders, switches, motors and the loop's own clock tell.
+/// Returns the readings of encoders, switches, motors and the loop's own clock.
 fn measured(status: &Status) -> String {
     let (health, ticks) = (&status.health, &status.ticks);
     let [a, b, c] = health.sense.counts;

@@ -48,7 +48,7 @@ pub struct Args {
     pub rendering: Rendering,
 }
 
-/// Shows a recording until nobody looks any more.
+/// Shows a recording until the viewer is closed.
 ///
 /// # Errors
 /// What is wrong with the recording or the terrain; no viewer.

@@ -53,7 +53,7 @@ impl Hint for ProgramError {
     }
 }
 
-/// What a viewer shows of a terrain in front of an arm.
+/// Returns the viewer's picture of a terrain in front of an arm.
 fn picture<'p, 't>(terrain: &'p Terrain<'t>, view: &Placement, title: &'p str) -> Picture<'p, 't> {
     let file = terrain.raster().georeference();
     Picture {
@@ -96,7 +96,7 @@ impl<'t> ToBeShown<'t> {
         }
     }
 
-    /// Starts it. A viewer that does not start is told, and ends nothing.
+    /// Starts it. A viewer that does not start is reported, and ends nothing.
     pub(in crate::cli) fn start(
         self,
         device: &DeviceHello,
@@ -116,7 +116,7 @@ impl<'t> ToBeShown<'t> {
     }
 }
 
-/// What a viewer is told of a session.
+/// Messages of a session to a viewer.
 pub(in crate::cli) struct Shown<'t> {
     feed: ViewFeed<'t>,
     title: String,

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::line::{Event, FORMAT, Line};
+use super::event::{Event, FORMAT, Line};
 
 /// Lines that wait for the thread, at most.
 const WAITING: usize = 4096;
@@ -21,13 +21,13 @@ const LOOK: Duration = Duration::from_millis(20);
 /// For how long readers may take what is left at the end.
 const AT_THE_END: Duration = Duration::from_secs(1);
 
-/// What the senders and the thread share.
+/// State that the senders and the thread share.
 #[derive(Debug, Default)]
 struct Shared {
     readers: AtomicUsize,
-    /// Readers that have come so far.
+    /// Number of readers that have connected.
     joined: AtomicU64,
-    /// Lines that no reader was told, because the queue was full.
+    /// Lines lost because the queue was full.
     dropped: AtomicU64,
 }
 
@@ -39,7 +39,7 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// Returns the number of readers that have come so far; none where nobody reads now.
+    /// Returns the number of readers that have connected; none if there is no reader now.
     pub(super) fn readers_so_far(&self) -> Option<u64> {
         let reads = self.shared.readers.load(Ordering::Acquire) > 0;
         reads.then(|| self.shared.joined.load(Ordering::Acquire))
@@ -112,7 +112,7 @@ impl Server {
     }
 }
 
-/// A reader, and what it has yet to be told.
+/// A reader, and its pending lines.
 struct Reader {
     stream: TcpStream,
     waiting: Vec<u8>,

@@ -5,20 +5,20 @@ use std::num::NonZeroU32;
 use hapterra_core::guard::{Fault, Limits, Mode};
 use hapterra_core::scene::TickRecord;
 
-use super::line::{At, Event, Line, Place};
+use super::event::{At, Event, Line, Place};
 use super::server::Sender;
 use crate::replay::{Mark, Record, mode_name, state_name};
 use crate::terrain::Terrain;
 use heightfield::ReadStatus;
 
-/// Between two places that are told, s of the device's time.
+/// Interval of reported places, s of the device's time.
 const PLACE_EVERY_S: f64 = 0.1;
 /// Between two looks at the material, s of the device's time.
 const MATERIAL_EVERY_S: f64 = 0.01;
 /// The HIP's speed is known from samples no farther apart than this, s.
 const SPEED_WITHIN_S: f64 = 0.005;
 
-/// What was told last.
+/// Last reported state.
 #[derive(Debug, Default)]
 struct Told {
     view: Option<usize>,
@@ -44,9 +44,9 @@ pub struct Watcher {
     before: Option<(usize, Record)>,
     /// The last lines about arming, and readers that had come when they were told.
     arming: (Vec<String>, u64),
-    /// Every so many samples one is told.
+    /// Interval of reported samples.
     every: Option<NonZeroU32>,
-    /// Samples since the last one that was told.
+    /// Samples since the last reported one.
     samples: u32,
 }
 
@@ -89,7 +89,7 @@ impl Watcher {
             self.before = None;
             return;
         };
-        // Whoever comes is told how everything is.
+        // A new reader gets the whole state.
         if readers != self.readers {
             (self.readers, self.told) = (readers, Told::default());
         }

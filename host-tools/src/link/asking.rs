@@ -10,7 +10,7 @@ use hapterra_core::wire::request::Request;
 use super::ask::Ask;
 use super::timeouts::Timeouts;
 
-/// What is under way.
+/// Pending request.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
     ask: Ask,
@@ -19,7 +19,7 @@ struct Pending {
     said: Duration,
 }
 
-/// What is under way, what waits for it, and what was given up.
+/// Pending request, waiting ones, and those that were given up.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Asking {
     pending: Option<Pending>,
@@ -45,20 +45,19 @@ impl Asking {
         self.give_up();
     }
 
-    /// What is asked for, or is to be, is not waited for any more.
+    /// Gives up the pending request and the waiting ones.
     pub(super) fn give_up(&mut self) {
         let under_way = self.pending.take().map(|pending| pending.ask);
         self.unanswered.extend(under_way);
         self.unanswered.extend(self.waiting.drain(..));
     }
 
-    /// What was given up without an answer since it was last taken.
+    /// Returns the requests that were given up without an answer since the last call.
     pub(super) fn take_unanswered(&mut self) -> Vec<Ask> {
         std::mem::take(&mut self.unanswered)
     }
 
-    /// What is to be said now: what is under way, again where it is due, or the next where
-    /// nothing is.
+    /// Returns the message to send now: the pending request if it is due again, or the next one.
     pub(super) fn due(&mut self, now: Duration, patience: &Timeouts) -> Option<ToDevice<'static>> {
         self.give_up_late(now, patience);
         match &mut self.pending {

@@ -25,7 +25,7 @@ use super::timeouts::Timeouts;
 use crate::materials::{MaterialBuffer, Materials};
 use crate::terrain::{Terrain, TileBuffer};
 
-/// A message from the device, as it concerns whoever uses the session.
+/// A message from the device, for the user of the session.
 #[derive(Debug)]
 pub enum Event<'e> {
     /// The scene is in force. `resumed` tells whether the device held it
@@ -45,8 +45,8 @@ pub enum Event<'e> {
         /// HIP, proxy, force and state at the point.
         sample: &'e TickRecord,
     },
-    /// Where the device's guard stands; told at the beginning of a session,
-    /// whenever it changes, and twice a second.
+    /// State of the device's guard; sent at the beginning of a session, at each change, and twice a
+    /// second.
     Guard(&'e Report),
     /// A view was put in ([`Client::put_view`]), or was not: the device refuses it, does
     /// not answer, or was restarted meanwhile.
@@ -60,11 +60,11 @@ pub enum Event<'e> {
     Status(&'e Status),
     /// The calibration in force.
     Calibration(Option<&'e Calibration>),
-    /// What came of a request.
+    /// Result of a request.
     Answered {
-        /// What was asked for.
+        /// The request.
         request: &'e Request,
-        /// Whether it was done; why not.
+        /// Success, or the reason of the refusal.
         result: Result<(), Refusal>,
     },
     /// A tick was marked, as was asked for by [`Request::Mark`].
@@ -74,7 +74,7 @@ pub enum Event<'e> {
     },
     /// A tile of the scene's level was said to the device, which may lose it and ask again.
     TileSent(TileKey),
-    /// What was asked for was given up: the device does not answer it, or was
+    /// A request was given up: the device does not answer it, or was
     /// restarted meanwhile. Whether it was done is not known.
     Unanswered(&'e Ask),
 }
@@ -136,7 +136,7 @@ pub struct Client<'t> {
     sent: Vec<TileKey>,
     /// Tiles whose heights have not come yet from elsewhere, and when they were asked for.
     awaited: Vec<(TileKey, Duration)>,
-    /// What lies before the HIP.
+    /// Ground ahead of the HIP.
     ahead: Ahead,
     zeroing: bool,
     /// The point of a replay that is to be felt, and when it was said.
@@ -216,7 +216,7 @@ impl<'t> Client<'t> {
         &self.scene
     }
 
-    /// Counts of what went over the link so far.
+    /// Statistics of the link.
     #[must_use]
     pub const fn tally(&self) -> &LinkStats {
         &self.tally
@@ -539,7 +539,7 @@ impl<'t> Client<'t> {
         let Some((heights, status)) = self.terrain.tile_of(&self.scene, key, &mut self.tile) else {
             return self.on_no_tile(now, key);
         };
-        // The underlay comes without.
+        // The fallback comes without.
         let materials = match key.level == self.scene.level {
             true => self.terrain.materials_of(key, &mut self.materials),
             false => None,
@@ -561,8 +561,8 @@ impl<'t> Client<'t> {
         self.talk.say(&message, out);
         let bytes = out.len() - before;
         if key.level != self.scene.level {
-            // Each view has its own underlay, and all have one name.
-            return self.tally.sent_underlay(bytes);
+            // Each view has its own fallback, and all have one name.
+            return self.tally.sent_fallback(bytes);
         }
         self.tally.sent_tile(key, bytes);
         on(Event::TileSent(key));

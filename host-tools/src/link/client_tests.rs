@@ -10,7 +10,7 @@ use super::*;
 use crate::terrain::Scale;
 use heightfield::Raster;
 
-/// How a device introduces itself.
+/// Returns the introduction of a device.
 pub(crate) fn hello() -> DeviceHello {
     DeviceHello {
         protocol: PROTOCOL,
@@ -35,7 +35,7 @@ struct Bench<'t> {
     out: Vec<u8>,
     opened: u32,
     unanswered: Vec<Ask>,
-    /// What was told of the calibration.
+    /// Reported calibrations.
     told: Vec<Option<Calibration>>,
     /// Views and whether they were taken.
     viewed: Vec<(u8, bool)>,
@@ -137,7 +137,7 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// What was said since this was last asked.
+    /// Returns the lines since the last call.
     fn said(&mut self) -> Vec<String> {
         let mut reader = FrameReader::<MAX_FRAME>::new();
         let out = std::mem::take(&mut self.out);
@@ -459,7 +459,7 @@ fn a_host_whose_session_is_over_is_told_why_at_once() {
                 let is_taken = matches!(error, LinkError::Taken);
                 assert!(is_taken != is_passing, "{error}");
                 assert_eq!(error.is_passing(), is_passing, "{error}");
-                // Whoever goes on does so in another session.
+                // The next host has another session.
                 bench.client.greet(bench.now, &mut bench.out);
                 assert_ne!(bench.client.session(), session);
             });
@@ -490,7 +490,7 @@ fn an_old_word_that_a_session_is_over_ends_no_other() {
                 heard.expect("passed over");
             }
         }
-        // Nobody has taken the device: it is silent.
+        // The device has no other host: it is silent.
         let error = loop {
             for session in [first, other] {
                 let heard = bench.hear_in(session, &over(2, SessionEnd::Replaced));

@@ -35,7 +35,7 @@ pub enum State {
     Detaching,
 }
 
-/// What a message of the device means to whoever holds the conversation.
+/// Meaning of a device's message for the conversation.
 #[derive(Debug)]
 pub(super) enum News {
     /// The device has introduced itself: its samples are numbered from zero. `restarted`
@@ -49,7 +49,7 @@ pub(super) enum News {
     /// The view that was said is answered: it is in force, where its scene is the one that
     /// is to be.
     SceneChange,
-    /// What was asked for is answered by this message.
+    /// This message answers the request.
     Answered(Ask, ToHost),
     /// A message that answers nothing, or more than the conversation.
     Other(ToHost),
@@ -204,7 +204,7 @@ impl Conversation {
         }
     }
 
-    /// A view that nobody answers, once.
+    /// An unanswered placement, once.
     pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<SceneChange> {
         let give_up = self.patience.give_up;
         let is_lost = |since: Duration| now.saturating_sub(since) >= give_up;
@@ -222,8 +222,7 @@ impl Conversation {
         }
     }
 
-    /// Whether the view that is not answered is in force tells the scene that the device
-    /// holds.
+    /// Determines from the device's scene whether the unanswered placement is in force.
     fn settle_view(&mut self, epoch: Option<u32>) {
         if let Some((view, _, _)) = self.view.take()
             && epoch == Some(view.scene.epoch)
@@ -247,13 +246,13 @@ impl Conversation {
         self.asking.ask(ask);
     }
 
-    /// Nobody has listened for a while: silence counts from now.
+    /// The line was not read for a while: silence counts from now.
     pub(super) fn listen_from(&mut self, now: Duration) {
         self.heard = now;
         self.alive_said = now;
     }
 
-    /// What was given up without an answer since it was last taken.
+    /// Returns the requests that were given up without an answer since the last call.
     pub(super) fn take_unanswered(&mut self) -> Vec<Ask> {
         self.asking.take_unanswered()
     }

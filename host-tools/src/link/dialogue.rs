@@ -23,7 +23,7 @@ use super::transport::Transport;
 /// In this time a device tells where it stands at least once.
 const MOMENT: Duration = Duration::from_millis(150);
 
-/// Is told of a message that comes unasked; what it returns is said to that.
+/// Is told of an unrequested message; the returned message is sent in answer.
 type OnMessage<'o> = &'o mut dyn FnMut(&ToHost) -> Option<ToDevice<'static>>;
 
 /// A conversation with a device. However it ends, the device is told: one that has put
@@ -44,7 +44,7 @@ struct Exchange<'t> {
     reader: Box<FrameReader<MAX_FRAME>>,
     /// It has put a scene in force, or asked for something that drives.
     drives: bool,
-    /// Its end was said, or there is nobody any more to say it to.
+    /// Its end was sent, or the other end is gone.
     is_over: bool,
 }
 
@@ -52,7 +52,7 @@ impl<'t> Dialogue<'t> {
     /// Says hello.
     ///
     /// # Errors
-    /// [`LinkError`]: nobody answers within `patience`, or in another protocol.
+    /// [`LinkError`]: no answer within `patience`, or in another protocol.
     pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
         Self::with(transport, Timeouts::of_a_dialogue(patience))
     }
@@ -207,7 +207,7 @@ impl<'t> Dialogue<'t> {
         }
     }
 
-    /// Puts a calibration in force and has it stored, once somebody has pressed the
+    /// Puts a calibration in force and has it stored, once the user has pressed the
     /// dead-man switch.
     ///
     /// # Errors
@@ -227,7 +227,7 @@ impl Exchange<'_> {
         ask: Ask,
         mut read: impl FnMut(ToHost) -> Option<T>,
     ) -> Result<T, LinkError> {
-        // Between two questions nobody listens: the user may think for a while.
+        // Between two questions the line is not read: the user may think for a while.
         self.talk.listen_from(self.line.now());
         self.talk.ask(ask);
         self.wait_for(|news| match news {

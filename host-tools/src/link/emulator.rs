@@ -1,6 +1,6 @@
 //! The emulated board: QEMU as a child of this program.
 //!
-//! The image may be anybody's. QEMU runs without semihosting, through which an image
+//! The image may be from any source. QEMU runs without semihosting, through which an image
 //! could read and write every file that its user can: what it has to say goes over
 //! three serial lines, and a reset is its end.
 
@@ -38,7 +38,7 @@ pub const INSTRUCTIONS_PER_COUNT: f64 = 5.0;
 /// Reason for which the board cannot be emulated.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
-    /// Nobody said where the image is.
+    /// The image was not stated.
     #[error("no image of the emulated board was named")]
     NoImage,
     /// The image cannot be read.
@@ -46,7 +46,7 @@ pub enum EmulatorError {
     Image {
         /// The image.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         #[source]
         source: io::Error,
     },
@@ -55,7 +55,7 @@ pub enum EmulatorError {
     Qemu {
         /// The program.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         #[source]
         source: io::Error,
     },
@@ -64,7 +64,7 @@ pub enum EmulatorError {
     NotUp {
         /// The program.
         path: PathBuf,
-        /// What it wrote, or how it ended.
+        /// Its output, or its exit status.
         said: String,
     },
     /// A socket for the lines cannot be had.
@@ -160,8 +160,8 @@ impl Emulator {
         }
     }
 
-    /// What the board has reported on its third line, which is QEMU's standard output,
-    /// and what QEMU has complained of.
+    /// Returns the reports of the board on its third line, which is QEMU's standard output, and
+    /// QEMU's errors.
     fn said(&mut self) -> String {
         let report = self.report();
         let complaint = self.complaint();
@@ -173,7 +173,7 @@ impl Emulator {
         self.child.stdout.take().map_or(String::new(), text)
     }
 
-    /// What QEMU has written on its standard error, read to its end: QEMU has ended.
+    /// Returns the standard error of QEMU, read to its end: QEMU has ended.
     fn complaint(&mut self) -> String {
         self.child.stderr.take().map_or(String::new(), text)
     }
@@ -196,8 +196,8 @@ impl Drop for Emulator {
     }
 }
 
-/// What a terminal may show of what is written there: of what is endless the beginning,
-/// and nothing of what cannot be read.
+/// Returns the printable text of a stream: the beginning of an endless one, and nothing of one that
+/// cannot be read.
 fn text(from: impl Read) -> String {
     let mut said = Vec::new();
     let _ = from.take(SAID).read_to_end(&mut said);

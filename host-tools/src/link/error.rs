@@ -11,9 +11,9 @@ pub enum LinkError {
     /// Nothing there to talk to.
     #[error("no device: looked for {looked_for}: {why}")]
     Absent {
-        /// What was looked for and where.
+        /// Sought device and place.
         looked_for: String,
-        /// What was found instead.
+        /// Finding in its place.
         why: String,
     },
     /// Several devices could be meant.
@@ -22,7 +22,7 @@ pub enum LinkError {
     /// The transport broke while the device was in use.
     #[error("the device is gone")]
     Gone(#[source] io::Error),
-    /// The transport stands, but nobody answers.
+    /// The transport stands, but there is no answer.
     #[error("the device has not answered for {0:.1?}")]
     Silent(Duration),
     /// The device has another host.

@@ -11,13 +11,13 @@ pub(super) const LOOK: Duration = Duration::from_millis(50);
 /// Time that a device may take over what is said at once before it counts as gone.
 const TAKES: Duration = Duration::from_secs(5);
 
-/// What [`Session`](super::Session) and [`Dialogue`](super::Dialogue) hold their
+/// Line on which [`Session`](super::Session) and [`Dialogue`](super::Dialogue) hold their
 /// conversation over.
 pub(super) struct Line<'t> {
     transport: Box<dyn Transport + 't>,
     is_open: bool,
     incoming: Box<[u8; 4096]>,
-    /// What is to be said with the next [`Line::flush`].
+    /// Bytes for the next [`Line::flush`].
     pub(super) out: Vec<u8>,
 }
 
@@ -89,7 +89,7 @@ impl<'t> Line<'t> {
         Ok(())
     }
 
-    /// What comes within `wait`: when, the bytes, and where the answers go.
+    /// Receives bytes within `wait`: the time, the bytes, and the buffer for answers.
     pub(super) fn receive(
         &mut self,
         wait: Duration,

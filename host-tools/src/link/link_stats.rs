@@ -41,7 +41,7 @@ pub struct LinkStats {
     /// Samples lost before the last one that was received, and in sessions that ended.
     gaps: u64,
     now: Numbering,
-    /// The session before, until the device has told how it ended.
+    /// The session before, until the device has reported its end.
     before: Option<Numbering>,
 }
 
@@ -50,7 +50,7 @@ pub struct LinkStats {
 struct Numbering {
     /// Number that the next sample should have.
     expected: u32,
-    /// What the device says that it has sent and dropped.
+    /// Device's counts of sent and dropped samples.
     told: SampleCount,
 }
 
@@ -73,7 +73,7 @@ impl Numbering {
     }
 }
 
-/// How far `later` is ahead of `earlier`; zero where it is behind.
+/// Returns the lead of `later` over `earlier`; zero if it is behind.
 fn ahead(earlier: u32, later: u32) -> u32 {
     match later.wrapping_sub(earlier) {
         behind if behind > u32::MAX / 2 => 0,
@@ -127,7 +127,7 @@ impl LinkStats {
         }
     }
 
-    pub(super) fn sent_underlay(&mut self, bytes: usize) {
+    pub(super) fn sent_fallback(&mut self, bytes: usize) {
         self.tiles += 1;
         self.tile_bytes += bytes as u64;
     }

@@ -41,7 +41,7 @@ pub(super) fn next_frame<T>(
     None
 }
 
-/// What a device's frame holds.
+/// Content of a device's frame.
 #[derive(Debug)]
 // Made, taken apart and dropped.
 #[allow(clippy::large_enum_variant)]

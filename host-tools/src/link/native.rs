@@ -66,7 +66,7 @@ impl TickClock for HostClock {
 /// A device in memory, in lock-step: its time passes while the host waits for
 /// it to say something, and only as long as it waits for nothing itself.
 ///
-/// Without an arm of its own the device's arm rests in its home pose, and nobody holds the
+/// Without an arm of its own the device's arm rests in its home pose, and no hand holds the
 /// dead-man switch.
 pub struct Native<C: TickClock = StoppedClock> {
     device: Device<C, WINDOW>,
@@ -78,7 +78,7 @@ pub struct Native<C: TickClock = StoppedClock> {
     /// Ticks run while waiting for the device to say something, at most.
     ticks_a_call: u32,
     ticks: u64,
-    /// What the device said while it was told something.
+    /// Bytes from the device that arrived during a send.
     pending: VecDeque<u8>,
 }
 
@@ -160,7 +160,7 @@ impl<C: TickClock> Native<C> {
         self
     }
 
-    /// The same device, whose time passes whenever somebody listens, as a
+    /// The same device, whose time passes whenever the line is read, as a
     /// board's does: also while it waits for nothing but the host.
     #[must_use]
     pub fn restless(mut self) -> Self {
@@ -182,7 +182,7 @@ impl<C: TickClock> Native<C> {
         self
     }
 
-    /// The same device, whose time does not run ahead of this machine's, for somebody who
+    /// The same device, whose time does not run ahead of this machine's, for a host that
     /// looks on. What it falls behind by more than a moment it does not catch up.
     #[must_use]
     pub fn in_real_time(self) -> Self {
@@ -220,7 +220,7 @@ impl<C: TickClock> Native<C> {
         self.device.memory()
     }
 
-    /// Lets time pass while nobody listens, as a board does whose host is gone.
+    /// Lets time pass while the line is not read, as a board does whose host is gone.
     pub fn pass(&mut self, ticks: u32) {
         for _ in 0..ticks {
             self.tick();

@@ -1,4 +1,4 @@
-//! A client over a transport, and the clock that it is told.
+//! A client over a transport, and its clock.
 
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ impl<'t> Session<'t> {
     /// `arming` says how.
     ///
     /// # Errors
-    /// [`LinkError`]: nobody answers, another protocol, a scene refused.
+    /// [`LinkError`]: no answer, another protocol, a scene refused.
     pub fn open(
         terrain: &'t Terrain<'t>,
         scene: Scene,
@@ -116,7 +116,7 @@ impl<'t> Session<'t> {
         self.client.scene()
     }
 
-    /// Counts of what went over the link so far.
+    /// Statistics of the link.
     #[must_use]
     pub const fn tally(&self) -> &LinkStats {
         self.client.tally()

@@ -31,6 +31,8 @@ impl Timeouts {
     /// Time for which an armed real board tolerates a silent host, unless the user says
     /// otherwise, seconds: longer than a host that goes on takes to come back.
     pub const REAL_SILENCE_S: u16 = 30;
+    /// The same as an option's value.
+    pub const REAL_SILENCE: &str = "30s";
 
     /// For a device that runs in real time.
     pub const REAL_TIME: Self = Self {
@@ -53,7 +55,7 @@ impl Timeouts {
         silence_s: DEFAULT_SILENCE_S,
     };
 
-    /// So long an answer may take: somebody has to press a switch before a calibration is
+    /// Time-out of an answer: the user has to press a switch before a calibration is
     /// stored.
     pub(super) fn with(&self, ask: &Ask) -> Duration {
         const PRESS: Duration = Duration::from_millis(PRESS_MS as u64);

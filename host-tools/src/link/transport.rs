@@ -55,7 +55,7 @@ impl<T: Transport + ?Sized> Transport for &mut T {
     }
 }
 
-/// The line of somebody who has hung up, at this time.
+/// The line of a device that has hung up, at this time.
 pub(super) struct NoLine(pub(super) Duration);
 
 impl Transport for NoLine {

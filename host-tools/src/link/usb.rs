@@ -140,7 +140,7 @@ fn serial_of(info: &nusb::DeviceInfo) -> Option<String> {
     info.serial_number().map(printable)
 }
 
-/// Where a device is plugged in, whatever it is at the moment.
+/// Returns the USB port of a device, in either of its forms.
 pub(crate) fn place_on_usb(info: &nusb::DeviceInfo) -> String {
     let ports: Vec<_> = info.port_chain().iter().map(u8::to_string).collect();
     format!("bus {} port {}", info.bus_id(), ports.join("."))

@@ -50,7 +50,7 @@ pub enum GroundError {
     TooMany(usize),
 }
 
-/// Where a raster lies, in longitude and latitude where these are known.
+/// Returns the place of a raster, in longitude and latitude if they are known.
 pub(super) fn place_of(raster: &Raster) -> String {
     if let Some(bounds) = raster.bounds_lonlat() {
         let (west, south, east, north) = (bounds.west, bounds.south, bounds.east, bounds.north);

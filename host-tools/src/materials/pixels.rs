@@ -95,8 +95,8 @@ pub(super) struct From<'p> {
 }
 
 impl From<'_> {
-    /// What the file has in the pixel of a place in the terrain's coordinates; NaN in a hole and
-    /// beyond the file. And whether it is known.
+    /// Returns the value of the file's pixel at a place in the terrain's coordinates; NaN in a hole
+    /// and beyond the file. And whether it is known.
     pub(super) fn value(&self, ground: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
         let there = self.pixels.way.lead(self.terrain, &self.classes, ground);
         let place = there.map(|at| self.classes.transform().to_samples(at));

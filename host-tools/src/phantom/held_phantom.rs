@@ -1,4 +1,4 @@
-//! A virtual Phantom in somebody's hand: all that a device has outside of
+//! A virtual Phantom in a hand: all that a device has outside of
 //! itself. A hand follows a script, and the terrain lies in front of both.
 
 use hapterra_core::guard::GuardInputs;
@@ -22,7 +22,7 @@ pub struct HeldPhantom {
     /// When the script begins, s.
     begin_s: f64,
     t_s: f64,
-    /// What the current monitors read a step ago: a board reads what was converted in
+    /// Readings of the current monitors a step ago: a board reads what was converted in
     /// the tick before.
     measured_ma: [i16; 3],
 }

@@ -31,6 +31,9 @@ pub enum PlacingError {
     /// The place to touch is farther out than can be addressed.
     #[error("the place to touch, ({:.0}, {:.0}, {:.0}) mm, is too far from the origin", .0[0], .0[1], .0[2])]
     FarAway([f64; 3]),
+    /// The user has asked for an end meanwhile.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 impl<'t> PlacedTerrain<'t> {
@@ -39,47 +42,58 @@ impl<'t> PlacedTerrain<'t> {
     ///
     /// # Errors
     /// [`PlacingError`].
-    pub fn new(terrain: &'t Terrain<'t>, law: SurfaceParams) -> Result<Self, PlacingError> {
-        Self::toured(terrain, law, None)
+    pub fn new(terrain: &'t Terrain<'t>, params: SurfaceParams) -> Result<Self, PlacingError> {
+        Self::toured(terrain, params, None, &|| true)
     }
 
     /// Leaves the terrain where a view has it, with this point of it at the tip in the home pose
-    /// (device millimetres), and tours what the arm gets to of it.
+    /// (device millimetres), and tours what the arm gets to of it; planning ends if `goes_on`
+    /// returns false.
     ///
     /// # Errors
     /// [`PlacingError`].
     pub fn in_view(
         terrain: &'t Terrain<'t>,
         home_mm: [f64; 3],
-        law: SurfaceParams,
+        params: SurfaceParams,
+        goes_on: &dyn Fn() -> bool,
     ) -> Result<Self, PlacingError> {
-        Self::toured(terrain, law, Some(home_mm))
+        Self::toured(terrain, params, Some(home_mm), goes_on)
     }
 
     fn toured(
         terrain: &'t Terrain<'t>,
-        law: SurfaceParams,
+        params: SurfaceParams,
         home_mm: Option<[f64; 3]>,
+        goes_on: &dyn Fn() -> bool,
     ) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
-        let surface = |east: f64, north: f64| terrain.planned_mm(east, north, PLANNED_APART_MM);
-        let tour = TourPlan {
+        // Without heights the plan is complete in a moment, and dropped.
+        let surface = |east: f64, north: f64| {
+            let height = || terrain.planned_mm(east, north, PLANNED_APART_MM);
+            goes_on().then(height).flatten()
+        };
+        let plan = TourPlan {
             surface: &surface,
             size_mm: terrain.size_mm(),
             model,
             hand,
-            wall_n_per_mm: f64::from(law.stiffness_n_per_mm).max(0.01),
+            wall_n_per_mm: f64::from(params.stiffness_n_per_mm).max(0.01),
             push_n: PUSH_N,
             home_mm,
         }
-        .plan()?;
+        .plan();
+        if !goes_on() {
+            return Err(PlacingError::Interrupted);
+        }
+        let tour = plan?;
         let home_mm = tour.placement.home_mm;
         let home = terrain.scale().to_grid(home_mm);
         let home = home.ok_or(PlacingError::FarAway(home_mm))?;
         let duration_s = HeldPhantom::ARMED_S + tour.script.duration_s() + REST_S;
         Ok(Self {
             terrain,
-            scene: terrain.scene(law, Source::Encoders, home),
+            scene: terrain.scene(params, Source::Encoders, home),
             home_mm,
             arm: HeldPhantom::new(model, hand, tour.placement, tour.script)?.arming(),
             duration_s,
@@ -106,10 +120,10 @@ impl<'t> PlacedTerrain<'t> {
         self.scene
     }
 
-    /// The force law.
+    /// The surface parameters.
     #[must_use]
-    pub const fn law(&self) -> SurfaceParams {
-        self.scene.law
+    pub const fn params(&self) -> SurfaceParams {
+        self.scene.params
     }
 
     /// The point of the terrain that is at the tip in the arm's home pose, hand
@@ -130,5 +144,41 @@ impl<'t> PlacedTerrain<'t> {
     #[must_use]
     pub const fn duration_s(&self) -> f64 {
         self.duration_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use heightfield::Raster;
+
+    use super::*;
+    use crate::terrain::Scale;
+
+    #[test]
+    fn planning_ends_when_the_user_asks_for_an_end() {
+        let raster = Raster::from_fn(201, 201, |column, _| column as f32).expect("a raster");
+        let scale = Scale::new(1.0, 0.1).expect("a scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
+        let home_mm = [100.0, 100.0, 20.0];
+        let looks = Cell::new(0);
+        let plan = |most: u32| {
+            looks.set(0);
+            PlacedTerrain::in_view(&terrain, home_mm, SurfaceParams::PREMIUM, &|| {
+                looks.set(looks.get() + 1);
+                looks.get() <= most
+            })
+            .map(drop)
+        };
+        assert_eq!(plan(u32::MAX), Ok(()));
+        let all = looks.get();
+        for most in [0, 1, all / 2] {
+            assert_eq!(
+                plan(most),
+                Err(PlacingError::Interrupted),
+                "{most} of {all}"
+            );
+        }
     }
 }

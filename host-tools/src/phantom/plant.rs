@@ -35,7 +35,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// An arm at rest in a pose, nobody holding it. Its counters read zero in
+    /// An arm at rest in a pose, without a hand. Its counters read zero in
     /// the pose `q = 0`; see [`Plant::power_up`].
     #[must_use]
     pub fn new(model: PhantomModel, q_rad: [f64; 3]) -> Self {
@@ -59,7 +59,7 @@ impl Plant {
         self
     }
 
-    /// The same arm with nobody's hand on it.
+    /// The same arm without a hand.
     #[must_use]
     pub fn let_go(mut self) -> Self {
         self.hand = None;
@@ -240,7 +240,7 @@ impl Plant {
     }
 }
 
-/// What does not change while only velocities do.
+/// Terms that do not depend on velocities.
 struct Fixed {
     pose: Pose,
     inverse_mass: DMat3,

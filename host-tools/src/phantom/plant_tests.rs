@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// What only tests ask of an arm.
+/// Queries of tests.
 impl Plant {
     /// The same arm with the joints turning, rad/s.
     pub(in crate::phantom) fn moving(mut self, rate_rad_s: [f64; 3]) -> Self {

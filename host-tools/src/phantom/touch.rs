@@ -99,7 +99,7 @@ impl<'a> Touch<'a> {
         self
     }
 
-    /// The plan so far.
+    /// The unfinished plan.
     #[must_use]
     pub fn script(&self) -> &Script {
         &self.script

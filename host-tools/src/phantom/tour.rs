@@ -125,7 +125,7 @@ impl TourPlan<'_> {
         best.map_or(self.size_mm.map(|side| 0.5 * side), |best| best.1)
     }
 
-    /// Where along an axis the middle of a plan may be: on the terrain and, where the home
+    /// Returns the range for the middle of a plan along an axis: on the terrain and, where the home
     /// is settled, not so far from it that no arm gets there.
     fn room(&self, axis: usize, half: f64) -> [f64; 2] {
         let (middle, room) = (0.5 * self.size_mm[axis], half / INSIDE);
@@ -151,7 +151,7 @@ impl TourPlan<'_> {
         beyond.count() as f64 / line.len() as f64
     }
 
-    /// How good a place is: known ground counts most, then relief up to what
+    /// Returns the value of a place: known ground counts most, then relief up to what
     /// is enough, then being central.
     fn worth(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
         let line = winding(place, half);

@@ -162,7 +162,7 @@ mod tests {
         }
     }
 
-    /// What a picture of run time against error needs.
+    /// Test of a picture of run time against error.
     #[test]
     fn logarithmic_axes_take_points_and_lines() {
         use plotters::prelude::*;

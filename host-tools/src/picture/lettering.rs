@@ -12,9 +12,9 @@ static BOLD: LazyLock<Option<FontRef<'static>>> =
 /// A line of type, y downwards, its pen starting at the origin on the baseline.
 #[derive(Default)]
 pub(super) struct TextLine {
-    /// What is filled with ink; `None` for blanks.
+    /// Outline that is filled with ink; `None` for blanks.
     pub(super) outline: Option<Path>,
-    /// How far the pen moves.
+    /// Advance of the pen.
     pub(super) width: f32,
     /// Height of its capitals.
     pub(super) height: f32,

@@ -80,7 +80,7 @@ fn label(area: &Area<'_>, x: i32, y: i32, text: &str, side: HPos) -> Result<(), 
     axes::write(area, text, (x, y), style::text(18, &SOFT_INK), side)
 }
 
-/// What the lines and colours mean.
+/// Draws the key to lines and colours.
 fn key(area: &Area<'_>, top: i32, holes: bool) -> Result<i32, PictureError> {
     let right = px(40);
     let mut y = top + px(4);

@@ -36,7 +36,7 @@ pub const SERIES: [RGBColor; 6] = [
     RGBColor(86, 92, 104),
 ];
 
-/// What `plotters` calls the type; there is no other.
+/// Name of the only font in `plotters`.
 const FAMILY: &str = "Noto Sans";
 
 /// Finished pixels to drawing coordinates.

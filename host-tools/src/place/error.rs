@@ -10,7 +10,7 @@ pub enum PlaceError {
         "the file states no reference system, so it is not known where a longitude and latitude are in it; it covers {bounds}"
     )]
     NoSystem {
-        /// What the terrain covers, in its own coordinates.
+        /// Bounds of the terrain, in its own coordinates.
         bounds: String,
     },
     /// Longitude and latitude of a file whose projection is not known.
@@ -20,7 +20,7 @@ pub enum PlaceError {
     NoProjection {
         /// Its name.
         system: String,
-        /// What the terrain covers, in its own coordinates.
+        /// Bounds of the terrain, in its own coordinates.
         bounds: String,
     },
     /// A longitude and latitude that the projection does not have.
@@ -32,7 +32,7 @@ pub enum PlaceError {
         lonlat: [f64; 2],
         /// The file's reference system.
         system: String,
-        /// What the terrain covers.
+        /// Bounds of the terrain.
         bounds: String,
     },
     /// A code without a reference system.
@@ -64,7 +64,7 @@ pub enum PlaceError {
     Outside {
         /// As asked for.
         place: String,
-        /// What the terrain covers.
+        /// Bounds of the terrain.
         bounds: String,
     },
     /// A place without a height.
@@ -72,7 +72,7 @@ pub enum PlaceError {
     Hole {
         /// As asked for.
         place: String,
-        /// What the terrain covers.
+        /// Bounds of the terrain.
         bounds: String,
     },
     /// A box whose sides are in the wrong order.
@@ -88,7 +88,7 @@ pub enum PlaceError {
     BoxOutside {
         /// As asked for.
         place: String,
-        /// What the terrain covers.
+        /// Bounds of the terrain.
         bounds: String,
     },
     /// A box around nothing but holes.
@@ -96,7 +96,7 @@ pub enum PlaceError {
     BoxOfHoles {
         /// As asked for.
         place: String,
-        /// What the terrain covers.
+        /// Bounds of the terrain.
         bounds: String,
     },
     /// A box that holds no patch.
@@ -104,7 +104,7 @@ pub enum PlaceError {
     BoxTooSmall {
         /// As asked for.
         place: String,
-        /// What the terrain covers.
+        /// Bounds of the terrain.
         bounds: String,
     },
     /// A box of longitude and latitude that a map does not hold in one piece.

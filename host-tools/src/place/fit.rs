@@ -12,7 +12,7 @@ const HALVINGS: usize = 24;
 /// A terrain is laid smaller than the reach by up to this factor, for its heights.
 const SMALLEST: f64 = 1e-6;
 
-/// What is laid into the reach.
+/// Extent to fit to the workspace.
 pub(super) struct Extent<'a> {
     /// East and north, haptic cells.
     pub(super) cells: [f64; 2],
@@ -20,7 +20,7 @@ pub(super) struct Extent<'a> {
     pub(super) heights_mm: &'a dyn Fn(f64) -> [f64; 2],
 }
 
-/// Where a terrain lies that was laid into the reach.
+/// Result of a fit to the workspace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
     /// Device millimetres a haptic cell.

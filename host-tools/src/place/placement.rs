@@ -70,7 +70,7 @@ pub struct PlacementOptions {
     pub sizing: Sizing,
     /// Its height.
     pub heights: Heights,
-    /// Level of detail; chosen by what the encoders tell where nobody states it.
+    /// Level of detail; chosen by the encoders' resolution if it is not stated.
     pub level: Option<u8>,
 }
 
@@ -147,13 +147,13 @@ impl Placement {
 
     /// Ground metres a haptic cell of the view's level, where the file knows its size.
     #[must_use]
-    pub fn felt_cell_m(&self) -> Option<f64> {
+    pub fn haptic_cell_m(&self) -> Option<f64> {
         self.side_m.map(|side| side * f64::from(self.level).exp2())
     }
 
     /// Device millimetres a haptic cell of the view's level.
     #[must_use]
-    pub fn felt_cell_mm(&self) -> f64 {
+    pub fn haptic_cell_mm(&self) -> f64 {
         self.scale.at_level(self.level).cell_mm()
     }
 
@@ -190,8 +190,8 @@ impl Placement {
         })
     }
 
-    /// How many times larger a grid's cells are on the ground than the view's; once where
-    /// nobody knows.
+    /// Returns the ratio of a grid's cell size on the ground to that of the placement; 1 if it is
+    /// unknown.
     pub(super) fn as_large_as_in(&self, grid: &HapticGrid<'_>) -> f64 {
         let sides = grid.side_m().zip(self.side_m);
         sides.map_or(1.0, |(there, here)| there / here)
@@ -233,15 +233,15 @@ impl Placement {
     ///
     /// # Errors
     /// [`PlaceError::FarAway`] where the home position is farther out than can be addressed.
-    pub fn scene(&self, terrain: &Terrain<'_>, law: SurfaceParams) -> Result<Scene, PlaceError> {
+    pub fn scene(&self, terrain: &Terrain<'_>, params: SurfaceParams) -> Result<Scene, PlaceError> {
         let home = terrain.scale().to_grid(self.home_mm);
         let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
-        let scene = terrain.scene(law, Source::Encoders, home);
+        let scene = terrain.scene(params, Source::Encoders, home);
         Ok(terrain.underlaid(scene, self.reach_mm))
     }
 }
 
-/// What is asked for of a grid, its numbers checked.
+/// Checked request for a grid.
 struct Wanted<'g> {
     grid: &'g HapticGrid<'g>,
     options: PlacementOptions,

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use hapterra_core::Vec3;
 use hapterra_core::phantom::Calibration;
 
-/// How far from its stops a pose counts as reached, rad: 5°, so that a hand at the
+/// Distance from the stops at which a pose counts as reached, rad: 5°, so that a hand at the
 /// terrain's border does not touch them.
 const MARGIN_RAD: f32 = 5.0 * (std::f32::consts::PI / 180.0);
 /// Nearest to the base's axis that a tip is taken to, as a share of both links: there
@@ -50,7 +50,7 @@ pub struct Reach {
     columns: usize,
     /// Places of the profile upwards, from both links' length below the axis on.
     rows: usize,
-    /// How many places that are not reached there are inwards of and below a place.
+    /// Number of unreached places inwards of and below a place.
     missing: Vec<u32>,
     /// Of the tip in the home pose, the coarsest axis, mm a count.
     resolution_mm: f64,
@@ -131,8 +131,8 @@ impl Reach {
             .is_some_and(|out| self.reaches_all(out, [low, high]))
     }
 
-    /// Returns the middle of a box of a size in the workspace: the one that is closest to the tip in
-    /// its home pose, mm east, north, up of it; not to the side.
+    /// Returns the middle of a box of a size in the workspace: the one that is closest to the tip
+    /// in its home pose, mm east, north, up of it; not to the side.
     #[must_use]
     pub fn middle_of(&self, size: [f64; 3]) -> Option<[f64; 3]> {
         let half = size.map(|side| 0.5 * side);
@@ -194,7 +194,7 @@ impl Reach {
         inside && self.missing_in(columns.map(|c| c as usize), rows.map(|r| r as usize)) == 0
     }
 
-    /// How many places of a rectangle, ends included, are not reached.
+    /// Returns the number of unreached places in a rectangle, ends included.
     fn missing_in(&self, columns: [usize; 2], rows: [usize; 2]) -> u32 {
         let until = |column: usize, row: usize| {
             let index = row * (self.columns + 1) + column;

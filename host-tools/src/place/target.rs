@@ -15,7 +15,7 @@ pub enum Target {
     /// A rectangle. Of degrees its west may be larger than its east: then it lies across
     /// the line where longitudes begin anew.
     Box(Sides, Coordinates),
-    /// What is under the tip in the home pose.
+    /// The place under the tip in the home pose.
     At([f64; 2], Coordinates),
 }
 

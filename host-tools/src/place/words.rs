@@ -46,9 +46,9 @@ pub fn place_in_words(file: &Georeference<'_>, ground: [f64; 2]) -> String {
     }
 }
 
-/// What longitudes and latitudes are, where they are not simply those of WGS 84.
+/// Returns the kind of longitudes and latitudes, if they differ from WGS 84.
 fn kind_in_words(kind: LonLat<'_>) -> String {
-    /// What is this close needs no word, m.
+    /// Distance below which no remark is needed, m.
     const CLOSE_M: f64 = 5.0;
     match kind {
         LonLat::Unstated | LonLat::Wgs84 => String::new(),
@@ -126,7 +126,7 @@ fn angle_in_words(system: System) -> &'static str {
     }
 }
 
-/// What a file's two coordinates are called: longitude and latitude are those that can be
+/// Returns the names of a file's two coordinates: longitude and latitude are those that can be
 /// asked for.
 fn names(file: &Georeference<'_>) -> [&'static str; 2] {
     match file.system() {

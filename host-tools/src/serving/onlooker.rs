@@ -5,16 +5,16 @@ use hapterra_core::scene::SceneChange;
 use crate::link::{Ask, Event, LinkStats};
 use crate::terrain::Terrain;
 
-/// Is told what happens while a terrain is served, and says what is asked of the device
+/// Receives the events of a session, and states the requests to the device
 /// and when there is enough of it.
 pub trait Onlooker<'t> {
-    /// Is told what the device tells.
+    /// Receives an event of the device.
     fn take(&mut self, event: Event<'_>);
 
-    /// Is told what becomes of the line, in words for the user.
+    /// Receives the state of the line, in words for the user.
     fn hear(&mut self, line: &str);
 
-    /// What is to be asked of the device now; taken after each look at the line.
+    /// Returns the requests to the device; read after each poll of the line.
     fn asks(&mut self) -> Vec<Ask>;
 
     /// Another view that is to be put in now, with its terrain; taken after each look at

@@ -13,7 +13,7 @@ use crate::terrain::Terrain;
 /// Between two looks at the clock while nothing comes.
 const POLL: Duration = Duration::from_millis(50);
 
-/// What a device says that was without its host for too long.
+/// Remark for a device that was without its host for too long.
 const WAS_SILENT: &str = "before this the device had heard nothing from its host for too long: it let the force out and disarmed the arm";
 
 /// Makes a line to the device.
@@ -42,7 +42,7 @@ pub struct Service<'s, 't> {
     pub tell: &'s dyn Fn(&str),
 }
 
-/// A session under way. Whoever drops it, also in a panic, says goodbye.
+/// A session under way. Dropping it, also in a panic, closes it.
 pub struct Served<'s, 't> {
     session: Session<'t>,
     connect: Connect<'s, 't>,

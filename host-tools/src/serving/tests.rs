@@ -42,7 +42,7 @@ struct Bench {
     deaf: Rc<Cell<bool>>,
     /// Nothing comes from the device over the lines up to this one, either.
     dead_up_to: Rc<Cell<u32>>,
-    /// Lines made so far.
+    /// Number of lines made.
     made: Rc<Cell<u32>>,
     told: Rc<RefCell<Vec<String>>>,
     /// The host's time: a millisecond for each look at a line.
@@ -122,7 +122,7 @@ impl Bench {
         }
     }
 
-    /// How the last session ended, as the next host hears it.
+    /// Returns the end of the last session, as reported to the next host.
     fn last_end(&self) -> SessionEnd {
         self.deaf.set(false);
         let line = Box::new(self.line());
@@ -292,7 +292,7 @@ fn silent_device_is_reopened_once_its_first_line_is_closed() {
     let bench = Bench::new();
     let mut onlooker = Looks::times(2_000, || {});
     let mut connect = || {
-        // Nobody waits for ever for a test that fails.
+        // A test that fails does not hang.
         let waits = bench.lines.get() > 0 && bench.made.get() > 0;
         assert!(!waits, "the line before is not closed");
         bench.only_line()

@@ -89,7 +89,7 @@ fn timed(line: &str) -> Result<(Option<f64>, &str), &'static str> {
     }
 }
 
-/// What follows on a word at the beginning of a line; none where it begins otherwise.
+/// Returns the rest of a line after its first word `word`; none if the line begins otherwise.
 fn after_word<'l>(line: &'l str, word: &str) -> Option<&'l str> {
     let rest = line.trim_start().strip_prefix(word)?;
     let ends = rest.chars().next().is_none_or(char::is_whitespace);

@@ -28,11 +28,11 @@ pub struct Put<'r> {
     pub view: SceneChange,
     /// The terrain that it is felt on.
     pub terrain: Terrain<'r>,
-    /// Place, scale and law.
+    /// Place, scale and surface parameters.
     pub laid: Laid,
 }
 
-/// Where a change stands.
+/// Stage of a change.
 enum Stage<'r> {
     /// The clutch is closed, as far as this host knows.
     Idle,
@@ -43,7 +43,7 @@ enum Stage<'r> {
     Open,
     /// This view was said, of this terrain.
     Putting(Box<(Laid, Terrain<'r>)>),
-    /// The clutch was let go, and is still told to be open.
+    /// The clutch was released, and is still reported open.
     Closing,
 }
 
@@ -62,7 +62,7 @@ pub struct Steering<'r> {
     by_input: bool,
     /// The user took the clutch, and may have gone far since the cells were measured.
     measures: bool,
-    /// How the device was asked to hold it.
+    /// Requested hold of the clutch.
     asked: ClutchHold,
     /// Since when the ground of another view has been awaited.
     awaits: Option<Instant>,
@@ -94,7 +94,7 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// The view in force, as far as this host knows, and its law.
+    /// The view in force, as far as this host knows, and its surface parameters.
     #[must_use]
     pub const fn now(&self) -> &Laid {
         &self.now
@@ -269,7 +269,7 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// Where a sample has the hand, in the view in force.
+    /// Returns the position of the hand in a sample, in the placement in force.
     fn hand(&self, sample: &TickRecord) -> Hand {
         let scale = self.terrain.scale();
         let touches = sample.state == ContactState::Touching;
@@ -303,7 +303,7 @@ impl<'r> Steering<'r> {
             point.ok_or("that is too far from the first sample")
         };
         let (hip, home) = (on_grid(hip_mm)?, on_grid(laid.view.home_mm)?);
-        let scene = terrain.scene(laid.law, Source::Encoders, home);
+        let scene = terrain.scene(laid.params, Source::Encoders, home);
         let view = SceneChange {
             number: self.number.wrapping_add(1),
             scene: terrain.underlaid(scene, laid.view.reach_mm),

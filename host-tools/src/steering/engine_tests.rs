@@ -28,9 +28,9 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = Placement::new(&grid, &reach, &options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
-    let law = SurfaceParams::PREMIUM;
+    let params = SurfaceParams::PREMIUM;
     let bounds = Bounds {
-        first: Laid { view, law },
+        first: Laid { view, params },
         resolution_mm: reach.resolution_mm(),
         level: None,
         tip_mm: 0.0,
@@ -47,7 +47,7 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
     (0..count).for_each(|_| steering.on_event(&Event::Sample(&sample)));
 }
 
-/// What was asked of the clutch last.
+/// Returns the last request to the clutch.
 fn asked(steering: &mut Steering<'_>) -> Option<ClutchHold> {
     steering.asks().into_iter().rev().find_map(|ask| match ask {
         Ask::Request(Request::Clutch { hold }) => Some(hold),

@@ -100,7 +100,7 @@ impl CommandQueue {
     }
 
     /// The next command that is due at a time of the device, s; `is_free` tells whether what came
-    /// before is done. What is wrong with a line is told.
+    /// before is done. Errors in a line are reported.
     pub fn due(&mut self, t_s: f64, is_free: bool, tell: &mut dyn FnMut(String)) -> Option<Wanted> {
         while self.waiting.len() < WAITING
             && let Some(Ok(read)) = self.lines.as_ref().map(Receiver::try_recv)
@@ -201,7 +201,7 @@ fn addressed(line: &str, devices: usize) -> Result<(Option<usize>, &str), String
     }
 }
 
-/// Hands lines over with their numbers until the input ends, or nobody takes them.
+/// Hands lines over with their numbers until the input ends, or there is no receiver.
 fn read_lines(
     origin: &Origin,
     mut take: impl FnMut(&str, u64) -> bool + Send + 'static,
@@ -311,7 +311,7 @@ mod tests {
         let (answers, others): (Vec<_>, Vec<_>) = due[1].iter().partition(is_answer);
         assert_eq!(others, [2.0, 3.0, 5.0].map(zoom).each_ref());
         assert_eq!(answers, [&Wanted::Enter(7)]);
-        // What is wrong is told once, and not by each device.
+        // An error is reported once, and not by each device.
         let [third, fourth, sixth, seventh] = &told[..] else {
             panic!("{told:?}");
         };

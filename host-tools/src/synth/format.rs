@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// What a terrain is written as.
+/// Format of a written terrain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WrittenFormat {
     GeoTiff,

@@ -5,7 +5,7 @@ use super::hash::{hash, unit};
 const OCTAVES: u32 = 8;
 /// Cells between the lattice points of the coarsest octave.
 const COARSEST: f64 = 256.0;
-/// How much lower each octave is than the one before, which is half as fine:
+/// Ratio of the height of each octave to the one before, which is half as fine:
 /// rough slopes at every scale, as eroded rock has them.
 const GAIN: f64 = 0.45;
 

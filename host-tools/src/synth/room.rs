@@ -75,7 +75,7 @@ mod tests {
     use super::*;
     use crate::synth::{Kind, write};
 
-    /// What is foretold for a file, and how long it is then.
+    /// Returns the predicted size of a file, and its real size.
     fn foretold_and_true(name: &str, kind: Kind) -> (u64, u64) {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);

@@ -136,7 +136,7 @@ fn write_tiff_kind<K: TiffKind>(out: &mut Output, rows: &mut Rows<'_>) -> Result
 }
 
 /// Metres on UTM zone 31 north, its south-west corner on the equator at 3° east:
-/// there is no land, so nobody takes it for a survey.
+/// there is no land, so it is not taken for a survey.
 fn georeference<W: Write + Seek, K: TiffKind>(
     tags: &mut tiff::encoder::DirectoryEncoder<'_, W, K>,
     rows: u32,

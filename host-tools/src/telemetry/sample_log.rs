@@ -42,7 +42,7 @@ impl<'t> SampleLog<'t> {
         record
     }
 
-    /// The views so far.
+    /// All placements.
     pub const fn views(&mut self) -> &mut Placements<'t> {
         &mut self.views
     }
@@ -77,7 +77,7 @@ impl<'t> SampleLog<'t> {
         self.timeline.t_s_of(tick)
     }
 
-    /// The figures so far.
+    /// Present figures.
     #[must_use]
     pub fn figures(&self) -> Figures {
         self.figures

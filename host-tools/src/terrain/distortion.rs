@@ -3,7 +3,7 @@
 //! Haptic cells are all alike, as large as the file's are at one place. The file's own cells are
 //! not: those of degrees get narrower towards the poles, and a map's scale changes.
 
-use super::felt_grid::HapticGrid;
+use super::haptic_grid::HapticGrid;
 use heightfield::{CellSize, Sides};
 
 /// Places looked at along each side of a rectangle, its ends among them: the size of cells
@@ -58,8 +58,8 @@ impl HapticGrid<'_> {
         off.max_by(|one, other| one.share.total_cmp(&other.share))
     }
 
-    /// How far the longest and the shortest step of a haptic cell's side in any direction are
-    /// from that side, as a share, where the file's cells are of a size.
+    /// Returns the deviation of the longest and the shortest side of a haptic cell in any
+    /// direction, as a share, for file cells of a size.
     fn off_by(&self, cell: &CellSize) -> Option<f64> {
         let side = self.side_m()?;
         let ((long, high), cosine) = (cell.ground_metres(), cell.lean);
@@ -90,7 +90,7 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
     use crate::terrain::HapticCells;
-    use crate::terrain::felt_grid::tests::cell;
+    use crate::terrain::haptic_grid::tests::cell;
     use heightfield::Raster;
 
     fn grid_off(lean: f64, (east, north): (f64, f64), cells: HapticCells) -> f64 {

@@ -18,8 +18,8 @@ use super::{HapticCells, HapticGrid, Scale, ScaleError, identity};
 use crate::materials::MaterialBuffer;
 use heightfield::{Raster, ReadStatus, ReadTracker, Wait};
 
-/// Heights that the file does not hold but are interpolated are rounded to multiples of this, cells.
-/// Single precision is as coarse 64 cells above a tile's base, and the floats of what is not
+/// Heights that the file does not hold but are interpolated are rounded to multiples of this,
+/// cells. Single precision is as coarse 64 cells above a tile's base, and the floats of what is not
 /// rounded have no bits that a tile could do without on the link.
 pub const INTERPOLATED_STEP: f64 = 1.0 / (1 << 17) as f64;
 
@@ -40,10 +40,10 @@ pub struct Terrain<'r> {
     /// Felt patches, east and north.
     size: [i32; 2],
     top: i32,
-    /// What feels it, if it is no point: heights are then those of the ball's centre.
+    /// Ball at the tip, if there is one: heights are then those of its centre.
     ball: Option<Ball>,
     fingerprint: OnceLock<u64>,
-    /// Whether it was said that a tile is too steep.
+    /// Set after the warning that a tile is too steep.
     steep: OnceLock<()>,
 }
 
@@ -109,7 +109,8 @@ impl Default for TileBuffer {
 }
 
 impl TileBuffer {
-    /// The heights, of which these are the lowest and the highest, as they are shortest on the link.
+    /// The heights, of which these are the lowest and the highest, as they are shortest on the
+    /// link.
     pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
         let base = tiles::base(low, high);
         for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
@@ -327,16 +328,16 @@ impl<'r> Terrain<'r> {
     /// The scene in which the device feels this terrain. Its epoch is a hash
     /// of the heights and of everything else in it.
     #[must_use]
-    pub fn scene(&self, law: SurfaceParams, source: Source, home: GridPoint) -> Scene {
+    pub fn scene(&self, params: SurfaceParams, source: Source, home: GridPoint) -> Scene {
         let mut scene = Scene {
             epoch: 0,
             level: self.level,
             size: FieldSize::new(self.size[0], self.size[1]),
             top: self.top,
-            underlay: None,
+            fallback: None,
             cell_mm: self.scale.cell_mm() as f32,
             home,
-            law,
+            params,
             source,
             hold_clock: true,
             materials: (self.grid.materials()).map(|materials| materials.table().check_sum()),
@@ -381,9 +382,10 @@ impl<'r> Terrain<'r> {
         self.ground_mm(level, [east_mm, north_mm], &ReadTracker::default())
     }
 
-    /// Height of the surface where a hand plans its path, by places so far apart, mm: of a raster in
-    /// memory [`Self::height_mm`], of one that stays in its file as [`Self::seen_mm`], with a ball's
-    /// centre over flat ground. A plan goes all over the terrain, and must not read all of it.
+    /// Height of the surface where a hand plans its path, by places so far apart, mm: of a raster
+    /// in memory [`Self::height_mm`], of one that stays in its file as [`Self::seen_mm`], with a
+    /// ball's centre over flat ground. A plan goes all over the terrain, and must not read all of
+    /// it.
     #[must_use]
     pub fn planned_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
         if self.raster().is_known_whole() {
@@ -500,7 +502,7 @@ impl<'r> Terrain<'r> {
         Some(materials.tile(felt, key.index, buffer))
     }
 
-    /// Checks that every read so far that waited was complete ([`Raster::check_complete`]).
+    /// Checks that every earlier read that waited was complete ([`Raster::check_complete`]).
     ///
     /// # Errors
     /// The reason why a height or class could not be read.
@@ -510,8 +512,8 @@ impl<'r> Terrain<'r> {
         of_classes.map_or(Ok(()), Raster::check_complete)
     }
 
-    /// The height of the ground at a felt sample, in the file's vertical unit, as the file has it at
-    /// a level of detail; NaN where there is none. And whether it is known.
+    /// The height of the ground at a felt sample, in the file's vertical unit, as the file has it
+    /// at a level of detail; NaN where there is none. And whether it is known.
     pub(crate) fn ground_seen(&self, level: u8, [column, row]: [u32; 2]) -> (f64, ReadStatus) {
         let place = [column, row].map(|index| f64::from(index) * self.cells_of_grid());
         self.grid.height_seen(level, place)
@@ -541,8 +543,7 @@ impl<'r> Terrain<'r> {
         }
     }
 
-    /// What heights are rounded to multiples of, cells, where they are other numbers than those of
-    /// the file.
+    /// Returns the step to which heights are rounded, cells, if they differ from those of the file.
     const fn step(&self) -> Option<f64> {
         match (&self.ball, self.grid.is_resampled()) {
             (Some(_), _) => Some(CENTRE_STEP),
@@ -580,8 +581,8 @@ impl<'r> Terrain<'r> {
         unit
     }
 
-    /// Samples of the level that a ball's nodes depend on, `side` of them each way from a felt sample
-    /// on, in felt cells, NaN in holes and off the data; and where the nodes are.
+    /// Samples of the level that a ball's nodes depend on, `side` of them each way from a felt
+    /// sample on, in felt cells, NaN in holes and off the data; and where the nodes are.
     fn samples(
         &self,
         ball: &Ball,
@@ -619,7 +620,7 @@ impl<'r> Terrain<'r> {
         }
     }
 
-    /// How many samples of the tile lie in the field.
+    /// Returns the number of samples of the tile in the field.
     fn samples_in(&self, key: TileKey) -> usize {
         let inside = |index: i32, size: i32| {
             let first = index * TILE_CELLS as i32;

@@ -30,7 +30,7 @@ const LIVE_BYTES: usize = 8 << 20;
 /// Bytes that may wait where nothing is armed: a replay is faster than a viewer for
 /// moments, and a recording waits.
 const PATIENT_BYTES: usize = 64 << 20;
-/// Time that the viewer may take at the end for what it was not told yet.
+/// Time-out of the viewer's pending messages at the end.
 const AT_THE_END: Duration = Duration::from_secs(5);
 
 /// Number of messages, samples in batches among them, that the viewer did not get.
@@ -180,7 +180,7 @@ impl<'t> ViewFeed<'t> {
         }
     }
 
-    /// A row as the viewer is told it.
+    /// A row for the viewer.
     fn shown(&self, record: &Record) -> Record {
         let standing = self.standing.as_ref();
         standing.map_or(*record, |standing| standing.record(record))
@@ -255,7 +255,7 @@ impl<'t> ViewFeed<'t> {
         }
     }
 
-    /// Waits until the viewer has taken most of what it was told: for recordings alone,
+    /// Waits until the viewer has taken most of its messages: for recordings alone,
     /// which nobody else waits for. False where it is gone.
     pub fn wait_for_room(&self) -> bool {
         self.queue.wait_for_room(Duration::from_secs(60))

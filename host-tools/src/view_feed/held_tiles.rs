@@ -29,7 +29,8 @@ impl HeldTiles {
         }
     }
 
-    /// A felt tile was sent: the tile of the level that is shown for it, and the slot that this takes.
+    /// A felt tile was sent: the tile of the level that is shown for it, and the slot that this
+    /// takes.
     pub(super) fn sent(&mut self, key: TileKey) -> (u32, TileKey) {
         let index = self.of_level(key.index);
         let slot = self.slot(index);
@@ -38,7 +39,7 @@ impl HeldTiles {
         (slot, TileKey { index, ..key })
     }
 
-    /// What the loop lacks now.
+    /// Sets the tile that the loop lacks now.
     pub(super) fn lacks(&mut self, tile: Option<TileIndex>) {
         let tile = tile.map(|tile| self.of_level(tile));
         self.has_changed |= self.awaited != tile;
@@ -84,7 +85,7 @@ impl HeldTiles {
         })
     }
 
-    /// The viewer has not been told: the change is there again.
+    /// The change was not sent to the viewer: it is pending again.
     pub(super) fn not_told(&mut self) {
         self.has_changed = true;
     }

@@ -10,7 +10,7 @@ const CELLS: i32 = 1024;
 /// Cells between the samples of the finest layer at most: the viewer takes every fourth
 /// sample for its mesh, whose cells then are not larger than a tile of any level.
 const FINEST_STEP: i32 = 8;
-/// How many times coarser each layer is than the next finer one, at most.
+/// Maximum ratio of the spacings of two layers.
 const RATIO: i32 = 16;
 /// The viewer's mesh takes every fourth sample of a layer at most.
 const MESH: i32 = 4;
@@ -127,7 +127,7 @@ impl Reading {
         layer.rows < self.rows
     }
 
-    /// What was read.
+    /// Returns the layer that was read.
     pub(super) fn into_layer(self) -> Layer {
         self.layer
     }

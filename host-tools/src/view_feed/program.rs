@@ -19,7 +19,7 @@ pub enum ProgramError {
     NotStarted {
         /// The program.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         why: std::io::Error,
     },
 }

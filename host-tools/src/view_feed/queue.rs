@@ -1,4 +1,4 @@
-//! A queue to the viewer's pipe that never lets anybody wait.
+//! A queue to the viewer's pipe that never blocks the sender.
 
 use std::io::Write;
 use std::sync::Arc;

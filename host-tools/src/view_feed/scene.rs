@@ -1,4 +1,4 @@
-//! The scene of a terrain, as a viewer is told it.
+//! The scene of a terrain, for a viewer.
 
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_view_stream::{Coordinates, Hello, Layer, Message, Scene, TickCost, VERSION};
@@ -103,7 +103,7 @@ impl<'t> Picture<'_, 't> {
     }
 }
 
-/// How a device tells the cost of its ticks.
+/// Returns the unit in which a device reports the cost of its ticks.
 pub(super) fn tick_cost(device: &DeviceHello) -> TickCost {
     let hz = f64::from(device.clock_hz.max(1));
     let (per_count, unit) = match device.board.as_str() {
@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(scene.home_mm, [32.0, 16.0, 1.5]);
         assert_eq!(scene.laid_mm, [0.0, 0.0, 64.0, 32.0]);
         assert_eq!(scene.height_per_mm, 2.0);
-        // Cells of a metre are 2 mm in the hand; where they lie nobody knows.
+        // Cells of a metre are 2 mm in the hand; their place is unknown.
         assert_eq!(
             (scene.coordinates, scene.ground_m_per_mm),
             (None, Some(0.5))

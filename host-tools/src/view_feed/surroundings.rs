@@ -12,12 +12,12 @@ const ROWS: u32 = 32;
 /// is the whole, and stays.
 #[derive(Debug)]
 pub(super) struct Surroundings {
-    /// Of all layers, as they are told or being told.
+    /// All layers, sent or pending.
     extents: Vec<Extent>,
-    /// Layers that are still to be told, the next one last.
+    /// Pending layers, the next one last.
     due: Vec<(usize, Extent)>,
     reading: Option<Reading>,
-    /// Read, and not told yet.
+    /// Read, and not sent yet.
     read: Option<Layer>,
 }
 
@@ -57,7 +57,7 @@ impl Surroundings {
         self.due = self.extents.iter().copied().enumerate().rev().collect();
     }
 
-    /// Reads some rows, and tells a layer that is read: nobody waits for more than these.
+    /// Reads some rows, and tells a layer that is read: callers wait for no more than these.
     pub(super) fn tell(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
         if let Some(layer) = self.read.take() {
             let message = Message::Layer(layer);

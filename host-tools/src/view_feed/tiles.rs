@@ -1,4 +1,4 @@
-//! The tiles that a viewer is told: those of the device's window, or those that a
+//! The tiles that a viewer receives: those of the device's window, or those that a
 //! recording's path goes over.
 
 use std::collections::HashSet;
@@ -16,24 +16,24 @@ use crate::terrain::Terrain;
 const MAX_COMING: usize = 1024;
 /// Tiles of a recording in full detail: beyond so many, others stay coarse.
 const MAX_DETAILED: usize = 400;
-/// Tiles that are told in one look, so that a look stays short: heights are read again for
+/// Tiles that are sent at once, so that a look stays short: heights are read again for
 /// them.
 const AT_A_TIME: usize = 8;
 
-/// Tiles, and which of them are still to be told.
+/// Tiles, and which of them are pending.
 pub(super) struct Tiles {
     held: HeldTiles,
     /// The device took a view of which no sample has come yet; tiles that were sent since.
     coming: Option<Vec<TileKey>>,
     /// Tiles that are shown for good.
     detailed: HashSet<TileKey>,
-    /// Tiles that the viewer is still to be told, by slot.
+    /// Pending tiles for the viewer, by slot.
     untold: Vec<(u32, TileKey)>,
 }
 
 impl Tiles {
-    /// Of a device with an empty window of `side` × `side` tiles, with so many haptic cells a cell of
-    /// the level.
+    /// Of a device with an empty window of `side` × `side` tiles, with so many haptic cells a cell
+    /// of the level.
     pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {
             held: HeldTiles::new(side, parts),
@@ -43,7 +43,7 @@ impl Tiles {
         }
     }
 
-    /// What the loop lacks now.
+    /// Sets the tile that the loop lacks now.
     pub(super) fn lacks(&mut self, tile: Option<TileIndex>) {
         self.held.lacks(tile);
     }

@@ -35,7 +35,7 @@ const SEQUENCE_NS: u64 = 75_000;
 /// The time without a conversion after which the next one is wrong on a G474, ns: a tenth less
 /// than the millisecond of ES0430, which a chip's own clock and temperature may make of it.
 const STALE_NS: u64 = 900_000;
-/// What a wrong conversion reads.
+/// Reading of a wrong conversion.
 const WRONG: u32 = 0xFFF;
 /// Time that the regulator takes to start, ns: a G474's 20 µs, an H743's 10.
 const REGULATOR_NS: [u64; 2] = [20_000, 10_000];
@@ -92,7 +92,7 @@ impl Adc {
         if is_up { control } else { control & !ADEN }
     }
 
-    /// What is at a channel: nothing where it is not connected.
+    /// Returns the level of a channel: zero if it is not connected.
     fn level(&self, channel: u32) -> u16 {
         let connected = self.registers[(PCSEL / 4) as usize] >> channel & 1 == 1;
         let level = self.levels.get(channel as usize).copied();

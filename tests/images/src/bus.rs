@@ -93,7 +93,7 @@ pub struct Bus {
     pub command_held_at: Option<(usize, u16)>,
     /// True if the oscillator of USB follows the host's start-of-frames.
     pub usb_clock_follows: bool,
-    /// What reads the commands back.
+    /// Converter that reads the commands back.
     read_back: Adc,
     /// Time since power-up.
     pub now_ns: u64,
@@ -204,7 +204,7 @@ impl Bus {
         self.plain(register) & bit != 0
     }
 
-    /// What stops the outputs in hardware acts on them.
+    /// Applies the break inputs to the outputs.
     fn follow_break(&mut self) {
         let Some(at) = self.chip.output_break else {
             return;
@@ -450,7 +450,7 @@ impl Bus {
         matches!(self.chip.commands, Commands::Serial { back, .. } if back == address)
     }
 
-    /// What the hardware adds to a register.
+    /// Returns the value of a register with the bits that the hardware adds.
     fn ready(&self, address: u32, mut value: u32) -> u32 {
         for rule in self.chip.follows.iter().filter(|f| f.address == address) {
             if value & rule.of != 0 {
@@ -526,7 +526,7 @@ impl Bus {
         }
     }
 
-    /// What a write does to the commands.
+    /// Applies a write to the commands.
     fn command(&mut self, address: u32, value: u32, mask: u32) {
         match self.chip.commands {
             Commands::Converters(at) | Commands::DutyCycles(at, _) => {

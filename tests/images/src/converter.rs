@@ -44,7 +44,7 @@ pub struct Converter {
     /// SYNC fell too soon: the frame is lost.
     is_lost: bool,
     frame: Vec<u8>,
-    /// What the last frame asked for.
+    /// Request of the last frame.
     asked: u16,
     /// Bytes that came back and were not read yet.
     back: Vec<u8>,

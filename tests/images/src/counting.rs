@@ -50,7 +50,7 @@ enum Owner {
     Tick,
     /// The image around it.
     Image,
-    /// What both may call.
+    /// Functions that both may call.
     Shared,
 }
 

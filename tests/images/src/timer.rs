@@ -43,7 +43,7 @@ pub struct Timer {
     hz: u64,
     registers: [u32; 28],
     now_ns: u64,
-    /// What is left of the last count, in billionths of a clock.
+    /// Remainder of the last count, in billionths of a clock.
     carry: u64,
     /// The level of ITR0.
     pub(crate) trigger: bool,

@@ -7,7 +7,7 @@ use hapterra_core::wire::request::Request;
 use hapterra_image_tests::bench::Bench;
 use hapterra_image_tests::device::Device;
 
-/// What the clutch does.
+/// Limits by the clutch.
 const OF_CLUTCH: Limits = Limits::CLUTCH_INPUT
     .union(Limits::CLUTCH_OPEN)
     .union(Limits::CLUTCH_MOVES);

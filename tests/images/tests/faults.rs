@@ -66,8 +66,8 @@ fn assert_told(device: &mut Device<'_>, fault: Fault) {
     assert_eq!(told, Some(fault));
 }
 
-/// What is done to the machine switches the amplifiers off in one tick, and they stay
-/// off after `undo`; the host is told this fault.
+/// Asserts that a fault switches the amplifiers off in one tick, and they stay off after `undo`;
+/// the host is told this fault.
 fn assert_trips_in_one_tick(
     device: &mut Device<'_>,
     fault: Fault,

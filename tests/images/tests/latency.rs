@@ -17,7 +17,7 @@ use heightfield::Raster;
 
 const HOME_MM: [f64; 3] = [100.0, 100.0, 75.0];
 
-/// What a board's row of the page says.
+/// A board's row of the page.
 struct Row {
     /// Cycles until the last output, and of the whole interrupt.
     cycles: [u32; 2],
@@ -146,8 +146,8 @@ fn kept(names: &[&str], is_m7: bool) -> u32 {
     rows.map(|(_, cycles)| cycles).max().expect("a row")
 }
 
-/// Up to which rate the costliest ticks end in time: those of the counted scenes, and the contact of
-/// the stress test's with all effects and materials around it, with the board's own part.
+/// Up to which rate the costliest ticks end in time: those of the counted scenes, and the contact
+/// of the stress test's with all effects and materials around it, with the board's own part.
 #[test]
 fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
     let mut in_time_khz = [u32::MAX; 2];
@@ -192,7 +192,7 @@ fn rates_at_which_every_tick_ends_in_time_are_on_the_pages() {
     }
 }
 
-/// What the model of cycles takes an H743's tick to read from AXI SRAM.
+/// Compares the loop's data with the lines of the model of cycles for an H743's AXI SRAM.
 #[test]
 fn the_loops_data_are_within_the_lines_of_the_model() {
     for machine in machines().into_iter().filter(|machine| machine.chip.is_m7) {

@@ -20,7 +20,7 @@ const ROM_STACK: u32 = 0x2000_0800;
 /// Branches to itself.
 const HANG: [u8; 2] = [0xFE, 0xE7];
 
-/// Where the ROM's vectors are, and the bit that switches the oscillator of USB on:
+/// Returns the address of the ROM's vectors, and the bit that switches the oscillator of USB on:
 /// AN2606, and the reference manuals.
 fn rom(machine: &Machine) -> (u32, (u32, u32)) {
     match machine.chip.is_m7 {

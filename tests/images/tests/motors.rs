@@ -16,7 +16,7 @@ use hapterra_image_tests::machine::{Machine, Stop};
 use hapterra_image_tests::supply::Reset;
 use heightfield::Raster;
 
-/// What a board's RAM holds whose motors were never used.
+/// Returns the RAM of a board whose motors were never used.
 fn cold() -> Copies {
     let tiles = Box::leak(Box::new(TileBuffers::<4>::VACANT));
     let memory = Box::leak(Box::new(WorkingMemory::new()));

@@ -15,7 +15,7 @@ const AFRL: u32 = 0x20;
 /// Pins and their modes, as a page has them.
 type Pins = BTreeMap<String, String>;
 
-/// What a page says from a heading to the next: rows of what, pin, signal, mode.
+/// Returns the table of a page after a heading: rows of what, pin, signal, mode.
 fn table(page: &str, heading: &str) -> Pins {
     let from = page.find(heading).expect("the heading");
     let section = &page[from + heading.len()..];
@@ -31,7 +31,7 @@ fn table(page: &str, heading: &str) -> Pins {
     rows.collect()
 }
 
-/// What the page of a board's image says.
+/// Returns the pins of a board on its page.
 fn said(board: &str) -> Pins {
     let page = |name: &str| {
         let path = repository().join(format!("docs/reference/boards/{name}.md"));
@@ -50,7 +50,7 @@ fn said(board: &str) -> Pins {
     }
 }
 
-/// How a pin is set up.
+/// Returns the mode of a pin.
 fn mode(machine: &Machine, port: u32, pin: u32) -> String {
     let register = |offset| {
         machine

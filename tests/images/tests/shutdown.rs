@@ -54,8 +54,8 @@ fn run_until_off(machine: &mut Machine, ms: u64) -> Stop {
     })
 }
 
-/// Where duty cycles command, the pins are driven low: an amplifier reads that as a broken
-/// wire, and nothing that is coupled into the wire as a command.
+/// Asserts that the pins of duty cycles are driven low: an amplifier reads that as a broken wire,
+/// and nothing that is coupled into the wire as a command.
 fn assert_low(machine: &Machine, why: &str) {
     let outputs = machine.bus().duty_outputs();
     assert!(

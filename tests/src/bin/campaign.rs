@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use hapterra_tests::campaign::{self, Ground, Violation};
 use hapterra_tests::link_campaign;
 
-/// What the user asked for.
+/// Request of the user.
 struct Request {
     /// The campaign of link faults, not that of the closed loop.
     link: bool,

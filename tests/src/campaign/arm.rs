@@ -8,9 +8,9 @@ use hapterra::terrain::Terrain;
 
 use crate::chance::Chance;
 
-/// How far the hand wanders from the home pose, east and north, mm.
+/// Range of the hand around the home pose, east and north, mm.
 const REACH_MM: [f64; 2] = [55.0, 30.0];
-/// How fast the hand moves up and down where it is not yanked, mm/s.
+/// Vertical speed of a hand that is not yanked, mm/s.
 const UP_AND_DOWN_MM_S: f64 = 100.0;
 /// Above the terrain while the arm is being armed, mm.
 const LIFTED_MM: f64 = 14.0;

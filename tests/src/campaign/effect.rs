@@ -40,7 +40,7 @@ pub struct Mishap {
     sign: i32,
     size: f64,
     by_mm: [f64; 3],
-    /// What a stuck encoder reads, and one that runs away read last.
+    /// Reading of a stuck encoder, and the last one of a runaway encoder.
     held: Option<i32>,
 }
 

@@ -14,12 +14,12 @@ use super::swing::{MAX_TURNS, Swing};
 /// From the beginning of a tick until its force acts, as a part of it
 /// ([`hapterra_firmware::amplifier::CURRENT_LOOP_US`]).
 const LATE: f32 = 0.11;
-/// What a contact may have given with the controller on, mJ: a hundredth of what a tap gives without
-/// (docs/explanation/effects.md).
+/// Energy that a contact may give with the controller on, mJ: a hundredth of what a tap gives
+/// without (docs/explanation/effects.md).
 const GIVEN_MJ: f32 = 0.05;
-/// What shaded ground may have given more, whose force is turned less and less until then
-/// (docs/explanation/effects.md): so much, and so large a part of the largest force times a cell and the depth,
-/// and no more than the most; mJ.
+/// Additional energy that shaded ground may give, until its force is no longer turned
+/// (docs/explanation/effects.md), mJ: a constant, a part of the largest force times a cell and the depth,
+/// and the bound of both.
 const SHADED_MJ: f32 = 0.2;
 const SHADED_PART: f32 = 0.2;
 const SHADED_MOST_MJ: f32 = 2.0;
@@ -32,7 +32,7 @@ const NOT_AS_ASKED: Limits = Limits::SLEW_LIMITED.union(Limits::SPEED_LIMITED);
 /// Limits under which a surface is no spring.
 const NO_SPRING: Limits = Limits::SPEED_LIMITED
     .union(Limits::TERRAIN_MISSING)
-    .union(Limits::BOUNDARY_FADING);
+    .union(Limits::EDGE_FADING);
 
 /// Watches what one scene feels like.
 pub struct ForceWatch {
@@ -59,7 +59,7 @@ pub struct ForceWatch {
     pub most_turns: usize,
 }
 
-/// What a contact did so far.
+/// Record of a contact.
 #[derive(Clone, Copy, Debug, Default)]
 struct Touched {
     /// The work of its force at the tip, mJ, less what a spring gets that becomes stiffer.
@@ -148,8 +148,8 @@ impl ForceWatch {
         }
     }
 
-    /// The energy that the spring which is let through holds at a depth, mJ: the guard clamps what the
-    /// clutch leaves, and the ramp takes its share of that.
+    /// The energy that the spring which is let through holds at a depth, mJ: the guard clamps what
+    /// the clutch leaves, and the ramp takes its share of that.
     fn holds_mj(&self, depth_mm: f32, shares: Shares) -> f32 {
         if shares.clutch == 0.0 {
             return 0.0;
@@ -164,9 +164,9 @@ impl ForceWatch {
         gives_mj.min(SHADED_MOST_MJ)
     }
 
-    /// With the controller on no contact has given more than it got, at any time, and the tip does not
-    /// swing; but for what shading and a texture may. `shares` are those of the tick before and of
-    /// this one.
+    /// With the controller on no contact has given more than it got, at any time, and the tip does
+    /// not swing; but for what shading and a texture may. `shares` are those of the tick before and
+    /// of this one.
     fn gives_nothing(
         &mut self,
         last: Option<&TickRecord>,

@@ -115,7 +115,7 @@ fn terrain(chance: &mut Chance) -> Raster {
 
 struct Segment<'t> {
     terrain: &'t Terrain<'t>,
-    /// What is felt besides the spring.
+    /// Effects besides the spring.
     effects: Option<Effects>,
     felt: ForceWatch,
     /// From this tick on nothing is wrong.
@@ -131,10 +131,10 @@ struct Segment<'t> {
     watch: Watch,
     /// Counts that the encoders are off by.
     lost: [i32; 3],
-    /// What the device was told that they read in its zero pose.
+    /// Counts of the zero pose, as sent to the device.
     zero: [i32; 3],
     dead_man: bool,
-    /// What the current monitors read a tick ago, mA.
+    /// Readings of the current monitors a tick ago, mA.
     measured_ma: [i16; 3],
     drive: GuardOutputs,
     now: u64,
@@ -243,8 +243,8 @@ impl<'t> Segment<'t> {
         Ok((outcome, off))
     }
 
-    /// What host and user do in a mishap that takes more than a tick, `at` ticks after its
-    /// first one and with so many left.
+    /// Acts as host and user in a fault of several ticks, `at` ticks after its first one and with
+    /// so many left.
     fn act(&mut self, kind: Kind, at: u64, left: u64) {
         match kind {
             Kind::ReplayThenRun if left == 1 => {
@@ -286,7 +286,7 @@ impl<'t> Segment<'t> {
         self.host.say(message, now, &kind, &mut self.chance);
     }
 
-    /// What has to hold after a mishap besides what [`Kind::expectation`] says.
+    /// Checks the conditions after a fault besides [`Kind::expectation`].
     fn judge(&self, kind: Kind, status: &Status) -> Result<(), String> {
         let zero = status.health.zero;
         if kind == Kind::ReplayThenRun && zero != Some(self.zero) {
@@ -482,7 +482,7 @@ impl<'t> Segment<'t> {
                 .map_or(Ok(()), hostile::keeps_ceilings)?;
         }
         for sample in std::mem::take(&mut self.host.samples) {
-            self.watch.sample(&sample, self.scene.law.max_force_n)?;
+            self.watch.sample(&sample, self.scene.params.max_force_n)?;
             let is_calm = self.now >= self.calm_from && !self.poisoned;
             self.felt.look(&sample, is_calm)?;
         }
@@ -490,10 +490,10 @@ impl<'t> Segment<'t> {
     }
 }
 
-/// What may be felt of a scene.
+/// Returns the possible surfaces of a scene.
 fn felt(terrain: &Terrain<'_>, scene: &Scene) -> SceneSurfaces {
     let materials = terrain.grid().materials();
-    SceneSurfaces::of(&scene.law, materials.map(Materials::table))
+    SceneSurfaces::of(&scene.params, materials.map(Materials::table))
 }
 
 fn scene(
@@ -503,9 +503,9 @@ fn scene(
     chance: &mut Chance,
 ) -> Scene {
     let stiffness_n_per_mm = chance.between(0.3, 0.8) as f32;
-    let law = match effects {
+    let params = match effects {
         // Another scene each time.
-        Some(effects) => effects.law(0.5 + stiffness_n_per_mm),
+        Some(effects) => effects.params(0.5 + stiffness_n_per_mm),
         None => SurfaceParams {
             stiffness_n_per_mm,
             max_force_n: 8.5,
@@ -516,6 +516,6 @@ fn scene(
     Scene {
         // Real time: nothing waits for the host.
         hold_clock: false,
-        ..terrain.scene(law, Source::Encoders, home)
+        ..terrain.scene(params, Source::Encoders, home)
     }
 }

@@ -1,14 +1,15 @@
-//! The share of a scene's force that is let through, by the modes and limits that the device reports.
+//! The share of a scene's force that is let through, by the modes and limits that the device
+//! reports.
 
 use hapterra_core::guard::{Limits, Mode};
 use hapterra_core::scene::TickRecord;
 
-/// What a ramp adds in a tick of a millisecond: 2 s after arming, 0.1 s and 0.5 s of the clutch.
+/// Increment of a ramp in a tick of a millisecond: 2 s after arming, 0.1 s and 0.5 s of the clutch.
 const RAMPS: f32 = 1.0 / 2_000.0;
 const OPENS: f32 = 1.0 / 100.0;
 const CLOSES: f32 = 1.0 / 500.0;
 
-/// Where the clutch is.
+/// State of the clutch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Clutch {
     Closed,

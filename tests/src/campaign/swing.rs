@@ -2,7 +2,7 @@
 
 use hapterra_core::Vec3;
 
-/// How far it goes, mm; what is less is an encoder's count or two, or the hand's tremor.
+/// Distance, mm; what is less is an encoder's count or two, or the hand's tremor.
 const FAR_MM: f32 = 0.3;
 /// Most turns back in so many ticks. Tremor of 11.2 Hz turns six times in 0.25 s.
 pub const MAX_TURNS: usize = 10;
@@ -19,7 +19,8 @@ pub struct Swing {
 }
 
 impl Swing {
-    /// Takes a tick's motion along a unit vector. Returns the turns of the last quarter of a second.
+    /// Takes a tick's motion along a unit vector. Returns the turns of the last quarter of a
+    /// second.
     pub fn turns(&mut self, tick: u32, moved_mm: Vec3, along: Vec3) -> usize {
         self.place_mm += moved_mm.dot(along);
         let back_mm = match self.is_out {

@@ -19,7 +19,7 @@ pub enum Outcome {
     Latched(Fault),
 }
 
-/// What became of one kind.
+/// Results of one kind.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 struct Row {
     injected: u32,

@@ -24,7 +24,7 @@ const HOTTEST_C: f64 = 112.0;
 /// A winding may be warmer than the device takes it to be by this, K: the arm's motors
 /// and the device's model are not the same formula.
 const COLDER_K: f64 = 1.0;
-/// What is created beyond this is forgotten, mJ (docs/explanation/effects.md).
+/// Bound of the energy that is kept, mJ (docs/explanation/effects.md).
 const MAX_CREATED_MJ: f32 = 2.0;
 /// Room for rounding in comparisons of f32.
 const ROUNDING: f32 = 1e-4;
@@ -121,7 +121,7 @@ impl Watch {
         Ok(())
     }
 
-    /// What holds of the outputs whatever the inputs say.
+    /// Checks the outputs for any inputs.
     fn outputs(&mut self, drive: &GuardOutputs, truth: &Truth) -> Result<(), String> {
         let currents = drive.currents_a;
         let largest = currents.abs().max_element();
@@ -206,7 +206,7 @@ impl Watch {
     ///
     /// # Errors
     /// What must not be.
-    pub fn sample(&mut self, sample: &TickRecord, law_n: f32) -> Result<(), String> {
+    pub fn sample(&mut self, sample: &TickRecord, max_force_n: f32) -> Result<(), String> {
         let force = sample.force_n.length();
         if !force.is_finite() {
             return Err(format!("a force is not a number: {sample:?}"));
@@ -215,7 +215,7 @@ impl Watch {
         if off && force != 0.0 {
             return Err(format!("{force} N with the amplifiers off: {sample:?}"));
         }
-        let clamp = (WORKING_SHARE * self.record.max_force_n).min(law_n);
+        let clamp = (WORKING_SHARE * self.record.max_force_n).min(max_force_n);
         if force > clamp * (1.0 + ROUNDING) {
             return Err(format!("{force} N is above the clamp of {clamp} N"));
         }

@@ -87,7 +87,7 @@ impl Account {
         known.dropped = known.dropped.max(count.dropped);
     }
 
-    /// What the sessions had together: sent, and dropped.
+    /// Returns the sums over sessions: sent, and dropped.
     pub(super) fn of(&self, sessions: &[u32]) -> (u64, u64) {
         let counts = sessions
             .iter()

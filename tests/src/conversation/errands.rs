@@ -25,7 +25,7 @@ pub(super) enum Errand {
     Wait(u64),
 }
 
-/// What is left of a list, and what came of the rest.
+/// Rest of a list, and the results of the others.
 #[derive(Default)]
 pub(super) struct Errands {
     left: VecDeque<Errand>,

@@ -16,7 +16,7 @@ fn frame(content: &impl Serialize) -> Vec<u8> {
     frame.expect("a short frame").to_vec()
 }
 
-/// What a host of another version says first.
+/// Returns the greeting of a host of another version.
 pub(super) fn greeting() -> [Vec<u8>; 2] {
     let hello = ToDevice::Hello(HostHello {
         protocol: OTHER,
@@ -33,7 +33,7 @@ pub(super) fn greeting() -> [Vec<u8>; 2] {
     ]
 }
 
-/// What another host says that takes the device, and gives it up at once.
+/// Returns the messages of another host that takes the device and gives it up at once.
 pub(super) fn takeover() -> [Vec<u8>; 2] {
     let hello = ToDevice::Hello(HostHello {
         protocol: PROTOCOL,

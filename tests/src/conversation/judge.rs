@@ -39,7 +39,7 @@ pub enum Wrong {
     Error(String),
 }
 
-/// What is known of a run, and what is wrong with it.
+/// State of a run, and its faults.
 #[derive(Default)]
 pub(super) struct Judge {
     account: Account,

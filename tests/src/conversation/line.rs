@@ -68,7 +68,7 @@ impl Line {
         self.cut_until = self.cut_until.max(until);
     }
 
-    /// What was begun will not be ended: its sender is gone.
+    /// Drops an unfinished frame: its sender is gone.
     pub(super) fn break_off(&mut self) {
         self.begun.clear();
     }

@@ -9,7 +9,7 @@ use super::judge::Wrong;
 pub(super) struct Questions {
     /// The device's tick at which it was asked.
     asked: Option<u32>,
-    /// How many were answered.
+    /// Number of answers.
     pub(super) answers: u32,
     /// The tick of the first status that is older than its question, and the question's.
     outdated: Option<(u32, u32)>,

@@ -62,7 +62,7 @@ pub struct Report {
     pub came_of: [u32; 3],
 }
 
-/// What the host is about.
+/// Step of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
     /// To open and to be armed.
@@ -99,7 +99,7 @@ struct World<'t> {
     /// The host asks for the status without a pause.
     curious: bool,
     questions: Questions,
-    /// What is asked for while the arm is armed, and then; none where nothing is.
+    /// Requests while the arm is armed, and afterwards; none without requests.
     errands: Option<[Errands; 2]>,
     /// Ticks of the device since it was started.
     device_ticks: u32,
@@ -276,7 +276,7 @@ impl<'t> World<'t> {
         self.say(&out);
     }
 
-    /// What the host says goes on its way.
+    /// Sends the bytes of the host.
     fn say(&mut self, out: &[u8]) {
         self.judge.host_says(out);
         self.lines[0].send(out, self.now);
@@ -312,7 +312,7 @@ impl<'t> World<'t> {
         }
     }
 
-    /// What the device says goes on its way.
+    /// Sends the bytes of the device.
     fn listen(&mut self) {
         let mut chunk = [0; 2048];
         loop {

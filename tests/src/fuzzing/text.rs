@@ -35,7 +35,7 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// What is read, or why not, can be said.
+/// Formats a result and its error.
 fn check<T: std::fmt::Debug, E: std::error::Error>(read: Result<T, E>) {
     let told = read.map_or_else(|error| error.to_string(), |read| format!("{read:?}"));
     assert!(!told.is_empty());

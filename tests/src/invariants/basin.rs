@@ -15,7 +15,7 @@ const FAR: f64 = 4.0;
 /// Columns over the reach of the HIP, where that is a cell or less: 64 a cell at least, and a
 /// whole number, so that edges between patches lie in columns.
 const COLUMNS: f64 = 256.0;
-/// What a channel between two columns may be narrower by, cells.
+/// Tolerance of a channel between two columns, cells.
 const SLACK: f64 = 0.02;
 
 impl Judge<'_> {

@@ -53,7 +53,7 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// What was felt last fades to nothing in equal steps.
+    /// Checks that the last force fades to nothing in equal steps.
     pub(super) fn lets_go_gently(&mut self, before: &Seen, seen: &Seen) -> Verdict {
         let felt = |seen: &Seen| seen.felt.displacement.as_dvec3().length();
         let lets_go = |seen: &Seen| seen.felt.state == ContactState::Releasing;

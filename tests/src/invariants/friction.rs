@@ -26,10 +26,10 @@ const STEEP: f64 = 1e3;
 struct Pull {
     along: f64,
     rest: f64,
-    /// How steep the ground is there.
+    /// Slope of the ground there.
     slope: f64,
-    /// What the height may be off by: the place is rounded, and of a patch with a needle at a
-    /// corner the heights that are mixed are.
+    /// Tolerance of the height: the place is rounded, and of a patch with a needle at a corner the
+    /// heights that are mixed are.
     rounding: f64,
 }
 
@@ -96,8 +96,8 @@ impl Judge<'_> {
         self.fail(Invariant::Cone, detail)
     }
 
-    /// Where the proxy was when its motion for this HIP began: ticks that were cut short go on with
-    /// it.
+    /// Returns the position of the proxy when its motion for this HIP began: ticks that were cut
+    /// short go on with it.
     pub(super) fn begun_at(&self, before: &Seen, seen: &Seen) -> [f64; 3] {
         match before.felt.converged || before.hip != seen.hip {
             true => before.proxy,
@@ -105,8 +105,8 @@ impl Judge<'_> {
         }
     }
 
-    /// Where a proxy has come from over the surface alone: around the two the HIP is clearly below
-    /// every tangent plane, so that nothing lifts it off.
+    /// Returns the start of a proxy's slide over the surface alone: around the two the HIP is
+    /// clearly below every tangent plane, so that nothing lifts it off.
     fn slid_from(&self, seen: &Seen) -> Option<[f64; 3]> {
         const LOOKS: u32 = 12;
         /// So far beside the straight way, in cells, a slide may lead.
@@ -141,14 +141,14 @@ impl Judge<'_> {
             })
     }
 
-    /// What the height may be off by at a place of a patch: the place is rounded, and of a patch
-    /// with a needle at a corner the heights that are mixed are.
+    /// Returns the tolerance of the height at a place of a patch: the place is rounded, and of a
+    /// patch with a needle at a corner the heights that are mixed are.
     fn rounding(&self, patch: &Patch, [x, y]: [f64; 2], hip: f64) -> f64 {
         f64::from(f32::EPSILON) * (patch.slope(x, y) + 4.0 * patch.mixed_size(x, y, hip))
     }
 
-    /// A proxy inside the cone does not move. One that was in the air slides at first, also where it
-    /// comes back to where it was.
+    /// A proxy inside the cone does not move. One that was in the air slides at first, also where
+    /// it comes back to where it was.
     pub(super) fn sticks(&mut self, before: &Seen, seen: &Seen) -> Verdict {
         let touches =
             |seen: &Seen| seen.felt.state == ContactState::Touching && seen.felt.converged;

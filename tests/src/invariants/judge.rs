@@ -84,7 +84,7 @@ pub struct Judge<'g> {
     pub(super) before: Option<Seen>,
     /// Place where the proxy was when its motion for the last HIP began.
     pub(super) began: [f64; 3],
-    /// What was felt, cells, when the proxy began to let go.
+    /// Displacement, cells, when the proxy began to let go.
     pub(super) let_go_from: f64,
     /// Ticks in a row in which a proxy in the air came no farther.
     pub(super) stalled: u32,
@@ -189,8 +189,8 @@ impl<'g> Judge<'g> {
         self.tick += 1;
     }
 
-    /// Judges whether the proxy of the next tick is where a friction lets it be that is known to lie
-    /// between two.
+    /// Judges whether the proxy of the next tick is where a friction lets it be that is known to
+    /// lie between two.
     ///
     /// # Errors
     /// [`Invariant::Cone`] and [`Invariant::Stuck`].

@@ -36,8 +36,8 @@ pub enum Invariant {
     Settles,
     /// In contact the proxy is on the surface.
     OnSurface,
-    /// Where a tick leaves no work over, no way along the surface leads from the
-    /// proxy nearer to the HIP.
+    /// After a tick with work left, no path along the surface leads from the proxy nearer to the
+    /// HIP.
     LocalMinimum,
     /// While a contact lasts, a way of ground and air joins the proxy with its last place, and is
     /// nowhere farther from the HIP than that place.

@@ -12,9 +12,9 @@ const FAR: f64 = 1e4;
 /// An exact local closest point.
 struct Minimum {
     at: [f64; 3],
-    /// How far the proxy is from it, cells.
+    /// Distance of the proxy from it, cells.
     off: f64,
-    /// Where, and in which patch, the way down to it began.
+    /// Start of the path down to it, with its patch.
     start: [f64; 2],
     patch: Patch,
 }
@@ -107,8 +107,8 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// How far the HIP is above the tangent plane of the patch that the straight way to it
-    /// leads into from a place; `None` where it leads into none.
+    /// Returns the height of the HIP above the tangent plane of the patch that the straight way to
+    /// it leads into from a place; `None` where it leads into none.
     fn height_of_way(&self, seen: &Seen, start: [f64; 2]) -> Option<f64> {
         let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
         let level = way[0].hypot(way[1]);

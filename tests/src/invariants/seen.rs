@@ -13,8 +13,8 @@ use crate::scene::terrain::Terrain;
 pub const ERROR: f64 = 2e-6;
 /// Stretches shorter than this, in cells, tell nothing about a fade.
 const SHORT: f64 = 1e-3;
-/// The law that turns displacements into forces, and the sizes of a cell it does so for.
-pub const LAW: SurfaceParams = SurfaceParams::PREMIUM;
+/// The surface parameters that turn displacements into forces; [`CELLS_MM`] are the cell sizes.
+pub const PARAMS: SurfaceParams = SurfaceParams::PREMIUM;
 /// Millimetres of a cell.
 pub const CELLS_MM: [f32; 3] = [1e-3, 1.0, 1e3];
 
@@ -31,7 +31,7 @@ pub struct Seen {
     pub textured: Option<Vec3>,
     /// The proxy, where the terrain was made.
     pub proxy: [f64; 3],
-    /// The force that the product's law gives for it, N, by [`CELLS_MM`].
+    /// The force that the product's surface parameters gives for it, N, by [`CELLS_MM`].
     pub force_n: [[f64; 3]; CELLS_MM.len()],
 }
 
@@ -62,7 +62,7 @@ impl Seen {
             textured: None,
             proxy: unshifted(&felt.proxy, shift),
             force_n: CELLS_MM.map(|cell_mm| {
-                let force = LAW.spring().force_n(felt.displacement * cell_mm);
+                let force = PARAMS.spring().force_n(felt.displacement * cell_mm);
                 force.as_dvec3().to_array()
             }),
         }
@@ -81,7 +81,7 @@ impl Seen {
         self.is_touching() && before.is_touching() && self.felt.proxy == before.felt.proxy
     }
 
-    /// What part of the spring is felt; `None` where it is too short to tell.
+    /// Returns the rendered share of the spring; `None` if the spring is too short.
     pub(super) fn edge_fade(&self) -> Option<f64> {
         let whole = distance(self.proxy, self.hip);
         let felt = self.felt.displacement.as_dvec3().length();
@@ -98,8 +98,8 @@ impl Seen {
         ERROR.max(4.0 * f64::from(f32::EPSILON) * largest)
     }
 
-    /// What four units in the last place of the corners of the proxy's patches
-    /// are, in height above the HIP: they are coordinates, too.
+    /// Returns the four units in the last place of the corners of the proxy's patches, as height
+    /// above the HIP: they are coordinates, too.
     pub(super) fn rounding_of_corners(&self, terrain: &Terrain) -> f64 {
         let [x, y, _] = self.proxy;
         let corners = patches_at(terrain, x, y).flat_map(|patch| patch.corners());

@@ -1,4 +1,5 @@
-//! The force with texture, by the formulas of docs/explanation/effects.md, in f64 and whole numbers.
+//! The force with texture, by the formulas of docs/explanation/effects.md, in f64 and whole
+//! numbers.
 
 use glam::DVec3;
 use hapterra_core::force::{Pattern, Texture};
@@ -32,7 +33,7 @@ pub struct TextureJudge {
     speed: f64,
 }
 
-/// What a texture adds.
+/// Contribution of a texture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Added {
     /// To the displacement, cells.
@@ -44,15 +45,15 @@ pub(super) struct Added {
 /// A texture as it is felt, cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TextureBounds {
-    /// How far it reaches above and below the surface.
+    /// Height above and below the surface.
     pub(super) amplitude: f64,
-    /// What it adds to the depth.
+    /// Addition to the depth.
     pub(super) rise: f64,
     /// Most that it adds along the surface.
     pub(super) along: f64,
 }
 
-/// What is wrong with a textured force.
+/// Verdict on a textured force.
 type Verdict = Result<(), String>;
 
 impl TextureJudge {
@@ -98,8 +99,8 @@ impl TextureJudge {
         held(off <= allowed && (!is_gone || textured == plain), told)
     }
 
-    /// What the whole texture adds to a displacement at a place, cells, where a share of it is
-    /// felt.
+    /// Returns the contribution of the whole texture to a displacement at a place, cells, where a
+    /// share of it is felt.
     pub(super) fn adds(&self, plain: DVec3, proxy: &GridPoint, share: f64) -> Added {
         let depth = plain.length();
         let normal = plain / depth;
@@ -122,7 +123,7 @@ impl TextureJudge {
         Added { wanted, allowed }
     }
 
-    /// How high and how steep the whole texture is at a place, under so much depth, cells.
+    /// Returns the height and slope of the whole texture at a place, under so much depth, cells.
     pub(super) fn relief(&self, proxy: &GridPoint, depth: f64) -> TextureBounds {
         let (amplitude, wavelength) = self.sizes();
         let (height, slopes) = height_and_slopes(&self.texture, proxy);
@@ -139,8 +140,8 @@ impl TextureJudge {
         self.speed
     }
 
-    /// How far a place is known, cells: to 2⁻²³; along a way of any direction, which is rounded, to
-    /// the last place of the distance from the origin.
+    /// Returns the precision of a place, cells: to 2⁻²³; along a way of any direction, which is
+    /// rounded, to the last place of the distance from the origin.
     fn misplaced(&self, at: &GridPoint) -> f64 {
         let [x, y, _] = at.cell().map(|cell| f64::from(cell.unsigned_abs()));
         let is_turned = self.texture.direction_deg != 0.0;
@@ -155,7 +156,8 @@ impl TextureJudge {
         )
     }
 
-    /// How much is felt of a texture at a proxy: a speed that falls does so by a tenth a tick.
+    /// Returns the rendered share of a texture at a proxy: a speed that falls does so by a tenth a
+    /// tick.
     pub(super) fn share(&mut self, proxy: &GridPoint) -> f64 {
         let now = self.before.map_or(1.0, |before| {
             let way = before.to(proxy).as_dvec3();

@@ -39,7 +39,7 @@ enum Step {
     Leave,
 }
 
-/// What goes wrong in a run, and when.
+/// Injected faults of a run, with their steps.
 struct Plan {
     kind: Kind,
     step: Step,
@@ -162,7 +162,7 @@ impl Run<'_, '_> {
         }
     }
 
-    /// What was planned for a step happens in it.
+    /// Carries out the plan of a step.
     fn may_go_on(&self, step: Step) -> bool {
         self.plan.done || self.plan.step != step
     }

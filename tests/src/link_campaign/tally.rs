@@ -17,7 +17,7 @@ pub enum Outcome {
     Killed,
 }
 
-/// What became of the runs with one kind of fault.
+/// Results of the runs with one kind of fault.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 struct Row {
     runs: u32,

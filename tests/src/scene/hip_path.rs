@@ -14,7 +14,7 @@ pub const LEAP: f64 = 32.0;
 /// Leaps toward a place, at most.
 const LEAPS: usize = 12;
 
-/// What the HIP does for a while.
+/// Motion of the HIP for some ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Habit {
     /// Steps of one length near the surface.

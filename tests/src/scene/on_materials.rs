@@ -13,7 +13,7 @@ use crate::invariants::judge::Measured;
 use crate::invariants::material::MaterialJudge;
 use crate::invariants::{Invariant, Violation};
 
-/// How far beyond the field the HIP of a shifted scene may be, and how far above or below, cells.
+/// Range of the HIP of a shifted scene beyond the field, and above or below it, cells.
 const BESIDE: f64 = 128.0;
 const DEEP: f64 = 4e6;
 
@@ -78,8 +78,8 @@ fn replay_in(
     }
 }
 
-/// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each point was
-/// felt with all of its terrain: one that needs more tiles than its window holds is not.
+/// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each
+/// point was felt with all of its terrain: one that needs more tiles than its window holds is not.
 fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {
         let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();

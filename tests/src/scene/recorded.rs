@@ -38,7 +38,7 @@ pub struct Recorded {
     message: SceneMessage,
     /// Tiles and HIPs, in the order they came.
     events: Vec<Event>,
-    /// What each tick answered here, at no cost.
+    /// Answer of each tick here, without costs.
     answers: Vec<Counted>,
 }
 
@@ -77,10 +77,10 @@ impl Recorded {
             level: 0,
             size: FieldSize::new(scene.terrain.size[0], scene.terrain.size[1]),
             top: scene.terrain.top(),
-            underlay: None,
+            fallback: None,
             cell_mm: 1.0,
             home: GridPoint::default(),
-            law: SurfaceParams {
+            params: SurfaceParams {
                 friction: scene.friction,
                 shading: scene.shading,
                 texture: scene.texture,
@@ -99,8 +99,8 @@ impl Recorded {
         }
     }
 
-    /// Replays a scene of a seed on its materials, in lock-step as the board does, and notes it down;
-    /// `None` where it has none.
+    /// Replays a scene of a seed on its materials, in lock-step as the board does, and notes it
+    /// down; `None` where it has none.
     #[must_use]
     pub fn on_materials(seed: u64, number: u64, surface: Surface) -> Option<Self> {
         let scene = Scene::random(seed, number).with_surface(surface);
@@ -115,8 +115,8 @@ impl Recorded {
         })
     }
 
-    /// Scenes by which the emulated processor is compared with this one, with their numbers: a third
-    /// of them with friction.
+    /// Scenes by which the emulated processor is compared with this one, with their numbers: a
+    /// third of them with friction.
     #[must_use]
     pub fn compared() -> Vec<(u64, Self)> {
         let random = |number| (number, Self::random(COMPARED, number, surface(number)));

@@ -54,7 +54,7 @@ pub struct Scene {
     pub(super) work_per_tick: u32,
     /// Which of the twins are run beside it.
     pub(super) twins: Twins,
-    /// What the twins' own choices follow from.
+    /// Seed of the twins' own choices.
     pub(super) seed: u64,
 }
 
@@ -87,8 +87,8 @@ const GRATING: Texture = Texture {
     ..Texture::NONE
 };
 
-/// Returns true if a texture feels the same a multiple of 32 cells away: it lies fast on the terrain's
-/// cells, of so many millimetres.
+/// Returns true if a texture feels the same a multiple of 32 cells away: it lies fast on the
+/// terrain's cells, of so many millimetres.
 pub(super) fn is_alike(texture: &Texture, cell_mm: f32) -> bool {
     // So many waves can be told without rounding.
     let fits = [0.25, 0.5, 1.0, 8.0, 32.0].contains(&texture.wavelength_mm)

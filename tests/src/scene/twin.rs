@@ -15,7 +15,7 @@ use crate::invariants::surface::distance;
 use crate::invariants::{Invariant, Violation};
 
 type Verdict = Result<(), Violation>;
-/// Whether the twin could be compared, to the end.
+/// Result of a comparison: true if the twin could be compared to the end.
 type Compared = Result<bool, Violation>;
 
 /// The same again, with the contact's shortcuts switched off: the same bits.
@@ -31,9 +31,9 @@ pub fn repeated(scene: &Scene, seen: &[Seen], buffers: &mut Buffers) -> Compared
     same_bits(Invariant::Repeatable, seen, &again, [0; 3]).map(|()| true)
 }
 
-/// How far beyond the field a shifted scene's HIP may be, cells.
+/// Range of a shifted scene's HIP beyond the field, cells.
 const BESIDE: f64 = 128.0;
-/// How far above or below, cells: farther down than any spike reaches up.
+/// Range above or below, cells: farther down than any spike reaches up.
 const DEEP: f64 = 4e6;
 
 /// Up to 10⁸ cells away: the same bits, but for textures that are others there.
@@ -238,8 +238,8 @@ pub fn same_way(
     Ok(true)
 }
 
-/// Whether a shaded force points the same way. A place that is off by as much as rounding
-/// allows turns it by less than this, rad, on ground that mirrored scenes are compared on.
+/// Tolerance of the direction of a shaded force. A place that is off by as much as rounding allows
+/// turns it by less than this, rad, on ground that mirrored scenes are compared on.
 const TURNED: f32 = 0.01;
 /// A force of a HIP that is farther away is not compared, cells.
 const FAR: f32 = 1e4;
@@ -295,8 +295,8 @@ fn is_elsewhere(there: &Seen, here: &Seen, hair: f64) -> bool {
     distance(there.proxy, here.proxy) > JUMP * hair * distance(here.proxy, here.hip).max(1.0)
 }
 
-/// Returns true if a hair's breadth makes the difference in the mirrored or turned twin, as it is felt
-/// once more.
+/// Returns true if a hair's breadth makes the difference in the mirrored or turned twin, as it is
+/// felt once more.
 fn is_twin_undecided(
     scene: &Scene,
     symmetry: Symmetry,
@@ -304,15 +304,15 @@ fn is_twin_undecided(
     buffers: &mut Buffers,
 ) -> bool {
     let twin = twin_of(scene, symmetry);
-    let own = felt_at(&twin, tick, |_| [0.0; 3], buffers);
+    let own = rendered_at(&twin, tick, |_| [0.0; 3], buffers);
     own.is_some_and(|own| {
         let decides = |there: &Seen, hair| is_elsewhere(there, &own, hair);
         is_undecided(&twin, tick, decides, buffers)
     })
 }
 
-/// Returns true if a hair's breadth on the way to this tick, or in this tick alone, cells, makes the
-/// difference, too.
+/// Returns true if a hair's breadth on the way to this tick, or in this tick alone, cells, makes
+/// the difference, too.
 fn is_undecided(
     scene: &Scene,
     tick: usize,
@@ -327,7 +327,7 @@ fn is_undecided(
         for corner in 0..8 {
             let off = [0, 1, 2].map(|bit| if corner >> bit & 1 == 0 { hair } else { -hair });
             let moved = |now| if now < first { [0.0; 3] } else { off };
-            if felt_at(scene, tick, moved, buffers).is_some_and(|felt| decides(&felt, hair)) {
+            if rendered_at(scene, tick, moved, buffers).is_some_and(|felt| decides(&felt, hair)) {
                 return true;
             }
         }
@@ -335,8 +335,8 @@ fn is_undecided(
     false
 }
 
-/// What is felt in a tick of a way that is moved by as much in each.
-fn felt_at(
+/// Returns the result of a tick of a path that is shifted by as much in each.
+fn rendered_at(
     scene: &Scene,
     tick: usize,
     moved: impl Fn(usize) -> [f64; 3],

@@ -180,7 +180,7 @@ pub fn enumerate(port: &mut impl Port) -> Result<Found, Failure> {
 pub struct ScriptedPipes<P> {
     port: Rc<RefCell<P>>,
     endpoints: BulkEndpoints,
-    /// What a host's controller holds of a transfer that was not read whole.
+    /// Rest of a transfer in the host's controller.
     left: Vec<u8>,
 }
 

@@ -25,9 +25,9 @@ pub(crate) const MIDDLE_MM: [f64; 2] = [100.0, 100.0];
 pub(crate) const BEGIN: u64 = (1e3 * HeldPhantom::ARMED_S) as u64;
 pub(crate) const PRESSED: u64 = BEGIN + 1_500;
 
-/// What goes wrong, by tick.
+/// Fault by tick.
 pub(crate) type Wrong = fn(u64, &mut GuardInputs);
-/// What each tick was given and what it drove.
+/// Inputs and outputs of each tick.
 pub(crate) type Log = Rc<RefCell<Vec<(GuardInputs, GuardOutputs)>>>;
 
 /// A device with an arm, a session with it, and all that was seen.
@@ -71,10 +71,10 @@ impl<'t> Bed<'t> {
             }),
         );
         let home = terrain.scale().to_grid(home_mm).expect("addressable");
-        let law = SurfaceParams::PREMIUM;
+        let params = SurfaceParams::PREMIUM;
         Self {
             terrain,
-            scene: terrain.scene(law, Source::Encoders, home),
+            scene: terrain.scene(params, Source::Encoders, home),
             device: Rc::new(RefCell::new(device)),
             session: None,
             log,

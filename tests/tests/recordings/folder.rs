@@ -84,7 +84,7 @@ impl Folder {
     }
 }
 
-/// What a command said on standard error.
+/// Returns the standard error of a command.
 pub(super) fn said(run: &Output) -> String {
     String::from_utf8_lossy(&run.stderr).into_owned()
 }

@@ -8,7 +8,7 @@ mod views;
 use std::path::Path;
 use std::process::Command;
 
-use hapterra::replay::COLUMNS;
+use hapterra::replay::{COLUMNS, TICK_COLUMNS};
 use hapterra::synth::Kind;
 use hapterra_tests::{UNCONTROLLED, hapterra_binary, terrain_file};
 
@@ -99,7 +99,7 @@ fn a_recording_of_another_terrain_is_refused() {
     );
 }
 
-/// What the terrain and the path decide alone; the path comes first.
+/// Columns that only the terrain and the path determine; the path comes first.
 const FELT: [&str; 9] = [
     "t_s",
     "x_mm",
@@ -112,7 +112,7 @@ const FELT: [&str; 9] = [
     "state",
 ];
 
-/// The guard comes to a force by steps in single precision: it is off the law's force by
+/// The guard comes to a force by steps in single precision: it differs from the spring's force by
 /// the rounding of one, N.
 const ROUNDING_N: f64 = 1e-6;
 
@@ -131,7 +131,7 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
         .collect();
     if !columns.contains(&"tick") {
         // Of `demo`, which has no board.
-        documented.retain(|name| !["tick", "work", "cost", "late"].contains(name));
+        documented.retain(|name| !TICK_COLUMNS.contains(name));
     }
     assert_eq!(columns, documented, "columns of the reference");
     let (live, again) = (rows(&live), rows(&again));
@@ -380,8 +380,8 @@ fn no_command_writes_over_its_own_input() {
     exists_as_before(&folder.path("arm.toml"), &record);
 }
 
-/// What lies beside a terrain and is read with it: header, reference system, world file,
-/// mask, overviews.
+/// Files beside a terrain that are read with it: header, reference system, world file, mask,
+/// overviews.
 #[test]
 fn no_command_writes_over_a_file_beside_its_input() {
     let folder = Folder::new();

@@ -26,7 +26,7 @@ const COMMANDS: &str = "# while a scripted hand slides\nat 3.8 zoom 1.5\nat 4.7 
     spin 3\nat 5.5 pan 2 1\nat 6.5 stiffness 0.8\nat 7.5 clutch on\nat 8 clutch off\n\
     at 8.7 tip 3mm\n";
 
-/// What a demo with these commands wrote; what it said.
+/// Returns the recording of a demo with these commands; on failure its messages.
 fn demo(folder: &Folder) -> String {
     folder.write("commands", COMMANDS);
     let [terrain, out, commands] = ["hills.tif", "demo", "commands"].map(|n| folder.text(n));
@@ -344,7 +344,7 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
 /// felt live is what a replay, which does all of a tick at once, gives again but for rounding.
 #[test]
 fn on_a_steep_saw_a_replay_gives_what_was_felt() {
-    /// What the digits of a file may leave, mm.
+    /// Rounding by the digits of a file, mm.
     const ROUNDING_MM: f64 = 1e-5;
     let folder = Folder::new();
     write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));

@@ -17,7 +17,7 @@ use hapterra_tests::served::{Served, signal, told};
 use hapterra_tests::timeouts::{HANG, end_of};
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
-/// What the terminal shows of a task, and the tasks after which Enter is pressed.
+/// Tasks after which Enter is pressed.
 const CONFIRMED: [Task; 2] = [Task::ZeroPose, Task::HoldLoosely];
 const SEEN: [Task; 1] = [Task::PressDeadMan];
 

@@ -35,7 +35,7 @@ struct Armed {
     guardian: Child,
 }
 
-/// How it has ended.
+/// End of a run.
 struct Ended {
     status: ExitStatus,
     shown: String,
@@ -126,7 +126,7 @@ impl Armed {
     }
 }
 
-/// What is there after the end.
+/// State after the end.
 struct Rest {
     folder: tempfile::TempDir,
     served: Served,
@@ -158,10 +158,10 @@ pub(super) fn partial(folder: &Path) -> Option<String> {
     names.find(|name| name.ends_with(".partial"))
 }
 
-/// The abort stands for a stack that overflows and for memory that ends: Rust's runtime ends both by
-/// one. Neither can be had truly. No input is known any more that overflows a stack, and a thread
-/// that runs has the pages of its stack already. A worker whose address space is limited to what it
-/// has goes on for minutes, and serves: it asks for no more.
+/// The abort stands for a stack that overflows and for memory that ends: Rust's runtime ends both
+/// by one. Neither can be had truly. No input is known any more that overflows a stack, and a
+/// thread that runs has the pages of its stack already. A worker whose address space is limited to
+/// what it has goes on for minutes, and serves: it asks for no more.
 #[test]
 fn worker_killed_while_armed_is_disarmed_by_guardian() {
     for (name, number) in [("ABRT", 6), ("KILL", 9)] {

@@ -5,6 +5,7 @@
 mod bringup;
 mod guardian;
 mod hostile;
+mod planning;
 mod terminal;
 
 use std::process::Command;

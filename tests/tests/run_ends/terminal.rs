@@ -44,7 +44,7 @@ pub(super) fn start_command_in(end: &File, mut command: Command) -> Child {
     command.spawn().expect("it runs")
 }
 
-/// Whether the terminal gives lines, and shows what is typed.
+/// Returns the modes of the terminal: lines or keys, and echo.
 pub(super) fn modes(end: &File) -> LocalModes {
     tcgetattr(end).expect("a terminal").local_modes
 }

@@ -40,17 +40,17 @@ pub struct Seen {
 /// Reason for which a server does not answer with a file.
 pub(crate) struct Refusal {
     pub(crate) status: StatusCode,
-    /// What programs know it by.
+    /// Its code for programs.
     pub(crate) code: &'static str,
-    /// What people are told.
+    /// Its message for people.
     pub(crate) message: String,
 }
 
-/// What is answered to somebody who may ask.
+/// Answer to an authorised request.
 pub(crate) enum Answer {
     /// The file at a path of the folder that is served.
     File(String),
-    /// What a program asked for besides files, as JSON.
+    /// Answer to a request besides files, as JSON.
     Words(String),
 }
 
@@ -60,10 +60,10 @@ pub(crate) trait Service: Send + Sync + 'static {
     /// When the key of a request does not open what it asks for.
     fn answer(&self, request: &Parts, body: &str) -> Result<Answer, Refusal>;
 
-    /// What is said of a file that is not there.
+    /// Returns the refusal for a missing file.
     fn missing(&self) -> Refusal;
 
-    /// What stands in the body of a refusal, and in its head.
+    /// Returns the body and head of a refusal.
     fn words(&self, refusal: &Refusal) -> (String, HeaderMap);
 
     /// The head that an answer with a file has besides a web server's.
@@ -191,7 +191,7 @@ pub(crate) fn headers<const N: usize>(of: [(&'static str, &'static str); N]) -> 
     of.map(entry).into_iter().collect()
 }
 
-/// What a server answers to somebody whose key it takes for a token.
+/// Returns the answer of a server to a key that it exchanges for a token.
 pub(crate) fn token(token: &str) -> Answer {
     Answer::Words(format!(
         r#"{{"access_token":"{token}","expires_in":3599,"token_type":"Bearer"}}"#

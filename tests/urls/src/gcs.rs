@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use crate::bucket::{Answer, PUBLIC, Refusal, Server, Service, bucket, headers, refusal, token};
 
-/// What a service account may be given to read files.
+/// Scopes that let a service account read files.
 const SCOPES: [&str; 3] = [
     "https://www.googleapis.com/auth/cloud-platform",
     "https://www.googleapis.com/auth/devstorage.read_only",

@@ -28,7 +28,7 @@ const MARGIN: f64 = 0.2;
 const POINTS: usize = 96;
 /// Parts of the bar, light and dark.
 const PARTS: usize = 4;
-/// How far border and bar float over the surface, in shares of half of what the eye sees.
+/// Height of border and bar over the surface, in shares of half of what the eye sees.
 const FLOAT: f64 = 0.008;
 const LIGHT: Rgb = [255, 255, 255];
 const DARK: Rgb = [20, 22, 28];
@@ -134,7 +134,7 @@ impl Square {
     }
 }
 
-/// What a frame is drawn from.
+/// Content of a frame.
 struct Picture<'p> {
     scene: &'p Scene,
     ground: &'p Ground,

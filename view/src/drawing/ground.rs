@@ -2,9 +2,9 @@
 
 use hapterra_view_stream::{Layer, Scene, TILE_CELLS};
 
-/// Where things are in the picture: metres on the ground, or millimetres of the tip in the
-/// first view where the terrain does not know its size. The origin is at the home position
-/// of the first view, at height zero, so that single precision is finest where the hand is.
+/// Coordinates of the picture: metres on the ground, or millimetres of the tip in the first view
+/// where the terrain does not know its size. The origin is at the home position of the first view,
+/// at height zero, so that single precision is finest where the hand is.
 ///
 /// Another view of the terrain has other millimetres. In the picture the terrain stays where
 /// it is, and what is told in those millimetres comes to lie on it. Heights are drawn as
@@ -18,11 +18,11 @@ pub(super) struct Ground {
     level: u8,
     /// Side of a cell of level 0.
     cell: f64,
-    /// What a vertical unit of the file is.
+    /// Size of a vertical unit of the file.
     relief: f64,
     /// Radius of the ball at the tip; 0 for a point.
     pub(super) ball: f64,
-    /// What a millimetre of the tip is, level and upright.
+    /// Size of a millimetre of the tip, level and upright.
     pub(super) per_mm: f64,
     up_per_mm: f64,
     /// Half the side of what is laid in front of the arm and near the hand: how far away the
@@ -103,12 +103,13 @@ impl Ground {
         self.at(self.home_mm)
     }
 
-    /// Where a place of the picture is, in cells of level 0 from the south-west sample.
+    /// Returns the position of a place of the picture, in cells of level 0 from the south-west
+    /// sample.
     pub(super) fn cells(&self, place: [f64; 2]) -> [f64; 2] {
         place.map(|at| at / self.step(1))
     }
 
-    /// How far samples are apart that are so many cells of level 0 apart.
+    /// Returns the distance in the picture of `cells` cells of level 0.
     pub(super) fn step(&self, cells: i32) -> f64 {
         f64::from(cells) * self.cell
     }
@@ -124,13 +125,13 @@ impl Ground {
     }
 
     /// Cells of level 0 in a felt one, along a side.
-    pub(super) fn felt_cell(&self) -> i32 {
+    pub(super) fn haptic_cell(&self) -> i32 {
         1_i32.checked_shl(self.level.into()).unwrap_or(i32::MAX)
     }
 
     /// Cells of level 0 in a tile, along a side.
     pub(super) fn tile_cells(&self) -> i32 {
-        TILE_CELLS.saturating_mul(self.felt_cell())
+        TILE_CELLS.saturating_mul(self.haptic_cell())
     }
 
     /// The south-west cell of a tile, of level 0.

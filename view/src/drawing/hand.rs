@@ -15,12 +15,12 @@ use super::shade::Rgb;
 const RATE_HZ: f64 = 60.0;
 /// New traces in a second.
 const TRACES_HZ: f64 = 10.0;
-/// How long the trace is, s, and points of it in a second.
+/// Length of the trace, s, and its points in a second.
 const TRACE_S: f64 = 4.0;
 const TRACE_HZ: f64 = 30.0;
 /// Length of the arrow for a newton, mm of the tip.
 const ARROW_MM_PER_N: f64 = 14.0;
-/// How far the trace floats over the surface, mm of the tip.
+/// Height of the trace over the surface, mm of the tip.
 const FLOAT_MM: f64 = 0.15;
 /// Colours.
 const PROXY: Rgb = [255, 120, 20];
@@ -29,7 +29,7 @@ const RAY: Rgb = [255, 60, 200];
 const FORCE: Rgb = [255, 230, 60];
 const TRACE: Rgb = [255, 170, 90];
 
-/// What the hand was last.
+/// Last state of the hand.
 #[derive(Default)]
 pub(super) struct Hand {
     /// When the next picture and the next trace are due, s.
@@ -40,7 +40,7 @@ pub(super) struct Hand {
     trace: VecDeque<(f64, [f32; 3])>,
 }
 
-/// How the parts of the hand look.
+/// Returns the appearance of the parts of the hand.
 pub(super) fn looks(log: &Log, ground: &Ground) -> Result<Vec<Entry>> {
     let points = |entity: &str, colour: Rgb, width: f32| {
         let looks = Points3D::update_fields()

@@ -30,7 +30,7 @@ pub(super) struct Layers {
     cut: Cut,
 }
 
-/// What is shown by tiles: their south-west cells of level 0, and cells along their sides.
+/// Part that tiles show: their south-west cells of level 0, and cells along their sides.
 #[derive(Clone, Default, PartialEq, Eq)]
 struct Cut {
     side: i32,
@@ -51,7 +51,7 @@ struct Block {
     extent: [i32; 4],
 }
 
-/// What an entity's samples and its triangles are known by.
+/// Name of an entity's samples and triangles.
 const MESH: &str = "mesh";
 const TRIANGLES: &str = "triangles";
 
@@ -140,7 +140,8 @@ impl Layers {
         Ok(entries)
     }
 
-    /// What is shown of a layer: not what the next finer one shows, nor what tiles show.
+    /// Returns the visible triangles of a layer: without the parts that the next finer one or tiles
+    /// show.
     fn triangles(&self, log: &Log, number: Option<usize>) -> Result<Vec<Entry>> {
         let Some(layer) = number.and_then(|number| self.layers.get(number)) else {
             return Ok(Vec::new());
@@ -152,7 +153,8 @@ impl Layers {
             .collect()
     }
 
-    /// What a finer layer shows of a layer, in cells of level 0: west, south, east, north.
+    /// Returns the part of a layer that a finer one shows, in cells of level 0: west, south, east,
+    /// north.
     fn inner(&self, number: usize) -> Option<[i32; 4]> {
         let finer = self.told.get(number + 1)?;
         Some(extent(finer))
@@ -265,7 +267,7 @@ fn slice(lines: &[usize], first: usize) -> &[usize] {
     lines.get(first..last).unwrap_or_default()
 }
 
-/// What a block is made of.
+/// Part of a block.
 struct Part<'p> {
     layer: &'p Layer,
     heights: &'p Heights<'p>,
@@ -414,8 +416,8 @@ fn contains(outer: [i32; 4], [west, south, east, north]: [i32; 4]) -> bool {
 }
 
 impl Cut {
-    /// Returns true if a cell of a mesh lies in one tile that is shown. Cells of the finest layer are
-    /// not larger than a tile; a larger one is never under a single tile, and stays.
+    /// Returns true if a cell of a mesh lies in one tile that is shown. Cells of the finest layer
+    /// are not larger than a tile; a larger one is never under a single tile, and stays.
     fn hides(&self, [west, south, east, north]: [i32; 4]) -> bool {
         let side = self.side.max(1);
         let first = |cell: i32| cell.div_euclid(side).saturating_mul(side);
@@ -494,7 +496,7 @@ mod tests {
         }
     }
 
-    /// What each key stands for after these entries, as triangles that are shown.
+    /// Returns the visible triangles of each key after these entries.
     fn taken(layers: &Layers) -> Vec<usize> {
         let shown = |(number, layer): (usize, &Shown)| {
             let inner = layers.inner(number);

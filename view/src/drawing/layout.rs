@@ -27,8 +27,8 @@ use super::{plots, words};
 const PLOT_S: f64 = 6.0;
 /// The sky.
 const SKY: Rgb = [17, 24, 36];
-/// Where the eye is from the hand, in shares of what is looked at: south-south-west of
-/// it, and above.
+/// Position of the eye relative to the hand, in shares of the visible size: south-south-west of it,
+/// and above.
 const EYE: [f64; 3] = [-0.5, -1.2, 0.8];
 
 /// The same for the contact alone: from the south, a little above, so many millimetres of the

@@ -25,7 +25,8 @@ pub(super) fn written(length: f64, is_on_ground: bool) -> String {
     format!("{} {unit}", (value * 1e6).round() / 1e6)
 }
 
-/// How far a place is to the east and the north of another one, in the picture's units.
+/// Returns the distance of a place to the east and the north of another one, in the picture's
+/// units.
 pub(super) fn distances(place: [f64; 2], is_on_ground: bool) -> String {
     let unit = if is_on_ground { "m" } else { "mm" };
     // Nothing is written as 0 and not as -0.

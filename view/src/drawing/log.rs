@@ -66,7 +66,7 @@ impl Log {
         })
     }
 
-    /// What an entity is at times, s, one row of each column a time.
+    /// Returns the states of an entity at times, s, one row of each column a time.
     pub(super) fn happened(
         &self,
         entity: &str,

@@ -27,7 +27,7 @@ const BAR: f64 = 0.4;
 /// its longer side.
 const ROOM: [f32; 2] = [0.02, 0.14];
 
-/// What the map shows.
+/// The map.
 #[derive(Default)]
 pub(super) struct Map {
     frame: Option<Frame>,
@@ -198,7 +198,7 @@ impl Map {
         Ok(entries)
     }
 
-    /// What is laid in front of the arm.
+    /// Returns the terrain in front of the arm.
     pub(super) fn laid(&self, log: &Log, scene: &Scene) -> Result<Option<Entry>> {
         let Some(frame) = self.frame else {
             return Ok(None);

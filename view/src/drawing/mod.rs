@@ -52,7 +52,7 @@ use words::Words;
 pub struct Drawing {
     log: Log,
     scene: Scene,
-    /// Where the hand is, in the view in force.
+    /// Ground under the hand, in the placement in force.
     ground: Ground,
     /// Place where the terrain is: of a recording as in its first view.
     terrain: Ground,

@@ -61,7 +61,7 @@ const PLOTS: [Plot; 6] = [
     },
 ];
 
-/// How the series look.
+/// Returns the appearance of the series.
 pub(super) fn looks(log: &Log) -> Result<Vec<Entry>> {
     let looks = PLOTS.iter().map(|plot| {
         let names = plot.series.iter().map(|(name, _)| Name::from(*name));
@@ -76,7 +76,7 @@ pub(super) fn looks(log: &Log) -> Result<Vec<Entry>> {
 /// Samples that are plotted at a time.
 const AT_A_TIME: usize = 200;
 
-/// What was plotted last.
+/// Last plotted values.
 pub(super) struct Plots {
     height_per_mm: f64,
     tick: Option<TickCost>,
@@ -169,7 +169,7 @@ impl Plots {
         Ok(vec![series(log, LINK, &[link.t_s], &[row])?])
     }
 
-    /// What the spring holds and what the hand was given, mJ, which is N·mm.
+    /// Returns the energy of the spring and to the hand, mJ, which is N·mm.
     fn energy(&mut self, sample: &Sample) -> Vec<f64> {
         let force = sample.force_n.map(f64::from);
         let held = 0.5 * length(force) * penetration(sample);

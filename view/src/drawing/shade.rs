@@ -19,7 +19,7 @@ const LIGHTS: [([f32; 3], f32); 3] = [
     ([-0.77, -0.2, 0.6], 0.2),
     ([0.3, 0.74, 0.6], 0.15),
 ];
-/// What stands in the shade, and in full light.
+/// Colours of the shade, and of full light.
 const DARK: [f32; 3] = [20.0, 28.0, 48.0];
 const LIGHT: [f32; 3] = [255.0, 252.0, 244.0];
 /// Slopes are exaggerated until this share of them is below 45°, within limits.
@@ -28,7 +28,7 @@ const EXAGGERATION: (f64, f64) = (0.3, 30.0);
 /// Ground of a hole.
 pub(super) const HOLE: Rgb = [60, 64, 72];
 
-/// How heights become colours: the same for all levels of detail of a terrain.
+/// Colours of heights: the same for all levels of detail of a terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shade {
     low: f32,

@@ -14,9 +14,9 @@ use super::shade::{HOLE, Heights, Rgb};
 
 /// Samples along the side of a tile.
 const SIDE: usize = TILE_CELLS as usize + 1;
-/// How far an outline floats above the surface, in haptic cells.
+/// Height of an outline above the surface, in haptic cells.
 const FLOAT_CELLS: f64 = 0.35;
-/// What a tile's samples are known by among the parts of its entity.
+/// Name of a tile's samples among the parts of its entity.
 const MESH: &str = "mesh";
 /// Colours of outlines.
 const HELD: Rgb = [64, 224, 208];
@@ -25,7 +25,7 @@ const AWAITED: Rgb = [255, 176, 32];
 /// The tiles that are shown.
 #[derive(Default)]
 pub(super) struct Tiles {
-    /// What stands in each slot.
+    /// Tile in each slot.
     slots: BTreeMap<u32, [i32; 2]>,
     /// The same by column and row, with the colours around each.
     tiles: BTreeMap<[i32; 2], (Lifted, Vec<Rgb>)>,
@@ -76,7 +76,7 @@ impl Tiles {
             slot: tile.slot,
             index: tile.index,
             up: ground.heights_of_mm(&tile.heights_mm),
-            step: ground.step(ground.felt_cell()),
+            step: ground.step(ground.haptic_cell()),
         };
         let heights = lifted.heights();
         let posts = Posts {
@@ -113,7 +113,7 @@ impl Tiles {
         layers: &Layers,
         changed: &[[i32; 2]],
     ) -> Result<Vec<Entry>> {
-        let every = (layers.mesh_cell() / ground.felt_cell()).clamp(1, TILE_CELLS);
+        let every = (layers.mesh_cell() / ground.haptic_cell()).clamp(1, TILE_CELLS);
         let near = changed.iter().flat_map(|index| {
             [[0, 0], [0, -1], [1, 0], [0, 1], [-1, 0]].map(|step| beside(*index, step))
         });
@@ -207,7 +207,7 @@ fn drawn(log: &Log, entity: &str, lines: Vec<Vec<[f32; 3]>>, colour: Rgb) -> Res
     log.standing(entity, "", &strips)
 }
 
-/// Where nothing is known of a tile: a square at the home position's height.
+/// Returns the outline of an unknown tile: a square at the home position's height.
 fn flat(ground: &Ground, index: [i32; 2]) -> Vec<[f32; 3]> {
     let [x, y] = ground.first_cell(index).map(f64::from);
     let side = f64::from(ground.tile_cells());
@@ -242,7 +242,7 @@ impl Posts<'_> {
     /// A sample's place, at a height.
     fn at(&self, column: usize, row: usize, up: f32) -> [f32; 3] {
         let [x, y] = self.first.map(f64::from);
-        let side = f64::from(self.ground.felt_cell());
+        let side = f64::from(self.ground.haptic_cell());
         let cell = [x + side * column as f64, y + side * row as f64];
         self.ground.sample(cell, up)
     }
@@ -308,7 +308,7 @@ impl Posts<'_> {
 
     /// Lines around the tile, broken at holes.
     fn outline(&self) -> Vec<Vec<[f32; 3]>> {
-        let float = (FLOAT_CELLS * self.ground.step(self.ground.felt_cell())) as f32;
+        let float = (FLOAT_CELLS * self.ground.step(self.ground.haptic_cell())) as f32;
         let ring = ring();
         let known = |place: &(usize, usize)| self.height(place.0, place.1).is_some();
         let lines = ring
@@ -325,7 +325,7 @@ impl Posts<'_> {
     }
 }
 
-/// What a slot is called in the picture.
+/// Returns the name of a slot in the picture.
 fn entity(slot: u32) -> String {
     format!("terrain/tiles/{slot}")
 }
@@ -334,7 +334,7 @@ fn skirt(slot: u32) -> String {
     format!("terrain/tiles/{slot}/skirt")
 }
 
-/// What the lines around the held tile in a slot are called.
+/// Returns the name of the lines around the held tile in a slot.
 fn held_in(slot: u32) -> String {
     format!("terrain/held/{slot}")
 }

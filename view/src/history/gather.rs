@@ -35,7 +35,7 @@ impl Piece {
 
 /// Entries that wait for others, and the pieces that they came in.
 pub(super) struct Gather {
-    /// What is put together spans so much of the device's time, ns.
+    /// Minimum span of a piece in the device's time, ns.
     least_ns: u64,
     pieces: Vec<Blob>,
     waiting: BTreeMap<EntityPath, Vec<(StoreId, Chunk)>>,
@@ -56,7 +56,7 @@ impl Gather {
         }
     }
 
-    /// What came since it last gave anything.
+    /// Returns the pieces since the last call.
     pub(super) fn pieces(&self) -> &[Blob] {
         &self.pieces
     }

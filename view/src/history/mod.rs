@@ -26,7 +26,7 @@ pub use page::{Next, Page, Pieces};
 /// A piece of a page's stream: a whole little `.rrd`.
 pub type Blob = Arc<Vec<u8>>;
 
-/// What happened is told to pages that take it gathered so much at a time, s.
+/// Span of a gathered piece for pages, s.
 const SHORT_S: u32 = 1;
 /// And to pages that missed it, s.
 const LONG_S: u32 = 10;
@@ -48,12 +48,12 @@ pub struct History {
 
 struct State {
     standing: BTreeMap<String, Blob>,
-    /// What happened, [`LONG_S`] at a time.
+    /// Events, [`LONG_S`] at a time.
     happened: VecDeque<Blob>,
     happened_bytes: usize,
-    /// What happened since, [`SHORT_S`] at a time.
+    /// Later events, [`SHORT_S`] at a time.
     recent: Gather,
-    /// What happened since, as it came.
+    /// The latest events, as received.
     latest: Gather,
     is_bounded: bool,
     ended: Option<End>,
@@ -87,7 +87,7 @@ pub struct Kept {
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // Whoever panicked held no half-made state: every change is one assignment or push.
+    // A panicked thread held no half-made state: every change is one assignment or push.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -246,7 +246,7 @@ fn encoded<'m>(messages: impl IntoIterator<Item = &'m LogMsg>) -> Result<Blob> {
     let (version, options) = encoding();
     let mut encoder =
         Encoder::new_eager(version, options, Vec::new()).context("encoding for the page")?;
-    // An index of the file's end, which nobody looks for in a piece of a stream.
+    // An index of the file's end, which no reader needs in a piece of a stream.
     encoder.do_not_emit_footer();
     for message in messages {
         encoder.append(message).context("encoding for the page")?;

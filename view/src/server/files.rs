@@ -3,8 +3,8 @@
 use anyhow::{Context as _, Result};
 use re_web_viewer_server::WebViewerData;
 
-/// What a page may load, and from where: from here alone. Without it rerun's viewer asks
-/// other machines, for fonts and to count its users.
+/// Sources that a page may load: from here alone. Without it rerun's viewer asks other machines,
+/// for fonts and to count its users.
 const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
     style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; \
     connect-src 'self'; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; \

@@ -26,7 +26,7 @@ pub struct Server {
     address: SocketAddr,
 }
 
-/// What all requests share.
+/// State that all requests share.
 struct Shared {
     history: Arc<History>,
     files: Files,

@@ -13,8 +13,8 @@ pub const TILE_POSTS: usize = TILE_CELLS as usize + 3;
 pub enum Message {
     /// The first one.
     Hello(Hello),
-    /// What is touched, and how large it is in the hand; a later one is another view of the
-    /// same terrain, in whose millimetres the tiles and samples after it are.
+    /// Scene and its size in the hand; a later one is another view of the same terrain, in whose
+    /// millimetres the tiles and samples after it are.
     Scene(Box<Scene>),
     /// A part of the terrain, coarser than it is felt.
     Layer(Layer),
@@ -22,9 +22,9 @@ pub enum Message {
     Tile(Tile),
     /// Which tiles the device holds and lacks.
     Tiles(Tiles),
-    /// What was felt, in the order of time.
+    /// Samples in the order of time.
     Samples(Vec<Sample>),
-    /// What went over the link.
+    /// Statistics of the link.
     Link(Link),
     /// There is no more.
     End,

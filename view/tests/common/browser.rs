@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::HANG;
 
-/// What a page says that is just being loaded: it is asked again.
+/// Errors of a page that is still loading: the query is repeated.
 const LOADING: [&str; 4] = [
     "Not attached to an active page",
     "Cannot find default execution context",
@@ -258,8 +258,8 @@ impl Browser {
         BASE64_STANDARD.decode(shot).expect("base 64")
     }
 
-    /// What a script makes of a part of pictures: `parts` are their pixels, with their widths.
-    /// The page itself takes the pictures apart.
+    /// Returns the result of a script on a part of pictures: `parts` are their pixels, with their
+    /// widths. The page itself takes the pictures apart.
     fn of_parts(&mut self, page: &Page, pictures: &[&str], part: [f64; 4], script: &str) -> Value {
         let expression = format!(
             "(async () => {{
@@ -281,7 +281,8 @@ impl Browser {
         self.value(page, &expression)
     }
 
-    /// Returns the difference of a part between two pictures: a mean over its pixels and colours, of 255.
+    /// Returns the difference of a part between two pictures: a mean over its pixels and colours,
+    /// of 255.
     pub fn difference(&mut self, page: &Page, pictures: [&str; 2], part: [f64; 4]) -> f64 {
         let script = "
             const [a, b] = parts.map((part) => part.data);

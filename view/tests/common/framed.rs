@@ -13,14 +13,14 @@ use super::recorded::{Csv, places};
 type Shown = BTreeMap<String, Vec<Chunk>>;
 
 const HIP: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
-/// How far single precision may be off, m.
+/// Tolerance of single precision, m.
 const OFF: f64 = 0.02;
 /// Coordinates of a file are told to the metre here, and a metre of a map is one on the ground
 /// up to this share.
 const ROUNDED: f64 = 0.51;
 const MAP_METRE: f64 = 5e-4;
 
-/// What a chunk's only row says of a component.
+/// Returns the component in a chunk's only row.
 fn read<T: Loggable>(chunk: &Chunk, component: &'static str) -> Vec<T> {
     let rows = chunk.components().get_array(component.into());
     let rows = rows.unwrap_or_else(|| panic!("{component} of {:?}", chunk.entity_path()));
@@ -59,7 +59,7 @@ fn is_round(length: f64) -> bool {
         .any(|round| (digit - round).abs() < 1e-6)
 }
 
-/// Where rows of the CSV are, m from the south-west sample, by their time.
+/// Returns the positions of the CSV's rows, m from the south-west sample, by their time.
 fn on_ground(csv: &Csv) -> BTreeMap<i64, [f64; 2]> {
     let rows = 0..csv.rows.len();
     rows.map(|row| {
@@ -108,8 +108,8 @@ pub fn check_frames(csv: &Csv, shown: &Shown) -> Vec<f64> {
     lengths
 }
 
-/// Where the map's pixels are: metres a pixel, and a pixel with its place, m from the
-/// south-west sample.
+/// Positions of the map's pixels: metres a pixel, and a pixel with its place, m from the south-west
+/// sample.
 struct OnMap {
     of_pixel: f64,
     pixel: [f64; 2],

@@ -19,7 +19,7 @@ use hapterra_view_stream::{Message, write};
 /// Time after which a page hangs: pages that software draws on a busy machine take minutes.
 pub const HANG: Duration = Duration::from_secs(900);
 
-/// How a viewer is started whose page nobody opens by itself, on any port that is free.
+/// Options of a viewer without a browser, on any free port.
 const UNSEEN: &str = "--no-browser --port 0";
 
 /// A program that runs while a test looks at it. It is killed where it has not ended by itself.

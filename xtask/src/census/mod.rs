@@ -1,4 +1,5 @@
-//! `cargo xtask census`: sizes of pages, command line and code, beside their bounds and the sizes before.
+//! `cargo xtask census`: sizes of pages, command line and code, beside their bounds and the sizes
+//! before.
 
 mod code;
 mod prose;
@@ -25,7 +26,7 @@ const BOUNDS: [(&str, f64); 12] = [
     ("circles of files in touch", 0.0),
     ("circles of files in host-tools", 0.0),
 ];
-/// How old the committed table may be, as a part of each measure.
+/// Tolerance of the committed table, as a part of each measure.
 const MAX_STALE: f64 = 0.02;
 const TABLE: &str = "docs/contributing/census.csv";
 /// Folders that hold code, in the order of the data.
@@ -59,8 +60,8 @@ const BUILT: [&str; 3] = ["target", "node_modules", ".git"];
 
 type Measures = Vec<(String, f64)>;
 
-/// Prints all measures beside those of the committed table, and compares them with it and with their
-/// bounds; `write` brings the table up to date.
+/// Prints all measures beside those of the committed table, and compares them with it and with
+/// their bounds; `write` brings the table up to date.
 ///
 /// # Errors
 /// Which bounds are broken, and where the table is old.

@@ -18,7 +18,7 @@ use crate::setup::{packages, toolchain};
 use crate::view;
 use server::Server;
 
-/// What the page is made of, in `page/`.
+/// Files of the page, in `page/`.
 const FILES: [&str; 3] = ["index.html", "style.css", "js"];
 /// The reader of GeoTIFF, in npm's folder, and what it is called beside the page.
 const GEOTIFF: [(&str, &str); 2] = [

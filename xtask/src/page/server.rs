@@ -44,7 +44,7 @@ impl Server {
         })
     }
 
-    /// What to open in a browser.
+    /// Returns the address for a browser.
     pub(crate) fn address(&self) -> String {
         format!("http://127.0.0.1:{}/", self.port)
     }

@@ -32,7 +32,7 @@ pub(crate) struct Calls {
     pub(crate) vectors: Vec<usize>,
 }
 
-/// Where a function lies.
+/// Extent of a function.
 #[derive(Debug, Clone, Copy)]
 struct Extent {
     start: u32,
@@ -43,8 +43,7 @@ struct Extent {
 struct Code<'a> {
     start: u32,
     bytes: &'a [u8],
-    /// Where instructions (true) and data (false) begin, from the linker's
-    /// mapping symbols.
+    /// Starts of instructions (true) and data (false), from the linker's mapping symbols.
     modes: BTreeMap<u32, bool>,
 }
 
@@ -142,7 +141,7 @@ fn functions(file: &object::File<'_>, code: &[Code<'_>]) -> (Vec<Extent>, Vec<Ve
     (extents, names)
 }
 
-/// What the linker calls its bridges: a branch reaches 16 MiB, and memories may be farther apart.
+/// Name of the linker's bridges: a branch reaches 16 MiB, and memories may be farther apart.
 const BRIDGE: &str = "__Thumbv7ABSLongThunk_";
 
 impl Function {

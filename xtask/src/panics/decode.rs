@@ -4,7 +4,7 @@
 //! (DDI 0403E, A7.7): for these few lines no disassembler is needed, and the
 //! ones on offer stop at floating-point instructions.
 
-/// What an instruction does to the flow.
+/// Effect of an instruction on the flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Flow {
     /// Goes on, returns, or stops.

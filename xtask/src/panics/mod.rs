@@ -85,7 +85,7 @@ fn reached(calls: &Calls, board: &Board, root: usize) -> Reached {
     })
 }
 
-/// What is wrong with a function that was reached, each with the way to it.
+/// Returns the faults of a reached function, each with the path to it.
 fn wrongs(calls: &Calls, board: &Board, found: &Reached, i: usize) -> Vec<String> {
     let functions = &calls.functions;
     let caller = &functions[i];

@@ -7,8 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::run::{on_path, output, run_quietly, say, shown};
 
-/// What one thing is called by each of the [`MANAGERS`]; empty where it has no
-/// package.
+/// Name of a package for each of the [`MANAGERS`]; empty where it has no package.
 pub(crate) type Packages = [&'static str; MANAGERS.len()];
 
 /// The package managers of Debian, Fedora, Arch and macOS: the command that installs,
@@ -46,8 +45,7 @@ pub(crate) const CMAKE_AND_LIBCLANG: Packages = [
 pub(crate) const RUST: Packages = ["rustc-web cargo-web rust-web-src lld", "", "", ""];
 pub(crate) const CLIPPY: Packages = ["rust-web-clippy", "", "", ""];
 
-/// What `find` finds; where it finds nothing, `packages` are installed, and it looks
-/// again.
+/// Returns the result of `find`; if there is none, `packages` are installed, and it is tried again.
 pub(crate) fn found_or_installed<T>(
     find: impl Fn() -> Result<T>,
     packages: &Packages,
@@ -97,7 +95,7 @@ fn needs_root(line: &str) -> bool {
     program(line) != "brew"
 }
 
-/// What a person would type.
+/// Returns the command for a person to type.
 fn typed(install: &str, names: &str) -> String {
     let sudo = if needs_root(install) { "sudo " } else { "" };
     format!("{sudo}{install} {names}")

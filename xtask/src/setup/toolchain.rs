@@ -18,7 +18,7 @@ const BY_HAND: &str = "\
 type: rustup target add thumbv7em-none-eabihf
       (rustup itself is on https://rustup.rs)";
 
-/// Where the boards' core library comes from.
+/// Source of the boards' core library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Toolchain {
     /// The toolchain that runs this program has it.
@@ -47,7 +47,8 @@ impl Toolchain {
         command
     }
 
-    /// Returns the place where it builds. Two compilers in one directory would undo each other's work.
+    /// Returns the place where it builds. Two compilers in one directory would undo each other's
+    /// work.
     pub(crate) fn target_dir(self) -> PathBuf {
         match self {
             Self::Own => target_dir(),

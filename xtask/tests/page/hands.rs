@@ -87,7 +87,7 @@ fn gamepad_moves_turns_and_presses() {
     site.wait("hapterra.scene.camera.yaw > 1");
 }
 
-/// What is heard of a force and its change: Hz, and the size of the sound.
+/// Returns the sound of a force and its change: Hz, and its volume.
 fn heard(site: &mut Site, newtons: f64, change: f64) -> [f64; 2] {
     let value = site.value(&format!(
         "import('./js/sound.js').then(async ({{ Sound }}) => {{

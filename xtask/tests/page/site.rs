@@ -33,7 +33,7 @@ pub(crate) struct Site {
     pub(crate) folder: tempfile::TempDir,
 }
 
-/// What `cargo xtask page --test` has built; none, and a line that says so, without it.
+/// Returns the result of `cargo xtask page --test`; none, with a message, if it was not built.
 fn built(what: &str) -> Option<PathBuf> {
     let found = std::env::var_os(what).map(PathBuf::from);
     if found.is_none() {

@@ -76,7 +76,7 @@ struct Neighbour {
 pub(super) struct Asking {
     /// Neighbours asked already, a bit each in the order of [`Side::neighbour`].
     asked: u8,
-    /// The best offer so far.
+    /// Best candidate.
     pub(super) best: Option<Offer>,
 }
 

@@ -162,7 +162,7 @@ fn wants_turning(found: &Ruling) -> bool {
     (found.at_end && inside_by(RESOLUTION)) || (steeper && inside_by(0.0))
 }
 
-/// Places in a patch closer than this, in cells, cannot be told apart for a HIP at
+/// Places in a patch closer than this, in cells, cannot be distinguished for a HIP at
 /// coordinate `hip`.
 pub(super) fn resolution(hip: f32) -> f32 {
     smaller(finest_resolution(hip), COARSEST_RESOLUTION)

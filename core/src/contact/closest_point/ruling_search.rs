@@ -27,7 +27,7 @@ const HALF: u8 = 4;
 pub(super) struct Rulings<'p> {
     pub(super) patch: &'p Patch,
     pub(super) hip: (f32, f32),
-    /// How many.
+    /// The number.
     pub(super) looked: u32,
     /// Their largest number.
     pub(super) most: u32,
@@ -51,7 +51,8 @@ impl Far {
 }
 
 impl Rulings<'_> {
-    /// The closest ruling of those that are joined with the one at `v` by rulings no farther than it.
+    /// The closest ruling of those that are joined with the one at `v` by rulings no farther than
+    /// it.
     pub(super) fn closest_to(&mut self, v: f32) -> Ruling {
         let first = self.look_at(v);
         let end = if first.slope < 0.0 { 1.0 } else { 0.0 };

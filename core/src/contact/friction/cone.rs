@@ -72,7 +72,7 @@ fn off(slope: f32, side: i32) -> f32 {
     if side == 0 { slope.abs() } else { 0.0 }
 }
 
-/// What friction holds.
+/// The friction cone's hold.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Cone {
     /// Coulomb's coefficient.
@@ -115,7 +115,7 @@ pub(in crate::contact) struct Excess {
     pub(in crate::contact) over: f32,
     /// The pull.
     pub(in crate::contact) pulls: f32,
-    /// What friction holds.
+    /// The friction cone's hold.
     held: f32,
 }
 

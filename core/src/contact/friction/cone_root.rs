@@ -11,7 +11,7 @@ pub(super) struct ConeRoot {
     high: Option<(f32, f32)>,
     /// By how much the excess falls over the way on a plane.
     falls: f32,
-    /// Where to look next.
+    /// Next place to evaluate.
     next: f32,
     /// Looks in a row that moved the same end: above zero the lower one.
     stayed: i32,
@@ -30,14 +30,14 @@ impl ConeRoot {
         }
     }
 
-    /// Where to look next.
+    /// Returns the next place to evaluate.
     pub(super) const fn next(&self) -> f32 {
         self.next
     }
 
-    /// Returns the end of a path whose evaluations are used up: the farthest place at which the proxy is still
-    /// pulled, from which the next way goes on; only where that is the start, the nearest place
-    /// at which the cone holds.
+    /// Returns the end of a path whose evaluations are used up: the farthest place at which the
+    /// proxy is still pulled, from which the next way goes on; only where that is the start, the
+    /// nearest place at which the cone holds.
     pub(super) fn so_far(&self) -> Option<f32> {
         let (low, _) = self.low;
         let high = self.high.map(|(t, _)| t);

@@ -7,7 +7,7 @@
 /// is taken to be above or on the surface. A start that is not above is a
 /// crossing at 0. Written so that nothing cancels and nothing is divided by
 /// the twist: flat, sloped and twisted patches are one case (Kahan's form of
-/// the quadratic), and a segment that stays clear is told without a root.
+/// the quadratic), and a segment that stays clear is recognised without a root.
 #[must_use]
 #[inline]
 pub fn first_crossing(start: f32, middle: f32, end: f32) -> Option<f32> {

@@ -5,7 +5,7 @@ pub(super) struct BitReader<'b> {
     bytes: core::slice::Iter<'b, u8>,
     /// The next bits, from the highest on; zeros below them.
     ahead: u32,
-    /// How many they are.
+    /// Number of held bits.
     held: u32,
     /// Bytes that were wanted after the last.
     beyond: u32,

@@ -1,7 +1,7 @@
 //! The Phantom's encoders on three encoder timers, the safety inputs, and what the
 //! amplifiers say.
 //!
-//! A count that a disturbance adds is a drift that nobody sees, so each channel passes
+//! A count that a disturbance adds is an undetected drift, so each channel passes
 //! a digital filter: a level counts when eight samples in a row have found it, and a
 //! sample is taken every 64 clocks of the timer. At the fastest motion that is not a
 //! fault, 128,000 counts a second, a channel keeps its level for 15.6 µs, and the other

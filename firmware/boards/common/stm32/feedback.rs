@@ -43,7 +43,7 @@ impl Feedback {
     }
 }
 
-/// The converter has not done what it was told a tick before.
+/// The converter has not carried out the command of the tick before.
 pub(crate) struct NotConverted;
 
 /// The sequence that reads the monitors.

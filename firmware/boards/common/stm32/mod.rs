@@ -21,6 +21,7 @@ pub(crate) mod priorities;
 pub(crate) mod stack;
 pub(crate) mod stack_guard;
 pub(crate) mod start;
+pub(crate) mod supervisor;
 pub(crate) mod supply;
 pub(crate) mod tasks;
 pub(crate) mod usb_clock;

@@ -14,7 +14,8 @@ use static_cell::ConstStaticCell;
 
 use super::calibration_memory::CalibrationMemory;
 use super::{
-    clock, failure, heartbeat, mark, motor_memory, priorities, stack_guard, supply, tasks,
+    clock, failure, heartbeat, mark, motor_memory, priorities, stack_guard, supervisor, supply,
+    tasks,
 };
 use crate::application::{self, Loop, TICK_DONE};
 use crate::chip::{self, Clock};
@@ -95,6 +96,6 @@ async fn main(spawner: Spawner) {
     priorities::start_tick(chip::HAPTIC_INTERRUPT, Interrupt::TIM6_DAC);
     let mut watchdog = IndependentWatchdog::new(parts.watchdog, WATCHDOG_US);
     watchdog.unleash();
-    spawner.spawn(tasks::supervise(monitor, watchdog, led).expect("started once"));
+    spawner.spawn(supervisor::supervise(monitor, watchdog, led).expect("started once"));
     defmt::info!("{} is up", BOARD);
 }

@@ -1,39 +1,27 @@
-//! The tasks of a board: the USB stack, the link, the supervisor.
+//! The tasks of a board for the USB stack and the link.
 
 use core::cell::Cell;
 
 use embassy_futures::join::join3;
-use embassy_stm32::gpio::Output;
-use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::{Duration, Instant, Ticker};
 use embassy_usb::UsbDevice;
 use embassy_usb::driver::Driver;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::request::Refusal;
-use hapterra_firmware::led::LedPattern;
 use hapterra_firmware::link::Link;
 use hapterra_firmware::link::task::{LinkBoard, run};
 use hapterra_firmware::monitor::{Monitor, Part};
 use hapterra_firmware::usb::{BulkStream, EndpointFilter};
 
 use super::calibration_memory::CalibrationMemory;
-use super::{loader, stack, usb_clock, usb_interrupt};
+use super::supervisor::{CHECK_MS, LED};
+use super::{loader, usb_interrupt};
 use crate::application::TICK_DONE;
-use crate::chip::{self, UsbDriver, WINDOW, WatchdogTimer};
+use crate::chip::{UsbDriver, WINDOW};
 use crate::usb::EndpointHalts;
-
-/// Interval of check-ins and of the supervisor, milliseconds.
-const CHECK_MS: u32 = 10;
-/// Interval of measurements of the stack and the oscillator of USB, milliseconds.
-const MEASURE_MS: u32 = 1_000;
 
 /// Time for which the host has to fetch the answer before the board enters its loader.
 const FAREWELL: Duration = Duration::from_millis(50);
-
-/// Pattern of the LED: the link sets it, the supervisor shows it.
-static LED: CriticalSectionMutex<Cell<LedPattern>> =
-    CriticalSectionMutex::new(Cell::new(LedPattern::Disarmed));
 
 /// Board for the link's task. A real board goes on ticking whatever
 /// the link does.
@@ -94,33 +82,4 @@ pub(crate) async fn serve_usb(
     };
     // What an interrupt tells comes before what the stack makes of it.
     join3(usb_interrupt::serve(), device.run(), checking_in).await;
-}
-
-/// Feeds the watchdog while all parts run, measures the stack, and shows the LED's
-/// pattern, for ever. Takes back what a debugger may have said about a halted core.
-#[embassy_executor::task]
-pub(crate) async fn supervise(
-    monitor: &'static Monitor,
-    mut watchdog: IndependentWatchdog<'static, WatchdogTimer>,
-    mut led: Output<'static>,
-) {
-    let mut ticker = Ticker::every(Duration::from_millis(CHECK_MS.into()));
-    let mut ms = 0_u32;
-    loop {
-        ticker.next().await;
-        chip::let_a_halt_stop_the_arm();
-        if monitor.may_feed_watchdog(&[Part::Tick, Part::Link, Part::Usb]) {
-            watchdog.pet();
-        }
-        if ms.is_multiple_of(MEASURE_MS) {
-            monitor.measure_stack(stack::figures());
-            // Before the first second there may have been no host.
-            let usb_clock = usb_clock::measure();
-            if ms > 0 {
-                monitor.measure_usb_clock(usb_clock);
-            }
-        }
-        ms = ms.wrapping_add(CHECK_MS);
-        led.set_level(LED.lock(Cell::get).is_lit(ms).into());
-    }
 }

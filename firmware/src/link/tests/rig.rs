@@ -53,10 +53,10 @@ pub(super) fn scene(source: Source) -> Scene {
         level: 0,
         size: FieldSize::new(640, 640),
         top: 3,
-        underlay: None,
+        fallback: None,
         cell_mm: 1.0,
         home: GridPoint::new([100, 100, 10], Vec3::ZERO),
-        law: SurfaceParams::PREMIUM,
+        params: SurfaceParams::PREMIUM,
         source,
         hold_clock: false,
         materials: None,
@@ -109,7 +109,7 @@ fn point_in(session: SessionNumber, seq: u32, x: f32, z: f32) -> Vec<u8> {
     framed(session, &ToDevice::Hip(HipCommand { seq, hip }))
 }
 
-/// A host, its device, and what was said so far.
+/// A host, its device, and their messages.
 pub(super) struct Rig {
     pub(super) device: Device<StoppedClock, D>,
     reader: Box<FrameReader<8192>>,
@@ -343,7 +343,7 @@ impl Rig {
         self.heard.iter().rev().find_map(guard)
     }
 
-    /// The answers so far to a kind of request.
+    /// All answers to a kind of request.
     pub(super) fn answers(&self, to: fn(&Request) -> bool) -> Vec<Result<(), Refusal>> {
         let answer = |m: &ToHost| match m {
             ToHost::Answer(Answer { number, result }) => {

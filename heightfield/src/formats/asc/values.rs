@@ -59,7 +59,7 @@ pub(super) fn read<R: Read>(
 /// float32, or float64 when integers came that a float32 would round.
 struct Growing {
     samples: Samples,
-    /// Largest size of the whole numbers so far.
+    /// Largest size of the whole numbers read.
     largest: f64,
 }
 

@@ -40,7 +40,7 @@ pub(super) struct Source {
     pub(super) options: Vec<String>,
 }
 
-/// A band in its file. It is read by one thread, and nobody who is served waits for that one
+/// A band in its file. It is read by one thread, and no served reader waits for that one
 /// ([`Blocks`](crate::blocks::Blocks)).
 pub(super) struct GdalBlocks {
     source: Source,

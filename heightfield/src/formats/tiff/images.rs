@@ -11,7 +11,7 @@ const NEW_SUBFILE_TYPE: u16 = 254;
 const REDUCED: u32 = 1;
 const MASK: u32 = 4;
 
-/// An image of a file. Its lists of places may be long: nobody has a copy of them.
+/// An image of a file. Its lists of places may be long: they are not copied.
 #[derive(Clone)]
 pub(super) struct Directory {
     file: Arc<TiffFile>,

@@ -26,7 +26,7 @@ pub(super) struct Unpacked {
     /// Bytes that one takes.
     each: u64,
     kept: Mutex<Kept>,
-    /// Is held by whoever unpacks something.
+    /// Held during an unpacking.
     turn: Mutex<()>,
 }
 
@@ -127,16 +127,34 @@ impl Unpacked {
         Some(read.map(|()| bytes))
     }
 
-    /// Writes the rows of a strip or tile to a place. What is wrong with it is known from then
-    /// on, and not tried again.
+    /// Writes the rows of a strip or tile to a place; after an error those before it. The fault is
+    /// kept, and the strip or tile is not tried again.
     fn unpack(
         &self,
         chunk: &Chunk,
         place: u64,
         unpack: impl FnOnce(&mut RowSink<'_>) -> Result<(), RasterError>,
     ) -> Slot {
+        let no_room = |error: io::Error| {
+            let megabytes = self.each.div_ceil(1_000_000);
+            RasterError::Damaged(format!(
+                "TIFF: {megabytes} MB could not be unpacked into the folder of --cache: {error}"
+            ))
+        };
         let mut bytes = 0;
-        let done = guarded(super::FORMAT.name, || self.write(place, &mut bytes, unpack));
+        let done = guarded(super::FORMAT.name, || {
+            let file = &self.unnamed.file;
+            let mut to = BufWriter::with_capacity(AT_ONCE, Placed { file, place });
+            let mut count = 0;
+            let unpacked = unpack(&mut |row| {
+                to.write_all(row).map_err(no_room)?;
+                count += row.len() as u64;
+                Ok(())
+            });
+            to.flush().map_err(no_room)?;
+            bytes = count;
+            unpacked
+        });
         Slot {
             is_of: (chunk.place, chunk.covers.rows),
             bytes,
@@ -146,32 +164,6 @@ impl Unpacked {
             }),
             used: 0,
         }
-    }
-
-    /// Writes rows to a place; after an error those before it.
-    fn write(
-        &self,
-        place: u64,
-        written: &mut u64,
-        unpack: impl FnOnce(&mut RowSink<'_>) -> Result<(), RasterError>,
-    ) -> Result<(), RasterError> {
-        let no_room = |error: io::Error| {
-            let megabytes = self.each.div_ceil(1_000_000);
-            RasterError::Damaged(format!(
-                "TIFF: {megabytes} MB could not be unpacked into the folder of --cache: {error}"
-            ))
-        };
-        let file = &self.unnamed.file;
-        let mut to = BufWriter::with_capacity(AT_ONCE, Placed { file, place });
-        let mut count = 0;
-        let unpacked = unpack(&mut |row| {
-            to.write_all(row).map_err(no_room)?;
-            count += row.len() as u64;
-            Ok(())
-        });
-        to.flush().map_err(no_room)?;
-        *written = count;
-        unpacked
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {

@@ -194,7 +194,7 @@ fn what_a_row_of_blocks_lies_in_is_at_hand_after_its_first_block() {
     }
 }
 
-/// Nobody who must not wait has to unpack a tile.
+/// A reader that must not wait never unpacks a tile.
 #[test]
 fn a_tile_is_at_hand_once_it_is_unpacked() {
     let made = Made {

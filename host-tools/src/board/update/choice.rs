@@ -21,13 +21,13 @@ pub enum Choice<'p> {
     Board(&'p Plugged),
     /// The loader that was named.
     Loader(&'p Plugged),
-    /// A loader that nobody named. Any STM32 may be one: a board after an update that
-    /// failed, or somebody's other machine. Its user has to say that it is meant.
+    /// A loader that the user did not name. Any STM32 may be one: a board after an update that
+    /// failed, or another machine of the user's. Its user has to say that it is meant.
     UnnamedLoader(&'p Plugged),
 }
 
 /// Picks the device with a serial number, or the only one that there is. A choice is
-/// never made between two: the image might go onto somebody's other board.
+/// never made between two: the image might go onto the wrong board.
 ///
 /// # Errors
 /// [`UpdateError::Nothing`] and [`UpdateError::Several`], which names them.

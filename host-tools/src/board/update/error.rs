@@ -9,7 +9,7 @@ pub enum UpdateError {
     /// Nothing to update is plugged in.
     #[error("no board to update: looked for {looked_for} on USB")]
     Nothing {
-        /// What was looked for.
+        /// Device that was sought.
         looked_for: String,
     },
     /// Several could be meant.
@@ -26,7 +26,7 @@ pub enum UpdateError {
     /// The loader did not show up.
     #[error("the board has left its program, and no loader has appeared on USB")]
     NoLoader,
-    /// What the loader says of its flash is not understood.
+    /// The loader's description of its flash is unknown.
     #[error("the loader describes its flash in a way that is not understood: {0:?}")]
     Layout(String),
     /// The loader's flash is not that of the board's chip.
@@ -34,7 +34,7 @@ pub enum UpdateError {
     OtherChip {
         /// The board that the image is for.
         board: &'static str,
-        /// What the loader says.
+        /// Description by the loader.
         said: String,
     },
     /// The loader cannot write, or not read back.
@@ -52,18 +52,18 @@ pub enum UpdateError {
     /// The loader went away or does not answer.
     #[error("the loader is gone, while it was to {doing}")]
     Gone {
-        /// What was under way.
+        /// Step that failed.
         doing: &'static str,
-        /// Why.
+        /// The reason.
         #[source]
         source: io::Error,
     },
     /// The loader refused something.
     #[error("the loader refused to {doing}: {why} (status {status}, state {state})")]
     Refused {
-        /// What was under way.
+        /// Step that failed.
         doing: &'static str,
-        /// What its status means.
+        /// Meaning of its status.
         why: &'static str,
         /// The status it gave.
         status: u8,
@@ -73,7 +73,7 @@ pub enum UpdateError {
     /// The loader never comes to an end.
     #[error("the loader did not finish: {0}")]
     Endless(&'static str),
-    /// What is read back is not what was written.
+    /// The read-back differs from the image.
     #[error("flash at {0:#010x} does not read back as it was written")]
     Differs(u64),
 }

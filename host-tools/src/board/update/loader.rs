@@ -71,7 +71,7 @@ pub trait ControlPipe {
     fn wait(&mut self, time: Duration);
 }
 
-/// What a loader answers when it is asked for its status.
+/// Answer of a loader to a status query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Status {
     status: u8,
@@ -82,7 +82,7 @@ struct Status {
 /// A loader at the end of a pipe.
 pub struct Loader<P> {
     pipe: P,
-    /// What it says of its flash.
+    /// Its description of its flash.
     layout: Layout,
     /// Bytes of a transfer.
     transfer: u16,
@@ -281,7 +281,7 @@ fn refused(doing: &'static str, Status { status, state, .. }: Status) -> UpdateE
     }
 }
 
-/// What a status means (DFU 1.1, 6.1.2; ST gives some of them a meaning of its own).
+/// Returns the meaning of a status (DFU 1.1, 6.1.2; ST gives some of them a meaning of its own).
 const fn meaning(status: u8) -> &'static str {
     match status {
         0x00 => "it is in another state than it should be",

@@ -8,7 +8,7 @@ use crate::board::boards::Board;
 use crate::board::image::Image;
 use crate::board::memories::Memories;
 
-/// What an erased byte reads.
+/// Value of an erased byte.
 const ERASED: u8 = 0xFF;
 /// Whole words of flash, and what they will hold.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -12,12 +12,12 @@ pub(super) const TRANSFER: usize = 1024;
 /// Time that it asks for to write, ms.
 const WRITE_MS: u64 = 5;
 
-/// What a chip's ROM knows of its flash.
+/// A chip's ROM as far as it concerns the flash.
 #[derive(Debug)]
 pub(super) struct Rom {
     /// The board with this chip.
     pub(super) board: &'static str,
-    /// What it says of its flash.
+    /// Its description of its flash.
     pub(super) words: &'static str,
     pub(super) flash_bytes: usize,
     /// Bytes that are erased at once.
@@ -61,7 +61,7 @@ pub(super) enum State {
     Error = 10,
 }
 
-/// What it was told to do with its flash.
+/// Operation on its flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Deed {
     Erased(u64),
@@ -69,7 +69,7 @@ pub(super) enum Deed {
     Started(u64),
 }
 
-/// What goes wrong with it.
+/// Its injected faults.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Faults {
     /// It is gone after so many requests.
@@ -80,7 +80,7 @@ pub(super) struct Faults {
     pub(super) stuck_page: Option<u64>,
     /// It is protected against reading.
     pub(super) protected: bool,
-    /// It never has done what it was told.
+    /// It never carries out a command.
     pub(super) never_done: bool,
 }
 

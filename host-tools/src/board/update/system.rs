@@ -18,7 +18,7 @@ pub const LOADER_PRODUCT_ID: u16 = 0xDF11;
 
 /// Time that a control transfer may take. An erase goes on behind its transfer.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// What the words of the part of its memory begin with that is flash.
+/// Beginning of the description of its flash.
 const FLASH: &str = "@Internal Flash";
 /// The type of a DFU functional descriptor.
 const FUNCTIONAL: u8 = 0x21;

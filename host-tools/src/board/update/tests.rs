@@ -12,7 +12,7 @@ static ROMS: [&Rom; 2] = [&G474, &H743];
 const FUNCTIONAL: [u8; 9] = [9, 0x21, 0x0B, 0xFF, 0, 0, (TRANSFER / 256) as u8, 0x1A, 1];
 /// Bytes of a program.
 const PROGRAM: usize = 11_000;
-/// Where its pieces begin: of an H743's, behind the first sector and in the second bank,
+/// Starts of its pieces: of an H743's, behind the first sector and in the second bank,
 /// because a program that fills these is long to write.
 const G474_PIECES: [u64; 3] = [0, 472, 4_000];
 const H743_PIECES: [u64; 3] = [0, 128 * 1024 + 480, 1024 * 1024];
@@ -46,7 +46,7 @@ fn image(rom: &Rom) -> Image {
         });
     Image {
         memories: memories(rom),
-        // In an order in which nobody writes.
+        // In an order that is never written.
         parts: parts.rev().collect(),
         placed: vec![],
     }

@@ -5,7 +5,7 @@ use crate::bringup::attendant::{Attendant, Task};
 use crate::bringup::finding::Finding;
 use crate::calibrate::Direction;
 
-/// How far the tip is to be moved, mm.
+/// Distance of the move, mm.
 const ABOUT_MM: u16 = 80;
 /// An encoder whose joint was moved that far has counted more than this.
 const ALIVE_COUNTS: u32 = 400;
@@ -38,7 +38,7 @@ fn moved(from: [i32; 3], to: [i32; 3]) -> [i32; 3] {
     std::array::from_fn(|i| to[i].wrapping_sub(from[i]))
 }
 
-/// What is wrong with the encoder of the joint (0 to 2) that was moved.
+/// Checks the encoder of the joint (0 to 2) that was moved.
 fn judge(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Finding> {
     let most = (0..3).max_by_key(|i| there[*i].unsigned_abs());
     let most = most.unwrap_or(joint);

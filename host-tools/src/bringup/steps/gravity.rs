@@ -18,7 +18,7 @@ const LOOKS: usize = 30;
 /// So far the tip may drift meanwhile, mm.
 const DRIFT_MM: f64 = 20.0;
 
-/// How fast the tip may move while it is left to itself, mm/s: half of what a jog may move
+/// Speed limit of a tip that is left to itself, mm/s: half of what a jog may move
 /// it.
 const FAST_MM_S: f64 = 100.0;
 /// Over so many milliseconds its speed is taken.
@@ -29,7 +29,7 @@ struct TipMotion {
     ticks_per_ms: u32,
     /// The latest samples: their ticks, and where the tip was, mm.
     latest: VecDeque<(u32, DVec3)>,
-    /// The fastest so far, mm/s.
+    /// Maximum speed, mm/s.
     fastest_mm_s: f64,
 }
 

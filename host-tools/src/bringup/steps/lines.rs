@@ -7,7 +7,7 @@ use super::{Board, Halt};
 use crate::bringup::attendant::{Attendant, BoardIs, Question, Reading, Task};
 use crate::bringup::finding::Finding;
 
-/// What is below this is low for every amplifier's enable input, V.
+/// Voltage below which every amplifier's enable input reads low, V.
 const LOW_V: f64 = 0.8;
 
 /// Has each ready wire pulled, and the enable line measured. The board is without power at

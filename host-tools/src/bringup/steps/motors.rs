@@ -185,7 +185,7 @@ fn find_torque(
     }
 }
 
-/// How far the tip is from a joint's axis in the zero pose, mm.
+/// Returns the distance of the tip from a joint's axis in the zero pose, mm.
 fn lever_mm(record: &Calibration, axis: usize) -> f64 {
     let arm = crate::calibrate::Arm::of(record);
     let tip = |q: DVec3| arm.tip_mm(q);

@@ -12,7 +12,7 @@ const FRACTIONS: [f32; 3] = [0.0, 0.5, -0.5];
 /// stage has resistors of a per cent, and so has the meter.
 const OFF_SHARE: f64 = 0.04;
 
-/// What a meter reads for a share of full scale, and where.
+/// Reading of a meter for a share of full scale, and the measured pins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct OutputScale {
     middle: f64,
@@ -72,8 +72,7 @@ mod tests {
     use super::*;
     use hapterra_firmware::amplifier::{duty_code, offset_code};
 
-    /// What an offset stage makes of the converter's volts that is built as the wiring
-    /// page says.
+    /// Returns the output of the offset stage of the wiring page for the converter's volts.
     fn behind_the_stage(volts: f64) -> f64 {
         (volts - 1.65) * 10.0 / 1.444
     }

@@ -33,13 +33,13 @@ pub(super) fn below_tip(record: &Calibration, status: &Status, below_mm: f32) ->
         level: 0,
         size: FieldSize::new(CELLS, CELLS),
         top: 1,
-        underlay: None,
+        fallback: None,
         cell_mm: CELL_MM,
         home: GridPoint::new(
             [middle, middle, 0],
             Vec3::Z * ((below_mm - up_mm) / CELL_MM),
         ),
-        law: SOFT,
+        params: SOFT,
         source: Source::Encoders,
         hold_clock: false,
         materials: None,
@@ -51,13 +51,13 @@ pub(super) fn tip_mm(record: &Calibration, status: &Status) -> DVec3 {
     Arm::of(record).tip_mm(status.health.angles_rad.as_dvec3())
 }
 
-/// Where the HIP is over the plane, mm, terrain frame.
+/// Returns the position of the HIP over the plane, mm, terrain frame.
 pub(super) fn hip_mm(sample: &TickRecord) -> DVec3 {
     let (cell, fraction) = (sample.hip.cell(), sample.hip.frac());
     (DVec3::from(cell.map(f64::from)) + fraction.as_dvec3()) * f64::from(CELL_MM)
 }
 
-/// How deep the HIP is below the proxy, mm.
+/// Returns the depth of the HIP below the proxy, mm.
 pub(super) fn depth_mm(sample: &TickRecord) -> f32 {
     let up = |point: GridPoint| point.cell()[2] as f32 + point.frac().z;
     (up(sample.proxy) - up(sample.hip)) * CELL_MM

@@ -7,7 +7,7 @@ use crate::bringup::attendant::{Attendant, Reading, Task};
 use crate::bringup::finding::Finding;
 use crate::calibrate::{Check, Direction, RatioFit, fit_ratios};
 
-/// How far the tip is to be moved, mm.
+/// Distance of the move, mm.
 const ABOUT_MM: u16 = 80;
 /// By this share a ratio may differ from the ruler's: one read to a millimetre gives it
 /// to two per cent.
@@ -45,7 +45,7 @@ pub(super) fn check(
     ))
 }
 
-/// What of the record is not as the ruler says.
+/// Compares the record with the ruler.
 fn judge(record: &Calibration, fit: &RatioFit) -> Result<(), Finding> {
     for joint in 0..3 {
         let sign = record.encoder_sign[joint];

@@ -17,7 +17,7 @@ const STILL_MM: f32 = 0.1;
 /// So many looks (a tenth of a second each) that may take.
 const LOOKS: usize = 600;
 
-/// What was felt of the plane.
+/// Contact with the plane.
 #[derive(Default)]
 struct PlaneContact {
     /// Deepest HIP below the proxy, mm, and the force up there, N.
@@ -26,7 +26,7 @@ struct PlaneContact {
     most_n: f32,
     /// The latest force, N.
     now_n: f32,
-    /// The deepest so far when the tip was looked at last, mm.
+    /// Maximum depth at the last sample, mm.
     looked_mm: f32,
 }
 
@@ -49,10 +49,10 @@ pub(super) fn soft_plane(
     super::armed_over_plane(board, attendant, BELOW_MM)?;
     let felt = touched(board, attendant)?;
     let (deep_mm, up_n) = felt.deepest;
-    let law = plane::SOFT;
-    let expected_n = (law.stiffness_n_per_mm * deep_mm).min(law.max_force_n);
+    let params = plane::SOFT;
+    let expected_n = (params.stiffness_n_per_mm * deep_mm).min(params.max_force_n);
     let pushed = (0.5 * expected_n..=1.1 * expected_n).contains(&up_n);
-    if !pushed || felt.most_n > 1.01 * law.max_force_n {
+    if !pushed || felt.most_n > 1.01 * params.max_force_n {
         return Err(Finding::NoFloor.into());
     }
     board.trips(attendant, Task::PressStop, Fault::EmergencyStop)?;
@@ -75,7 +75,7 @@ pub(super) fn soft_plane(
     ))
 }
 
-/// Whether a move has come to its end.
+/// Condition for the end of a move.
 type IsDone = fn(&PlaneContact) -> bool;
 
 /// Lets the tip be lowered until it is deep enough, and lifted until nothing is felt.

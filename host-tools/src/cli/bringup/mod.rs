@@ -75,7 +75,7 @@ fn bring_up<A: Attendant>(
     connect: impl Fn(&A) -> Result<Box<dyn Transport>, Failure>,
 ) -> Result<(), Failure> {
     let mut again_from = args.again_from;
-    // A virtual arm's log is of no use to anybody who does not ask for it.
+    // A virtual arm's log is written on request only.
     let mut kept = None;
     loop {
         let mut dialogue = Dialogue::open(connect(user)?, patience)?;
@@ -93,7 +93,7 @@ fn bring_up<A: Attendant>(
             say(format!("log            {}", path.display()));
         }
         match (walked, dialogue) {
-            // The session went with the board's power: there is nobody to say an end to.
+            // The session went with the board's power: there is no session to close.
             (Ok(Walked::BoardWasOff), _) => kept = Some(log),
             (Ok(Walked::ToTheEnd), dialogue) => {
                 dialogue.end()?;

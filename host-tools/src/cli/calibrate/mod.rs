@@ -25,7 +25,7 @@ use measure::Measure;
 use questions::UserAtTerminal;
 use set::Setting;
 
-/// What to do where the record cannot be written.
+/// Hint for a record that cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
 /// Time that a device in this program may take to answer.
 const PATIENCE: Duration = Duration::from_secs(20);

@@ -14,7 +14,7 @@ pub struct Setting {
     value: f32,
 }
 
-/// Where a number stands in the record.
+/// Place of a number in the record.
 #[derive(Clone, Copy, Debug)]
 enum Number {
     /// One for the whole arm.

@@ -15,7 +15,7 @@ pub(in crate::cli) enum News {
     MayBeArmed(String),
     /// The thread that serves this device has seen that an end is asked for.
     Leaving(String),
-    /// The device has confirmed that it is disarmed, or the user was told that it has not.
+    /// The device has confirmed that it is disarmed, or its absence was reported to the user.
     Settled(String),
     /// This file grows.
     Recording(PathBuf),

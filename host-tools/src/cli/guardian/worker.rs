@@ -62,7 +62,7 @@ pub(super) fn report(news: &News) {
     if let Some(to) = NEWS.get() {
         let line = [news.line(), b"\n".to_vec()].concat();
         let mut to = to.lock().unwrap_or_else(PoisonError::into_inner);
-        // A guardian that is gone is noticed by whoever reads from it.
+        // The reader notices a guardian that is gone.
         let _ = to.write_all(&line);
     }
 }

@@ -150,7 +150,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
     hint.into()
 }
 
-/// What to do about a file at a URL.
+/// Returns the hint for a file at a URL.
 fn elsewhere(path: &Path, error: &std::io::Error) -> &'static str {
     const NO_URLS: &str = "build it with them: cargo build --release --features remote (cargo xtask demo URL does); or fetch the file and name that";
     let url = path.to_str().unwrap_or_default().to_ascii_lowercase();
@@ -188,7 +188,7 @@ fn extension(path: &Path) -> String {
     extension.to_string_lossy().to_lowercase()
 }
 
-/// What makes GDAL read the file as it is, where that is missing and might do.
+/// Returns the hint for GDAL, if it is missing and may read the file as it is.
 fn with_gdal(path: &Path) -> String {
     match is_known_to_gdal(path) && gdal().is_err() {
         true => format!(
@@ -243,7 +243,7 @@ fn converted(path: &Path, options: &str) -> String {
 
 /// The command that makes a VRT of files.
 fn built(path: &Path, files: &[String]) -> String {
-    /// More names make no command that somebody reads.
+    /// More names make an unreadable command.
     const SHOWN: usize = 20;
     let each: Vec<_> = files.iter().take(SHOWN).map(|file| quoted(file)).collect();
     let more = match files.len() {
@@ -301,7 +301,7 @@ fn names(path: &Path) -> (String, String) {
     (quoted(&from), quoted(&to))
 }
 
-/// What a converted copy is called, without its ending.
+/// Returns the name of a converted copy, without its ending.
 fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     format!("{}-converted", stem.to_string_lossy())

@@ -35,7 +35,7 @@ struct Form {
     /// Bytes of a tile's frame: mean, and the most.
     mean_bytes: f64,
     worst_bytes: u64,
-    /// What the link carries, by the mean.
+    /// Mean rate of the link.
     tiles_per_s: f64,
     /// Speed along an axis at which they come in time, by the mean.
     cells_per_s: f64,

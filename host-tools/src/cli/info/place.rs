@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use heightfield::{Bounds, CellUnit, Certainty, LonLat, Raster, ReferenceSystem, System};
 
-/// Where something comes from, as the JSON says it.
+/// Returns the source of a value, as in the JSON.
 pub(super) const fn from(certainty: Certainty) -> &'static str {
     match certainty {
         Certainty::Stated => "file",
@@ -33,15 +33,14 @@ pub(super) struct Rectangle {
     north: f64,
     /// Of the sides: `metre`, `degree`, `grad` or `unit of 0.3048 m`.
     unit: String,
-    /// Where the unit comes from; of longitudes and latitudes, where the way to them
-    /// does.
+    /// Source of the unit; of longitudes and latitudes, that of their conversion.
     from: &'static str,
     /// Of longitudes and latitudes: what they belong to.
     #[serde(flatten)]
     globe: Option<Globe>,
 }
 
-/// What longitudes and latitudes belong to.
+/// Datum of longitudes and latitudes.
 #[derive(Serialize)]
 struct Globe {
     /// `WGS 84`, the name of a datum or of a body's; nothing where the file states none.
@@ -157,7 +156,7 @@ impl Rectangle {
     }
 }
 
-/// What the heights are in, and what they count from.
+/// Unit and zero of the heights.
 #[derive(Serialize)]
 pub(super) struct Vertical {
     metres_per_unit: f64,

@@ -44,7 +44,7 @@ enum InputValue {
     CellM(f64),
     /// Metres in a unit of height.
     HeightUnitM(f64),
-    /// How colours encode heights.
+    /// Encoding of heights as colours.
     Encoding(Encoding),
     /// The channel of a PNG that holds the height.
     Channel(PngChannel),
@@ -253,8 +253,9 @@ mod tests {
             ("raw=4x4:i16:middle", "little"),
             ("raw=4x4:i16:le:more", "too much"),
             ("cell=0", "from"),
-            ("cell=-3", "from"),
-            ("cell=1e9", "from"),
+            ("cell=-3m", "from"),
+            ("cell=30", "as 30m"),
+            ("cell=1e9m", "from"),
             ("cell=3furlongs", "km"),
             ("height-unit=furlong", "us-ft"),
             ("height-unit=0", "us-ft"),

@@ -48,8 +48,7 @@ pub(in crate::cli) struct Asked<'r> {
 }
 
 impl Placing {
-    /// What is asked for of a raster. What is wrong with the place itself is found here,
-    /// before any device is spoken to.
+    /// Checks the placement on a raster, before any device is contacted.
     ///
     /// # Errors
     /// No such place.
@@ -84,7 +83,7 @@ impl Placing {
 }
 
 impl Asked<'_> {
-    /// What lies where in front of an arm with a calibration.
+    /// Returns the placement in front of an arm with a calibration.
     ///
     /// # Errors
     /// Heights that the arm does not reach.
@@ -93,7 +92,7 @@ impl Asked<'_> {
     }
 }
 
-/// Where a terrain lies and how large it is, in lines as `run` and `demo` print them.
+/// Returns the place and size of a terrain, in lines as `run` and `demo` print them.
 pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(
@@ -131,8 +130,8 @@ pub(in crate::cli) fn off_in_words(worst: &Distortion) -> String {
 
 /// A view's scale, and what a haptic cell of its level is.
 pub(in crate::cli) fn scale_in_words(view: &Placement) -> String {
-    let (level, cell_mm) = (view.level, short(view.felt_cell_mm()));
-    match (view.ground_m_per_mm(), view.felt_cell_m()) {
+    let (level, cell_mm) = (view.level, short(view.haptic_cell_mm()));
+    match (view.ground_m_per_mm(), view.haptic_cell_m()) {
         (Some(scale), Some(cell_m)) => format!(
             "{} ground metres a device millimetre; at level {level} a haptic cell is {} m, {cell_mm} mm at the device",
             short(scale),
@@ -151,8 +150,8 @@ pub(in crate::cli) fn picture_lines(
     if let Some(scale) = view.ground_m_per_mm() {
         lines.push(("1 mm in the hand".to_owned(), format!("{} m", short(scale))));
     }
-    let cell_mm = short(view.felt_cell_mm());
-    lines.push(match view.felt_cell_m() {
+    let cell_mm = short(view.haptic_cell_mm());
+    lines.push(match view.haptic_cell_m() {
         Some(metres) => (
             format!("haptic cell, level {}", view.level),
             format!("{} m, {cell_mm} mm", short(metres)),

@@ -115,9 +115,9 @@ pub(in crate::cli) struct PlacementControl<'t> {
     entered: Option<u32>,
 }
 
-/// Where keys come from.
+/// Source of keys.
 enum Typing {
-    /// Nobody types, or what is typed are lines.
+    /// No keyboard, or input by lines.
     Nobody,
     /// The terminal, in raw mode until this is dropped.
     Terminal(RawMode),
@@ -244,13 +244,13 @@ impl<'t> PlacementControl<'t> {
 
     /// The view in force in a few words, and the keys.
     pub(in crate::cli) fn in_words(&self) -> String {
-        let Laid { view, law } = self.steering.now();
+        let Laid { view, params } = self.steering.now();
         let scale = match view.ground_m_per_mm() {
             Some(metres) => format!("{} m/mm", short(metres)),
-            None => format!("{} mm a cell", short(view.felt_cell_mm())),
+            None => format!("{} mm a cell", short(view.haptic_cell_mm())),
         };
         let times = view.exaggeration.unwrap_or(1.0);
-        let stiffness = short(f64::from(law.stiffness_n_per_mm));
+        let stiffness = short(f64::from(params.stiffness_n_per_mm));
         format!(
             "{scale}, level {}, heights × {}, {stiffness} N/mm",
             view.level,
@@ -259,11 +259,11 @@ impl<'t> PlacementControl<'t> {
     }
 }
 
-/// What a surface feels like, without what it has not.
-fn surface_in_words(law: &SurfaceParams) -> String {
+/// Describes a surface by the effects that it has.
+fn surface_in_words(params: &SurfaceParams) -> String {
     let number = |number: f32| placing::short(f64::from(number));
-    let (friction, texture) = (&law.friction, &law.texture);
-    let mut words = vec![format!("{} N/mm", number(law.stiffness_n_per_mm))];
+    let (friction, texture) = (&params.friction, &params.texture);
+    let mut words = vec![format!("{} N/mm", number(params.stiffness_n_per_mm))];
     if friction.static_mu > 0.0 {
         let [sliding, at_rest] = [friction.dynamic_mu, friction.static_mu].map(number);
         words.push(format!("friction {sliding}, {at_rest} at rest"));
@@ -271,10 +271,10 @@ fn surface_in_words(law: &SurfaceParams) -> String {
     if friction.viscous_s > 0.0 {
         words.push(format!("viscous friction {} s", number(friction.viscous_s)));
     }
-    if law.damping.ns_per_m > 0.0 {
-        words.push(format!("damping {} N·s/m", number(law.damping.ns_per_m)));
+    if params.damping.ns_per_m > 0.0 {
+        words.push(format!("damping {} N·s/m", number(params.damping.ns_per_m)));
     }
-    if !law.shading.is_none() {
+    if !params.shading.is_none() {
         words.push("shading".to_owned());
     }
     if !texture.is_none() {
@@ -284,7 +284,7 @@ fn surface_in_words(law: &SurfaceParams) -> String {
     words.join(", ")
 }
 
-/// What was marked, in a line.
+/// Describes a mark in a line.
 pub(in crate::cli) fn marked(mark: &Mark) -> String {
     let Mark { text, t_s, .. } = mark;
     match mark.tick {
@@ -295,13 +295,13 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
     }
 }
 
-/// What a view that was put in is, in a line.
+/// Describes a placement that took effect, in a line.
 pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     format!(
         "view {number}: {}; {}; {}; {} under the home position",
         scale_in_words(&laid.view),
-        surface_in_words(&laid.law),
+        surface_in_words(&laid.params),
         match terrain.grid().tip_mm() {
             0.0 => "a point".to_owned(),
             mm => format!("a ball of {} mm", short(mm)),

@@ -54,7 +54,7 @@ pub(super) struct OneDevice {
     pub(super) address: DeviceAddress,
     /// The plant line of an emulated board.
     pub(super) plant: Option<String>,
-    /// What is felt on it is written there.
+    /// File of its recording.
     pub(super) record: Option<PathBuf>,
     pub(super) device_console: DeviceConsole,
 }
@@ -108,7 +108,7 @@ fn addresses_of(args: &Args) -> Vec<DeviceAddress> {
     devices.map(|device| device.address.clone()).collect()
 }
 
-/// What several devices cannot be given.
+/// Refuses options that several devices cannot have.
 fn check(args: &Args) -> Result<(), Failure> {
     let count = args.device.len();
     if count > shared_keyboard::MOST {
@@ -188,7 +188,7 @@ fn is_same_socket(first: &str, second: &str) -> bool {
     if port(first) != port(second) {
         return false;
     }
-    // A name that is not known is told when a line is made.
+    // An unknown name is reported when a line is made.
     let of = |text: &str| text.to_socket_addrs().map(Vec::from_iter);
     match (of(first), of(second)) {
         (Ok(first), Ok(second)) => first.iter().any(|address| second.contains(address)),
@@ -222,9 +222,9 @@ fn same_plant(plant: &str) -> Failure {
     Failure::new(error).hint("give each emulated board a plant line of its own")
 }
 
-/// Where the recording of a device goes, as `felt-2.csv` for `felt.csv`.
+/// Returns the file of the recording of a device, as `felt-2.csv` for `felt.csv`.
 fn of_device(path: &Path, number: usize) -> PathBuf {
-    // What stands for standard output, or is a folder, is told as that.
+    // What stands for standard output, or is a folder, is reported as that.
     let Some(stem) = path.file_stem().filter(|stem| *stem != "-") else {
         return path.to_owned();
     };

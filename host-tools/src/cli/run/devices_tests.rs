@@ -54,7 +54,7 @@ fn each_of_several_devices_has_its_number_its_name_and_its_recording() {
         assert_eq!(device.record, Some(file));
     }
     assert_eq!(of_device(Path::new("felt"), 2), Path::new("felt-2"));
-    // What cannot be written to is told by its own name.
+    // A file that cannot be written is reported by its own name.
     assert_eq!(of_device(Path::new("-"), 2), Path::new("-"));
     assert_eq!(of_device(Path::new(".."), 2), Path::new(".."));
 }

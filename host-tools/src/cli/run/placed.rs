@@ -7,12 +7,13 @@ use hapterra_core::scene::Scene;
 use super::devices::OneDevice;
 use crate::cli::failure::Failure;
 use crate::cli::options::placing::Asked;
-use crate::cli::terminal::waiting::shown_reading;
+use crate::cli::terminal::interrupt;
+use crate::cli::terminal::waiting::shown_planning;
 use crate::phantom::PlacedTerrain;
 use crate::place::Placement;
 use crate::terrain::Terrain;
 
-/// What lies where in front of an arm.
+/// Terrain placed in front of an arm.
 pub(super) struct InReach<'r> {
     view: Placement,
     terrain: Terrain<'r>,
@@ -49,19 +50,19 @@ impl<'t> Placed<'t> {
     pub(super) fn new(
         device: &OneDevice,
         (name, laid): (&str, &'t InReach<'t>),
-        law: SurfaceParams,
+        params: SurfaceParams,
     ) -> Result<Self, Failure> {
         let (view, terrain) = (laid.view, &laid.terrain);
         let tour = match device.is_scripted() {
-            true => Some(shown_reading(name, terrain.raster(), || {
-                PlacedTerrain::in_view(terrain, view.home_mm, law)
+            true => Some(shown_planning(name, terrain.raster(), || {
+                PlacedTerrain::in_view(terrain, view.home_mm, params, &|| !interrupt::requested())
             })?),
             false => None,
         };
         Ok(Self {
             terrain,
             view,
-            scene: view.scene(terrain, law)?,
+            scene: view.scene(terrain, params)?,
             arm: laid.arm,
             tour,
         })

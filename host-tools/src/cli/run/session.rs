@@ -28,7 +28,7 @@ use crate::output::{Output, folder_of};
 use crate::phantom::{HeldPhantom, PlacedTerrain};
 use crate::place::Laid;
 use crate::replay::settings::Device;
-use crate::replay::{Column, LoopColumns, Recording, Rule, Settings};
+use crate::replay::{Column, LoopColumns, Recording, Rule, Settings, TICK_COLUMNS};
 use crate::serving::{Service, told_of_last_end};
 use crate::stability;
 use crate::steering::CommandQueue;
@@ -39,6 +39,9 @@ const RETRY: Duration = Duration::from_millis(500);
 /// For how long the virtual arm stays after the session has ended.
 const LINGER: Duration = Duration::from_secs(2);
 
+/// Remark at the end of a virtual arm's session without contact.
+const UNTOUCHED: &str = "the virtual hand never touched the ground: choose another place with --at, or a longer --duration";
+
 /// Bytes that a recording may have on any disk: a day of CSV at 1 kHz.
 const MAX_RECORDED: u64 = 16 << 30;
 
@@ -47,7 +50,7 @@ pub(super) struct Serving<'p, 't> {
     pub(super) args: &'p Args,
     pub(super) device: &'p OneDevice,
     pub(super) placed: &'p Placed<'t>,
-    /// Whether the device has told its calibration. If not, it is said goodbye to: the
+    /// Success of the query for the calibration. After a failure the session is closed: the
     /// arm may be armed from before.
     pub(super) met: Result<(), Failure>,
     pub(super) recording: Option<Recording>,
@@ -91,7 +94,7 @@ impl<'t> Serving<'_, 't> {
         may_be_armed(true);
         let met = self.met;
         let opened = service.open(|line| met.and_then(|()| fit_to_serve(args, device, line)));
-        // Where it could not be opened, what has to be told is told.
+        // After a failure to open, pending messages are shown.
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
         device_console.say(format!("terrain        {}: {how}", args.terrain.name()));
@@ -108,18 +111,18 @@ impl<'t> Serving<'_, 't> {
         }
         let materials = placed.terrain.grid().materials();
         let table = materials.map(Materials::table);
-        stability::warn_of(&placed.scene.law, table, &hello);
+        stability::warn_of(&placed.scene.params, table, &hello);
         let recording = described(self.recording, args, placed, &hello);
         let laid = Laid {
             view: placed.view,
-            law: placed.scene.law,
+            params: placed.scene.params,
         };
         let mut control = PlacementControl::new(
             (placed.terrain, laid),
             (&placed.arm, args.rendering.level),
             self.commands,
         );
-        // Before anybody else asks the keyboard for anything.
+        // Before any other reader uses the keyboard.
         match &self.device_keys {
             Some(device_keys) => control.use_keys(device_keys),
             None if device_console.name().is_some() => {}
@@ -150,6 +153,9 @@ impl<'t> Serving<'_, 't> {
             tally: end.tally,
         };
         device_console.show(summary.text());
+        if placed.tour.is_some() && summary.figures.force_n.count() == 0 {
+            device_console.tell(UNTOUCHED);
+        }
         if let (Ok(()), Some(path)) = (&kept, &device.record) {
             device_console.say(format!("recording      {}", path.display()));
         }
@@ -199,14 +205,14 @@ fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Re
     match (&device.plant, &device.address) {
         (_, DeviceAddress::Native) => Ok(()),
         // Whatever else is said: its zero pose would be taken for known, and its lines for
-        // an arm that hurts nobody.
+        // a harmless virtual arm.
         (Some(_), _) => drives_no_arm(line),
         (None, _) if args.unchecked => Ok(()),
         (None, _) => brought_up(line),
     }
 }
 
-/// What is served, and to which device.
+/// Returns the service of a terrain to a device.
 fn service<'s, 't: 's>(
     args: &'s Args,
     (device, placed): (&'s OneDevice, &'s Placed<'t>),
@@ -233,7 +239,7 @@ fn service<'s, 't: 's>(
     }
 }
 
-/// How it ended, as a failure; where two things went wrong, the first is told here.
+/// Returns the failure of the session; of two, the first is reported here.
 fn told(
     why: Result<(), LinkError>,
     disarmed: Result<(), LinkError>,
@@ -254,7 +260,7 @@ fn told(
 /// A file that cannot be written.
 pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure> {
     let [state, mode, limits, view] = LoopColumns::COLUMNS;
-    let [tick, work, cost, late] = ["tick", "work", "cost", "late"].map(Column::Count);
+    let [tick, work, cost, late] = TICK_COLUMNS.map(Column::Count);
     let columns = [state, tick, work, cost, late, mode, limits, view];
     let recording = device.record.as_deref().map(|path| {
         let output = Output::create(path)?.of_recording(most_recorded(path));
@@ -282,9 +288,9 @@ fn described(
 ) -> Option<Recording> {
     if let Some(recording) = &mut recording {
         let (file, device) = (without_key(&args.terrain.file), Device::of(device));
-        let law = (placed.scene.law, Rule::Swept);
+        let params = (placed.scene.params, Rule::Swept);
         let home_mm = Some(placed.view.home_mm);
-        let settings = Settings::new(&file, placed.terrain, law, home_mm, device);
+        let settings = Settings::new(&file, placed.terrain, params, home_mm, device);
         recording.describe(&settings);
     }
     recording

@@ -39,7 +39,7 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
     all_failures(count, failures)
 }
 
-/// How a thread has failed, with the device's name; none where it has not.
+/// Returns the failure of a thread, with the device's name; none if it has succeeded.
 fn failed(
     (name, thread): (String, ScopedJoinHandle<'_, Result<(), Failure>>),
 ) -> Option<(String, Failure)> {

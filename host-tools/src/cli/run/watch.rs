@@ -29,17 +29,17 @@ const STANDS_STILL: Duration = Duration::from_secs(60);
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(2);
 
-/// What is seen and recorded of a session while it goes on.
+/// Observation and recording of a running session.
 pub(super) struct Watch<'t> {
     log: SampleLog<'t>,
     stop_s: f64,
-    /// When the last tick of a virtual arm was told of.
+    /// Time of the last reported tick of a virtual arm.
     ticked: Option<Instant>,
     /// The latest sample and its row.
     latest: Option<(TickRecord, Record)>,
     recording: Option<Recording>,
     failed: Option<OutputError>,
-    /// Number of views that the recording has been told of.
+    /// Number of placements in the recording.
     described: usize,
     control: PlacementControl<'t>,
     prompts: ArmingPrompts,
@@ -49,7 +49,7 @@ pub(super) struct Watch<'t> {
     device_console: DeviceConsole,
 }
 
-/// What was seen in all.
+/// Result of the observation.
 pub(super) struct Seen<'t> {
     /// Ticks run since the scene was taken.
     pub(super) ticks: u64,
@@ -58,7 +58,7 @@ pub(super) struct Seen<'t> {
     pub(super) stood_still: bool,
     /// The way to the viewer, where there is one.
     pub(super) shown: Option<Shown<'t>>,
-    /// Whether the recording, where there is one, is complete and in its place.
+    /// Success of the recording, if there is one: complete and in its place.
     pub(super) kept: Result<(), OutputError>,
 }
 
@@ -92,12 +92,12 @@ impl<'t> Watch<'t> {
         }
     }
 
-    /// The same, and a viewer is told what is felt.
+    /// The same, with samples to a viewer.
     pub(super) fn shown(self, shown: Option<Shown<'t>>) -> Self {
         Self { shown, ..self }
     }
 
-    /// The same, and readers of events are told what happens.
+    /// The same, with events to their readers.
     pub(super) fn with_events(self, events: Option<Watcher>) -> Self {
         Self { events, ..self }
     }

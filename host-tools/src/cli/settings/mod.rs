@@ -26,7 +26,7 @@ pub(super) use recorded::differences;
 const USUAL_FILE: &str = "hapterra.toml";
 /// The commands that a settings file is for.
 const COMMANDS: [&str; 3] = ["run", "demo", "replay"];
-/// What no settings file can say.
+/// Options that no settings file can contain.
 const NOT_IN_FILE: [&str; 4] = ["settings", "help", "version", "verbose"];
 
 /// Which settings file is read.
@@ -57,7 +57,7 @@ struct Setting {
     name: String,
     /// Its values, as on the command line; none for a flag.
     values: Vec<OsString>,
-    /// Where it is from, for messages.
+    /// Its source, for messages.
     place: String,
 }
 
@@ -220,8 +220,8 @@ fn option<'c>(command: &'c Command, name: &str) -> Option<&'c Arg> {
     options.find(|option| option.get_long() == Some(name))
 }
 
-/// The words of a setting; none where a given option stands for it or against it, or the command has
-/// no such option.
+/// The words of a setting; none where a given option stands for it or against it, or the command
+/// has no such option.
 fn words_of(
     command: &Command,
     of: &Command,

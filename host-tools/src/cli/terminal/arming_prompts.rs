@@ -20,7 +20,7 @@ use crate::link::{Ask, Event};
 /// More than an arm that is armed, faulted and armed again in a second needs.
 const LINES_A_SECOND: u32 = 24;
 
-/// What Enter means.
+/// Meaning of Enter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Question {
     /// The fault that was shown and is cleared.
@@ -33,13 +33,13 @@ struct Question {
 #[derive(Debug)]
 struct Line {
     text: String,
-    /// What Enter means from now on.
+    /// Meaning of Enter from now on.
     asks: Option<Question>,
 }
 
-/// Where Enter comes from.
+/// Source of Enter.
 trait Enter {
-    /// Forgets what was pressed so far.
+    /// Forgets the keys pressed before.
     fn forget(&mut self);
 
     /// Returns true if Enter was pressed since the last look.
@@ -70,7 +70,7 @@ impl Enter for Arc<DeviceKeys> {
     }
 }
 
-/// Where nobody presses anything.
+/// No source of Enter.
 struct Nobody;
 
 impl Enter for Nobody {
@@ -84,9 +84,9 @@ impl Enter for Nobody {
 /// Leads the user from disarmed to armed.
 pub(in crate::cli) struct ArmingPrompts {
     enter: Box<dyn Enter>,
-    /// What the user does to answer, in the imperative.
+    /// The user's action to answer, in the imperative.
     press_enter: String,
-    /// What was asked last and not answered yet.
+    /// The open question.
     question: Option<Question>,
     /// Number of the question that was asked last.
     number: u32,
@@ -104,7 +104,7 @@ pub(in crate::cli) struct ArmingPrompts {
 }
 
 impl ArmingPrompts {
-    /// For a virtual hand: only what is wrong is told.
+    /// For a virtual hand: only errors are shown.
     pub(in crate::cli) fn for_a_script() -> Self {
         Self {
             leads: false,
@@ -248,7 +248,7 @@ impl ArmingPrompts {
         });
     }
 
-    /// What is to be said to the device now.
+    /// Returns the messages for the device now.
     pub(in crate::cli) fn messages(&mut self) -> Vec<Ask> {
         if self.enter.was_pressed()
             && let Some(question) = self.question.take()
@@ -274,7 +274,7 @@ impl ArmingPrompts {
 
     fn on_enter(&mut self, question: Question) {
         let fault = self.report.and_then(|report| report.fault);
-        // Nobody has read of a fault that came after the question.
+        // The user has not read of a fault after the question.
         if fault.is_some() && fault != question.fault {
             let blockers = self.report.unwrap_or_default().blockers;
             return self.ask_for_enter(blockers);
@@ -290,9 +290,8 @@ impl ArmingPrompts {
         });
     }
 
-    /// What is to be said to the user now: a device whose state flickers gets so many
-    /// lines a second, and the others are counted. A question that is left out was not
-    /// asked.
+    /// Returns the lines for the user now: a device whose state flickers gets a limited number of
+    /// lines a second, and the others are counted. A question that is left out was not asked.
     pub(in crate::cli) fn lines(&mut self) -> Vec<String> {
         let now = Instant::now();
         let mut said = vec![];

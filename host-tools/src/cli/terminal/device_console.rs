@@ -14,7 +14,7 @@ pub(in crate::cli) struct DeviceConsole {
 
 #[derive(Clone)]
 struct Several {
-    /// What a line begins with, as `[2 tcp:localhost:4000]`.
+    /// Prefix of a line, as `[2 tcp:localhost:4000]`.
     name: String,
     /// Its place among the lines at the bottom.
     index: usize,
@@ -52,7 +52,7 @@ impl DeviceConsole {
             .collect()
     }
 
-    /// What its lines begin with, where there are several.
+    /// Returns the prefix of its lines, if there are several devices.
     pub(in crate::cli) fn name(&self) -> Option<&str> {
         self.several.as_ref().map(|several| several.name.as_str())
     }

@@ -28,13 +28,13 @@ pub(in crate::cli) const ASK_FOR_AN_END: [i32; 7] = {
 static IS_LISTENING: AtomicBool = AtomicBool::new(false);
 /// An end is asked for.
 static REQUESTED: AtomicBool = AtomicBool::new(false);
-/// Somebody has pressed Ctrl-C, or what counts as that.
+/// The user has pressed Ctrl-C, or its equivalent.
 static PRESSED: AtomicBool = AtomicBool::new(false);
 /// The boards that may be armed by this program, by what lines about them begin with: nothing,
 /// where there is one.
 static MAY_BE_ARMED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
-/// In this time that is written, or nobody reads it.
+/// Time-out of a write to a terminal without a reader.
 const WRITTEN: Duration = Duration::from_millis(200);
 
 /// Exit code of a program that was interrupted twice, as shells have it.
@@ -123,7 +123,7 @@ fn press() {
     }
 }
 
-/// What is said where a program ends that may leave these boards armed.
+/// Returns the message at the end of a program that may leave these boards armed.
 pub(in crate::cli) fn not_confirmed(boards: &BTreeSet<String>) -> Option<String> {
     let names: Vec<&str> = boards.iter().map(String::as_str).collect();
     let (who, is) = match &names[..] {
@@ -137,7 +137,7 @@ pub(in crate::cli) fn not_confirmed(boards: &BTreeSet<String>) -> Option<String>
     ))
 }
 
-/// Writes to a terminal that somebody reads; one that nobody reads does not hold the end
+/// Writes to a terminal; one without a reader does not hold the end
 /// up.
 pub(in crate::cli) fn say(line: String) {
     let (done, is_done) = channel();

@@ -1,4 +1,4 @@
-//! Lines from standard input, whoever waits for them, or its keys one by one.
+//! Lines from standard input for any waiting thread, or its keys one by one.
 //!
 //! A thread reads, so that Ctrl-C is heeded while a line is waited for, and so that what
 //! was typed before a question is not taken for its answer. Where the terminal is in raw mode
@@ -28,7 +28,7 @@ pub(in crate::cli) struct Keyboard {
     keys: Vec<Key>,
     /// Number of times that Enter was pressed and not taken.
     enters: usize,
-    /// Somebody types: a line that was typed before a question is no answer. What a pipe
+    /// A keyboard: a line that was typed before a question is no answer. What a pipe
     /// holds is there on purpose.
     is_typed: bool,
 }
@@ -77,8 +77,8 @@ impl Keyboard {
         mem::take(&mut self.keys)
     }
 
-    /// What was pressed since the last look, in its order; a line that holds nothing but a
-    /// digit is that key, and each line ends in Enter. Nothing where nobody types.
+    /// Returns the keys since the last call, in order; a line of a single digit is that key, and
+    /// each line ends in Enter. Nothing without a keyboard.
     pub(super) fn pressed(&mut self) -> Vec<Pressed> {
         let mut pressed: Vec<_> = self.pressed.try_iter().collect();
         if self.is_typed {
@@ -131,7 +131,7 @@ fn read(typed: &SyncSender<String>, is_typed: bool) {
             return;
         };
         let taken = match is_typed {
-            // Whoever types ahead so far does not answer anything.
+            // Earlier input is no answer.
             true => !matches!(typed.try_send(line), Err(TrySendError::Disconnected(_))),
             false => typed.send(line).is_ok(),
         };

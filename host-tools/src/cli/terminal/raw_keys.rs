@@ -7,7 +7,7 @@ use std::sync::mpsc::SyncSender;
 use super::{interrupt, raw_mode};
 use crate::steering::keys::Key;
 
-/// What the thread at the keyboard has read.
+/// Input that the thread at the keyboard has read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pressed {
     /// Enter.
@@ -23,7 +23,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
         for byte in chunk.iter().take(n) {
             match keys.take(*byte) {
                 Some(Typed::Interrupt) => interrupt::press_key(),
-                // Whoever types ahead so far is not heeded.
+                // Earlier input is ignored.
                 Some(Typed::Pressed(key)) => drop(pressed.try_send(key)),
                 None => {}
             }
@@ -32,7 +32,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
     raw_mode::put_back();
 }
 
-/// What a byte, or the last of some, comes to.
+/// Meaning of a byte, or of the last of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Typed {
     /// Ctrl-C, or Ctrl-\.

@@ -1,6 +1,6 @@
 //! One keyboard for several devices. A digit chooses a device, and keys go to the device that was
 //! chosen last. Enter goes to a device whose digit was pressed right before it, and else to none:
-//! nobody arms another user's arm by an Enter for one's own.
+//! an Enter for one arm never arms another user's arm.
 //!
 //! Where the terminal gives whole lines, a line that is the number of a device is that digit and
 //! Enter.
@@ -21,7 +21,7 @@ const WAITING: usize = 64;
 
 /// The keyboard of several devices.
 struct SharedKeyboard {
-    /// What each device's lines begin with.
+    /// Prefix of each device's lines.
     names: Vec<String>,
     state: Mutex<State>,
     /// While keys come one by one.
@@ -36,7 +36,7 @@ struct State {
     inboxes: Vec<Inbox>,
 }
 
-/// What was pressed for a device and not taken.
+/// Keys for a device that it has not taken.
 #[derive(Default)]
 struct Inbox {
     keys: Vec<Key>,
@@ -141,7 +141,7 @@ impl DeviceKeys {
         self.shared_keyboard.raw.is_some()
     }
 
-    /// What the user presses to answer a question of this device.
+    /// Returns the key that answers a question of this device.
     pub(in crate::cli) fn press_enter(&self) -> String {
         format!("press {} and then Enter", self.index + 1)
     }
@@ -203,7 +203,7 @@ mod tests {
         told.collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
-    /// What a device got, without a look at the real keyboard.
+    /// Returns the keys of a device, without the real keyboard.
     fn got(device_keys: &DeviceKeys) -> (Vec<Key>, usize) {
         let mut state = device_keys.shared_keyboard.state();
         let inbox = std::mem::take(&mut state.inboxes[device_keys.index]);

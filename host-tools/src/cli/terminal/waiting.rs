@@ -36,11 +36,18 @@ pub(in crate::cli) fn shown_meanwhile<T>(
     })
 }
 
-/// The same of work that reads an open terrain.
-pub(in crate::cli) fn shown_reading<T>(name: &str, raster: &Raster, work: impl FnOnce() -> T) -> T {
+/// The same of the plan of a path over an open terrain.
+pub(in crate::cli) fn shown_planning<T>(
+    name: &str,
+    raster: &Raster,
+    work: impl FnOnce() -> T,
+) -> T {
     let line = || match raster.blocks() {
-        0 => format!("reading {name} to plan a path over it"),
-        all => format!("reading {name}: {} of {all} blocks", raster.blocks_read()),
+        0 => format!("planning a path over {name}"),
+        all => format!(
+            "planning a path over {name}: {} of {all} blocks read",
+            raster.blocks_read()
+        ),
     };
     shown_meanwhile(line, work)
 }

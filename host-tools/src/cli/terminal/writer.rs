@@ -20,7 +20,7 @@ use heightfield::shown::shown_lines;
 /// Lines that wait to be written; beyond them, lines are left out.
 const WAITING: usize = 512;
 
-/// What is to be written.
+/// Text to write.
 enum Said {
     /// To standard output, as it is.
     Out(String),
@@ -73,7 +73,7 @@ fn speak(said: Said) {
         thread.spawn(move || write_all(said)).ok().map(|_| writer)
     });
     match writer {
-        // Where nobody takes it, nobody can be told that either.
+        // Without a reader this cannot be reported either.
         Some(writer) => drop(writer.try_send(said)),
         None => write(said, &mut None),
     }

@@ -1,5 +1,13 @@
 //! The columns of a recording of `run`, in their order, with their meanings for the reference.
 
+/// Columns of the board's loop, which only `run` writes.
+pub const TICK_COLUMNS: [&str; 4] = [TICK, WORK, COST, LATE];
+
+const TICK: &str = "tick";
+const WORK: &str = "work";
+const COST: &str = "cost";
+const LATE: &str = "late";
+
 /// Columns that share a meaning, and the meaning.
 pub const COLUMNS: [(&[&str], &str); 12] = [
     (&["t_s"], "time of the tick, s"),
@@ -18,11 +26,11 @@ pub const COLUMNS: [(&[&str], &str); 12] = [
     ),
     (&["state"], "`free`, `touching`, `releasing`, or `unseeded`"),
     (
-        &["tick", "work"],
+        &[TICK, WORK],
         "`run`: number of the tick; units of contact work",
     ),
-    (&["cost"], "`run`: clock ticks of the tick before"),
-    (&["late"], "`run`: late ticks"),
+    (&[COST], "`run`: clock ticks of the tick before"),
+    (&[LATE], "`run`: late ticks"),
     (&["mode"], "`run`, `demo`: progress of arming"),
     (
         &["limits"],

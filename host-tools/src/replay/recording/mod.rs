@@ -13,7 +13,7 @@ use std::path::Path;
 use hapterra_core::contact::ContactState;
 use hapterra_core::scene::TickRecord;
 
-pub use columns::COLUMNS;
+pub use columns::{COLUMNS, TICK_COLUMNS};
 
 use super::marks::Mark;
 use super::settings::{PlacementSettings, Settings};
@@ -35,9 +35,9 @@ pub(super) const NUMBERS: [&str; 10] = [
 ];
 /// The column of every recording that says whether the surface was touched, 0 or 1.
 pub(super) const CONTACT: &str = "contact";
-/// How many of [`NUMBERS`] stand before [`CONTACT`].
+/// Number of [`NUMBERS`] before [`CONTACT`].
 const BEFORE_CONTACT: usize = 4;
-/// What the name of a Parquet recording ends in.
+/// Extension of a Parquet recording.
 const PARQUET: &str = "parquet";
 
 /// One row of a recording.

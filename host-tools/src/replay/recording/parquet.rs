@@ -37,7 +37,7 @@ pub(super) struct Parquet {
 /// The values of one column in a group.
 enum Values {
     Numbers(Vec<f64>),
-    /// Whether the surface was touched.
+    /// Flags: true if the surface was touched.
     Flags(Vec<i32>),
     Counts(Vec<i64>),
     Texts(Vec<ByteArray>),

@@ -2,7 +2,7 @@
 
 use hapterra_touch::ticks::{Counts, ODD_MOVE_S, Untimed};
 
-/// What rows were for ticks; none where they were a tick each by their own times.
+/// Describes the rows as ticks; none if each row was a tick by its own time.
 pub(super) fn pace(counts: &Counts, hz: u32) -> Option<String> {
     let rows = counts.rows;
     Some(match counts.untimed {
@@ -20,7 +20,7 @@ pub(super) fn pace(counts: &Counts, hz: u32) -> Option<String> {
     })
 }
 
-/// What is odd, a sentence each.
+/// Returns the remarks, a sentence each.
 pub(super) fn remarks(counts: &Counts) -> Vec<String> {
     let longest = (counts.longest_move_s * 1e6).round() / 1e6;
     let odd = counts.odd_moves;

@@ -56,14 +56,14 @@ impl<R: Seek> Seek for Again<R> {
     }
 }
 
-/// What a block of comments begins with that tells of another view or of a mark.
+/// First words of a block of comments for a placement or a mark.
 const LATER: [&[u8]; 2] = [b"[[view]]", b"[[mark]]"];
 /// Bytes of such blocks that are looked at, at most: a view takes less than four hundred.
 const MOST: usize = 1 << 24;
 
-/// Reads the comments between rows that tell of other views and of marks, without their `#` and a space
-/// after it; other remarks are passed over, and so is one that no row follows: whoever wrote it
-/// may have been killed in the middle.
+/// Reads the comments between rows that tell of other views and of marks, without their `#` and a
+/// space after it; other remarks are passed over, and so is one that no row follows: whoever wrote
+/// it may have been killed in the middle.
 pub(super) fn later(stream: impl Read) -> io::Result<String> {
     let (mut reader, mut line) = (
         BufReader::with_capacity(1 << 16, Bounded::new(stream)),
@@ -99,7 +99,7 @@ pub(super) fn later(stream: impl Read) -> io::Result<String> {
     Ok(found)
 }
 
-/// How many lines from here on are empty or comments: a row begins after them.
+/// Returns the number of lines from here on that are empty or comments: a row begins after them.
 pub(super) fn lines_before_a_row(stream: impl Read) -> u64 {
     let (mut reader, mut line, mut count) = (BufReader::new(stream), Vec::new(), 0);
     loop {

@@ -34,7 +34,7 @@ impl TrajectoryError {
     }
 }
 
-/// What is wrong with a trajectory, and where. Lines and rows count from 1.
+/// Fault of a trajectory, and its place. Lines and rows count from 1.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum TrajectoryFault {
     #[error("cannot read the trajectory: {0}")]

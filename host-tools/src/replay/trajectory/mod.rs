@@ -168,7 +168,7 @@ impl Trajectory {
         }
     }
 
-    /// Where the present row is, for a message: no row can be read afterwards.
+    /// Returns the place of the present row, for a message: no row can be read afterwards.
     fn place(&mut self) -> String {
         match &mut self.form {
             Form::Csv(rows) => rows.place(),
@@ -199,7 +199,8 @@ impl Iterator for Trajectory {
     }
 }
 
-/// What a CSV file says of views and marks between its rows; nothing where it cannot be wound back.
+/// Returns the comments on placements and marks between the rows of a CSV file; nothing if it
+/// cannot be rewound.
 fn later_remarks(file: &mut File) -> Result<String, TrajectoryFault> {
     if file.stream_position().is_err() {
         return Ok(String::new());

@@ -21,16 +21,16 @@ pub(super) struct Rows {
     next_group: usize,
     /// The columns that are read.
     names: &'static [&'static str],
-    /// What reads the columns of the present group.
+    /// Readers of the columns of the present group.
     columns: Vec<ColumnReaderImpl<DoubleType>>,
     /// Which column tells the view, where there is one; what reads it, and what it read.
     view_column: Option<usize>,
     view: Option<ColumnReaderImpl<Int64Type>>,
     views: Vec<i64>,
-    /// Rows that were read, and are not told yet from `next` on.
+    /// Rows that were read; those from `next` on are pending.
     read: Vec<Vec<f64>>,
     next: usize,
-    /// Rows told so far.
+    /// Number of rows handed out.
     told: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Rows of a recording with all that was felt, for whoever shows them again.
+//! Rows of a recording with all that was felt, for another display.
 
 use std::fs::File;
 use std::io;

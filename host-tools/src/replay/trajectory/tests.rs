@@ -79,7 +79,7 @@ fn a_recording_that_was_cut_in_a_row_has_the_rows_before() {
     let path = folder.path().join("t.csv");
     let whole =
         "# a remark\nt_s,x_mm,y_mm,z_mm,contact,state\n0,1,2,3,0,free\n0.001,4,5,6,1,touching\n";
-    // Not after the last comma: nobody sees there that the text after it is missing.
+    // Not after the last comma: there the missing text would not be noticed.
     let last_row = whole.len() - "0.001,4,5,6,1,touching\n".len();
     let last_comma = whole.len() - "touching\n".len();
     for end in last_row + 1..last_comma {

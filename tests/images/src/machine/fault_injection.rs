@@ -12,7 +12,7 @@ use crate::stopwatch::Stopwatch;
 /// The interrupt controller's first register that disables.
 const NVIC_ICER: u32 = 0xE000_E180;
 
-/// Whether the core loads a word of flash that cannot be read.
+/// Load of a word of flash, which may fail.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Load {
     #[default]

@@ -55,7 +55,7 @@ pub struct Machine {
     load: Rc<Cell<Load>>,
     /// The data cache, of a core that has one.
     cache: Rc<RefCell<DataCache>>,
-    /// What the memory protection unit forbids.
+    /// Memory protection unit.
     protection: Protection,
     /// Vectors taken since it was last cleared.
     pub taken: Vec<u32>,
@@ -138,8 +138,8 @@ impl Machine {
         }
     }
 
-    /// Resets the chip. Memory keeps what it holds, but not what only the data cache did, and what is outside of the chip knows of
-    /// no reset but a power-up.
+    /// Resets the chip. Memory keeps what it holds, but not what only the data cache did, and what
+    /// is outside of the chip knows of no reset but a power-up.
     pub fn reset(&mut self, cause: Reset) {
         let inputs = self.chip;
         let before = self.bus.replace(Bus::new(self.chip, cause));

@@ -22,7 +22,7 @@ const MSTKERR: u32 = 1 << 4;
 const MMARVALID: u32 = 1 << 7;
 const STKERR: u32 = 1 << 12;
 
-/// What is forbidden, and the last access to it.
+/// Forbidden memory, and the last access to it.
 #[derive(Default)]
 pub(super) struct Protection {
     /// Base and attributes of each region, as the registers had them.
@@ -70,7 +70,7 @@ impl Machine {
         self.core.ctl_flush_tlb().expect("what it knows is dropped");
     }
 
-    /// Where there is memory: elsewhere an access fails anyway.
+    /// Allows accesses to a region of memory: elsewhere an access fails anyway.
     fn allow(&mut self, region: Range<u32>, access: Prot) {
         for (start, bytes) in self.chip.memories {
             let from = region.start.max(*start);

@@ -68,8 +68,8 @@ impl FullSpeed {
         }
     }
 
-    /// What a write does to an endpoint's register: some bits are written, some are
-    /// inverted by a one, some are cleared by a zero, and SETUP is the peripheral's.
+    /// Writes an endpoint's register: some bits are written, some are inverted by a one, some are
+    /// cleared by a zero, and SETUP is the peripheral's.
     fn write_endpoint(&mut self, index: usize, value: u16) {
         let old = self.endpoints[index];
         self.endpoints[index] =

@@ -58,7 +58,7 @@ const DONE: u32 = 1 << 0;
 const DISABLED: u32 = 1 << 1;
 const SETUP_DONE: u32 = 1 << 3;
 const EMPTY: u32 = 1 << 7;
-/// What the receive FIFO holds.
+/// Kind of content of the receive FIFO.
 const OUT_DATA: u32 = 2;
 const OUT_DONE: u32 = 3;
 const SETUP_COMPLETE: u32 = 4;

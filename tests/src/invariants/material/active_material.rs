@@ -17,11 +17,11 @@ const LEFT: f64 = 5e-6;
 /// Ticks in which a texture goes out, or comes in: half of that.
 const FADE: u32 = CHANGE / 2;
 
-/// What goes evenly from one material to the next: stiffness, static, dynamic and viscous
+/// Numbers that change evenly from one material to the next: stiffness, static, dynamic and viscous
 /// friction, damping.
 type Numbers = [f64; 5];
 
-/// What may be in force.
+/// A material that may be in force.
 #[derive(Clone, Debug)]
 pub(super) struct ActiveMaterial {
     /// The class of the wanted one.
@@ -35,7 +35,7 @@ pub(super) struct ActiveMaterial {
     /// The texture of which a share is felt, and so many of [`FADE`] parts of it.
     texture: Texture,
     parts: u32,
-    /// How fast the proxy goes over it.
+    /// Judge of its texture.
     judge: Option<TextureJudge>,
     /// The share that this speed leaves.
     speed_share: f64,
@@ -85,8 +85,8 @@ impl ActiveMaterial {
         }
     }
 
-    /// Returns true if friction may hold the proxy in the next tick: it does as long as something is left of
-    /// a change from it.
+    /// Returns true if friction may hold the proxy in the next tick: it does as long as something
+    /// is left of a change from it.
     pub(super) fn may_rub(&self) -> bool {
         let [_, was_static, was_dynamic, was_viscous, _] = self.from;
         let was_rough = was_static + was_dynamic + was_viscous > 0.0;
@@ -103,7 +103,7 @@ impl ActiveMaterial {
         self.unsure_numbers()[4]
     }
 
-    /// What holds the proxy in the next tick.
+    /// Returns the friction of the next tick.
     pub(super) fn friction(&self) -> Friction {
         self.friction_of(|i| self.numbers[i])
     }
@@ -229,7 +229,7 @@ impl ActiveMaterial {
 /// The numbers of a material, as stiff as the scene has it.
 fn numbers(materials: &Materials, class: u8) -> Numbers {
     let table = &materials.table;
-    let scale = f64::from(materials.law.stiffness_n_per_mm / table[0].stiffness_n_per_mm);
+    let scale = f64::from(materials.params.stiffness_n_per_mm / table[0].stiffness_n_per_mm);
     let one = &table[usize::from(class)];
     [
         f64::from(one.stiffness_n_per_mm) * scale,

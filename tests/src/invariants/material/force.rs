@@ -10,7 +10,7 @@ const ROUNDING: f64 = 1e-5;
 /// Forces below this, N, are not told from none.
 const LEAST_N: f64 = 1e-12;
 
-/// What a tick is felt with.
+/// Conditions of a tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TickConditions<'p> {
     /// From the HIP to the proxy, cells.

@@ -5,7 +5,7 @@ use hapterra_url_tests::bucket::{PUBLIC, Seen, Server};
 
 use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, said};
 
-/// What to do, as a user is told.
+/// The user's hint.
 const HINT: &str = "hint: set what the server wants: AZURE_STORAGE_ACCOUNT_NAME";
 /// Times before which a signature holds.
 const ONE_DAY: &str = "2100-01-31T00:00:00Z";

@@ -5,7 +5,7 @@ use hapterra_url_tests::gcs::{STRANGER, SURVEYOR, TOKEN, served};
 
 use crate::opened::{Hills, NAME, assert_fetched_in_parts, assert_refused, hills, mosaic, said};
 
-/// What to do, as a user is told.
+/// The user's hint.
 const HINT: &str = "hint: set what the server wants: GOOGLE_APPLICATION_CREDENTIALS";
 
 /// A server of buckets, and a file for a key.

@@ -69,7 +69,8 @@ pub(crate) fn mosaic(folder: &Path, files: [&str; 2]) -> String {
     path.display().to_string()
 }
 
-/// What the second process says: that it felt the file, or the lines of a command that fails.
+/// Returns the output of the second process: that it rendered the file, or the lines of a command
+/// that fails.
 pub(crate) fn said(name: &str, environment: &[(&str, &str)]) -> String {
     let mut process = Command::new(std::env::current_exe().expect("this program"));
     process.args(["--exact", "opened::in_another_process", "--nocapture"]);

@@ -81,7 +81,7 @@ pub(super) fn check(material: &Material) -> Result<(), String> {
     })
 }
 
-/// What is wrong, and what to do, as a failure.
+/// Returns the failure with a message and a hint.
 pub(super) fn told(why: &str) -> Failure {
     let (what, next_step) = why
         .split_once(": ")

@@ -59,7 +59,7 @@ pub enum TableError {
     Unreadable {
         /// The file.
         file: PathBuf,
-        /// Why.
+        /// The reason.
         why: std::io::Error,
     },
     /// It is no such TOML.
@@ -67,7 +67,7 @@ pub enum TableError {
     NoTable {
         /// The file.
         file: PathBuf,
-        /// What was found, and in which line.
+        /// Found text, and its line.
         why: String,
     },
     /// One of its classes.
@@ -77,7 +77,7 @@ pub enum TableError {
         file: PathBuf,
         /// The line, from 1 on.
         line: usize,
-        /// What is wrong.
+        /// The fault.
         why: String,
     },
 }
@@ -110,7 +110,7 @@ impl Written {
     }
 }
 
-/// What is wrong with a text, and the present name of a key that has another one.
+/// Describes the fault of a text, with the present name of a renamed key.
 fn explained(why: &toml::de::Error) -> String {
     let text = why.to_string().trim_end().to_owned();
     let is_unknown = |(old, _): &&(&str, &str)| text.contains(&format!("unknown field `{old}`"));

@@ -20,7 +20,7 @@ pub enum Event<'e> {
     },
     /// Lines that this reader was too slow for, since the line before.
     Dropped {
-        /// How many.
+        /// The number.
         lines: u64,
     },
     /// The contact begins or ends.
@@ -31,7 +31,7 @@ pub enum Event<'e> {
         speed_mm_s: Option<f64>,
         /// Force on the hand, N: east, north, up.
         force_n: [f64; 3],
-        /// Where.
+        /// The place.
         #[serde(flatten)]
         place: Place,
     },
@@ -42,7 +42,7 @@ pub enum Event<'e> {
     Material {
         /// Its class in the file; none for the default.
         class: Option<i64>,
-        /// What the table calls it.
+        /// Its name in the table.
         name: Option<&'e str>,
     },
     /// Another view is felt.
@@ -58,7 +58,7 @@ pub enum Event<'e> {
         /// Device millimetres a vertical unit of the file.
         height_mm_per_unit: f64,
     },
-    /// What makes the force less than the surface's, how far arming has come, or the fault has
+    /// The limits of the force, the mode or the fault has
     /// changed.
     Limits {
         /// Names of the limits, as in the column `limits` of a recording.
@@ -68,7 +68,7 @@ pub enum Event<'e> {
         /// Number of the latched fault.
         fault: Option<u8>,
     },
-    /// What the loop did in a tick.
+    /// A tick of the loop.
     Sample {
         /// The HIP, device millimetres of the view: east, north, up.
         hip_mm: [f64; 3],
@@ -83,7 +83,7 @@ pub enum Event<'e> {
         /// The view, counted from 0.
         view: usize,
     },
-    /// What there is to say to who arms the arm.
+    /// Instructions for arming.
     Arming {
         /// Lines for the user.
         lines: &'e [String],
@@ -92,7 +92,7 @@ pub enum Event<'e> {
     },
     /// A command was not done.
     Refused {
-        /// Why.
+        /// The reason.
         text: &'e str,
     },
     /// The session with the device is over.

@@ -48,7 +48,7 @@ pub struct HapticGrid<'r> {
     cells: HapticCells,
     /// A cell of the file where `measured_at` is.
     cell: Option<CellSize>,
-    /// Where the cell was measured, in the file's coordinates; `None` for the middle.
+    /// Place at which the cell was measured, in the file's coordinates; `None` for the middle.
     measured_at: Option<[f64; 2]>,
     columns: u32,
     rows: u32,
@@ -56,11 +56,11 @@ pub struct HapticGrid<'r> {
     side_m: Option<f64>,
     /// Place where the samples lie in the file; `None` where they are the file's own.
     resampling: Option<Resampling>,
-    /// What the ground is made of, where that is not the same everywhere.
+    /// Materials of the ground, if there are several.
     materials: Option<&'r Materials>,
     /// Radius of the ball that feels it, hand millimetres; 0 for a point.
     tip_mm: f64,
-    /// Whether reads wait.
+    /// Behaviour of reads.
     wait: Wait,
 }
 
@@ -122,7 +122,7 @@ impl<'r> HapticGrid<'r> {
         self.tip_mm
     }
 
-    /// What the ground is made of, where that is not the same everywhere.
+    /// Returns the materials of the ground, if there are several.
     #[must_use]
     pub const fn materials(&self) -> Option<&'r Materials> {
         self.materials
@@ -292,7 +292,7 @@ impl<'r> HapticGrid<'r> {
         self.side_m
     }
 
-    /// How many cells high one vertical unit is at true proportions, where the file
+    /// Returns the height of one vertical unit in cells at true proportions, if the file
     /// knows its cell size: with `cell_mm` hand millimetres a cell, the true height
     /// of a unit is `cell_mm` times this.
     #[must_use]
@@ -455,7 +455,7 @@ impl<'r> HapticGrid<'r> {
 }
 
 impl HapticGrid<'_> {
-    /// What the grid is besides the samples of its raster.
+    /// Hashes the grid except the samples of its raster.
     pub(super) fn hash_shape<H: Hasher>(&self, hasher: &mut H) {
         (self.columns, self.rows).hash(hasher);
         if let Some(materials) = self.materials {

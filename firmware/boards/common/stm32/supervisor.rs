@@ -1,0 +1,51 @@
+//! The supervisor: feeds the watchdog while all tasks run, and shows the LED's pattern.
+
+use core::cell::Cell;
+
+use embassy_stm32::gpio::Output;
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
+use embassy_time::{Duration, Ticker};
+use hapterra_firmware::led::LedPattern;
+use hapterra_firmware::monitor::{Monitor, Part};
+
+use super::{stack, usb_clock};
+use crate::chip::{self, WatchdogTimer};
+
+/// Interval of check-ins and of the supervisor, milliseconds.
+pub(super) const CHECK_MS: u32 = 10;
+/// Interval of measurements of the stack and the oscillator of USB, milliseconds.
+const MEASURE_MS: u32 = 1_000;
+
+/// Pattern of the LED: the link sets it, the supervisor shows it.
+pub(super) static LED: CriticalSectionMutex<Cell<LedPattern>> =
+    CriticalSectionMutex::new(Cell::new(LedPattern::Disarmed));
+
+/// Feeds the watchdog while all parts run, measures the stack, and shows the LED's
+/// pattern, for ever. Takes back what a debugger may have said about a halted core.
+#[embassy_executor::task]
+pub(crate) async fn supervise(
+    monitor: &'static Monitor,
+    mut watchdog: IndependentWatchdog<'static, WatchdogTimer>,
+    mut led: Output<'static>,
+) {
+    let mut ticker = Ticker::every(Duration::from_millis(CHECK_MS.into()));
+    let mut ms = 0_u32;
+    loop {
+        ticker.next().await;
+        chip::let_a_halt_stop_the_arm();
+        if monitor.may_feed_watchdog(&[Part::Tick, Part::Link, Part::Usb]) {
+            watchdog.pet();
+        }
+        if ms.is_multiple_of(MEASURE_MS) {
+            monitor.measure_stack(stack::figures());
+            // Before the first second there may have been no host.
+            let usb_clock = usb_clock::measure();
+            if ms > 0 {
+                monitor.measure_usb_clock(usb_clock);
+            }
+        }
+        ms = ms.wrapping_add(CHECK_MS);
+        led.set_level(LED.lock(Cell::get).is_lit(ms).into());
+    }
+}

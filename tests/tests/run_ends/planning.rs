@@ -1,0 +1,59 @@
+//! Ctrl-C while the path of a virtual arm is planned.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Read;
+use std::os::fd::OwnedFd;
+use std::process::{Command, Stdio};
+
+use hapterra_tests::hapterra_binary;
+use hapterra_tests::served::signal;
+use hapterra_tests::timeouts::end_of;
+
+use super::terminal::shows;
+
+/// Ground with so many holes that each size of the plan is tried.
+fn ground_of_holes() -> String {
+    let mut text = String::from("ncols 200\nnrows 200\ncellsize 1\nnodata_value -9999\n");
+    for row in 0..200_u32 {
+        for column in 0..200_u32 {
+            let height = match (column % 12 < 3, row % 12 < 3) {
+                (true, true) => -9999.0,
+                _ => f64::from((column * row) % 17),
+            };
+            let _ = write!(text, "{height} ");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[test]
+fn ctrl_c_ends_the_planning_of_a_path() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let terrain = folder.path().join("holes.asc");
+    std::fs::write(&terrain, ground_of_holes()).expect("written");
+    let mut child = Command::new(hapterra_binary())
+        .args(["run", "--tip", "8mm", "--level", "0"])
+        // One path after the other is planned: much more than a signal's time.
+        .args(["--device", "native"].repeat(8))
+        .args(["--scale", "1mm/cell", "--exaggeration", "0.05mm/unit"])
+        .arg(&terrain)
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it runs");
+    let stderr = child.stderr.take().expect("piped");
+    let mut stderr = File::from(OwnedFd::from(stderr));
+    shows(&mut stderr, "planning a path over");
+    signal(&child, "INT");
+    let output = end_of(child);
+    let mut rest = String::new();
+    stderr.read_to_string(&mut rest).expect("text");
+    assert_eq!(output.status.code(), Some(1), "{rest}");
+    assert!(rest.contains("interrupted\nhint: start again"), "{rest}");
+    // Otherwise a line follows every three seconds until the plan is complete.
+    assert!(rest.matches("planning").count() <= 1, "{rest}");
+}
