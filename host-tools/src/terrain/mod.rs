@@ -8,6 +8,8 @@
 mod distortion;
 mod felt_grid;
 mod identity;
+#[cfg(test)]
+pub(crate) mod in_file;
 mod steps;
 mod tiler;
 mod underlay;
