@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
+use crate::cli::failure::Failure;
 use heightfield::Raster;
 
 /// Before the first line where there is no terminal, and between two of them.
@@ -37,12 +38,24 @@ pub(in crate::cli) fn shown_meanwhile<T>(
 }
 
 /// The same of work that reads an open terrain.
-pub(in crate::cli) fn shown_reading<T>(name: &str, raster: &Raster, work: impl FnOnce() -> T) -> T {
+///
+/// # Errors
+/// The reason why heights could not be read, or else that of the work.
+pub(in crate::cli) fn shown_reading<T, E>(
+    name: &str,
+    raster: &Raster,
+    work: impl FnOnce() -> Result<T, E>,
+) -> Result<T, Failure>
+where
+    Failure: From<E>,
+{
     let line = || match raster.blocks() {
         0 => format!("reading {name} to plan a path over it"),
         all => format!("reading {name}: {} of {all} blocks", raster.blocks_read()),
     };
-    shown_meanwhile(line, work)
+    let done = shown_meanwhile(line, work);
+    raster.check_complete()?;
+    Ok(done?)
 }
 
 fn at_bottom(line: impl Fn() -> String, goes_on: impl Fn(Duration) -> bool) {
