@@ -15,8 +15,8 @@ pub struct OpenOptions {
     pub png_channel: Option<PngChannel>,
     /// Stored sample value that means no data; replaces what the file says.
     pub no_data: Option<f64>,
-    /// Samples without data are filled from data this near. The default leaves them, and so do
-    /// [`OpenOptions::classes`].
+    /// Distance within which samples without data are filled from data. Without it, and of
+    /// [`OpenOptions::classes`], they stay without a height.
     pub fill: Option<Fill>,
     /// Which band holds the height, the first being 1. Without it: the first.
     pub band: Option<u32>,
