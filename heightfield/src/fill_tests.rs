@@ -22,7 +22,7 @@ fn stored(column: u32, row: u32) -> Option<f32> {
         || (430..470).contains(&column) && (400..450).contains(&row);
     let is_island = (column, row) == (511, 300) || (column, row) == (450, 425);
     let has_data = is_island || !(is_wide || mixed.is_multiple_of(5));
-    has_data.then(|| (column as f32 * 0.37 - row as f32 * 0.11) + mixed as f32 * 0.01)
+    has_data.then_some((column as f32 * 0.37 - row as f32 * 0.11) + mixed as f32 * 0.01)
 }
 
 /// All samples of the file, its first row the northernmost.
