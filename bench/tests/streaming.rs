@@ -50,7 +50,7 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
     for link in RATES {
         let (small, large) = (of(small, link), of(large, link));
         // The same way over the same samples: tiles differ by what their numbers take, and by the
-        // ticks that the underlay takes on the link, whose heights are others.
+        // ticks that the fallback takes on the link, whose heights are others.
         let [a, b] = [small, large].map(|row| row.tiles.expect("tiles"));
         assert!(a.abs_diff(b) <= 3, "{a} {b}");
         let [a, b] = [small, large].map(|row| row.tile_bytes_mean.expect("tiles"));
@@ -64,7 +64,7 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
             let [[straight, ..], [turning, ..]] = row.missing();
             assert_eq!([straight, turning], [Some(0); 2], "{row:?}");
         }
-        // An underlay leaves no hole at any speed, and a slow hand does not feel it.
+        // A fallback leaves no hole at any speed, and a slow hand does not feel it.
         for row in [small, large] {
             let [[straight, ..], [turning, ..]] = row.coarse();
             let seen = [straight, turning, row.holes_underlaid];
@@ -80,7 +80,7 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
         // Of the file: the same blocks, in as many reads. The index grows, by 8 bytes a block.
         if let [Some(a), Some(b)] = [small, large].map(|row| row.way_bytes) {
             assert!(a.abs_diff(b) < a / 100, "{a} {b}");
-            // The near tile of the underlay lies so many of its cells from the corner of the wide
+            // The near tile of the fallback lies so many of its cells from the corner of the wide
             // one, which is elsewhere in each terrain: its border may reach a block farther.
             let [a, b] = [small, large].map(|row| row.way_requests.expect("of the file"));
             assert!(a.abs_diff(b) <= 1, "{a} {b}");

@@ -64,31 +64,31 @@ pub struct HapterraSurface {
 }
 
 impl HapterraSurface {
-    pub(crate) fn of(law: &SurfaceParams) -> Self {
+    pub(crate) fn of(params: &SurfaceParams) -> Self {
         Self {
-            stiffness_n_per_mm: law.stiffness_n_per_mm,
-            max_force_n: law.max_force_n,
-            static_friction: law.friction.static_mu,
-            dynamic_friction: law.friction.dynamic_mu,
-            viscous_friction_s: law.friction.viscous_s,
-            damping_ns_per_m: law.damping.ns_per_m,
-            shading: match law.shading {
+            stiffness_n_per_mm: params.stiffness_n_per_mm,
+            max_force_n: params.max_force_n,
+            static_friction: params.friction.static_mu,
+            dynamic_friction: params.friction.dynamic_mu,
+            viscous_friction_s: params.friction.viscous_s,
+            damping_ns_per_m: params.damping.ns_per_m,
+            shading: match params.shading {
                 Shading::None => HapterraShading::None,
                 Shading::Smooth => HapterraShading::Smooth,
             } as u32,
-            texture: match law.texture.pattern {
+            texture: match params.texture.pattern {
                 Pattern::None => HapterraTexture::None,
                 Pattern::Grain => HapterraTexture::Grain,
                 Pattern::Grating => HapterraTexture::Grating,
             } as u32,
-            texture_amplitude_mm: law.texture.amplitude_mm,
-            texture_wavelength_mm: law.texture.wavelength_mm,
-            texture_direction_deg: law.texture.direction_deg,
-            texture_seed: law.texture.seed,
+            texture_amplitude_mm: params.texture.amplitude_mm,
+            texture_wavelength_mm: params.texture.wavelength_mm,
+            texture_direction_deg: params.texture.direction_deg,
+            texture_seed: params.texture.seed,
         }
     }
 
-    pub(crate) fn law(&self) -> Result<SurfaceParams, Failure> {
+    pub(crate) fn params(&self) -> Result<SurfaceParams, Failure> {
         let unknown = |what: &str, number: u32, known: &str| {
             let message = format!("{what} is {number}: give {known}");
             Failure::new(HapterraStatus::Choice, message)
@@ -164,11 +164,13 @@ pub(crate) unsafe fn surface(
             "no surface: give at least one",
         ));
     };
-    let surface = Surface::new(first.law()?)?;
+    let surface = Surface::new(first.params()?)?;
     if others.is_empty() {
         return Ok(surface);
     }
-    let materials = others.iter().map(|other| Ok(Material::of(&other.law()?)));
+    let materials = others
+        .iter()
+        .map(|other| Ok(Material::of(&other.params()?)));
     let materials = materials.collect::<Result<Vec<_>, Failure>>()?;
     Ok(surface.with_materials(&materials)?)
 }

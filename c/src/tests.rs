@@ -30,14 +30,14 @@ fn rough() -> HapterraSurface {
 
 #[test]
 fn surface_keeps_every_number() {
-    let law = rough().law().expect("known numbers");
-    assert_eq!(HapterraSurface::of(&law), rough());
+    let params = rough().params().expect("known numbers");
+    assert_eq!(HapterraSurface::of(&params), rough());
     let mut default = MaybeUninit::uninit();
     hapterra_surface_default(Some(&mut default));
     // SAFETY: it was just filled.
     let default = unsafe { default.assume_init() };
-    let law = default.law().expect("known numbers");
-    assert_eq!(Surface::new(law).expect("in bounds"), Surface::default());
+    let params = default.params().expect("known numbers");
+    assert_eq!(Surface::new(params).expect("in bounds"), Surface::default());
     assert_eq!(
         (size_of::<HapterraSurface>(), size_of::<HapterraStep>()),
         (48, 64)
@@ -58,7 +58,7 @@ fn steps_are_those_of_the_library() {
     let terrain =
         Terrain::from_slice(60, 50, 0.8, RowOrder::NorthFirst, &heights).expect("a terrain");
     let terrain = terrain.with_tip(1.5).expect("a ball");
-    let surface = Surface::new(rough().law().expect("known numbers")).expect("a surface");
+    let surface = Surface::new(rough().params().expect("known numbers")).expect("a surface");
     let mut contact = Contact::at_rate(terrain, surface, 2000).expect("a contact");
     let expected = contact.run(path.iter().copied()).expect("steps");
 

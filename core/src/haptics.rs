@@ -111,10 +111,10 @@ pub struct Board {
 ///     level: 0,
 ///     size,
 ///     top: 3,
-///     underlay: None,
+///     fallback: None,
 ///     cell_mm: 1.0,
 ///     home: GridPoint::default(),
-///     law: SurfaceParams::PREMIUM,
+///     params: SurfaceParams::PREMIUM,
 ///     source: Source::Points,
 ///     hold_clock: false,
 ///     materials: None,
@@ -198,7 +198,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     }
 
     /// Takes a command between ticks. Returns a tile buffer that is free again, if there is
-    /// one: most tiles bring one in the place of another, those of an underlay stay besides, and
+    /// one: most tiles bring one in the place of another, those of a fallback stay besides, and
     /// their buffers come back one by one under a scene that has none.
     ///
     /// # Errors
@@ -270,7 +270,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
         if let Some(scene) = &scene {
             self.window.reset(scene.level, scene.size, scene.top);
-            self.window.lay(scene.underlay);
+            self.window.lay(scene.fallback);
             self.tick = 0;
         }
         self.renderer.take(scene.as_ref(), None);
@@ -304,9 +304,9 @@ impl<'t, const D: usize> Haptics<'t, D> {
         if !view.keeps_tiles {
             self.window.reset(scene.level, scene.size, scene.top);
         }
-        let has_other_underlay = before.is_none_or(|before| before.underlay != scene.underlay);
-        if has_other_underlay || !view.keeps_tiles {
-            self.window.lay(scene.underlay);
+        let has_other_fallback = before.is_none_or(|before| before.fallback != scene.fallback);
+        if has_other_fallback || !view.keeps_tiles {
+            self.window.lay(scene.fallback);
         }
         // Whatever bits came over the wire.
         let hip = hip.normalised();

@@ -188,12 +188,12 @@ impl Renderer {
                 let friction = self.materials.some_friction();
                 self.state.contact.set_friction(friction);
             }
-            let law = self
+            let params = self
                 .state
                 .effects
                 .as_ref()
-                .map_or(&scene.law, |it| it.law(&scene.law));
-            self.state.contact.set_friction(law.friction);
+                .map_or(&scene.params, |it| it.params(&scene.params));
+            self.state.contact.set_friction(params.friction);
         }
         self.state.before = None;
     }
@@ -206,8 +206,8 @@ impl Renderer {
             arm: scene.source == Source::Encoders,
         };
         match scene.materials {
-            Some(_) => Effects::with_materials(&self.materials, &scene.law, &felt),
-            None => Effects::of(&scene.law, &felt),
+            Some(_) => Effects::with_materials(&self.materials, &scene.params, &felt),
+            None => Effects::of(&scene.params, &felt),
         }
     }
 
@@ -280,7 +280,7 @@ impl Renderer {
             Some(_) => self.with_effects(window, scene, hip, mover),
             None => {
                 let displacement_mm = self.contact().output().displacement * scene.cell_mm;
-                scene.law.spring().force_n(displacement_mm) * mover.clutch()
+                scene.params.spring().force_n(displacement_mm) * mover.clutch()
             }
         }
     }
@@ -305,7 +305,7 @@ impl Renderer {
         };
         let displacement = effects.displacement(window, contact, &self.materials);
         let displacement_mm = displacement * scene.cell_mm;
-        let spring = effects.law(&scene.law).spring();
+        let spring = effects.params(&scene.params).spring();
         let spring_n = spring.force_n(displacement_mm) * mover.clutch();
         if let Some(friction) = effects.friction() {
             contact.set_friction(friction);

@@ -10,7 +10,7 @@ use crate::contact::ContactState;
 use crate::force::SurfaceParams;
 use crate::grid::{GridPoint, MAX_CELL};
 use crate::guard::{Fault, GuardInputs, Limits, Mode, Report};
-use crate::terrain::{FieldSize, TileIndex, Underlay};
+use crate::terrain::{Fallback, FieldSize, TileIndex};
 
 /// Source of the haptic interface point (HIP).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -22,11 +22,11 @@ pub enum Source {
     Points,
 }
 
-/// A field, its placement under the arm, and the law of its force. Checked as a
+/// A field, its placement under the arm, and the surface parameters of its force. Checked as a
 /// whole before it is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
-    /// Names this field, placement and law; tiles carry it.
+    /// Names this field, placement and surface parameters; tiles carry it.
     pub epoch: u32,
     /// Decimation level of the tiles, 0 the finest.
     pub level: u8,
@@ -35,13 +35,13 @@ pub struct Scene {
     /// A whole height in cells that no sample exceeds.
     pub top: i32,
     /// Coarse fallback where a tile has not arrived; none where ticks wait for their tiles.
-    pub underlay: Option<Underlay>,
+    pub fallback: Option<Fallback>,
     /// Millimetres of the arm's tip a cell.
     pub cell_mm: f32,
     /// The point of the terrain that is at the tip in the home pose.
     pub home: GridPoint,
     /// Spring and limit.
-    pub law: SurfaceParams,
+    pub params: SurfaceParams,
     /// Source of the haptic interface point (HIP).
     pub source: Source,
     /// On an emulated board: let its clock stand still while the host owes a
@@ -49,8 +49,8 @@ pub struct Scene {
     pub hold_clock: bool,
     /// The check sum of the table of its materials
     /// ([`MaterialTable::check_sum`](crate::force::MaterialTable::check_sum)); none where all
-    /// of it is of one material, that of the law. Tiles of a scene with materials carry a
-    /// material for each sample, but for its underlay.
+    /// of it is of one material, that of the surface parameters. Tiles of a scene with materials carry a
+    /// material for each sample, but for its fallback.
     pub materials: Option<u32>,
 }
 
@@ -61,10 +61,10 @@ impl Scene {
         let top_ok = self.top.unsigned_abs() <= MAX_CELL.unsigned_abs() + 1;
         let cell_ok = self.cell_mm.is_finite() && self.cell_mm > 0.0;
         // Points are answered from the tiles alone, so that no answer depends on what came when.
-        let underlay_ok = self.underlay.is_none_or(|underlay| {
-            underlay.is_valid(self.level) && self.source == Source::Encoders
+        let fallback_ok = self.fallback.is_none_or(|fallback| {
+            fallback.is_valid(self.level) && self.source == Source::Encoders
         });
-        self.size.is_valid() && top_ok && cell_ok && underlay_ok && self.law.is_valid()
+        self.size.is_valid() && top_ok && cell_ok && fallback_ok && self.params.is_valid()
     }
 }
 
@@ -74,7 +74,7 @@ impl Scene {
 pub struct SceneChange {
     /// Counts the views of a scene from 1 on, wrapping; samples carry it.
     pub number: u8,
-    /// The field, its scale and the law. Its home is where the device would begin if it
+    /// The field, its scale and the surface parameters. Its home is where the device would begin if it
     /// were restarted; while it runs the home follows from [`SceneChange::hip`].
     pub scene: Scene,
     /// The haptic interface point in the view, cells, for the tip where it was when the clutch
@@ -110,7 +110,7 @@ pub struct TickRecord {
     /// Proxy, cells over the terrain.
     pub proxy: GridPoint,
     /// Force commanded, newtons: east, north, up. Zero unless the amplifiers
-    /// are on; in a replay, what the scene's law makes.
+    /// are on; in a replay, what the scene's surface parameters makes.
     pub force_n: Vec3,
     /// The view in which this was felt ([`SceneChange::number`]); 0 for the scene as it was taken.
     pub view: u8,

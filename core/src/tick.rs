@@ -85,7 +85,7 @@ impl<const D: usize> Haptics<'_, D> {
     /// The full path: pose, haptic interface point, force, torques, currents.
     fn tick_arm(&mut self, pose: Option<&Pose>, outcome: &mut Outcome) {
         if let Some(scene) = &self.scene
-            && scene.underlay.is_some()
+            && scene.fallback.is_some()
         {
             self.settle(scene.cell_mm);
         }
@@ -121,7 +121,7 @@ impl<const D: usize> Haptics<'_, D> {
         let wanted_n = self.renderer.step(&self.window, scene, hip, &arm);
         write_output(hip, &self.renderer, sample);
         if self.renderer.has_effects() && self.renderer.created_mj() > 0.0 {
-            self.guard.says(Limits::ENERGY_TAKEN_BACK);
+            self.guard.says(Limits::ENERGY_DISSIPATED);
         }
         wanted_n
     }
@@ -158,8 +158,8 @@ impl<const D: usize> Haptics<'_, D> {
         self.write_state(Vec3::ZERO, sample);
     }
 
-    /// Lets the surface of a scene with an underlay move on to the tiles that have come.
-    // Apart, so that the tick of a scene without underlay has nothing of it.
+    /// Lets the surface of a scene with a fallback move on to the tiles that have come.
+    // Apart, so that the tick of a scene without fallback has nothing of it.
     #[cold]
     #[inline(never)]
     fn settle(&mut self, cell_mm: f32) {
@@ -181,7 +181,7 @@ impl<const D: usize> Haptics<'_, D> {
         } = self.guard.report();
         limits.set(Limits::TERRAIN_MISSING, sample.missing_tile.is_some());
         limits.set(
-            Limits::BOUNDARY_FADING,
+            Limits::EDGE_FADING,
             self.renderer.contact().edge_fade() < 1.0,
         );
         limits |= self.clutch.limits();
@@ -193,12 +193,12 @@ impl<const D: usize> Haptics<'_, D> {
         (sample.mode, sample.limits, sample.fault) = (mode, limits, fault);
     }
 
-    /// Returns true if the proxy is over the underlay, over a tile that has not settled, or over nothing
-    /// where an underlay is on its way.
+    /// Returns true if the proxy is over the fallback, over a tile that has not settled, or over nothing
+    /// where a fallback is on its way.
     fn is_over_coarse_ground(&self, sample: &TickRecord) -> bool {
         let cell = sample.proxy.column();
         let scene = self.scene.as_ref();
-        scene.is_some_and(|scene| scene.underlay.is_some() && scene.size.has_cell(cell))
+        scene.is_some_and(|scene| scene.fallback.is_some() && scene.size.has_cell(cell))
             && !self.window.is_settled(cell)
     }
 }

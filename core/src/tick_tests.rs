@@ -13,7 +13,7 @@ use crate::rate::TickRate;
 use crate::scene::HipCommand;
 use crate::terrain::testing::buffers;
 use crate::terrain::{
-    CoarseTile, FieldSize, RequestHint, TILE_SAMPLES, Tile, TileKey, TileRequester, Underlay,
+    CoarseTile, Fallback, FieldSize, RequestHint, TILE_SAMPLES, Tile, TileKey, TileRequester,
 };
 
 #[path = "tick_tests/materials.rs"]
@@ -40,10 +40,10 @@ fn scene(source: Source) -> Scene {
         level: 0,
         size: FieldSize::new(SIZE, SIZE),
         top: 1 << 20,
-        underlay: None,
+        fallback: None,
         cell_mm: 1.0,
         home: GridPoint::new([320, 320, 5], Vec3::ZERO),
-        law: SPRING,
+        params: SPRING,
         source,
         hold_clock: false,
         materials: None,
@@ -263,14 +263,14 @@ fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
 }
 
 #[test]
-fn an_underlay_that_comes_last_is_kept_whatever_the_proxy_touches() {
+fn an_fallback_that_comes_last_is_kept_whatever_the_proxy_touches() {
     let mut tiles = buffers::<3>();
     let mut device = dipped(&mut tiles);
     let of = |shift| CoarseTile {
         first: Cell::new(256, 256),
         shift,
     };
-    let underlay = Underlay {
+    let fallback = Fallback {
         wide: of(4),
         near: Some(of(2)),
     };
@@ -280,8 +280,8 @@ fn an_underlay_that_comes_last_is_kept_whatever_the_proxy_touches() {
         device.haptics.window.occupant(TileKey::new(0, 0, 0)),
         Some(beside)
     );
-    device.haptics.window.lay(Some(underlay));
-    for key in underlay.keys(0).into_iter().flatten() {
+    device.haptics.window.lay(Some(fallback));
+    for key in fallback.keys(0).into_iter().flatten() {
         let tile = device.spare.pop().expect("a spare one");
         tile.fill(key, 0, |_, _| 0.0).expect("in range");
         assert!(matches!(
@@ -620,7 +620,7 @@ fn pushed_over_the_edge_of_the_data_the_force_fades_and_says_why() {
     for n in 0..2_000 {
         let outcome = device.tick([n, 0, 0]);
         let sample = &outcome.sample;
-        if sample.limits.contains(Limits::BOUNDARY_FADING) {
+        if sample.limits.contains(Limits::EDGE_FADING) {
             fading.push(sample.force_n.length());
         }
         assert!((sample.force_n - last).length() < 0.02 || n < 2);

@@ -15,7 +15,7 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use crate::monitor::Monitor;
 
 /// Tile buffers besides the window's: one for each tile on its way, and one more. The two tiles of
-/// an underlay keep two of them, so three tiles of the field are on their way over it.
+/// a fallback keep two of them, so three tiles of the field are on their way over it.
 pub(crate) const SPARES: usize = IN_FLIGHT + 1;
 /// Slots of the command queue, one of which stays empty.
 const COMMANDS: usize = 16;

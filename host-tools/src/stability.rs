@@ -49,9 +49,14 @@ pub const LEFT_WITH_TEXTURE: f32 = 0.5;
 pub const LEFT_LATE_WITH_TEXTURE: f32 = 1.0 / 3.0;
 
 /// Warns of a surface that is too stiff for a device's tick rate and latency.
-pub fn warn(law: &SurfaceParams, device: &DeviceHello) {
+pub fn warn(params: &SurfaceParams, device: &DeviceHello) {
     let (rate, latency_us) = (TickRate::new(device.tick_hz), device.latency_us);
-    let warnings = rate.map(|rate| [warning(law, rate, latency_us), too_fine(&law.texture, rate)]);
+    let warnings = rate.map(|rate| {
+        [
+            warning(params, rate, latency_us),
+            too_fine(&params.texture, rate),
+        ]
+    });
     for warning in warnings.into_iter().flatten().flatten() {
         tracing::warn!("{warning}");
     }
@@ -59,17 +64,17 @@ pub fn warn(law: &SurfaceParams, device: &DeviceHello) {
 
 /// The same of a surface of several materials, once for each warning. The device takes the
 /// controller for the stiffest of them.
-pub fn warn_of(law: &SurfaceParams, materials: Option<&MaterialTable>, device: &DeviceHello) {
+pub fn warn_of(params: &SurfaceParams, materials: Option<&MaterialTable>, device: &DeviceHello) {
     let Some(table) = materials else {
-        return warn(law, device);
+        return warn(params, device);
     };
-    for warning in warnings_of(law, table, device.tick_hz, device.latency_us) {
+    for warning in warnings_of(params, table, device.tick_hz, device.latency_us) {
         tracing::warn!("{warning}");
     }
 }
 
 fn warnings_of(
-    law: &SurfaceParams,
+    params: &SurfaceParams,
     table: &MaterialTable,
     tick_hz: u32,
     latency_us: u16,
@@ -78,13 +83,13 @@ fn warnings_of(
     let Some(rate) = TickRate::new(tick_hz) else {
         return told;
     };
-    let scale = table.stiffness_scale(law);
+    let scale = table.stiffness_scale(params);
     for material in table.materials() {
-        let mut law = material.law(law);
-        law.stiffness_n_per_mm *= scale;
+        let mut params = material.params(params);
+        params.stiffness_n_per_mm *= scale;
         let warnings = [
-            warning(&law, rate, latency_us),
-            too_fine(&law.texture, rate),
+            warning(&params, rate, latency_us),
+            too_fine(&params.texture, rate),
         ];
         told.extend(warnings.into_iter().flatten());
     }
@@ -108,18 +113,18 @@ fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
 /// What has to be said of a surface at a device's rate and latency; `None` where every hand on the
 /// virtual arm holds it still, and theory does not speak against it.
 #[must_use]
-fn warning(law: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<String> {
-    let (stiffness, hz) = (law.stiffness_n_per_mm, rate.hz());
+fn warning(params: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<String> {
+    let (stiffness, hz) = (params.stiffness_n_per_mm, rate.hz());
     let latency_s = 1e-6 * f32::from(latency_us);
-    let is_controlled = law.is_controlled();
+    let is_controlled = params.is_controlled();
     let with = if is_controlled { "with" } else { "without" };
-    let still = still_n_per_mm(rate, latency_us, is_controlled, &law.texture);
+    let still = still_n_per_mm(rate, latency_us, is_controlled, &params.texture);
     let late = match latency_us > SHORT_US {
         true => format!(" and {:.2} ms to the motors", 1e3 * latency_s),
         false => String::new(),
     };
     if stiffness > still {
-        let shakes = match law.texture.is_none() {
+        let shakes = match params.texture.is_none() {
             true => "is unstable",
             false => "may be unstable on a texture",
         };
@@ -177,7 +182,7 @@ mod tests {
         latency_us: u16,
         controller: Controller,
     ) -> String {
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             stiffness_n_per_mm,
             damping: Damping {
                 controller,
@@ -186,7 +191,7 @@ mod tests {
             ..SurfaceParams::PREMIUM
         };
         let rate = TickRate::new(hz).expect("a rate");
-        warning(&law, rate, latency_us).unwrap_or_default()
+        warning(&params, rate, latency_us).unwrap_or_default()
     }
 
     #[test]
@@ -205,19 +210,19 @@ mod tests {
             },
             ..soft
         };
-        let told = |materials: &[Material], law: &SurfaceParams| {
+        let told = |materials: &[Material], params: &SurfaceParams| {
             let table = MaterialTable::new(materials).expect("some");
-            warnings_of(law, &table, 1000, SHORT_US).join("; ")
+            warnings_of(params, &table, 1000, SHORT_US).join("; ")
         };
-        let law = SurfaceParams::PREMIUM;
-        assert_eq!(told(&[soft, soft], &law), "");
-        let both = told(&[soft, stiff, fine, stiff], &law);
+        let params = SurfaceParams::PREMIUM;
+        assert_eq!(told(&[soft, soft], &params), "");
+        let both = told(&[soft, stiff, fine, stiff], &params);
         assert_eq!(both.matches("a stiffness of 8 N/mm").count(), 1, "{both}");
         assert!(both.contains("wavelength of 0.3 mm"));
         // A scene that is twice as stiff is so on each of them.
         let twice = SurfaceParams {
             stiffness_n_per_mm: 1.0,
-            ..law
+            ..params
         };
         assert!(told(&[soft, stiff], &twice).contains("a stiffness of 16 N/mm"));
     }
@@ -247,7 +252,7 @@ mod tests {
     #[test]
     fn a_textured_surface_is_warned_of_at_half_the_stiffness() {
         let told = |stiffness_n_per_mm| {
-            let law = SurfaceParams {
+            let params = SurfaceParams {
                 stiffness_n_per_mm,
                 texture: Texture {
                     pattern: Pattern::Grain,
@@ -257,7 +262,7 @@ mod tests {
                 },
                 ..SurfaceParams::PREMIUM
             };
-            warning(&law, TickRate::DEFAULT, SHORT_US).unwrap_or_default()
+            warning(&params, TickRate::DEFAULT, SHORT_US).unwrap_or_default()
         };
         assert_eq!(told(1.0), "");
         let shakes = told(3.1);

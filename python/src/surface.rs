@@ -71,7 +71,7 @@ impl Surface {
         texture_seed: u32,
         materials: Vec<Py<Self>>,
     ) -> PyResult<Self> {
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             stiffness_n_per_mm: stiffness,
             max_force_n: max_force,
             friction: Friction {
@@ -96,7 +96,7 @@ impl Surface {
                 },
             },
         };
-        let surface = Touched::new(law).map_err(refused)?;
+        let surface = Touched::new(params).map_err(refused)?;
         let others = materials.len();
         if others == 0 {
             return Ok(Self { surface, others });
@@ -110,45 +110,45 @@ impl Surface {
     /// The parameters by the names of the constructor, without those of a texture that is not
     /// there, and how many materials there are.
     fn params<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let law = self.surface.params();
-        let params = PyDict::new(py);
-        params.set_item("stiffness", law.stiffness_n_per_mm)?;
-        params.set_item("max_force", law.max_force_n)?;
-        params.set_item("friction", law.friction.dynamic_mu)?;
-        params.set_item("static_friction", law.friction.static_mu)?;
-        params.set_item("viscous_friction", law.friction.viscous_s)?;
-        params.set_item("damping", law.damping.ns_per_m)?;
-        params.set_item("shading", name(SHADINGS, law.shading))?;
-        params.set_item("texture", name(PATTERNS, law.texture.pattern))?;
-        if !law.texture.is_none() {
-            params.set_item("texture_amplitude", law.texture.amplitude_mm)?;
-            params.set_item("texture_wavelength", law.texture.wavelength_mm)?;
-            params.set_item("texture_seed", law.texture.seed)?;
+        let params = self.surface.params();
+        let dict = PyDict::new(py);
+        dict.set_item("stiffness", params.stiffness_n_per_mm)?;
+        dict.set_item("max_force", params.max_force_n)?;
+        dict.set_item("friction", params.friction.dynamic_mu)?;
+        dict.set_item("static_friction", params.friction.static_mu)?;
+        dict.set_item("viscous_friction", params.friction.viscous_s)?;
+        dict.set_item("damping", params.damping.ns_per_m)?;
+        dict.set_item("shading", name(SHADINGS, params.shading))?;
+        dict.set_item("texture", name(PATTERNS, params.texture.pattern))?;
+        if !params.texture.is_none() {
+            dict.set_item("texture_amplitude", params.texture.amplitude_mm)?;
+            dict.set_item("texture_wavelength", params.texture.wavelength_mm)?;
+            dict.set_item("texture_seed", params.texture.seed)?;
         }
-        if law.texture.pattern == Pattern::Grating {
-            params.set_item("texture_direction", law.texture.direction_deg)?;
+        if params.texture.pattern == Pattern::Grating {
+            dict.set_item("texture_direction", params.texture.direction_deg)?;
         }
-        params.set_item("materials", self.others)?;
-        Ok(params)
+        dict.set_item("materials", self.others)?;
+        Ok(dict)
     }
 
     fn __repr__(&self) -> String {
-        let law = self.surface.params();
+        let params = self.surface.params();
         let Friction {
             static_mu,
             dynamic_mu,
             viscous_s,
-        } = law.friction;
+        } = params.friction;
         let mut text = format!(
             "Surface(stiffness={}, max_force={}, friction={dynamic_mu}, static_friction={static_mu}, \
              viscous_friction={viscous_s}, damping={}, shading='{}', texture='{}'",
-            law.stiffness_n_per_mm,
-            law.max_force_n,
-            law.damping.ns_per_m,
-            name(SHADINGS, law.shading),
-            name(PATTERNS, law.texture.pattern),
+            params.stiffness_n_per_mm,
+            params.max_force_n,
+            params.damping.ns_per_m,
+            name(SHADINGS, params.shading),
+            name(PATTERNS, params.texture.pattern),
         );
-        let texture = &law.texture;
+        let texture = &params.texture;
         if !texture.is_none() {
             text += &format!(
                 ", texture_amplitude={}, texture_wavelength={}, texture_direction={}, texture_seed={}",

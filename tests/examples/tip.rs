@@ -23,7 +23,7 @@ fn main() {
     };
     let grid = HapticGrid::new(&raster, HapticCells::default());
     let scale = grid.true_scale(1.0).expect("scale");
-    println!("radius_cells,felt_cells_in_radius,bytes_a_tile,tiles_per_s,times_link");
+    println!("radius_cells,haptic_cells_in_radius,bytes_a_tile,tiles_per_s,times_link");
     for radius in [0.0, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0] {
         let grid = grid.with_tip(radius * scale.cell_mm());
         let terrain = Terrain::over(grid, scale, 0).expect("terrain");

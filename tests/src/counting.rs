@@ -55,7 +55,7 @@ pub type Follow = fn(image: &Path, folder: &Path) -> Vec<Cycles>;
 pub enum Event {
     /// A tile arrives.
     Tile(TileKey),
-    /// A tile of the underlay arrives.
+    /// A tile of the fallback arrives.
     Coarse(CoarseTile),
     /// A tick with the HIP here.
     Hip(GridPoint),
@@ -69,7 +69,7 @@ pub trait Samples {
     /// hole.
     fn sample(&self, column: i32, row: i32) -> f32;
 
-    /// The height that the underlay has there.
+    /// The height that the fallback has there.
     fn under(&self, column: i32, row: i32) -> f32 {
         self.sample(column, row)
     }
@@ -179,20 +179,20 @@ impl CountingBoard {
         self.ticks_of(scene, (field, materials), (&events, counts))
     }
 
-    /// The same, but the scene's underlay is held before the first tick, and the tiles come
+    /// The same, but the scene's fallback is held before the first tick, and the tiles come
     /// before the tick of a number; `None` for never.
     ///
     /// # Panics
-    /// When the emulated program fails, and where the scene has no underlay.
+    /// When the emulated program fails, and where the scene has no fallback.
     #[must_use]
-    pub fn chain_over_underlay(
+    pub fn chain_over_fallback(
         &self,
         scene: &Scene,
         field: &dyn Samples,
         (late, counts): (Option<u32>, &[[i32; 3]]),
     ) -> Vec<Counted> {
-        let underlay = scene.underlay.expect("an underlay");
-        let mut events: Vec<Event> = [Some(underlay.wide), underlay.near]
+        let fallback = scene.fallback.expect("a fallback");
+        let mut events: Vec<Event> = [Some(fallback.wide), fallback.near]
             .into_iter()
             .flatten()
             .map(Event::Coarse)

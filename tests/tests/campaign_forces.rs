@@ -12,7 +12,7 @@ use hapterra_core::scene::TickRecord;
 use hapterra_tests::campaign::force_watch::ForceWatch;
 use hapterra_tests::campaign::ground::SceneSurfaces;
 
-const LAW: SurfaceParams = SurfaceParams {
+const PARAMS: SurfaceParams = SurfaceParams {
     damping: Damping {
         controller: Controller::On,
         ..Damping::NONE
@@ -45,32 +45,32 @@ fn at(tick: u32, height: f32, force_n: Vec3) -> TickRecord {
     }
 }
 
-fn watch(law: &SurfaceParams, table: Option<&[Material]>) -> ForceWatch {
+fn watch(params: &SurfaceParams, table: Option<&[Material]>) -> ForceWatch {
     let table = table.map(|all| MaterialTable::new(all).expect("some"));
-    ForceWatch::new(SceneSurfaces::of(law, table.as_ref()), 0.5)
+    ForceWatch::new(SceneSurfaces::of(params, table.as_ref()), 0.5)
 }
 
 /// What is said of one tick, 2 mm deep.
-fn said(law: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
+fn said(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
     let sample = TickRecord {
         limits,
         ..at(0, -4.0, force_n)
     };
-    watch(law, None).look(&sample, true)
+    watch(params, None).look(&sample, true)
 }
 
 #[test]
 fn a_force_that_pulls_is_told_but_where_it_is_on_its_way() {
     let shaded = SurfaceParams {
         shading: Shading::Smooth,
-        ..LAW
+        ..PARAMS
     };
-    for law in [LAW, shaded] {
+    for params in [PARAMS, shaded] {
         for force_n in [Vec3::Z, Vec3::ZERO, Vec3::new(1.0, 0.0, 0.01)] {
-            assert_eq!(said(&law, force_n, Limits::empty()), Ok(()));
+            assert_eq!(said(&params, force_n, Limits::empty()), Ok(()));
         }
-        assert!(said(&law, -Vec3::Z * 0.01, Limits::empty()).is_err());
-        assert_eq!(said(&law, -Vec3::Z * 0.01, Limits::SLEW_LIMITED), Ok(()));
+        assert!(said(&params, -Vec3::Z * 0.01, Limits::empty()).is_err());
+        assert_eq!(said(&params, -Vec3::Z * 0.01, Limits::SLEW_LIMITED), Ok(()));
     }
 }
 
@@ -86,13 +86,13 @@ fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
         },
         ..plain
     };
-    let most = |law: &SurfaceParams, most_n: f32| {
-        let force = |newtons: f32| said(law, Vec3::Z * newtons, Limits::empty());
-        assert_eq!(force(most_n), Ok(()), "{law:?}");
-        assert!(force(1.01 * most_n).is_err(), "{law:?}");
+    let most = |params: &SurfaceParams, most_n: f32| {
+        let force = |newtons: f32| said(params, Vec3::Z * newtons, Limits::empty());
+        assert_eq!(force(most_n), Ok(()), "{params:?}");
+        assert!(force(1.01 * most_n).is_err(), "{params:?}");
     };
     most(&plain, 1.0);
-    most(&LAW, 2.0);
+    most(&PARAMS, 2.0);
     most(&textured, 0.5 * 2.1_f32.hypot(0.2 * std::f32::consts::TAU));
     // The stiffest of the materials, in a scene that is twice as stiff as its table.
     let of = |stiffness_n_per_mm| Material {
@@ -110,13 +110,13 @@ fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
 
 /// In and out of the ground at 50 mm/s, with this much more force on the way out: whether it is
 /// told, and how much was given.
-fn tap(law: &SurfaceParams, more: f32, is_calm: bool) -> (bool, f32) {
-    taps(law, more, is_calm, 1)
+fn tap(params: &SurfaceParams, more: f32, is_calm: bool) -> (bool, f32) {
+    taps(params, more, is_calm, 1)
 }
 
 /// The same so many times, without leaving the ground between.
-fn taps(law: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool, f32) {
-    let mut watch = watch(law, None);
+fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool, f32) {
+    let mut watch = watch(params, None);
     let into = (0..20).map(|i| (0.5 - 0.1 * i as f32, 1.0));
     let dip = (0..30).map(|i: i32| match i < 15 {
         true => (-1.5 + 0.08 * i as f32, 1.0 + more),
@@ -137,16 +137,16 @@ fn taps(law: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool, f
 fn a_contact_that_gives_is_told_with_the_controller_on() {
     // A spring that is felt in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s and
     // twice 0.75 mm.
-    let (told, given) = tap(&LAW, 0.0, true);
+    let (told, given) = tap(&PARAMS, 0.0, true);
     assert!(!told && (given - 0.0229).abs() < 0.001, "{given}");
-    let (told, given) = tap(&LAW, 0.5, true);
+    let (told, given) = tap(&PARAMS, 0.5, true);
     assert!(told && given > 0.05, "{given}");
     // Not while something goes wrong, or without the controller.
-    assert_eq!(tap(&LAW, 0.5, false), (false, 0.0));
+    assert_eq!(tap(&PARAMS, 0.5, false), (false, 0.0));
     assert_eq!(tap(&OFF, 0.0, true), (false, 0.0));
     let shaded = SurfaceParams {
         shading: Shading::Smooth,
-        ..LAW
+        ..PARAMS
     };
     // Shading may give 0.2 mJ more, and 0.2 times 0.375 N times 0.5 mm and 0.75 mm.
     let (told, given) = tap(&shaded, 0.99, true);
@@ -158,7 +158,7 @@ fn a_contact_that_gives_is_told_with_the_controller_on() {
 /// A press of 2 mm at rest while the ramp lets force in, from the confirmation on, and then `more` times
 /// the force that it may have.
 fn ramped(times: f32) -> Result<(), String> {
-    let mut watch = watch(&LAW, None);
+    let mut watch = watch(&PARAMS, None);
     let mut look = |tick: u32, mode: Mode, force_n: f32, limits: Limits| {
         let sample = TickRecord {
             mode,
@@ -188,7 +188,7 @@ fn a_ramp_is_judged_by_the_share_that_it_lets_through() {
 #[test]
 fn a_tap_in_the_ramp_that_gives_is_told() {
     let tapped = |more: f32| {
-        let mut watch = watch(&LAW, None);
+        let mut watch = watch(&PARAMS, None);
         let mut told = false;
         for tick in 0..1500_u32 {
             let share = tick as f32 / 2000.0;
@@ -218,7 +218,7 @@ fn a_tap_in_the_ramp_that_gives_is_told() {
 #[test]
 fn a_force_that_grows_on_its_way_out_is_told() {
     let told = |second_n: f32| {
-        let mut watch = watch(&LAW, None);
+        let mut watch = watch(&PARAMS, None);
         let fades = |tick, force_n| TickRecord {
             mode: Mode::Fading,
             limits: Limits::FADING,
@@ -232,7 +232,7 @@ fn a_force_that_grows_on_its_way_out_is_told() {
 #[test]
 fn a_force_with_an_open_clutch_is_told() {
     let told = |limits| {
-        let mut watch = watch(&LAW, None);
+        let mut watch = watch(&PARAMS, None);
         let open = |tick, force_n| TickRecord {
             limits,
             ..at(tick, -4.0, force_n)
@@ -247,7 +247,7 @@ fn a_force_with_an_open_clutch_is_told() {
 #[test]
 fn a_tip_that_swings_is_told_and_tremor_is_not() {
     let told = |hz: f32, amplitude_mm: f32| {
-        let mut watch = watch(&LAW, None);
+        let mut watch = watch(&PARAMS, None);
         let mut told = false;
         for tick in 0..1000_u32 {
             let turn = std::f32::consts::TAU * hz * tick as f32 * 1e-3;

@@ -62,13 +62,13 @@ fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
     // With all its weight, which the device holds.
     let model = PhantomModel::premium_1_5();
     let rig = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
-    let law = SurfaceParams {
+    let params = SurfaceParams {
         stiffness_n_per_mm,
         max_force_n: 8.5,
         ..SurfaceParams::PREMIUM
     };
     let home = scale.to_grid(home_mm).expect("addressable");
-    let scene = terrain.scene(law, Source::Encoders, home);
+    let scene = terrain.scene(params, Source::Encoders, home);
     let samples = run(&terrain, scene, rig, ticks);
     (
         samples,

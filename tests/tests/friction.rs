@@ -13,7 +13,7 @@ use hapterra_tests::invariants::surface::distance;
 use hapterra_tests::real_ground::{self, terrain};
 use heightfield::Raster;
 
-fn law(friction: Friction) -> SurfaceParams {
+fn params(friction: Friction) -> SurfaceParams {
     SurfaceParams {
         friction,
         ..SurfaceParams::PREMIUM
@@ -25,8 +25,8 @@ const CAUGHT_MM: f64 = 20.0;
 
 /// What a HIP feels that slides around the middle of a terrain on an ellipse, `depth` mm
 /// deep, so many millimetres a tick. A hand that the edge of a hole has caught lifts for a tick.
-fn slide(terrain: &Terrain<'_>, law: SurfaceParams, depth: f64, speed: f64) -> Vec<TickRecord> {
-    let mut replayer = on_native(terrain, law).expect("opened");
+fn slide(terrain: &Terrain<'_>, params: SurfaceParams, depth: f64, speed: f64) -> Vec<TickRecord> {
+    let mut replayer = on_native(terrain, params).expect("opened");
     let size = terrain.size_mm();
     let radius = size[0].min(size[1]) / 3.0;
     let mut felt = vec![];
@@ -91,7 +91,7 @@ fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
 /// The ratios of the forces of all slides around a terrain, so many millimetres a tick. One that is off
 /// by more than `off` of μ is left out if the proxy flew.
 fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> Vec<f64> {
-    let felt = slide(terrain, law(Friction::coulomb(mu as f32)), depth, speed);
+    let felt = slide(terrain, params(Friction::coulomb(mu as f32)), depth, speed);
     // The proxy that has just come out of the air has not slid yet, and one that a wall has held, far
     // behind the HIP, comes over many cells at once.
     let trails = 2.0 * depth * (1.0 + mu * mu).sqrt() + 3.0 * speed;
@@ -152,11 +152,11 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
     let raster =
         Raster::from_fn(64, 64, |x, y| ((x * 7 + y * 3) % 11) as f32 * 0.03).expect("made");
     let terrain = terrain(&raster);
-    let law = law(Friction::coulomb(0.8));
+    let params = params(Friction::coulomb(0.8));
     let mut chance = Chance::new(5);
     // Inside a patch, on an edge, on a vertex.
     for at in [[20.3, 30.6], [25.0, 30.4], [41.0, 17.0]] {
-        let mut replayer = on_native(&terrain, law).expect("opened");
+        let mut replayer = on_native(&terrain, params).expect("opened");
         let ground = terrain.height_mm(at[0], at[1]).expect("inside");
         let mut step = |off: [f64; 3]| {
             let hip = [at[0] + off[0], at[1] + off[1], ground + off[2]];

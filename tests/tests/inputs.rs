@@ -195,7 +195,7 @@ fn all_that_is_promised_of_materials_is_drawn() {
             "one a hundred times as stiff as another",
             most > 100.0 * least,
         );
-        let own = materials.law.stiffness_n_per_mm;
+        let own = materials.params.stiffness_n_per_mm;
         is(
             "a scene softer or stiffer than its default",
             own != table[0].stiffness_n_per_mm,

@@ -338,7 +338,7 @@ fn an_answer_that_is_no_answer_is_found() {
         (Consistent, with(honest, |f| f.displacement.z = -0.5)),
         (Consistent, with(honest, |f| f.displacement.z = 0.501)),
         (Consistent, with(waiting(BELOW), |f| f.displacement.z = 0.1)),
-        // The law's forces: too long, of another spring, the other way, no number.
+        // The surface parameters's forces: too long, of another spring, the other way, no number.
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, z * 1.000_01])),
         (Clamp, forces(honest, |[_, _, z]| [0.0, 0.0, -z])),
         (Clamp, forces(honest, |_| [0.0, 0.0, 8.500_01])),

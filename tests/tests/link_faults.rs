@@ -56,7 +56,7 @@ fn felt(sample: &TickRecord) -> (GridPoint, GridPoint, [u32; 3], ContactState) {
 fn a_bad_link_changes_nothing_that_is_felt() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
-    let law = SurfaceParams::PREMIUM;
+    let params = SurfaceParams::PREMIUM;
     let path = wander(&terrain, 9, 1200, 1.0);
     let walk = |replayer: &mut OfflineDevice<'_>| -> Vec<_> {
         let hips = path
@@ -65,7 +65,7 @@ fn a_bad_link_changes_nothing_that_is_felt() {
         hips.map(|hip| felt(&replayer.step(hip).expect("felt")))
             .collect()
     };
-    let mut clean = on_native(&terrain, law).expect("opened");
+    let mut clean = on_native(&terrain, params).expect("opened");
     let expected = walk(&mut clean);
     // The last says everything twice, the greeting included.
     for (fault, one_in) in [
@@ -77,7 +77,7 @@ fn a_bad_link_changes_nothing_that_is_felt() {
         let link = Faulty::new(Native::for_replay(), fault, one_in, 1);
         let harmed = Rc::clone(&link.harmed);
         let mut replayer =
-            OfflineDevice::open(&terrain, law, Box::new(link), AT_ONCE).expect("opened");
+            OfflineDevice::open(&terrain, params, Box::new(link), AT_ONCE).expect("opened");
         let got = walk(&mut replayer);
         assert!(expected == got, "{fault:?} changed what is felt");
         let tally = replayer.tally();

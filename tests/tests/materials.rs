@@ -129,8 +129,8 @@ fn felt(recording: &str) -> Vec<(f64, f64)> {
 #[test]
 fn classes_in_another_system_and_resolution_are_felt_where_they_lie() {
     let folder = Folder::new();
-    let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
-    assert!(felt_it, "{said}");
+    let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
+    assert!(succeeded, "{said}");
     assert!(said.contains("materials      "), "{said}");
     assert!(said.contains("rock") && said.contains("meadow"), "{said}");
     let felt = felt(&folder.read("a.csv"));
@@ -170,8 +170,8 @@ fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
     let replay = |more: &[&str], output: &str| {
         folder.hapterra(&[&["replay", "level.asc", "a.csv", "--out", output][..], more].concat())
     };
-    let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
-    assert!(felt_it, "{said}");
+    let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
+    assert!(succeeded, "{said}");
     let recorded = folder.read("a.csv");
     assert!(
         recorded.contains("# [materials]\n# file = \"classes.asc\"\n"),
@@ -226,8 +226,8 @@ fn the_demo_and_run_feel_materials_too() {
         "--duration",
         "3s",
     ];
-    let (felt_it, said) = folder.hapterra(&[&demo[..], &MATERIALS].concat());
-    assert!(felt_it && said.contains("materials      "), "{said}");
+    let (succeeded, said) = folder.hapterra(&[&demo[..], &MATERIALS].concat());
+    assert!(succeeded && said.contains("materials      "), "{said}");
     assert!(folder.read("demo/level.csv").contains("# [materials]\n"));
     let run = [
         "run",
@@ -239,8 +239,8 @@ fn the_demo_and_run_feel_materials_too() {
         "--out",
         "r.csv",
     ];
-    let (felt_it, said) = folder.hapterra(&[&run[..], &MATERIALS].concat());
-    assert!(felt_it && said.contains("materials      "), "{said}");
+    let (succeeded, said) = folder.hapterra(&[&run[..], &MATERIALS].concat());
+    assert!(succeeded && said.contains("materials      "), "{said}");
     assert!(folder.read("r.csv").contains("# [materials]\n"));
 }
 
@@ -269,8 +269,8 @@ fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
     let folder = Folder::new();
     let fails = |materials: &str, table: &str, wanted: &[&str]| {
         let options = ["x.csv", "--materials", materials, "--surface", table];
-        let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &options].concat());
-        assert!(!felt_it && said.contains("hint: "), "{said}");
+        let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &options].concat());
+        assert!(!succeeded && said.contains("hint: "), "{said}");
         for part in wanted {
             assert!(said.contains(part), "{part}: {said}");
         }
@@ -295,12 +295,12 @@ fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
         "wild.toml",
         &["wild.toml, line 2, class 10", "friction of 30"],
     );
-    let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["x.csv"], &MATERIALS[..2]].concat());
-    assert!(!felt_it && said.contains("--surface"), "{said}");
+    let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["x.csv"], &MATERIALS[..2]].concat());
+    assert!(!succeeded && said.contains("--surface"), "{said}");
     // No output may be one of them.
-    let (felt_it, said) = folder.hapterra(&[&REPLAY[..], &["table.toml"], &MATERIALS].concat());
+    let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["table.toml"], &MATERIALS].concat());
     assert!(
-        !felt_it && folder.read("table.toml").contains("rock"),
+        !succeeded && folder.read("table.toml").contains("rock"),
         "{said}"
     );
 }
@@ -320,8 +320,8 @@ fn the_table_for_worldcover_names_all_of_its_classes_and_can_be_felt() {
     let file = worldcover();
     let options = ["w.csv", "--materials", "classes.asc", "--surface"];
     let replay = [&REPLAY[..], &options, &[file.to_str().expect("text")]].concat();
-    let (felt_it, said) = folder.hapterra(&replay);
-    assert!(felt_it, "{said}");
+    let (succeeded, said) = folder.hapterra(&replay);
+    assert!(succeeded, "{said}");
     assert!(
         said.contains("permanent water bodies") && !said.contains("warn"),
         "{said}"
@@ -400,13 +400,13 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
     let several = grid.with_materials(Some(&materials));
     let several = Terrain::over(several, scale, 0).expect("terrain");
     let path = wander(&one, 17, 400, -1.0);
-    let law = SurfaceParams {
+    let params = SurfaceParams {
         shading: Shading::Smooth,
         ..SurfaceParams::PREMIUM
     };
-    let mut native = on_native(&several, law).expect("opened");
+    let mut native = on_native(&several, params).expect("opened");
     let expected = walk(&mut native, &path);
-    let mut plain = on_native(&one, law).expect("opened");
+    let mut plain = on_native(&one, params).expect("opened");
     let plain = walk(&mut plain, &path);
     let touching = |felt: &&(ContactState, [u32; 9])| felt.0 == ContactState::Touching;
     assert!(expected.iter().filter(touching).count() > 80);
@@ -421,7 +421,8 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let _plant = lines.plant;
     let link = Box::new(lines.link);
-    let mut board = OfflineDevice::open(&several, law, link, Timeouts::EMULATED).expect("opened");
+    let mut board =
+        OfflineDevice::open(&several, params, link, Timeouts::EMULATED).expect("opened");
     let got = walk(&mut board, &path);
     for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
         assert_eq!(expected, got, "row {i} at {:?}", path[i]);

@@ -77,7 +77,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         },
         ..plain
     };
-    for (name, raster, law) in [
+    for (name, raster, params) in [
         ("fractal", made(Kind::Fractal), plain),
         ("steps", made(Kind::Steps), with(Pattern::Grating)),
         ("holes", holed(), with(Pattern::Grain)),
@@ -85,13 +85,13 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         let scale = Scale::new(0.8, 0.9).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let path = wander(&terrain, 17, 300, -2.0);
-        let mut native = on_native(&terrain, law).expect("opened");
+        let mut native = on_native(&terrain, params).expect("opened");
         let expected = walk(&mut native, &path);
         let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
         let _plant = lines.plant;
         let link = Box::new(lines.link);
         let mut board =
-            OfflineDevice::open(&terrain, law, link, Timeouts::EMULATED).expect("opened");
+            OfflineDevice::open(&terrain, params, link, Timeouts::EMULATED).expect("opened");
         assert_eq!(board.device().board.as_str(), "mps2-an386");
         let got = walk(&mut board, &path);
         for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {

@@ -185,14 +185,14 @@ fn surface(x: f64, y: f64) -> f64 {
 
 #[test]
 fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
-    let law = SurfaceParams::PREMIUM;
+    let params = SurfaceParams::PREMIUM;
     let mut contact = FieldContact::new(64, rolling);
     contact.step([30.5, 30.5, 3.0]);
     for depth in [0.01, 0.1, 0.5] {
         let hip = [30.5, 30.5, surface(30.5, 30.5) - depth];
         let felt = contact.step(hip);
         let proxy = position(&felt.proxy);
-        let force = law.spring().force_n(felt.displacement);
+        let force = params.spring().force_n(felt.displacement);
         for axis in 0..3 {
             let expected = 0.5 * (proxy[axis] - hip[axis]);
             assert!((f64::from(force[axis]) - expected).abs() < 1e-6);

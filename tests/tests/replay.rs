@@ -63,8 +63,8 @@ fn judge(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
     let terrain = Terrain::new(raster, scale, 0).expect("terrain");
     let height = heights(&terrain);
     let oracle = Oracle::new(terrain.size().map(i64::from), &height);
-    let law = SurfaceParams::PREMIUM;
-    let mut replayer = on_native(&terrain, law).expect("opened");
+    let params = SurfaceParams::PREMIUM;
+    let mut replayer = on_native(&terrain, params).expect("opened");
     let mut touched = 0;
     let mut near_holes = 0;
     for hip_mm in wander(&terrain, seed, rows, 0.5) {
@@ -94,8 +94,8 @@ fn judge(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize {
             "{closer} closer than {proxy_c:?} to {hip_c:?}"
         );
         let displacement_mm: [f64; 3] = std::array::from_fn(|i| proxy[i] - hip[i]);
-        let k = f64::from(law.stiffness_n_per_mm);
-        let full = (k * length(displacement_mm)).min(f64::from(law.max_force_n));
+        let k = f64::from(params.stiffness_n_per_mm);
+        let full = (k * length(displacement_mm)).min(f64::from(params.max_force_n));
         // The force follows the displacement; near a hole it may be faded.
         assert!(
             length(force) <= full + FORCE_N,
@@ -156,11 +156,11 @@ fn on_real_terrains_too_whatever_their_holes() {
 
 /// A replayer by a contact rule.
 fn opened<'t>(terrain: &'t Terrain<'t>, rule: Rule) -> OfflineDevice<'t> {
-    let law = SurfaceParams::PREMIUM;
-    let replayer = on_native(terrain, law).expect("opened");
+    let params = SurfaceParams::PREMIUM;
+    let replayer = on_native(terrain, params).expect("opened");
     match rule {
         Rule::Swept => replayer,
-        Rule::Paper => replayer.by_published_rule(law),
+        Rule::Paper => replayer.by_published_rule(params),
     }
 }
 

@@ -11,7 +11,7 @@ const STIFFNESS: f64 = 0.5;
 /// A surface with a damping of 5 N·s/m.
 const DAMPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/damped.toml");
 
-const LAW: [&str; 2] = ["--scale=1mm/cell", "--stiffness=0.5"];
+const PARAMS: [&str; 2] = ["--scale=1mm/cell", "--stiffness=0.5"];
 
 /// A row of what was felt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,7 +150,7 @@ fn pressed(felt: &[Row]) -> usize {
 #[test]
 fn damping_is_the_same_however_often_a_path_has_rows() {
     let folder = Folder::new();
-    let damped = [&LAW[..], &["--surface", DAMPED]].concat();
+    let damped = [&PARAMS[..], &["--surface", DAMPED]].concat();
     for hz in [2, 10, 100, 250, 1_000, 1_600, 8_000, 100_000] {
         let rows = sampled(hz, 0.5, |t| [40.0, 20.0, 2.0 - 20.0 * t]);
         let (felt, said) = folder.felt(&path(&rows), &damped);
@@ -259,7 +259,7 @@ fn times_that_contradict_a_recordings_rate_are_refused() {
 #[test]
 fn rows_without_times_are_ticks_and_that_is_said() {
     let folder = Folder::new();
-    let damped = [&LAW[..], &["--surface", DAMPED]].concat();
+    let damped = [&PARAMS[..], &["--surface", DAMPED]].concat();
     let timed = sampled(1_000, 0.5, |t| [40.0, 20.0, 2.0 - 20.0 * t]);
     let (expected, _) = folder.felt(&path(&timed), &damped);
     let places = timed
@@ -312,16 +312,16 @@ fn wrong_times_are_refused_and_odd_ones_remarked_on() {
             "line 4, column t_s: the HIP moves during a gap of 10 s",
         ),
     ] {
-        let said = folder.fails(&path(rows), &LAW);
+        let said = folder.fails(&path(rows), &PARAMS);
         assert!(said.contains(expected), "{rows}: {said}");
         assert!(!folder.path("out.csv").exists(), "{rows}");
     }
     // Perhaps milliseconds, perhaps places to go to.
-    let (felt, said) = folder.felt(&path("0,40,20,1\n1,40,20,0\n2,40,20,-1\n"), &LAW);
+    let (felt, said) = folder.felt(&path("0,40,20,1\n1,40,20,0\n2,40,20,-1\n"), &PARAMS);
     assert_eq!(felt.len(), 2_001);
     let remark = "in.csv: 2 times the HIP moves for more than 0.05 s between two rows, 1 s at most";
     assert!(said.contains(remark), "{said}");
-    let (felt, said) = folder.felt(&path(&sampled(1_000, 0.1, drag)), &LAW);
+    let (felt, said) = folder.felt(&path(&sampled(1_000, 0.1, drag)), &PARAMS);
     assert_eq!((felt.len(), said.contains("note")), (101, false), "{said}");
 }
 
@@ -376,9 +376,9 @@ fn reviewed_paths_and_recordings_are_felt_by_time() {
         0.0995,
     );
     assert!(adds.iter().all(|n| (n - 0.1003).abs() < 2e-4), "{adds:?}");
-    let law = ["--surface", DAMPED, "--stiffness=0.5"];
+    let params = ["--surface", DAMPED, "--stiffness=0.5"];
     let adds = damping(
-        &felt("case3_flat33.tif", "case3_path_10ms.csv", &law),
+        &felt("case3_flat33.tif", "case3_path_10ms.csv", &params),
         2.1,
         3.9,
     );

@@ -34,11 +34,11 @@ struct Circle<'c> {
 impl Circle<'_> {
     /// What a HIP feels that goes round once, where it touches.
     fn felt(&self, terrain: &Terrain<'_>, shading: Shading) -> Vec<TickRecord> {
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             shading,
             ..SurfaceParams::PREMIUM
         };
-        let mut replayer = on_native(terrain, law).expect("opened");
+        let mut replayer = on_native(terrain, params).expect("opened");
         let size = terrain.size_mm();
         let radius = ROUND / std::f64::consts::TAU;
         let felt = (0..=self.steps()).filter_map(|tick| {

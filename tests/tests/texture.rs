@@ -53,8 +53,8 @@ fn rasters() -> Vec<(&'static str, Raster)> {
 /// What a HIP feels on a circle, half a millimetre deep, that sets out from the air. In the middle
 /// it lifts twice and goes fast for some time. A cell is a millimetre, so that the force is half of
 /// the displacement, to the bit.
-fn circle(terrain: &Terrain<'_>, law: SurfaceParams) -> Vec<TickRecord> {
-    let mut replayer = on_native(terrain, law).expect("opened");
+fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
+    let mut replayer = on_native(terrain, params).expect("opened");
     let size = terrain.size_mm();
     let radius = STEP * f64::from(STEPS) / std::f64::consts::TAU;
     let radius = radius.min(0.4 * size[0].min(size[1]));
@@ -98,13 +98,13 @@ fn a_replay_is_textured_and_the_proxy_is_where_it_is_without() {
         let grid = HapticGrid::new(raster, HapticCells::Square);
         let scale = grid.true_scale(1.0).expect("scale");
         let terrain = Terrain::over(grid, scale, 0).expect("terrain");
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             shading: Shading::Smooth,
             ..SurfaceParams::PREMIUM
         };
-        let plain = circle(&terrain, law);
+        let plain = circle(&terrain, params);
         for texture in [GRAIN, GRATING] {
-            let textured = circle(&terrain, SurfaceParams { texture, ..law });
+            let textured = circle(&terrain, SurfaceParams { texture, ..params });
             assert_eq!(plain.len(), textured.len());
             let mut judge = TextureJudge::new(texture);
             let (mut touched, mut most) = (0, 0.0_f32);

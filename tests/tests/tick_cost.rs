@@ -29,14 +29,14 @@ fn felt() -> Option<(Vec<TickRecord>, Status)> {
         .raster(400, 400)
         .expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("scale"), 0).expect("terrain");
-    let law = SurfaceParams {
+    let params = SurfaceParams {
         damping: Damping {
             controller: Controller::Off,
             ..Damping::NONE
         },
         ..SurfaceParams::PREMIUM
     };
-    let placed = PlacedTerrain::new(&terrain, law).expect("placed");
+    let placed = PlacedTerrain::new(&terrain, params).expect("placed");
     let mut rig = placed.held_phantom();
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let mut plant = lines.plant;

@@ -178,15 +178,15 @@ fn a_ball_touches_poles_walls_and_pits_a_radius_away() {
 
 /// Of 20 passes over a pole of one sample, 20 cells high, at half of its height, beside it by at most
 /// a part of the radius, those in which it is felt, by speed in cells a tick. Cells are a millimetre.
-fn felt_passes(radius: f64, speed: f64, (most_beside, friction): (f64, f32)) -> usize {
+fn passes_touching(radius: f64, speed: f64, (most_beside, friction): (f64, f32)) -> usize {
     let pole = |x: u32, y: u32| if (x, y) == (60, 30) { 20.0 } else { 0.0 };
     let raster = Raster::from_fn(120, 60, pole).expect("raster");
     let [terrain, _] = terrains(&raster, Scale::new(1.0, 1.0).expect("scale"), radius);
-    let law = SurfaceParams {
+    let params = SurfaceParams {
         friction: Friction::coulomb(friction),
         ..SurfaceParams::PREMIUM
     };
-    let mut replayer = on_native(&terrain, law).expect("opened");
+    let mut replayer = on_native(&terrain, params).expect("opened");
     let is_felt = |pass: &u32| {
         let share = (f64::from(*pass) + 0.5) / 20.0;
         let beside = radius.max(0.5) * most_beside * (2.0 * share - 1.0);
@@ -210,14 +210,14 @@ fn a_pole_is_felt_at_steps_of_one_and_a_half_radii() {
     for radius in [1.0, 2.0, 4.0, 8.0] {
         for step in [0.1, 0.5 * radius, radius, 1.5 * radius] {
             assert_eq!(
-                felt_passes(radius, step, (0.5, 0.0)),
+                passes_touching(radius, step, (0.5, 0.0)),
                 20,
                 "radius {radius}, {step} cells a tick"
             );
         }
     }
     // A point's tick ends beyond it.
-    assert!(felt_passes(0.0, 12.0, (0.5, 0.0)) < 10);
+    assert!(passes_touching(0.0, 12.0, (0.5, 0.0)) < 10);
 }
 
 /// A longer tick meets the pole, too. Without friction its proxy slides around the pole to a HIP
@@ -230,7 +230,7 @@ fn friction_holds_a_ball_at_a_pole_at_any_speed() {
             if speed / radius * 32.0 > 512.0 {
                 continue;
             }
-            let [ice, rough] = [0.0, 0.4].map(|mu| felt_passes(radius, speed, (0.3, mu)));
+            let [ice, rough] = [0.0, 0.4].map(|mu| passes_touching(radius, speed, (0.3, mu)));
             eprintln!("radius {radius}, {speed} cells a tick: {ice} on ice, {rough} of 20");
             assert_eq!(rough, 20, "radius {radius}, {speed} cells a tick");
         }

@@ -80,12 +80,12 @@ fn name(state: State) -> &'static str {
 fn same(
     terrain: &Terrain<'_>,
     contact: &mut Contact,
-    law: SurfaceParams,
+    params: SurfaceParams,
     rate: u32,
     seed: u64,
 ) -> usize {
     let rate = TickRate::new(rate).expect("a rate");
-    let mut replayer = on_native_at(rate, terrain, law).expect("opened");
+    let mut replayer = on_native_at(rate, terrain, params).expect("opened");
     let mut touched = 0;
     for (row, hip_mm) in wander(terrain, seed, 4_000, -2.0).into_iter().enumerate() {
         let hip = terrain.scale().to_grid(hip_mm).expect("addressable");
@@ -122,14 +122,14 @@ fn forces_over_an_array_are_those_of_a_replay() {
     let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
     let ground = touch::Terrain::from_slice(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, &heights);
     let ground = ground.expect("a terrain");
-    for (law, rate, seed) in [
+    for (params, rate, seed) in [
         (SurfaceParams::PREMIUM, 1_000, 1),
         (rough(), 1_000, 2),
         (rough(), 4_000, 3),
     ] {
-        let surface = Surface::new(law).expect("a surface");
+        let surface = Surface::new(params).expect("a surface");
         let mut contact = Contact::at_rate(ground.clone(), surface, rate).expect("a contact");
-        let touched = same(&terrain, &mut contact, law, rate, seed);
+        let touched = same(&terrain, &mut contact, params, rate, seed);
         assert!(touched > 1_000, "{touched} in contact");
     }
 }
@@ -212,7 +212,7 @@ fn materials_are_those_of_a_replay() {
     let over = over.expect("they overlap");
     let grid = HapticGrid::new(&raster, HapticCells::default()).with_materials(Some(&over));
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
-    let law = over.law(&rough());
+    let params = over.params(&rough());
     let ground = touch::Terrain::from_vec(COLUMNS, ROWS, CELL_MM, RowOrder::NorthFirst, heights);
     let index = |class: &u8| {
         [0, 7, 9]
@@ -222,13 +222,13 @@ fn materials_are_those_of_a_replay() {
     };
     let indices = classes.iter().map(index).collect();
     let ground = ground.and_then(|it| it.with_materials(RowOrder::NorthFirst, indices));
-    let surface = Surface::new(law).and_then(|it| it.with_materials(&materials));
+    let surface = Surface::new(params).and_then(|it| it.with_materials(&materials));
     let (ground, surface) = (ground.expect("a terrain"), surface.expect("a surface"));
     for (tip_mm, seed) in [(0.0, 5), (3.0, 10)] {
         let terrain = Terrain::over(grid.with_tip(tip_mm), scale, 0).expect("a terrain");
         let ball = ground.clone().with_tip(tip_mm).expect("a ball");
         let mut contact = Contact::new(ball, surface.clone()).expect("a contact");
-        let touched = same(&terrain, &mut contact, law, 1_000, seed);
+        let touched = same(&terrain, &mut contact, params, 1_000, seed);
         assert!(touched > 1_000, "{tip_mm} mm: {touched} in contact");
     }
 }

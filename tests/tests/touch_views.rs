@@ -82,11 +82,11 @@ fn pressed_at<T>(
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = Placement::new(&grid, &reach, options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
-    let law = SurfaceParams::PREMIUM;
-    let scene = view.scene(&terrain, law).expect("a scene");
+    let params = SurfaceParams::PREMIUM;
+    let scene = view.scene(&terrain, params).expect("a scene");
     let [east, north, _] = view.home_mm;
     let surface = |x: f64, y: f64| terrain.height_mm(x, y);
-    let (hand, wall) = (HandModel::default(), f64::from(law.stiffness_n_per_mm));
+    let (hand, wall) = (HandModel::default(), f64::from(params.stiffness_n_per_mm));
     let touch = Touch::start(&surface, &hand, wall, [east, north], 10.0);
     let script: Script = touch.press(PUSH_N, seconds).finish();
     let home_mm = view.home_mm;
@@ -99,7 +99,7 @@ fn pressed_at<T>(
     let (arming, patience) = (Some(Arming::VIRTUAL), Timeouts::EMULATED);
     let opened = Session::open(&terrain, scene, arming, Box::new(device), patience);
     let bounds = Bounds {
-        first: Laid { view, law },
+        first: Laid { view, params },
         resolution_mm: RESOLUTION_MM,
         level: None,
     };
@@ -224,7 +224,7 @@ fn assert_pressed(sample: &TickRecord, before: &TickRecord, what: &str) {
 fn assert_felt(sample: &TickRecord, what: &str) {
     assert_eq!(sample.state, ContactState::Touching, "{what}");
     // The controller acts on every scene, and encoders of half a millimetre give it work.
-    let others = sample.limits.difference(Limits::ENERGY_TAKEN_BACK);
+    let others = sample.limits.difference(Limits::ENERGY_DISSIPATED);
     assert_eq!(others, Limits::empty(), "{what}");
 }
 
@@ -341,7 +341,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             assert_eq!(sample.state, ContactState::Touching, "{change:?}");
         }
         assert_eq!(touching.said, [""; 0]);
-        let law = touching.steering.now().law;
+        let params = touching.steering.now().params;
         let wanted = SurfaceParams {
             friction: Friction {
                 static_mu: 0.5,
@@ -356,7 +356,7 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             texture,
             ..SurfaceParams::PREMIUM
         };
-        assert_eq!(law, wanted);
+        assert_eq!(params, wanted);
         let friction = SurfaceChange::Friction {
             dynamic_mu: 11.0,
             static_mu: 11.0,
@@ -367,10 +367,10 @@ fn a_surface_set_by_commands_while_it_is_pressed_makes_no_step() {
             "{:?}",
             touching.said
         );
-        assert_eq!(touching.steering.now().law, wanted, "it stays as it was");
+        assert_eq!(touching.steering.now().params, wanted, "it stays as it was");
         let reset = touching.change(PlacementChange::Reset);
         assert_pressed(&reset, &first, "as at the beginning");
-        assert_eq!(touching.steering.now().law, SurfaceParams::PREMIUM);
+        assert_eq!(touching.steering.now().params, SurfaceParams::PREMIUM);
         judge(&touching.samples[began..], GENTLE_N);
     });
 }
@@ -500,7 +500,7 @@ fn slope_of_degrees(axis: usize) -> Raster {
 }
 
 /// How steep a pressing hand feels the ground, to the east and to the north.
-fn felt_slope(sample: &TickRecord) -> [f64; 2] {
+fn slope_of_force(sample: &TickRecord) -> [f64; 2] {
     let [x, y, z] = sample.force_n.to_array().map(f64::from);
     [-x / z, -y / z]
 }
@@ -524,7 +524,7 @@ fn a_far_pan(axis: usize) {
         let began = touching.samples.len();
         let wanted = [[1.0, 0.0], [0.0, 1.0]][axis];
         let is_true = |sample: &TickRecord, where_: &str| {
-            let felt = felt_slope(sample);
+            let felt = slope_of_force(sample);
             eprintln!("{where_}: {felt:?}");
             for (felt, wanted) in felt.iter().zip(wanted) {
                 assert!(

@@ -174,7 +174,7 @@ impl Contact {
     /// # Errors
     /// [`StepError`]; the step has not happened then.
     pub fn step(&mut self, hip_mm: [f64; 3]) -> Result<Step, StepError> {
-        let scale = self.terrain.felt_scale();
+        let scale = self.terrain.haptic_scale();
         let hip = scale.to_grid(hip_mm).ok_or(StepError::Place {
             hip_mm,
             cell_mm: scale.cell_mm(),
@@ -224,7 +224,7 @@ impl Contact {
         // or let the force come in again. They need no heights that were not read before.
         for _ in 0..MAX_SETTLING {
             match self.last.map(|hip| self.sample(hip, [0.0; 3])) {
-                Some(Ok(sample)) if sample.limits.contains(Limits::BOUNDARY_FADING) => {}
+                Some(Ok(sample)) if sample.limits.contains(Limits::EDGE_FADING) => {}
                 _ => break,
             }
         }
@@ -263,7 +263,7 @@ impl Contact {
 
 /// A surface on a terrain, as the loop takes it.
 fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
-    let cell_mm = terrain.felt_scale().cell_mm() as f32;
+    let cell_mm = terrain.haptic_scale().cell_mm() as f32;
     terrain.check_heights()?;
     surface.check_cells(cell_mm)?;
     let [east, north] = terrain.size();
@@ -278,10 +278,10 @@ fn scene(terrain: &Terrain, surface: &Surface) -> Result<Scene, ContactError> {
         level: 0,
         size: FieldSize::new(east, north),
         top: terrain.top(),
-        underlay: None,
+        fallback: None,
         cell_mm,
         home: GridPoint::default(),
-        law: *surface.params(),
+        params: *surface.params(),
         source: Source::Points,
         hold_clock: false,
         materials: table.map(MaterialTable::check_sum),

@@ -25,7 +25,7 @@ impl Terrain {
     /// over it ([`Self::with_tip`]). `None` in a hole, off the terrain, and where it cannot be read.
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
-        let (size, cell_mm) = (self.size(), self.felt_scale().cell_mm());
+        let (size, cell_mm) = (self.size(), self.haptic_scale().cell_mm());
         let (column, u) = tiles::place(east_mm / cell_mm, size[0])?;
         let (row, v) = tiles::place(north_mm / cell_mm, size[1])?;
         if let Some(ball) = &self.ball {
@@ -56,7 +56,7 @@ impl Terrain {
     }
 
     /// The scale of haptic cells: that of the samples, or a whole part of it under a ball.
-    pub(crate) fn felt_scale(&self) -> Scale {
+    pub(crate) fn haptic_scale(&self) -> Scale {
         self.scale.in_parts(self.parts())
     }
 
@@ -72,7 +72,7 @@ impl Terrain {
         let Some(range) = self.range else {
             return MAX_CELL + 1;
         };
-        let scale = self.felt_scale();
+        let scale = self.haptic_scale();
         let ends = range.map(|height| scale.height_cells(height));
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let radius = self.ball.as_ref().map_or(0.0, Ball::radius);
@@ -88,7 +88,7 @@ impl Terrain {
     /// Checks that the heights can be touched at the scale; those of a callback, and what a ball makes
     /// of heights, are checked tile by tile.
     pub(crate) fn check_heights(&self) -> Result<(), TerrainError> {
-        let scale = self.felt_scale();
+        let scale = self.haptic_scale();
         let cell_mm = scale.cell_mm();
         for height in self.range.into_iter().flatten() {
             let cells = scale.height_cells(height);
@@ -212,7 +212,7 @@ impl Terrain {
         room.clear();
         room.resize(block.columns as usize * block.rows as usize, f64::NAN);
         self.heights.read(block, room)?;
-        let scale = self.felt_scale();
+        let scale = self.haptic_scale();
         for height in room.iter_mut() {
             *height = within(scale.height_cells(*height));
         }

@@ -98,7 +98,7 @@ impl Surface {
         };
         others.copy_from_slice(materials);
         for material in materials {
-            check(&material.law(&self.params))?;
+            check(&material.params(&self.params))?;
         }
         if self.params.stiffness_n_per_mm == 0.0 {
             return Err(SurfaceError::NoStiffness);

@@ -185,16 +185,16 @@ mod tests {
     #[test]
     fn failed_target_is_repeated_by_its_kind() {
         let said = [
-            "     Running tests/underlay.rs (target/debug/deps/underlay-1)",
-            "error: test failed, to rerun pass `-p hapterra-tests --test underlay`",
+            "     Running tests/fallback.rs (target/debug/deps/fallback-1)",
+            "error: test failed, to rerun pass `-p hapterra-tests --test fallback`",
             "error: 2 targets failed:",
-            "    `-p hapterra-tests --test underlay`",
+            "    `-p hapterra-tests --test fallback`",
             "    `-p hapterra-core --doc`",
         ];
         let failed = said.iter().filter_map(|line| listed_target(line));
         let commands: Vec<_> = failed.map(|target| repeat(target, false)).collect();
         let expected = [
-            "cargo xtask test -- --test underlay    # hapterra-tests",
+            "cargo xtask test -- --test fallback    # hapterra-tests",
             "cargo xtask test -- --doc    # hapterra-core",
         ];
         assert_eq!(commands, expected);

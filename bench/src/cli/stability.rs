@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rates: args.rate.clone(),
         stiffness_n_per_mm: args.stiffness.clone(),
         dampings: dampings(args),
-        texture: of_surface.load()?.law.texture,
+        texture: of_surface.load()?.params.texture,
         delay_s: args.delay,
         arm_frictions: args.arm_friction.clone(),
     };

@@ -3,8 +3,8 @@
 use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::{
-    CoarseTile, FieldSize, RequestHint, SETTLING_MM_S, TILE_CELLS, Tile, TileKey, TileRequester,
-    Underlay,
+    CoarseTile, Fallback, FieldSize, RequestHint, SETTLING_MM_S, TILE_CELLS, Tile, TileKey,
+    TileRequester,
 };
 
 use super::row::{DEPTH, Row, SIDE, STEP};
@@ -16,7 +16,7 @@ use crate::product::{buffers, empty, fill};
 
 /// Where the HIP begins to slide, cells before the next tile.
 const BEFORE: f64 = 1.0;
-/// Cells that the surface moves in a tick from the underlay to a tile that has come: at 1 kHz, a
+/// Cells that the surface moves in a tick from the fallback to a tile that has come: at 1 kHz, a
 /// cell a millimetre.
 const SETTLED_A_TICK: f32 = SETTLING_MM_S / 1_000.0;
 /// Ticks it slides eastward.
@@ -26,7 +26,7 @@ const TICKS: u32 = 400;
 /// is so far beyond its border.
 pub(super) fn measure() -> Vec<Row> {
     let late = |beyond: f64| ((BEFORE + beyond) / STEP) as u32;
-    let under = Some(UNDERLAY);
+    let under = Some(FALLBACK);
     [
         ("every tile here", 0, None),
         ("tile 0.2 cell late", late(0.2), None),
@@ -36,12 +36,12 @@ pub(super) fn measure() -> Vec<Row> {
         ("0.45 cell late over a coarse fallback", late(0.45), under),
         ("1 cell late over a coarse fallback", late(1.0), under),
     ]
-    .map(|(name, due, underlay)| Row::of(name, SWEPT, &[&felt(due, underlay)]))
+    .map(|(name, due, fallback)| Row::of(name, SWEPT, &[&felt(due, fallback)]))
     .to_vec()
 }
 
 /// Under both tiles.
-const UNDERLAY: Underlay = Underlay {
+const FALLBACK: Fallback = Fallback {
     wide: CoarseTile {
         first: Cell::new(0, 0),
         shift: 3,
@@ -49,20 +49,20 @@ const UNDERLAY: Underlay = Underlay {
     near: None,
 };
 
-/// The underlay's tile; beyond the field it goes on as it ends there.
-fn coarse(grid: &Grid, underlay: &Underlay) -> Tile {
+/// The fallback's tile; beyond the field it goes on as it ends there.
+fn coarse(grid: &Grid, fallback: &Fallback) -> Tile {
     let mut tile = Tile::VACANT;
-    let side = underlay.wide.spacing() as usize;
+    let side = fallback.wide.spacing() as usize;
     let height = |col: usize, row: usize| {
         grid.post((col * side).min(grid.columns), (row * side).min(grid.rows))
     };
-    tile.fill(underlay.wide.key(0), 0, height)
+    tile.fill(fallback.wide.key(0), 0, height)
         .expect("in range");
     tile
 }
 
 /// What is felt from where the HIP begins to slide.
-fn felt(due: u32, underlay: Option<Underlay>) -> Vec<Answer> {
+fn felt(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
     let grid = Grid::from_fn("two tiles", [2 * TILE_CELLS, TILE_CELLS], |x, y| {
         (1.5 * (0.2 * x as f64).sin() * (0.17 * y as f64).cos()) as f32
     });
@@ -72,8 +72,8 @@ fn felt(due: u32, underlay: Option<Underlay>) -> Vec<Answer> {
     let size = FieldSize::new(grid.columns as i32, grid.rows as i32);
     let mut requester = TileRequester::<SIDE>::new();
     requester.reset(0, size);
-    window.lay(underlay);
-    under = underlay.map(|underlay| coarse(&grid, &underlay));
+    window.lay(fallback);
+    under = fallback.map(|fallback| coarse(&grid, &fallback));
     if let Some(tile) = &mut under {
         assert!(window.take(tile, [Cell::new(0, 0); 2]).is_none());
     }

@@ -140,13 +140,13 @@ impl<'g> Arm<'g> {
     /// The loop that the arm is driven by.
     pub(super) fn open<'t>(
         &self,
-        law: SurfaceParams,
+        params: SurfaceParams,
         tiles: &'t mut [Tile],
     ) -> Result<Box<Haptics<'t, WINDOW>>, NotMeasured> {
         let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5);
         let mechanism = mechanism.map_err(|why| NotMeasured(why.to_string()))?;
         let home = Hip::at(self.placement.home_mm).grid;
-        let scene = replay::scene(self.grid, law, Source::Encoders, home);
+        let scene = replay::scene(self.grid, params, Source::Encoders, home);
         let mut haptics = replay::open(self.grid, scene, tiles);
         haptics.configure(mechanism);
         for command in [Command::Zero([0; 3]), Command::Arm] {
@@ -155,14 +155,14 @@ impl<'g> Arm<'g> {
         Ok(haptics)
     }
 
-    /// What the way feels like under a law, with what is looked at.
+    /// What the way feels like under surface parameters, with what is looked at.
     pub(super) fn render(
         &self,
-        law: SurfaceParams,
+        params: SurfaceParams,
         way: &Way,
     ) -> Result<Vec<EffectTick>, NotMeasured> {
         let mut tiles = replay::tiles();
-        let mut driven = Driven::begin(self, law, way, &mut tiles)?;
+        let mut driven = Driven::begin(self, params, way, &mut tiles)?;
         for place in &way.down {
             driven.tick(place);
         }
@@ -182,11 +182,11 @@ pub(super) struct Driven<'t> {
 impl<'t> Driven<'t> {
     pub(super) fn begin(
         arm: &Arm<'_>,
-        law: SurfaceParams,
+        params: SurfaceParams,
         way: &Way,
         tiles: &'t mut [Tile],
     ) -> Result<Self, NotMeasured> {
-        let haptics = arm.open(law, tiles)?;
+        let haptics = arm.open(params, tiles)?;
         let mut driven = Self { haptics };
         let counts = way.down.first().map_or([0; 3], |place| place.counts);
         for tick in 0..ARMING {

@@ -5,9 +5,9 @@ use hapterra::phantom::{ArmFrame, kinematics};
 use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured, Place, Way};
+use super::effect::Effect;
 use super::effect_tick::EffectTick;
 use super::foaw;
-use super::law::Effect;
 use super::row::{self, Error};
 use super::vector::{Vector, dot, length, minus};
 use crate::compare::Effort;
@@ -22,13 +22,13 @@ const ROUNDING: f64 = 0.01;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
     let arm = Arm::over(grid);
-    let law = Effect::Damping.law();
+    let params = Effect::Damping.params();
     let mut errors = Vec::new();
     for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
-        let felt = arm.render(law, &way)?;
+        let felt = arm.render(params, &way)?;
         let place = row::Place(&grid.name, way.name, Effect::Damping.name());
-        let own = off_mn(&law, &felt, |tick| by_foaw(&arm, &way, tick));
-        let path = off_mn(&law, &felt, |tick| vec![by_path(&way, tick)]);
+        let own = off_mn(&params, &felt, |tick| by_foaw(&arm, &way, tick));
+        let path = off_mn(&params, &felt, |tick| vec![by_path(&way, tick)]);
         errors.extend(place.error(("force off that by FOAW in f64", "mN"), ROUNDING, own));
         errors.extend(place.error(("force off that by the path's velocity", "mN"), None, path));
         errors.extend(place.error(("pull of the surface", "mN"), 0.0, pulls_mn(&felt)));
@@ -38,14 +38,14 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
 
 /// How far each force is from the documented one, mN, with the nearest of some velocities.
 fn off_mn(
-    law: &SurfaceParams,
+    params: &SurfaceParams,
     felt: &[EffectTick],
     velocities_mm_s: impl Fn(usize) -> Vec<Vector>,
 ) -> Vec<f64> {
     let felt = felt.iter().enumerate().skip(READINGS);
     let off = felt.filter(|(_, felt)| felt.whole).map(|(tick, felt)| {
         let off = velocities_mm_s(tick).into_iter().map(|velocity| {
-            let wanted = damped_n(law, felt.spring(), velocity);
+            let wanted = damped_n(params, felt.spring(), velocity);
             1e3 * length(minus(felt.force_n, wanted))
         });
         off.fold(f64::INFINITY, f64::min)
@@ -54,15 +54,15 @@ fn off_mn(
 }
 
 /// F' = F − b (v·f) f, where b |v·f| counts at most |F|.
-fn damped_n(law: &SurfaceParams, spring_mm: Vector, velocity_mm_s: Vector) -> Vector {
+fn damped_n(params: &SurfaceParams, spring_mm: Vector, velocity_mm_s: Vector) -> Vector {
     let deep = length(spring_mm);
     if deep == 0.0 {
         return [0.0; 3];
     }
     let along = spring_mm.map(|x| x / deep);
-    let most = f64::from(law.max_force_n);
-    let spring_n = (f64::from(law.stiffness_n_per_mm) * deep).min(most);
-    let damping = 1e-3 * f64::from(law.damping.ns_per_m) * dot(velocity_mm_s, along);
+    let most = f64::from(params.max_force_n);
+    let spring_n = (f64::from(params.stiffness_n_per_mm) * deep).min(most);
+    let damping = 1e-3 * f64::from(params.damping.ns_per_m) * dot(velocity_mm_s, along);
     let force_n = (spring_n - damping.clamp(-spring_n, spring_n)).min(most);
     along.map(|x| x * force_n)
 }
@@ -118,18 +118,18 @@ mod tests {
         let grid = terrain();
         let arm = Arm::over(&grid);
         let way = arm.tap(2000).expect("in reach");
-        let law = Effect::Damping.law();
-        let felt = arm.render(law, &way).expect("felt");
-        let off = |law: &SurfaceParams, felt: &[EffectTick]| {
-            worst(off_mn(law, felt, |tick| by_foaw(&arm, &way, tick)))
+        let params = Effect::Damping.params();
+        let felt = arm.render(params, &way).expect("felt");
+        let off = |params: &SurfaceParams, felt: &[EffectTick]| {
+            worst(off_mn(params, felt, |tick| by_foaw(&arm, &way, tick)))
         };
-        assert!(off(&law, &felt) < ROUNDING && worst(pulls_mn(&felt)) == 0.0);
+        assert!(off(&params, &felt) < ROUNDING && worst(pulls_mn(&felt)) == 0.0);
         // Five percent more damping.
-        let mut more = law;
+        let mut more = params;
         more.damping.ns_per_m *= 1.05;
         assert!(off(&more, &felt) > 10.0 * ROUNDING);
         // The velocity of the tick before.
-        let late = off_mn(&law, &felt, |tick| by_foaw(&arm, &way, tick - 1));
+        let late = off_mn(&params, &felt, |tick| by_foaw(&arm, &way, tick - 1));
         assert!(worst(late) > 10.0 * ROUNDING);
         // A damper whose part is not bounded by the spring's force.
         let mut pulling = felt.clone();
@@ -138,6 +138,6 @@ mod tests {
             let speed = dot(by_path(&way, tick), spring) / deep.max(1e-9);
             felt.force_n = spring.map(|x| x * (0.5 - 2e-3 * speed / deep.max(1e-9)));
         }
-        assert!(worst(pulls_mn(&pulling)) > 1.0 && off(&law, &pulling) > 1.0);
+        assert!(worst(pulls_mn(&pulling)) > 1.0 && off(&params, &pulling) > 1.0);
     }
 }

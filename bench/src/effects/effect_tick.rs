@@ -29,7 +29,7 @@ const LESS: Limits = Limits::FORCE_CLAMPED
     .union(Limits::RAMPING)
     .union(Limits::FADING)
     .union(Limits::TERRAIN_MISSING)
-    .union(Limits::BOUNDARY_FADING);
+    .union(Limits::EDGE_FADING);
 
 impl EffectTick {
     pub(super) fn of(sample: &TickRecord) -> Self {

@@ -6,7 +6,7 @@ use hapterra::phantom::{ArmFrame, HeldPhantom, PhantomModel, Script};
 use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured};
-use super::law::Effect;
+use super::effect::Effect;
 use super::replay;
 use super::row::{Error, Place};
 use super::vector::{Vector, dot, minus};
@@ -32,14 +32,14 @@ const LATE_S: f64 = 0.08e-3;
 pub(super) fn measure(grid: &Grid) -> Result<Vec<Error>, NotMeasured> {
     let mut rows = Vec::new();
     for (effect, bound) in [(Effect::None, None), (Effect::Controller, Some(MAX_MJ))] {
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             stiffness_n_per_mm: STIFFNESS,
-            ..effect.law()
+            ..effect.params()
         };
         let mut given = Vec::new();
         for speed in SPEEDS {
             for grasp in Grasp::ALL {
-                given.extend(given_mj(&tapped(grid, law, grasp, speed)?));
+                given.extend(given_mj(&tapped(grid, params, grasp, speed)?));
             }
         }
         let place = Place(&grid.name, "a hand taps", effect.name());
@@ -72,7 +72,7 @@ fn given_mj(parts: &[Part]) -> Vec<f64> {
 /// A hand that taps on the middle of a terrain.
 fn tapped(
     grid: &Grid,
-    law: SurfaceParams,
+    params: SurfaceParams,
     grasp: Grasp,
     speed_mm_s: f64,
 ) -> Result<Vec<Part>, NotMeasured> {
@@ -96,7 +96,7 @@ fn tapped(
     );
     let mut held = held.map_err(|why| NotMeasured(why.to_string()))?.arming();
     let mut tiles = replay::tiles();
-    let mut haptics = arm.open(law, &mut tiles)?;
+    let mut haptics = arm.open(params, &mut tiles)?;
     let ticks = ((HeldPhantom::ARMED_S + held.script_s()) / TICK_S) as usize;
     let tip = |held: &HeldPhantom| {
         let plant = held.plant();
@@ -158,14 +158,14 @@ mod tests {
 
     #[test]
     fn without_the_controller_a_tap_gives() {
-        let law = |controller| {
-            let mut law = Effect::None.law();
-            law.stiffness_n_per_mm = STIFFNESS;
-            law.damping.controller = controller;
-            law
+        let params = |controller| {
+            let mut params = Effect::None.params();
+            params.stiffness_n_per_mm = STIFFNESS;
+            params.damping.controller = controller;
+            params
         };
         let most = |controller| {
-            let parts = tapped(&terrain(), law(controller), Grasp::Normal, 200.0);
+            let parts = tapped(&terrain(), params(controller), Grasp::Normal, 200.0);
             let given = given_mj(&parts.expect("in reach"));
             assert_eq!(given.len(), TAPS);
             given.into_iter().fold(f64::MIN, f64::max)

@@ -1,8 +1,8 @@
 //! Friction: the tangential over the normal force of a proxy that slides, and whether one that
 //! sticks stays.
 
+use super::effect::{Effect, FRICTION};
 use super::effect_tick::EffectTick;
-use super::law::{Effect, FRICTION};
 use super::replay::render;
 use super::row::{Error, Place};
 use super::vector::{Vector, dot, length, minus, normal, plus};
@@ -28,9 +28,9 @@ const HELD_DEPTH: f64 = 0.1;
 const TREMBLE: f64 = 0.025;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
-    let law = Effect::Friction.law();
+    let params = Effect::Friction.params();
     let slide = path::slide_at(grid, "slide 0.01", [STEP, DEPTH], effort.ticks);
-    let slid = render(grid, law, &slide.hips);
+    let slid = render(grid, params, &slide.hips);
     let off = off_percent(
         grid,
         f64::from(FRICTION.dynamic_mu),
@@ -38,7 +38,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     );
     let part = |sign: f64| off.iter().map(|off| (sign * off).max(0.0)).collect();
     let (hips, from) = held(grid);
-    let stuck = render(grid, law, &hips);
+    let stuck = render(grid, params, &hips);
     let drifts = from
         .iter()
         .filter_map(|from| drift(&stuck[*from..][..HELD]));
@@ -139,11 +139,11 @@ mod tests {
 
     #[test]
     fn friction_that_is_five_percent_off_is_seen() {
-        let (grid, mut law) = (terrain(), Effect::Friction.law());
+        let (grid, mut params) = (terrain(), Effect::Friction.params());
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
         let mut worst = |mu: f32| {
-            law.friction.dynamic_mu = mu;
-            let felt = render(&grid, law, &slide.hips);
+            params.friction.dynamic_mu = mu;
+            let felt = render(&grid, params, &slide.hips);
             let off = off_percent(&grid, 0.3, &felt[slide.approach..]);
             let above = off.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             (above, -off.iter().copied().fold(f64::INFINITY, f64::min))
@@ -175,7 +175,7 @@ mod tests {
     fn a_proxy_on_ice_drifts() {
         let grid = terrain();
         let (hips, from) = held(&grid);
-        let felt = render(&grid, Effect::None.law(), &hips);
+        let felt = render(&grid, Effect::None.params(), &hips);
         let drift = drift(&felt[from[0]..][..HELD]);
         assert!(drift.is_some_and(|drift| drift > 0.01), "{drift:?}");
     }

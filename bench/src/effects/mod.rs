@@ -1,6 +1,6 @@
 //! Cost and error of each effect of a surface.
 //!
-//! - [`Effect`]: the laws that are compared;
+//! - [`Effect`]: the surface parameters that are compared;
 //! - `time`: the whole tick from encoder counts to currents, all effects in turns;
 //! - `friction`, `shading`, `texture`, `damping`, `energy`, `together`: one judge each, in f64,
 //!   by the formulas of docs/explanation/effects.md. No judge calls what it judges;
@@ -11,11 +11,11 @@
 
 mod arm;
 mod damping;
+mod effect;
 mod effect_tick;
 mod energy;
 mod foaw;
 mod friction;
-mod law;
 mod relief;
 mod replay;
 mod row;
@@ -29,7 +29,7 @@ use crate::compare::Effort;
 use crate::grid::Grid;
 
 pub use arm::NotMeasured;
-pub use law::Effect;
+pub use effect::Effect;
 pub use row::{Error, Measured, Spread, Time};
 
 /// Cells along the side of what is felt of a terrain: what a device's window holds, and more than

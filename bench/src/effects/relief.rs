@@ -55,7 +55,7 @@ fn scrambled(x: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::law::texture;
+    use crate::effects::effect::texture;
 
     #[test]
     fn the_slopes_are_those_of_the_heights() {

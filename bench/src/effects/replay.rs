@@ -24,16 +24,16 @@ pub(super) fn tiles() -> Vec<Tile> {
 }
 
 /// A scene over the whole of a grid.
-pub(super) fn scene(grid: &Grid, law: SurfaceParams, source: Source, home: GridPoint) -> Scene {
+pub(super) fn scene(grid: &Grid, params: SurfaceParams, source: Source, home: GridPoint) -> Scene {
     Scene {
         epoch: 1,
         level: 0,
         size: FieldSize::new(grid.columns as i32, grid.rows as i32),
         top: grid.top().floor() as i32 + 1,
-        underlay: None,
+        fallback: None,
         cell_mm: 1.0,
         home,
-        law,
+        params,
         source,
         hold_clock: false,
         materials: None,
@@ -65,10 +65,10 @@ pub(super) fn open<'t>(
     haptics
 }
 
-/// What each point feels like under a law.
-pub(super) fn render(grid: &Grid, law: SurfaceParams, hips: &[Hip]) -> Vec<EffectTick> {
+/// What each point feels like under surface parameters.
+pub(super) fn render(grid: &Grid, params: SurfaceParams, hips: &[Hip]) -> Vec<EffectTick> {
     let mut tiles = tiles();
-    let scene = scene(grid, law, Source::Points, GridPoint::default());
+    let scene = scene(grid, params, Source::Points, GridPoint::default());
     let mut haptics = open(grid, scene, &mut tiles);
     let mut answer = |(seq, hip): (u32, &Hip)| {
         let point = HipCommand { seq, hip: hip.grid };

@@ -1,8 +1,8 @@
 //! Shading: the direction of the force against that of the documented normal, and how far it turns
 //! from one HIP to the next.
 
+use super::effect::Effect;
 use super::effect_tick::EffectTick;
-use super::law::Effect;
 use super::replay::render;
 use super::row::{Error, Place};
 use super::vector::{Vector, cross, degrees, length, minus, normal, plus, unit};
@@ -24,7 +24,8 @@ const TURNED: f64 = 60.0;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     let slide = path::slide_at(grid, "slide 0.01", [STEP, DEPTH], effort.ticks);
-    let felt = |effect: Effect| render(grid, effect.law(), &slide.hips).split_off(slide.approach);
+    let felt =
+        |effect: Effect| render(grid, effect.params(), &slide.hips).split_off(slide.approach);
     let (plain, shaded) = (felt(Effect::None), felt(Effect::Shading));
     let [none, own] =
         [Effect::None, Effect::Shading].map(|of| Place(&grid.name, slide.name, of.name()));
@@ -127,7 +128,7 @@ mod tests {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
         let worst = |felt: &[EffectTick]| off(&grid, felt).into_iter().fold(0.0, f64::max);
-        let shaded = render(&grid, Effect::Shading.law(), &slide.hips);
+        let shaded = render(&grid, Effect::Shading.params(), &slide.hips);
         assert!(worst(&shaded) < ROUNDING);
         let (sin, cos) = 1_f64.to_radians().sin_cos();
         let mut wrong = shaded.clone();
@@ -138,7 +139,7 @@ mod tests {
         // About the axis of the turn a force does not move.
         let least = off(&grid, &wrong).into_iter().fold(f64::INFINITY, f64::min);
         assert!(worst(&wrong) > 0.9 && least > ROUNDING, "{least}");
-        let plain = render(&grid, Effect::None.law(), &slide.hips);
+        let plain = render(&grid, Effect::None.params(), &slide.hips);
         assert!(worst(&plain) > 1.0);
         assert!(turns(&plain).into_iter().fold(0.0, f64::max) > 1.0);
     }
@@ -149,7 +150,7 @@ mod tests {
         let mut dice = path::Dice(3);
         let rough = Grid::from_fn("rough", [64, 64], |_, _| dice.between(0.0, 6.0) as f32);
         let slide = path::slide_at(&rough, "", [STEP, DEPTH], 8000);
-        let shaded = render(&rough, Effect::Shading.law(), &slide.hips);
+        let shaded = render(&rough, Effect::Shading.params(), &slide.hips);
         let off = off(&rough, &shaded);
         let worst = off.iter().copied().fold(0.0, f64::max);
         let most = shaded.iter().filter_map(|felt| {

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use hapterra_core::force::{SurfaceParams, Texture};
 
+use super::effect::Effect;
 use super::effect_tick::EffectTick;
-use super::law::Effect;
 use super::relief::rise;
 use super::replay::render;
 use super::row::{Error, Place};
@@ -30,8 +30,8 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     for (name, step) in STEPS {
         let slide = path::slide_at(grid, name, [step, DEPTH], effort.ticks);
         for effect in [Effect::Grain, Effect::Grating] {
-            let law = effect.law();
-            let off = off_percent(&law, &render(grid, law, &slide.hips));
+            let params = effect.params();
+            let off = off_percent(&params, &render(grid, params, &slide.hips));
             let place = Place(&grid.name, name, effect.name());
             let [high, along] = [0, 1].map(|i| off.iter().map(|off| off[i]).collect());
             errors.extend(place.error(("rendered height off", "% of A"), MAX_HIGH, high));
@@ -44,11 +44,11 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 
 /// How far what is felt is from the formula, tick by tick: along the force without texture,
 /// percent of the amplitude, and across it, percent of what the steepest slope does.
-fn off_percent(law: &SurfaceParams, felt: &[EffectTick]) -> Vec<[f64; 2]> {
-    let texture = &law.texture;
+fn off_percent(params: &SurfaceParams, felt: &[EffectTick]) -> Vec<[f64; 2]> {
+    let texture = &params.texture;
     let (amplitude, stiffness) = (
         f64::from(texture.amplitude_mm),
-        f64::from(law.stiffness_n_per_mm),
+        f64::from(params.stiffness_n_per_mm),
     );
     let mut fade = Fade::new(f64::from(texture.wavelength_mm));
     // The proxy has a speed in the air, too.
@@ -124,8 +124,8 @@ mod tests {
     use super::*;
     use crate::state::terrain;
 
-    fn worst(law: &SurfaceParams, felt: &[EffectTick]) -> [f64; 2] {
-        let off = off_percent(law, felt);
+    fn worst(params: &SurfaceParams, felt: &[EffectTick]) -> [f64; 2] {
+        let off = off_percent(params, felt);
         [0, 1].map(|i| off.iter().map(|off| off[i]).fold(0.0, f64::max))
     }
 
@@ -134,9 +134,9 @@ mod tests {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [0.05, DEPTH], 2000);
         for effect in [Effect::Grain, Effect::Grating] {
-            let law = effect.law();
-            let felt = render(&grid, law, &slide.hips);
-            let [high, along] = worst(&law, &felt);
+            let params = effect.params();
+            let felt = render(&grid, params, &slide.hips);
+            let [high, along] = worst(&params, &felt);
             assert!(high < MAX_HIGH && along < MAX_ALONG, "{high} {along}");
             let wrong: [fn(&mut Texture); 3] = [
                 |texture| texture.seed += 1,
@@ -144,7 +144,7 @@ mod tests {
                 |texture| texture.wavelength_mm *= 1.01,
             ];
             for change in wrong {
-                let mut other = law;
+                let mut other = params;
                 change(&mut other.texture);
                 let [high, _] = worst(&other, &felt);
                 assert!(high > 10.0 * MAX_HIGH, "{other:?}: {high}");
@@ -155,13 +155,13 @@ mod tests {
                 felt.hip[0] += 0.01;
                 felt.proxy[0] += 0.01;
             }
-            assert!(worst(&law, &shifted)[0] > 10.0 * MAX_HIGH);
+            assert!(worst(&params, &shifted)[0] > 10.0 * MAX_HIGH);
             // Valleys where there should be ridges.
             let mut inverse = felt.clone();
             for felt in &mut inverse {
                 felt.force_n = minus(felt.spring(), felt.force_n);
             }
-            assert!(worst(&law, &inverse)[0] > 100.0);
+            assert!(worst(&params, &inverse)[0] > 100.0);
         }
     }
 
@@ -169,13 +169,13 @@ mod tests {
     fn a_texture_that_does_not_fade_is_seen() {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [0.18, DEPTH], 2000);
-        let law = Effect::Grating.law();
-        let mut felt = render(&grid, law, &slide.hips);
-        assert!(worst(&law, &felt)[0] < MAX_HIGH);
+        let params = Effect::Grating.params();
+        let mut felt = render(&grid, params, &slide.hips);
+        assert!(worst(&params, &felt)[0] < MAX_HIGH);
         for felt in &mut felt {
-            let added = wanted(&law.texture, felt.proxy, felt.spring(), 1.0);
+            let added = wanted(&params.texture, felt.proxy, felt.spring(), 1.0);
             felt.force_n = plus(felt.spring(), added, 1.0).map(|x| x * 0.5);
         }
-        assert!(worst(&law, &felt)[0] > 10.0);
+        assert!(worst(&params, &felt)[0] > 10.0);
     }
 }

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use super::arm::{Arm, Driven, NotMeasured, Way};
-use super::law::Effect;
+use super::effect::Effect;
 use super::replay;
 use super::row::Time;
 use crate::clock::Stopwatch;
@@ -21,7 +21,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Time>, NotMeasu
 fn along(arm: &Arm<'_>, way: &Way, effort: Effort) -> Result<Vec<Time>, NotMeasured> {
     let mut tiles = Effect::ALL.map(|_| replay::tiles());
     let begun = Effect::ALL.iter().zip(&mut tiles);
-    let begun = begun.map(|(effect, tiles)| Driven::begin(arm, effect.law(), way, tiles));
+    let begun = begun.map(|(effect, tiles)| Driven::begin(arm, effect.params(), way, tiles));
     let mut driven = begun.collect::<Result<Vec<_>, _>>()?;
     let times = interleave(driven.len(), effort.rounds, |index| {
         round(&mut driven[index], way)

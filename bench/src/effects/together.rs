@@ -3,8 +3,8 @@
 use hapterra_core::force::SurfaceParams;
 
 use super::arm::{Arm, NotMeasured};
+use super::effect::Effect;
 use super::effect_tick::EffectTick;
-use super::law::Effect;
 use super::row::{Error, Place};
 use super::vector::{degrees, length};
 use crate::compare::Effort;
@@ -17,15 +17,15 @@ const WHOLE: f64 = 100.0;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
     let arm = Arm::over(grid);
-    let law = Effect::All.law();
+    let params = Effect::All.params();
     let mut errors = Vec::new();
     for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
-        let felt = arm.render(law, &way)?;
+        let felt = arm.render(params, &way)?;
         let place = Place(&grid.name, way.name, Effect::All.name());
         let turn = ("force off the spring's direction", "°");
         errors.extend(place.error(turn, MAX_TURN, off_degrees(&felt)));
         let share = ("size of the force", "% of its bound");
-        errors.extend(place.error(share, WHOLE, shares(&law, &felt)));
+        errors.extend(place.error(share, WHOLE, shares(&params, &felt)));
     }
     Ok(errors)
 }
@@ -39,20 +39,20 @@ fn off_degrees(felt: &[EffectTick]) -> Vec<f64> {
 }
 
 /// Each force over the most it may be, percent.
-fn shares(law: &SurfaceParams, felt: &[EffectTick]) -> Vec<f64> {
+fn shares(params: &SurfaceParams, felt: &[EffectTick]) -> Vec<f64> {
     let felt = felt.iter().filter(|felt| felt.whole);
-    let share = felt.map(|felt| length(felt.force_n) / most_n(law, length(felt.spring())));
+    let share = felt.map(|felt| length(felt.force_n) / most_n(params, length(felt.spring())));
     share.map(|share| 100.0 * share).collect()
 }
 
 /// Shading keeps the size; texture adds its height along the force and at most λ/7.6 across it;
 /// damping and controller add as much again.
-fn most_n(law: &SurfaceParams, depth_mm: f64) -> f64 {
+fn most_n(params: &SurfaceParams, depth_mm: f64) -> f64 {
     let [amplitude, wavelength] =
-        [law.texture.amplitude_mm, law.texture.wavelength_mm].map(f64::from);
+        [params.texture.amplitude_mm, params.texture.wavelength_mm].map(f64::from);
     let deep = depth_mm + amplitude.min(depth_mm);
-    let textured_n = f64::from(law.stiffness_n_per_mm) * deep.hypot(wavelength / 7.6);
-    (2.0 * textured_n).min(f64::from(law.max_force_n))
+    let textured_n = f64::from(params.stiffness_n_per_mm) * deep.hypot(wavelength / 7.6);
+    (2.0 * textured_n).min(f64::from(params.max_force_n))
 }
 
 #[cfg(test)]
@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn a_force_that_pulls_or_is_too_large_is_seen() {
-        let law = Effect::All.law();
+        let params = Effect::All.params();
         let felt = |force_n| EffectTick {
             hip: [0.0; 3],
             proxy: [0.0, 0.0, 1.0],
@@ -70,7 +70,7 @@ mod tests {
         };
         let seen = |force_n| {
             let felt = [felt(force_n)];
-            (off_degrees(&felt)[0], shares(&law, &felt)[0])
+            (off_degrees(&felt)[0], shares(&params, &felt)[0])
         };
         let (turn, share) = seen([0.1, 0.0, 0.5]);
         assert!(turn < MAX_TURN && share < WHOLE);

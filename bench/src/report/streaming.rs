@@ -84,7 +84,7 @@ pub fn streaming_head() -> String {
     );
     format!(
         "held: the fastest hand, cells/s, straight and turning; missing: ticks without their terrain at {slow}, {usual} \
-         and {fast} cells/s, straight / turning; coarse: the same ticks over an underlay; holes: ticks that it leaves without\n{names}"
+         and {fast} cells/s, straight / turning; coarse: the same ticks over a fallback; holes: ticks that it leaves without\n{names}"
     )
 }
 

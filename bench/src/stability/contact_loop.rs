@@ -193,10 +193,10 @@ fn scene(felt: &LoopSettings) -> Scene {
         level: 0,
         size: FieldSize::new(CELLS, CELLS),
         top: 64,
-        underlay: None,
+        fallback: None,
         cell_mm: CELL_MM as f32,
         home: GridPoint::new([east as i32, north as i32, up as i32], Vec3::ZERO),
-        law: SurfaceParams {
+        params: SurfaceParams {
             stiffness_n_per_mm: felt.stiffness_n_per_mm as f32,
             max_force_n: MAX_N,
             damping: felt.damping,

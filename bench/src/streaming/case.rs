@@ -139,7 +139,7 @@ impl Bench<'_> {
         let opened = meter.traffic()?;
         let began = Instant::now();
         let terrain = terrain(&raster)?;
-        let scene = self.hand.scene(&terrain, Late::Underlay)?;
+        let scene = self.hand.scene(&terrain, Late::Fallback)?;
         let terrain = terrain.non_blocking();
         let pace = case.pace(Pace::Real);
         let mut chain = Chain::new(&terrain, scene, board, self.bytes_a_tick(), pace);
@@ -186,13 +186,13 @@ impl Bench<'_> {
         self.underlaid(row)
     }
 
-    /// What is coarse over an underlay, and whether it leaves a hole.
+    /// What is coarse over a fallback, and whether it leaves a hole.
     fn underlaid(&self, row: &mut Row) -> Result<(), NotMeasured> {
         let Ways { straight, turning } = self.ways;
-        let fastest = self.motion(straight, run::SPEEDS[1], Late::Underlay, false)?;
+        let fastest = self.motion(straight, run::SPEEDS[1], Late::Fallback, false)?;
         let mut holes = fastest.felt.missing;
         let mut coarse = |way, speed: u32| {
-            let felt = self.motion(way, speed.into(), Late::Underlay, false)?.felt;
+            let felt = self.motion(way, speed.into(), Late::Fallback, false)?.felt;
             holes += felt.missing;
             Ok::<_, NotMeasured>(Some(felt.coarse))
         };

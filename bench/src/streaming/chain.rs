@@ -44,7 +44,7 @@ pub(super) fn board() -> Board {
     )
 }
 
-/// A tile of the field that was sent; the one of its underlay does not count.
+/// A tile of the field that was sent; the one of its fallback does not count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SentTile {
     /// The tick in which the host put it onto the line.

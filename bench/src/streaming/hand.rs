@@ -21,8 +21,8 @@ const ABOVE: f64 = 30.0;
 pub(super) enum Late {
     /// Nothing: there is a hole.
     Hole,
-    /// The underlay of all that the arm reaches.
-    Underlay,
+    /// The fallback of all that the arm reaches.
+    Fallback,
 }
 
 /// A Premium 1.5 whose tip is led exactly where it is to be.
@@ -60,7 +60,7 @@ impl Hand {
         };
         Ok(match late {
             Late::Hole => scene,
-            Late::Underlay => {
+            Late::Fallback => {
                 let reach = Reach::of(&Calibration::PREMIUM_1_5);
                 terrain.underlaid(scene, reach.sides_mm())
             }

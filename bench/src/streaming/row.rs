@@ -53,7 +53,7 @@ pub struct Row {
     pub held_straight: Option<f64>,
     /// The same on the turning way.
     pub held_turning: Option<f64>,
-    /// Without an underlay: ticks whose terrain was missing, of the straight way at 500 cells a second.
+    /// Without a fallback: ticks whose terrain was missing, of the straight way at 500 cells a second.
     pub missing_straight_500: Option<u32>,
     /// At 2,000 cells a second.
     pub missing_straight_2000: Option<u32>,
@@ -65,7 +65,7 @@ pub struct Row {
     pub missing_turning_2000: Option<u32>,
     /// At 5,000 cells a second.
     pub missing_turning_5000: Option<u32>,
-    /// With an underlay: ticks that felt it, or a tile that settled from it, of the straight way at
+    /// With a fallback: ticks that felt it, or a tile that settled from it, of the straight way at
     /// 500 cells a second.
     pub coarse_straight_500: Option<u32>,
     /// At 2,000 cells a second.
@@ -78,13 +78,13 @@ pub struct Row {
     pub coarse_turning_2000: Option<u32>,
     /// At 5,000 cells a second.
     pub coarse_turning_5000: Option<u32>,
-    /// With an underlay: ticks that had nothing to feel, in these six motions and one of 20,000 cells a
+    /// With a fallback: ticks that had nothing to feel, in these six motions and one of 20,000 cells a
     /// second.
     pub holes_underlaid: Option<u32>,
 }
 
 impl Row {
-    /// Ticks over an underlay, as [`Row::missing`] has them without one.
+    /// Ticks over a fallback, as [`Row::missing`] has them without one.
     #[must_use]
     pub const fn coarse(&self) -> [[Option<u32>; 3]; 2] {
         [

@@ -11,7 +11,7 @@ pub(super) struct TickCounts {
     pub(super) ticks: u32,
     /// Ticks whose terrain was not on the device yet, and nothing coarser either.
     pub(super) missing: u32,
-    /// Ticks over an underlay, or over a tile that settles from it.
+    /// Ticks over a fallback, or over a tile that settles from it.
     pub(super) coarse: u32,
     /// Ticks without a contact, though nothing was missing.
     pub(super) free: u32,
@@ -46,7 +46,7 @@ mod tests {
             ..TickRecord::default()
         };
         let mut felt = TickCounts::default();
-        let fading = Limits::BOUNDARY_FADING;
+        let fading = Limits::EDGE_FADING;
         felt.add(&sample(Limits::empty(), ContactState::Touching));
         felt.add(&sample(fading, ContactState::Touching));
         felt.add(&sample(Limits::TERRAIN_COARSE, ContactState::Touching));

@@ -8,14 +8,14 @@ use hapterra_core::force::{
 };
 use hapterra_core::grid::Cell;
 use hapterra_core::scene::{Scene, Source};
-use hapterra_core::terrain::{CoarseTile, Underlay};
+use hapterra_core::terrain::{CoarseTile, Fallback};
 use hapterra_lab::grid::Grid;
 use hapterra_lab::path::Dice;
 use hapterra_lab::state::{TICKS, terrain};
 use hapterra_tests::counting::{CountingBoard, Samples};
 use hapterra_tests::scene::materials::Materials;
 
-use super::contact::{GridSamples, rough, scene, with_law};
+use super::contact::{GridSamples, rough, scene, with_params};
 use super::table::{Row, Target, Tick};
 
 /// Ticks on the way down, which do not count.
@@ -23,7 +23,7 @@ const APPROACH: usize = 50;
 
 /// Tiles that settle come before this tick.
 const LATE: Option<usize> = Some(APPROACH);
-/// How far the underlay is above the tiles, by how much a tick moves the surface, and how
+/// How far the fallback is above the tiles, by how much a tick moves the surface, and how
 /// long tiles settle, ticks.
 const UNDER_MM: f64 = 3.0;
 const STEP_MM: f64 = 0.05;
@@ -31,7 +31,7 @@ const SETTLES: usize = 60;
 /// Times that they do.
 const RUNS: u32 = 20;
 
-/// A field in cells of a millimetre, and an underlay that is off.
+/// A field in cells of a millimetre, and a fallback that is off.
 struct Under<'g>(GridSamples<'g>);
 
 impl Samples for Under<'_> {
@@ -89,18 +89,18 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         arm.row(board, name, target, (counts, arm.scene()), state)
     };
     let fast_rough = (&fast[..], rough(arm.scene()));
-    let smooth = |law| SurfaceParams {
+    let smooth = |params| SurfaceParams {
         shading: Shading::Smooth,
-        ..law
+        ..params
     };
-    let damped = |law| SurfaceParams {
+    let damped = |params| SurfaceParams {
         damping: Damping {
             ns_per_m: 2.0,
             controller: Controller::On,
         },
-        ..law
+        ..params
     };
-    let grained = |law| SurfaceParams {
+    let grained = |params| SurfaceParams {
         texture: Texture {
             pattern: Pattern::Grain,
             amplitude_mm: 0.1,
@@ -108,39 +108,39 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
             direction_deg: 0.0,
             seed: 1,
         },
-        ..law
+        ..params
     };
-    let grated = |law| {
-        let mut law = grained(law);
-        (law.texture.pattern, law.texture.direction_deg) = (Pattern::Grating, 30.0);
-        law
+    let grated = |params| {
+        let mut params = grained(params);
+        (params.texture.pattern, params.texture.direction_deg) = (Pattern::Grating, 30.0);
+        params
     };
-    let grain = (&sliding[..], with_law(arm.scene(), grained));
-    let grating = (&sliding[..], with_law(arm.scene(), grated));
-    let shaded = (&sliding[..], with_law(arm.scene(), smooth));
-    let damping = (&sliding[..], with_law(arm.scene(), damped));
-    let controlled = |scene| with_law(scene, |law| with_controller(law, Controller::On));
-    let all = with_law(with_law(rough(arm.scene()), smooth), damped);
+    let grain = (&sliding[..], with_params(arm.scene(), grained));
+    let grating = (&sliding[..], with_params(arm.scene(), grated));
+    let shaded = (&sliding[..], with_params(arm.scene(), smooth));
+    let damping = (&sliding[..], with_params(arm.scene(), damped));
+    let controlled = |scene| with_params(scene, |params| with_controller(params, Controller::On));
+    let all = with_params(with_params(rough(arm.scene()), smooth), damped);
     // Slower than half a cell a tick, at which it has faded.
-    let coarse = |law| {
-        let mut law = grained(law);
-        law.texture.wavelength_mm = 8.0;
-        law
+    let coarse = |params| {
+        let mut params = grained(params);
+        params.texture.wavelength_mm = 8.0;
+        params
     };
-    let all = with_law(all, coarse);
-    let hard = |law| SurfaceParams {
+    let all = with_params(all, coarse);
+    let hard = |params| SurfaceParams {
         stiffness_n_per_mm: 0.8,
-        ..law
+        ..params
     };
-    let two = arm.classes(&[arm.scene().law, hard(arm.scene().law)]);
-    let other = |law: SurfaceParams| {
-        let mut law = hard(law);
-        law.texture.pattern = Pattern::Grating;
-        law.friction.dynamic_mu = 0.1;
-        law.damping.ns_per_m = 1.0;
-        law
+    let two = arm.classes(&[arm.scene().params, hard(arm.scene().params)]);
+    let other = |params: SurfaceParams| {
+        let mut params = hard(params);
+        params.texture.pattern = Pattern::Grating;
+        params.friction.dynamic_mu = 0.1;
+        params.damping.ns_per_m = 1.0;
+        params
     };
-    let each = arm.classes(&[all.law, other(all.law), arm.scene().law]);
+    let each = arm.classes(&[all.params, other(all.params), arm.scene().params]);
     let on = |scene: Scene, materials: &Materials| Scene {
         materials: Some(materials.told().check_sum()),
         ..scene
@@ -224,7 +224,7 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
         ),
         arm.settling(
             board,
-            "chain, sliding, underlay",
+            "chain, sliding, fallback",
             in_the_air,
             (arm.scene(), None),
         ),
@@ -297,9 +297,9 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     ]
 }
 
-fn with_controller(mut law: SurfaceParams, controller: Controller) -> SurfaceParams {
-    law.damping.controller = controller;
-    law
+fn with_controller(mut params: SurfaceParams, controller: Controller) -> SurfaceParams {
+    params.damping.controller = controller;
+    params
 }
 
 impl<'g> Arm<'g> {
@@ -314,10 +314,10 @@ impl<'g> Arm<'g> {
         }
     }
 
-    /// The materials of these laws, in squares of five samples: sliding, one is nearly always on
+    /// The materials of these surface parameters, in squares of five samples: sliding, one is nearly always on
     /// its way in.
-    fn classes(&self, laws: &[SurfaceParams]) -> Materials {
-        let table: Vec<Material> = laws.iter().map(Material::of).collect();
+    fn classes(&self, all_params: &[SurfaceParams]) -> Materials {
+        let table: Vec<Material> = all_params.iter().map(Material::of).collect();
         let size = [self.grid.columns as i32, self.grid.rows as i32];
         let count = table.len() as i32;
         Materials::from_fn(&table, size, |x, y| ((x / 5 + y / 5) % count) as u8)
@@ -347,10 +347,10 @@ impl<'g> Arm<'g> {
             ..scene(self.grid)
         };
         // The rows that name it have it.
-        with_law(arm, |law| with_controller(law, Controller::Off))
+        with_params(arm, |params| with_controller(params, Controller::Off))
     }
 
-    /// Slides over the underlay, which is [`UNDER_MM`] off, at half a cell a tick, once in each
+    /// Slides over the fallback, which is [`UNDER_MM`] off, at half a cell a tick, once in each
     /// of several directions, and counts the ticks from the one in which tiles come until they
     /// have settled; as many where none comes.
     fn settling(
@@ -369,7 +369,7 @@ impl<'g> Arm<'g> {
             ..spacing(2)
         };
         let scene = Scene {
-            underlay: Some(Underlay {
+            fallback: Some(Fallback {
                 wide: spacing(3),
                 near: Some(near),
             }),
@@ -392,7 +392,7 @@ impl<'g> Arm<'g> {
                 })
                 .collect();
             let late = late.map(|late| late as u32);
-            let ticks = board.chain_over_underlay(&scene, &field, (late, &counts));
+            let ticks = board.chain_over_fallback(&scene, &field, (late, &counts));
             ticks.into_iter().enumerate().skip(counted.start)
         });
         let touching = ContactState::Touching as u32;

@@ -161,16 +161,19 @@ fn size(grid: &Grid) -> FieldSize {
 
 /// The same on a rough surface.
 pub(crate) fn rough(scene: Scene) -> Scene {
-    with_law(scene, |law| SurfaceParams {
+    with_params(scene, |params| SurfaceParams {
         friction: ROUGH,
-        ..law
+        ..params
     })
 }
 
-/// The same under another law.
-pub(crate) fn with_law(scene: Scene, change: impl FnOnce(SurfaceParams) -> SurfaceParams) -> Scene {
-    let law = change(scene.law);
-    Scene { law, ..scene }
+/// The same under other surface parameters.
+pub(crate) fn with_params(
+    scene: Scene,
+    change: impl FnOnce(SurfaceParams) -> SurfaceParams,
+) -> Scene {
+    let params = change(scene.params);
+    Scene { params, ..scene }
 }
 
 /// A scene of points over the field.
@@ -180,10 +183,10 @@ pub(crate) fn scene(grid: &Grid) -> Scene {
         level: 0,
         size: size(grid),
         top: grid.top().floor() as i32 + 1,
-        underlay: None,
+        fallback: None,
         cell_mm: 1.0,
         home: GridPoint::default(),
-        law: SurfaceParams::PREMIUM,
+        params: SurfaceParams::PREMIUM,
         source: Source::Points,
         hold_clock: false,
         materials: None,

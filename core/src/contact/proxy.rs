@@ -1,10 +1,10 @@
 //! The proxy: what a tick does, and what is remembered from tick to tick.
 
 mod departures;
-mod held_back;
 mod in_air;
 mod landing;
 mod on_ground;
+mod with_friction;
 
 use glam::Vec3;
 
@@ -19,8 +19,8 @@ use super::sweep::Path;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::{TILE_CELLS, Window};
 use departures::Departures;
-use held_back::Rough;
 use landing::Landing;
+use with_friction::Rough;
 
 /// Phase of the proxy, with its memory.
 // The path is most of a contact's state, and there is no heap to put it on.

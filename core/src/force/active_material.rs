@@ -24,8 +24,8 @@ pub(crate) struct ActiveMaterial {
     step: f32,
     /// Factor of the stiffness.
     scale: f32,
-    /// The law as it is felt. Its texture is the one whose share is felt.
-    law: SurfaceParams,
+    /// The surface parameters as it is felt. Its texture is the one whose share is felt.
+    params: SurfaceParams,
     /// Share of that texture that is felt.
     texture_share: f32,
     cell_mm: f32,
@@ -38,11 +38,11 @@ impl ActiveMaterial {
     /// Before anything is felt: the default.
     pub(crate) fn of(
         table: &MaterialTable,
-        law: &SurfaceParams,
+        params: &SurfaceParams,
         cell_mm: f32,
         rate: TickRate,
     ) -> Option<Self> {
-        let scale = table.stiffness_scale(law);
+        let scale = table.stiffness_scale(params);
         let default = scaled(table.at(0)?, scale);
         let mut material = Self {
             index: 0,
@@ -50,25 +50,25 @@ impl ActiveMaterial {
             done: 1.0,
             step: rate.tick_s() / MATERIAL_CHANGE_S,
             scale,
-            law: *law,
+            params: *params,
             texture_share: 1.0,
             cell_mm,
             rate,
             was_felt: false,
         };
         material.feels(&default);
-        material.law.texture = default.texture;
+        material.params.texture = default.texture;
         Some(material)
     }
 
-    /// The law that is felt.
-    pub(crate) const fn law(&self) -> &SurfaceParams {
-        &self.law
+    /// The surface parameters that is felt.
+    pub(crate) const fn params(&self) -> &SurfaceParams {
+        &self.params
     }
 
     /// Returns the friction from the next tick on.
     pub(crate) const fn friction(&self) -> Friction {
-        self.law.friction
+        self.params.friction
     }
 
     /// Returns the share of the texture that is felt.
@@ -78,7 +78,7 @@ impl ActiveMaterial {
 
     /// The texture that is felt, as a scene of its own would have it.
     pub(crate) fn texturer(&self) -> Option<Texturer> {
-        Texturer::of(&self.law.texture, self.cell_mm, self.rate)
+        Texturer::of(&self.params.texture, self.cell_mm, self.rate)
     }
 
     /// One more tick of a contact, which is done with its HIP. Returns whether another texture
@@ -106,7 +106,7 @@ impl ActiveMaterial {
         if let Some(index) = there
             && index != self.index
         {
-            (self.from, self.done, self.index) = (Material::of(&self.law), 0.0, index);
+            (self.from, self.done, self.index) = (Material::of(&self.params), 0.0, index);
         }
         let Some(wanted) = table.at(self.index) else {
             return false;
@@ -134,13 +134,13 @@ impl ActiveMaterial {
         }
         // Out in half of the time, and in in the other half.
         let step = 2.0 * self.step;
-        if self.law.texture == wanted.texture {
+        if self.params.texture == wanted.texture {
             self.texture_share = (self.texture_share + step).min(1.0);
             return false;
         }
         // An even surface has nothing that could go out.
         let share = self.texture_share - step;
-        if share > 0.0 && !self.law.texture.is_none() {
+        if share > 0.0 && !self.params.texture.is_none() {
             self.texture_share = share;
             return false;
         }
@@ -169,15 +169,15 @@ impl ActiveMaterial {
 
     /// Puts all of a material in force but its texture.
     fn feels(&mut self, material: &Material) {
-        self.law = SurfaceParams {
-            texture: self.law.texture,
-            ..material.law(&self.law)
+        self.params = SurfaceParams {
+            texture: self.params.texture,
+            ..material.params(&self.params)
         };
     }
 
     fn takes_texture(&mut self, texture: &Texture) -> bool {
-        let is_other = self.law.texture != *texture;
-        self.law.texture = *texture;
+        let is_other = self.params.texture != *texture;
+        self.params.texture = *texture;
         is_other
     }
 }

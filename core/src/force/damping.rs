@@ -69,7 +69,7 @@ impl Damping {
 /// any has none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Damper {
-    law: SurfaceParams,
+    params: SurfaceParams,
     controller: Option<Passivity>,
 }
 
@@ -77,18 +77,18 @@ impl Damper {
     /// Of a scene. Points have no hand that energy could be given to.
     // A call: it is made by two, once for a scene.
     #[inline(never)]
-    pub(crate) fn of(law: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
-        let is_controlled = felt.arm && law.is_controlled();
+    pub(crate) fn of(params: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
+        let is_controlled = felt.arm && params.is_controlled();
         let controller = is_controlled.then(|| Passivity::new(felt));
-        (controller.is_some() || law.damping.ns_per_m > 0.0).then_some(Self {
-            law: *law,
+        (controller.is_some() || params.damping.ns_per_m > 0.0).then_some(Self {
+            params: *params,
             controller,
         })
     }
 
     /// The surface is another one from this tick on, of the same controller.
-    pub(crate) const fn feels(&mut self, law: &SurfaceParams) {
-        self.law = *law;
+    pub(crate) const fn feels(&mut self, params: &SurfaceParams) {
+        self.params = *params;
     }
 
     /// The energy that was created and not taken back yet, mJ, where it is watched.
@@ -102,7 +102,10 @@ impl Damper {
     /// along it takes back what comes across. Towards an edge it gives what it takes beyond, so
     /// all of the turn is left while no more was created than an edge gives.
     pub(crate) fn turn_left(&self, depth_mm: f32, cell_mm: f32) -> f32 {
-        let spring_n = smaller(depth_mm * self.law.stiffness_n_per_mm, self.law.max_force_n);
+        let spring_n = smaller(
+            depth_mm * self.params.stiffness_n_per_mm,
+            self.params.max_force_n,
+        );
         // None of the turn is left at twice as much, and more than the book holds is forgotten.
         let gives_mj = smaller(
             EDGE_GIVES * spring_n * (cell_mm + depth_mm) + LEAST_MJ,
@@ -122,7 +125,7 @@ impl Damper {
     /// Books the energy since the tick before.
     pub(crate) fn observe(&mut self, now: &Moment) {
         if let Some(controller) = &mut self.controller {
-            controller.observe(&self.law, now);
+            controller.observe(&self.params, now);
         }
     }
 
@@ -147,13 +150,13 @@ impl Damper {
                 across_squared: across_mm_s.length_squared(),
             })
         });
-        if !(self.law.shading.is_none() && self.law.texture.is_none()) {
+        if !(self.params.shading.is_none() && self.params.texture.is_none()) {
             // Such a force is not on the way to the proxy: damping across it could pull.
             takes.across = 0.0;
         }
-        takes.along += 1e-3 * self.law.damping.ns_per_m;
+        takes.along += 1e-3 * self.params.damping.ns_per_m;
         let along_n = spring_n * (1.0 - (takes.along * share).clamp(-1.0, 1.0));
-        let most_n = smaller(2.0 * spring_n.length(), self.law.max_force_n);
+        let most_n = smaller(2.0 * spring_n.length(), self.params.max_force_n);
         clamp_length(along_n - across_mm_s * takes.across, most_n)
     }
 }

@@ -11,8 +11,8 @@ use super::*;
 use crate::rate::TickRate;
 
 /// A scene's damper with an arm.
-fn damper(law: &SurfaceParams, hz: u32) -> Option<Damper> {
-    Damper::of(law, &felt(hz, 0.1e-3))
+fn damper(params: &SurfaceParams, hz: u32) -> Option<Damper> {
+    Damper::of(params, &felt(hz, 0.1e-3))
 }
 
 /// With an arm.
@@ -25,7 +25,7 @@ fn felt(hz: u32, latency_s: f32) -> EffectContext {
     }
 }
 
-fn law(stiffness_n_per_mm: f32, ns_per_m: f32, controller: Controller) -> SurfaceParams {
+fn params(stiffness_n_per_mm: f32, ns_per_m: f32, controller: Controller) -> SurfaceParams {
     SurfaceParams {
         stiffness_n_per_mm,
         damping: Damping {
@@ -38,14 +38,14 @@ fn law(stiffness_n_per_mm: f32, ns_per_m: f32, controller: Controller) -> Surfac
 
 #[test]
 fn damping_is_against_the_motion_and_no_more_than_the_spring() {
-    let law = law(0.5, 4.0, Controller::Off);
-    let damper = damper(&law, 1000).expect("damped");
+    let params = params(0.5, 4.0, Controller::Off);
+    let damper = damper(&params, 1000).expect("damped");
     let normal = Vec3::new(0.6, 0.0, 0.8);
     let across = Vec3::new(-0.8, 0.0, 0.6);
     for deep_mm in [0.0_f32, 1e-6, 0.01, 1.0, 6.0, 16.0, 40.0] {
         for speed_mm_s in [-900.0_f32, -50.0, -1e-3, 0.0, 50.0, 900.0] {
             let velocity_mm_s = normal * speed_mm_s + across * 300.0;
-            let force_n = damper.force_n(law.spring().force_n(normal * deep_mm), velocity_mm_s);
+            let force_n = damper.force_n(params.spring().force_n(normal * deep_mm), velocity_mm_s);
             let spring_n = (0.5 * deep_mm).min(8.5);
             let damping_n = (-0.004 * speed_mm_s).clamp(-spring_n, spring_n);
             let wanted = normal * (spring_n + damping_n).clamp(0.0, 8.5);
@@ -60,7 +60,7 @@ fn damping_is_against_the_motion_and_no_more_than_the_spring() {
 #[test]
 fn the_controller_acts_on_every_arm_unless_it_is_off() {
     let acts = |stiffness, hz, controller| {
-        let damper = damper(&law(stiffness, 0.0, controller), hz);
+        let damper = damper(&params(stiffness, 0.0, controller), hz);
         damper.is_some_and(|damper| damper.controller.is_some())
     };
     for (stiffness, hz) in [(0.01, 10_000), (0.5, 1000), (4.0, 1000)] {
@@ -73,15 +73,15 @@ fn the_controller_acts_on_every_arm_unless_it_is_off() {
         arm: false,
         ..felt(1000, 0.1e-3)
     };
-    let points = Damper::of(&law(4.0, 0.0, Controller::On), &points);
+    let points = Damper::of(&params(4.0, 0.0, Controller::On), &points);
     assert!(points.is_none());
 }
 
 /// The energy that `ramps` books on a tip at rest, and on one that leaves with the force of the
 /// whole spring, mJ.
 fn created_by(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
-    let law = law(1.0, 0.0, Controller::On);
-    let mut damper = damper(&law, 1000).expect("controlled");
+    let params = params(1.0, 0.0, Controller::On);
+    let mut damper = damper(&params, 1000).expect("controlled");
     let mut at = |tick: u16, up_mm: f32, moved_mm: f32| {
         damper.observe(&Moment {
             displacement_mm: Vec3::Z * -up_mm,
@@ -128,8 +128,8 @@ fn ramp_and_clutch_book_only_energy_of_the_motion() {
 fn damping_is_that_of_the_spring_which_is_let_through() {
     // What half of a spring created takes as much damping a newton as all of one.
     let damped = |shares: Shares| {
-        let law = law(1.0, 0.0, Controller::On);
-        let mut damper = damper(&law, 1000).expect("controlled");
+        let params = params(1.0, 0.0, Controller::On);
+        let mut damper = damper(&params, 1000).expect("controlled");
         let velocity_mm_s = Vec3::Z * 100.0;
         let inside = shares.clutch;
         let outside = shares.ramp * shares.speed;
@@ -194,9 +194,9 @@ impl Taps {
 
     /// Energy that the surface gives in each of a few taps, mJ, integrated a hundred times a tick.
     /// The force changes by no more than the guard lets it.
-    fn given_mj(self, law: &SurfaceParams) -> Vec<f64> {
+    fn given_mj(self, params: &SurfaceParams) -> Vec<f64> {
         const DEEP_MM: f64 = 3.0;
-        let mut damper = Damper::of(law, &felt(self.hz, self.told_s as f32));
+        let mut damper = Damper::of(params, &felt(self.hz, self.told_s as f32));
         let tick_s = 1.0 / f64::from(self.hz);
         let slew_n = 1000.0 * tick_s as f32;
         let height_mm = |t_s: f64| DEEP_MM * libm::cos(TAU * self.tap_hz * t_s);
@@ -210,7 +210,7 @@ impl Taps {
             let velocity_mm_s = Vec3::Z * speed_mm_s as f32;
             let moved_mm = Vec3::Z * (height_mm(now_s) - height_mm(now_s - tick_s)) as f32;
             let asked_n = Vec3::Z * forces_n.last().map_or(0.0, |last| *last as f32);
-            let mut force_n = law.spring().force_n(displacement_mm);
+            let mut force_n = params.spring().force_n(displacement_mm);
             if let Some(damper) = &mut damper {
                 damper.observe(&Moment {
                     displacement_mm,
@@ -249,8 +249,8 @@ fn with_the_controller_no_tap_gives_energy_and_without_it_every_one_does() {
         for stiffness in [0.2, 0.5, 1.0, 2.0, 4.0] {
             for late_s in LATE_S {
                 let taps = Taps::new(hz, late_s);
-                let without = taps.given_mj(&law(stiffness, 0.0, Controller::Off));
-                let with = taps.given_mj(&law(stiffness, 0.0, Controller::On));
+                let without = taps.given_mj(&params(stiffness, 0.0, Controller::Off));
+                let with = taps.given_mj(&params(stiffness, 0.0, Controller::On));
                 assert!(without.len() >= 4 && with.len() >= 4);
                 assert!(without.iter().all(|mj| *mj > 0.0), "{hz} Hz: {without:?}");
                 for (with, without) in with.iter().zip(&without) {
@@ -266,20 +266,20 @@ fn with_the_controller_no_tap_gives_energy_and_without_it_every_one_does() {
 
 /// Energy, mJ, that a point which holds the proxy gives to a tip on circles of 4 mm round it,
 /// 200 mm/s fast, in a second: no motion is along the force.
-fn given_on_circles_mj(law: &SurfaceParams, hz: u32) -> f64 {
+fn given_on_circles_mj(params: &SurfaceParams, hz: u32) -> f64 {
     const RADIUS_MM: f64 = 4.0;
     let tick_s = 1.0 / f64::from(hz);
     let tip_mm = |t_s: f64| {
         let (sin, cos) = libm::sincos(200.0 / RADIUS_MM * t_s);
         Vec3::new(cos as f32, sin as f32, 0.0) * RADIUS_MM as f32
     };
-    let mut damper = Damper::of(law, &felt(hz, 0.0));
+    let mut damper = Damper::of(params, &felt(hz, 0.0));
     let (mut given_mj, mut asked_n) = (0.0, Vec3::ZERO);
     for tick in 0..hz {
         let now_s = f64::from(tick) * tick_s;
         let moved_mm = tip_mm(now_s) - tip_mm(now_s - tick_s);
         let velocity_mm_s = moved_mm * hz as f32;
-        let mut force_n = law.spring().force_n(-tip_mm(now_s));
+        let mut force_n = params.spring().force_n(-tip_mm(now_s));
         if let Some(damper) = &mut damper {
             damper.observe(&Moment {
                 displacement_mm: -tip_mm(now_s),
@@ -301,8 +301,8 @@ fn given_on_circles_mj(law: &SurfaceParams, hz: u32) -> f64 {
 fn a_tip_on_circles_round_a_point_is_given_no_energy() {
     for hz in [1000, 2000, 4000, 10_000] {
         for stiffness in [0.2, 0.5, 1.0, 2.0] {
-            let without = given_on_circles_mj(&law(stiffness, 0.0, Controller::Off), hz);
-            let with = given_on_circles_mj(&law(stiffness, 0.0, Controller::On), hz);
+            let without = given_on_circles_mj(&params(stiffness, 0.0, Controller::Off), hz);
+            let with = given_on_circles_mj(&params(stiffness, 0.0, Controller::On), hz);
             assert!(without > 0.3, "{hz} Hz, {stiffness} N/mm: {without} mJ");
             assert!(
                 with.abs() < 0.02 * without,
@@ -322,27 +322,27 @@ fn across_a_shaded_or_textured_force_nothing_is_taken() {
     };
     let shaded = SurfaceParams {
         shading: Shading::Smooth,
-        ..law(1.0, 0.0, Controller::On)
+        ..params(1.0, 0.0, Controller::On)
     };
     let textured = SurfaceParams {
         texture,
-        ..law(1.0, 0.0, Controller::On)
+        ..params(1.0, 0.0, Controller::On)
     };
-    for law in [shaded, textured] {
-        assert!(given_on_circles_mj(&law, 1000) > 1.0);
+    for params in [shaded, textured] {
+        assert!(given_on_circles_mj(&params, 1000) > 1.0);
     }
 }
 
 #[test]
 fn energy_of_unstated_latency_is_not_all_dissipated() {
     // So it matters that a board states how long it and its amplifiers take.
-    let on = law(1.0, 0.0, Controller::On);
+    let on = params(1.0, 0.0, Controller::On);
     let known = Taps::new(1000, 1.1e-3);
     let unknown = Taps {
         told_s: 0.1e-3,
         ..known
     };
-    let without = known.given_mj(&law(1.0, 0.0, Controller::Off));
+    let without = known.given_mj(&params(1.0, 0.0, Controller::Off));
     let (known, unknown) = (known.given_mj(&on), unknown.given_mj(&on));
     for ((known, unknown), without) in known.iter().zip(&unknown).zip(&without) {
         assert!(*known < 0.0, "{known} mJ");
@@ -359,7 +359,7 @@ fn a_force_that_comes_earlier_than_it_is_said_to_gives_nothing_either() {
                 told_s: 1.13e-3,
                 ..Taps::new(hz, late_s)
             };
-            let with = taps.given_mj(&law(1.0, 0.0, Controller::On));
+            let with = taps.given_mj(&params(1.0, 0.0, Controller::On));
             assert!(with.iter().all(|mj| *mj < 0.0), "{hz} Hz: {with:?} mJ");
         }
     }
@@ -374,7 +374,7 @@ fn a_tip_too_fast_for_the_guards_force_gets_nothing_either() {
                 tap_hz: 30.0,
                 ..Taps::new(hz, 0.2e-3)
             };
-            let with = taps.given_mj(&law(stiffness, 0.0, Controller::On));
+            let with = taps.given_mj(&params(stiffness, 0.0, Controller::On));
             assert!(
                 with.len() >= 4 && with.iter().all(|mj| *mj < 0.0),
                 "{hz} Hz, {stiffness} N/mm: {with:?} mJ"
@@ -389,8 +389,8 @@ fn what_is_taken_back_is_not_much_more_than_was_created() {
     for hz in [1000, 4000] {
         for late_s in LATE_S {
             let taps = Taps::new(hz, late_s);
-            let without = taps.given_mj(&law(1.0, 0.0, Controller::Off));
-            let with = taps.given_mj(&law(1.0, 0.0, Controller::On));
+            let without = taps.given_mj(&params(1.0, 0.0, Controller::Off));
+            let with = taps.given_mj(&params(1.0, 0.0, Controller::On));
             for (given, taken) in without.iter().zip(&with) {
                 assert!(-taken < *given, "{hz} Hz: {taken} mJ, {given} without");
             }
@@ -400,8 +400,8 @@ fn what_is_taken_back_is_not_much_more_than_was_created() {
 
 #[test]
 fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
-    let law = law(2.0, 0.0, Controller::On);
-    let mut damper = damper(&law, 1000).expect("controlled");
+    let params = params(2.0, 0.0, Controller::On);
+    let mut damper = damper(&params, 1000).expect("controlled");
     let mut share = |up_mm: f32, speed_mm_s: f32, ticks: u32| {
         let displacement_mm = Vec3::Z * (-up_mm).max(0.0);
         for _ in 0..ticks {
@@ -415,9 +415,9 @@ fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
             });
         }
         damper
-            .force_n(law.spring().force_n(displacement_mm), Vec3::ZERO)
+            .force_n(params.spring().force_n(displacement_mm), Vec3::ZERO)
             .z
-            / law.spring().force_n(Vec3::Z * -up_mm).z
+            / params.spring().force_n(Vec3::Z * -up_mm).z
     };
     // 500 N/s are half of what the guard allows.
     assert_eq!(share(-1.0, 250.0, 1), 1.0);
@@ -436,8 +436,8 @@ fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
 
 #[test]
 fn what_was_created_is_forgotten_at_rest_and_never_more_than_a_little() {
-    let law = law(1.0, 0.0, Controller::On);
-    let mut damper = damper(&law, 1000).expect("controlled");
+    let params = params(1.0, 0.0, Controller::On);
+    let mut damper = damper(&params, 1000).expect("controlled");
     let mut at = |up_mm: f32, asked_n: f32| {
         damper.observe(&Moment {
             displacement_mm: Vec3::Z * (5.0 - up_mm),

@@ -21,10 +21,10 @@ pub(crate) struct Effects {
 impl Effects {
     /// Of a scene without materials.
     #[inline(never)]
-    pub(crate) fn of(law: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
-        let shader = Shader::of(law.shading);
-        let texturer = Texturer::of(&law.texture, felt.cell_mm, felt.rate);
-        let damper = Damper::of(law, felt);
+    pub(crate) fn of(params: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
+        let shader = Shader::of(params.shading);
+        let texturer = Texturer::of(&params.texture, felt.cell_mm, felt.rate);
+        let damper = Damper::of(params, felt);
         let is_there = shader.is_some() || texturer.is_some() || damper.is_some();
         is_there.then_some(Self {
             shader,
@@ -39,16 +39,16 @@ impl Effects {
     #[inline(never)]
     pub(crate) fn with_materials(
         table: &MaterialTable,
-        law: &SurfaceParams,
+        params: &SurfaceParams,
         felt: &EffectContext,
     ) -> Option<Self> {
-        let material = ActiveMaterial::of(table, law, felt.cell_mm, felt.rate)?;
-        let mut damper = Damper::of(&table.hardest(law), felt);
+        let material = ActiveMaterial::of(table, params, felt.cell_mm, felt.rate)?;
+        let mut damper = Damper::of(&table.hardest(params), felt);
         if let Some(damper) = &mut damper {
-            damper.feels(material.law());
+            damper.feels(material.params());
         }
         Some(Self {
-            shader: Shader::of(law.shading),
+            shader: Shader::of(params.shading),
             texturer: material.texturer(),
             damper,
             material: Some(material),
@@ -116,7 +116,7 @@ impl Effects {
             self.texturer = material.texturer();
         }
         if let Some(damper) = &mut self.damper {
-            damper.feels(material.law());
+            damper.feels(material.params());
         }
         let (proxy, share) = (&contact.output().proxy, material.texture_share());
         match &mut self.texturer {
@@ -125,9 +125,11 @@ impl Effects {
         }
     }
 
-    /// The law that is felt, where it is another than the scene's.
-    pub(crate) fn law<'l>(&'l self, of_scene: &'l SurfaceParams) -> &'l SurfaceParams {
-        self.material.as_ref().map_or(of_scene, ActiveMaterial::law)
+    /// The surface parameters that is felt, where it is another than the scene's.
+    pub(crate) fn params<'l>(&'l self, of_scene: &'l SurfaceParams) -> &'l SurfaceParams {
+        self.material
+            .as_ref()
+            .map_or(of_scene, ActiveMaterial::params)
     }
 
     /// Returns the friction from the next tick on, in a scene with materials.

@@ -7,7 +7,7 @@ use crate::grid::GridPoint;
 use crate::rate::TickRate;
 use crate::terrain::{FieldSize, TileArena};
 
-const LAW: SurfaceParams = SurfaceParams {
+const PARAMS: SurfaceParams = SurfaceParams {
     shading: Shading::Smooth,
     damping: Damping {
         controller: Controller::On,
@@ -42,7 +42,7 @@ fn created(effects: &mut Effects, created_mj: f32) {
 }
 
 /// The displacement beside a ridge, without shading and with it, where the book has so much in it.
-fn beside_a_ridge(law: &SurfaceParams, created_mj: f32) -> [Vec3; 2] {
+fn beside_a_ridge(params: &SurfaceParams, created_mj: f32) -> [Vec3; 2] {
     let size = FieldSize::new(40, 40);
     let ridge = |x: i32, _| -0.5 * (x - 20).abs() as f32;
     let mut field = TileArena::<2>::from_fn(size, ridge).expect("it fits");
@@ -54,7 +54,7 @@ fn beside_a_ridge(law: &SurfaceParams, created_mj: f32) -> [Vec3; 2] {
             &GridPoint::new([20, 20, 0], Vec3::new(0.2, 0.5, height)),
         );
     }
-    let mut effects = Effects::of(law, &felt()).expect("shaded");
+    let mut effects = Effects::of(params, &felt()).expect("shaded");
     created(&mut effects, created_mj);
     let table = MaterialTable::EMPTY;
     let plain = contact.output().displacement;
@@ -63,18 +63,18 @@ fn beside_a_ridge(law: &SurfaceParams, created_mj: f32) -> [Vec3; 2] {
 
 #[test]
 fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
-    let [plain, shaded] = beside_a_ridge(&LAW, 0.0);
+    let [plain, shaded] = beside_a_ridge(&PARAMS, 0.0);
     let angle = plain.angle_between(shaded);
     assert!(angle > 0.1, "{angle}");
     // What an edge gives at this depth, and a tenth of a millijoule.
     let deep_mm = plain.length();
     let gives_mj = 0.1 * 0.5 * deep_mm * (1.0 + deep_mm) + 0.1;
     for share in [0.3, 0.99] {
-        assert_eq!(beside_a_ridge(&LAW, share * gives_mj)[1], shaded);
+        assert_eq!(beside_a_ridge(&PARAMS, share * gives_mj)[1], shaded);
     }
     let mut last = angle;
     for share in [0.1, 0.4, 0.7, 0.9] {
-        let [_, less] = beside_a_ridge(&LAW, (1.0 + share) * gives_mj);
+        let [_, less] = beside_a_ridge(&PARAMS, (1.0 + share) * gives_mj);
         assert!((less.length() - plain.length()).abs() < 1e-5 * plain.length());
         let turned = plain.angle_between(less);
         let wanted = angle * (1.0 - share);
@@ -83,7 +83,7 @@ fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
         last = turned;
     }
     for created_mj in [2.001 * gives_mj, 1.0, 3.0] {
-        let [_, unturned] = beside_a_ridge(&LAW, created_mj);
+        let [_, unturned] = beside_a_ridge(&PARAMS, created_mj);
         assert!((unturned - plain).length() < 1e-6, "{created_mj}");
     }
 }
@@ -92,7 +92,7 @@ fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
 fn what_the_book_holds_at_most_is_enough_to_turn_no_force() {
     // A cell of a metre: an edge gives more than the book holds.
     let damper = |created_mj: f32| {
-        let mut effects = Effects::of(&LAW, &felt()).expect("shaded");
+        let mut effects = Effects::of(&PARAMS, &felt()).expect("shaded");
         created(&mut effects, created_mj);
         effects.damper.expect("controlled")
     };
@@ -103,23 +103,23 @@ fn what_the_book_holds_at_most_is_enough_to_turn_no_force() {
 /// Slides 20 mm over facets of two cells, so deep, and compares each tick with the same without the
 /// controller: the largest step of the force of both, N, and the share of the turn that was left.
 fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] {
-    let law = SurfaceParams {
+    let params = SurfaceParams {
         stiffness_n_per_mm,
-        ..LAW
+        ..PARAMS
     };
     let uncontrolled = SurfaceParams {
         damping: Damping {
             controller: Controller::Off,
             ..Damping::NONE
         },
-        ..law
+        ..params
     };
     let height = |x: f32| slope * (x.rem_euclid(4.0) - 2.0).abs();
     let size = FieldSize::new(60, 60);
     let mut field = TileArena::<2>::from_fn(size, |x, _| height(x as f32)).expect("it fits");
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
-    let mut controlled = Effects::of(&law, &felt()).expect("shaded");
+    let mut controlled = Effects::of(&params, &felt()).expect("shaded");
     let mut free = Effects::of(&uncontrolled, &felt()).expect("shaded");
     let table = MaterialTable::EMPTY;
     let step = mm_s * TickRate::DEFAULT.tick_s();
@@ -147,8 +147,8 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
                 most_n: 8.5,
                 shares: Shares::ALL,
             });
-            asked_n = damper.force_n(law.spring().force_n(felt[0]), velocity_mm_s);
-            let forces = felt.map(|displacement| law.spring().force_n(displacement));
+            asked_n = damper.force_n(params.spring().force_n(felt[0]), velocity_mm_s);
+            let forces = felt.map(|displacement| params.spring().force_n(displacement));
             if let Some((_, before)) = last.replace((tip_mm, forces))
                 && tick > down
             {
@@ -198,8 +198,8 @@ fn shading_turns_all_force_without_the_controller() {
             controller: Controller::Off,
             ..Damping::NONE
         },
-        ..LAW
+        ..PARAMS
     };
-    let [_, shaded] = beside_a_ridge(&LAW, 0.0);
+    let [_, shaded] = beside_a_ridge(&PARAMS, 0.0);
     assert_eq!(beside_a_ridge(&uncontrolled, 3.0)[1], shaded);
 }

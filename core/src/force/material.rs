@@ -33,35 +33,35 @@ pub struct Material {
 impl Material {
     /// Returns the material that a scene's surface parameters describe.
     #[must_use]
-    pub const fn of(law: &SurfaceParams) -> Self {
+    pub const fn of(params: &SurfaceParams) -> Self {
         Self {
-            stiffness_n_per_mm: law.stiffness_n_per_mm,
-            friction: law.friction,
-            damping_ns_per_m: law.damping.ns_per_m,
-            texture: law.texture,
+            stiffness_n_per_mm: params.stiffness_n_per_mm,
+            friction: params.friction,
+            damping_ns_per_m: params.damping.ns_per_m,
+            texture: params.texture,
         }
     }
 
-    /// A law over this material; what is no surface's (the limit, the controller, the normals)
+    /// Surface parameters over this material; what is no surface's (the limit, the controller, the normals)
     /// stays.
     #[must_use]
-    pub const fn law(&self, law: &SurfaceParams) -> SurfaceParams {
+    pub const fn params(&self, params: &SurfaceParams) -> SurfaceParams {
         SurfaceParams {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             friction: self.friction,
             damping: Damping {
                 ns_per_m: self.damping_ns_per_m,
-                ..law.damping
+                ..params.damping
             },
             texture: self.texture,
-            ..*law
+            ..*params
         }
     }
 
     /// Returns true if its numbers are such that a loop can work with.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        self.law(&SurfaceParams::PREMIUM).is_valid()
+        self.params(&SurfaceParams::PREMIUM).is_valid()
     }
 }
 
@@ -144,32 +144,32 @@ impl MaterialTable {
         named.or_else(|| self.materials.first())
     }
 
-    /// By how much a law multiplies the stiffness of all materials: its own stiffness, over the
+    /// By how much surface parameters multiplies the stiffness of all materials: its own stiffness, over the
     /// default's. A view that is twice as stiff is so on each material.
     #[must_use]
-    pub fn stiffness_scale(&self, law: &SurfaceParams) -> f32 {
+    pub fn stiffness_scale(&self, params: &SurfaceParams) -> f32 {
         let default = self.at(0).map_or(0.0, |default| default.stiffness_n_per_mm);
         match default > 0.0 {
-            true => law.stiffness_n_per_mm / default,
+            true => params.stiffness_n_per_mm / default,
             false => 1.0,
         }
     }
 
-    /// A law as stiff as the stiffest material under it, and as damped as the most damped: what
+    /// Surface parameters as stiff as the stiffest material under it, and as damped as the most damped: what
     /// a rule of stability has to hold for.
     #[must_use]
-    pub fn hardest(&self, law: &SurfaceParams) -> SurfaceParams {
+    pub fn hardest(&self, params: &SurfaceParams) -> SurfaceParams {
         let most = |of: fn(&Material) -> f32| {
             let all = self.materials.iter().map(of);
             all.fold(0.0, |most: f32, one| most.max(one))
         };
         SurfaceParams {
-            stiffness_n_per_mm: most(|m| m.stiffness_n_per_mm) * self.stiffness_scale(law),
+            stiffness_n_per_mm: most(|m| m.stiffness_n_per_mm) * self.stiffness_scale(params),
             damping: Damping {
                 ns_per_m: most(|m| m.damping_ns_per_m),
-                ..law.damping
+                ..params.damping
             },
-            ..*law
+            ..*params
         }
     }
 

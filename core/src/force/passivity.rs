@@ -158,18 +158,18 @@ impl Passivity {
     /// force has acted for a tick, all but the work of that force. Energy that was lost gives no
     /// credit.
     ///
-    /// The spring is that of the force which leaves the guard: the law's, times all shares. A
+    /// The spring is that of the force which leaves the guard: the surface parameters's, times all shares. A
     /// spring that becomes stiffer puts energy in. Ramp and clutch are meant to do so, each once,
     /// and that energy is not booked; everything else is.
-    pub(super) fn observe(&mut self, law: &SurfaceParams, now: &Moment) {
+    pub(super) fn observe(&mut self, params: &SurfaceParams, now: &Moment) {
         let depth = Depth::of(now.displacement_mm, now.velocity_mm_s);
         let Shares {
             clutch,
             ramp,
             speed,
         } = now.shares;
-        let stiffness_n_per_mm = clutch * law.stiffness_n_per_mm;
-        let max_force_n = smaller(clutch * law.max_force_n, now.most_n);
+        let stiffness_n_per_mm = clutch * params.stiffness_n_per_mm;
+        let max_force_n = smaller(clutch * params.max_force_n, now.most_n);
         let ramped = Spring {
             stiffness_n_per_mm: ramp * stiffness_n_per_mm,
             max_force_n: ramp * max_force_n,
@@ -197,7 +197,7 @@ impl Passivity {
         }
         self.before = Some(Before {
             depth_mm: depth.mm,
-            stiffness_n_per_mm: law.stiffness_n_per_mm,
+            stiffness_n_per_mm: params.stiffness_n_per_mm,
             softening,
             speed,
         });

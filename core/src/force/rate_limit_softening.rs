@@ -15,7 +15,7 @@ use crate::scalar::smaller;
 /// The spring's part of what the force may change by; the rest is for damping.
 const SPRING_PART: f32 = 0.5;
 /// A tip that is slower rests, mm/s. After so long, in s, the surface begins to become as stiff
-/// again as its law says.
+/// again as its surface parameters says.
 const RESTS_MM_S: f32 = 10.0;
 const RESTED_S: f32 = 0.3;
 /// By how much the energy of the spring grows meanwhile, mJ/s. The observer books it, and the

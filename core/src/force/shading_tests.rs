@@ -47,7 +47,7 @@ fn hip_over(height: Height, [x, y]: [f64; 2], above: f64) -> GridPoint {
 }
 
 /// Returns the answers along a path, after contact onset at its first place.
-fn felt_along<const D: usize>(
+fn forces_along<const D: usize>(
     field: &Field<'_, D>,
     height: Height,
     friction: Friction,
@@ -126,7 +126,7 @@ fn a_plane_is_felt_as_without() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), plane);
     let way = straight([3.3, 4.1], [35.2, 36.7]).step_by(cases(1, 100) as usize);
-    for felt in felt_along(&field, plane, Friction::NONE, way) {
+    for felt in forces_along(&field, plane, Friction::NONE, way) {
         let off = (felt.shaded - felt.plain).length();
         assert!(off < 2e-6 * felt.plain.length(), "{off}");
         assert_eq!(felt.missing, None);
@@ -139,7 +139,7 @@ fn the_force_turns_evenly_over_valley_and_ridge() {
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(8.0, 16.0), (16.0, 24.0)] {
         let way = straight([from, 9.3], [to, 10.1]);
-        let felt = felt_along(&field, folds, Friction::NONE, way);
+        let felt = forces_along(&field, folds, Friction::NONE, way);
         let (plain, shaded) = largest_turns(&felt);
         assert!(
             plain > 20.0 && shaded < 0.1 * plain,
@@ -190,7 +190,7 @@ fn on_rough_ground_no_step_turns_the_force_by_more_than_a_tenth() {
     for i in 0..cases(40, 1) {
         let y = 2.0 + f64::from(i);
         let way = straight([2.1, y], [57.9, y + 13.0 * f64::from(i % 2)]);
-        let felt = felt_along(&field, rough, Friction::NONE, way);
+        let felt = forces_along(&field, rough, Friction::NONE, way);
         let (a, b) = largest_turns(&felt);
         (plain, shaded) = (plain.max(a), shaded.max(b));
     }
@@ -204,7 +204,7 @@ fn on_rough_ground_no_step_turns_the_force_by_more_than_a_tenth() {
 fn a_cliff_stays_a_cliff() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), cliff);
-    let felt = felt_along(
+    let felt = forces_along(
         &field,
         cliff,
         Friction::NONE,
@@ -240,8 +240,8 @@ fn a_tiles_border_is_felt_as_its_inside() {
     let across = Field::<2>::held(&mut tiles.1, FieldSize::new(60, 60), moved);
     let way = || straight([6.3, 7.9], [14.2, 12.1]);
     let shifted = way().map(|[x, y]| [x + 22.0, y + 22.0]);
-    let one = felt_along(&inside, rough, Friction::NONE, way());
-    let other = felt_along(&across, moved, Friction::NONE, shifted);
+    let one = forces_along(&inside, rough, Friction::NONE, way());
+    let other = forces_along(&across, moved, Friction::NONE, shifted);
     for (one, other) in one.iter().zip(&other) {
         let off = degrees(one.shaded, other.shaded);
         assert!(off < 0.05, "{:?}: {off}°", one.proxy);
@@ -254,7 +254,7 @@ fn a_tile_that_is_not_here_is_named_and_felt_as_the_end() {
     let mut tiles = buffers::<2>();
     let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), folds);
     field.install(TileKey::holding(0, Cell::new(5, 5)));
-    let felt = felt_along(&field, folds, Friction::NONE, [[30.5, 5.5], [31.5, 5.5]]);
+    let felt = forces_along(&field, folds, Friction::NONE, [[30.5, 5.5], [31.5, 5.5]]);
     let missing: Vec<_> = felt.iter().map(|felt| felt.missing).collect();
     assert_eq!(missing, [None, Some(TileIndex::new(1, 0))]);
     assert!(degrees(felt[1].shaded, felt[1].plain) < 1e-3);
@@ -272,7 +272,7 @@ fn next_to_a_hole_the_force_turns_evenly_and_the_pull_back_stays() {
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), holed);
     // Along the hole's southern border, half a cell and a tenth of one beside it.
     for y in [8.5, 8.9] {
-        let felt = felt_along(
+        let felt = forces_along(
             &field,
             holed,
             Friction::NONE,
@@ -338,7 +338,7 @@ fn what_friction_holds_is_turned_with_the_rest() {
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(11.0, 13.0), (13.0, 11.0)] {
         // Into the valley and out of it.
-        let felt = felt_along(
+        let felt = forces_along(
             &field,
             folds,
             Friction::coulomb(0.5),

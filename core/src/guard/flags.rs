@@ -63,7 +63,7 @@ bitflags! {
         /// Terrain that might be felt here is not on the device yet.
         const TERRAIN_MISSING = 1 << 7;
         /// The surface fades out at its border, or comes in after a wait.
-        const BOUNDARY_FADING = 1 << 8;
+        const EDGE_FADING = 1 << 8;
         /// The clutch is open: there is no force, and the HIP stays where it is over the terrain.
         const CLUTCH_OPEN = 1 << 9;
         /// The clutch opens or closes: the force goes out, or comes in again.
@@ -71,7 +71,7 @@ bitflags! {
         /// The clutch is held by the board's clutch input.
         const CLUTCH_INPUT = 1 << 11;
         /// The ticks have created energy, and damping takes it back.
-        const ENERGY_TAKEN_BACK = 1 << 12;
+        const ENERGY_DISSIPATED = 1 << 12;
         /// The ground under the proxy is coarser than the scene's level, or moves from there to it.
         const TERRAIN_COARSE = 1 << 13;
     }
@@ -139,7 +139,7 @@ impl Limits {
             Self::RAMPING => "force is coming in after arming",
             Self::FADING => "the force ramps down before disarming",
             Self::TERRAIN_MISSING => "terrain that may be touched here has not arrived yet",
-            Self::BOUNDARY_FADING => {
+            Self::EDGE_FADING => {
                 "the force ramps down at the edge of the surface, or up after a wait"
             }
             Self::CLUTCH_OPEN => "the clutch is open: no force",
@@ -147,7 +147,7 @@ impl Limits {
                 "the force ramps down before a change of placement, or up after one"
             }
             Self::CLUTCH_INPUT => "the board's clutch input is held",
-            Self::ENERGY_TAKEN_BACK => {
+            Self::ENERGY_DISSIPATED => {
                 "the surface is damped to dissipate the energy leak of the sampled wall"
             }
             Self::TERRAIN_COARSE => "the coarse fallback is rendered until the tile arrives",

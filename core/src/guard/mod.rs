@@ -10,6 +10,7 @@
 //! be armed. The steps from off to on and back are in [`Mode`].
 
 mod arming;
+mod checks;
 mod fault;
 mod feedback;
 mod flags;
@@ -20,7 +21,6 @@ mod mode;
 mod speed;
 mod stall;
 pub mod thermal;
-mod watch;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -36,7 +36,7 @@ const ROUNDING: f32 = 1e-4;
 
 impl Calibration {
     /// Checks that the record stays within its model's ceilings.
-    pub(super) fn check_ceilings(&self) -> Result<(), CalibrationError> {
+    pub(super) fn check_absolute_limits(&self) -> Result<(), CalibrationError> {
         let preset = self.model.preset();
         let (mine, theirs) = (&self.thermal, &preset.thermal);
         let (peak, continuous) = (self.peak_current_a, self.continuous_current_a);

@@ -249,7 +249,7 @@ impl Calibration {
         one(CalibrationField::HousingTime, thermal.housing_s)?;
         one(CalibrationField::MaxForce, self.max_force_n)?;
         one(CalibrationField::MaxSpeed, self.max_speed_mm_s)?;
-        self.check_ceilings()
+        self.check_absolute_limits()
     }
 }
 

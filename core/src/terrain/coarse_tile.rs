@@ -1,4 +1,4 @@
-//! A tile of coarser samples than the scene's level, as an underlay has them.
+//! A tile of coarser samples than the scene's level, as a fallback has them.
 //!
 //! Its 33 × 33 samples lie [`CoarseTile::spacing`] cells of the scene's level apart, linear
 //! between them along rows and columns. Between coarse samples that is a bilinear patch again, also

@@ -2,6 +2,7 @@
 
 mod coarse_tile;
 mod extent;
+mod fallback;
 mod index;
 mod max_pyramid;
 pub mod packed;
@@ -11,11 +12,11 @@ pub(crate) mod testing;
 mod tile;
 mod tile_blend;
 mod tile_requests;
-mod underlay;
 mod window;
 
 pub use coarse_tile::CoarseTile;
 pub use extent::{CellBox, FieldSize};
+pub use fallback::Fallback;
 pub use index::{TILE_CELLS, TILE_SAMPLES, TILE_SHIFT, TileIndex, TileKey};
 pub use storage::{FieldError, TileArena};
 pub use tile::{MAX_STEP_CELLS, Tile, TileError};
@@ -23,5 +24,4 @@ pub use tile_blend::SETTLING_MM_S;
 pub use tile_requests::{
     HORIZON_TICKS, IN_FLIGHT, MARGIN_CELLS, RETRY_TICKS, RequestHint, TileRequester,
 };
-pub use underlay::Underlay;
 pub use window::{CellContent, Corners, Window};

@@ -3,15 +3,15 @@
 //! What the device asks for follows from the tile that the loop lacks, from where
 //! the proxy and the haptic interface point (HIP) are, and from how the HIP moves.
 //! A tile that the HIP cannot reach within [`HORIZON_TICKS`] is not asked for, and one
-//! that is held is not asked for again. Over an underlay that time begins when an answer can
+//! that is held is not asked for again. Over a fallback that time begins when an answer can
 //! come, so what the HIP will have left by then is not asked for either. Time is counted in ticks
 //! of a millisecond, whatever the rate of the loop.
 
 use heapless::Vec;
 
 use super::extent::FieldSize;
+use super::fallback::{Fallback, PARTS};
 use super::index::{TileIndex, TileKey, wrap};
-use super::underlay::{PARTS, Underlay};
 use crate::grid::Cell;
 
 /// Horizon of the HIP's extrapolated path, ticks.
@@ -68,8 +68,8 @@ pub struct TileRequester<const D: usize> {
     level: u8,
     size: FieldSize,
     held: [[Option<TileKey>; D]; D],
-    /// The underlay's tiles, and whether each is held: they are wanted before all others.
-    underlay: [Option<(TileKey, bool)>; PARTS],
+    /// The fallback's tiles, and whether each is held: they are wanted before all others.
+    fallback: [Option<(TileKey, bool)>; PARTS],
     asked: Vec<(TileKey, u32), IN_FLIGHT>,
     /// The tick in which something was last asked for, and in how many ticks the last answers
     /// came.
@@ -91,7 +91,7 @@ impl<const D: usize> TileRequester<D> {
             level: 0,
             size: FieldSize::new(0, 0),
             held: [[None; D]; D],
-            underlay: [None; PARTS],
+            fallback: [None; PARTS],
             asked: Vec::new(),
             now: 0,
             answer_ticks: 0.0,
@@ -105,11 +105,11 @@ impl<const D: usize> TileRequester<D> {
         self.size = size;
     }
 
-    /// The field has this underlay, which is not held; or none. Underlays that are as coarse have
+    /// The field has this fallback, which is not held; or none. Fallbacks that are as coarse have
     /// the same names: what was asked for before is to be forgotten ([`Self::forget_asked`]).
-    pub fn lay(&mut self, underlay: Option<Underlay>) {
-        let keys = underlay.map_or([None; PARTS], |underlay| underlay.keys(self.level));
-        self.underlay = keys.map(|key| key.map(|key| (key, false)));
+    pub fn lay(&mut self, fallback: Option<Fallback>) {
+        let keys = fallback.map_or([None; PARTS], |fallback| fallback.keys(self.level));
+        self.fallback = keys.map(|key| key.map(|key| (key, false)));
     }
 
     /// Forgets what was asked, as after the link was lost; held tiles stay.
@@ -158,9 +158,9 @@ impl<const D: usize> TileRequester<D> {
         }
     }
 
-    /// Whether a tile of the underlay is held.
+    /// Whether a tile of the fallback is held.
     fn part_is_held(&mut self, key: TileKey) -> Option<&mut bool> {
-        let mut parts = self.underlay.iter_mut().flatten();
+        let mut parts = self.fallback.iter_mut().flatten();
         parts.find_map(|(part, is_held)| (*part == key).then_some(is_held))
     }
 
@@ -177,8 +177,8 @@ impl<const D: usize> TileRequester<D> {
         if self.asked.is_full() {
             return None;
         }
-        let mut underlay = self.underlay.iter().flatten();
-        let key = match underlay.find(|(key, is_held)| !is_held && !self.awaits(*key)) {
+        let mut fallback = self.fallback.iter().flatten();
+        let key = match fallback.find(|(key, is_held)| !is_held && !self.awaits(*key)) {
             Some((key, _)) => *key,
             None => self.most_urgent(demand)?,
         };
@@ -208,8 +208,8 @@ impl<const D: usize> TileRequester<D> {
     /// that none can push out a tile that is nearer.
     fn most_urgent(&self, demand: &RequestHint) -> Option<TileKey> {
         let centre = demand.centre();
-        // Over an underlay nothing waits for a tile that the HIP has left when it comes.
-        let first = if self.underlay[0].is_some() {
+        // Over a fallback nothing waits for a tile that the HIP has left when it comes.
+        let first = if self.fallback[0].is_some() {
             self.answer_ticks
         } else {
             0.0
@@ -277,12 +277,12 @@ mod tests {
             .collect()
     }
 
-    fn underlay(near: Option<u8>) -> Underlay {
+    fn fallback(near: Option<u8>) -> Fallback {
         let of = |shift| CoarseTile {
             first: Cell::new(0, 0),
             shift,
         };
-        Underlay {
+        Fallback {
             wide: of(4),
             near: near.map(of),
         }
@@ -312,12 +312,12 @@ mod tests {
     }
 
     #[test]
-    fn the_underlay_comes_before_all_others_and_once() {
+    fn the_fallback_comes_before_all_others_and_once() {
         let mut requester = requester();
-        let underlay = underlay(Some(2));
-        requester.lay(Some(underlay));
-        let near = underlay.near.expect("near").key(0);
-        let key = underlay.wide.key(0);
+        let fallback = fallback(Some(2));
+        requester.lay(Some(fallback));
+        let near = fallback.near.expect("near").key(0);
+        let key = fallback.wide.key(0);
         assert_eq!(requester.next_request(0, &at(48, 48)), Some(key));
         assert_eq!(requester.next_request(0, &at(48, 48)), Some(near));
         requester.received(near);
@@ -339,7 +339,7 @@ mod tests {
         );
         requester.received(key);
         // Another one of the same name is another.
-        requester.lay(Some(underlay));
+        requester.lay(Some(fallback));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(key));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(near));
         requester.lay(None);
@@ -349,11 +349,11 @@ mod tests {
 
     #[test]
     fn tiles_left_behind_are_not_requested_over_a_fallback() {
-        for has_underlay in [false, true] {
+        for has_fallback in [false, true] {
             let mut requester = requester();
-            if has_underlay {
-                requester.lay(Some(underlay(None)));
-                requester.received(underlay(None).wide.key(0));
+            if has_fallback {
+                requester.lay(Some(fallback(None)));
+                requester.received(fallback(None).wide.key(0));
             }
             // Answers take 60 ticks each.
             for (tick, col) in (0..40_u32).map(|n| (n * 61, n as i32 % 8)) {
@@ -369,10 +369,10 @@ mod tests {
                 ..at(16 * 32 + 16, 48)
             };
             let first = drain(&mut requester, 4000, &demand);
-            assert_eq!(first.contains(&(16, 1)), !has_underlay, "{first:?}");
+            assert_eq!(first.contains(&(16, 1)), !has_fallback, "{first:?}");
             // A HIP that stands still is there when it comes.
             let first = drain(&mut requester, 4000, &at(16 * 32 + 16, 48));
-            assert_eq!(first.contains(&(16, 1)), has_underlay, "{first:?}");
+            assert_eq!(first.contains(&(16, 1)), has_fallback, "{first:?}");
         }
     }
 

@@ -1,13 +1,13 @@
 //! The window: the tiles a device holds, in a torus around the HIP.
 
-mod unsettled;
+mod late_tiles;
 
 use super::extent::{CellBox, FieldSize};
+use super::fallback::Laid;
 use super::index::{BLOCK_SHIFT, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
 use super::tile::Tile;
 use super::tile_blend::TileBlend;
-use super::underlay::Laid;
 use crate::grid::{Altitude, Cell};
 
 /// Content of a cell.
@@ -86,7 +86,7 @@ pub struct Window<'t, const D: usize> {
     level: u8,
     pub(super) slots: [[&'t mut Tile; D]; D],
     pyramid: MaxPyramid<D>,
-    pub(super) underlay: Laid<'t>,
+    pub(super) fallback: Laid<'t>,
     pub(super) tile_blend: TileBlend<D>,
 }
 
@@ -109,7 +109,7 @@ impl<'t, const D: usize> Window<'t, D> {
             level: 0,
             size,
             top,
-            underlay: Laid::NOTHING,
+            fallback: Laid::NOTHING,
             tile_blend: TileBlend::NOTHING,
         };
         for key in size.tiles() {
@@ -121,7 +121,7 @@ impl<'t, const D: usize> Window<'t, D> {
         window
     }
 
-    /// Forgets every tile and takes a new field without underlay ([`Self::lay`]): its level, its
+    /// Forgets every tile and takes a new field without fallback ([`Self::lay`]): its level, its
     /// size, and a whole height in cells no sample exceeds.
     // A call: the loop over the tiles is unrolled wherever it is inlined.
     #[inline(never)]
@@ -139,7 +139,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Puts `tile` in its slot and gives back the buffer that was there; gives
     /// back `tile` itself when it is vacant, of another level, or outside.
     ///
-    /// It is the surface at once ([`Self::take`] has the tiles over an underlay).
+    /// It is the surface at once ([`Self::take`] has the tiles over a fallback).
     ///
     /// A buffer that comes back with a key is that of a tile that is not held. The same
     /// tile once more therefore gives back a vacant buffer.
@@ -148,7 +148,7 @@ impl<'t, const D: usize> Window<'t, D> {
         self.put(tile, false)
     }
 
-    /// The same of a tile that `settles`, where an underlay was felt.
+    /// The same of a tile that `settles`, where a fallback was felt.
     pub(super) fn put(&mut self, tile: &'t mut Tile, settles: bool) -> &'t mut Tile {
         let Some(key) = tile.key().filter(|key| self.expects(*key)) else {
             return tile;

@@ -50,8 +50,8 @@ impl<'t> Ground<'t> {
             materials: Some(table.check_sum()),
             ..scene(Source::Points)
         };
-        scene.law.stiffness_n_per_mm = table.materials()[0].stiffness_n_per_mm;
-        scene.law.shading = shading;
+        scene.params.stiffness_n_per_mm = table.materials()[0].stiffness_n_per_mm;
+        scene.params.shading = shading;
         haptics.take_materials(&table);
         assert!(matches!(haptics.accept(Command::Scene(scene)), Ok(None)));
         assert!(haptics.scene.is_some(), "taken");
@@ -323,8 +323,8 @@ fn replayed<'t, const D: usize>(
         materials: Some(table.check_sum()),
         ..scene(Source::Points)
     };
-    scene.law.stiffness_n_per_mm = table.materials()[0].stiffness_n_per_mm;
-    scene.law.shading = Shading::Smooth;
+    scene.params.stiffness_n_per_mm = table.materials()[0].stiffness_n_per_mm;
+    scene.params.shading = Shading::Smooth;
     device.haptics.take_materials(&table);
     device.say(Command::Scene(scene));
     device.requester.reset(0, scene.size);

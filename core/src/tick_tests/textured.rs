@@ -30,8 +30,8 @@ fn felt(late: u32) -> (Vec<Vec3>, u32) {
         size: FieldSize::new(64, 32),
         ..scene(Source::Points)
     };
-    scene.law.shading = Shading::Smooth;
-    scene.law.texture = Texture {
+    scene.params.shading = Shading::Smooth;
+    scene.params.texture = Texture {
         pattern: Pattern::Grating,
         amplitude_mm: 0.1,
         wavelength_mm: 1.0,

@@ -19,7 +19,7 @@ use crate::force::{
 use crate::grid::{Cell, GridPoint};
 use crate::guard::{Fault, Limits, Mode};
 use crate::scene::{Scene, SceneChange, Source, TickRecord};
-use crate::terrain::{CoarseTile, FieldSize, TileIndex, TileKey, Underlay};
+use crate::terrain::{CoarseTile, Fallback, FieldSize, TileIndex, TileKey};
 
 fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
     let mut buffer = [0; 256];
@@ -32,7 +32,7 @@ fn float(x: f32) -> Vec<u8> {
     x.to_le_bytes().to_vec()
 }
 
-const UNDERLAY: Underlay = Underlay {
+const FALLBACK: Fallback = Fallback {
     wide: CoarseTile {
         first: Cell::new(300, -1),
         shift: 4,
@@ -50,10 +50,10 @@ fn a_scene() {
         level: 2,
         size: FieldSize::new(640, 129),
         top: -3,
-        underlay: Some(UNDERLAY),
+        fallback: Some(FALLBACK),
         cell_mm: 1.5,
         home: GridPoint::new([320, -7, 5], Vec3::new(0.25, 0.5, 0.0)),
-        law: SurfaceParams {
+        params: SurfaceParams {
             damping: Damping {
                 ns_per_m: 2.0,
                 controller: Controller::Off,
@@ -151,10 +151,10 @@ fn a_view_and_the_clutch() {
         level: 1,
         size: FieldSize::new(2, 3),
         top: 1,
-        underlay: Some(UNDERLAY),
+        fallback: Some(FALLBACK),
         cell_mm: 1.5,
         home: GridPoint::default(),
-        law: SurfaceParams::PREMIUM,
+        params: SurfaceParams::PREMIUM,
         source: Source::Encoders,
         hold_clock: false,
         materials: None,

@@ -103,12 +103,12 @@
 //! - What waits for a press of the dead-man switch (an arm command before anything is
 //!   driven, a calibration to be stored) ends after 2 s without a frame of the session:
 //!   its host is not there to see what the press does.
-//! - The tiles of a scene's underlay are asked for before the others, and by keys of their own
-//!   ([`Underlay::keys`](crate::terrain::Underlay::keys)); each view brings its own.
+//! - The tiles of a scene's fallback are asked for before the others, and by keys of their own
+//!   ([`Fallback::keys`](crate::terrain::Fallback::keys)); each view brings its own.
 //! - A scene with materials comes with their table
 //!   ([`ToDevice::MaterialScene`](message::ToDevice::MaterialScene)), and is refused where the table is not the one
 //!   that the scene names, or is none that can be felt. Each of its tiles comes with materials
-//!   ([`ToDevice::MaterialTile`](message::ToDevice::MaterialTile)), and its underlay without; any other is a bad frame. Its
+//!   ([`ToDevice::MaterialTile`](message::ToDevice::MaterialTile)), and its fallback without; any other is a bad frame. Its
 //!   views keep the table, or have none.
 //! - A new session keeps the scene and every tile that is held; samples and requests
 //!   are numbered anew. Where the arm was being armed but nothing is driven yet, that

@@ -68,7 +68,7 @@ pub(crate) const RECORD: usize = 13;
 
 static TILES: ConstStaticCell<[[Tile; WINDOW]; WINDOW]> =
     ConstStaticCell::new([const { [const { Tile::VACANT }; WINDOW] }; WINDOW]);
-/// An underlay keeps two.
+/// A fallback keeps two.
 static SPARES: ConstStaticCell<[Tile; 3]> = ConstStaticCell::new([const { Tile::VACANT }; 3]);
 static SPARE: ConstStaticCell<Tile> = ConstStaticCell::new(Tile::VACANT);
 
@@ -192,7 +192,7 @@ fn contact_of(scene: &Scene) -> Contact {
         work_per_tick: work_per_tick(TickRate::new(10_000).unwrap_or_default()),
         ..ContactSettings::AT_1_KHZ
     };
-    Contact::new(settings.with_friction(scene.law.friction))
+    Contact::new(settings.with_friction(scene.params.friction))
 }
 
 /// A step of the contact in real time. A function of its own, so that its caller is

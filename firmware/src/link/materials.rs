@@ -56,7 +56,7 @@ impl<const D: usize> Link<'_, D> {
         materials: Option<TileMaterials<'_>>,
     ) -> Result<(), TileError> {
         let scene = self.scene.filter(|scene| scene.materials.is_some());
-        // The underlay is of another level, and has none.
+        // The fallback is of another level, and has none.
         let wanted = scene.is_some_and(|scene| scene.level == key.level);
         match (wanted, materials, self.materials) {
             (false, None, _) => Ok(()),

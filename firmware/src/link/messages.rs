@@ -270,7 +270,7 @@ impl<const D: usize> Link<'_, D> {
         if accepted && self.scene != Some(scene) {
             self.drop_what_was_felt();
             self.requester.reset(scene.level, scene.size);
-            self.requester.lay(scene.underlay);
+            self.requester.lay(scene.fallback);
             self.forget_positions();
             self.scene = Some(scene);
             self.command(room, Command::Scene(scene));

@@ -91,9 +91,9 @@ impl<const D: usize> Link<'_, D> {
         if !view.keeps_tiles {
             self.requester.reset(scene.level, scene.size);
         }
-        let underlay = self.scene.and_then(|before| before.underlay);
-        if !view.keeps_tiles || underlay != scene.underlay {
-            self.requester.lay(scene.underlay);
+        let fallback = self.scene.and_then(|before| before.fallback);
+        if !view.keeps_tiles || fallback != scene.fallback {
+            self.requester.lay(scene.fallback);
         }
         self.requester.forget_asked();
         self.request_hint = Some(RequestHint {

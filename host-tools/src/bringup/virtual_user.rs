@@ -30,7 +30,7 @@ pub struct VirtualUser {
     /// The direction of the scale, and what it read when it was called out, grams.
     scale: (DVec3, f64),
     /// The largest push up while the tip was lowered, N.
-    felt_n: f64,
+    force_n: f64,
     /// Takes what is said, a line at a time.
     pub says: fn(&str),
 }
@@ -49,7 +49,7 @@ impl VirtualUser {
             before_m: bench.tip_m(),
             bench: Rc::new(RefCell::new(bench)),
             scale: (DVec3::ZERO, 0.0),
-            felt_n: 0.0,
+            force_n: 0.0,
             says: |line| tracing::info!("{line}"),
         }
     }
@@ -110,7 +110,7 @@ impl VirtualUser {
             }
             Task::LiftTip => {
                 // Against the push of the hand, the floor's is what is left over.
-                self.felt_n = bench.scale_grams(DVec3::Z) * crate::calibrate::N_PER_GRAM;
+                self.force_n = bench.scale_grams(DVec3::Z) * crate::calibrate::N_PER_GRAM;
                 bench.step(self.before_m);
             }
         }
@@ -162,7 +162,7 @@ impl Attendant for VirtualUser {
         let yes = match question {
             Question::ReadyIsWired => true,
             Question::StopTakesPower => !self.bench.borrow().has_power(),
-            Question::PushedBack => self.felt_n > FELT_N,
+            Question::PushedBack => self.force_n > FELT_N,
         };
         (self.says)(&format!(
             "  ? {question} {}",

@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     outputs.keep_apart(args)?;
     let options = &args.rendering.surface;
     let surface = options.load()?;
-    let law = surface.law;
+    let params = surface.params;
     let materials = surface.materials(options, (&name, &raster), &args.reading)?;
     let cells = args.reading.cells();
     let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
@@ -118,7 +118,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
     let terrain = view.terrain(asked.grid)?;
     let placed = shown_reading(&name, &raster, || {
-        PlacedTerrain::in_view(&terrain, view.home_mm, law)
+        PlacedTerrain::in_view(&terrain, view.home_mm, params)
     })?;
     let placed = placed.repeated(args.rounds);
     show(args, (&placed, &view), &name, &outputs)
@@ -226,8 +226,8 @@ fn show(
     let file = args.file.as_ref();
     let file = file.map_or(OWN_TERRAIN.into(), |file| without_key(file));
     let device = Device::of(&toured.summary.device);
-    let law = (placed.law(), Rule::Swept);
-    let settings = Settings::new(&file, terrain, law, Some(placed.home_mm()), device);
+    let params = (placed.params(), Rule::Swept);
+    let settings = Settings::new(&file, terrain, params, Some(placed.home_mm()), device);
     write(&toured, &settings, &outputs.recording).or_hint(OTHER_FOLDER)?;
     let summary = &toured.summary;
     print!("{}", summary.text());
@@ -267,9 +267,9 @@ fn control<'t>(
     placed: &PlacedTerrain<'t>,
     view: &Placement,
 ) -> Result<PlacementControl<'t>, Failure> {
-    let (law, view) = (placed.law(), *view);
+    let (params, view) = (placed.params(), *view);
     let arm = (&Calibration::PREMIUM_1_5, args.rendering.level);
-    let served = (placed.terrain(), Laid { view, law });
+    let served = (placed.terrain(), Laid { view, params });
     Ok(PlacementControl::new(served, arm, args.commands.open()?))
 }
 
@@ -353,7 +353,7 @@ impl<'t> Tour<'_, 't> {
         let line = format!("device         {}\n", session_summary::device(&device));
         writer::put(std::io::stdout(), &line);
         let materials = terrain.grid().materials();
-        stability::warn_of(&scene.law, materials.map(Materials::table), &device);
+        stability::warn_of(&scene.params, materials.map(Materials::table), &device);
         let tell = |line: String| writer::put(std::io::stderr(), &(line + "\n"));
         let mut shown = self.shown.and_then(|shown| shown.start(&device, tell));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;

@@ -157,7 +157,7 @@ struct Cell {
     east_m: f64,
     north_m: f64,
     /// Side of the square cell that is felt, m on the ground.
-    felt_m: f64,
+    haptic_cell_m: f64,
     /// True if heights are interpolated for that, as the stored cells are not square.
     resampled: bool,
     /// True if stored cells that are not square are felt as squares.
@@ -362,7 +362,7 @@ impl Cell {
             unit_from: from(cell.certainty),
             east_m,
             north_m,
-            felt_m: grid.side_m().unwrap_or_default(),
+            haptic_cell_m: grid.side_m().unwrap_or_default(),
             resampled: grid.is_resampled(),
             distorted: grid.is_distorted(),
             worst_share: worst.map(|worst| worst.share),
@@ -380,7 +380,7 @@ impl Cell {
     }
 
     fn text(&self) -> String {
-        let (east_m, north_m, felt_m) = (self.east_m, self.north_m, self.felt_m);
+        let (east_m, north_m, haptic_cell_m) = (self.east_m, self.north_m, self.haptic_cell_m);
         let stored = format!(
             "{} × {} {} ({}), {east_m:.3} east × {north_m:.3} north m on the ground",
             self.east,
@@ -394,7 +394,7 @@ impl Cell {
         };
         match self.resampled || self.distorted {
             false => stored,
-            true => format!("{stored}, rendered as {felt_m:.3} m squares{hint}"),
+            true => format!("{stored}, rendered as {haptic_cell_m:.3} m squares{hint}"),
         }
     }
 }

@@ -116,7 +116,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     let surface = options.load()?;
     let recorded_rule = recorded.as_ref().map(|it| it.force.rule);
     let rule = rule.or(recorded_rule).unwrap_or(Rule::Swept);
-    check_rule(rule, &surface.law)?;
+    check_rule(rule, &surface.params)?;
     let materials = surface.materials(options, (&name, &raster), reading)?;
     let grid = rendering.grid((&raster, reading.cells()), measured_at);
     let grid = grid.with_materials(materials.as_ref());
@@ -137,7 +137,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     let (views, marks) = later.unwrap_or_default();
     let felt = Inputs {
         terrain: &terrain,
-        law: (surface.law, rule),
+        params: (surface.params, rule),
         file,
         title: args.terrain.name(),
         home_mm,
@@ -190,7 +190,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
 /// What is felt, and how.
 struct Inputs<'t> {
     terrain: &'t Terrain<'t>,
-    law: (SurfaceParams, Rule),
+    params: (SurfaceParams, Rule),
     /// The rate of the recording.
     recorded_at: Option<TickRate>,
     /// The other views of the recording.
@@ -266,18 +266,18 @@ fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Checks that a law has no effects under the published rule, which has none.
-fn check_rule(rule: Rule, law: &SurfaceParams) -> Result<(), Failure> {
+/// Checks that surface parameters has no effects under the published rule, which has none.
+fn check_rule(rule: Rule, params: &SurfaceParams) -> Result<(), Failure> {
     let plain = SurfaceParams {
-        stiffness_n_per_mm: law.stiffness_n_per_mm,
-        max_force_n: law.max_force_n,
+        stiffness_n_per_mm: params.stiffness_n_per_mm,
+        max_force_n: params.max_force_n,
         damping: Damping {
             ns_per_m: 0.0,
-            ..law.damping
+            ..params.damping
         },
         ..SurfaceParams::PREMIUM
     };
-    match rule == Rule::Paper && *law != plain {
+    match rule == Rule::Paper && *params != plain {
         false => Ok(()),
         true => Err("an effect with the published contact rule, which has none")
             .or_hint("leave out what --surface and --friction add, or take the path alone with --ignore-settings"),
@@ -298,11 +298,11 @@ fn native(
     felt: &Inputs<'_>,
     trajectory: Trajectory,
 ) -> Result<(Summary, Ticks), Failure> {
-    let (law, rule) = felt.law;
+    let (params, rule) = felt.params;
     let rate = felt.recorded_at.unwrap_or_default();
-    let mut replayer = on_native_at(rate, felt.terrain, law)?;
+    let mut replayer = on_native_at(rate, felt.terrain, params)?;
     if rule == Rule::Paper {
-        replayer = replayer.by_published_rule(law);
+        replayer = replayer.by_published_rule(params);
     }
     replay(args, felt, trajectory, &mut replayer)
 }
@@ -313,7 +313,7 @@ fn emulated(
     felt: &Inputs<'_>,
     trajectory: Trajectory,
 ) -> Result<(Summary, Ticks), Failure> {
-    let (law, rule) = felt.law;
+    let (params, rule) = felt.params;
     if rule == Rule::Paper {
         return Err("no device has the published contact rule of this recording")
             .or_hint("leave --device out: the host renders it");
@@ -322,7 +322,7 @@ fn emulated(
     // The other line stays open and silent: points take the arm's place.
     let _plant = lines.plant;
     let link: Box<dyn Transport> = Box::new(lines.link);
-    let mut replayer = OfflineDevice::open(felt.terrain, law, link, Timeouts::EMULATED)?;
+    let mut replayer = OfflineDevice::open(felt.terrain, params, link, Timeouts::EMULATED)?;
     let felt = replay(args, felt, trajectory, &mut replayer)?;
     replayer.say_goodbye()?;
     if let Err(why) = emulator.finish() {
@@ -365,9 +365,9 @@ fn replay<'t>(
     interrupt::listen();
     let materials = felt.terrain.grid().materials();
     let table = materials.map(Materials::table);
-    stability::warn_of(&felt.law.0, table, replayer.device());
+    stability::warn_of(&felt.params.0, table, replayer.device());
     let device = Device::of(replayer.device());
-    let mut settings = Settings::new(&felt.file, felt.terrain, felt.law, None, device);
+    let mut settings = Settings::new(&felt.file, felt.terrain, felt.params, None, device);
     settings.views.clone_from(&felt.views);
     settings.marks.clone_from(&felt.marks);
     let output = Output::create_or_standard_output(&args.out).map_err(ReplayError::from)?;

@@ -162,8 +162,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let name = args.terrain.name();
     let (options, reading) = (&args.rendering.surface, &args.terrain.reading);
     let surface = options.load()?;
-    let law = surface.law;
-    check_stiffness(law.stiffness_n_per_mm)?;
+    let params = surface.params;
+    check_stiffness(params.stiffness_n_per_mm)?;
     let materials = surface.materials(options, (&name, &raster), reading)?;
     let cells = reading.cells();
     let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
@@ -178,7 +178,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         InReach::of(&asked, arm).map_err(|failure| failure.about(device.device_console.name()))
     })?;
     let placed = of_each(devices.iter().zip(&laid), |(device, laid)| {
-        Placed::new(device, (&name, laid), law)
+        Placed::new(device, (&name, laid), params)
             .map_err(|failure| failure.about(device.device_console.name()))
     })?;
     // The coarse levels are read before anything is armed. A viewer shows one device.

@@ -8,10 +8,10 @@
 //! the buffers have bounds, and a line that finds no room is dropped and counted
 //! (`docs/how-to/events.md`).
 
-mod line;
+mod event;
 mod server;
 mod watcher;
 
-pub use line::{Event, FORMAT, Place};
+pub use event::{Event, FORMAT, Place};
 pub use server::{Sender, Server};
 pub use watcher::Watcher;

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::line::{Event, FORMAT, Line};
+use super::event::{Event, FORMAT, Line};
 
 /// Lines that wait for the thread, at most.
 const WAITING: usize = 4096;

@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use hapterra_core::guard::{Fault, Limits, Mode};
 use hapterra_core::scene::TickRecord;
 
-use super::line::{At, Event, Line, Place};
+use super::event::{At, Event, Line, Place};
 use super::server::Sender;
 use crate::replay::{Mark, Record, mode_name, state_name};
 use crate::terrain::Terrain;

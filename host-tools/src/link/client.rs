@@ -539,7 +539,7 @@ impl<'t> Client<'t> {
         let Some((heights, status)) = self.terrain.tile_of(&self.scene, key, &mut self.tile) else {
             return self.on_no_tile(now, key);
         };
-        // The underlay comes without.
+        // The fallback comes without.
         let materials = match key.level == self.scene.level {
             true => self.terrain.materials_of(key, &mut self.materials),
             false => None,
@@ -561,8 +561,8 @@ impl<'t> Client<'t> {
         self.talk.say(&message, out);
         let bytes = out.len() - before;
         if key.level != self.scene.level {
-            // Each view has its own underlay, and all have one name.
-            return self.tally.sent_underlay(bytes);
+            // Each view has its own fallback, and all have one name.
+            return self.tally.sent_fallback(bytes);
         }
         self.tally.sent_tile(key, bytes);
         on(Event::TileSent(key));

@@ -127,7 +127,7 @@ impl LinkStats {
         }
     }
 
-    pub(super) fn sent_underlay(&mut self, bytes: usize) {
+    pub(super) fn sent_fallback(&mut self, bytes: usize) {
         self.tiles += 1;
         self.tile_bytes += bytes as u64;
     }

@@ -146,10 +146,10 @@ impl Materials {
         })
     }
 
-    /// A law over the default material: that of a scene with these materials.
+    /// Surface parameters over the default material: that of a scene with these materials.
     #[must_use]
-    pub const fn law(&self, law: &SurfaceParams) -> SurfaceParams {
-        self.looks.default.law(law)
+    pub const fn params(&self, params: &SurfaceParams) -> SurfaceParams {
+        self.looks.default.params(params)
     }
 
     /// The index in the table of the material at a place of a grid, in the coordinates of its file,

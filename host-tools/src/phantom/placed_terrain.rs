@@ -39,8 +39,8 @@ impl<'t> PlacedTerrain<'t> {
     ///
     /// # Errors
     /// [`PlacingError`].
-    pub fn new(terrain: &'t Terrain<'t>, law: SurfaceParams) -> Result<Self, PlacingError> {
-        Self::toured(terrain, law, None)
+    pub fn new(terrain: &'t Terrain<'t>, params: SurfaceParams) -> Result<Self, PlacingError> {
+        Self::toured(terrain, params, None)
     }
 
     /// Leaves the terrain where a view has it, with this point of it at the tip in the home pose
@@ -51,14 +51,14 @@ impl<'t> PlacedTerrain<'t> {
     pub fn in_view(
         terrain: &'t Terrain<'t>,
         home_mm: [f64; 3],
-        law: SurfaceParams,
+        params: SurfaceParams,
     ) -> Result<Self, PlacingError> {
-        Self::toured(terrain, law, Some(home_mm))
+        Self::toured(terrain, params, Some(home_mm))
     }
 
     fn toured(
         terrain: &'t Terrain<'t>,
-        law: SurfaceParams,
+        params: SurfaceParams,
         home_mm: Option<[f64; 3]>,
     ) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
@@ -68,7 +68,7 @@ impl<'t> PlacedTerrain<'t> {
             size_mm: terrain.size_mm(),
             model,
             hand,
-            wall_n_per_mm: f64::from(law.stiffness_n_per_mm).max(0.01),
+            wall_n_per_mm: f64::from(params.stiffness_n_per_mm).max(0.01),
             push_n: PUSH_N,
             home_mm,
         }
@@ -79,7 +79,7 @@ impl<'t> PlacedTerrain<'t> {
         let duration_s = HeldPhantom::ARMED_S + tour.script.duration_s() + REST_S;
         Ok(Self {
             terrain,
-            scene: terrain.scene(law, Source::Encoders, home),
+            scene: terrain.scene(params, Source::Encoders, home),
             home_mm,
             arm: HeldPhantom::new(model, hand, tour.placement, tour.script)?.arming(),
             duration_s,
@@ -106,10 +106,10 @@ impl<'t> PlacedTerrain<'t> {
         self.scene
     }
 
-    /// The force law.
+    /// The surface parameters.
     #[must_use]
-    pub const fn law(&self) -> SurfaceParams {
-        self.scene.law
+    pub const fn params(&self) -> SurfaceParams {
+        self.scene.params
     }
 
     /// The point of the terrain that is at the tip in the arm's home pose, hand

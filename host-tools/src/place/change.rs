@@ -95,13 +95,13 @@ pub enum ChangeError {
     Scale(#[from] ScaleError),
 }
 
-/// A view, and the law of its force.
+/// A view, and the surface parameters of its force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Laid {
     /// Place, scale, level and heights.
     pub view: Placement,
     /// Stiffness and limit.
-    pub law: SurfaceParams,
+    pub params: SurfaceParams,
 }
 
 /// Bounds of all placements of a session.
@@ -211,7 +211,7 @@ impl Bounds {
         mut at: [f64; 2],
         change: &PlacementChange,
     ) -> Result<(Laid, [f64; 2]), ChangeError> {
-        let Laid { view, law } = &mut laid;
+        let Laid { view, params } = &mut laid;
         let scale = view.scale;
         let (cell_mm, height) = (scale.cell_mm(), scale.height_mm_per_unit());
         match *change {
@@ -233,24 +233,24 @@ impl Bounds {
                 *view = view.scaled(cell_mm, height * factor_of(factor)?)?;
             }
             PlacementChange::Stiffness(factor) => {
-                let stiffness = law.stiffness_n_per_mm * factor_of(factor)? as f32;
+                let stiffness = params.stiffness_n_per_mm * factor_of(factor)? as f32;
                 // A stiffness of the user's own may go down, and come back.
-                let most = STIFFEST_N_PER_MM.max(self.first.law.stiffness_n_per_mm);
+                let most = STIFFEST_N_PER_MM.max(self.first.params.stiffness_n_per_mm);
                 if !(SOFTEST_N_PER_MM..=most).contains(&stiffness) {
                     return Err(ChangeError::Stiffness(stiffness));
                 }
-                law.stiffness_n_per_mm = stiffness;
+                params.stiffness_n_per_mm = stiffness;
                 // Other materials of the scene become as much stiffer.
                 if let Some(materials) = grid.materials() {
-                    let stiffest = |law| materials.table().hardest(law).stiffness_n_per_mm;
-                    let (now, first) = (stiffest(law), stiffest(&self.first.law));
+                    let stiffest = |params| materials.table().hardest(params).stiffness_n_per_mm;
+                    let (now, first) = (stiffest(params), stiffest(&self.first.params));
                     if now > STIFFEST_N_PER_MM.max(first) {
                         return Err(ChangeError::Material(now));
                     }
                 }
             }
             PlacementChange::Surface(change) => {
-                *law = change.of(law, grid.materials().is_some())?;
+                *params = change.of(params, grid.materials().is_some())?;
             }
             PlacementChange::Reset => {
                 let first = &self.first.view;
@@ -258,7 +258,7 @@ impl Bounds {
                 let height = first.scale.height_mm_per_unit();
                 *view = view.scaled(cell_mm, height)?;
                 view.exaggeration = first.exaggeration;
-                *law = self.first.law;
+                *params = self.first.params;
             }
         }
         Ok((laid, at))

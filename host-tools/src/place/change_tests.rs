@@ -42,7 +42,7 @@ impl Bench {
         let bounds = Bounds {
             first: Laid {
                 view,
-                law: SurfaceParams::PREMIUM,
+                params: SurfaceParams::PREMIUM,
             },
             resolution_mm: reach.resolution_mm(),
             level: self.level,
@@ -159,9 +159,9 @@ fn heights_and_stiffness_change_by_factors_and_come_back() {
         ];
         let changed = bounds.apply(terrain, &bounds.first, &steeper, &hand);
         let changed = changed.expect("changed");
-        let Laid { view, law } = changed.laid;
+        let Laid { view, params } = changed.laid;
         assert!((view.exaggeration.expect("known") - 3.0).abs() < 1e-9);
-        assert_eq!(law.stiffness_n_per_mm, 0.25);
+        assert_eq!(params.stiffness_n_per_mm, 0.25);
         assert!(!changed.terrain.has_tiles_of(terrain));
         let there = Hand {
             hip_mm: changed.hip_mm,
@@ -171,8 +171,8 @@ fn heights_and_stiffness_change_by_factors_and_come_back() {
         let back = bounds.apply(&changed.terrain, &changed.laid, &back, &there);
         let back = back.expect("back").laid;
         assert_eq!(
-            (back.view.scale, back.law),
-            (bounds.first.view.scale, bounds.first.law)
+            (back.view.scale, back.params),
+            (bounds.first.view.scale, bounds.first.params)
         );
         assert_eq!(back.view.exaggeration, bounds.first.view.exaggeration);
     });

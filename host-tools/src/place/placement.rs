@@ -153,13 +153,13 @@ impl Placement {
 
     /// Ground metres a haptic cell of the view's level, where the file knows its size.
     #[must_use]
-    pub fn felt_cell_m(&self) -> Option<f64> {
+    pub fn haptic_cell_m(&self) -> Option<f64> {
         self.side_m.map(|side| side * f64::from(self.level).exp2())
     }
 
     /// Device millimetres a haptic cell of the view's level.
     #[must_use]
-    pub fn felt_cell_mm(&self) -> f64 {
+    pub fn haptic_cell_mm(&self) -> f64 {
         self.scale.at_level(self.level).cell_mm()
     }
 
@@ -239,10 +239,10 @@ impl Placement {
     ///
     /// # Errors
     /// [`PlaceError::FarAway`] where the home position is farther out than can be addressed.
-    pub fn scene(&self, terrain: &Terrain<'_>, law: SurfaceParams) -> Result<Scene, PlaceError> {
+    pub fn scene(&self, terrain: &Terrain<'_>, params: SurfaceParams) -> Result<Scene, PlaceError> {
         let home = terrain.scale().to_grid(self.home_mm);
         let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
-        let scene = terrain.scene(law, Source::Encoders, home);
+        let scene = terrain.scene(params, Source::Encoders, home);
         Ok(terrain.underlaid(scene, self.reach_mm))
     }
 }

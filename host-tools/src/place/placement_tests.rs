@@ -258,15 +258,15 @@ fn the_scale_is_said_as_it_is_at_the_place_and_level() {
         let (grid, view) = seen(raster, &options).expect(name);
         let found = view.ground_m_per_mm().expect("known");
         assert!((found - 40.0).abs() < 1e-9, "{name}: {found}");
-        let felt = view.felt_cell_m().expect("known");
+        let felt = view.haptic_cell_m().expect("known");
         assert!((felt / (4.0 * side) - 1.0).abs() < 5e-3, "{name}: {felt}");
-        assert!((felt / view.felt_cell_mm() - 40.0).abs() < 1e-9, "{name}");
+        assert!((felt / view.haptic_cell_mm() - 40.0).abs() < 1e-9, "{name}");
         assert_eq!(
             view.exaggeration.map(|times| (times * 1e6).round()),
             Some(1e6)
         );
         let terrain = view.terrain(grid).expect("a terrain");
-        assert_eq!(terrain.scale().cell_mm(), view.felt_cell_mm());
+        assert_eq!(terrain.scale().cell_mm(), view.haptic_cell_mm());
     }
 }
 
@@ -303,9 +303,9 @@ fn box_is_centred_and_no_finer_than_the_encoders() {
     let resolution = reach().resolution_mm();
     // Samples are finer than a count, pairs of them are not.
     assert!(whole.scale.cell_mm() < resolution, "{whole:?}");
-    assert!(whole.felt_cell_mm() >= resolution, "{whole:?}");
-    assert_eq!(whole.level, 1, "{} mm", whole.felt_cell_mm());
-    assert!(0.5 * whole.felt_cell_mm() < resolution, "{whole:?}");
+    assert!(whole.haptic_cell_mm() >= resolution, "{whole:?}");
+    assert_eq!(whole.level, 1, "{} mm", whole.haptic_cell_mm());
+    assert!(0.5 * whole.haptic_cell_mm() < resolution, "{whole:?}");
     let sides = [501_000.0, 4_000_010.0, 501_060.0, 4_000_050.0];
     let (grid, view) = seen(&raster, &boxed(sides, OWN)).expect("there");
     assert_eq!(view.level, 0);

@@ -68,16 +68,16 @@ pub enum SurfaceError {
 }
 
 impl SurfaceChange {
-    /// The law after this change; `has_materials` where the ground is not the same everywhere.
+    /// The surface parameters after this change; `has_materials` where the ground is not the same everywhere.
     ///
     /// # Errors
     /// [`SurfaceError`].
     pub fn of(
         self,
-        law: &SurfaceParams,
+        params: &SurfaceParams,
         has_materials: bool,
     ) -> Result<SurfaceParams, SurfaceError> {
-        let mut law = *law;
+        let mut params = *params;
         if has_materials && !matches!(self, Self::Shading(_)) {
             return Err(SurfaceError::OfMaterials);
         }
@@ -86,36 +86,38 @@ impl SurfaceChange {
                 dynamic_mu,
                 static_mu,
             } => {
-                (law.friction.dynamic_mu, law.friction.static_mu) = (dynamic_mu, static_mu);
+                (params.friction.dynamic_mu, params.friction.static_mu) = (dynamic_mu, static_mu);
                 let error = SurfaceError::Friction {
                     dynamic_mu,
                     static_mu,
                 };
-                law.friction.is_valid().then_some(law).ok_or(error)
+                params.friction.is_valid().then_some(params).ok_or(error)
             }
             Self::ViscousFriction(viscous_s) => {
-                law.friction.viscous_s = viscous_s;
+                params.friction.viscous_s = viscous_s;
                 let error = SurfaceError::ViscousFriction(viscous_s);
-                law.friction.is_valid().then_some(law).ok_or(error)
+                params.friction.is_valid().then_some(params).ok_or(error)
             }
             Self::Damping(ns_per_m) => {
-                law.damping.ns_per_m = ns_per_m;
+                params.damping.ns_per_m = ns_per_m;
                 let error = SurfaceError::Damping(ns_per_m);
-                law.damping.is_valid().then_some(law).ok_or(error)
+                params.damping.is_valid().then_some(params).ok_or(error)
             }
             Self::Shading(shading) => {
-                law.shading = shading;
-                Ok(law)
+                params.shading = shading;
+                Ok(params)
             }
-            Self::Named(named) => Ok(named.material.law(&law)),
+            Self::Named(named) => Ok(named.material.params(&params)),
             Self::Texture(texture) => {
-                law.texture = texture;
+                params.texture = texture;
                 let error = SurfaceError::Texture {
                     amplitude_mm: texture.amplitude_mm,
                     wavelength_mm: texture.wavelength_mm,
                 };
                 let is_felt = texture.is_none() || texture.amplitude_mm > 0.0;
-                (is_felt && texture.is_valid()).then_some(law).ok_or(error)
+                (is_felt && texture.is_valid())
+                    .then_some(params)
+                    .ok_or(error)
             }
         }
     }
@@ -154,17 +156,17 @@ mod tests {
             SurfaceChange::Texture(Texture::NONE),
             texture(0.125, 1.0),
         ] {
-            let law = change
+            let params = change
                 .of(&SurfaceParams::PREMIUM, false)
                 .expect("can be had");
-            assert!(law.is_valid(), "{change:?}");
+            assert!(params.is_valid(), "{change:?}");
             let SurfaceParams {
                 stiffness_n_per_mm,
                 max_force_n,
                 ..
             } = SurfaceParams::PREMIUM;
-            assert_eq!(law.stiffness_n_per_mm, stiffness_n_per_mm);
-            assert_eq!(law.max_force_n, max_force_n);
+            assert_eq!(params.stiffness_n_per_mm, stiffness_n_per_mm);
+            assert_eq!(params.max_force_n, max_force_n);
         }
     }
 
@@ -176,9 +178,9 @@ mod tests {
             shading: Shading::Smooth,
             ..SurfaceParams::PREMIUM
         };
-        let law = SurfaceChange::Named(sand).of(&before, false).expect("sand");
-        assert_eq!(Material::of(&law), sand.material);
-        assert_eq!((law.max_force_n, law.shading), (4.0, Shading::Smooth));
+        let params = SurfaceChange::Named(sand).of(&before, false).expect("sand");
+        assert_eq!(Material::of(&params), sand.material);
+        assert_eq!((params.max_force_n, params.shading), (4.0, Shading::Smooth));
     }
 
     #[test]
@@ -202,12 +204,12 @@ mod tests {
 
     #[test]
     fn materials_have_all_but_shading_by_themselves() {
-        let law = &SurfaceParams::PREMIUM;
+        let params = &SurfaceParams::PREMIUM;
         let damping = SurfaceChange::Damping(1.0);
-        assert_eq!(damping.of(law, true), Err(SurfaceError::OfMaterials));
+        assert_eq!(damping.of(params, true), Err(SurfaceError::OfMaterials));
         assert!(
             SurfaceChange::Shading(Shading::Smooth)
-                .of(law, true)
+                .of(params, true)
                 .is_ok()
         );
     }

@@ -4,7 +4,7 @@
 //!
 //! In lock-step: the device feels one point a tick, answers, and only then gets the
 //! next. Every point is felt exactly once, with all the terrain it needs, so
-//! the result depends on nothing but the terrain, the law, the trajectory and the tick rate.
+//! the result depends on nothing but the terrain, the surface parameters, the trajectory and the tick rate.
 //! [`Ticks`] says where the HIP is in each tick.
 
 mod loop_columns;
@@ -182,7 +182,7 @@ fn go_over<'t>(
     };
     let terrain = terrain_of(first, view)?;
     let hip = trajectory.to_grid(tick.hip_mm, terrain.scale())?;
-    replayer.put_view(terrain, view.law(), hip)?;
+    replayer.put_view(terrain, view.params(), hip)?;
     Ok(recording.view(view)?)
 }
 
@@ -201,9 +201,9 @@ pub fn is_below_ground(sample: &TickRecord, record: &Record, terrain: &Terrain<'
 /// As [`OfflineDevice::open`].
 pub fn on_native<'t>(
     terrain: &'t Terrain<'t>,
-    law: SurfaceParams,
+    params: SurfaceParams,
 ) -> Result<OfflineDevice<'t>, LinkError> {
-    on_native_at(TickRate::DEFAULT, terrain, law)
+    on_native_at(TickRate::DEFAULT, terrain, params)
 }
 
 /// The same at another tick rate.
@@ -213,8 +213,8 @@ pub fn on_native<'t>(
 pub fn on_native_at<'t>(
     rate: TickRate,
     terrain: &'t Terrain<'t>,
-    law: SurfaceParams,
+    params: SurfaceParams,
 ) -> Result<OfflineDevice<'t>, LinkError> {
     let device = Native::for_replay_at(rate);
-    OfflineDevice::open(terrain, law, device, Timeouts::EMULATED)
+    OfflineDevice::open(terrain, params, device, Timeouts::EMULATED)
 }

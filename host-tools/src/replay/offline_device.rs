@@ -37,11 +37,11 @@ impl<'t> OfflineDevice<'t> {
     /// [`LinkError`].
     pub fn open(
         terrain: &'t Terrain<'t>,
-        law: SurfaceParams,
+        params: SurfaceParams,
         transport: Box<dyn Transport + 't>,
         patience: Timeouts,
     ) -> Result<Self, LinkError> {
-        let mut scene = terrain.scene(law, Source::Points, GridPoint::default());
+        let mut scene = terrain.scene(params, Source::Points, GridPoint::default());
         // A device that holds the scene of an earlier replay would go on from
         // where that ended.
         let nonce = nonce();
@@ -61,8 +61,8 @@ impl<'t> OfflineDevice<'t> {
 
     /// Renders the points by the paper's rule on the host from now on, and not on the device.
     #[must_use]
-    pub fn by_published_rule(mut self, law: SurfaceParams) -> Self {
-        self.published = Some(Published::new(self.terrain.clone(), law));
+    pub fn by_published_rule(mut self, params: SurfaceParams) -> Self {
+        self.published = Some(Published::new(self.terrain.clone(), params));
         self
     }
 
@@ -80,12 +80,12 @@ impl<'t> OfflineDevice<'t> {
     pub fn put_view(
         &mut self,
         terrain: Terrain<'t>,
-        law: SurfaceParams,
+        params: SurfaceParams,
         hip: GridPoint,
     ) -> Result<(), LinkError> {
         self.view = self.view.wrapping_add(1);
         self.last = None;
-        let mut scene = terrain.scene(law, Source::Points, GridPoint::default());
+        let mut scene = terrain.scene(params, Source::Points, GridPoint::default());
         // One that comes again is another one.
         scene.epoch ^= self.nonce.rotate_left(8) ^ u32::from(self.view);
         let view = SceneChange {
@@ -96,7 +96,7 @@ impl<'t> OfflineDevice<'t> {
         };
         self.terrain = terrain.clone();
         if self.published.is_some() {
-            self.published = Some(Published::new(terrain.clone(), law));
+            self.published = Some(Published::new(terrain.clone(), params));
         }
         self.session.put_view(view, terrain)?;
         let deadline = Instant::now() + 2 * self.session.patience().give_up;
@@ -208,13 +208,13 @@ mod tests {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
-        let (law, hip) = (SurfaceParams::PREMIUM, GridPoint::default());
-        let mut replayer = on_native(&terrain, law).expect("opened");
+        let (params, hip) = (SurfaceParams::PREMIUM, GridPoint::default());
+        let mut replayer = on_native(&terrain, params).expect("opened");
         let (mut epochs, mut last) = (std::collections::HashSet::new(), 0);
         for view in 0..300_u32 {
             if view > 0 {
                 let again = terrain.clone();
-                replayer.put_view(again, law, hip).expect("taken");
+                replayer.put_view(again, params, hip).expect("taken");
             }
             let sample = replayer.step(hip).expect("felt");
             assert_eq!(u32::from(sample.view), view % 256);
@@ -225,7 +225,7 @@ mod tests {
         }
         // As many as there are numbers, and the beginning.
         assert_eq!(epochs.len(), 257);
-        let another = on_native(&terrain, law).expect("opened");
+        let another = on_native(&terrain, params).expect("opened");
         assert!(!epochs.contains(&another.session.scene().epoch));
     }
 }

@@ -12,10 +12,10 @@ use crate::terrain::Terrain;
 /// Newton steps in one patch, at most.
 const STEPS: u32 = 20;
 
-/// The paper's rule in `f64`, with the spring of a law.
+/// The paper's rule in `f64`, with the spring of surface parameters.
 pub(super) struct Published<'t> {
     rule: Paper<InCells<'t>, f64>,
-    law: SurfaceParams,
+    params: SurfaceParams,
     cell_mm: f32,
 }
 
@@ -49,11 +49,11 @@ impl Heights for InCells<'_> {
 }
 
 impl<'t> Published<'t> {
-    pub(super) fn new(terrain: Terrain<'t>, law: SurfaceParams) -> Self {
+    pub(super) fn new(terrain: Terrain<'t>, params: SurfaceParams) -> Self {
         let cell_mm = terrain.scale().cell_mm() as f32;
         Self {
             rule: Paper::new(InCells(terrain), Start::LastPoint, STEPS),
-            law,
+            params,
             cell_mm,
         }
     }
@@ -73,7 +73,7 @@ impl<'t> Published<'t> {
         TickRecord {
             hip,
             proxy: GridPoint::new(cell, frac + displacement),
-            force_n: self.law.spring().force_n(displacement * self.cell_mm),
+            force_n: self.params.spring().force_n(displacement * self.cell_mm),
             state,
             ..TickRecord::default()
         }

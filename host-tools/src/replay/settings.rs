@@ -1,5 +1,5 @@
 //! Settings of a recording: on which terrain, at which place and scale, under
-//! which law and by which device it was felt.
+//! which surface parameters and by which device it was felt.
 //!
 //! The text is TOML. In a CSV recording each of its lines stands behind `# ` before the
 //! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
@@ -39,9 +39,9 @@ pub struct Settings {
     pub terrain: TerrainFile,
     /// The rendered part, its place and scale.
     pub felt: RenderedTerrain,
-    /// The force law and the contact rule.
+    /// The surface parameters and the contact rule.
     pub force: Force,
-    /// Materials of the ground, where there were several; the law is then
+    /// Materials of the ground, where there were several; the surface parameters is then
     /// that of the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub materials: Option<MaterialSettings>,
@@ -119,12 +119,12 @@ impl PlacementSettings {
             height_mm_per_unit: scale.height_mm_per_unit(),
             exaggeration: grid.exaggeration(&scale),
             home_mm: laid.view.home_mm,
-            stiffness_n_per_mm: laid.law.stiffness_n_per_mm,
-            max_force_n: laid.law.max_force_n,
-            shading: laid.law.shading,
-            texture: laid.law.texture,
-            friction: laid.law.friction,
-            damping: laid.law.damping,
+            stiffness_n_per_mm: laid.params.stiffness_n_per_mm,
+            max_force_n: laid.params.max_force_n,
+            shading: laid.params.shading,
+            texture: laid.params.texture,
+            friction: laid.params.friction,
+            damping: laid.params.damping,
         }
     }
 
@@ -134,9 +134,9 @@ impl PlacementSettings {
         toml::to_string(&Views { view: [self] }).unwrap_or_default()
     }
 
-    /// The force law.
+    /// The surface parameters.
     #[must_use]
-    pub const fn law(&self) -> SurfaceParams {
+    pub const fn params(&self) -> SurfaceParams {
         SurfaceParams {
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             max_force_n: self.max_force_n,
@@ -310,7 +310,7 @@ impl Settings {
     pub fn new(
         file: &str,
         terrain: &Terrain<'_>,
-        (law, rule): (SurfaceParams, Rule),
+        (params, rule): (SurfaceParams, Rule),
         home_mm: Option<[f64; 3]>,
         device: Device,
     ) -> Self {
@@ -342,13 +342,13 @@ impl Settings {
                 home_mm,
             },
             force: Force {
-                stiffness_n_per_mm: law.stiffness_n_per_mm,
-                max_force_n: law.max_force_n,
+                stiffness_n_per_mm: params.stiffness_n_per_mm,
+                max_force_n: params.max_force_n,
                 rule,
-                shading: law.shading,
-                texture: law.texture,
-                friction: law.friction,
-                damping: law.damping,
+                shading: params.shading,
+                texture: params.texture,
+                friction: params.friction,
+                damping: params.damping,
             },
             materials: grid.materials().map(MaterialSettings::of),
             device,
@@ -396,9 +396,9 @@ impl Settings {
         toml::from_str(text).map(Some).map_err(unreadable)
     }
 
-    /// The force law.
+    /// The surface parameters.
     #[must_use]
-    pub const fn law(&self) -> SurfaceParams {
+    pub const fn params(&self) -> SurfaceParams {
         SurfaceParams {
             stiffness_n_per_mm: self.force.stiffness_n_per_mm,
             max_force_n: self.force.max_force_n,
@@ -518,7 +518,7 @@ mod tests {
     }
 
     fn settings(terrain: &Terrain<'_>) -> Settings {
-        let law = (SurfaceParams::PREMIUM, Rule::Paper);
+        let params = (SurfaceParams::PREMIUM, Rule::Paper);
         let device = Device {
             board: "native".into(),
             firmware: "0.1.0".into(),
@@ -527,7 +527,7 @@ mod tests {
         Settings::new(
             "a \"b\"\nc.tif",
             terrain,
-            law,
+            params,
             Some([1.5, -2.0, 0.1]),
             device,
         )
@@ -546,7 +546,7 @@ mod tests {
 
     #[test]
     fn a_law_comes_back_with_all_that_a_surface_has() {
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             stiffness_n_per_mm: 0.75,
             max_force_n: 6.0,
             friction: Friction::coulomb(0.3),
@@ -566,8 +566,14 @@ mod tests {
         let raster = raster(0.0);
         let terrain = terrain(&raster);
         let mut settings = settings(&terrain);
-        settings = Settings::new("t.tif", &terrain, (law, Rule::Swept), None, settings.device);
-        assert_eq!(settings.law(), law);
+        settings = Settings::new(
+            "t.tif",
+            &terrain,
+            (params, Rule::Swept),
+            None,
+            settings.device,
+        );
+        assert_eq!(settings.params(), params);
         let (grid, scale) = (terrain.grid(), terrain.scale_of_level_0());
         let view = Placement {
             home_mm: [1.0; 3],
@@ -580,8 +586,8 @@ mod tests {
             heights_mm: [0.0; 2],
             reach_mm: [0.0; 4],
         };
-        let view = PlacementSettings::new(1, &terrain, &Laid { view, law });
-        assert_eq!(view.law(), law);
+        let view = PlacementSettings::new(1, &terrain, &Laid { view, params });
+        assert_eq!(view.params(), params);
         settings.views = vec![view];
         let text = settings.to_toml();
         assert_eq!(Settings::from_toml(&text).expect("read"), Some(settings));

@@ -28,7 +28,7 @@ pub struct Put<'r> {
     pub view: SceneChange,
     /// The terrain that it is felt on.
     pub terrain: Terrain<'r>,
-    /// Place, scale and law.
+    /// Place, scale and surface parameters.
     pub laid: Laid,
 }
 
@@ -94,7 +94,7 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// The view in force, as far as this host knows, and its law.
+    /// The view in force, as far as this host knows, and its surface parameters.
     #[must_use]
     pub const fn now(&self) -> &Laid {
         &self.now
@@ -303,7 +303,7 @@ impl<'r> Steering<'r> {
             point.ok_or("that is too far from the first sample")
         };
         let (hip, home) = (on_grid(hip_mm)?, on_grid(laid.view.home_mm)?);
-        let scene = terrain.scene(laid.law, Source::Encoders, home);
+        let scene = terrain.scene(laid.params, Source::Encoders, home);
         let view = SceneChange {
             number: self.number.wrapping_add(1),
             scene: terrain.underlaid(scene, laid.view.reach_mm),

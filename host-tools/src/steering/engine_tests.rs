@@ -28,9 +28,9 @@ fn with_raster<T>(raster: &Raster, look: impl FnOnce(&mut Steering<'_>) -> T) ->
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
     let view = Placement::new(&grid, &reach, &options).expect("a view");
     let terrain = view.terrain(grid).expect("a terrain");
-    let law = SurfaceParams::PREMIUM;
+    let params = SurfaceParams::PREMIUM;
     let bounds = Bounds {
-        first: Laid { view, law },
+        first: Laid { view, params },
         resolution_mm: reach.resolution_mm(),
         level: None,
     };

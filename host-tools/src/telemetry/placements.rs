@@ -10,7 +10,7 @@ use crate::terrain::Terrain;
 pub struct SessionPlacement<'t> {
     /// Its terrain.
     pub terrain: Terrain<'t>,
-    /// Place, scale and law; none for the scene that was served first.
+    /// Place, scale and surface parameters; none for the scene that was served first.
     pub laid: Option<Laid>,
 }
 
@@ -93,9 +93,9 @@ mod tests {
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
         let view = crate::place::Placement::new(&grid, &reach, &options).expect("a view");
         let terrain = view.terrain(grid).expect("a terrain");
-        let law = SurfaceParams::PREMIUM;
+        let params = SurfaceParams::PREMIUM;
         let views = Placements::new(terrain.clone());
-        look(views, terrain, Laid { view, law });
+        look(views, terrain, Laid { view, params });
     }
 
     fn of(view: u8) -> TickRecord {
@@ -125,7 +125,7 @@ mod tests {
         with(|mut views, terrain, laid| {
             views.put(1, terrain.clone(), laid);
             let hip = GridPoint::default();
-            let scene = terrain.scene(laid.law, Source::Encoders, hip);
+            let scene = terrain.scene(laid.params, Source::Encoders, hip);
             let view = SceneChange {
                 number: 1,
                 scene,

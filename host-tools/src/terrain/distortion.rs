@@ -3,7 +3,7 @@
 //! Haptic cells are all alike, as large as the file's are at one place. The file's own cells are
 //! not: those of degrees get narrower towards the poles, and a map's scale changes.
 
-use super::felt_grid::HapticGrid;
+use super::haptic_grid::HapticGrid;
 use heightfield::{CellSize, Sides};
 
 /// Places looked at along each side of a rectangle, its ends among them: the size of cells
@@ -90,7 +90,7 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
     use crate::terrain::HapticCells;
-    use crate::terrain::felt_grid::tests::cell;
+    use crate::terrain::haptic_grid::tests::cell;
     use heightfield::Raster;
 
     fn grid_off(lean: f64, (east, north): (f64, f64), cells: HapticCells) -> f64 {

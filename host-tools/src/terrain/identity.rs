@@ -1,4 +1,4 @@
-//! A number that names a scene: what is felt, how large, and by which law.
+//! A number that names a scene: what is felt, how large, and by which surface parameters.
 
 use std::hash::{Hash, Hasher};
 

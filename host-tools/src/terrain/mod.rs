@@ -6,17 +6,17 @@
 //! by one when they are asked for: nothing of the raster is copied or kept.
 
 mod distortion;
-mod felt_grid;
+mod fallback;
+mod haptic_grid;
 mod identity;
 #[cfg(test)]
 pub(crate) mod in_file;
 mod steps;
 mod tiler;
-mod underlay;
 
 pub use distortion::Distortion;
-pub use felt_grid::{HapticCells, HapticGrid};
 pub use hapterra_touch::tip::MAX_CELLS as MAX_TIP_CELLS;
 pub use hapterra_touch::{Scale, ScaleError};
+pub use haptic_grid::{HapticCells, HapticGrid};
 pub(crate) use identity::fingerprint;
 pub use tiler::{INTERPOLATED_STEP, Terrain, TerrainError, TileBuffer};

@@ -327,16 +327,16 @@ impl<'r> Terrain<'r> {
     /// The scene in which the device feels this terrain. Its epoch is a hash
     /// of the heights and of everything else in it.
     #[must_use]
-    pub fn scene(&self, law: SurfaceParams, source: Source, home: GridPoint) -> Scene {
+    pub fn scene(&self, params: SurfaceParams, source: Source, home: GridPoint) -> Scene {
         let mut scene = Scene {
             epoch: 0,
             level: self.level,
             size: FieldSize::new(self.size[0], self.size[1]),
             top: self.top,
-            underlay: None,
+            fallback: None,
             cell_mm: self.scale.cell_mm() as f32,
             home,
-            law,
+            params,
             source,
             hold_clock: true,
             materials: (self.grid.materials()).map(|materials| materials.table().check_sum()),

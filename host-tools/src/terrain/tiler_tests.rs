@@ -149,14 +149,14 @@ fn a_scenes_epoch_follows_heights_scale_and_law() {
         let raster = Raster::from_fn(9, 9, |x, y| if (x, y) == (4, 4) { bump } else { 0.0 });
         let raster = raster.expect("raster");
         let scale = Scale::new(cell_mm, 1.0).expect("valid");
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             stiffness_n_per_mm,
             max_force_n: 8.5,
             ..SurfaceParams::PREMIUM
         };
         let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
         let home = GridPoint::default();
-        terrain.scene(law, Source::Points, home).epoch
+        terrain.scene(params, Source::Points, home).epoch
     };
     let same = scene(1.0, 1.0, 0.5);
     assert_eq!(same, scene(1.0, 1.0, 0.5));

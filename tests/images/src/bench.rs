@@ -54,7 +54,7 @@ impl Bench {
             .scale
             .to_grid(self.plane.place.home_mm)
             .expect("addressable");
-        terrain.scene(self.plane.law, Source::Encoders, home)
+        terrain.scene(self.plane.params, Source::Encoders, home)
     }
 
     /// Presses 3 mm deep and holds still.

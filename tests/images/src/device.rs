@@ -273,11 +273,11 @@ pub struct Plane {
     /// Height above the origin, mm.
     pub height_mm: f64,
     /// Spring and limit.
-    pub law: SurfaceParams,
+    pub params: SurfaceParams,
 }
 
 impl Plane {
-    /// A level plane at this height, felt with a Premium 1.5 at its preset's law.
+    /// A level plane at this height, felt with a Premium 1.5 at its preset's surface parameters.
     #[must_use]
     pub fn level(home_mm: [f64; 3], height_mm: f64) -> Self {
         Self {
@@ -285,7 +285,7 @@ impl Plane {
             place: ArmFrame { home_mm },
             slope: [0.0; 2],
             height_mm,
-            law: SurfaceParams::PREMIUM,
+            params: SurfaceParams::PREMIUM,
         }
     }
 
@@ -325,8 +325,8 @@ impl Plane {
         });
         let tip = kinematics::tip(&self.model, q);
         let depth_mm = -self.above_mm(self.place.to_terrain_mm(&self.model, tip));
-        let newtons = (f64::from(self.law.stiffness_n_per_mm) * depth_mm)
-            .clamp(0.0, self.law.max_force_n.into());
+        let newtons = (f64::from(self.params.stiffness_n_per_mm) * depth_mm)
+            .clamp(0.0, self.params.max_force_n.into());
         let force = ArmFrame::turn_to_device(self.normal().map(|n| n * newtons));
         let jacobian = kinematics::jacobian(&self.model, q);
         // What holds the links, by the record: -g2·cos q2 and -g3·sin q3 pull.

@@ -17,7 +17,7 @@ fn plane() -> Plane {
         },
         slope: [0.25, -0.125],
         height_mm: 55.0,
-        law: SurfaceParams::PREMIUM,
+        params: SurfaceParams::PREMIUM,
     }
 }
 

@@ -32,7 +32,7 @@ const NOT_AS_ASKED: Limits = Limits::SLEW_LIMITED.union(Limits::SPEED_LIMITED);
 /// Limits under which a surface is no spring.
 const NO_SPRING: Limits = Limits::SPEED_LIMITED
     .union(Limits::TERRAIN_MISSING)
-    .union(Limits::BOUNDARY_FADING);
+    .union(Limits::EDGE_FADING);
 
 /// Watches what one scene feels like.
 pub struct ForceWatch {

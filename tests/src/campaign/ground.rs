@@ -34,7 +34,7 @@ impl Ground {
 /// The effects of a segment.
 #[derive(Clone, Debug)]
 pub struct Effects {
-    law: SurfaceParams,
+    params: SurfaceParams,
     classes: Vec<Material>,
     /// Samples of the terrain to a pixel of the classes.
     pixel: u32,
@@ -52,10 +52,10 @@ impl Effects {
             _ => chance.between(1.0, 2.0),
         };
         let default = material(chance, stiffness_n_per_mm as f32);
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             max_force_n: [8.5, 8.5, 3.0][chance.below(3)],
             shading: [Shading::None, Shading::None, Shading::Smooth][chance.below(3)],
-            ..default.law(&SurfaceParams {
+            ..default.params(&SurfaceParams {
                 damping: Damping {
                     controller,
                     ..Damping::NONE
@@ -79,7 +79,7 @@ impl Effects {
         let classes = (0..classes).map(&mut class).collect();
         let pixel = [1, 3, 10, 60][chance.below(4)];
         Self {
-            law,
+            params,
             classes,
             pixel,
         }
@@ -106,19 +106,19 @@ impl Effects {
             material: *material,
         };
         let looks = Looks {
-            default: Material::of(&self.law),
+            default: Material::of(&self.params),
             class: (1..).zip(&self.classes).map(class).collect(),
         };
         let over = ("terrain", terrain);
         Materials::over(over, ("classes", classes.expect("classes")), looks).ok()
     }
 
-    /// The law of a scene that is so many times as stiff.
+    /// The surface parameters of a scene that is so many times as stiff.
     #[must_use]
-    pub const fn law(&self, times: f32) -> SurfaceParams {
+    pub const fn params(&self, times: f32) -> SurfaceParams {
         SurfaceParams {
-            stiffness_n_per_mm: self.law.stiffness_n_per_mm * times,
-            ..self.law
+            stiffness_n_per_mm: self.params.stiffness_n_per_mm * times,
+            ..self.params
         }
     }
 }
@@ -157,42 +157,47 @@ fn material(chance: &mut Chance, stiffness_n_per_mm: f32) -> Material {
     }
 }
 
-/// All that may be felt of a scene: a law of each of its materials.
+/// All that may be felt of a scene: surface parameters of each of its materials.
 #[derive(Clone, Debug)]
 pub struct SceneSurfaces {
-    laws: Vec<SurfaceParams>,
+    all_params: Vec<SurfaceParams>,
     hardest: SurfaceParams,
 }
 
 impl SceneSurfaces {
-    /// Of a law, and of a table where there is one.
+    /// Of surface parameters, and of a table where there is one.
     #[must_use]
-    pub fn of(law: &SurfaceParams, table: Option<&MaterialTable>) -> Self {
+    pub fn of(params: &SurfaceParams, table: Option<&MaterialTable>) -> Self {
         let Some(table) = table else {
-            let (laws, hardest) = (vec![*law], *law);
-            return Self { laws, hardest };
+            let (all_params, hardest) = (vec![*params], *params);
+            return Self {
+                all_params,
+                hardest,
+            };
         };
         let default = table
             .materials()
             .first()
-            .map_or(law.stiffness_n_per_mm, |default| default.stiffness_n_per_mm);
-        let times = law.stiffness_n_per_mm / default;
+            .map_or(params.stiffness_n_per_mm, |default| {
+                default.stiffness_n_per_mm
+            });
+        let times = params.stiffness_n_per_mm / default;
         let of = |one: &Material| SurfaceParams {
             stiffness_n_per_mm: one.stiffness_n_per_mm * times,
-            ..one.law(law)
+            ..one.params(params)
         };
         Self {
-            laws: table.materials().iter().map(of).collect(),
-            hardest: table.hardest(law),
+            all_params: table.materials().iter().map(of).collect(),
+            hardest: table.hardest(params),
         }
     }
 
     /// The stiffest of them, N/mm.
     #[must_use]
     pub fn stiffest_n_per_mm(&self) -> f32 {
-        self.laws
+        self.all_params
             .iter()
-            .fold(0.0, |most, law| law.stiffness_n_per_mm.max(most))
+            .fold(0.0, |most, params| params.stiffness_n_per_mm.max(most))
     }
 
     /// The largest force of a spring so deep, N.
@@ -222,29 +227,31 @@ impl SceneSurfaces {
     /// Returns true if its force is that of one spring: no material follows a softer one.
     #[must_use]
     pub fn is_spring(&self) -> bool {
-        let stiff = |law: &SurfaceParams| law.stiffness_n_per_mm;
-        let mut pairs = self.laws.windows(2);
+        let stiff = |params: &SurfaceParams| params.stiffness_n_per_mm;
+        let mut pairs = self.all_params.windows(2);
         pairs.all(|pair| stiff(&pair[0]) == stiff(&pair[1]))
     }
 
     /// Returns true if some of it is damped.
     #[must_use]
     pub fn is_damped(&self) -> bool {
-        self.laws.iter().any(|law| law.damping.ns_per_m > 0.0)
+        self.all_params
+            .iter()
+            .any(|params| params.damping.ns_per_m > 0.0)
     }
 
     /// The highest texture, mm, and the steepest.
     #[must_use]
     pub fn relief(&self) -> [f32; 2] {
-        let relief = |most: [f32; 2], law: &SurfaceParams| {
-            let texture = &law.texture;
+        let relief = |most: [f32; 2], params: &SurfaceParams| {
+            let texture = &params.texture;
             if texture.is_none() {
                 return most;
             }
             let steep = std::f32::consts::TAU * texture.amplitude_mm / texture.wavelength_mm;
             [most[0].max(texture.amplitude_mm), most[1].max(steep)]
         };
-        self.laws.iter().fold([0.0; 2], relief)
+        self.all_params.iter().fold([0.0; 2], relief)
     }
 
     /// Returns true if the force is turned by as much as shading turns it.

@@ -482,7 +482,7 @@ impl<'t> Segment<'t> {
                 .map_or(Ok(()), hostile::keeps_ceilings)?;
         }
         for sample in std::mem::take(&mut self.host.samples) {
-            self.watch.sample(&sample, self.scene.law.max_force_n)?;
+            self.watch.sample(&sample, self.scene.params.max_force_n)?;
             let is_calm = self.now >= self.calm_from && !self.poisoned;
             self.felt.look(&sample, is_calm)?;
         }
@@ -493,7 +493,7 @@ impl<'t> Segment<'t> {
 /// What may be felt of a scene.
 fn felt(terrain: &Terrain<'_>, scene: &Scene) -> SceneSurfaces {
     let materials = terrain.grid().materials();
-    SceneSurfaces::of(&scene.law, materials.map(Materials::table))
+    SceneSurfaces::of(&scene.params, materials.map(Materials::table))
 }
 
 fn scene(
@@ -503,9 +503,9 @@ fn scene(
     chance: &mut Chance,
 ) -> Scene {
     let stiffness_n_per_mm = chance.between(0.3, 0.8) as f32;
-    let law = match effects {
+    let params = match effects {
         // Another scene each time.
-        Some(effects) => effects.law(0.5 + stiffness_n_per_mm),
+        Some(effects) => effects.params(0.5 + stiffness_n_per_mm),
         None => SurfaceParams {
             stiffness_n_per_mm,
             max_force_n: 8.5,
@@ -516,6 +516,6 @@ fn scene(
     Scene {
         // Real time: nothing waits for the host.
         hold_clock: false,
-        ..terrain.scene(law, Source::Encoders, home)
+        ..terrain.scene(params, Source::Encoders, home)
     }
 }

@@ -206,7 +206,7 @@ impl Watch {
     ///
     /// # Errors
     /// What must not be.
-    pub fn sample(&mut self, sample: &TickRecord, law_n: f32) -> Result<(), String> {
+    pub fn sample(&mut self, sample: &TickRecord, max_force_n: f32) -> Result<(), String> {
         let force = sample.force_n.length();
         if !force.is_finite() {
             return Err(format!("a force is not a number: {sample:?}"));
@@ -215,7 +215,7 @@ impl Watch {
         if off && force != 0.0 {
             return Err(format!("{force} N with the amplifiers off: {sample:?}"));
         }
-        let clamp = (WORKING_SHARE * self.record.max_force_n).min(law_n);
+        let clamp = (WORKING_SHARE * self.record.max_force_n).min(max_force_n);
         if force > clamp * (1.0 + ROUNDING) {
             return Err(format!("{force} N is above the clamp of {clamp} N"));
         }

@@ -11,7 +11,7 @@ use hapterra_core::guard::{Fault, GuardInputs};
 use hapterra_core::phantom::{Calibration, Kinematics};
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::{HipCommand, Scene, SceneChange, Source};
-use hapterra_core::terrain::{CoarseTile, FieldSize, Tile, TileKey, Underlay};
+use hapterra_core::terrain::{CoarseTile, Fallback, FieldSize, Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome};
 
 use super::bytes::Bytes;
@@ -19,7 +19,7 @@ use super::materials;
 
 /// Tiles along the side of the window.
 const SIDE: usize = 2;
-/// Buffers besides: one that comes and goes, and those that an underlay keeps.
+/// Buffers besides: one that comes and goes, and those that a fallback keeps.
 const SPARES: usize = 3;
 
 /// Does what the bytes say, and looks at every tick.
@@ -35,7 +35,7 @@ pub fn run(data: &[u8]) {
     let mut spare: Vec<&mut Tile> = (0..SPARES).map(|_| next()).collect();
     let mut haptics = Haptics::<SIDE>::new(window, TickRate::DEFAULT, None);
     haptics.configure(Kinematics::new(&Calibration::PREMIUM_1_5).expect("a preset"));
-    let mut law = SurfaceParams::PREMIUM;
+    let mut params = SurfaceParams::PREMIUM;
     let mut table = MaterialTable::EMPTY;
     // Ticks since the scene was taken, where that is known.
     let mut ticks = Some(0);
@@ -54,7 +54,7 @@ pub fn run(data: &[u8]) {
                     keeps_tiles: kind.is_multiple_of(2),
                 };
                 if is_taken(&scene, &table) {
-                    law = scene.law;
+                    params = scene.params;
                 }
                 spare.extend(haptics.accept(Command::SceneChange(view)).ok().flatten());
                 ticks = None;
@@ -72,7 +72,7 @@ pub fn run(data: &[u8]) {
                     _ => bytes.int().cast_unsigned(),
                 });
                 if is_taken(&scene, &table) {
-                    (law, ticks) = (scene.law, Some(0));
+                    (params, ticks) = (scene.params, Some(0));
                 }
                 spare.extend(haptics.accept(Command::Scene(scene)).ok().flatten());
             }
@@ -88,12 +88,12 @@ pub fn run(data: &[u8]) {
             0 => {
                 let scene = scene(&mut bytes);
                 if scene.is_valid() {
-                    (law, ticks) = (scene.law, Some(0));
+                    (params, ticks) = (scene.params, Some(0));
                 }
                 spare.extend(haptics.accept(Command::Scene(scene)).ok().flatten());
             }
             1 | 2 => {
-                let tile = spare.pop().expect("an underlay keeps two at most");
+                let tile = spare.pop().expect("a fallback keeps two at most");
                 fill(tile, &mut bytes);
                 if kind % 16 >= 8 {
                     materials::lay(tile, &table, &mut bytes);
@@ -147,7 +147,7 @@ pub fn run(data: &[u8]) {
         let is_next = ticks.is_none_or(|ticks: u32| outcome.sample.tick == ticks + 1);
         assert!(is_next, "{ticks:?}, then {outcome:?}");
         ticks = Some(outcome.sample.tick);
-        look(&outcome, &law);
+        look(&outcome, &params);
     }
 }
 
@@ -164,10 +164,10 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         level: 0,
         size: FieldSize::new(64, 64),
         top: 1 << 20,
-        underlay: None,
+        fallback: None,
         cell_mm: 1.0,
         home: GridPoint::new([30, 30, 2], Vec3::ZERO),
-        law: SurfaceParams::PREMIUM,
+        params: SurfaceParams::PREMIUM,
         source: if kind & 2 == 0 {
             Source::Points
         } else {
@@ -181,12 +181,12 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
         scene.top = bytes.int();
     }
     if kind & 6 == 2 {
-        scene.underlay = underlay(bytes);
+        scene.fallback = fallback(bytes);
     }
     if kind & 8 != 0 {
         scene.cell_mm = bytes.float();
         scene.home = position(bytes);
-        scene.law = SurfaceParams {
+        scene.params = SurfaceParams {
             stiffness_n_per_mm: bytes.float(),
             max_force_n: bytes.float(),
             ..SurfaceParams::PREMIUM
@@ -195,29 +195,29 @@ fn scene(bytes: &mut Bytes<'_>) -> Scene {
     if kind & 16 != 0 {
         let share = |byte: u8| f32::from(byte) / 64.0;
         let dynamic_mu = share(bytes.byte());
-        scene.law.friction = Friction {
+        scene.params.friction = Friction {
             dynamic_mu,
             static_mu: dynamic_mu + share(bytes.byte()),
             viscous_s: share(bytes.byte()) / 32.0,
         };
     }
     if kind & 32 != 0 {
-        scene.law.damping = Damping {
+        scene.params.damping = Damping {
             ns_per_m: f32::from(bytes.byte()) / 255.0 * Damping::MAX_NS_PER_M,
             controller: Controller::On,
         };
     }
     if kind & 64 != 0 {
-        scene.law.shading = Shading::Smooth;
+        scene.params.shading = Shading::Smooth;
     }
     if kind & 128 != 0 {
-        scene.law.texture = texture(bytes);
+        scene.params.texture = texture(bytes);
     }
     scene
 }
 
-/// An underlay that a scene may have, or any numbers; or none.
-fn underlay(bytes: &mut Bytes<'_>) -> Option<Underlay> {
+/// A fallback that a scene may have, or any numbers; or none.
+fn fallback(bytes: &mut Bytes<'_>) -> Option<Fallback> {
     let kind = bytes.byte();
     let mut part = |shift: u8| match kind >= 250 {
         true => CoarseTile {
@@ -231,7 +231,7 @@ fn underlay(bytes: &mut Bytes<'_>) -> Option<Underlay> {
     };
     let (near, wide) = (part(2), part(3));
     let near = kind.is_multiple_of(2).then_some(near);
-    (!kind.is_multiple_of(3)).then_some(Underlay { wide, near })
+    (!kind.is_multiple_of(3)).then_some(Fallback { wide, near })
 }
 
 /// A texture that a scene may have, or any numbers.
@@ -259,7 +259,7 @@ pub(super) fn texture(bytes: &mut Bytes<'_>) -> Texture {
 }
 
 fn fill(tile: &mut Tile, bytes: &mut Bytes<'_>) {
-    // Of the field, of an underlay, or of another level.
+    // Of the field, of a fallback, or of another level.
     let level = [0, 0, 2, 3, 1][usize::from(bytes.byte() / 60)];
     let key = TileKey::new(
         level,
@@ -283,15 +283,15 @@ fn position(bytes: &mut Bytes<'_>) -> GridPoint {
     GridPoint::new(cell.map(i32::from), offset - Vec3::new(0.0, 0.0, 4.0))
 }
 
-/// Looks at what one tick gave, felt by `law`.
+/// Looks at what one tick gave, felt by `surface parameters`.
 ///
 /// # Panics
 /// When no tick may give that.
-pub fn look(outcome: &Outcome, law: &SurfaceParams) {
+pub fn look(outcome: &Outcome, params: &SurfaceParams) {
     let (sample, drive) = (&outcome.sample, &outcome.drive);
     let force = sample.force_n.as_dvec3().length();
     // A limit smaller than any normal number is kept to no more than that.
-    let limit = f64::from(law.max_force_n.max(f32::MIN_POSITIVE)) * (1.0 + 1e-6);
+    let limit = f64::from(params.max_force_n.max(f32::MIN_POSITIVE)) * (1.0 + 1e-6);
     assert!(sample.force_n.is_finite() && force <= limit, "{outcome:?}");
     assert!(drive.currents_a.is_finite(), "{outcome:?}");
     let most = Calibration::PREMIUM_1_5.peak_current_a;

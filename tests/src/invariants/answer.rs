@@ -5,7 +5,7 @@ use hapterra_core::grid::MAX_CELL;
 
 use super::Invariant;
 use super::judge::{Judge, Verdict};
-use super::seen::{CELLS_MM, LAW, Seen};
+use super::seen::{CELLS_MM, PARAMS, Seen};
 use super::surface::distance;
 
 /// Part by which a force may be off: the clamp keeps eight units in the last
@@ -48,9 +48,9 @@ impl Judge<'_> {
     /// The force is the spring's, or as long as the clamp.
     pub(super) fn is_clamped(&self, seen: &Seen) -> Verdict {
         let displacement = seen.felt.displacement.as_dvec3().to_array();
-        let most = f64::from(LAW.max_force_n);
+        let most = f64::from(PARAMS.max_force_n);
         for (cell_mm, force) in CELLS_MM.iter().zip(seen.force_n) {
-            let rate = f64::from(LAW.stiffness_n_per_mm) * f64::from(*cell_mm);
+            let rate = f64::from(PARAMS.stiffness_n_per_mm) * f64::from(*cell_mm);
             let spring = displacement.map(|s| s * rate);
             let part = (most / length(spring)).min(1.0);
             let off = distance(force, spring.map(|f| f * part));

@@ -13,8 +13,8 @@ use crate::scene::terrain::Terrain;
 pub const ERROR: f64 = 2e-6;
 /// Stretches shorter than this, in cells, tell nothing about a fade.
 const SHORT: f64 = 1e-3;
-/// The law that turns displacements into forces, and the sizes of a cell it does so for.
-pub const LAW: SurfaceParams = SurfaceParams::PREMIUM;
+/// The surface parameters that turns displacements into forces, and the sizes of a cell it does so for.
+pub const PARAMS: SurfaceParams = SurfaceParams::PREMIUM;
 /// Millimetres of a cell.
 pub const CELLS_MM: [f32; 3] = [1e-3, 1.0, 1e3];
 
@@ -31,7 +31,7 @@ pub struct Seen {
     pub textured: Option<Vec3>,
     /// The proxy, where the terrain was made.
     pub proxy: [f64; 3],
-    /// The force that the product's law gives for it, N, by [`CELLS_MM`].
+    /// The force that the product's surface parameters gives for it, N, by [`CELLS_MM`].
     pub force_n: [[f64; 3]; CELLS_MM.len()],
 }
 
@@ -62,7 +62,7 @@ impl Seen {
             textured: None,
             proxy: unshifted(&felt.proxy, shift),
             force_n: CELLS_MM.map(|cell_mm| {
-                let force = LAW.spring().force_n(felt.displacement * cell_mm);
+                let force = PARAMS.spring().force_n(felt.displacement * cell_mm);
                 force.as_dvec3().to_array()
             }),
         }

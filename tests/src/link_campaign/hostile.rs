@@ -133,10 +133,10 @@ fn host_scene(chance: &mut Chance, epoch: u32) -> Scene {
         level: chance.bits() as u8,
         size: FieldSize::new(word(chance), word(chance)),
         top: word(chance),
-        underlay: None,
+        fallback: None,
         cell_mm: [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5][chance.below(6)],
         home: GridPoint::default(),
-        law: SurfaceParams {
+        params: SurfaceParams {
             stiffness_n_per_mm: [f32::NAN, -1.0, 1e30, 0.5][chance.below(4)],
             max_force_n: [f32::INFINITY, -8.0, 8.5][chance.below(3)],
             friction: Friction::coulomb([0.0, -1.0, f32::NAN][chance.below(3)]),

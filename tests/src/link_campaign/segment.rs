@@ -251,7 +251,7 @@ impl<'t> Segment<'t> {
         for sample in std::mem::take(&mut host.samples) {
             self.board
                 .watch
-                .sample(&sample, self.scene.law.max_force_n)?;
+                .sample(&sample, self.scene.params.max_force_n)?;
             let off = surface::judge(self.terrain, &sample)?;
             self.off_surface = self.off_surface.max(off);
             self.touching += u64::from(off > 0.0);
@@ -304,7 +304,7 @@ impl<'t> Segment<'t> {
 
 /// A scene like no other before.
 fn scene(terrain: &Terrain<'_>, board: &Board<'_>, chance: &mut Chance) -> Scene {
-    let law = SurfaceParams {
+    let params = SurfaceParams {
         stiffness_n_per_mm: chance.between(0.3, 0.8) as f32,
         max_force_n: 8.5,
         ..SurfaceParams::PREMIUM
@@ -313,6 +313,6 @@ fn scene(terrain: &Terrain<'_>, board: &Board<'_>, chance: &mut Chance) -> Scene
     Scene {
         hold_clock: board.lock_step,
         materials: None,
-        ..terrain.scene(law, Source::Encoders, home)
+        ..terrain.scene(params, Source::Encoders, home)
     }
 }

@@ -45,8 +45,8 @@ pub struct Materials {
     pub table: Vec<Material>,
     /// Layout of the classes.
     pub layout: Layout,
-    /// The scene's own law: a limit, and a stiffness that is the default's or a multiple.
-    pub law: SurfaceParams,
+    /// The scene's own params: a limit, and a stiffness that is the default's or a multiple.
+    pub params: SurfaceParams,
     /// Millimetres a cell: a power of two, so that lengths in cells are exact.
     pub cell_mm: f32,
     /// Samples each way.
@@ -85,7 +85,7 @@ impl Materials {
         }
         let layout = LAYOUTS[chance.below(LAYOUTS.len())];
         let scale = [1.0, 1.0, 0.5, 3.0][chance.below(4)];
-        let law = SurfaceParams {
+        let params = SurfaceParams {
             stiffness_n_per_mm: table[0].stiffness_n_per_mm * scale,
             max_force_n: [8.5, 8.5, 1.0, 1e4][chance.below(4)],
             ..SurfaceParams::PREMIUM
@@ -93,7 +93,7 @@ impl Materials {
         let mut materials = Self {
             table,
             layout,
-            law,
+            params,
             cell_mm: [1.0, 1.0, 0.25, 4.0][chance.below(4)],
             size: terrain.size.map(|patches| patches + 1),
             classes: Vec::new(),
@@ -110,7 +110,7 @@ impl Materials {
         let mut materials = Self {
             table: table.to_vec(),
             layout: Layout::Each,
-            law: SurfaceParams {
+            params: SurfaceParams {
                 stiffness_n_per_mm: table[0].stiffness_n_per_mm,
                 ..SurfaceParams::PREMIUM
             },

@@ -77,10 +77,10 @@ impl Recorded {
             level: 0,
             size: FieldSize::new(scene.terrain.size[0], scene.terrain.size[1]),
             top: scene.terrain.top(),
-            underlay: None,
+            fallback: None,
             cell_mm: 1.0,
             home: GridPoint::default(),
-            law: SurfaceParams {
+            params: SurfaceParams {
                 friction: scene.friction,
                 shading: scene.shading,
                 texture: scene.texture,

@@ -264,12 +264,12 @@ fn message(scene: &Scene, materials: &Materials, shift: [i32; 3]) -> SceneMessag
         level: 0,
         size: FieldSize::new(columns + shift[0], rows + shift[1]),
         top: scene.terrain.top() + shift[2],
-        underlay: None,
+        fallback: None,
         cell_mm: materials.cell_mm,
         home: GridPoint::default(),
-        law: SurfaceParams {
+        params: SurfaceParams {
             shading: scene.shading,
-            ..materials.law
+            ..materials.params
         },
         source: Source::Points,
         hold_clock: false,

@@ -304,7 +304,7 @@ fn is_twin_undecided(
     buffers: &mut Buffers,
 ) -> bool {
     let twin = twin_of(scene, symmetry);
-    let own = felt_at(&twin, tick, |_| [0.0; 3], buffers);
+    let own = rendered_at(&twin, tick, |_| [0.0; 3], buffers);
     own.is_some_and(|own| {
         let decides = |there: &Seen, hair| is_elsewhere(there, &own, hair);
         is_undecided(&twin, tick, decides, buffers)
@@ -327,7 +327,7 @@ fn is_undecided(
         for corner in 0..8 {
             let off = [0, 1, 2].map(|bit| if corner >> bit & 1 == 0 { hair } else { -hair });
             let moved = |now| if now < first { [0.0; 3] } else { off };
-            if felt_at(scene, tick, moved, buffers).is_some_and(|felt| decides(&felt, hair)) {
+            if rendered_at(scene, tick, moved, buffers).is_some_and(|felt| decides(&felt, hair)) {
                 return true;
             }
         }
@@ -336,7 +336,7 @@ fn is_undecided(
 }
 
 /// What is felt in a tick of a way that is moved by as much in each.
-fn felt_at(
+fn rendered_at(
     scene: &Scene,
     tick: usize,
     moved: impl Fn(usize) -> [f64; 3],

@@ -71,10 +71,10 @@ impl<'t> Bed<'t> {
             }),
         );
         let home = terrain.scale().to_grid(home_mm).expect("addressable");
-        let law = SurfaceParams::PREMIUM;
+        let params = SurfaceParams::PREMIUM;
         Self {
             terrain,
-            scene: terrain.scene(law, Source::Encoders, home),
+            scene: terrain.scene(params, Source::Encoders, home),
             device: Rc::new(RefCell::new(device)),
             session: None,
             log,

@@ -112,7 +112,7 @@ const FELT: [&str; 9] = [
     "state",
 ];
 
-/// The guard comes to a force by steps in single precision: it is off the law's force by
+/// The guard comes to a force by steps in single precision: it is off the surface parameters's force by
 /// the rounding of one, N.
 const ROUNDING_N: f64 = 1e-6;
 

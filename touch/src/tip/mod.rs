@@ -34,7 +34,7 @@ pub use bearing::{Nodes, Samples};
 /// Largest radius, cells of the ground.
 pub const MAX_CELLS: f64 = 8.0;
 /// Haptic cells in a radius, at least.
-pub const FELT_CELLS: f64 = 32.0;
+pub const CELLS_IN_RADIUS: f64 = 32.0;
 /// A haptic cell is not made smaller than this, device millimetres: half an encoder's count.
 pub const FINEST_MM: f64 = 1.0 / 64.0;
 /// Heights of the centre are rounded to multiples of this, haptic cells: slopes stay true to a
@@ -100,7 +100,7 @@ impl Ball {
 
     fn of(cells: f64, cell_mm: f64) -> Self {
         let most = libm::floor(cell_mm / FINEST_MM).max(1.0);
-        let parts = libm::ceil(FELT_CELLS / cells).clamp(1.0, most) as u32;
+        let parts = libm::ceil(CELLS_IN_RADIUS / cells).clamp(1.0, most) as u32;
         let radius = cells * f64::from(parts);
         let reach = radius as i32;
         let cap = |(x, y): (i32, i32)| {

@@ -124,13 +124,13 @@ impl Ground {
     }
 
     /// Cells of level 0 in a felt one, along a side.
-    pub(super) fn felt_cell(&self) -> i32 {
+    pub(super) fn haptic_cell(&self) -> i32 {
         1_i32.checked_shl(self.level.into()).unwrap_or(i32::MAX)
     }
 
     /// Cells of level 0 in a tile, along a side.
     pub(super) fn tile_cells(&self) -> i32 {
-        TILE_CELLS.saturating_mul(self.felt_cell())
+        TILE_CELLS.saturating_mul(self.haptic_cell())
     }
 
     /// The south-west cell of a tile, of level 0.

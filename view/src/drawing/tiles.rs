@@ -76,7 +76,7 @@ impl Tiles {
             slot: tile.slot,
             index: tile.index,
             up: ground.heights_of_mm(&tile.heights_mm),
-            step: ground.step(ground.felt_cell()),
+            step: ground.step(ground.haptic_cell()),
         };
         let heights = lifted.heights();
         let posts = Posts {
@@ -113,7 +113,7 @@ impl Tiles {
         layers: &Layers,
         changed: &[[i32; 2]],
     ) -> Result<Vec<Entry>> {
-        let every = (layers.mesh_cell() / ground.felt_cell()).clamp(1, TILE_CELLS);
+        let every = (layers.mesh_cell() / ground.haptic_cell()).clamp(1, TILE_CELLS);
         let near = changed.iter().flat_map(|index| {
             [[0, 0], [0, -1], [1, 0], [0, 1], [-1, 0]].map(|step| beside(*index, step))
         });
@@ -242,7 +242,7 @@ impl Posts<'_> {
     /// A sample's place, at a height.
     fn at(&self, column: usize, row: usize, up: f32) -> [f32; 3] {
         let [x, y] = self.first.map(f64::from);
-        let side = f64::from(self.ground.felt_cell());
+        let side = f64::from(self.ground.haptic_cell());
         let cell = [x + side * column as f64, y + side * row as f64];
         self.ground.sample(cell, up)
     }
@@ -308,7 +308,7 @@ impl Posts<'_> {
 
     /// Lines around the tile, broken at holes.
     fn outline(&self) -> Vec<Vec<[f32; 3]>> {
-        let float = (FLOAT_CELLS * self.ground.step(self.ground.felt_cell())) as f32;
+        let float = (FLOAT_CELLS * self.ground.step(self.ground.haptic_cell())) as f32;
         let ring = ring();
         let known = |place: &(usize, usize)| self.height(place.0, place.1).is_some();
         let lines = ring

@@ -3,16 +3,16 @@
 //!
 //! A proxy stays where it is while the HIP pulls it from inside the static friction cone over
 //! the surface there. Outside of it the proxy slides: it follows the pull until dynamic and
-//! viscous friction hold it (`walk`). `cone` measures how the HIP pulls, and what friction holds.
+//! viscous friction hold it (`stick_or_slide`). `cone` measures how the HIP pulls, and what friction holds.
 
 mod cone;
 mod cone_root;
-mod walk;
+mod stick_or_slide;
 
 use serde::{Deserialize, Serialize};
 
 pub(super) use cone::Cone;
-pub(super) use walk::{Walk, Walked};
+pub(super) use stick_or_slide::{Walk, Walked};
 
 /// Friction of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@ use hapterra_core::Vec3;
 use hapterra_core::force::{Material, MaterialTable, SurfaceParams};
 use hapterra_core::grid::{Cell, GridPoint};
 use hapterra_core::scene::{HipCommand, Scene, Source};
-use hapterra_core::terrain::{CoarseTile, TileKey, Underlay};
+use hapterra_core::terrain::{CoarseTile, Fallback, TileKey};
 use hapterra_core::wire::materials::{
     MAX_TABLE_BYTES, MaterialScene, MaterialTile, TileMaterials, table_bytes,
 };
@@ -178,7 +178,7 @@ fn scenes_that_follow_each_other_at_once_have_each_their_own_table() {
     let mut room = [0; MAX_TABLE_BYTES];
     for (epoch, table) in [(1, &soft), (2, &hard), (3, &soft), (4, &soft), (5, &hard)] {
         let scene = Scene {
-            law: SurfaceParams {
+            params: SurfaceParams {
                 stiffness_n_per_mm: table.materials()[0].stiffness_n_per_mm,
                 ..SurfaceParams::PREMIUM
             },
@@ -195,16 +195,16 @@ fn scenes_that_follow_each_other_at_once_have_each_their_own_table() {
 }
 
 #[test]
-fn the_underlay_comes_without_materials() {
+fn the_fallback_comes_without_materials() {
     let mut rig = greeted();
     let table = table(&[0.5, 1.0]);
     let wide = CoarseTile {
         first: Cell::new(0, 0),
         shift: 4,
     };
-    let underlay = Underlay { wide, near: None };
+    let fallback = Fallback { wide, near: None };
     let scene = Scene {
-        underlay: Some(underlay),
+        fallback: Some(fallback),
         source: Source::Encoders,
         ..scene_of(&table, 9)
     };

@@ -49,10 +49,10 @@ pub(super) fn soft_plane(
     super::armed_over_plane(board, attendant, BELOW_MM)?;
     let felt = touched(board, attendant)?;
     let (deep_mm, up_n) = felt.deepest;
-    let law = plane::SOFT;
-    let expected_n = (law.stiffness_n_per_mm * deep_mm).min(law.max_force_n);
+    let params = plane::SOFT;
+    let expected_n = (params.stiffness_n_per_mm * deep_mm).min(params.max_force_n);
     let pushed = (0.5 * expected_n..=1.1 * expected_n).contains(&up_n);
-    if !pushed || felt.most_n > 1.01 * law.max_force_n {
+    if !pushed || felt.most_n > 1.01 * params.max_force_n {
         return Err(Finding::NoFloor.into());
     }
     board.trips(attendant, Task::PressStop, Fault::EmergencyStop)?;

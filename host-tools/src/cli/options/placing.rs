@@ -143,8 +143,8 @@ pub(in crate::cli) fn off_in_words(worst: &Distortion) -> String {
 
 /// A view's scale, and what a haptic cell of its level is.
 pub(in crate::cli) fn scale_in_words(view: &Placement) -> String {
-    let (level, cell_mm) = (view.level, short(view.felt_cell_mm()));
-    match (view.ground_m_per_mm(), view.felt_cell_m()) {
+    let (level, cell_mm) = (view.level, short(view.haptic_cell_mm()));
+    match (view.ground_m_per_mm(), view.haptic_cell_m()) {
         (Some(scale), Some(cell_m)) => format!(
             "{} ground metres a device millimetre; at level {level} a haptic cell is {} m, {cell_mm} mm at the device",
             short(scale),
@@ -163,8 +163,8 @@ pub(in crate::cli) fn picture_lines(
     if let Some(scale) = view.ground_m_per_mm() {
         lines.push(("1 mm in the hand".to_owned(), format!("{} m", short(scale))));
     }
-    let cell_mm = short(view.felt_cell_mm());
-    lines.push(match view.felt_cell_m() {
+    let cell_mm = short(view.haptic_cell_mm());
+    lines.push(match view.haptic_cell_m() {
         Some(metres) => (
             format!("haptic cell, level {}", view.level),
             format!("{} m, {cell_mm} mm", short(metres)),

@@ -243,13 +243,13 @@ impl<'t> PlacementControl<'t> {
 
     /// The view in force in a few words, and the keys.
     pub(in crate::cli) fn in_words(&self) -> String {
-        let Laid { view, law } = self.steering.now();
+        let Laid { view, params } = self.steering.now();
         let scale = match view.ground_m_per_mm() {
             Some(metres) => format!("{} m/mm", short(metres)),
-            None => format!("{} mm a cell", short(view.felt_cell_mm())),
+            None => format!("{} mm a cell", short(view.haptic_cell_mm())),
         };
         let times = view.exaggeration.unwrap_or(1.0);
-        let stiffness = short(f64::from(law.stiffness_n_per_mm));
+        let stiffness = short(f64::from(params.stiffness_n_per_mm));
         format!(
             "{scale}, level {}, heights × {}, {stiffness} N/mm",
             view.level,
@@ -259,10 +259,10 @@ impl<'t> PlacementControl<'t> {
 }
 
 /// What a surface feels like, without what it has not.
-fn surface_in_words(law: &SurfaceParams) -> String {
+fn surface_in_words(params: &SurfaceParams) -> String {
     let number = |number: f32| placing::short(f64::from(number));
-    let (friction, texture) = (&law.friction, &law.texture);
-    let mut words = vec![format!("{} N/mm", number(law.stiffness_n_per_mm))];
+    let (friction, texture) = (&params.friction, &params.texture);
+    let mut words = vec![format!("{} N/mm", number(params.stiffness_n_per_mm))];
     if friction.static_mu > 0.0 {
         let [sliding, at_rest] = [friction.dynamic_mu, friction.static_mu].map(number);
         words.push(format!("friction {sliding}, {at_rest} at rest"));
@@ -270,10 +270,10 @@ fn surface_in_words(law: &SurfaceParams) -> String {
     if friction.viscous_s > 0.0 {
         words.push(format!("viscous friction {} s", number(friction.viscous_s)));
     }
-    if law.damping.ns_per_m > 0.0 {
-        words.push(format!("damping {} N·s/m", number(law.damping.ns_per_m)));
+    if params.damping.ns_per_m > 0.0 {
+        words.push(format!("damping {} N·s/m", number(params.damping.ns_per_m)));
     }
-    if !law.shading.is_none() {
+    if !params.shading.is_none() {
         words.push("shading".to_owned());
     }
     if !texture.is_none() {
@@ -300,7 +300,7 @@ pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) ->
     format!(
         "view {number}: {}; {}; {} under the home position",
         scale_in_words(&laid.view),
-        surface_in_words(&laid.law),
+        surface_in_words(&laid.params),
         crate::place::place_in_words(&file, laid.view.home_ground)
     )
 }

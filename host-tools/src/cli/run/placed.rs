@@ -49,19 +49,19 @@ impl<'t> Placed<'t> {
     pub(super) fn new(
         device: &OneDevice,
         (name, laid): (&str, &'t InReach<'t>),
-        law: SurfaceParams,
+        params: SurfaceParams,
     ) -> Result<Self, Failure> {
         let (view, terrain) = (laid.view, &laid.terrain);
         let tour = match device.is_scripted() {
             true => Some(shown_reading(name, terrain.raster(), || {
-                PlacedTerrain::in_view(terrain, view.home_mm, law)
+                PlacedTerrain::in_view(terrain, view.home_mm, params)
             })?),
             false => None,
         };
         Ok(Self {
             terrain,
             view,
-            scene: view.scene(terrain, law)?,
+            scene: view.scene(terrain, params)?,
             arm: laid.arm,
             tour,
         })

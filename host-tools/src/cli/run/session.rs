@@ -108,11 +108,11 @@ impl<'t> Serving<'_, 't> {
         }
         let materials = placed.terrain.grid().materials();
         let table = materials.map(Materials::table);
-        stability::warn_of(&placed.scene.law, table, &hello);
+        stability::warn_of(&placed.scene.params, table, &hello);
         let recording = described(self.recording, args, placed, &hello);
         let laid = Laid {
             view: placed.view,
-            law: placed.scene.law,
+            params: placed.scene.params,
         };
         let mut control = PlacementControl::new(
             (placed.terrain, laid),
@@ -282,9 +282,9 @@ fn described(
 ) -> Option<Recording> {
     if let Some(recording) = &mut recording {
         let (file, device) = (without_key(&args.terrain.file), Device::of(device));
-        let law = (placed.scene.law, Rule::Swept);
+        let params = (placed.scene.params, Rule::Swept);
         let home_mm = Some(placed.view.home_mm);
-        let settings = Settings::new(&file, placed.terrain, law, home_mm, device);
+        let settings = Settings::new(&file, placed.terrain, params, home_mm, device);
         recording.describe(&settings);
     }
     recording

@@ -144,7 +144,7 @@ fn recording(folder: &Path) -> (PathBuf, Settings) {
     let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
     let scale = Scale::new(2.0, 6.0).expect("valid");
     let terrain = Terrain::new(&raster, scale, 1).expect("terrain");
-    let law = SurfaceParams {
+    let params = SurfaceParams {
         stiffness_n_per_mm: 0.3,
         max_force_n: 4.0,
         friction: Friction::coulomb(0.25),
@@ -156,7 +156,7 @@ fn recording(folder: &Path) -> (PathBuf, Settings) {
         firmware: String::new(),
         tick_hz: 1000,
     };
-    let settings = Settings::new("t.tif", &terrain, (law, Rule::Swept), None, device);
+    let settings = Settings::new("t.tif", &terrain, (params, Rule::Swept), None, device);
     let path = folder.join("felt.csv");
     let lines = settings.to_toml();
     let lines: String = lines.lines().map(|line| format!("# {line}\n")).collect();
@@ -231,26 +231,26 @@ fn recorded_surface_has_all_bits_of_its_law() {
         max_force: Some(4.0),
         ..SurfaceOptions::default()
     };
-    let law = options
+    let params = options
         .load()
-        .map(|surface| surface.law)
+        .map(|surface| surface.params)
         .map_err(|it| it.text());
-    assert_eq!(law, Ok(settings.law()));
+    assert_eq!(params, Ok(settings.params()));
     // A friction of one's own brings its static part, and leaves shading as it is.
     let rough = SurfaceOptions {
         friction: Some(0.7),
         ..options
     };
-    let law = rough
+    let params = rough
         .load()
-        .map(|surface| surface.law)
+        .map(|surface| surface.params)
         .map_err(|it| it.text());
     let friction = Friction::coulomb(0.7);
     assert_eq!(
-        law,
+        params,
         Ok(SurfaceParams {
             friction,
-            ..settings.law()
+            ..settings.params()
         })
     );
     // So may `run` take it.

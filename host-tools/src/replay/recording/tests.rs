@@ -26,8 +26,8 @@ fn settings() -> Settings {
         firmware: "0.1.0".into(),
         tick_hz: 1000,
     };
-    let law = (SurfaceParams::PREMIUM, crate::replay::Rule::Swept);
-    Settings::new("flat.tif", &terrain.expect("terrain"), law, None, device)
+    let params = (SurfaceParams::PREMIUM, crate::replay::Rule::Swept);
+    Settings::new("flat.tif", &terrain.expect("terrain"), params, None, device)
 }
 
 fn record(tick: u32) -> Record {

@@ -229,7 +229,7 @@ impl ActiveMaterial {
 /// The numbers of a material, as stiff as the scene has it.
 fn numbers(materials: &Materials, class: u8) -> Numbers {
     let table = &materials.table;
-    let scale = f64::from(materials.law.stiffness_n_per_mm / table[0].stiffness_n_per_mm);
+    let scale = f64::from(materials.params.stiffness_n_per_mm / table[0].stiffness_n_per_mm);
     let one = &table[usize::from(class)];
     [
         f64::from(one.stiffness_n_per_mm) * scale,

@@ -111,7 +111,7 @@ impl<'g> MaterialJudge<'g> {
     /// What holds of every force: its limit, and none without a contact.
     fn is_bounded(&self, replied: &Replied) -> Verdict {
         let (force, state) = (replied.sample.force_n.as_dvec3(), replied.sample.state);
-        let most = f64::from(self.materials.law.max_force_n);
+        let most = f64::from(self.materials.params.max_force_n);
         let is_bounded = force.length() <= most * (1.0 + 1e-6);
         let may_press = matches!(state, ContactState::Touching | ContactState::Releasing);
         if !is_bounded || !(may_press || force == DVec3::ZERO) {
@@ -202,7 +202,7 @@ impl<'g> MaterialJudge<'g> {
         }
         let felt = self.felt(replied, seen);
         let force = replied.sample.force_n.as_dvec3();
-        let fades = replied.sample.limits.contains(Limits::BOUNDARY_FADING);
+        let fades = replied.sample.limits.contains(Limits::EDGE_FADING);
         let is_whole = !fades && self.shading == Shading::None;
         let mut told = String::new();
         let changing = courses.iter().any(|course| !course.is_settled());
@@ -260,7 +260,7 @@ impl<'g> MaterialJudge<'g> {
             allowed: seen.allowed_in_space(self.place.terrain),
             proxy: &replied.sample.proxy,
             velocity_mm_s: (hip - DVec3::from_array(from)) * (cell_mm * RATE_HZ),
-            most_n: f64::from(self.materials.law.max_force_n),
+            most_n: f64::from(self.materials.params.max_force_n),
             cell_mm,
         }
     }

@@ -34,7 +34,7 @@ impl MaterialJudge<'_> {
             (0..2).all(|axis| (1.0..size[axis] - 1.0).contains(&p[axis]))
         };
         let is_plane = matches!(self.kind, Kind::Flat | Kind::Slope);
-        let is_whole = |sample: &TickRecord| !sample.limits.contains(Limits::BOUNDARY_FADING);
+        let is_whole = |sample: &TickRecord| !sample.limits.contains(Limits::EDGE_FADING);
         let is_told = is_plane
             && touches(before.sample.state)
             && touches(seen.felt.state)

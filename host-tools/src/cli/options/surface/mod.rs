@@ -87,8 +87,8 @@ pub fn choice() -> impl TypedValueParser<Value = SurfaceChoice> {
 /// A surface with all its numbers.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// The law of the scene: that of the default where the ground has classes.
-    pub law: SurfaceParams,
+    /// The surface parameters of the scene: that of the default where the ground has classes.
+    pub params: SurfaceParams,
     /// The classes of the ground, where the surface has some.
     looks: Option<Looks>,
 }
@@ -111,25 +111,25 @@ impl SurfaceOptions {
         let mut surface = match &self.surface {
             None => Surface::of(&SurfaceParams::PREMIUM),
             Some(SurfaceChoice::Named(named)) => {
-                Surface::of(&named.material.law(&SurfaceParams::PREMIUM))
+                Surface::of(&named.material.params(&SurfaceParams::PREMIUM))
             }
             Some(SurfaceChoice::File(file)) if file.extension().is_some_and(|it| it == "toml") => {
                 self.of_table(file)?
             }
             Some(SurfaceChoice::File(file)) => self.of_recording(file)?,
         };
-        let law = &mut surface.law;
+        let params = &mut surface.params;
         if let Some(stiffness) = self.stiffness {
-            law.stiffness_n_per_mm = stiffness;
+            params.stiffness_n_per_mm = stiffness;
         }
         if let Some(mu) = self.friction {
-            law.friction = rubbed(&law.friction, mu);
+            params.friction = rubbed(&params.friction, mu);
         }
         if let Some(force) = self.max_force {
-            law.max_force_n = force;
+            params.max_force_n = force;
         }
-        check(&Material::of(law)).map_err(|why| told(&why))?;
-        let limit = law.max_force_n;
+        check(&Material::of(params)).map_err(|why| told(&why))?;
+        let limit = params.max_force_n;
         if !(limit.is_finite() && limit >= 0.0) {
             return Err(format!("a largest force of {limit} N is not valid"))
                 .or_hint("--max-force finite and not below 0; 8.5 N without it");
@@ -148,8 +148,8 @@ impl SurfaceOptions {
             return Err("--friction: each of the recorded materials has its own")
                 .or_hint("leave it out, or name a table that states it with --surface");
         }
-        let law = settings.law();
-        Ok(Surface { law, looks })
+        let params = settings.params();
+        Ok(Surface { params, looks })
     }
 
     /// The surface of a table: the options over its default, and the classes over that.
@@ -196,7 +196,7 @@ impl SurfaceOptions {
             ..SurfaceParams::PREMIUM
         };
         Ok(Surface {
-            law: default.law(&scene),
+            params: default.params(&scene),
             looks: Some(Looks { default, class }),
         })
     }
@@ -221,9 +221,9 @@ impl SurfaceOptions {
 
 impl Surface {
     /// A surface that is the same everywhere.
-    const fn of(law: &SurfaceParams) -> Self {
+    const fn of(params: &SurfaceParams) -> Self {
         Self {
-            law: *law,
+            params: *params,
             looks: None,
         }
     }

@@ -23,10 +23,10 @@ fn class_takes_from_the_default_and_the_options() {
     };
     let text = "[default]\nstatic_friction = 0.9\nstiffness = 0.3\ntexture = \"grating\"\ntexture_direction = 20\n[class.3]\nfriction = 0.5\ntexture = \"grain\"\n[class.2]\nstiffness = 0.9\n";
     let surface = load(options, text).expect("a table");
-    assert_eq!(surface.law.stiffness_n_per_mm, 0.7);
-    assert_eq!(surface.law.friction, Friction::coulomb(0.2));
+    assert_eq!(surface.params.stiffness_n_per_mm, 0.7);
+    assert_eq!(surface.params.friction, Friction::coulomb(0.2));
     let looks = surface.looks.expect("classes");
-    assert_eq!(looks.default, Material::of(&surface.law));
+    assert_eq!(looks.default, Material::of(&surface.params));
     let [two, three] = &looks.class[..] else {
         panic!("{looks:?}");
     };
@@ -41,12 +41,14 @@ fn class_takes_from_the_default_and_the_options() {
 #[test]
 fn scene_has_shading_and_passivity() {
     let text = "shading = \"smooth\"\npassivity = \"off\"\n[default]\ndamping = 2\n";
-    let law = load(SurfaceOptions::default(), text).expect("a table").law;
-    assert_eq!(law.shading, Shading::Smooth);
-    assert_eq!(law.damping.controller, Controller::Off);
-    assert_eq!(law.damping.ns_per_m, 2.0);
-    let law = load(SurfaceOptions::default(), "").expect("nothing").law;
-    assert_eq!(law, SurfaceParams::PREMIUM);
+    let params = load(SurfaceOptions::default(), text)
+        .expect("a table")
+        .params;
+    assert_eq!(params.shading, Shading::Smooth);
+    assert_eq!(params.damping.controller, Controller::Off);
+    assert_eq!(params.damping.ns_per_m, 2.0);
+    let params = load(SurfaceOptions::default(), "").expect("nothing").params;
+    assert_eq!(params, SurfaceParams::PREMIUM);
 }
 
 #[test]
@@ -108,7 +110,7 @@ fn options_that_no_surface_has_are_refused() {
             "force of -1",
         ),
     ] {
-        let why = options.load().map(|it| it.law).expect_err(wanted).text();
+        let why = options.load().map(|it| it.params).expect_err(wanted).text();
         assert!(why.contains(wanted) && why.contains("hint: "), "{why}");
     }
 }
@@ -148,9 +150,12 @@ fn surface_is_a_name_or_a_file() {
         friction: Some(0.7),
         ..SurfaceOptions::default()
     };
-    let law = options.load().expect("sand").law;
-    assert_eq!(law.friction, Friction::coulomb(0.7));
-    assert_eq!((law.stiffness_n_per_mm, law.damping.ns_per_m), (0.4, 2.0));
+    let params = options.load().expect("sand").params;
+    assert_eq!(params.friction, Friction::coulomb(0.7));
+    assert_eq!(
+        (params.stiffness_n_per_mm, params.damping.ns_per_m),
+        (0.4, 2.0)
+    );
 }
 
 #[test]
@@ -198,6 +203,10 @@ fn raster_or_classes_alone_are_refused() {
         surface: Some(SurfaceChoice::File("no/t.toml".into())),
         ..SurfaceOptions::default()
     };
-    let why = options.load().map(|it| it.law).expect_err("no file").text();
+    let why = options
+        .load()
+        .map(|it| it.params)
+        .expect_err("no file")
+        .text();
     assert!(why.contains("no/t.toml"), "{why}");
 }

@@ -1,4 +1,4 @@
-//! The surface between underlay and tiles, against a model of its own in f64.
+//! The surface between fallback and tiles, against a model of its own in f64.
 
 use std::boxed::Box;
 use std::collections::BTreeMap;
@@ -25,11 +25,11 @@ const NEAR: CoarseTile = CoarseTile {
     first: Cell::new(112, 104),
     shift: 2,
 };
-const UNDERLAY: Underlay = Underlay {
+const FALLBACK: Fallback = Fallback {
     wide: WIDE,
     near: Some(NEAR),
 };
-/// Heights of tiles count from here, those of the underlay from below.
+/// Heights of tiles count from here, those of the fallback from below.
 const BASE: i32 = 10;
 
 /// Hills of some cells with a rough part.
@@ -74,7 +74,7 @@ fn through(tile: CoarseTile, x: i32, y: i32, sample: &dyn Fn(i32, i32) -> f64) -
     Some(south * (1.0 - t) + north * t)
 }
 
-/// A window over the hills, and how far the model has each tile that came from the underlay.
+/// A window over the hills, and how far the model has each tile that came from the fallback.
 struct Bed<'t> {
     window: Window<'t, 4>,
     spare: Vec<&'t mut Tile>,
@@ -92,7 +92,7 @@ impl<'t> Bed<'t> {
         let slots = core::array::from_fn(|_| core::array::from_fn(|_| next()));
         let mut window = Window::new(slots);
         window.reset(0, SIZE, 1 << 28);
-        window.lay(Some(UNDERLAY));
+        window.lay(Some(FALLBACK));
         Self {
             window,
             spare,
@@ -100,7 +100,7 @@ impl<'t> Bed<'t> {
         }
     }
 
-    fn with_underlay(room: &'t mut [Tile]) -> Self {
+    fn with_fallback(room: &'t mut [Tile]) -> Self {
         let mut bed = Self::new(room);
         bed.lays();
         bed
@@ -200,8 +200,8 @@ const HERE: Cell = Cell::new(140, 140);
 #[test]
 fn it_is_the_model_s_whatever_has_come_and_settled() {
     let mut room = room();
-    let mut bed = Bed::with_underlay(&mut room);
-    assert_eq!(bed.judge(3..6), 96 * 96, "the underlay alone");
+    let mut bed = Bed::with_fallback(&mut room);
+    assert_eq!(bed.judge(3..6), 96 * 96, "the fallback alone");
     let tiles = [
         (4, 4),
         (5, 4),
@@ -224,9 +224,9 @@ fn it_is_the_model_s_whatever_has_come_and_settled() {
 
 /// Cells on either side of the near tile's border, too.
 #[test]
-fn cells_that_share_samples_of_the_underlay_agree_to_the_bit() {
+fn cells_that_share_samples_of_the_fallback_agree_to_the_bit() {
     let mut room = room();
-    let bed = Bed::with_underlay(&mut room);
+    let bed = Bed::with_fallback(&mut room);
     let heights = |x: i32, y: i32| match bed.window.ground(Cell::new(x, y)) {
         CellContent::Patch(corners) => corners.heights.map(f32::to_bits),
         ground => panic!("{x} {y}: {ground:?}"),
@@ -244,7 +244,7 @@ fn cells_that_share_samples_of_the_underlay_agree_to_the_bit() {
 #[test]
 fn blended_samples_keep_their_speed_and_end_at_the_tile() {
     let mut room = room();
-    let mut bed = Bed::with_underlay(&mut room);
+    let mut bed = Bed::with_fallback(&mut room);
     let heights = |bed: &Bed<'_>| {
         let mut all = Vec::new();
         for x in 126..162 {
@@ -299,10 +299,10 @@ fn blended_samples_keep_their_speed_and_end_at_the_tile() {
 #[test]
 fn untouched_tile_is_the_surface_at_once() {
     let mut room = room();
-    let mut bed = Bed::with_underlay(&mut room);
+    let mut bed = Bed::with_fallback(&mut room);
     bed.comes(6, 4, HERE);
     assert!(bed.window.is_settled(Cell::new(6 * 32, 140)));
-    // Beside the hand's, which is the underlay still: it would bend at once.
+    // Beside the hand's, which is the fallback still: it would bend at once.
     bed.comes(5, 4, HERE);
     assert!(!bed.window.is_settled(Cell::new(5 * 32, 140)));
     bed.judge(3..7);
@@ -316,7 +316,7 @@ fn untouched_tile_is_the_surface_at_once() {
 }
 
 #[test]
-fn without_its_underlay_a_tile_is_the_surface_at_once_and_stays_it() {
+fn without_its_fallback_a_tile_is_the_surface_at_once_and_stays_it() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
     assert_eq!(bed.window.ground(HERE), CellContent::Missing);
@@ -333,7 +333,7 @@ fn without_its_underlay_a_tile_is_the_surface_at_once_and_stays_it() {
 fn no_data_of_a_tile_acts_at_once() {
     let mut room = room();
     let mut bed = Bed::new(&mut room);
-    bed.window.lay(Some(Underlay {
+    bed.window.lay(Some(Fallback {
         wide: WIDE,
         near: None,
     }));
@@ -427,7 +427,7 @@ fn near_tile_counts_for_clearance_and_blend_distance() {
 #[test]
 fn clear_means_clear_over_what_has_not_settled() {
     let mut room = room();
-    let mut bed = Bed::with_underlay(&mut room);
+    let mut bed = Bed::with_fallback(&mut room);
     let mut seen = [0, 0];
     const EACH: usize = cases(1, 8) as usize;
     for step in (0..3000_i32).step_by(EACH) {
@@ -457,30 +457,30 @@ fn clear_means_clear_over_what_has_not_settled() {
 #[test]
 fn buffers_are_neither_lost_nor_doubled() {
     let mut room = room();
-    let mut bed = Bed::with_underlay(&mut room);
-    assert_eq!(bed.spare.len(), 2, "the underlay keeps two");
+    let mut bed = Bed::with_fallback(&mut room);
+    assert_eq!(bed.spare.len(), 2, "the fallback keeps two");
     bed.lays();
     bed.comes(4, 4, HERE);
     bed.comes(8, 4, HERE);
     bed.comes(8, 4, HERE);
     assert_eq!(bed.spare.len(), 2);
     assert!(bed.window.take_spare().is_none(), "they are in use");
-    bed.window.lay(Some(UNDERLAY));
+    bed.window.lay(Some(FALLBACK));
     assert!(bed.window.take_spare().is_none(), "others are going to be");
-    let without_near = Underlay {
+    let without_near = Fallback {
         near: None,
-        ..UNDERLAY
+        ..FALLBACK
     };
     bed.window.lay(Some(without_near));
     let spare = bed.window.take_spare().expect("no near one any more");
     assert_eq!(spare.key(), None);
     assert!(bed.window.take_spare().is_none(), "the wide one is to be");
     bed.window.reset(0, SIZE, 50);
-    assert!(bed.window.take_spare().is_some(), "no underlay any more");
+    assert!(bed.window.take_spare().is_some(), "no fallback any more");
     assert!(bed.window.take_spare().is_none());
 }
 
-/// The sample in the middle of the hand's tile where that is farthest above the underlay, or
+/// The sample in the middle of the hand's tile where that is farthest above the fallback, or
 /// farthest below it.
 fn where_it_moves(up: bool) -> (i32, i32) {
     let rise = |&(x, y): &(i32, i32)| {
@@ -495,11 +495,11 @@ fn where_it_moves(up: bool) -> (i32, i32) {
     most
 }
 
-/// Depth and state in each tick of a hand that holds still, `above` the underlay, while the tile
+/// Depth and state in each tick of a hand that holds still, `above` the fallback, while the tile
 /// under it comes in tick 50.
 fn held_still(friction: Friction, up: bool, above: f64) -> Vec<(f64, ContactState)> {
     let mut room = room();
-    let mut bed = Bed::with_underlay(&mut room);
+    let mut bed = Bed::with_fallback(&mut room);
     let settings = ContactSettings::AT_1_KHZ.with_friction(friction);
     let mut contact = Box::new(Contact::new(settings));
     let (x, y) = where_it_moves(up);
@@ -575,7 +575,7 @@ fn a_hand_that_holds_still_feels_the_surface_move_and_no_step() {
 fn a_hand_that_the_surface_passes_does_not_fall_through_it() {
     let (x, y) = where_it_moves(true);
     let mut room = room();
-    let mut bed = Bed::with_underlay(&mut room);
+    let mut bed = Bed::with_fallback(&mut room);
     let mut contact = Box::new(Contact::new(ContactSettings::AT_1_KHZ));
     let z = (coarse(x, y).expect("known") + 0.1) as f32;
     let hip = GridPoint::new([x, y, 0], Vec3::new(0.01, 0.01, z));

@@ -1,4 +1,4 @@
-//! The effects that are compared, each as the law of a scene.
+//! The effects that are compared, each as the surface parameters of a scene.
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams, Texture};
@@ -72,22 +72,22 @@ impl Effect {
         }
     }
 
-    /// The law of a scene with this effect, and no other. The controller is off where it is
+    /// The surface parameters of a scene with this effect, and no other. The controller is off where it is
     /// not asked for.
-    pub(super) fn law(self) -> SurfaceParams {
+    pub(super) fn params(self) -> SurfaceParams {
         let of = |effect| self == effect || self == Self::All;
-        let mut law = SurfaceParams::PREMIUM;
+        let mut params = SurfaceParams::PREMIUM;
         if of(Self::Friction) {
-            law.friction = FRICTION;
+            params.friction = FRICTION;
         }
         if of(Self::Shading) {
-            law.shading = Shading::Smooth;
+            params.shading = Shading::Smooth;
         }
         if of(Self::Grain) {
-            law.texture = texture(Pattern::Grain);
+            params.texture = texture(Pattern::Grain);
         }
         if self == Self::Grating {
-            law.texture = texture(Pattern::Grating);
+            params.texture = texture(Pattern::Grating);
         }
         let ns_per_m = if of(Self::Damping) {
             DAMPING_NS_PER_M
@@ -99,10 +99,10 @@ impl Effect {
         } else {
             Controller::Off
         };
-        law.damping = Damping {
+        params.damping = Damping {
             ns_per_m,
             controller,
         };
-        law
+        params
     }
 }

@@ -1,4 +1,4 @@
-//! The underlay of a scene: coarse tiles under all that the arm reaches.
+//! The fallback of a scene: coarse tiles under all that the arm reaches.
 //!
 //! A device feels it where a tile has not come yet. Its samples are those of the terrain at
 //! every so many-th sample of the scene's level, or what the file's overviews have there; they
@@ -6,7 +6,7 @@
 
 use hapterra_core::grid::Cell;
 use hapterra_core::scene::Scene;
-use hapterra_core::terrain::{CoarseTile, TILE_CELLS, TILE_SAMPLES, TileKey, Underlay};
+use hapterra_core::terrain::{CoarseTile, Fallback, TILE_CELLS, TILE_SAMPLES, TileKey};
 use hapterra_core::wire::message::Heights;
 use heightfield::{ReadStatus, ReadTracker};
 
@@ -17,7 +17,7 @@ use super::{Terrain, TileBuffer, identity};
 const NEAR_IS_FINER: u8 = 2;
 
 impl Terrain<'_> {
-    /// A scene of this terrain with an underlay under all that an arm reaches. `reach_mm` is the
+    /// A scene of this terrain with a fallback under all that an arm reaches. `reach_mm` is the
     /// rectangle around that: west, south, east and north of the tip in its home pose, hand
     /// millimetres ([`crate::place::Reach::sides_mm`]).
     ///
@@ -26,22 +26,22 @@ impl Terrain<'_> {
     #[must_use]
     pub fn underlaid(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
         let mut scene = Scene {
-            underlay: self.under(&scene, reach_mm),
+            fallback: self.under(&scene, reach_mm),
             ..scene
         };
         scene.epoch = identity::epoch(self.fingerprint(), self.grid(), self.scale(), &scene);
         scene
     }
 
-    fn under(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<Underlay> {
+    fn under(&self, scene: &Scene, reach_mm: [f64; 4]) -> Option<Fallback> {
         let size = self.size();
         if size.iter().all(|cells| *cells <= 2 * TILE_CELLS as i32) {
             return None;
         }
         let wide = self.wide(scene, reach_mm)?;
         let near = near(&wide, scene.home.column());
-        let underlay = Underlay { wide, near };
-        underlay.is_valid(self.level()).then_some(underlay)
+        let fallback = Fallback { wide, near };
+        fallback.is_valid(self.level()).then_some(fallback)
     }
 
     /// The finest tile that spans the rectangle.
@@ -70,7 +70,7 @@ impl Terrain<'_> {
     }
 
     /// The heights of a tile that a device with this scene asks for, as they go on the link: of the
-    /// scene's level, or of its underlay. `None` if there is no such tile. And whether they are
+    /// scene's level, or of its fallback. `None` if there is no such tile. And whether they are
     /// complete.
     #[must_use]
     pub fn tile_of<'b>(
@@ -91,7 +91,7 @@ impl Terrain<'_> {
         buffer: &'b mut TileBuffer,
         reads: &ReadTracker,
     ) -> Option<Heights<'b>> {
-        let Some(Underlay { wide, near }) = &scene.underlay else {
+        let Some(Fallback { wide, near }) = &scene.fallback else {
             return self.heights_of(key, buffer, reads);
         };
         let coarse = |tile: &CoarseTile| key == tile.key(scene.level);
@@ -200,5 +200,5 @@ fn coarse_tile(buffer: &mut TileBuffer, sample: impl Fn(usize, usize) -> f64) ->
 }
 
 #[cfg(test)]
-#[path = "underlay_tests.rs"]
+#[path = "fallback_tests.rs"]
 mod tests;

@@ -1,5 +1,5 @@
 //! A hand that is faster than the link: 2,000 cells a second over a line of 200 bytes a tick. It
-//! feels the underlay where its tiles are late, and no hole.
+//! feels the fallback where its tiles are late, and no hole.
 
 use std::path::Path;
 use std::time::Duration;
@@ -52,8 +52,8 @@ impl<'t> Slide<'t> {
         let middle = terrain.size_mm().map(|side| 0.5 * side);
         let [x, y] = middle;
         let ground = surface(x, y).expect("ground in the middle");
-        let (hand, law) = (HandModel::default(), SurfaceParams::PREMIUM);
-        let wall = f64::from(law.stiffness_n_per_mm);
+        let (hand, params) = (HandModel::default(), SurfaceParams::PREMIUM);
+        let wall = f64::from(params.stiffness_n_per_mm);
         let ends = [[x + AWAY_MM, y + 10.0], [x - AWAY_MM, y - 10.0]];
         let mut touch = Touch::start(&surface, &hand, wall, middle, 10.0).press(1.5, 0.3);
         for _ in 0..3 {
@@ -73,7 +73,7 @@ impl<'t> Slide<'t> {
         }
     }
 
-    fn scene(&self, has_underlay: bool) -> Scene {
+    fn scene(&self, has_fallback: bool) -> Scene {
         let home = self.terrain.scale().to_grid(self.home_mm);
         let home = home.expect("addressable");
         let scene = self
@@ -86,7 +86,7 @@ impl<'t> Slide<'t> {
             ..scene
         };
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
-        match has_underlay {
+        match has_fallback {
             true => self.terrain.underlaid(scene, reach.sides_mm()),
             false => scene,
         }
@@ -130,19 +130,19 @@ impl<'t> Slide<'t> {
         (samples, client)
     }
 
-    /// The underlay's own error over all that the hand slides over, mm: at the samples, where the
+    /// The fallback's own error over all that the hand slides over, mm: at the samples, where the
     /// two differ most, as both are bilinear between them.
     fn stated_error_mm(&self, scene: &Scene) -> f64 {
-        let underlay = scene.underlay.expect("an underlay");
+        let fallback = scene.fallback.expect("a fallback");
         let size = self.terrain.size();
         let at = |column: i32, row: i32| {
             let place = [column.clamp(0, size[0]), row.clamp(0, size[1])];
             let [east, north] = place.map(|cells| f64::from(cells) * CELL_MM);
             self.terrain.height_mm(east, north).expect("known")
         };
-        let near = underlay.near.expect("a finer tile where the hand is");
+        let near = fallback.near.expect("a finer tile where the hand is");
         // On its border the near tile has the heights of the wide one.
-        let wide = |column: i32, row: i32| between(&underlay.wide, &at, column, row);
+        let wide = |column: i32, row: i32| between(&fallback.wide, &at, column, row);
         let of_near = |column: i32, row: i32| match is_on_border(&near, column, row) {
             true => wide(column, row),
             false => at(column, row),
@@ -232,10 +232,10 @@ fn holds(
     let ground = judged(slide.terrain, samples);
     let stated = slide.stated_error_mm(scene);
     eprintln!(
-        "{name}: {ground:?}, underlay off by up to {stated:.3} mm, {} tiles",
+        "{name}: {ground:?}, fallback off by up to {stated:.3} mm, {} tiles",
         tally.tiles
     );
-    // All that is known before the underlay has come is that it has not.
+    // All that is known before the fallback has come is that it has not.
     let comes = samples
         .iter()
         .position(|s| !s.limits.contains(Limits::TERRAIN_MISSING));
@@ -312,7 +312,7 @@ fn at_2000_cells_a_second_over_200_kb_a_second_there_is_no_hole() {
     let ground = judged(&terrain, &in_memory(&slide, without).0);
     assert!(
         ground.lacked > 100,
-        "without an underlay there are holes: {ground:?}"
+        "without a fallback there are holes: {ground:?}"
     );
     let scene = slide.scene(true);
     holds(

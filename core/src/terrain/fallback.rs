@@ -1,4 +1,4 @@
-//! The underlay: a coarse image of all that the arm reaches, felt where a tile has not come.
+//! The fallback: a coarse image of all that the arm reaches, felt where a tile has not come.
 //!
 //! It is a wide tile under all of the reach and, within it, a near one of finer samples around the
 //! home pose, where the hand is most of the time. Where both are, the near one is felt. The host
@@ -16,17 +16,17 @@ use crate::scalar::{larger, smaller};
 /// Position of the tiles of a coarse fallback.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Underlay {
+pub struct Fallback {
     /// Under all that the arm reaches.
     pub wide: CoarseTile,
     /// The finer one around the home pose, if there is one.
     pub near: Option<CoarseTile>,
 }
 
-/// Tiles of an underlay, at most.
+/// Tiles of a fallback, at most.
 pub(super) const PARTS: usize = 2;
 
-impl Underlay {
+impl Fallback {
     /// Returns true if it is one that the loop can work with, in a scene of this level.
     #[must_use]
     pub fn is_valid(&self, level: u8) -> bool {
@@ -47,10 +47,10 @@ impl Underlay {
     }
 }
 
-/// The underlay of a window: where it lies, and the tiles of it that have come.
+/// The fallback of a window: where it lies, and the tiles of it that have come.
 pub(super) struct Laid<'t> {
     /// Its place, if the scene has one.
-    place: Option<Underlay>,
+    place: Option<Fallback>,
     /// The tiles, once they have come; or their buffers.
     tiles: [Option<&'t mut Tile>; PARTS],
 }
@@ -62,7 +62,7 @@ impl<'t> Laid<'t> {
     };
 
     /// Takes another place. The buffers of the tiles before are kept for those of this one.
-    pub(super) fn lay(&mut self, place: Option<Underlay>) {
+    pub(super) fn lay(&mut self, place: Option<Fallback>) {
         self.place = place;
         for tile in self.tiles.iter_mut().flatten() {
             tile.vacate();
@@ -99,7 +99,7 @@ impl<'t> Laid<'t> {
         Some(spent)
     }
 
-    /// The underlay, once all of it has come. A part alone is not felt: the surface would
+    /// The fallback, once all of it has come. A part alone is not felt: the surface would
     /// move at once when the other comes.
     pub(super) fn felt(&self) -> Option<Coarse<'_>> {
         let place = self.place?;
@@ -120,7 +120,7 @@ fn come<'w>(buffer: &'w Option<&mut Tile>) -> Option<&'w Tile> {
     buffer.as_deref().filter(|tile| tile.key().is_some())
 }
 
-/// An underlay that has come.
+/// A fallback that has come.
 pub(super) struct Coarse<'w> {
     wide: (CoarseTile, &'w Tile),
     near: Option<(CoarseTile, &'w Tile)>,

@@ -1,4 +1,4 @@
-//! The tiles of an underlay as a device holds them.
+//! The tiles of a fallback as a device holds them.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
@@ -21,15 +21,15 @@ fn hills() -> Raster {
     Raster::from_fn(2001, 1501, height).expect("raster")
 }
 
-fn underlay(terrain: &Terrain<'_>, home: [i32; 2], reach_mm: [f64; 4]) -> (Scene, Underlay) {
+fn fallback(terrain: &Terrain<'_>, home: [i32; 2], reach_mm: [f64; 4]) -> (Scene, Fallback) {
     let home = GridPoint::new([home[0], home[1], 100], hapterra_core::Vec3::ZERO);
     let scene = terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home);
     let scene = terrain.underlaid(scene, reach_mm);
-    let underlay = scene.underlay.expect("an underlay");
-    (scene, underlay)
+    let fallback = scene.fallback.expect("a fallback");
+    (scene, fallback)
 }
 
-/// The height at a sample of the level through the tile of an underlay, as its device has it.
+/// The height at a sample of the level through the tile of a fallback, as its device has it.
 struct Felt(CoarseTile, Vec<f64>);
 
 impl Felt {
@@ -61,7 +61,7 @@ fn the_near_tile_is_around_the_home_pose_and_within_the_wide_one() {
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
     let reach_mm = [-500.0, -300.0, 500.0, 400.0];
     for home in [[1000, 800], [1003, 777], [0, 0], [2000, 1500], [400, 1480]] {
-        let (_, Underlay { wide, near }) = underlay(&terrain, home, reach_mm);
+        let (_, Fallback { wide, near }) = fallback(&terrain, home, reach_mm);
         let near = near.expect("a finer one");
         assert_eq!(near.shift + NEAR_IS_FINER, wide.shift);
         let side = |tile: &CoarseTile| 32 * tile.spacing();
@@ -85,8 +85,8 @@ fn the_near_tile_is_around_the_home_pose_and_within_the_wide_one() {
 fn the_surface_goes_on_evenly_over_the_border_of_the_near_tile() {
     let raster = hills();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
-    let (scene, Underlay { wide, near }) =
-        underlay(&terrain, [1003, 777], [-500.0, -300.0, 500.0, 400.0]);
+    let (scene, Fallback { wide, near }) =
+        fallback(&terrain, [1003, 777], [-500.0, -300.0, 500.0, 400.0]);
     let near = near.expect("a finer one");
     let [wide, within] = [wide, near].map(|tile| Felt::of(&terrain, &scene, tile));
     let side = 32 * near.spacing();
@@ -124,8 +124,8 @@ fn where_the_wide_tile_has_a_hole_the_border_of_the_near_one_is_its_own() {
     };
     let raster = Raster::from_fn(2049, 2049, height).expect("raster");
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
-    let (scene, Underlay { wide, near }) =
-        underlay(&terrain, [1024, 640], [-1024.0, -640.0, 1024.0, 1408.0]);
+    let (scene, Fallback { wide, near }) =
+        fallback(&terrain, [1024, 640], [-1024.0, -640.0, 1024.0, 1408.0]);
     let near = near.expect("a finer one");
     assert_eq!((wide.first, wide.shift), (Cell::new(0, 0), 6));
     assert_eq!((near.first, near.shift), (Cell::new(768, 384), 4));
@@ -136,18 +136,18 @@ fn where_the_wide_tile_has_a_hole_the_border_of_the_near_one_is_its_own() {
 }
 
 #[test]
-fn only_the_names_of_its_own_tiles_are_those_of_an_underlay() {
+fn only_the_names_of_its_own_tiles_are_those_of_an_fallback() {
     let raster = hills();
     let terrain = Terrain::new(&raster, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
-    let (scene, underlay) = underlay(&terrain, [1000, 700], [-500.0, -300.0, 500.0, 400.0]);
+    let (scene, fallback) = fallback(&terrain, [1000, 700], [-500.0, -300.0, 500.0, 400.0]);
     let has = |key: TileKey| {
         let mut buffer = TileBuffer::default();
         terrain.tile_of(&scene, key, &mut buffer).is_some()
     };
-    assert_eq!(underlay.keys(0).map(|key| key.is_some_and(has)), [true; 2]);
-    let wide = underlay.wide.key(0);
+    assert_eq!(fallback.keys(0).map(|key| key.is_some_and(has)), [true; 2]);
+    let wide = fallback.wide.key(0);
     for level in 1..wide.level + 3 {
-        let named = underlay.keys(0).contains(&Some(TileKey::new(level, 0, 0)));
+        let named = fallback.keys(0).contains(&Some(TileKey::new(level, 0, 0)));
         assert_eq!(has(TileKey::new(level, 0, 0)), named, "{level}");
         assert!(!has(TileKey::new(level, 1, 0)));
     }

@@ -4,10 +4,10 @@
 use super::{CellContent, Corners, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::scalar::larger;
+use crate::terrain::fallback::Fallback;
 use crate::terrain::index::{TILE_CELLS, TileIndex};
 use crate::terrain::tile::Tile;
 use crate::terrain::tile_blend::{Allowance, TileBlend, within};
-use crate::terrain::underlay::Underlay;
 
 /// A height that is felt at a sample, and whether it is a tile's.
 #[derive(Clone, Copy)]
@@ -17,17 +17,17 @@ struct BlendedHeight {
 }
 
 impl<'t, const D: usize> Window<'t, D> {
-    /// Lays an underlay under the field, or none; the tiles that are held are the surface as
-    /// they are. The buffers of the underlay before are kept for this one
+    /// Lays a fallback under the field, or none; the tiles that are held are the surface as
+    /// they are. The buffers of the fallback before are kept for this one
     /// ([`Self::take_spare`]).
-    pub fn lay(&mut self, underlay: Option<Underlay>) {
-        self.underlay.lay(underlay);
+    pub fn lay(&mut self, fallback: Option<Fallback>) {
+        self.fallback.lay(fallback);
         self.tile_blend = TileBlend::NOTHING;
         for row in 0..D {
             for col in 0..D {
                 self.slots[row][col].become_surface();
                 let key = self.slots[row][col].key();
-                if let (Some(key), true) = (key, underlay.is_some()) {
+                if let (Some(key), true) = (key, fallback.is_some()) {
                     let top = self.slots[row][col].top();
                     self.renew_maxima(key.index, top);
                 }
@@ -35,14 +35,14 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// Gives back a buffer that held a tile of an underlay, where there is to be none any more.
+    /// Gives back a buffer that held a tile of a fallback, where there is to be none any more.
     /// There may be another.
     #[must_use]
     pub fn take_spare(&mut self) -> Option<&'t mut Tile> {
-        self.underlay.take_spare()
+        self.fallback.take_spare()
     }
 
-    /// Takes a tile that was asked for: one of the field, or of the underlay. Gives back a buffer,
+    /// Takes a tile that was asked for: one of the field, or of the fallback. Gives back a buffer,
     /// if one is left over.
     ///
     /// `felt` are the cells of proxy and HIP. A tile of the field settles where what is felt there
@@ -50,12 +50,12 @@ impl<'t, const D: usize> Window<'t, D> {
     /// is the surface at once, as with [`Self::install`].
     #[must_use]
     pub fn take(&mut self, tile: &'t mut Tile, felt: [Cell; 2]) -> Option<&'t mut Tile> {
-        if !self.underlay.is_wanted() {
+        if !self.fallback.is_wanted() {
             return Some(self.install(tile));
         }
-        if let Some(part) = self.underlay.part(tile.key(), self.level()) {
+        if let Some(part) = self.fallback.part(tile.key(), self.level()) {
             self.tile_blend.has_changed = true;
-            return self.underlay.put(part, tile);
+            return self.fallback.put(part, tile);
         }
         let depends = |cell: Cell, index: TileIndex| {
             let at = TileIndex::holding(cell);
@@ -68,7 +68,7 @@ impl<'t, const D: usize> Window<'t, D> {
         Some(self.put(tile, settles))
     }
 
-    /// Returns true if a patch is that of its tile, and not of the underlay, nor between the two.
+    /// Returns true if a patch is that of its tile, and not of the fallback, nor between the two.
     #[must_use]
     #[inline]
     pub fn is_settled(&self, cell: Cell) -> bool {
@@ -112,11 +112,11 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// A tile has come into the slot of `index`: it settles if it is to, and the underlay was felt
+    /// A tile has come into the slot of `index`: it settles if it is to, and the fallback was felt
     /// there. One that was there before goes on as it was.
     pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
         let (row, col) = TileBlend::<D>::slot(index);
-        self.tile_blend.has_changed = self.underlay.is_wanted();
+        self.tile_blend.has_changed = self.fallback.is_wanted();
         if was_here && self.tile_blend.allowed(index) < f32::INFINITY {
             return;
         }
@@ -133,7 +133,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Returns the largest distance of a tile's samples from the coarse fallback, cells; `None` where that is not rendered.
     fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
         let [lowest, highest] = tile.range()?;
-        let [low, high] = self.underlay.felt()?.range_over(index, tile.base())?;
+        let [low, high] = self.fallback.felt()?.range_over(index, tile.base())?;
         let far = larger(highest - low, high - lowest);
         (far > 0.0).then_some(far)
     }
@@ -142,7 +142,7 @@ impl<'t, const D: usize> Window<'t, D> {
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_ground(&self, cell: Cell) -> CellContent {
-        let Some(under) = self.underlay.felt() else {
+        let Some(under) = self.fallback.felt() else {
             return CellContent::Missing;
         };
         let index = TileIndex::holding(cell);
@@ -160,13 +160,13 @@ impl<'t, const D: usize> Window<'t, D> {
         };
         let (mut heights, mut are_of_tiles) = (alone, own.is_some());
         if !is_inside(cell) {
-            are_of_tiles = self.felt_on_border(cell, (&mut heights, are_of_tiles), coarse, base);
+            are_of_tiles = self.blend_on_border(cell, (&mut heights, are_of_tiles), coarse, base);
         }
         let [sw, se, nw, ne] = heights;
         match (sw + se + nw + ne).is_nan() {
             false => CellContent::Patch(Corners { base, heights }),
             true if are_of_tiles => CellContent::Hole,
-            // What the underlay does not know may yet come.
+            // What the fallback does not know may yet come.
             true => CellContent::Missing,
         }
     }
@@ -175,7 +175,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// place of those that `alone` has, with or without its tile. Returns whether every corner without
     /// a height is one of a tile.
     #[inline(never)]
-    fn felt_on_border(
+    fn blend_on_border(
         &self,
         cell: Cell,
         alone: (&mut [f32; 4], bool),
@@ -260,10 +260,10 @@ impl<'t, const D: usize> Window<'t, D> {
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_is_below(&self, index: TileIndex, low: Altitude) -> bool {
-        let Some(under) = self.underlay.felt() else {
+        let Some(under) = self.fallback.felt() else {
             return false;
         };
-        // Where neither a tile nor the underlay has heights, anything may be.
+        // Where neither a tile nor the fallback has heights, anything may be.
         let is_known = self.tile_here(index).is_some() || under.covers(index);
         if !(is_known && under.is_below(low)) {
             return false;
@@ -288,5 +288,5 @@ fn is_inside(cell: Cell) -> bool {
 }
 
 #[cfg(test)]
-#[path = "unsettled_tests.rs"]
+#[path = "late_tiles_tests.rs"]
 mod tests;
