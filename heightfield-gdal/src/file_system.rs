@@ -1,8 +1,8 @@
 //! Files that GDAL reads through its caller, as those at a server.
 //!
 //! GDAL opens them by the names that a [`Mount`](crate::Mount) has for them, and finds what they name beside
-//! themselves in the same way. A VRT among them may name nothing else: each one is looked at before
-//! GDAL reads it.
+//! themselves in the same way. A VRT or an MRF among them may name nothing else: each one is looked at
+//! before GDAL reads it.
 
 use std::io;
 

@@ -39,6 +39,7 @@ mod in_time;
 mod library;
 mod loaded;
 mod mount;
+mod mrf;
 mod settings;
 mod srs;
 mod text;

@@ -1,4 +1,5 @@
-//! File systems of callers under names of GDAL's. Each VRT in them is looked at before GDAL reads it.
+//! File systems of callers under names of GDAL's. Each VRT and MRF in them is looked at before GDAL
+//! reads it.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -10,7 +11,7 @@ use std::time::{Duration, Instant};
 use crate::error::Error;
 use crate::file_system::{FileSystem, PREFIX, ReadAt};
 use crate::loaded::Loaded;
-use crate::vrt;
+use crate::{mrf, vrt};
 
 /// A file system under names of GDAL's, until the last clone and the last
 /// [`Dataset`](crate::Dataset) in it are dropped.
@@ -137,19 +138,31 @@ impl Mounted {
         self.read(|| {
             let file = self.files.open(&name)?;
             let head = file.bytes().min(vrt::HEAD_BYTES);
-            match vrt::begins(&file.read_at(0, head as usize)?) {
-                true => Ok(Box::new(self.own_vrt(&name, &*file)?) as Box<dyn ReadAt>),
-                false => Ok(file),
+            let head = file.read_at(0, head as usize)?;
+            if vrt::begins(&head) {
+                return Ok(Box::new(self.own_vrt(&name, &*file)?) as Box<dyn ReadAt>);
             }
+            if mrf::begins(&head) {
+                self.check_mrf(&name, &*file)?;
+            }
+            Ok(file)
         })
+    }
+
+    /// Checks that an MRF names files of this file system only.
+    fn check_mrf(&self, name: &str, file: &dyn ReadAt) -> io::Result<()> {
+        if file.bytes() > mrf::MAX_BYTES {
+            return Err(not_opened(name, mrf::too_large()));
+        }
+        let bytes = file.read_at(0, file.bytes() as usize)?;
+        let header = String::from_utf8_lossy(&bytes);
+        let checked = mrf::check(&self.library, &header).map_err(io::Error::other)?;
+        checked.map_err(|why| not_opened(name, why))
     }
 
     /// A VRT that names files of this file system only.
     fn own_vrt(&self, name: &str, file: &dyn ReadAt) -> io::Result<Text> {
-        let refused = |why: String| {
-            let path = name.into();
-            io::Error::other(Error::NotOpened { path, why })
-        };
+        let refused = |why: String| not_opened(name, why);
         if file.bytes() > vrt::MAX_BYTES {
             return Err(refused(vrt::too_large()));
         }
@@ -214,6 +227,12 @@ impl ReadAt for Text {
             .map(<[u8]>::to_vec)
             .ok_or(io::ErrorKind::UnexpectedEof.into())
     }
+}
+
+/// The refusal of a file.
+fn not_opened(name: &str, why: String) -> io::Error {
+    let path = name.into();
+    io::Error::other(Error::NotOpened { path, why })
 }
 
 /// Returns true if an error says that there is no such file.

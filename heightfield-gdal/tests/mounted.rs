@@ -189,6 +189,72 @@ fn what_a_file_names_on_this_computer_is_not_opened() {
     }
 }
 
+/// An MRF of 4 × 3 floats in one tile, as it is.
+fn mrf(more: &str) -> Vec<u8> {
+    format!(
+        "<MRF_META><Raster><Size x=\"4\" y=\"3\" c=\"1\"/><PageSize x=\"4\" y=\"3\" c=\"1\"/>\
+         <Compression>NONE</Compression><DataType>Float32</DataType>{more}</Raster></MRF_META>"
+    )
+    .into_bytes()
+}
+
+/// The index of one tile of 12 floats.
+fn index() -> Vec<u8> {
+    [0_u64, 48].into_iter().flat_map(u64::to_be_bytes).collect()
+}
+
+#[test]
+fn an_mrf_names_files_beside_it_only() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [samples, _] = field(0);
+    let (data, idx) = (folder.path().join("x.dat"), folder.path().join("x.idx"));
+    std::fs::write(&data, &samples).expect("written");
+    std::fs::write(&idx, index()).expect("written");
+    let both = format!(
+        "<DataFile>{}</DataFile><IndexFile>{}</IndexFile>",
+        data.display(),
+        idx.display()
+    );
+    let own = "<DataFile>west.dat</DataFile><IndexFile>west.idx</IndexFile>";
+    let copied = format!(
+        "</Raster><CachedSource><Source>{}</Source></CachedSource><Raster>",
+        data.display()
+    );
+    let files = [
+        ("a/own.mrf", mrf(own)),
+        ("a/west.idx", index()),
+        ("a/absolute.mrf", mrf(&both)),
+        (
+            "a/escaped.mrf",
+            mrf(&both.replace('/', "&#47;").replace("<&#47;", "</")),
+        ),
+        ("a/up.mrf", mrf("<DataFile>../../x.dat</DataFile>")),
+        (
+            "a/working_folder.mrf",
+            mrf("<DataFile>./Cargo.toml</DataFile>"),
+        ),
+        ("a/copied.mrf", mrf(&copied)),
+    ];
+    let Some((gdal, mount, _)) = mounted(&files) else {
+        return;
+    };
+    let local = folder.path().join("here.mrf");
+    std::fs::write(&local, mrf(&both)).expect("written");
+    let local = local.display().to_string();
+    assert_eq!(last(&gdal, &local), Ok(11.0), "here it is read");
+    assert_eq!(last(&gdal, &mount.path("a/own.mrf")), Ok(11.0));
+    assert!(mount.take_fault().is_none());
+    for (name, _) in &files[2..] {
+        assert!(last(&gdal, &mount.path(name)).is_err(), "{name}");
+        let why = mount.take_fault().map(|fault| fault.to_string());
+        let why = why.unwrap_or_default();
+        assert!(
+            why.contains("it names") && why.contains("beside it"),
+            "{name}: {why}"
+        );
+    }
+}
+
 #[test]
 fn vrts_in_each_other_end() {
     let number = |at: u32| format!("a/{at}.vrt");

@@ -38,7 +38,7 @@
 //!
 //! **Holes.** No-data as the format states it, NaN, masked samples and tiles
 //! that a sparse file leaves out are holes: [`Raster::height`] is NaN there. So is a sample
-//! beyond [`MAX_HEIGHT`], with a remark.
+//! beyond [`MAX_HEIGHT`], with a remark. With [`OpenOptions::fill`] a hole near data has a height.
 
 #![forbid(unsafe_code)]
 
@@ -52,6 +52,7 @@ mod doubtful;
 mod encoding;
 mod error;
 mod file_layout;
+mod fill;
 mod format;
 mod formats;
 mod geometry;
@@ -93,6 +94,7 @@ pub use crs::{LonLat, ReferenceSystem};
 pub use doubtful::MAX_HEIGHT;
 pub use error::{Error, RasterError};
 pub use file_layout::{FileLayout, SamplesAre};
+pub use fill::Fill;
 pub use geometry::metres_in;
 pub use geometry::{CellSize, CellUnit, Certainty, VerticalDatum};
 pub use georeference::around;
@@ -106,7 +108,7 @@ pub use read_status::{ReadStatus, ReadTracker, Wait};
 pub use remote::{RemoteFetcher, file_name, is_url, without_key};
 pub use samples::{Endian, SampleType, Samples};
 
-use blocks::Survey;
+use blocks::{Blocks, Survey};
 use decoded::Decoded;
 use place::Place;
 use samples::{SampleValue, with_samples};
@@ -146,6 +148,7 @@ pub struct Window {
 pub struct Raster {
     source: Decoded,
     survey: Survey,
+    fill: Option<Fill>,
     /// Empty where it was made in memory.
     path: PathBuf,
 }
@@ -199,6 +202,7 @@ impl Raster {
             .inspect(|_| options.elsewhere.touch())
             .map(|raster| Self {
                 path: path.to_owned(),
+                fill: options.fill.filter(|_| !options.classes),
                 ..raster
             })
             .map_err(|fault| Error::new(path, fault))
@@ -242,6 +246,7 @@ impl Raster {
         Ok(Self {
             source,
             survey,
+            fill: None,
             path: PathBuf::new(),
         })
     }
@@ -418,8 +423,10 @@ impl Raster {
                 } else {
                     last[1] - row
                 };
-                let height = |stored| self.source.height_in_file(stored);
-                blocks.between(image, [column, row], wait, height)
+                let size = blocks.size(image);
+                blocks.between(image, [column, row], |at| {
+                    self.filled(at, size, |at| self.in_blocks(blocks, image, at, wait))
+                })
             }
             _ => {
                 let reads = ReadTracker::default();
@@ -453,11 +460,12 @@ impl Raster {
         if column >= self.columns() || row >= self.rows() {
             return (f64::NAN, ReadStatus::Complete);
         }
-        let (column, row) = (self.file_column(column), self.file_row(row));
-        match &self.source.storage {
+        let at = [self.file_column(column), self.file_row(row)];
+        let size = [self.columns(), self.rows()];
+        self.filled(at, size, |at| match &self.source.storage {
             Storage::Held { samples, mask } => {
-                let index =
-                    (u64::from(row) * u64::from(self.columns()) + u64::from(column)) as usize;
+                let [column, row] = at.map(u64::from);
+                let index = (row * u64::from(self.columns()) + column) as usize;
                 let height = match mask.as_ref().is_some_and(|mask| mask.contains(index)) {
                     true => f64::NAN,
                     false => with_samples!(samples, values => {
@@ -466,11 +474,32 @@ impl Raster {
                 };
                 (height, ReadStatus::Complete)
             }
-            Storage::Blocks(blocks) => match blocks.stored(0, column, row, wait) {
-                Ok(stored) => (self.source.height_in_file(stored), ReadStatus::Complete),
-                Err(_) => (f64::NAN, ReadStatus::Pending),
-            },
+            Storage::Blocks(blocks) => self.in_blocks(blocks, 0, at, wait),
+        })
+    }
+
+    /// The height at a sample of an image, in the file's order, filled if that was asked for.
+    fn filled(
+        &self,
+        at: [u32; 2],
+        size: [u32; 2],
+        read: impl Fn([u32; 2]) -> (f64, ReadStatus),
+    ) -> (f64, ReadStatus) {
+        match self.fill {
+            Some(fill) => fill.height(at, size, read),
+            None => read(at),
         }
+    }
+
+    /// The height at a sample of an image in blocks, in the file's order.
+    fn in_blocks(
+        &self,
+        blocks: &Blocks,
+        image: usize,
+        at: [u32; 2],
+        wait: Wait,
+    ) -> (f64, ReadStatus) {
+        blocks.height(image, at, wait, |stored| self.source.height_in_file(stored))
     }
 
     fn file_column(&self, column: u32) -> u32 {
@@ -487,7 +516,12 @@ impl Raster {
         }
     }
 
-    /// Range of the heights and number of holes: of all samples where they are in memory,
+    /// Distance within which samples without data are filled; `None` where they are not.
+    pub fn fill(&self) -> Option<Fill> {
+        self.fill
+    }
+
+    /// Range of the heights and number of holes, before any is filled: of all samples where they are in memory,
     /// else of those that were looked at.
     pub fn summary(&self) -> HeightSummary {
         self.survey.summary
@@ -513,9 +547,10 @@ impl Raster {
     }
 
     /// A hash of the file's index and of the heights that were looked at, where the samples
-    /// stay in the file.
+    /// stay in the file; of filled heights another than of unfilled ones.
     pub fn print_in_file(&self) -> Option<u64> {
-        self.survey.print
+        let print = self.survey.print?;
+        Some(self.fill.map_or(print, |fill| fill.print_of(print)))
     }
 
     /// Name of the format and variant, as `GeoTIFF, int16, deflate`.

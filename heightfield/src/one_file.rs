@@ -32,7 +32,7 @@ fn with_notes(
     options: &OpenOptions,
     decode: impl FnOnce(&OpenOptions) -> Result<Decoded, RasterError>,
 ) -> Result<Decoded, RasterError> {
-    let notes = Notes::read(input, options.band.unwrap_or(1));
+    let notes = Notes::read(input, options.band.unwrap_or(1))?;
     let mut decoded = decode(&OpenOptions {
         no_data: options.no_data.or(notes.no_data),
         ..options.clone()

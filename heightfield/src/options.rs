@@ -1,5 +1,6 @@
 //! Options of the user for a file.
 
+use super::fill::Fill;
 use super::samples::{Endian, SampleType};
 use crate::disk_cache::DiskCache;
 use crate::remote::RemoteFetcher;
@@ -14,6 +15,9 @@ pub struct OpenOptions {
     pub png_channel: Option<PngChannel>,
     /// Stored sample value that means no data; replaces what the file says.
     pub no_data: Option<f64>,
+    /// Distance within which samples without data are filled from data. Without it, and of
+    /// [`OpenOptions::classes`], they stay without a height.
+    pub fill: Option<Fill>,
     /// Which band holds the height, the first being 1. Without it: the first.
     pub band: Option<u32>,
     /// Which raster of several holds the height: a variable of a NetCDF file, a file of an archive,
@@ -53,6 +57,7 @@ impl Default for OpenOptions {
             raw: None,
             png_channel: None,
             no_data: None,
+            fill: None,
             band: None,
             variable: None,
             open_options: Vec::new(),

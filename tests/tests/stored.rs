@@ -57,6 +57,32 @@ fn info_shows_what_is_stored() {
 }
 
 #[test]
+fn no_data_is_counted_before_it_is_filled() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let grid =
+        "ncols 3\nnrows 2\nxllcorner 5000\nyllcorner 0\ncellsize 1\nNODATA_value -1\n1 -1 3 4 5 6";
+    fs::write(folder.path().join("x.asc"), grid).expect("written");
+    let output = hapterra(folder.path(), &["info", "x.asc", "--input", "fill=1"]);
+    let text = String::from_utf8(output.stdout).expect("text");
+    for line in [
+        "no data   1 samples (16.67 %)",
+        "fill      those within 1 samples of data are filled from it",
+    ] {
+        assert!(text.contains(line), "{line} is missing in {text}");
+    }
+    let filled = ["cut", "x.asc", "-o", "out", "--input", "fill=1"];
+    hapterra(folder.path(), &filled);
+    let npy = fs::read(folder.path().join("out/terrain.npy")).expect("written");
+    let north: Vec<f32> = npy[128..]
+        .chunks_exact(4)
+        .take(3)
+        .flat_map(<[u8; 4]>::try_from)
+        .map(f32::from_le_bytes)
+        .collect();
+    assert_eq!(north, [1.0, 3.0, 3.0]);
+}
+
+#[test]
 fn remarks_are_noted_where_a_terrain_is_touched() {
     let folder = tempfile::tempdir().expect("a folder");
     let grid = "ncols 3\nnrows 2\nxllcorner 5000\nyllcorner 0\ncellsize 1\n1 2 3 4 5 -32768";

@@ -4,11 +4,12 @@
 //! Which of two sources counts is as in GDAL: the notes for no-data, reference system and place,
 //! the file for scale, offset and unit. Where both differ, a remark says so.
 
+use crate::RasterError;
 use crate::crs::ReferenceSystem;
 use crate::decoded::Decoded;
 use crate::geometry::metres_in;
 use crate::ground_map::GroundMap;
-use crate::input::{Data, FileBytes};
+use crate::input::FileBytes;
 use crate::numbers::{no_data, number};
 use crate::xml;
 
@@ -29,22 +30,22 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
-    /// Reads the notes on a band, the first being 1, beside a file on disk: at a server they would be one
-    /// more request for every file.
-    pub(crate) fn read(input: &FileBytes, band: u32) -> Self {
-        if !matches!(input.data(), Data::File(..)) {
-            return Self::default();
-        }
+    /// Reads the notes on a band, the first being 1, beside a file on disk or at a URL.
+    ///
+    /// # Errors
+    /// Where they are elsewhere and cannot be read at present: no-data would be taken for heights.
+    pub(crate) fn read(input: &FileBytes, band: u32) -> Result<Self, RasterError> {
         let (text, name) = match super::text_appended(input, "aux.xml") {
             Ok(Some(found)) => found,
-            Ok(None) => return Self::default(),
-            Err(fault) => return Self::unread(&fault.to_string()),
+            Ok(None) => return Ok(Self::default()),
+            Err(fault) if fault.is_of_the_line() => return Err(fault),
+            Err(fault) => return Ok(Self::unread(&fault.to_string())),
         };
         let mut notes = Self::of(&text, band).unwrap_or_else(|fault| {
             Self::unread(&format!("{name} beside it cannot be read ({fault})"))
         });
         notes.name = name;
-        notes
+        Ok(notes)
     }
 
     fn unread(why: &str) -> Self {

@@ -165,18 +165,19 @@ impl Blocks {
             .sample(image, [column, row], self.possible(wait))
     }
 
-    /// A stored sample between the samples of an image, linear along rows and columns, at a
-    /// place in columns and rows of the full one; every corner that counts must have
-    /// a height. `height` makes one of a stored value.
-    pub(super) fn between(
+    /// The height at a column and row of an image, in the file's order; `height` makes one of a stored
+    /// value.
+    pub(super) fn height(
         &self,
         image: usize,
-        place: [f64; 2],
+        [column, row]: [u32; 2],
         wait: Wait,
         height: impl Fn(Option<f64>) -> f64,
     ) -> (f64, ReadStatus) {
-        let wait = self.possible(wait);
-        self.shared.between(image, place, wait, height)
+        match self.stored(image, column, row, wait) {
+            Ok(stored) => (height(stored), ReadStatus::Complete),
+            Err(NotHere) => (f64::NAN, ReadStatus::Pending),
+        }
     }
 
     /// Has blocks read in the background: those of the image that serves a level, between two
@@ -353,13 +354,20 @@ impl Shared {
         Err(NotHere)
     }
 
-    /// [`Blocks::between`].
-    fn between(
+    /// Columns and rows of an image.
+    pub(super) fn size(&self, image: usize) -> [u32; 2] {
+        let of = self.images.get(image);
+        of.map_or([0; 2], |of| [of.columns, of.rows])
+    }
+
+    /// A height between the samples of an image, linear along rows and columns, at a place in columns
+    /// and rows of the full one; every corner that counts must have a height. `read` returns the height
+    /// at a column and row of the image, in the file's order.
+    pub(super) fn between(
         &self,
         image: usize,
         [column, row]: [f64; 2],
-        wait: Wait,
-        height: impl Fn(Option<f64>) -> f64,
+        read: impl Fn([u32; 2]) -> (f64, ReadStatus),
     ) -> (f64, ReadStatus) {
         let Some(of) = self.images.get(image) else {
             return (f64::NAN, ReadStatus::Complete);
@@ -375,12 +383,7 @@ impl Shared {
             place(row - f64::from(of.first[1]), times[1], of.rows),
         ];
         let reads = ReadTracker::default();
-        let height = bilinear::at(place, |column, row| {
-            reads.record(match self.sample(image, [column, row], wait) {
-                Ok(stored) => (height(stored), ReadStatus::Complete),
-                Err(NotHere) => (f64::NAN, ReadStatus::Pending),
-            })
-        });
+        let height = bilinear::at(place, |column, row| reads.record(read([column, row])));
         (height, reads.status())
     }
 

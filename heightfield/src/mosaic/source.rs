@@ -139,7 +139,9 @@ impl Opened {
                         let is_hole = |value: &f64| self.decoded.no_data == Some(*value);
                         stored.filter(|value| !is_hole(value)).unwrap_or(f64::NAN)
                     };
-                    let (value, status) = blocks.between(image, place, Wait::UntilRead, known);
+                    let (value, status) = blocks.between(image, place, |at| {
+                        blocks.height(image, at, Wait::UntilRead, known)
+                    });
                     (Some(value).filter(|value| !value.is_nan()), status)
                 }
             },

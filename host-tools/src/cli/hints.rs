@@ -91,6 +91,7 @@ impl Hint for PlaceError {
             Self::Outside { .. } | Self::Hole { .. } => {
                 "choose a place inside: longitude (or x) comes first"
             }
+            Self::Unread { .. } => "try again when the file can be read",
             Self::BoxOutside { .. } | Self::BoxOfHoles { .. } => {
                 "choose a box that overlaps it: west, south, east, north"
             }

@@ -20,7 +20,7 @@ use crate::place::place_in_words;
 use crate::terrain::{Distortion, HapticGrid};
 use heightfield::shown::shown_json;
 use heightfield::without_key;
-use heightfield::{CellSize, CellUnit, Certainty, ReferenceSystem, SamplesAre};
+use heightfield::{CellSize, CellUnit, Certainty, Fill, ReferenceSystem, SamplesAre};
 use link::LinkFigures;
 use place::{Rectangle, Vertical, from, told};
 
@@ -118,6 +118,8 @@ struct FileReport {
     offset: f64,
     /// Among the samples that were looked at.
     no_data: u64,
+    /// Distance in samples within which these are filled from data, where they are.
+    filled_within: Option<u32>,
     /// The stored value that means no data.
     no_data_value: Option<f64>,
     /// Bands, of which one holds the heights.
@@ -207,6 +209,7 @@ impl FileReport {
             scale,
             offset,
             no_data: summary.holes,
+            filled_within: raster.fill().map(Fill::samples),
             no_data_value: raster.no_data(),
             bands: layout.bands,
             block: layout.block,
@@ -270,6 +273,10 @@ impl FileReport {
             "no data",
             format!("{} samples ({share:.2} %){looked}", self.no_data),
         );
+        if let Some(samples) = self.filled_within {
+            let filled = format!("those within {samples} samples of data are filled from it");
+            line("fill", filled);
+        }
         for (name, value) in self.stored() {
             line(name, value);
         }

@@ -130,6 +130,7 @@ const OLD: &[Old] = &[
     old(OPENING, "--raw-type", "--input raw=512x400:i16:le", ""),
     old(OPENING, "--raw-endian", "--input raw=512x400:i16:le", ""),
     old(OPENING, "--no-data", "--input no-data=-9999", ""),
+    old(OPENING, "--fill", "--input fill=16", ""),
     old(OPENING, "--band", "--input band=2", ""),
     old(OPENING, "--variable", "--input variable=depth", ""),
     old(OPENING, "--asset", "--input variable=dem", ""),

@@ -294,9 +294,55 @@ fn speed_into(before: &Record, now: &Record) -> Option<f64> {
 mod tests {
     use super::super::Server;
     use super::*;
+    use crate::materials::{ClassMaterial, Looks, Materials};
+    use crate::terrain::in_file::in_file;
+    use crate::terrain::{HapticCells, HapticGrid, Scale};
     use crate::timeouts::wait_until;
+    use hapterra_core::force::{Material, SurfaceParams};
+    use heightfield::{GroundTransform, Raster};
     use std::io::{BufRead, BufReader};
     use std::net::TcpStream;
+
+    #[test]
+    fn material_is_reported_when_it_is_read_and_not_before() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let raster = Raster::from_fn(600, 600, |_, _| 1.0).expect("raster");
+        let classes = in_file(folder.path(), [600, 600], |_, _| 7.0);
+        let metres = GroundTransform::new([0.0, 0.0], [1.0, 0.0], [0.0, 1.0]).expect("a map");
+        let [raster, classes] = [raster, classes].map(|it| it.with_ground(metres, Some(32632)));
+        let default = Material::of(&SurfaceParams::PREMIUM);
+        let class = ClassMaterial {
+            class: 7,
+            name: None,
+            material: default,
+        };
+        let looks = Looks {
+            default,
+            class: vec![class],
+        };
+        let materials = Materials::over(("t", &raster), ("c", classes), looks).expect("overlap");
+        let grid = HapticGrid::new(&raster, HapticCells::Stored).with_materials(Some(&materials));
+        let scale = Scale::new(1.0, 1.0).expect("scale");
+        let terrain = Terrain::over(grid, scale, 0)
+            .expect("terrain")
+            .non_blocking();
+        let record = Record {
+            t_s: 0.0,
+            hip_mm: [9.0; 3],
+            contact: true,
+            proxy_mm: [9.0; 3],
+            force_n: [0.0; 3],
+        };
+        let server = Server::listen(0).expect("listens");
+        let mut watcher = Watcher::new(server.sender(), 1);
+        watcher.tell_material(&record, &terrain, true);
+        assert_eq!(watcher.told.class, None, "neither waited nor the default");
+        wait_until("the class", || {
+            watcher.tell_material(&record, &terrain, true);
+            watcher.told.class.is_some()
+        });
+        assert_eq!(watcher.told.class, Some(Some(7)));
+    }
 
     #[test]
     fn late_readers_are_told_the_open_question_once() {

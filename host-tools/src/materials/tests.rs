@@ -6,8 +6,10 @@ use hapterra_core::scene::Source;
 use hapterra_core::terrain::{Tile, TileKey};
 
 use super::*;
+use crate::terrain::in_file::in_file;
 use crate::terrain::{HapticCells, Scale, Terrain};
-use heightfield::{GroundTransform, OpenOptions};
+use crate::timeouts::wait_until;
+use heightfield::{GroundTransform, OpenOptions, Wait};
 
 /// A raster whose south-west sample is at `origin`, in steps of so much, in the system of a code.
 fn raster(
@@ -248,4 +250,29 @@ fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
     assert!(materials.told(&grid).contains("read where it is touched"));
     let apart = at(900_000.0).expect_err("elsewhere").to_string();
     assert!(apart.contains("https://host/c.tif lies"), "{apart}");
+}
+
+#[test]
+fn pending_class_is_no_answer_of_the_default() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let utm = Some(32632);
+    let terrain = raster((600, 600), [0.0, 0.0], 1.0, utm, |_, _| 1.0);
+    let metres = GroundTransform::new([0.0, 0.0], [1.0, 0.0], [0.0, 1.0]).expect("a map");
+    let classes = in_file(folder.path(), [600, 600], |_, _| 10.0).with_ground(metres, utm);
+    let materials = over(&terrain, classes, looks(&[10])).expect("they overlap");
+    let grid = HapticGrid::new(&terrain, HapticCells::Stored).with_wait(Wait::Never);
+    let mut buffer = MaterialBuffer::default();
+    let mut tile = |index| {
+        let (tile, status) = materials.tile((&grid, [599, 599], 1.0), index, &mut buffer);
+        (format!("{tile:?}"), status)
+    };
+    let [far, near] = [TileIndex::new(15, 0), TileIndex::new(0, 0)];
+    assert_eq!(tile(far).1, ReadStatus::Pending);
+    let (index, status) = materials.index_at(&grid, [3.0, 3.0]);
+    assert_eq!((index, status), (0, ReadStatus::Pending));
+    wait_until("the tile", || tile(near).1.is_complete());
+    assert_eq!(
+        materials.index_at(&grid, [3.0, 3.0]),
+        (1, ReadStatus::Complete)
+    );
 }

@@ -1,5 +1,7 @@
 use super::*;
 use crate::place::{Heights, PlacementOptions, Reach, Sizing, Target};
+use crate::terrain::in_file::in_file;
+use crate::timeouts::wait_until;
 use hapterra_core::phantom::Calibration;
 use heightfield::Raster;
 
@@ -221,5 +223,33 @@ fn in_the_air_the_height_over_the_ground_stays() {
         let [x, y, z] = changed.hip_mm;
         let ground = changed.terrain.height_mm(x, y).expect("ground");
         assert!((z - ground - 7.0).abs() < 1e-9, "{}", z - ground);
+    });
+}
+
+#[test]
+fn pending_ground_is_not_known_ground() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bench = Bench {
+        raster: in_file(folder.path(), [2049, 600], |x, y| (x + y) as f32),
+        // Its samples and those of the finest level lie in different blocks.
+        level: Some(3),
+    };
+    bench.with(|terrain, bounds| {
+        let terrain = terrain.non_blocking();
+        let hand = Hand {
+            hip_mm: [1.0, 1.0, 50.0],
+            proxy_mm: None,
+        };
+        let zoom = [PlacementChange::Zoom(2.0)];
+        let changed = || {
+            let changed = bounds.apply(&terrain, &bounds.first, &zoom, &hand);
+            changed.expect("zoomed")
+        };
+        let first = changed();
+        assert!(!first.ground_is_known);
+        assert_eq!(first.hip_mm[2], 50.0, "the height of before");
+        wait_until("the ground", || changed().ground_is_known);
+        // Twice as high as what rises by 1 unit a cell.
+        assert!(changed().hip_mm[2] > 50.0);
     });
 }

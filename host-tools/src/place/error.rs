@@ -75,6 +75,12 @@ pub enum PlaceError {
         /// Bounds of the terrain.
         bounds: String,
     },
+    /// Heights that cannot be read at present: they are no holes.
+    #[error("the heights at {place} cannot be read at present")]
+    Unread {
+        /// As asked for.
+        place: String,
+    },
     /// A box whose sides are in the wrong order.
     #[error("a box is west,south,east,north: {0} is not")]
     NoBox(String),

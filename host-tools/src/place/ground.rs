@@ -6,7 +6,9 @@ use super::words::{
     asked_in_words, bounds_in_words, box_in_words, own_box_in_words, system_in_words,
 };
 use crate::terrain::HapticGrid;
-use heightfield::{Georeference, LonLat, ReferenceSystem, Sides, System, around};
+use heightfield::{
+    Georeference, LonLat, ReadStatus, ReadTracker, ReferenceSystem, Sides, System, around,
+};
 
 /// Points along each side of a box in another system than the file's: its sides are bent on a map.
 const ALONG: u32 = 24;
@@ -226,9 +228,10 @@ pub(super) fn spot(
     let felt = grid.of_ground(ground);
     let most = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
     let felt = [0, 1].map(|axis| felt[axis].clamp(0.0, most[axis]));
-    match grid.surface(felt) {
-        Some(height) => Ok((felt, height)),
-        None => {
+    match grid.read_surface(felt) {
+        (Some(height), _) => Ok((felt, height)),
+        (None, ReadStatus::Pending) => Err(PlaceError::Unread { place: told().0 }),
+        (None, ReadStatus::Complete) => {
             let (place, bounds) = told();
             Err(PlaceError::Hole { place, bounds })
         }
@@ -260,8 +263,12 @@ pub(super) fn area(
     }
     let cells = [west, south, east, north];
     match heights(grid, cells) {
-        Some(heights) => Ok((cells, heights)),
-        None => {
+        // The range of what was read would be too small.
+        (_, ReadStatus::Pending) => Err(PlaceError::Unread {
+            place: format!("the box {}", told().0),
+        }),
+        (Some(heights), ReadStatus::Complete) => Ok((cells, heights)),
+        (None, ReadStatus::Complete) => {
             let (place, bounds) = told();
             Err(PlaceError::BoxOfHoles { place, bounds })
         }
@@ -269,8 +276,11 @@ pub(super) fn area(
 }
 
 /// Lowest and highest of the samples in a rectangle of haptic cells, or of many of them
-/// where they are very many.
-fn heights(grid: &HapticGrid<'_>, [west, south, east, north]: Sides) -> Option<[f64; 2]> {
+/// where they are very many. And whether all of these were read.
+fn heights(
+    grid: &HapticGrid<'_>,
+    [west, south, east, north]: Sides,
+) -> (Option<[f64; 2]>, ReadStatus) {
     let along = |from: f64, to: f64| {
         let looks = LOOKS.min((to.ceil() - from.floor()) as u32 + 1).max(2);
         (0..looks).map(move |look| {
@@ -280,12 +290,14 @@ fn heights(grid: &HapticGrid<'_>, [west, south, east, north]: Sides) -> Option<[
     };
     let apart = (east - west).max(north - south) / f64::from(LOOKS);
     let level = grid.raster().level_for(apart);
+    let reads = ReadTracker::default();
     let known = along(south, north)
         .flat_map(|row| along(west, east).map(move |column| (column >> level, row >> level)))
-        .map(|(column, row)| grid.height_of_level(level, column, row))
+        .map(|(column, row)| reads.record(grid.read_height(level, column, row)))
         .filter(|height| !height.is_nan());
-    known.fold(None, |range: Option<[f64; 2]>, height| {
+    let range = known.fold(None, |range: Option<[f64; 2]>, height| {
         let [low, high] = range.unwrap_or([height; 2]);
         Some([low.min(height), high.max(height)])
-    })
+    });
+    (range, reads.status())
 }

@@ -107,7 +107,8 @@ impl Placement {
     ///
     /// # Errors
     /// [`PlaceError`]: no such place or box, nothing known there, a scale that is none,
-    /// heights that the arm does not reach.
+    /// heights that the arm does not reach. [`heightfield::Raster::check_complete`] returns the
+    /// reason for [`PlaceError::Unread`].
     pub fn new(
         grid: &HapticGrid<'_>,
         reach: &Reach,
@@ -125,7 +126,12 @@ impl Placement {
                 let felt = wanted.last().map(|last| 0.5 * last);
                 // The middle may be a hole; what is around it is felt all the same.
                 let [low, high] = wanted.whole_heights();
-                let height = grid.surface(felt).unwrap_or(0.5 * (low + high));
+                let (height, status) = grid.read_surface(felt);
+                if !status.is_complete() {
+                    let place = "the middle of the terrain".into();
+                    return Err(PlaceError::Unread { place });
+                }
+                let height = height.unwrap_or(0.5 * (low + high));
                 wanted.over(reach, scale, felt, height)
             }
             (Target::Whole, Sizing::Fit) => {

@@ -3,9 +3,10 @@
 use super::*;
 use crate::place::{Coordinates, ReachBox};
 use crate::terrain::HapticCells;
+use crate::terrain::in_file::in_file;
 use hapterra_core::Vec3;
 use hapterra_core::phantom::{Calibration, Pose};
-use heightfield::{CellSize, CellUnit, Certainty, Globe, GroundTransform, Raster};
+use heightfield::{CellSize, CellUnit, Certainty, Globe, GroundTransform, Raster, Wait};
 
 const LONLAT: Coordinates = Coordinates::LonLat;
 const OWN: Coordinates = Coordinates::Own;
@@ -610,4 +611,32 @@ fn place_in_another_reference_system_is_the_same_place() {
         why.contains("no place of") || why.contains("outside"),
         "{why}"
     );
+}
+
+#[test]
+fn heights_that_were_not_read_are_no_holes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let raster = in_file(folder.path(), [600, 600], |x, y| (x + y) as f32);
+    let grid = HapticGrid::new(&raster, HapticCells::Stored).with_wait(Wait::Never);
+    for (target, words) in [
+        // Each reads a block that nothing before it has read.
+        (Target::At([30.0, 20.0], OWN), "column 30, row 20"),
+        (Target::Whole, "the middle of the terrain"),
+        (
+            Target::Box([500.0, 9.0, 590.0, 99.0], OWN),
+            "the box 500,9,590,99",
+        ),
+    ] {
+        let options = PlacementOptions {
+            target,
+            sizing: Sizing::CellMm(1.0),
+            ..PlacementOptions::default()
+        };
+        let reach = Reach::of(&Calibration::PREMIUM_1_5);
+        let fault = Placement::new(&grid, &reach, &options).expect_err("not read");
+        let PlaceError::Unread { place } = &fault else {
+            panic!("{fault}");
+        };
+        assert!(place.starts_with(words), "{place}");
+    }
 }

@@ -56,6 +56,7 @@ pub(super) fn epoch(fingerprint: u64, grid: &HapticGrid<'_>, scale: &Scale, scen
 #[cfg(test)]
 mod tests {
     use super::*;
+    use heightfield::{Fill, OpenOptions};
 
     /// Recordings name terrains by this number, so it may never change: XXH64 by an
     /// implementation of its own.
@@ -73,5 +74,21 @@ mod tests {
         assert_eq!(print(f32::NAN), FOR_EVER);
         assert_eq!(print(-f32::NAN), FOR_EVER);
         assert_ne!(print(12.0), FOR_EVER);
+    }
+
+    #[test]
+    fn filled_heights_are_another_terrain() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("t.asc");
+        let grid = "ncols 3\nnrows 2\ncellsize 1\nNODATA_value -1\n1 -1 3 4 5 6";
+        std::fs::write(&path, grid).expect("written");
+        let print = |fill| {
+            let options = OpenOptions {
+                fill,
+                ..OpenOptions::default()
+            };
+            fingerprint(&Raster::open(&path, &options).expect("opened"))
+        };
+        assert_ne!(print(None), print(Fill::within(1)));
     }
 }

@@ -9,6 +9,8 @@ mod distortion;
 mod fallback;
 mod haptic_grid;
 mod identity;
+#[cfg(test)]
+pub(crate) mod in_file;
 mod steps;
 mod tiler;
 

@@ -300,6 +300,8 @@ impl<'t> ViewFeed<'t> {
 mod tests {
     use super::*;
     use crate::terrain::Scale;
+    use crate::terrain::in_file::in_file;
+    use crate::timeouts::wait_until;
     use crate::view_feed::pipe::Pipe;
     use heightfield::Raster;
     use std::sync::mpsc::sync_channel;
@@ -324,6 +326,23 @@ mod tests {
             force_n: [0.0; 3],
         };
         feed.row(&record, None);
+    }
+
+    #[test]
+    fn feed_does_not_wait_for_ground_while_an_arm_may_be_armed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        // Wide enough that the layers are of coarser samples.
+        let raster = in_file(folder.path(), [2100, 300], |x, y| (x + y) as f32);
+        let terrain = Terrain::new(&raster, Scale::new(0.5, 0.5).expect("scale"), 0);
+        let terrain = terrain.expect("terrain");
+        let prepared = picture(&terrain).prepare().non_blocking();
+        let mut feed = ViewFeed::into_pipe(std::io::sink(), prepared, None);
+        let ground = |feed: &mut ViewFeed<'_>| {
+            row(feed, 0.0);
+            feed.latest.expect("a row").ground_mm
+        };
+        assert!(ground(&mut feed).is_nan(), "the feed waited");
+        wait_until("ground", || !ground(&mut feed).is_nan());
     }
 
     #[test]

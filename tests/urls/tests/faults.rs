@@ -1,5 +1,8 @@
 //! Faults of a server or the line to it: they are reported, and nothing wrong is rendered.
 
+use hapterra::place::{Coordinates, PlaceError, Placement, PlacementOptions, Reach, Target};
+use hapterra::terrain::{HapticCells, HapticGrid};
+use hapterra_core::phantom::Calibration;
 use hapterra_tests::timeouts::wait_for;
 use hapterra_url_tests::cog::cog;
 use hapterra_url_tests::has_gdal;
@@ -120,6 +123,63 @@ fn a_mask_that_cannot_be_asked_for_is_not_taken_for_none() {
     // Who may not list a folder is told of what is not there that it is forbidden.
     server.fail_at(".msk", Fault::Forbidden, usize::MAX);
     open(&server, "hills.tif").expect("no mask");
+}
+
+#[test]
+fn notes_beside_a_url_are_read_as_beside_a_file() {
+    let (folder, server) = hills();
+    let lowest = height(0, 0);
+    let notes = format!(
+        "<PAMDataset><PAMRasterBand band='1'><NoDataValue>{lowest}</NoDataValue>\
+         <Scale>0.5</Scale><UnitType>ft</UnitType></PAMRasterBand></PAMDataset>"
+    );
+    let beside = folder.path().join("hills.tif.aux.xml");
+    std::fs::write(beside, notes).expect("written");
+    let here = Raster::open(folder.path().join("hills.tif"), &OpenOptions::default());
+    let (here, there) = (
+        here.expect("opens"),
+        open(&server, "hills.tif").expect("opens"),
+    );
+    for raster in [&here, &there] {
+        assert_eq!(raster.no_data(), Some(f64::from(lowest)));
+        assert_eq!(raster.scale_and_offset(), (0.5, 0.0));
+        assert_eq!(raster.stated_metres_per_vertical_unit(), Some(0.3048));
+    }
+    let [column, row] = [1200, 700];
+    assert_eq!(there.height(column, row), 0.5 * expected(column, row));
+    assert!(there.height(0, SIZE[1] - 1).is_nan() && here.height(0, SIZE[1] - 1).is_nan());
+    let (requests, _) = server.seen();
+    let asked = requests.iter().filter(|line| line.ends_with(".aux.xml"));
+    assert_eq!(asked.count(), 1, "{requests:?}");
+    server.fail_at(".aux.xml", Fault::Error500, usize::MAX);
+    let told = open(&server, "hills.tif").expect_err("who knows what is no data");
+    assert!(told.contains("500"), "{told}");
+}
+
+/// The error is the server's, and not that there is no data.
+#[test]
+fn place_on_a_terrain_whose_server_is_down_is_no_hole() {
+    let (_folder, server) = hills();
+    let raster = open(&server, "hills.tif").expect("opens");
+    let grid = HapticGrid::new(&raster, HapticCells::Stored);
+    server.fail(Fault::Error500, usize::MAX);
+    for target in [
+        Target::At([527_015.0, 3_958_015.0], Coordinates::Own),
+        Target::Box(
+            [503_015.0, 3_940_015.0, 504_215.0, 3_941_215.0],
+            Coordinates::Own,
+        ),
+    ] {
+        let options = PlacementOptions {
+            target,
+            ..PlacementOptions::default()
+        };
+        let reach = Reach::of(&Calibration::PREMIUM_1_5);
+        let fault = Placement::new(&grid, &reach, &options).expect_err("not read");
+        assert!(matches!(fault, PlaceError::Unread { .. }), "{fault}");
+        let told = raster.check_complete().expect_err("it did not come");
+        assert!(matches!(told.fault(), RasterError::Remote(_)), "{told}");
+    }
 }
 
 #[test]

@@ -254,6 +254,43 @@ fn archives_are_the_same_from_a_server() {
     assert_eq!(open(server.url("hills.tar")).height(2, 1), 3.0);
 }
 
+#[test]
+fn files_at_a_url_lead_to_no_file_of_this_computer() {
+    if !has_gdal() {
+        return;
+    }
+    let local = tempfile::tempdir().expect("a folder");
+    let secret = local.path().join("secret.asc");
+    let heights = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 10\n1 2 3\n4 5 6\n";
+    std::fs::write(&secret, heights).expect("written");
+    let secret = secret.display();
+    let mrf = format!(
+        "<MRF_META><Raster><Size x='3' y='2' c='1'/><PageSize x='3' y='2' c='1'/>\
+         <Compression>NONE</Compression><DataType>Byte</DataType>\
+         <DataFile>{secret}</DataFile></Raster></MRF_META>"
+    );
+    let vrt = format!(
+        "<VRTDataset rasterXSize='3' rasterYSize='2'><VRTRasterBand dataType='Float32' band='1'>\
+         <SimpleSource><SourceFilename relativeToVRT='0'>{secret}</SourceFilename></SimpleSource>\
+         </VRTRasterBand></VRTDataset>"
+    );
+    for (name, bytes) in [
+        ("there.mrf", mrf.clone().into_bytes()),
+        ("there.vrt", vrt.clone().into_bytes()),
+        ("mrf.tar", tar("in.mrf", mrf.as_bytes())),
+        ("vrt.tar", tar("in.vrt", vrt.as_bytes())),
+    ] {
+        let (_folder, _, server) = served(name, &bytes);
+        let told = Raster::open(server.url(name), &OpenOptions::default());
+        let told = told.expect_err(name).to_string();
+        let words = "on this computer";
+        assert!(
+            told.contains(words) || told.contains("beside it"),
+            "{name}: {told}"
+        );
+    }
+}
+
 /// A tar file of one file.
 fn tar(name: &str, bytes: &[u8]) -> Vec<u8> {
     let mut header = [0_u8; 512];

@@ -147,6 +147,7 @@ fn opened(
         Err(fault @ RasterError::ByGdal(_)) => return Err(of_stac()?.unwrap_or(fault)),
         dataset => dataset?,
     };
+    place.check_files(&dataset, head)?;
     let driver = dataset.driver();
     if BY_HEADER.contains(&driver.as_str()) && headered::is_of_another_kind(head) {
         return Err(RasterError::UnknownFormat);
@@ -164,7 +165,9 @@ fn opened(
     let (dataset, name) = match part {
         Some(name) => {
             let part = library.open_part(&name, &open_options(options));
-            (part.map_err(fault)?, name)
+            let part = part.map_err(fault)?;
+            place.check_files(&part, head)?;
+            (part, name)
         }
         None => (dataset, path.display().to_string()),
     };

@@ -108,6 +108,41 @@ impl Place {
         }
     }
 
+    /// Checks that a file at a URL, which begins with some bytes, names no file of this computer.
+    ///
+    /// # Errors
+    /// The file that it names, and what to do.
+    pub(super) fn check_files(&self, dataset: &Dataset, head: &[u8]) -> Result<(), RasterError> {
+        let root = match (&self.served, &self._folder) {
+            (Some((_, mount)), _) => mount.path(""),
+            (None, Some(folder)) if self.source.to_str().is_some_and(is_url) => {
+                folder.path().display().to_string()
+            }
+            _ => return Ok(()),
+        };
+        let driver = dataset.driver();
+        let signs = [("VRT", "<VRTDataset"), ("MRF", "<MRF_META")];
+        let has = |sign: &str| head.windows(sign.len()).any(|part| part == sign.as_bytes());
+        let is_looked_at = |(name, sign)| name == driver && has(sign);
+        if self.served.is_some() && signs.into_iter().any(is_looked_at) {
+            // Its mount has checked each name in it.
+            return Ok(());
+        }
+        let mut names = dataset
+            .files()
+            .into_iter()
+            .map(|it| it.display().to_string());
+        let what = match names.find(|name| !name.contains(&root)) {
+            Some(name) => format!("it names {name}"),
+            // Of an MRF the files with its samples are not listed.
+            None if driver == "MRF" => "an MRF in an archive may name files".into(),
+            None => return Ok(()),
+        };
+        let why = format!("{what} on this computer: get the file, and open it here");
+        let path = without_key(&self.source).into();
+        Err(fault(Error::NotOpened { path, why }))
+    }
+
     /// Returns the reason for which something at its server could not be read.
     pub(super) fn take_fault(&self) -> Option<std::io::Error> {
         let (_, mount) = self.served.as_ref()?;

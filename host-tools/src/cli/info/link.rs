@@ -23,6 +23,8 @@ pub(super) struct LinkFigures {
     tiles: u64,
     /// Level tiles and tiles without a surface, among those looked at.
     others: u64,
+    /// Tiles that could not be read at present, among those looked at.
+    unread: u64,
     /// As they travel.
     sent: Form,
     /// With each sample as a single float.
@@ -52,12 +54,13 @@ impl LinkFigures {
             .map(|cells| (cells.unsigned_abs() as usize).div_ceil(TILE_CELLS) as u64);
         let stride = (columns * rows).div_ceil(MAX_TILES) as usize;
         let mut buffer = TileBuffer::default();
-        let (mut tiles, mut others, mut sum, mut worst) = (0, 0, 0, 0);
+        let (mut tiles, mut others, mut unread) = (0, 0, 0);
+        let (mut sum, mut worst) = (0, 0);
         for at in (0..columns * rows).step_by(stride) {
             let key = TileKey::new(0, (at % columns) as i32, (at / columns) as i32);
             match terrain.tile(key, &mut buffer) {
                 // A tile that a server did not send says nothing of the others.
-                Some((_, ReadStatus::Pending)) => {}
+                Some((_, ReadStatus::Pending)) => unread += 1,
                 None | Some((Heights::Hole | Heights::Flat { .. }, _)) => others += 1,
                 Some((heights, _)) => {
                     let bytes = frame_bytes(key, heights);
@@ -77,6 +80,7 @@ impl LinkFigures {
             mb_per_s,
             tiles,
             others,
+            unread,
             sent: Form::new(sum as f64 / tiles.max(1) as f64, worst, mb_per_s),
             floats: Form::new(floats as f64, floats, mb_per_s),
         })
@@ -87,8 +91,13 @@ impl LinkFigures {
             mb_per_s,
             tiles,
             others,
+            unread,
             ..
         } = self;
+        let unread = match unread {
+            0 => String::new(),
+            unread => format!(", {unread} that cannot be read at present"),
+        };
         let what = |form: &Form, of: String| {
             format!(
                 "{:.0} bytes a tile, at worst {}; at {mb_per_s} MB/s {:.0} tiles and {:.0} cells along an axis a second: {of}",
@@ -98,7 +107,7 @@ impl LinkFigures {
         [
             what(
                 &self.sent,
-                format!("packed, {tiles} tiles and {others} of a few bytes"),
+                format!("packed, {tiles} tiles and {others} of a few bytes{unread}"),
             ),
             what(&self.floats, "each sample a float".into()),
         ]
@@ -143,7 +152,8 @@ fn frame_bytes(key: TileKey, heights: Heights<'_>) -> u64 {
 mod tests {
     use super::*;
     use crate::terrain::HapticCells;
-    use heightfield::Raster;
+    use crate::terrain::in_file::in_file;
+    use heightfield::{Raster, Wait};
 
     #[test]
     fn a_hip_along_an_axis_needs_two_tiles_every_32_cells() {
@@ -167,5 +177,18 @@ mod tests {
         let figures = LinkFigures::of(&HapticGrid::new(&level, HapticCells::Square), 1.0);
         let figures = figures.expect("figures");
         assert_eq!((figures.tiles, figures.others), (3, 6));
+    }
+
+    #[test]
+    fn pending_tiles_are_not_tiles_without_a_surface() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let hills = in_file(folder.path(), [600, 600], |x, y| (x * y % 50) as f32);
+        let grid = HapticGrid::new(&hills, HapticCells::Square).with_wait(Wait::Never);
+        let figures = LinkFigures::of(&grid, 1.0).expect("figures");
+        // Some may be read in the background meanwhile; the first cannot.
+        assert!(figures.unread > 0);
+        assert_eq!((figures.tiles + figures.unread, figures.others), (361, 0));
+        let [line, _] = figures.lines();
+        assert!(line.contains(" that cannot be read at present"), "{line}");
     }
 }

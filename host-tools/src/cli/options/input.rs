@@ -5,12 +5,15 @@ use std::str::FromStr;
 use super::quantity::{GROUND, MEMORY};
 use crate::cli::failure::{Failure, OrHint};
 use crate::terrain::HapticCells;
-use heightfield::{Encoding, Endian, OpenOptions, PngChannel, RawLayout, SampleType, metres_in};
+use heightfield::{
+    Encoding, Endian, Fill, OpenOptions, PngChannel, RawLayout, SampleType, metres_in,
+};
 
 /// The keys, each with an example.
-const KEYS: [(&str, &str); 12] = [
+const KEYS: [(&str, &str); 13] = [
     ("raw", "512x400:i16:le"),
     ("no-data", "-9999"),
+    ("fill", "16"),
     ("band", "2"),
     ("variable", "depth"),
     ("cell", "30m"),
@@ -36,6 +39,8 @@ enum InputValue {
     Raw(u32, u32, SampleType, Endian),
     /// The stored value that means no data.
     NoData(f64),
+    /// Distance within which samples without data are filled.
+    Fill(Fill),
     /// The band that holds the height, the first being 1.
     Band(u32),
     /// Which raster of several holds the height.
@@ -73,6 +78,7 @@ impl FromStr for InputSetting {
         let parsed = match key {
             "raw" => raw(value),
             "no-data" => number(value).map(InputValue::NoData),
+            "fill" => fill(value).map(InputValue::Fill),
             "band" => match value.parse() {
                 Ok(band) if band > 0 => Ok(InputValue::Band(band)),
                 _ => Err("a band is a whole number from 1 on".into()),
@@ -135,6 +141,7 @@ pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Fai
                 });
             }
             InputValue::NoData(value) => options.no_data = Some(*value),
+            InputValue::Fill(fill) => options.fill = Some(*fill),
             InputValue::Band(band) => options.band = Some(*band),
             InputValue::Variable(name) => options.variable = Some(name.clone()),
             InputValue::CellM(side) => options.ground_cell_m = Some(*side),
@@ -189,6 +196,13 @@ fn number(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "a number is wanted".into())
 }
 
+/// A distance within which samples without data are filled.
+fn fill(text: &str) -> Result<Fill, String> {
+    let samples = text.trim().parse().ok();
+    let wanted = || format!("a whole number of samples from 1 to {}", Fill::MAX);
+    samples.and_then(Fill::within).ok_or_else(wanted)
+}
+
 /// A unit of height in metres.
 fn height_unit(text: &str) -> Result<f64, String> {
     let text = text.trim();
@@ -229,6 +243,7 @@ mod tests {
             "raw=512x400:f32:be",
             "no-data=-9999",
             "cell=0.5km",
+            "fill=64",
             "gdal:A=b=c",
         ];
         let options = options(&all).expect("read");
@@ -237,6 +252,7 @@ mod tests {
         assert_eq!((raw.sample, raw.endian), (SampleType::F32, Endian::Big));
         assert_eq!(options.no_data, Some(-9999.0));
         assert_eq!(options.ground_cell_m, Some(500.0));
+        assert_eq!(options.fill, Fill::within(64));
         assert_eq!(options.open_options, ["A=b=c"]);
     }
 
@@ -261,6 +277,10 @@ mod tests {
             ("height-unit=0", "us-ft"),
             ("height-unit=nan", "us-ft"),
             ("no-data=none", "number"),
+            ("fill=0", "from 1 to 64"),
+            ("fill=65", "from 1 to 64"),
+            ("fill=-3", "from 1 to 64"),
+            ("fill=2.5", "from 1 to 64"),
             ("in-memory=1TB", "MB, GB"),
             ("cells=round", "square or stored"),
             ("encoding=morse", "terrarium"),

@@ -7,8 +7,8 @@ use super::rendering::Rendering;
 use super::scale::MapScale;
 use crate::cli::failure::Failure;
 use crate::place::{
-    Coordinates, FELT_MM, Placement, PlacementOptions, Reach, Target, coordinates_in_words,
-    place_in_words,
+    Coordinates, FELT_MM, PlaceError, Placement, PlacementOptions, Reach, Target,
+    coordinates_in_words, place_in_words,
 };
 use crate::terrain::{Distortion, HapticCells, HapticGrid, Terrain};
 use heightfield::{Georeference, Raster};
@@ -60,10 +60,8 @@ impl Placing {
         let options = self.options(rendering);
         let grid = options.target.grid(raster, cells)?;
         // Whichever arm it will be: of one, all but the reach shows already.
-        let tried = Placement::new(&grid, &Reach::of(&Calibration::PREMIUM_3_0), &options);
-        tried
-            .map(|_| Asked { grid, options })
-            .map_err(Failure::from)
+        placement(&grid, &Calibration::PREMIUM_3_0, &options)?;
+        Ok(Asked { grid, options })
     }
 
     fn options(&self, rendering: &Rendering) -> PlacementOptions {
@@ -88,11 +86,29 @@ impl Asked<'_> {
     /// # Errors
     /// Heights that the arm does not reach.
     pub(in crate::cli) fn view(&self, arm: &Calibration) -> Result<Placement, Failure> {
-        Ok(Placement::new(&self.grid, &Reach::of(arm), &self.options)?)
+        placement(&self.grid, arm, &self.options)
     }
 }
 
+<<<<<<< main
 /// Returns the place and size of a terrain, in lines as `run` and `demo` print them.
+=======
+/// Lays a terrain in front of an arm. The error of heights that cannot be read is that of the file.
+fn placement(
+    grid: &HapticGrid<'_>,
+    arm: &Calibration,
+    options: &PlacementOptions,
+) -> Result<Placement, Failure> {
+    let fault = match Placement::new(grid, &Reach::of(arm), options) {
+        Err(fault @ PlaceError::Unread { .. }) => fault,
+        placed => return Ok(placed?),
+    };
+    grid.raster().check_complete()?;
+    Err(fault.into())
+}
+
+/// Where a terrain lies and how large it is, in lines as `run` and `demo` print them.
+>>>>>>> 4341c079df7080c1b807339b0a3cbe788862f789
 pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(

@@ -43,8 +43,9 @@ pub struct ReadingOptions {
     /// Statement about the file, as no-data=-9999, band=2 or cell=30m
     ///
     /// May be repeated. raw=512x400:i16:le: raw samples, north row first, their type and byte order;
-    /// no-data=VALUE: the stored value without a height; band=N: the band with the heights;
-    /// variable=NAME: which raster of several (a NetCDF variable, a file of an archive, a STAC asset);
+    /// no-data=VALUE: the stored value without a height; fill=N: samples without data get heights from
+    /// data at most N samples away, 1 to 64; band=N: the band with the heights; variable=NAME: which
+    /// raster of several (a NetCDF variable, a file of an archive, a STAC asset);
     /// cell=30m: side of a cell on the ground, where the file states none; height-unit=m|ft|us-ft or
     /// metres in a unit; encoding=terrarium|terrain-rgb: how colours are heights; channel=red|green|
     /// blue|alpha|grey: of a PNG; cells=square|stored: which cells are rendered; in-memory=64MB: a

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
+use crate::cli::failure::Failure;
 use heightfield::Raster;
 
 /// Before the first line where there is no terminal, and between two of them.
@@ -36,12 +37,27 @@ pub(in crate::cli) fn shown_meanwhile<T>(
     })
 }
 
+<<<<<<< main
 /// The same of the plan of a path over an open terrain.
 pub(in crate::cli) fn shown_planning<T>(
     name: &str,
     raster: &Raster,
     work: impl FnOnce() -> T,
 ) -> T {
+=======
+/// The same of work that reads an open terrain.
+///
+/// # Errors
+/// The reason why heights could not be read, or else that of the work.
+pub(in crate::cli) fn shown_reading<T, E>(
+    name: &str,
+    raster: &Raster,
+    work: impl FnOnce() -> Result<T, E>,
+) -> Result<T, Failure>
+where
+    Failure: From<E>,
+{
+>>>>>>> 4341c079df7080c1b807339b0a3cbe788862f789
     let line = || match raster.blocks() {
         0 => format!("planning a path over {name}"),
         all => format!(
@@ -49,7 +65,9 @@ pub(in crate::cli) fn shown_planning<T>(
             raster.blocks_read()
         ),
     };
-    shown_meanwhile(line, work)
+    let done = shown_meanwhile(line, work);
+    raster.check_complete()?;
+    Ok(done?)
 }
 
 fn at_bottom(line: impl Fn() -> String, goes_on: impl Fn(Duration) -> bool) {

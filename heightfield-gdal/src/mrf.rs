@@ -1,0 +1,77 @@
+//! Names in an MRF, whose header names the files with its samples and their index.
+
+use crate::error::Error;
+use crate::loaded::Loaded;
+use crate::xml;
+
+/// GDAL tells an MRF by its first bytes.
+const SIGN: &[u8] = b"<MRF_META";
+/// A longer header is none.
+pub(crate) const MAX_BYTES: u64 = 1 << 20;
+/// Elements that name a file beside the header.
+const BESIDE: [&str; 2] = ["DataFile", "IndexFile"];
+/// The element with another raster, of which GDAL writes a copy.
+const COPIED: &str = "Source";
+
+/// Returns true if a file is an MRF, by its beginning.
+pub(crate) fn begins(head: &[u8]) -> bool {
+    head.windows(SIGN.len()).any(|part| part == SIGN)
+}
+
+pub(crate) fn too_large() -> String {
+    format!("an MRF whose header has more than {MAX_BYTES} bytes")
+}
+
+/// Checks that the header of an MRF at a server names nothing but files beside it: GDAL opens other
+/// names on this computer, some of them from the folder in which the program runs.
+///
+/// # Errors
+/// [`Error::Refused`], [`Error::ZeroByte`]; as a text, what it names and what to do.
+pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>, Error> {
+    // GDAL stops at a zero byte, too.
+    let header = header.replace('\0', " ");
+    for named in xml::texts(library, &header)? {
+        let is_any_of = |names: &[&str]| {
+            let mut names = names.iter();
+            names.any(|name| named.node.eq_ignore_ascii_case(name))
+        };
+        let name = named.value.trim();
+        let leads_away = is_any_of(&BESIDE) && !is_beside(name);
+        if leads_away || is_any_of(&[COPIED]) {
+            return Ok(Err(format!(
+                "it names {name}, which need not lie beside it: get both files, and open the MRF here"
+            )));
+        }
+    }
+    Ok(Ok(()))
+}
+
+/// Returns true if a name leads neither to the root, nor out of the MRF's folder.
+fn is_beside(name: &str) -> bool {
+    let mut parts = name.split(['/', '\\']);
+    !name.contains(':') && parts.all(|part| !part.is_empty() && !part.starts_with('.'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_beside_a_file_are_plain() {
+        for (name, is_it) in [
+            ("hills.dat", true),
+            ("data/hills.v2.dat", true),
+            ("/etc/hostname", false),
+            ("\\\\host\\share", false),
+            ("C:\\hills.dat", false),
+            ("C:hills.dat", false),
+            ("./hills.dat", false),
+            ("a/../../hills.dat", false),
+            ("/vsizip/hills.zip", false),
+            ("http://h/hills.dat", false),
+            ("", false),
+        ] {
+            assert_eq!(is_beside(name), is_it, "{name}");
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Heights of samples without data, by inverse distance from data along four axes.
+//!
+//! From a sample without data the nearest sample with data is sought to the left, right, up and down.
+//! Those found within the limit are averaged, each weighted by the inverse of its distance in samples;
+//! if none is found, there is no data. Only heights of the file count, never filled ones, so a value
+//! does not depend on the window that is read.
+//!
+//! GDAL's `FillNodata` weights in the same manner. Its directions are four quadrants, not axes, so its
+//! values differ.
+
+use std::hash::Hasher;
+
+use twox_hash::XxHash64;
+
+use super::{ReadStatus, ReadTracker};
+
+/// Distance within which samples without data are filled ([`OpenOptions::fill`](crate::OpenOptions)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fill(u32);
+
+impl Fill {
+    /// Max distance, samples.
+    pub const MAX: u32 = 64;
+
+    /// Fills from data at most `samples` away; `None` unless that is from 1 to [`Fill::MAX`].
+    #[must_use]
+    pub fn within(samples: u32) -> Option<Self> {
+        (1..=Self::MAX).contains(&samples).then_some(Self(samples))
+    }
+
+    /// Max distance of the data, samples of the level that is read.
+    #[must_use]
+    pub const fn samples(self) -> u32 {
+        self.0
+    }
+
+    /// The print of a file whose heights are filled, from the print of the file.
+    pub(super) fn print_of(self, file: u64) -> u64 {
+        let mut hasher = XxHash64::with_seed(0);
+        hasher.write_u64(file);
+        hasher.write_u32(self.0);
+        hasher.finish()
+    }
+
+    /// The height at a sample of an image of a size, filled if it has none. It is pending while any
+    /// sample that decides it is.
+    pub(super) fn height(
+        self,
+        at: [u32; 2],
+        size: [u32; 2],
+        read: impl Fn([u32; 2]) -> (f64, ReadStatus),
+    ) -> (f64, ReadStatus) {
+        let (height, status) = read(at);
+        if !height.is_nan() || !status.is_complete() {
+            return (height, status);
+        }
+        let reads = ReadTracker::default();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (axis, is_forward) in [(0, false), (0, true), (1, false), (1, true)] {
+            let along = |distance: u32| {
+                let index = match is_forward {
+                    true => at[axis].checked_add(distance),
+                    false => at[axis].checked_sub(distance),
+                };
+                let mut there = at;
+                there[axis] = index.filter(|index| *index < size[axis])?;
+                Some(there)
+            };
+            let looked_at = (1..=self.0).map_while(|distance| Some((distance, along(distance)?)));
+            for (distance, there) in looked_at {
+                let (height, status) = read(there);
+                reads.add(status);
+                if !status.is_complete() {
+                    break;
+                }
+                if !height.is_nan() {
+                    let weight = 1.0 / f64::from(distance);
+                    (sum, weights) = (sum + weight * height, weights + weight);
+                    (lowest, highest) = (lowest.min(height), highest.max(height));
+                    break;
+                }
+            }
+        }
+        if weights == 0.0 || !reads.status().is_complete() {
+            return (f64::NAN, reads.status());
+        }
+        // Rounding must not exceed the file's range.
+        ((sum / weights).clamp(lowest, highest), ReadStatus::Complete)
+    }
+}
+
+#[cfg(test)]
+#[path = "fill_tests.rs"]
+mod tests;
