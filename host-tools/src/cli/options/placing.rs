@@ -90,9 +90,6 @@ impl Asked<'_> {
     }
 }
 
-<<<<<<< main
-/// Returns the place and size of a terrain, in lines as `run` and `demo` print them.
-=======
 /// Lays a terrain in front of an arm. The error of heights that cannot be read is that of the file.
 fn placement(
     grid: &HapticGrid<'_>,
@@ -107,8 +104,7 @@ fn placement(
     Err(fault.into())
 }
 
-/// Where a terrain lies and how large it is, in lines as `run` and `demo` print them.
->>>>>>> 4341c079df7080c1b807339b0a3cbe788862f789
+/// Returns the place and size of a terrain, in lines as `run` and `demo` print them.
 pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(

@@ -37,19 +37,11 @@ pub(in crate::cli) fn shown_meanwhile<T>(
     })
 }
 
-<<<<<<< main
 /// The same of the plan of a path over an open terrain.
-pub(in crate::cli) fn shown_planning<T>(
-    name: &str,
-    raster: &Raster,
-    work: impl FnOnce() -> T,
-) -> T {
-=======
-/// The same of work that reads an open terrain.
 ///
 /// # Errors
 /// The reason why heights could not be read, or else that of the work.
-pub(in crate::cli) fn shown_reading<T, E>(
+pub(in crate::cli) fn shown_planning<T, E>(
     name: &str,
     raster: &Raster,
     work: impl FnOnce() -> Result<T, E>,
@@ -57,7 +49,6 @@ pub(in crate::cli) fn shown_reading<T, E>(
 where
     Failure: From<E>,
 {
->>>>>>> 4341c079df7080c1b807339b0a3cbe788862f789
     let line = || match raster.blocks() {
         0 => format!("planning a path over {name}"),
         all => format!(
