@@ -55,7 +55,7 @@ cargo xtask COMMAND
   lint                   formatting, clippy and documentation, warnings as errors
   census [--write]       words, options, public items, circles of files and lines of code, beside
                          the kept table and the bounds; --write: keep these
-  docs [--write]         the reference, figures, links and command lines of the book, and the book
+  docs [--write]         the reference, figures and links of the book, and the book
                          itself where mdBook is installed; --write: write the reference anew
   setup                  only find or install what the commands need
   size [BOARD]           build the images and hold them to their flash and RAM budgets
