@@ -21,7 +21,7 @@ pub const MAX_SLEW_N_PER_S: f32 = 1_000.0;
 pub struct TickRate(u32);
 
 impl TickRate {
-    /// Slowest and fastest, ticks a second.
+    /// Minimum and maximum tick rate, Hz.
     pub const RANGE_HZ: (u32, u32) = (1_000, 10_000);
     /// 1 kHz.
     pub const DEFAULT: Self = Self(1_000);

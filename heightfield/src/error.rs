@@ -202,9 +202,7 @@ pub enum RasterError {
     #[error("not understood: {0}; the file is damaged, or of a kind that is not known here")]
     Unfamiliar(String),
     /// A third-party decoder panicked.
-    #[error(
-        "the {0} decoder failed on this file, which is damaged, or of a kind that is not known here"
-    )]
+    #[error("the {0} decoder failed: the file is damaged or of an unsupported kind")]
     DecoderFailed(&'static str),
 }
 

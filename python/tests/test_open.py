@@ -247,7 +247,7 @@ def test_places_are_longitude_and_latitude_too(tmp_path):
     unplaced = np.save(tmp_path / "hills.npy", hills()) or Terrain.open(tmp_path / "hills.npy")
     assert unplaced.mm_at(3, 4) == (3, 4)
     for call in (lambda: unplaced.mm_at(7, 45, "lonlat"), lambda: unplaced.ground_at(7, 45, "lonlat")):
-        with pytest.raises(ValueError, match="hint: say the place in the file's own coordinates"):
+        with pytest.raises(ValueError, match="hint: give the place in the file's own coordinates"):
             call()
     with pytest.raises(ValueError, match="crs is 'EPSG:4326': give \"lonlat\""):
         terrain.mm_at(7, 45, "EPSG:4326")

@@ -83,7 +83,7 @@ pub enum ContactError {
     Terrain(#[from] TerrainError),
     /// The terrain has a material that the surface has not.
     #[error(
-        "the terrain has material {found}, and the surface {count}, from 0 on: give it more, or the terrain less"
+        "the terrain has material {found}, and the surface only {count}, counted from 0: add materials to the surface"
     )]
     Material {
         /// The largest of the terrain.
@@ -99,7 +99,7 @@ pub enum ContactError {
     Refused,
 }
 
-/// A step that has not happened: the contact is as before it.
+/// Error of a step; the contact is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
     /// A place that is not a number, or too far away.

@@ -32,8 +32,8 @@ pub fn top(low: f64, high: f64) -> i32 {
     (libm::ceil(high) as i32 + rounding).min(MAX_CELL + 1)
 }
 
-/// The patch and the share of it of a coordinate in cells, on a field of a count of patches; none
-/// beside the field.
+/// Returns the index of the patch of a coordinate in cells and the fraction in it; `None` outside the
+/// field.
 #[must_use]
 pub fn place(cells: f64, patches: i32) -> Option<(u32, f64)> {
     if !(0.0..=f64::from(patches)).contains(&cells) {

@@ -89,7 +89,7 @@ impl Blockers {
         self.iter_names().map(|(name, bit)| (name, bit.meaning()))
     }
 
-    /// Returns the meaning of one bit and its remedy; of the lowest where there are more.
+    /// Returns the meaning and the remedy of the lowest set bit.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         let lowest = Self::from_bits_retain(self.bits() & self.bits().wrapping_neg());

@@ -193,7 +193,7 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// Disarmed, with a fault that was found at boot.
+    /// Makes a disarmed guard, with the fault found at boot, if any.
     #[must_use]
     pub fn new(rate: TickRate, found_at_boot: Option<Fault>) -> Self {
         Self {
@@ -334,7 +334,7 @@ impl Guard {
         self.jog = Some(JogRun::new(jog, self.arming.rate));
     }
 
-    /// Switches off after force has gone out.
+    /// Lowers the force to zero, then switches off.
     pub fn disarm(&mut self) {
         self.hold.end();
         let gain = self.arming.gain;

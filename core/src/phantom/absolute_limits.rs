@@ -35,7 +35,7 @@ const STOPS_RAD: f32 = 5.0 * (core::f32::consts::PI / 180.0);
 const ROUNDING: f32 = 1e-4;
 
 impl Calibration {
-    /// Checks that the record stays within its model's ceilings.
+    /// Checks that the record stays within its model's absolute limits.
     pub(super) fn check_absolute_limits(&self) -> Result<(), CalibrationError> {
         let preset = self.model.preset();
         let (mine, theirs) = (&self.thermal, &preset.thermal);

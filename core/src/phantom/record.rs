@@ -13,7 +13,7 @@ use super::calibration::Calibration;
 use super::check::CalibrationError;
 use crate::crc;
 
-/// Version of the layout. Any change to [`Calibration`] is a new one.
+/// Version of the layout, which increases with any change to [`Calibration`].
 pub const VERSION: u16 = 1;
 /// The longest record in bytes, and a multiple of every flash's write size.
 pub const RECORD_BYTES: usize = 256;

@@ -78,5 +78,5 @@ pub const SILENCE_S: (u16, u16) = (5, 3_600);
 /// Session number of a host that only looks: it opens no session, and is no host
 /// whose silence ends anything.
 pub const ONLY_LOOKS: u16 = 0;
-/// That time where the user says nothing, seconds.
+/// The time of a session whose host states none, seconds.
 pub const DEFAULT_SILENCE_S: u16 = 180;

@@ -11,7 +11,7 @@ pub struct Board {
     pub chip: Option<&'static str>,
     /// The memories of that chip.
     pub memories: Option<Memories>,
-    /// Its description.
+    /// Chip, role and connection, for lists of boards.
     pub what: &'static str,
 }
 

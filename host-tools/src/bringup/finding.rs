@@ -162,7 +162,7 @@ pub enum Finding {
         mm_s: f64,
     },
     /// The pressed stop leaves the amplifiers their power.
-    #[error("the pressed stop leaves the amplifiers' power stages their power")]
+    #[error("the pressed stop does not cut the power of the amplifiers' power stages")]
     StopLeavesPower,
     /// The floor does not push, or not up.
     #[error("the floor does not push the tip back")]

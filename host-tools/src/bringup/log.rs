@@ -69,7 +69,7 @@ fn fingerprint(record: &Calibration) -> String {
 /// Outcome of a step.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
-    /// Which step.
+    /// The step that was done.
     pub step: Step,
     /// True if it was passed.
     pub passed: bool,

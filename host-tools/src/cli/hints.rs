@@ -59,7 +59,7 @@ impl Hint for GroundError {
                     .into()
             }
             Self::Apart { .. } | Self::OtherBody { .. } => {
-                "name the classes of this ground with --materials".into()
+                "name a class raster that covers this terrain with --materials".into()
             }
             Self::TooMany(_) => {
                 "remove the classes that may use the default from the table".into()
@@ -83,7 +83,7 @@ impl Hint for PlaceError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::NoSystem { .. } => {
-                "say the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
+                "give the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
             }
             Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } | Self::NoProjection { .. } => {
                 "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as no data: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
@@ -96,7 +96,7 @@ impl Hint for PlaceError {
                 "choose a box that overlaps it: west, south, east, north"
             }
             Self::UnknownCode(_) => {
-                "say the place with --crs file or --crs lonlat, or install GDAL, which knows more codes"
+                "give the place with --crs file or --crs lonlat, or install GDAL, which knows more codes"
             }
             Self::OtherDatum { .. } => "say the place in the file's own coordinates: --crs file",
             Self::NotInSystem { .. } => "choose a place inside: x, to the east, comes first",
@@ -107,7 +107,7 @@ impl Hint for PlaceError {
                 return format!("swap them: --bbox {east},{south},{west},{north} --crs lonlat");
             }
             Self::NoBox(_) => {
-                "say west before east and south before north; only a box of degrees may cross 180°"
+                "give west before east and south before north; only a box of degrees may cross 180°"
             }
             Self::BoxInTwoParts { .. } => "name one of both parts, or --at a place",
             Self::BoxTooSmall { .. } => "choose a larger box",
@@ -166,7 +166,7 @@ impl Hint for ReplayError {
 
 impl Hint for OtherTerrain {
     fn hint(&self) -> String {
-        "name the file that was recorded on, and read it with the same options; or take the recording's path alone, on this terrain, with --ignore-settings".into()
+        "name the terrain file of the recording, with the same options; or take the recording's path alone, on this terrain, with --ignore-settings".into()
     }
 }
 
@@ -186,7 +186,7 @@ impl Hint for LinkError {
             }
             Self::Version { .. } => "install the hapterra command that belongs to the firmware",
             Self::Taken => {
-                "switch the amplifiers off where nobody has the arm in hand; end the other host, then start again"
+                "if nobody holds the arm, switch its amplifiers off; end the other host; start again"
             }
             Self::NotConfirmed => "then see hapterra status",
             Self::Interrupted => "start again",

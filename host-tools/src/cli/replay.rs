@@ -246,10 +246,8 @@ impl<'t> Inputs<'t> {
 /// not be read twice.
 fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
     if !args.trajectory.is_file() {
-        return Err(
-            "the recording is no regular file: it is read twice, its settings before its path",
-        )
-        .or_hint("write it to a file first, or take the path alone with --ignore-settings");
+        return Err("the recording must be a regular file, because it is read twice")
+            .or_hint("write it to a file first, or take the path alone with --ignore-settings");
     }
     let cells = args.terrain.reading.cells();
     let lines = differences(&args.rendering, cells, (&args.trajectory, recorded));

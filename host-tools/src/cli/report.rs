@@ -19,7 +19,7 @@ pub fn put(report: &str) -> Result<(), Failure> {
     match written.and_then(|()| output.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(Failure::new(format!("cannot write the report: {error}"))
-                .hint("make room where standard output goes to"))
+                .hint("free disk space for standard output"))
         }
         _ => Ok(()),
     }

@@ -51,7 +51,7 @@ pub enum LinkError {
     #[error("the device refused the scene: it finds a number in it that it cannot work with")]
     SceneRefused,
     /// In the middle of something that cannot be taken up again.
-    #[error("the device was restarted and has forgotten what it was doing")]
+    #[error("the device was restarted and lost its session")]
     Restarted,
     /// A point of a replay is never answered.
     #[error("the device did not finish point {0} of the trajectory")]

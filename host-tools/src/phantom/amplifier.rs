@@ -35,8 +35,7 @@ impl Amplifier {
         }
     }
 
-    /// Sets the command in amperes; it is cut at the peak current. What is not
-    /// a number is no command: zero.
+    /// Sets the current command in amperes, limited to the peak current; NaN commands zero.
     pub fn command(&mut self, amperes: f64) {
         let peak = self.axis.motor.peak_a;
         self.command_a = if amperes.is_nan() {

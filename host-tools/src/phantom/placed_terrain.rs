@@ -126,7 +126,7 @@ impl<'t> PlacedTerrain<'t> {
         self.scene.params
     }
 
-    /// The point of the terrain that is at the tip in the arm's home pose, hand
+    /// The point of the terrain that is at the tip in the arm's home pose, device
     /// millimetres.
     #[must_use]
     pub const fn home_mm(&self) -> [f64; 3] {

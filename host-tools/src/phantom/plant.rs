@@ -73,8 +73,7 @@ impl Plant {
         }
     }
 
-    /// Puts the arm to rest in another pose, and the hand with it. The counters
-    /// go on from where they were.
+    /// Moves arm and hand to another pose, at rest. The counters continue.
     pub fn put(&mut self, q_rad: [f64; 3]) {
         self.q = DVec3::from(q_rad);
         self.rate = DVec3::ZERO;

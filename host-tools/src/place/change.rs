@@ -22,11 +22,11 @@ pub const TIPS_MM: [f64; 2] = [0.0, 100.0];
 /// Change of a placement during a session.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlacementChange {
-    /// Another place under the hand: so many hand millimetres farther east and north.
+    /// Another place under the hand: so many device millimetres farther east and north.
     Pan {
-        /// Hand millimetres east.
+        /// Device millimetres east.
         east_mm: f64,
-        /// Hand millimetres north.
+        /// Device millimetres north.
         north_mm: f64,
     },
     /// The same in ground metres.
@@ -57,9 +57,7 @@ pub enum ChangeError {
     #[error("that place is outside of the terrain")]
     Outside,
     /// Ground metres, of a file that knows none.
-    #[error(
-        "the file does not know how large its cells are on the ground: pan by device millimetres"
-    )]
+    #[error("the file does not state its cell size on the ground: pan by device millimetres")]
     NoGroundSize,
     /// A factor that is none.
     #[error("{0} is not a valid factor: it must be above zero, and finite")]
@@ -69,7 +67,7 @@ pub enum ChangeError {
         "a sample of the file would be {cell_mm:.0} mm wide in the hand: it has no more detail"
     )]
     NoDetail {
-        /// Hand millimetres a felt cell of level 0.
+        /// Device millimetres a felt cell of level 0.
         cell_mm: f64,
     },
     /// Smaller than can be felt.
@@ -160,7 +158,7 @@ pub struct Changed<'r> {
     pub laid: Laid,
     /// Its terrain.
     pub terrain: Terrain<'r>,
-    /// The HIP, hand millimetres of the new view. Its height over the place under
+    /// The HIP, device millimetres of the new view. Its height over the place under
     /// the hand is what it was.
     pub hip_mm: [f64; 3],
     /// True if the heights that this follows from have been read. If not, the HIP has the

@@ -132,7 +132,7 @@ pub enum PlaceError {
         parts: [String; 2],
     },
     /// Ground metres, of a file that knows none.
-    #[error("the file does not know how large its cells are on the ground")]
+    #[error("the file does not state its cell size on the ground")]
     NoGroundSize,
     /// A scale that is none.
     #[error("{0} ground metres a device millimetre: it must be above zero, and finite")]

@@ -164,7 +164,7 @@ impl Placement {
     }
 
     /// The haptic cell within the arm's reach that is farthest from its true shape; of the
-    /// view's own grid. `None` where the file does not know how large its cells are.
+    /// view's own grid. `None` where the file does not state its cell size.
     #[must_use]
     pub fn worst_reached(&self, grid: &HapticGrid<'_>) -> Option<Distortion> {
         let cells =

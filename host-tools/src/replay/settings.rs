@@ -202,7 +202,7 @@ pub struct RenderedTerrain {
     /// Times that heights are higher than true to scale, where the file knows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
-    /// The point of the terrain that was at the tip in the arm's home pose, hand
+    /// The point of the terrain that was at the tip in the arm's home pose, device
     /// millimetres; none where no arm felt it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home_mm: Option<[f64; 3]>,

@@ -34,7 +34,7 @@ impl Distortion {
 impl HapticGrid<'_> {
     /// The haptic cell of a rectangle (west, south, east, north, in haptic cells) that is
     /// farthest from its true shape, among 17 × 17 places of the part that is inside the
-    /// field. `None` where the file does not know how large its cells are, and of a rectangle
+    /// field. `None` where the file does not state its cell size, and of a rectangle
     /// beside the field.
     #[must_use]
     pub fn worst_in(&self, [west, south, east, north]: Sides) -> Option<Distortion> {

@@ -19,7 +19,7 @@ const NEAR_IS_FINER: u8 = 2;
 
 impl Terrain<'_> {
     /// A scene of this terrain with a fallback under all that an arm reaches. `reach_mm` is the
-    /// rectangle around that: west, south, east and north of the tip in its home pose, hand
+    /// rectangle around that: west, south, east and north of the tip in its home pose, device
     /// millimetres ([`crate::place::Reach::sides_mm`]).
     ///
     /// The scene stays as it is where none of the terrain lies in there, or all of it fits into four

@@ -58,7 +58,7 @@ pub struct HapticGrid<'r> {
     resampling: Option<Resampling>,
     /// Materials of the ground, if there are several.
     materials: Option<&'r Materials>,
-    /// Radius of the ball that feels it, hand millimetres; 0 for a point.
+    /// Radius of the ball that feels it, device millimetres; 0 for a point.
     tip_mm: f64,
     /// Behaviour of reads.
     wait: Wait,
@@ -116,7 +116,7 @@ impl<'r> HapticGrid<'r> {
         Self { tip_mm, ..self }
     }
 
-    /// Radius of the ball that feels it, hand millimetres; 0 for a point.
+    /// Radius of the ball that feels it, device millimetres; 0 for a point.
     #[must_use]
     pub const fn tip_mm(&self) -> f64 {
         self.tip_mm
@@ -293,7 +293,7 @@ impl<'r> HapticGrid<'r> {
     }
 
     /// Returns the height of one vertical unit in cells at true proportions, if the file
-    /// knows its cell size: with `cell_mm` hand millimetres a cell, the true height
+    /// knows its cell size: with `cell_mm` device millimetres a cell, the true height
     /// of a unit is `cell_mm` times this.
     #[must_use]
     pub fn cells_per_vertical_unit(&self) -> Option<f64> {
@@ -301,7 +301,7 @@ impl<'r> HapticGrid<'r> {
         self.side_m.map(|side| metres / side)
     }
 
-    /// The scale of `cell_mm` hand millimetres a cell, with heights at the file's true proportions,
+    /// The scale of `cell_mm` device millimetres a cell, with heights at the file's true proportions,
     /// or 1 mm a unit where it does not know its cell size.
     ///
     /// # Errors

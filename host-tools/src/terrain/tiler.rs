@@ -319,7 +319,7 @@ impl<'r> Terrain<'r> {
         self.top
     }
 
-    /// Extent east and north from the south-west sample, hand millimetres.
+    /// Extent east and north from the south-west sample, device millimetres.
     #[must_use]
     pub fn size_mm(&self) -> [f64; 2] {
         self.size.map(|s| f64::from(s) * self.scale.cell_mm())
@@ -346,7 +346,7 @@ impl<'r> Terrain<'r> {
         scene
     }
 
-    /// Height of the surface that is felt in hand millimetres at a place in hand
+    /// Height of the surface that is felt in device millimetres at a place in device
     /// millimetres, in `f64`: bilinear between samples, or between the heights of a ball's centre
     /// at samples. `None` in a hole and off the data.
     #[must_use]

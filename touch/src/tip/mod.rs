@@ -140,8 +140,8 @@ impl Ball {
         self.radius
     }
 
-    /// The samples that nodes depend on, `side` of them along each axis from a felt node on: the
-    /// first sample, which may lie beside the field, how many along a side, and where the nodes are.
+    /// Returns the samples that `side` × `side` nodes from the node `first` depend on: the first sample,
+    /// which may lie outside the field, the samples along a side, and where the nodes are among them.
     #[must_use]
     pub fn around(&self, first: [u32; 2], side: usize) -> ([i64; 2], usize, Nodes) {
         let (parts, halo) = (i64::from(self.parts), self.halo as i64);

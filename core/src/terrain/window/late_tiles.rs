@@ -75,8 +75,8 @@ impl<'t, const D: usize> Window<'t, D> {
         self.held(TileIndex::holding(cell)).is_some()
     }
 
-    /// Moves the surface on to the tiles that have come, by `step` cells at most. Returns
-    /// whether it may be another than in the tick before.
+    /// Blends arrived tiles in by at most `step` cells. Returns true if the surface may have changed
+    /// since the tick before.
     pub fn settle(&mut self, step: f32) -> bool {
         let has_changed = core::mem::take(&mut self.tile_blend.has_changed);
         if self.tile_blend.count == 0 {

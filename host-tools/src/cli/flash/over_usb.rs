@@ -73,10 +73,10 @@ fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
     match ask(&question).as_deref() {
         Some("y" | "Y" | "yes") => Ok(()),
         _ => Err(Failure::new(format!(
-            "the loader {serial} at {place} was not confirmed as the board to write"
+            "the loader {serial} at {place} could not be confirmed as the board to write"
         ))
         .hint(format!(
-            "nothing was touched; name it: --device usb:{serial}"
+            "nothing was changed; name it: --device usb:{serial}"
         ))),
     }
 }
@@ -142,7 +142,7 @@ fn greet(place: &str) -> Result<(), Failure> {
     })?;
     let Some(device) = back else {
         return Err(
-            Failure::new("the board was updated, and does not come back on USB")
+            Failure::new("the board was updated, and did not reappear on USB")
                 .hint("press its reset button; `hapterra status` shows how it is then"),
         );
     };

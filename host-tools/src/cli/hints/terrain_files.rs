@@ -40,7 +40,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         }
         RasterError::ByGdal(_) => {
             return format!(
-                "see whether GDAL's own program reads it: gdalinfo {}; a newer GDAL may",
+                "see whether GDAL's own program reads it: gdalinfo {}; or try a newer GDAL",
                 names(path).0
             );
         }
@@ -126,9 +126,9 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         }
         RasterError::Unreadable(_) => "check the path and that you may read the file",
         RasterError::Remote(error) => elsewhere(path, error),
-        RasterError::RawSizeMissing => "say how the samples lie: --input raw=WxH:i16:le",
+        RasterError::RawSizeMissing => "state the sample layout: --input raw=WxH:i16:le",
         RasterError::AmbiguousChannels(_) => {
-            "say which channel holds the height: --input channel=red|green|blue|alpha|grey"
+            "state which channel holds the height: --input channel=red|green|blue|alpha|grey"
         }
         RasterError::TooSmall { .. } => "take a larger part of the terrain",
         RasterError::AllNoData { .. } => {

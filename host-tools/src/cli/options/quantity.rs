@@ -93,7 +93,7 @@ impl Units {
     /// Reads a quantity in the first of the units.
     ///
     /// # Errors
-    /// No finite number, or another unit; the message names those that are known.
+    /// A number that is not finite, or an unknown unit; the message lists the units.
     pub fn read(&self, text: &str) -> Result<f64, String> {
         let (number, unit) = split(text);
         let size = self.size_of(unit);

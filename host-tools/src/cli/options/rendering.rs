@@ -61,7 +61,7 @@ impl Rendering {
             None => 1.0,
             Some(scale) => scale
                 .cell_mm(grid.side_m())
-                .ok_or("the file does not know how large its cells are on the ground")
+                .ok_or("the file does not state its cell size on the ground")
                 .or_hint("state the size of a cell, as --scale 1mm/cell, or of the file's cells, as --input cell=30m")?,
         };
         let plain = || grid.true_scale(cell_mm);

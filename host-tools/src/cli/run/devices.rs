@@ -213,8 +213,10 @@ fn plants_apart(args: &Args) -> Result<(), Failure> {
     if count == 0 || count == others {
         return Ok(());
     }
-    let error = format!("{count} of {others} devices that are not native have a plant line");
-    Err(Failure::new(error).hint("name it with each of them, as tcp:HOST:PORT+plant:HOST:PORT, and serve real arms by another `hapterra run`"))
+    let error = format!("{count} of {others} devices other than native have a plant line");
+    Err(Failure::new(error).hint(
+        "add +plant:HOST:PORT to each of them, and run real arms in a separate `hapterra run`",
+    ))
 }
 
 fn same_plant(plant: &str) -> Failure {

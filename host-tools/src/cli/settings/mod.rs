@@ -198,7 +198,7 @@ fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Sett
     let settings = settings_of(&path)?
         .ok_or_else(|| {
             format!(
-                "{} is no recording with settings, and no .toml",
+                "{} is neither a recording with settings nor a .toml",
                 path.display()
             )
         })

@@ -242,7 +242,7 @@ impl Surface {
         let has_classes = |looks: &&Looks| !looks.class.is_empty();
         let (file, looks) = match (&options.materials, &self.looks) {
             (None, looks) if looks.as_ref().is_some_and(|it| has_classes(&it)) => {
-                return Err("a surface of several classes without a raster of them")
+                return Err("the surface lists several classes, but no class raster is given")
                     .or_hint("name the raster with --materials");
             }
             (None, _) => return Ok(None),
