@@ -10,7 +10,9 @@
 //! be armed. The steps from off to on and back are in [`Mode`].
 
 mod arming;
+mod blockers;
 mod checks;
+mod driven_faults;
 mod fault;
 mod feedback;
 mod flags;

@@ -1,5 +1,7 @@
 //! Tiles made on demand from the one raster.
 
+mod tile_samples;
+
 use std::sync::OnceLock;
 
 use hapterra_core::force::SurfaceParams;
@@ -11,9 +13,9 @@ use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
 use hapterra_touch::tiles;
-use hapterra_touch::tip::{self, Ball, CENTRE_STEP, Nodes, Samples, TipError};
+use hapterra_touch::tip::{self, Ball, TipError};
 
-use super::steps::{BinaryUnit, steps};
+use super::steps::steps;
 use super::{HapticCells, HapticGrid, Scale, ScaleError, identity};
 use crate::materials::MaterialBuffer;
 use heightfield::{Raster, ReadStatus, ReadTracker, Wait};
@@ -533,91 +535,6 @@ impl<'r> Terrain<'r> {
         let from = from.map(|felt| felt.div_euclid(parts).saturating_sub(halo));
         let to = to.map(|felt| felt.div_euclid(parts).saturating_add(halo));
         self.grid.prefetch(self.level, from, to);
-    }
-
-    /// A height in cells; NaN where positions cannot say it.
-    fn within(&self, cells: f64) -> f64 {
-        match cells.abs() <= f64::from(MAX_CELL) {
-            true => cells,
-            false => f64::NAN,
-        }
-    }
-
-    /// Returns the step to which heights are rounded, cells, if they differ from those of the file.
-    const fn step(&self) -> Option<f64> {
-        match (&self.ball, self.grid.is_resampled()) {
-            (Some(_), _) => Some(CENTRE_STEP),
-            (None, true) => Some(INTERPOLATED_STEP),
-            (None, false) => None,
-        }
-    }
-
-    /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what the heights
-    /// are multiples of in the file's vertical unit.
-    fn read(
-        &self,
-        key: TileKey,
-        heights: &mut [f64; TILE_SAMPLES * TILE_SAMPLES],
-        reads: &ReadTracker,
-    ) -> BinaryUnit {
-        let first = |index: i32| index as u32 * TILE_CELLS as u32;
-        let (west, south) = (first(key.index.col), first(key.index.row));
-        if let Some(ball) = &self.ball {
-            let (samples, nodes) = self.samples(ball, [west, south], TILE_SAMPLES, reads);
-            for (height, centre) in heights.iter_mut().zip(ball.centres(&samples, nodes)) {
-                *height = self.rounded(self.within(centre));
-            }
-            return BinaryUnit::ANY;
-        }
-        let mut unit = BinaryUnit::ANY;
-        for (row, line) in (south..).zip(heights.chunks_exact_mut(TILE_SAMPLES)) {
-            reads.add(self.grid.read_row(self.level, row, west, line));
-            for height in line {
-                unit = unit.with(*height);
-                // Where not all heights were read before, one may leave what can be said.
-                *height = self.rounded(self.within(self.scale.height_cells(*height)));
-            }
-        }
-        unit
-    }
-
-    /// Samples of the level that a ball's nodes depend on, `side` of them each way from a felt
-    /// sample on, in felt cells, NaN in holes and off the data; and where the nodes are.
-    fn samples(
-        &self,
-        ball: &Ball,
-        first: [u32; 2],
-        side: usize,
-        reads: &ReadTracker,
-    ) -> (Samples, Nodes) {
-        let ([west, south], along, nodes) = ball.around(first, side);
-        let mut heights = vec![f64::NAN; along * along];
-        // West of the field there are no columns to ask for.
-        let beside = west.min(0).unsigned_abs() as usize;
-        for (row, line) in (south..).zip(heights.chunks_exact_mut(along)) {
-            let (Ok(row), Some(line)) = (u32::try_from(row), line.get_mut(beside..)) else {
-                continue;
-            };
-            let west = west.max(0) as u32;
-            reads.add(self.grid.read_row(self.level, row, west, line));
-            for height in line {
-                *height = self.within(self.scale.height_cells(*height));
-            }
-        }
-        let samples = Samples {
-            columns: along,
-            rows: along,
-            heights,
-        };
-        (samples, nodes)
-    }
-
-    /// A height in cells, as it goes to the device.
-    fn rounded(&self, cells: f64) -> f64 {
-        match self.step() {
-            Some(step) => (cells / step).round() * step,
-            None => cells,
-        }
     }
 
     /// Returns the number of samples of the tile in the field.

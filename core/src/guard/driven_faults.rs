@@ -1,0 +1,51 @@
+//! The faults that end driving: what may not be while the amplifiers are on.
+
+use super::speed::SpeedCheck;
+use super::{Fault, Guard, GuardInputs, Surroundings};
+
+impl Guard {
+    /// The first fault that may not be while the amplifiers are on.
+    pub(super) fn find_fault(
+        &mut self,
+        sense: &GuardInputs,
+        around: &Surroundings<'_>,
+    ) -> Option<Fault> {
+        let Some((mechanism, pose)) = around.arm else {
+            return Some(Fault::CalibrationCorrupt);
+        };
+        if sense.emergency_stop {
+            return Some(Fault::EmergencyStop);
+        }
+        if sense.hardware_failed {
+            return Some(Fault::Hardware);
+        }
+        if sense.outputs_not_as_set {
+            return Some(Fault::OutputsNotAsSet);
+        }
+        if self.feedback.is_unready(sense) {
+            return Some(Fault::AmplifierNotReady);
+        }
+        if !around.watchdog_live {
+            return Some(Fault::TaskStalled);
+        }
+        if !self.stops.each_allows(pose.angles()) {
+            return Some(Fault::JointLimit);
+        }
+        if !self.stops.linkage_allows(pose.angles()) {
+            return Some(Fault::Linkage);
+        }
+        match self.speed.check(sense.counts, mechanism, pose) {
+            SpeedCheck::NotYet => None,
+            SpeedCheck::TooFast => Some(Fault::TooFast),
+            SpeedCheck::Moved(moved) => {
+                let bearable = self.motors.continuous_a;
+                let in_vain = self.stall.check(moved, self.currents_a, bearable);
+                let (hz, gain) = (self.speed.hz, self.arming.gain);
+                let jogged = self.jog.as_mut();
+                let jogged =
+                    jogged.and_then(|jog| jog.check(moved, hz, mechanism, pose.angles(), gain));
+                in_vain.then_some(Fault::NoMotion).or(jogged)
+            }
+        }
+    }
+}
