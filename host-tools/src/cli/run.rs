@@ -81,8 +81,8 @@ pub struct Args {
 
     /// Disarm after this time without a message from here, as 10s
     ///
-    /// The device does so by itself.
-    #[arg(long, value_name = "TIME", default_value = Timeouts::REAL_SILENCE, value_parser = silence)]
+    /// The device does so by itself; a number alone is in seconds.
+    #[arg(long, value_name = "TIME", default_value_t = Timeouts::REAL_SILENCE_S, value_parser = silence)]
     pub silence: u16,
 
     /// Serve a real board without a complete log of hapterra bringup

@@ -31,8 +31,6 @@ impl Timeouts {
     /// Time for which an armed real board tolerates a silent host, unless the user says
     /// otherwise, seconds: longer than a host that goes on takes to come back.
     pub const REAL_SILENCE_S: u16 = 30;
-    /// The same as an option's value.
-    pub const REAL_SILENCE: &str = "30s";
 
     /// For a device that runs in real time.
     pub const REAL_TIME: Self = Self {

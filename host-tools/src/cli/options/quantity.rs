@@ -1,5 +1,4 @@
-//! Quantities as they are typed: a number and its unit. A number alone is read if the option's
-//! placeholder names its unit, as `N/MM` does.
+//! Quantities as they are typed: a number, and a unit where it is not the usual one.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -7,31 +6,26 @@ use std::str::FromStr;
 /// The units that a kind of quantity may carry.
 #[derive(Debug)]
 pub struct Units {
-    /// Name of the quantity, for messages.
+    /// What the quantity is, for messages.
     name: &'static str,
-    /// Each unit and its size in the first.
+    /// Each unit and its size in the first, which is that of a number alone.
     units: &'static [(&'static str, f64)],
-    /// True if a number alone is in the first unit; otherwise it is refused.
-    reads_alone: bool,
 }
 
 /// A force between tip and surface for each millimetre between HIP and proxy.
 pub const STIFFNESS: Units = Units {
     name: "a stiffness",
     units: &[("N/mm", 1.0), ("N/m", 1e-3)],
-    reads_alone: true,
 };
 /// A force.
 pub const FORCE: Units = Units {
     name: "a force",
     units: &[("N", 1.0), ("mN", 1e-3)],
-    reads_alone: true,
 };
 /// A length at the device.
 pub const LENGTH: Units = Units {
     name: "a length at the device",
     units: &[("mm", 1.0), ("cm", 10.0), ("um", 1e-3), ("µm", 1e-3)],
-    reads_alone: true,
 };
 /// A length on the ground.
 pub const GROUND: Units = Units {
@@ -43,7 +37,6 @@ pub const GROUND: Units = Units {
         ("mm", 1e-3),
         ("ft", 0.3048),
     ],
-    reads_alone: false,
 };
 /// A time.
 pub const TIME: Units = Units {
@@ -56,37 +49,31 @@ pub const TIME: Units = Units {
         ("us", 1e-6),
         ("µs", 1e-6),
     ],
-    reads_alone: false,
 };
 /// A rate of the loop.
 pub const FREQUENCY: Units = Units {
     name: "a rate",
     units: &[("Hz", 1.0), ("kHz", 1e3)],
-    reads_alone: true,
 };
 /// A force for each unit of speed.
 pub const DAMPING: Units = Units {
     name: "a damping",
     units: &[("Ns/m", 1.0), ("N·s/m", 1.0), ("Ns/mm", 1e3)],
-    reads_alone: true,
 };
 /// An angle.
 pub const ANGLE: Units = Units {
     name: "an angle",
     units: &[("deg", 1.0), ("°", 1.0)],
-    reads_alone: true,
 };
 /// A size in memory.
 pub const MEMORY: Units = Units {
     name: "a size",
     units: &[("MB", 1.0), ("GB", 1024.0)],
-    reads_alone: false,
 };
 /// Ground under a millimetre of the device.
 pub const GROUND_SCALE: Units = Units {
     name: "a scale",
     units: &[("m/mm", 1.0), ("km/mm", 1e3), ("cm/mm", 0.01)],
-    reads_alone: false,
 };
 
 impl Units {
@@ -102,9 +89,6 @@ impl Units {
             .ok()
             .filter(|number| number.is_finite());
         match (value, size) {
-            (Some(value), _) if unit.is_empty() && value != 0.0 && !self.reads_alone => {
-                Err(self.expected(text))
-            }
             (Some(value), Some(1.0)) => Ok(value),
             (Some(value), Some(size)) => Ok(value * size),
             _ => Err(self.expected(text)),
@@ -160,10 +144,7 @@ impl Units {
         let (name, units) = (self.name, units.join(", "));
         let usual = self.usual();
         match split(text) {
-            ("", _) => format!("{name} is a number with its unit: {units}"),
-            (number, "") if !self.reads_alone => {
-                format!("{name} needs its unit, as {number}{usual}: its units are {units}")
-            }
+            ("", _) => format!("{name} is a number in {usual}, or with its unit: {units}"),
             (_, "") => format!("{name} is a finite number in {usual}"),
             (_, unit) => format!("{name} is not in `{unit}`: its units are {units}"),
         }
@@ -188,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn number_alone_is_in_the_unit_of_the_placeholder() {
+    fn number_alone_is_in_the_first_unit() {
         assert_eq!(STIFFNESS.read("0.5"), Ok(0.5));
         assert_eq!(STIFFNESS.read(" 0.5 N/mm "), Ok(0.5));
         assert_eq!(STIFFNESS.read("500N/m"), Ok(0.5));
@@ -196,7 +177,6 @@ mod tests {
         assert_eq!(TIME.read("2min"), Ok(120.0));
         assert_eq!(DAMPING.read("2N·s/m"), Ok(2.0));
         assert_eq!(GROUND_SCALE.read("5m/mm"), Ok(5.0));
-        assert_eq!(TIME.read("0"), Ok(0.0));
     }
 
     #[test]
@@ -205,11 +185,7 @@ mod tests {
             (&STIFFNESS, "0.5N", "N/mm, N/m"),
             (&LENGTH, "2m", "mm, cm"),
             (&TIME, "soon", "s, ms, min, h"),
-            (&FORCE, "", "with its unit: N, mN"),
-            (&TIME, "5", "as 5s: its units are s, ms"),
-            (&GROUND, "30", "as 30m: its units are m, km"),
-            (&MEMORY, "64", "as 64MB: its units are MB, GB"),
-            (&GROUND_SCALE, "50", "as 50m/mm"),
+            (&FORCE, "", "a number in N"),
             (&FORCE, "nan", "finite"),
             (&FORCE, "inf", "finite"),
             (&FORCE, "1e999", "finite"),

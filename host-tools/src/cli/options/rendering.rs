@@ -20,7 +20,7 @@ pub struct Rendering {
     /// Ground metres a device millimetre (5m/mm), or 1.5mm/cell
     ///
     /// [default: replay 1mm/cell; else the terrain is fitted to the workspace, and with --at it is
-    /// 1mm/cell] mm/cell is the size of a haptic cell.
+    /// 1mm/cell] mm/cell is the size of a haptic cell; a number alone is in m/mm.
     #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
     pub scale: Option<MapScale>,
 

@@ -82,6 +82,7 @@ mod tests {
     #[test]
     fn metres_and_cells() {
         for (text, wanted) in [
+            ("5", MapScale::GroundMPerMm(5.0)),
             ("5m/mm", MapScale::GroundMPerMm(5.0)),
             ("0.25 km/mm", MapScale::GroundMPerMm(250.0)),
             ("1.5mm/cell", MapScale::CellMm(1.5)),
@@ -92,7 +93,6 @@ mod tests {
         }
         for bad in [
             "",
-            "5",
             "5mm",
             "0",
             "-2m/mm",
