@@ -110,7 +110,7 @@ def test_materials_lie_where_the_array_says():
         return contact.run([[east, 5, 0]] * 300)["force_n"][-1, 2]
 
     assert (force(3), force(17)) == (0.5, np.float32(0.1))
-    with pytest.raises(ValueError, match="has material 1, and the surface 1"):
+    with pytest.raises(ValueError, match="has material 1, and the surface only 1"):
         Contact(terrain)
     for bad in (materials[:5], materials * 99, materials.astype(float), -materials):
         with pytest.raises(ValueError, match="materials"):
