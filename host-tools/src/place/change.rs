@@ -185,8 +185,7 @@ impl Bounds {
         let mut at = [at_mm[0] / cell_mm, at_mm[1] / cell_mm];
         let mut grid = *terrain.grid();
         for change in changes {
-            (laid, at) = self.step(&grid, laid, at, change)?;
-            grid = grid.with_tip(self.tip_after(grid.tip_mm(), change)?);
+            (laid, at) = self.step(&mut grid, laid, at, change)?;
         }
         if let Some(anew) = grid.measured_anew(at) {
             at = anew.of_ground(grid.to_ground(at));
@@ -211,22 +210,10 @@ impl Bounds {
         })
     }
 
-    /// The radius of the tip after a change.
-    fn tip_after(&self, tip_mm: f64, change: &PlacementChange) -> Result<f64, ChangeError> {
-        match *change {
-            PlacementChange::Tip(mm) if !(TIPS_MM[0]..=TIPS_MM[1]).contains(&mm) => {
-                Err(ChangeError::Tip(mm))
-            }
-            PlacementChange::Tip(mm) => Ok(mm),
-            PlacementChange::Reset => Ok(self.tip_mm),
-            _ => Ok(tip_mm),
-        }
-    }
-
     /// One change, at a place in felt cells of level 0.
     fn step(
         &self,
-        grid: &HapticGrid<'_>,
+        grid: &mut HapticGrid<'_>,
         mut laid: Laid,
         mut at: [f64; 2],
         change: &PlacementChange,
@@ -272,7 +259,12 @@ impl Bounds {
             PlacementChange::Surface(change) => {
                 *params = change.of(params, grid.materials().is_some())?;
             }
-            PlacementChange::Tip(_) => {}
+            PlacementChange::Tip(mm) => {
+                if !(TIPS_MM[0]..=TIPS_MM[1]).contains(&mm) {
+                    return Err(ChangeError::Tip(mm));
+                }
+                *grid = grid.with_tip(mm);
+            }
             PlacementChange::Reset => {
                 let first = &self.first.view;
                 let cell_mm = first.scale.cell_mm() * first.as_large_as_in(grid);
@@ -280,6 +272,7 @@ impl Bounds {
                 *view = view.scaled(cell_mm, height)?;
                 view.exaggeration = first.exaggeration;
                 *params = self.first.params;
+                *grid = grid.with_tip(self.tip_mm);
             }
         }
         Ok((laid, at))
