@@ -3,9 +3,9 @@
 use divan::{Bencher, counter::ItemsCount};
 use hapterra_lab::baseline::{Paper, Start};
 use hapterra_lab::grid::Grid;
-use hapterra_lab::haptics::Haptics;
 use hapterra_lab::path::{self, Flight, Path};
 use hapterra_lab::product::{self, Product, SIDE};
+use hapterra_lab::variant::Haptics;
 
 const TICKS: usize = 4000;
 const PATHS: [&str; 6] = [

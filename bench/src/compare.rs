@@ -4,11 +4,11 @@ use hapterra_core::terrain::Window;
 
 use crate::baseline::{GodObject, Paper, Parry, Project, ProxyGraph, Start};
 use crate::grid::Grid;
-use crate::haptics::{Answer, Haptics};
+use crate::oracle::{self, Verdict};
 use crate::path::{self, Path};
 use crate::product::{self, Copy, Product, SIDE};
 use crate::stats::{interleave, part, quantiles, timing};
-use crate::truth::{self, Verdict};
+use crate::variant::{Answer, Haptics};
 
 /// Effort of a measurement.
 #[derive(Clone, Copy, Debug)]
@@ -245,7 +245,7 @@ fn error(grid: &Grid, path: &Path, answers: &[Answer], judged: usize) -> Option<
         .zip(answers)
         .step_by(every)
         .filter(|(_, answer)| answer.touching)
-        .filter_map(|(hip, answer)| truth::judge(grid, hip, answer));
+        .filter_map(|(hip, answer)| oracle::judge(grid, hip, answer));
     Error::of(&verdicts.collect::<Vec<_>>())
 }
 

@@ -2,17 +2,17 @@
 //! terrain, under the same HIP, in the same run.
 //!
 //! - [`grid`] and [`path`]: the terrains and the paths of the HIP;
-//! - [`haptics`]: what every variant is asked and answers;
-//! - [`product`]: our own rules;
-//! - [`baseline`]: the opponents, none of which is in the product;
-//! - [`truth`]: the exact closest point in f64, which judges every answer;
+//! - [`variant`]: the interface of every compared contact rule;
+//! - [`product`]: the product's contact rule;
+//! - [`baseline`]: the compared methods, none of which is in the product;
+//! - [`oracle`]: the exact closest point in f64, against which every answer is measured;
 //! - [`compare`]: all variants on one terrain, interleaved;
-//! - [`continuity`]: how much the force changes from one tick to the next;
-//! - [`effects`]: what friction, shading, texture and damping cost, and how exact they are;
+//! - [`continuity`]: the change of the force from one tick to the next;
+//! - [`effects`]: cost and error of friction, shading, texture and damping;
 //! - [`solver`]: one patch, and the square root, alone;
-//! - [`state`]: what a tick can be doing, for counting instructions;
+//! - [`tick_states`]: states of a tick, for counting instructions;
 //! - [`streaming`]: terrain larger than memory and farther than the disk;
-//! - [`stability`]: how stiff a surface may be, by trials on a virtual arm;
+//! - [`stability`]: the largest stable stiffness, by trials on a virtual arm;
 //! - [`report`]: the table, the CSV file, the picture;
 //! - [`cli`]: the command `hapterra-lab`.
 
@@ -25,13 +25,13 @@ pub mod compare;
 pub mod continuity;
 pub mod effects;
 pub mod grid;
-pub mod haptics;
+pub mod oracle;
 pub mod path;
 pub mod product;
 pub mod report;
 pub mod solver;
 pub mod stability;
-pub mod state;
 mod stats;
 pub mod streaming;
-pub mod truth;
+pub mod tick_states;
+pub mod variant;

@@ -1,7 +1,7 @@
 //! The paths of the HIP: seeded, and placed by the surface they are over.
 
 use crate::grid::Grid;
-use crate::haptics::Hip;
+use crate::variant::Hip;
 
 /// A HIP's way over one terrain.
 #[derive(Clone, Debug)]
@@ -85,9 +85,9 @@ pub fn random(grid: &Grid, ticks: usize) -> Path {
     let mut height = 0.5;
     let mut hips = vec![over(grid, walk.at, height)];
     hips.extend((0..ticks).map(|_| {
-        walk.heading = walk.dice.between(0.0, std::f64::consts::TAU);
-        let step = walk.dice.between(0.0, 0.3);
-        height += walk.dice.between(-0.3, 0.3);
+        walk.heading = walk.random.between(0.0, std::f64::consts::TAU);
+        let step = walk.random.between(0.0, 0.3);
+        height += walk.random.between(-0.3, 0.3);
         // Back from 1 cell above or below.
         height -= 2.0 * (height - height.clamp(-1.0, 1.0));
         over(grid, walk.on(grid, step), height)
@@ -143,16 +143,16 @@ pub fn sweeps(grid: &Grid, name: &'static str, length: f64, ticks: usize) -> Opt
     }
     let ways = (2e5 / length) as usize;
     let ways = ways.min(ticks / (2 * THERE_AND_BACK)).max(4);
-    let mut dice = Dice(16);
+    let mut random = Random(16);
     let sky = f64::from(grid.top()) + 2.0;
     let mut hips = Vec::new();
     for _ in 0..ways {
         let (from, to) = loop {
             let from = [
-                dice.between(MARGIN, width - MARGIN),
-                dice.between(MARGIN, height - MARGIN),
+                random.between(MARGIN, width - MARGIN),
+                random.between(MARGIN, height - MARGIN),
             ];
-            let angle = dice.between(0.0, std::f64::consts::TAU);
+            let angle = random.between(0.0, std::f64::consts::TAU);
             let to = [
                 from[0] + length * angle.cos(),
                 from[1] + length * angle.sin(),
@@ -208,24 +208,27 @@ fn inside(grid: &Grid, [x, y]: [f64; 2]) -> bool {
 
 /// A walk that turns slowly and stays inside the field.
 struct Walk {
-    dice: Dice,
+    random: Random,
     at: [f64; 2],
     heading: f64,
 }
 
 impl Walk {
     fn new(grid: &Grid, seed: u64) -> Self {
-        let mut dice = Dice(seed);
-        let part = |dice: &mut Dice, side: usize| side as f64 * dice.between(0.3, 0.7);
+        let mut random = Random(seed);
+        let part = |random: &mut Random, side: usize| side as f64 * random.between(0.3, 0.7);
         Self {
-            at: [part(&mut dice, grid.columns), part(&mut dice, grid.rows)],
-            heading: dice.between(0.0, std::f64::consts::TAU),
-            dice,
+            at: [
+                part(&mut random, grid.columns),
+                part(&mut random, grid.rows),
+            ],
+            heading: random.between(0.0, std::f64::consts::TAU),
+            random,
         }
     }
 
     fn on(&mut self, grid: &Grid, step: f64) -> [f64; 2] {
-        self.heading += self.dice.between(-0.05, 0.05);
+        self.heading += self.random.between(-0.05, 0.05);
         let next = [
             self.at[0] + step * self.heading.cos(),
             self.at[1] + step * self.heading.sin(),
@@ -240,12 +243,12 @@ impl Walk {
 }
 
 /// A small seeded generator, the same everywhere (xorshift64*).
-pub struct Dice(
+pub struct Random(
     /// Its state; any number but zero.
     pub u64,
 );
 
-impl Dice {
+impl Random {
     /// In `[low, high)`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0 ^= self.0 >> 12;

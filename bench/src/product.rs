@@ -4,7 +4,7 @@ use hapterra_core::contact::{Contact, ContactSettings, ContactState};
 use hapterra_core::terrain::{FieldSize, TILE_CELLS, Tile, TileKey, Window};
 
 use crate::grid::Grid;
-use crate::haptics::{Answer, Haptics, Hip};
+use crate::variant::{Answer, Haptics, Hip};
 
 /// Tiles along the window's side: enough for [`crate::grid::MAX_SIDE`], so
 /// that no variant ever waits for terrain.

@@ -11,9 +11,9 @@ use crate::baseline::newton;
 use crate::clock::Stopwatch;
 use crate::compare::{Effort, Error, Family, Label, Row};
 use crate::grid::Grid;
-use crate::path::Dice;
+use crate::oracle::{self, Verdict};
+use crate::path::Random;
 use crate::stats::{interleave, timing};
-use crate::truth::{self, Verdict};
 
 /// Patches, or rays, in one measurement.
 const CASES: usize = 2000;
@@ -30,21 +30,21 @@ struct Case {
 }
 
 impl Case {
-    fn random(dice: &mut Dice, slope: f64) -> Self {
-        let corners: [f32; 4] = std::array::from_fn(|_| dice.between(0.0, slope) as f32);
+    fn random(random: &mut Random, slope: f64) -> Self {
+        let corners: [f32; 4] = std::array::from_fn(|_| random.between(0.0, slope) as f32);
         let grid = Grid::from_fn("patch", [1, 1], |x, y| corners[2 * y + x]);
-        let (x, y) = (dice.between(0.0, 1.0), dice.between(0.0, 1.0));
+        let (x, y) = (random.between(0.0, 1.0), random.between(0.0, 1.0));
         // Depths from 0.01 to 1 cell.
-        let depth = 10_f64.powf(dice.between(-2.0, 0.0));
+        let depth = 10_f64.powf(random.between(-2.0, 0.0));
         let single = |x: f64| f64::from(x as f32);
         let hip = [single(x), single(y), single(grid.height(x, y) - depth)];
-        let turn = dice.between(0.0, std::f64::consts::TAU);
+        let turn = random.between(0.0, std::f64::consts::TAU);
         let before = [
             hip[0] + 0.01 * turn.cos(),
             hip[1] + 0.01 * turn.sin(),
             hip[2],
         ];
-        let last = truth::closest(&grid, &before, [x, y]).unwrap_or(hip);
+        let last = oracle::closest(&grid, &before, [x, y]).unwrap_or(hip);
         Self {
             corners,
             hip,
@@ -75,7 +75,7 @@ impl Case {
         // The upper borders belong to this patch: there is no other.
         let inside = |x: f64| x.clamp(0.0, 1.0 - f64::EPSILON);
         let from = [inside(u), inside(v)];
-        let exact = truth::closest(&self.grid, &self.hip, from)?;
+        let exact = oracle::closest(&self.grid, &self.hip, from)?;
         let displacement = [
             u - self.hip[0],
             v - self.hip[1],
@@ -84,8 +84,8 @@ impl Case {
         let force = [0, 1, 2].map(|i| exact[i] - self.hip[i]);
         let off = [0, 1, 2].map(|i| displacement[i] - force[i]);
         Some(Verdict {
-            error: truth::length(&off),
-            angle: truth::angle(&displacement, &force),
+            error: oracle::length(&off),
+            angle: oracle::angle(&displacement, &force),
         })
     }
 }
@@ -123,8 +123,10 @@ const SOLVERS: [Solver<Case, (f64, f64)>; 11] = [
 #[must_use]
 pub fn patches(effort: Effort) -> Vec<Row> {
     let rows = |slope: f64| {
-        let mut dice = Dice(21);
-        let cases: Vec<Case> = (0..CASES).map(|_| Case::random(&mut dice, slope)).collect();
+        let mut random = Random(21);
+        let cases: Vec<Case> = (0..CASES)
+            .map(|_| Case::random(&mut random, slope))
+            .collect();
         let terrain = format!("one patch, slope {slope}");
         let (first, rest) = cases.split_at(effort.judged.min(CASES));
         measure(
@@ -205,10 +207,10 @@ const ROOTS: [Solver<Gap, f32>; 3] = [
 /// The ray's quadratic, by square root. Errors are in parts of the ray.
 #[must_use]
 pub fn roots(effort: Effort) -> Vec<Row> {
-    let mut dice = Dice(22);
+    let mut random = Random(22);
     let mut gap = || {
-        let middle = dice.between(-1.0, 1.0);
-        [-dice.between(0.0, 1.0), middle, dice.between(0.0, 1.0)].map(|x| x as f32)
+        let middle = random.between(-1.0, 1.0);
+        [-random.between(0.0, 1.0), middle, random.between(0.0, 1.0)].map(|x| x as f32)
     };
     let gaps: Vec<Gap> = (0..CASES).map(|_| gap()).collect();
     let judge = |gap: &Gap, found: f32| {

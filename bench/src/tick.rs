@@ -7,9 +7,9 @@
 use std::hint::black_box;
 use std::process::ExitCode;
 
-use hapterra_lab::haptics::{Answer, Haptics, Hip};
 use hapterra_lab::product::{self, Product};
-use hapterra_lab::state::{STATES, terrain};
+use hapterra_lab::tick_states::{STATES, terrain};
+use hapterra_lab::variant::{Answer, Haptics, Hip};
 
 /// Tiles along the window's side, as on a device.
 const SIDE: usize = 8;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hapterra_lab::compare::Effort;
 use hapterra_lab::effects::{Effect, Error, errors, measure};
-use hapterra_lab::{report, state};
+use hapterra_lab::{report, tick_states};
 
 /// A kept figure may be off by this share of itself, or of what it may be: four digits are kept, and
 /// machines round sines differently.
@@ -28,7 +28,7 @@ fn number(text: &str) -> f64 {
 #[test]
 fn the_kept_errors_are_those_of_the_code_as_it_is() {
     let kept = kept();
-    let measured = errors(&state::terrain(), Effort::FULL).expect("in reach");
+    let measured = errors(&tick_states::terrain(), Effort::FULL).expect("in reach");
     let count = kept.iter().filter(|row| &row[3] != "tick").count();
     assert_eq!(
         count,
@@ -70,7 +70,7 @@ fn the_kept_errors_are_below_what_they_may_be() {
 
 #[test]
 fn what_is_written_has_every_row_of_the_table() {
-    let grid = state::terrain();
+    let grid = tick_states::terrain();
     let effort = Effort {
         ticks: 400,
         rounds: 1,

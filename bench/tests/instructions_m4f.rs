@@ -10,7 +10,7 @@
 #[allow(dead_code)] // The cycles use others of them.
 mod m4f;
 
-use hapterra_tests::counting::CountingBoard;
+use hapterra_tests::instruction_counter::CountingBoard;
 use m4f::table::{Row, Table};
 use m4f::{chain, contact, soak, tiles};
 

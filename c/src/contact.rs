@@ -7,7 +7,7 @@ use hapterra_touch::{Contact, State, Step};
 
 use crate::border::{array, caught, room};
 use crate::status::{Failure, HapterraStatus, Message};
-use crate::surface::{HapterraSurface, surface};
+use crate::surface_params::{HapterraSurface, surface};
 use crate::terrain::HapterraTerrain;
 
 /// The state of a proxy.

@@ -8,7 +8,7 @@ mod border;
 pub mod contact;
 pub mod memory;
 pub mod status;
-pub mod surface;
+pub mod surface_params;
 pub mod terrain;
 
 #[cfg(test)]

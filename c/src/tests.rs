@@ -7,7 +7,9 @@ use hapterra_touch::{Contact, RowOrder, Surface, Terrain};
 use crate::contact::{
     HapterraStep, hapterra_contact_begin, hapterra_contact_new, hapterra_contact_run,
 };
-use crate::surface::{HapterraShading, HapterraSurface, HapterraTexture, hapterra_surface_default};
+use crate::surface_params::{
+    HapterraShading, HapterraSurface, HapterraTexture, hapterra_surface_default,
+};
 use crate::terrain::{hapterra_terrain_new, hapterra_terrain_set_f64, hapterra_terrain_set_tip};
 
 /// All of it that can differ from the defaults.

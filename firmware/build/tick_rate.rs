@@ -16,7 +16,7 @@ pub(crate) const FASTEST_HZ: [(&str, u32); 3] = [
 /// what `HAPTERRA_TICK_HZ` says, or 1,000.
 ///
 /// # Errors
-/// What to say of a value that the board cannot have.
+/// A message about a value that the board cannot have.
 pub(crate) fn tick_hz(
     chosen: Option<&str>,
     board: &str,

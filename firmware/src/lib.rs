@@ -27,7 +27,7 @@
 //! | [`store`] | the calibration record in flash |
 //! | [`crash`] | how a program ended, kept over the reset |
 //! | [`motor_memory`] | how warm the motors are, kept over the reset |
-//! | `press` | the press of the dead-man switch without which nothing is stored |
+//! | `dead_man_press` | the press of the dead-man switch that a stored record needs |
 //! | [`native`] | the same application as a value in a host program |
 //!
 //! The images are in `boards/`.
@@ -72,6 +72,7 @@ pub mod amplifier;
 pub mod app;
 pub mod board;
 pub mod crash;
+mod dead_man_press;
 pub mod encoder;
 pub mod haptic_loop;
 pub mod led;
@@ -79,7 +80,6 @@ pub mod link;
 pub mod monitor;
 pub mod motor_memory;
 pub mod native;
-mod press;
 mod queues;
 pub mod store;
 pub mod usb;

@@ -2,10 +2,10 @@
 
 use std::ffi::{c_int, c_void};
 
-use crate::calls::Call;
 use crate::error::Error;
 use crate::functions::Handle;
 use crate::loaded::Loaded;
+use crate::pending_calls::Call;
 use crate::text::from_c;
 
 /// `GF_Read`.

@@ -138,7 +138,7 @@ impl Dataset {
     }
 
     /// Returns why a file that GDAL reads through its caller could not be read, since the last call.
-    /// What GDAL gives then may lack it, also where it says nothing.
+    /// The samples that GDAL returns may then be incomplete, even without an error of its own.
     #[must_use]
     pub fn take_fault(&self) -> Option<std::io::Error> {
         self.files.as_ref()?.take_fault()

@@ -21,7 +21,7 @@ pub trait FileSystem: Send + Sync {
     /// The last parts of the names of files that lie beside one and belong to it.
     ///
     /// # Errors
-    /// Why it is not known.
+    /// The reason for which it is not known.
     fn beside(&self, name: &str) -> io::Result<Vec<String>>;
 
     /// Beginnings of absolute names, as `https://host/`, by which a VRT may name these files. One
@@ -37,6 +37,6 @@ pub trait ReadAt: Send {
     /// Bytes at a place, all of them inside the file.
     ///
     /// # Errors
-    /// Why they cannot be read.
+    /// The reason for which they cannot be read.
     fn read_at(&self, at: u64, count: usize) -> io::Result<Vec<u8>>;
 }

@@ -28,18 +28,18 @@
 
 mod axes;
 mod band;
-mod beforehand;
 mod callbacks;
-mod calls;
 mod dataset;
 mod error;
 mod file_system;
 mod functions;
-mod in_time;
 mod library;
 mod loaded;
 mod mount;
 mod mrf;
+mod open_timeout;
+mod path_check;
+mod pending_calls;
 mod settings;
 mod srs;
 mod text;
@@ -50,12 +50,12 @@ mod xml;
 
 pub use axes::Axis;
 pub use band::{Band, Mask, Sample, SampleType, Window};
-pub use calls::exit_if_stuck;
 pub use dataset::{Dataset, Subdataset};
 pub use error::Error;
 pub use file_system::{FileSystem, ReadAt};
 pub use library::{Driver, Library};
 pub use mount::Mount;
+pub use pending_calls::exit_if_stuck;
 pub use settings::Settings;
 pub use srs::{AxisUnit, SpatialReference};
 pub use version::Version;

@@ -13,7 +13,7 @@ use crate::settings::Settings;
 use crate::srs::SpatialReference;
 use crate::text::from_c;
 use crate::version::Version;
-use crate::{beforehand, callbacks, in_time};
+use crate::{callbacks, open_timeout, path_check};
 
 /// A driver of GDAL's that reads rasters.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,8 +88,8 @@ impl Library {
     /// [`Error::Refused`] in GDAL's words, [`Error::NotOpened`], [`Error::OpenOption`],
     /// [`Error::Slow`], [`Error::ZeroByte`].
     pub fn open(&self, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
-        beforehand::check(&self.loaded, path)?;
-        in_time::open(&self.loaded, path, options)
+        path_check::check(&self.loaded, path)?;
+        open_timeout::open(&self.loaded, path, options)
     }
 
     /// Has GDAL read files through their caller.
@@ -124,7 +124,7 @@ impl Library {
     /// # Errors
     /// As [`open`](Self::open), but nothing is looked at before.
     pub fn open_part(&self, name: &str, options: &[&str]) -> Result<Dataset, Error> {
-        let dataset = in_time::open(&self.loaded, Path::new(name), options)?;
+        let dataset = open_timeout::open(&self.loaded, Path::new(name), options)?;
         // One on disk is looked into; here, it may name pipes, devices and addresses.
         let is_in_archive = name.starts_with("/vsi") && !name.starts_with(PREFIX);
         match is_in_archive && dataset.driver() == "VRT" {

@@ -93,7 +93,7 @@ impl Text {
     /// Checks that it names nothing that is elsewhere, for a VRT on disk.
     ///
     /// # Errors
-    /// What it names, and what to do.
+    /// The named file, and what to do.
     pub(crate) fn check_here(&self) -> Result<(), String> {
         let shown = self.shown();
         let is_refused = |part: &str| REFUSED.iter().any(|refused| part.starts_with(refused));
@@ -112,7 +112,7 @@ impl Text {
     /// of a text that is no name.
     ///
     /// # Errors
-    /// What else it names, and what to do.
+    /// The other named file, and what to do.
     pub(crate) fn at_server(&self, root: &str) -> Result<Option<&str>, String> {
         let value = self.value.as_str();
         if value.starts_with(root) {

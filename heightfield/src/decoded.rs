@@ -4,13 +4,13 @@ use std::cell::RefCell;
 
 use super::blocks::Survey;
 use super::crs::{ReferenceSystem, Vertical};
-use super::doubtful::{MAX_HEIGHT, Outermost};
 use super::file_layout::FileLayout;
 use super::geometry::{CellSize, metres_in, unknown_unit};
 use super::height_summary::HeightSummary;
 use super::place::Place;
 use super::samples::{SampleValue, with_samples};
 use super::storage::Storage;
+use super::suspicious_values::{MAX_HEIGHT, Outermost};
 use super::{Certainty, RasterError, VerticalDatum};
 
 /// Result of a decoder: samples in file order and all that the file says

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::options::Encoding;
+use crate::printable_text::printable;
 use crate::remote::{is_lost, is_missing, is_outage, without_key};
-use crate::shown::shown;
 
 /// A file that could not be opened as a height field: what is wrong with which file.
 #[derive(Debug, thiserror::Error)]
-#[error("{}", shown(&format!("{fault} ({})", without_key(path))))]
+#[error("{}", printable(&format!("{fault} ({})", without_key(path))))]
 pub struct Error {
     path: PathBuf,
     fault: RasterError,

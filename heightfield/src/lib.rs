@@ -47,8 +47,8 @@ pub mod bilinear;
 mod blocks;
 mod crs;
 mod decoded;
+mod decoder_panic;
 pub mod disk_cache;
-mod doubtful;
 mod encoding;
 mod error;
 mod file_layout;
@@ -59,7 +59,6 @@ mod geometry;
 mod georeference;
 mod globe;
 mod ground_map;
-mod guard;
 mod height_summary;
 mod input;
 mod mosaic;
@@ -69,17 +68,18 @@ mod open;
 mod options;
 mod place;
 mod placed;
-mod plain;
+pub mod printable_text;
+mod raw_samples;
 mod read;
 mod read_status;
 pub mod regular_file;
 mod remote;
 mod samples;
-pub mod shown;
 mod storage;
+mod subsampled;
+mod suspicious_values;
 mod tangents;
-mod thinned;
-mod unread;
+mod unreadable_parts;
 mod xml;
 
 // What the tests of all crates wait with, of which each uses its part.
@@ -91,7 +91,6 @@ mod timeouts;
 use std::path::{Path, PathBuf};
 
 pub use crs::{LonLat, ReferenceSystem};
-pub use doubtful::MAX_HEIGHT;
 pub use error::{Error, RasterError};
 pub use file_layout::{FileLayout, SamplesAre};
 pub use fill::Fill;
@@ -107,6 +106,7 @@ pub use options::{Encoding, OpenOptions, PngChannel, RawLayout};
 pub use read_status::{ReadStatus, ReadTracker, Wait};
 pub use remote::{RemoteFetcher, file_name, is_url, without_key};
 pub use samples::{Endian, SampleType, Samples};
+pub use suspicious_values::MAX_HEIGHT;
 
 use blocks::{Blocks, Survey};
 use decoded::Decoded;
@@ -117,7 +117,7 @@ use storage::Storage;
 /// The libgdal of this machine, which reads what nothing here does; it is loaded the first time.
 ///
 /// # Errors
-/// Why there is none that can be used.
+/// The reason for which none can be used.
 pub fn gdal() -> Result<heightfield_gdal::Library, heightfield_gdal::Error> {
     heightfield_gdal::Library::load(heightfield_gdal::Settings::default())
 }
@@ -158,7 +158,7 @@ impl Raster {
     /// extension.
     ///
     /// # Errors
-    /// What is wrong with which file; never a panic, and never an allocation
+    /// The file and its fault; never a panic, and never an allocation
     /// that the file's own size does not justify.
     pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Self, Error> {
         Self::opened(path.as_ref(), options, open::decode)

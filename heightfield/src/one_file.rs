@@ -1,9 +1,9 @@
 //! From one file to decoded samples: tells the format, decodes.
 
 use super::beside::{Notes, remark_unread};
+use super::decoder_panic::guarded;
 use super::format::{Claim, Format};
-use super::formats::{FORMATS, gdal, headered, raw};
-use super::guard::guarded;
+use super::formats::{FORMATS, flt_bil, gdal, raw};
 use super::input::FileBytes;
 use super::{Decoded, OpenOptions, RasterError};
 
@@ -54,8 +54,8 @@ fn decode_here(
         return decode_as(format, input, options);
     }
     // A header beside a file tells more than the file's extension.
-    if !headered::is_of_another_kind(head)
-        && let Some(decoded) = guarded("raw", || headered::decode_by_header(input, options))?
+    if !flt_bil::is_of_another_kind(head)
+        && let Some(decoded) = guarded("raw", || flt_bil::decode_by_header(input, options))?
     {
         check_no_open_options("plain samples with a header", options)?;
         return Ok(decoded);

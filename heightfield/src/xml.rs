@@ -29,7 +29,7 @@ impl Element {
 /// itself last.
 ///
 /// # Errors
-/// What is no XML that is read here.
+/// The part that is no XML or not supported here.
 pub(super) fn for_each(text: &str, mut visit: impl FnMut(&[Element])) -> Result<(), String> {
     let mut reader = Reader::from_str(text);
     let mut open: Vec<Element> = Vec::new();

@@ -6,7 +6,7 @@
 //! - [`heightfield`], a crate of its own: terrain files become one [`heightfield::Raster`];
 //! - [`synth`]: terrains made by formula, for trying and testing;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
-//! - [`surface`]: surfaces with a name, and their tables;
+//! - [`named_surfaces`]: surfaces that an option can name;
 //! - [`materials`]: classes of ground over a terrain, each with its surface;
 //! - [`link`]: the terrain served to a device, tile by tile;
 //! - [`serving`]: that session from its first line to an end that is known;
@@ -30,7 +30,7 @@
 
 // Before all others: its macros hold from here on.
 #[macro_use]
-mod say;
+mod print_macros;
 // What the tests of all crates wait with, of which each uses its part.
 #[cfg(test)]
 #[path = "../../tests/src/timeouts.rs"]
@@ -44,6 +44,7 @@ pub mod cli;
 pub mod events;
 pub mod link;
 pub mod materials;
+pub mod named_surfaces;
 pub mod output;
 pub mod phantom;
 pub mod picture;
@@ -53,7 +54,6 @@ pub mod replay;
 pub mod serving;
 pub mod stability;
 pub mod steering;
-pub mod surface;
 pub mod synth;
 pub mod telemetry;
 pub mod terrain;

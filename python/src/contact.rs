@@ -8,7 +8,7 @@ use pyo3::types::PyByteArray;
 use pyo3::{Bound, PyErr, PyResult, Python, pyclass, pymethods};
 
 use crate::open::Opened;
-use crate::surface::Surface;
+use crate::surface_params::Surface;
 use crate::terrain::Terrain;
 use crate::ticks::{Tick, Ticks};
 use crate::{notes, numbers, refused};

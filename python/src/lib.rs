@@ -9,7 +9,7 @@ mod contact;
 mod notes;
 mod open;
 mod recording;
-mod surface;
+mod surface_params;
 mod terrain;
 mod ticks;
 mod virtual_arm;
@@ -27,7 +27,7 @@ mod _native {
     #[pymodule_export]
     use super::recording::recording;
     #[pymodule_export]
-    use super::surface::Surface;
+    use super::surface_params::Surface;
     #[pymodule_export]
     use super::terrain::Terrain;
     #[pymodule_export]

@@ -3,36 +3,36 @@
 
 #![forbid(unsafe_code)]
 
-pub mod bounded;
 pub mod campaign;
-pub mod chance;
-pub mod conversation;
-pub mod counting;
+pub mod campaign_table;
 pub mod cycles;
+pub mod dense_search;
 pub mod emulation;
-pub mod faulty;
-pub mod field;
+pub mod faulty_links;
 pub mod figures;
 pub mod fuzzing;
-pub mod greedy;
+pub mod gdal_stand_in;
+pub mod greedy_device;
+pub mod instruction_counter;
 pub mod invariants;
 pub mod link_campaign;
-pub mod minima;
-pub mod oracle;
-pub mod readers;
+pub mod link_model;
+pub mod local_minima;
+pub mod memory_limit;
+pub mod random;
+pub mod random_paths;
+pub mod reader;
 pub mod real_ground;
-pub mod rows;
 pub mod scene;
-#[cfg(unix)]
-pub mod served;
 pub mod slow_line;
 pub mod soak;
-pub mod stand_in;
+#[cfg(unix)]
+pub mod socket_device;
 mod terrain_file;
 pub mod tiffs;
 pub mod timeouts;
 pub mod usb;
-pub mod walk;
+pub mod whole_field;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -15,7 +15,7 @@ use hapterra_firmware::app::{TileBuffers, WorkingMemory};
 use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
-use crate::link_campaign::wire::{from_host, said_by_host};
+use crate::link_campaign::frames::{from_host, said_by_host};
 use crate::timeouts::HANG;
 
 /// Tiles along the side of the window, as on the emulated board.

@@ -155,9 +155,9 @@ fn an_error_says_what_where_and_what_next() {
 }
 
 /// A seeded generator (xorshift), so that every run damages files alike.
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     fn roll(&mut self, below: usize) -> usize {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -168,19 +168,19 @@ impl Dice {
 
 /// Damages a file in one of three ways; the header, where it matters most, is hit
 /// half of the time.
-fn damage(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
+fn damage(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     let mut damaged = bytes.to_vec();
-    match dice.roll(4) {
-        0 => damaged.truncate(dice.roll(bytes.len())),
+    match random.roll(4) {
+        0 => damaged.truncate(random.roll(bytes.len())),
         kind => {
-            let reach = [bytes.len(), 512.min(bytes.len())][dice.roll(2)];
-            for _ in 0..=dice.roll(8) {
-                let place = dice.roll(reach);
-                let bit = 1 << dice.roll(8);
+            let reach = [bytes.len(), 512.min(bytes.len())][random.roll(2)];
+            for _ in 0..=random.roll(8) {
+                let place = random.roll(reach);
+                let bit = 1 << random.roll(8);
                 damaged[place] = if kind == 1 {
                     damaged[place] ^ bit
                 } else {
-                    dice.roll(256) as u8
+                    random.roll(256) as u8
                 };
             }
         }
@@ -200,7 +200,7 @@ fn damaged_copies_of_good_files_never_panic() {
     const COPIES: usize = 60;
     let tries = std::env::temp_dir().join(format!("hapterra-fuzz-{}", std::process::id()));
     std::fs::create_dir_all(&tries).expect("a folder for tries");
-    let mut dice = Dice(0x5eed_7e44_a1d0_0001);
+    let mut random = Random(0x5eed_7e44_a1d0_0001);
     let (mut copies, mut opened, mut panicked) = (0, 0, 0);
     for sub in ["variants", "tiff_ok", "real"] {
         for path in files_in(&folder.join(sub)) {
@@ -212,7 +212,7 @@ fn damaged_copies_of_good_files_never_panic() {
             let bytes = std::fs::read(&path).expect("readable");
             let copy = tries.join(path.file_name().expect("a name"));
             for _ in 0..COPIES {
-                std::fs::write(&copy, damage(&bytes, &mut dice)).expect("a copy to try");
+                std::fs::write(&copy, damage(&bytes, &mut random)).expect("a copy to try");
                 copies += 1;
                 match Raster::open(&copy, &OpenOptions::default()) {
                     Ok(_) => opened += 1,

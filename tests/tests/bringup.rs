@@ -9,7 +9,7 @@ use hapterra::bringup::{
     Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, Step,
     Stopped, Task, VirtualBench, VirtualUser, Walked, walk,
 };
-use hapterra::link::{Dialogue, Native};
+use hapterra::link::{ControlSession, Native};
 use hapterra::phantom::{PhantomModel, Wiring};
 use hapterra_core::guard::{Blockers, JOG_FAST_RAD_S, Jog};
 use hapterra_core::phantom::Calibration;
@@ -65,7 +65,7 @@ fn walked_once(
     device: Native<StoppedClock>,
     log: &mut Log,
 ) -> Result<Walked, BringupError> {
-    let opened = Dialogue::open(Box::new(device), HANG);
+    let opened = ControlSession::open(Box::new(device), HANG);
     walk(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
 }
 
@@ -85,7 +85,7 @@ fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Fi
     let mut user = VirtualUser::at(bench);
     user.says = say;
     let mut log = Log::default();
-    let opened = Dialogue::open(Box::new(user.device(record)), HANG);
+    let opened = ControlSession::open(Box::new(user.device(record)), HANG);
     let opened = opened.expect("it answers");
     _ = log.meet(Identity::of(opened.device(), Some(&record)));
     for step in Step::ALL.into_iter().filter(|step| *step < from) {
@@ -493,9 +493,9 @@ fn a_motor_that_does_not_push_is_named() {
 #[test]
 fn a_jog_beyond_its_bounds_is_refused() {
     let user = VirtualUser::new(Wiring::RIGHT);
-    let opened = Dialogue::open(Box::new(user.device(RECORD)), HANG);
-    let mut dialogue = opened.expect("it answers");
-    let mut ask = |request| dialogue.request(&request).expect("it answers");
+    let opened = ControlSession::open(Box::new(user.device(RECORD)), HANG);
+    let mut control = opened.expect("it answers");
+    let mut ask = |request| control.request(&request).expect("it answers");
     let jog = |axis, current_a, hold_ms| {
         Request::Jog(Jog {
             axis,

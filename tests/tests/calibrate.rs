@@ -2,7 +2,7 @@
 //! from the preset, over the real link.
 
 use hapterra::calibrate::{Attendant, Plan, Review, VirtualUser, walk};
-use hapterra::link::{Dialogue, HostClock, LinkError, Native};
+use hapterra::link::{ControlSession, HostClock, LinkError, Native};
 use hapterra::phantom::STANDARD_GRAVITY;
 use hapterra_core::phantom::Calibration;
 use hapterra_tests::timeouts::HANG;
@@ -14,19 +14,19 @@ fn calibrated(user: &mut VirtualUser) -> Review {
     let device = Native::new(HostClock::default(), None)
         .meddled_with(user.hands())
         .restless();
-    let opened = Dialogue::open(Box::new(device), HANG);
-    let mut dialogue = opened.expect("it answers");
+    let opened = ControlSession::open(Box::new(device), HANG);
+    let mut control = opened.expect("it answers");
     let plan = Plan {
         ratios: true,
         gravity: true,
     };
     let mut counts =
-        || -> Result<[i32; 3], LinkError> { Ok(dialogue.fresh_status()?.health.sense.counts) };
+        || -> Result<[i32; 3], LinkError> { Ok(control.fresh_status()?.health.sense.counts) };
     let review = walk(&Calibration::PREMIUM_1_5, plan, user, &mut counts).expect("a record");
-    let stored = dialogue.store(review.after).expect("it answers");
+    let stored = control.store(review.after).expect("it answers");
     assert_eq!(stored, Ok(()));
     assert_eq!(
-        dialogue.calibration().expect("it answers"),
+        control.calibration().expect("it answers"),
         Some(review.after)
     );
     review

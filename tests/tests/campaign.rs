@@ -1,7 +1,7 @@
 //! A short stretch of the closed-loop campaign, and whether the report that is
 //! kept is whole.
 
-use hapterra_tests::campaign::kind::Kind;
+use hapterra_tests::campaign::fault_kind::Kind;
 use hapterra_tests::campaign::{SEED, report, run};
 use hapterra_tests::repository;
 

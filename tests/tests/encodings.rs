@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hapterra_tests::readers::Reader;
+use hapterra_tests::reader::Reader;
 use heightfield::{OpenOptions, Raster, RasterError};
 
 const HOLE: (u32, u32) = (3, 4);

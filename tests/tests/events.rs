@@ -11,7 +11,7 @@ use std::thread::{JoinHandle, spawn};
 use hapterra::replay::Trajectory;
 use hapterra::synth::Kind;
 use hapterra_core::wire::session::SessionEnd;
-use hapterra_tests::served::Served;
+use hapterra_tests::socket_device::SocketDevice;
 use hapterra_tests::timeouts::next;
 use hapterra_tests::{hapterra_binary, repository, terrain_file};
 use serde_json::Value;
@@ -420,7 +420,7 @@ fn run_ends_disarmed_when_its_input_ends() {
 fn enter_answers_the_question_of_its_number() {
     let folder = tempfile::tempdir().expect("a folder");
     let hills = hills_in(folder.path(), 64);
-    let served = Served::start();
+    let served = SocketDevice::start();
     let device = format!("tcp:{}", served.address);
     let words = ["run", text(&hills), "--device", &device, "--unchecked"];
     let mut run = Telling::start(

@@ -7,10 +7,10 @@ use hapterra_core::force::SurfaceParams;
 use hapterra_core::rate::TickRate;
 use hapterra_core::scene::TickRecord;
 use hapterra_core::terrain::{FieldSize, TileArena};
-use hapterra_tests::chance::Chance;
-use hapterra_tests::field::{point, position};
 use hapterra_tests::invariants::surface::distance;
+use hapterra_tests::random::Random;
 use hapterra_tests::real_ground::{self, terrain};
+use hapterra_tests::whole_field::{point, position};
 use heightfield::Raster;
 
 fn params(friction: Friction) -> SurfaceParams {
@@ -155,7 +155,7 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
         Raster::from_fn(64, 64, |x, y| ((x * 7 + y * 3) % 11) as f32 * 0.03).expect("made");
     let terrain = terrain(&raster);
     let params = params(Friction::coulomb(0.8));
-    let mut chance = Chance::new(5);
+    let mut random = Random::new(5);
     // Inside a patch, on an edge, on a vertex.
     for at in [[20.3, 30.6], [25.0, 30.4], [41.0, 17.0]] {
         let mut replayer = on_native(&terrain, params).expect("opened");
@@ -168,7 +168,7 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
         let _ = step([0.0, 0.0, 0.5]);
         let stuck = step([0.0, 0.0, -1.0]).proxy;
         for tick in 0..3_600_000 {
-            let mut count = || 0.03 * (chance.below(3) as f64 - 1.0);
+            let mut count = || 0.03 * (random.below(3) as f64 - 1.0);
             let now = step([count(), count(), -1.0 + count()]).proxy;
             assert_eq!(now, stuck, "tick {tick} at {at:?}");
         }

@@ -18,7 +18,7 @@ use hapterra_core::wire::status::{BootReport, Crash, CrashKind, ResetCause};
 use hapterra_firmware::native::StoppedClock;
 use hapterra_firmware::store::Stored;
 use hapterra_tests::hapterra_binary;
-use hapterra_tests::link_campaign::wire;
+use hapterra_tests::link_campaign::frames;
 
 /// Requests for tiles that there are not, after each message of samples.
 const REQUESTS: i32 = 200;
@@ -59,7 +59,7 @@ fn rename(hello: &mut DeviceHello) {
 /// Returns the substitute for a frame of the device.
 fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let mut has_samples = false;
-    let said = wire::changed(frame, |message| match message {
+    let said = frames::changed(frame, |message| match message {
         ToHost::Hello(hello) => rename(hello),
         ToHost::Status { status, .. } => rename(&mut status.device),
         ToHost::SceneAck { epoch: taken, .. } => *epoch = *taken,
@@ -70,7 +70,7 @@ fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     if has_samples {
         for column in 0..REQUESTS {
             let key = TileKey::new(9, i32::MAX - column, i32::MIN);
-            let request = wire::changed(frame, |message| {
+            let request = frames::changed(frame, |message| {
                 *message = ToHost::TileRequest { epoch: *epoch, key };
             });
             said.extend(request.expect("the device's own"));

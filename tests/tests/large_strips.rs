@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
-use hapterra_tests::bounded::{self, zstd_bomb};
+use hapterra_tests::memory_limit::{self, zstd_bomb};
 use hapterra_tests::tiffs::{DATA, Directory, Values, floats_in_a_strip, placed, tiff};
 use heightfield::disk_cache::DiskCache;
 use heightfield::{OpenOptions, Raster};
@@ -170,7 +170,7 @@ fn a_packed_strip_is_felt_in_the_memory_of_a_terrain() {
         std::fs::write(&path, tiff(packed, &[image(packed.len())])).expect("written");
     };
     let info = |options: &[&str]| {
-        let output = bounded::info(&path, options);
+        let output = memory_limit::info(&path, options);
         let told = [output.stdout, output.stderr].concat();
         (
             output.status.code(),
@@ -252,7 +252,7 @@ fn of_an_overview_that_ends_early_the_rows_that_are_there_are_felt() {
 #[test]
 fn a_strip_of_4_gb_is_felt_in_the_memory_of_a_terrain() {
     let (_folder, path) = file();
-    let output = bounded::info(&path, &[]);
+    let output = memory_limit::info(&path, &[]);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
     assert!(!told.contains("whole"), "{told}");
@@ -280,7 +280,7 @@ fn a_file_of_nothing_is_looked_through_and_it_says_so() {
         .expect("there");
     file.set_len(u64::from(FIRST) + u64::from(WIDE * WIDE) * 4)
         .expect("a sparse file");
-    let output = bounded::info(&path, &["--input", "no-data=0"]);
+    let output = memory_limit::info(&path, &["--input", "no-data=0"]);
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{told}");
     let search = told.find("32 places of").expect("it says that it searches");
@@ -288,7 +288,7 @@ fn a_file_of_nothing_is_looked_through_and_it_says_so() {
     assert!(search < end, "{told}");
     assert!(told.contains("all 144000000 samples"), "{told}");
     // Where zeros are heights, the first places have some.
-    let output = bounded::info(&path, &[]);
+    let output = memory_limit::info(&path, &[]);
     assert!(output.status.success());
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(!told.contains("places of"), "nothing is to be searched for");
@@ -326,7 +326,7 @@ fn four_million_tiles_are_felt_in_the_memory_of_a_terrain() {
             .expect("there");
         file.set_len(u64::from(ACROSS * TILE).pow(2))
             .expect("a sparse file");
-        let output = bounded::info_without_gdal(&path, &[]);
+        let output = memory_limit::info_without_gdal(&path, &[]);
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         (output.status.code(), told)
     };

@@ -22,9 +22,9 @@ use hapterra_core::wire::message::ToHost;
 use hapterra_core::wire::session::InSession;
 use hapterra_core::wire::version::VersionCheck;
 use hapterra_firmware::native::StoppedClock;
-use hapterra_tests::faulty::{Fault, Faulty, Shared};
+use hapterra_tests::faulty_links::{Fault, Faulty, Shared};
+use hapterra_tests::random_paths::wander;
 use hapterra_tests::timeouts::HANG;
-use hapterra_tests::walk::wander;
 use heightfield::Raster;
 
 /// A device in memory answers at once: what has not come in a moment is lost.

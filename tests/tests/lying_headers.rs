@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hapterra_tests::bounded::{self, zstd_bomb};
+use hapterra_tests::memory_limit::{self, zstd_bomb};
 use hapterra_tests::tiffs::{DATA, Directory, Values, placed, tiff};
 use heightfield::{OpenOptions, Raster};
 
@@ -88,7 +88,7 @@ fn open(path: &Path) -> Raster {
 /// It ends, within the memory, in an error that says what, where and what next, or without.
 fn ends_well(what: &str, path: &Path, more: &[&str]) -> (bool, String) {
     let options = [&["--input", "in-memory=0MB"], more].concat();
-    let output = bounded::info(path, &options);
+    let output = memory_limit::info(path, &options);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     println!("{what}: {:?} {told}", output.status.code());
     match output.status.code() {

@@ -14,7 +14,7 @@ use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::{Material, Pattern, Shading, SurfaceParams, Texture};
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
-use hapterra_tests::walk::wander;
+use hapterra_tests::random_paths::wander;
 use heightfield::Raster;
 
 const UTM_32: &str = r#"PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]"#;

@@ -1,12 +1,12 @@
 //! Many files as one terrain, judged by GDAL: what it makes one file of with `gdalwarp`, or
 //! with `gdal_translate` of a VRT, has the same samples as the folder, the pattern and the VRT,
 //! which is read through libgdal.
-//! Where GDAL's programs are not installed this says so and is skipped.
+//! Without GDAL's programs it is skipped, with a message.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use hapterra_tests::{bounded, hapterra_binary};
+use hapterra_tests::{hapterra_binary, memory_limit};
 use heightfield::{OpenOptions, Raster, Wait, files_read_with, gdal};
 
 fn has_gdal() -> bool {
@@ -474,7 +474,7 @@ fn malformed_vrts_end_in_bounded_memory() {
         files.push(path);
     }
     for path in files {
-        let output = bounded::info(&path, &[]);
+        let output = memory_limit::info(&path, &[]);
         let told = told(&output);
         match output.status.code() {
             Some(0) => {}

@@ -14,8 +14,8 @@ use hapterra_core::force::{Pattern, Shading, SurfaceParams, Texture};
 use hapterra_core::scene::TickRecord;
 use hapterra_tests::emulation::emulated_board;
 use hapterra_tests::hapterra_binary;
+use hapterra_tests::random_paths::wander;
 use hapterra_tests::timeouts::pass;
-use hapterra_tests::walk::wander;
 use heightfield::Raster;
 
 /// The compared part of an answer: all but the work and the time it took, which depend on when a

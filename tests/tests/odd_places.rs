@@ -8,7 +8,7 @@ use std::process::Command;
 
 use hapterra::place::{Coordinates, Target};
 use hapterra::terrain::{HapticCells, HapticGrid};
-use hapterra_tests::readers::Reader;
+use hapterra_tests::reader::Reader;
 use hapterra_tests::{hapterra_binary, info};
 use heightfield::{OpenOptions, Raster};
 

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hapterra_tests::{bounded, hapterra_binary, stand_in};
+use hapterra_tests::{gdal_stand_in, hapterra_binary, memory_limit};
 use heightfield::{OpenOptions, Raster, RasterError, files_read_with, gdal};
 
 /// Returns true if there is a libgdal; says so where not.
@@ -325,7 +325,7 @@ fn formats_are_named_where_there_is_no_libgdal() {
     ] {
         let path = at.join(name);
         std::fs::write(&path, head).expect("written");
-        let output = bounded::info_without_gdal(&path, &[]);
+        let output = memory_limit::info_without_gdal(&path, &[]);
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(1), "{told}");
         for part in [
@@ -340,7 +340,7 @@ fn formats_are_named_where_there_is_no_libgdal() {
     let old = std::process::Command::new(hapterra_binary())
         .arg("info")
         .arg(at.join("a.nc"))
-        .env("GDAL_LIBRARY", stand_in::library(at))
+        .env("GDAL_LIBRARY", gdal_stand_in::library(at))
         .env("STAND_IN_VERSION", "3030200")
         .output()
         .expect("it runs");
@@ -381,12 +381,12 @@ fn slow_libgdal_holds_up_no_tick() {
     let recording = at.join("felt.csv");
     let output = std::process::Command::new(hapterra_binary())
         .arg("run")
-        .arg(stand_in::terrain(at))
+        .arg(gdal_stand_in::terrain(at))
         .args(["--device", "native", "--input", "in-memory=0MB"])
         .args(["--scale", "1mm/cell", "--exaggeration", "0.1mm/unit"])
         .args(["--duration", "1s", "--out"])
         .arg(&recording)
-        .env("GDAL_LIBRARY", stand_in::library(at))
+        .env("GDAL_LIBRARY", gdal_stand_in::library(at))
         .env("STAND_IN_SLEEP_MS", "300")
         .stdin(std::process::Stdio::null())
         .output()

@@ -5,7 +5,7 @@ use hapterra_core::contact::ContactState;
 use hapterra_core::contact::closest_point::nearest_downhill;
 use hapterra_core::contact::surface::patch::Patch;
 use hapterra_core::force::SurfaceParams;
-use hapterra_tests::field::{FieldContact, position};
+use hapterra_tests::whole_field::{FieldContact, position};
 
 /// Answer of a rule to a HIP: contact or not, and the proxy.
 type Answer = (bool, [f64; 3]);

@@ -1,15 +1,15 @@
 //! Properties of the tick on small terrains that proptest makes up and, where one
 //! fails, makes as small and plain as it can.
 //!
-//! What is checked in each tick is in `hapterra_tests::invariants`. Failures are
+//! The checks of each tick are in `hapterra_tests::invariants`. Failures are
 //! kept in `properties.proptest-regressions` and run first the next time; what
 //! they taught has a test of its own in `regressions.rs`.
 
 use hapterra_core::terrain::MAX_STEP_CELLS;
 use hapterra_tests::scene::hip_path::GRAIN;
 use hapterra_tests::scene::run::{Execution, Scene};
-use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
+use hapterra_tests::scene::tile_supply::{Buffers, Supply};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{FileFailurePersistence, RngSeed};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain, TileBuffer};
 use hapterra_core::terrain::TileKey;
-use hapterra_tests::readers::Reader;
+use hapterra_tests::reader::Reader;
 use hapterra_tests::shared;
 use heightfield::{CellUnit, OpenOptions, PngChannel, Raster, RasterError, Wait, gdal};
 

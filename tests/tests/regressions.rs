@@ -3,8 +3,8 @@
 use hapterra_core::contact::ContactState;
 use hapterra_tests::invariants::Violation;
 use hapterra_tests::scene::run::{Execution, Scene};
-use hapterra_tests::scene::supply::{Buffers, Supply};
 use hapterra_tests::scene::terrain::{Kind, Terrain};
+use hapterra_tests::scene::tile_supply::{Buffers, Supply};
 
 fn field(size: [i32; 2], height: impl Fn(i32, i32) -> f32) -> Terrain {
     Terrain::from_fn(Kind::Rough, size, height)

@@ -7,9 +7,9 @@ use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::TickRecord;
-use hapterra_tests::oracle::Oracle;
+use hapterra_tests::dense_search::Oracle;
+use hapterra_tests::random_paths::wander;
 use hapterra_tests::shared;
-use hapterra_tests::walk::wander;
 use heightfield::{OpenOptions, Raster};
 
 /// Distance of the proxy from the surface, cells: a few roundings of a height
@@ -35,7 +35,7 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Heights of a terrain in cells, from the grid that is felt (`true_shape.rs` holds that
+/// Heights of a terrain in cells, from the grid that is felt (`geographic_scale.rs` holds that
 /// against the ground).
 fn heights<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     move |x, y| {

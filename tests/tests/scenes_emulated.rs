@@ -3,15 +3,15 @@
 //! by tick.
 
 use hapterra_core::Vec3;
-use hapterra_tests::counting::{Counted, CountingBoard};
-use hapterra_tests::scene::recorded::Recorded;
+use hapterra_tests::instruction_counter::{Counted, CountingBoard};
+use hapterra_tests::scene::emulator_scene::EmulatorScene;
 
 #[test]
 fn scenes_give_the_same_bits_on_the_emulated_processor() {
     let Some(board) = CountingBoard::found() else {
         return;
     };
-    let there = replayed(&board, &Recorded::compared());
+    let there = replayed(&board, &EmulatorScene::compared());
     let ticks: usize = there.iter().map(Vec::len).sum();
     assert!(ticks > 15_000, "{ticks}");
 }
@@ -22,7 +22,7 @@ fn scenes_on_materials_give_the_same_bits_on_the_emulated_processor() {
     let Some(board) = CountingBoard::found() else {
         return;
     };
-    let scenes = Recorded::compared_on_materials();
+    let scenes = EmulatorScene::compared_on_materials();
     assert!(scenes.len() >= 20, "{} scenes", scenes.len());
     let there = replayed(&board, &scenes);
     let forces = there.iter().flatten();
@@ -31,7 +31,7 @@ fn scenes_on_materials_give_the_same_bits_on_the_emulated_processor() {
 }
 
 /// Returns the answers of the board, which must equal those here.
-fn replayed(board: &CountingBoard, scenes: &[(u64, Recorded)]) -> Vec<Vec<Counted>> {
+fn replayed(board: &CountingBoard, scenes: &[(u64, EmulatorScene)]) -> Vec<Vec<Counted>> {
     let replays: Vec<_> = scenes.iter().map(|(_, scene)| scene.replay()).collect();
     let there = board.contact(&replays);
     for ((number, scene), there) in scenes.iter().zip(&there) {

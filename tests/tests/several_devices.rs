@@ -12,9 +12,9 @@ use hapterra::link::Native;
 use hapterra::synth::Kind;
 use hapterra_core::guard::GuardInputs;
 use hapterra_core::wire::session::SessionEnd;
-use hapterra_tests::served::{Served, signal, terrain, told};
+use hapterra_tests::socket_device::{SocketDevice, signal, terrain, told};
 use hapterra_tests::timeouts::end_of;
-use hapterra_tests::{greedy, hapterra_binary, terrain_file};
+use hapterra_tests::{greedy_device, hapterra_binary, terrain_file};
 
 /// Serves the terrain in a folder to these devices.
 fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
@@ -45,14 +45,14 @@ fn texts(owned: &[String]) -> Vec<&str> {
 /// Two devices behind sockets, and the names that lines about them begin with.
 struct Pair {
     folder: tempfile::TempDir,
-    served: [Served; 2],
+    served: [SocketDevice; 2],
 }
 
 impl Pair {
-    fn of(second: Served) -> Self {
+    fn of(second: SocketDevice) -> Self {
         Self {
             folder: tempfile::tempdir().expect("a folder"),
-            served: [Served::start(), second],
+            served: [SocketDevice::start(), second],
         }
     }
 
@@ -169,7 +169,7 @@ fn two_arms_in_memory_feel_to_the_bit_what_each_feels_alone() {
 #[test]
 fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
     for name in ["INT", "TERM"] {
-        let pair = Pair::of(Served::start());
+        let pair = Pair::of(SocketDevice::start());
         let child = pair.start();
         signal(&child, name);
         let output = end_of(child);
@@ -185,7 +185,7 @@ fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
 
 #[test]
 fn unconfirmed_board_is_named_beside_a_confirmed_one() {
-    let pair = Pair::of(Served::start());
+    let pair = Pair::of(SocketDevice::start());
     let child = pair.start();
     pair.served[1].deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
@@ -208,7 +208,7 @@ fn unconfirmed_board_is_named_beside_a_confirmed_one() {
 
 #[test]
 fn the_second_signal_names_the_boards_that_have_not_confirmed() {
-    let pair = Pair::of(Served::start());
+    let pair = Pair::of(SocketDevice::start());
     let mut child = pair.start();
     pair.served[1].deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
@@ -231,7 +231,7 @@ fn the_second_signal_names_the_boards_that_have_not_confirmed() {
 fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
     let gone = Arc::new(AtomicBool::new(false));
     let is_gone = Arc::clone(&gone);
-    let mortal = Served::with(move || {
+    let mortal = SocketDevice::with(move || {
         let die = move || {
             if is_gone.load(Ordering::Relaxed) {
                 // With its socket, and without a word.
@@ -270,7 +270,7 @@ fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
 #[test]
 fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let there = format!("tcp:{}", served.address);
     // Nobody listens there any more.
     let absent = {
@@ -302,7 +302,7 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
 #[test]
 fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
     // A current flows that nobody commanded.
-    let conducts = Served::with(|| {
+    let conducts = SocketDevice::with(|| {
         let current = Box::new(|_, sense: &mut GuardInputs, _: &_| {
             sense.measured_ma = Some([2_000, 0, 0]);
         });
@@ -321,7 +321,7 @@ fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
     for served in &pair.served {
         assert_eq!(served.last_end(), SessionEnd::Goodbye);
     }
-    let fault_of = |served: &Served| served.status().health.report.fault;
+    let fault_of = |served: &SocketDevice| served.status().health.report.fault;
     assert_eq!(fault_of(&pair.served[0]), None);
     assert!(fault_of(&pair.served[1]).is_some());
 }
@@ -329,10 +329,10 @@ fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
 #[test]
 fn a_hostile_device_costs_the_other_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let (there, greedy) = (
         format!("tcp:{}", served.address),
-        format!("tcp:{}", greedy::start()),
+        format!("tcp:{}", greedy_device::start()),
     );
     let mut more = recorded(folder.path(), "felt.csv");
     more.push("--unchecked".into());

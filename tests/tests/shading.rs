@@ -6,8 +6,8 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::{Shading, SurfaceParams};
 use hapterra_core::scene::TickRecord;
-use hapterra_tests::field::position;
 use hapterra_tests::real_ground;
+use hapterra_tests::whole_field::position;
 
 /// From one HIP to the next, cells.
 const STEP: f64 = 0.01;

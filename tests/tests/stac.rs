@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use hapterra_tests::tiffs::{DATA, floats_in_a_strip, placed, tiff};
-use hapterra_tests::{bounded, hapterra_binary};
+use hapterra_tests::{hapterra_binary, memory_limit};
 use heightfield::{OpenOptions, Raster, gdal};
 use serde_json::{Value, json};
 
@@ -233,7 +233,7 @@ fn documents_that_are_too_large_or_too_deep_end_in_bounded_memory() {
     let many = vec!["{\"assets\":{\"a\":{\"href\":\"a.tif\"}}}"; 300_000].join(",");
     let many = write("many.json", &format!("{{\"features\":[{many}]}}"));
     for path in [&huge, &deep, &many] {
-        let output = bounded::info(path, &[]);
+        let output = memory_limit::info(path, &[]);
         let told = told(&output);
         assert_eq!(output.status.code(), Some(1), "{told}");
         assert!(

@@ -9,9 +9,9 @@ use hapterra::terrain::{HapticCells, HapticGrid, Terrain};
 use hapterra_core::contact::{ContactOutput, ContactState};
 use hapterra_core::force::{Pattern, Shading, SurfaceParams, Texture};
 use hapterra_core::scene::TickRecord;
-use hapterra_tests::field::position;
-use hapterra_tests::invariants::seen::Seen;
+use hapterra_tests::invariants::observed_tick::ObservedTick;
 use hapterra_tests::invariants::texture::TextureJudge;
+use hapterra_tests::whole_field::position;
 use hapterra_tests::{hapterra_binary, terrain_file};
 use heightfield::{OpenOptions, Raster};
 
@@ -78,7 +78,7 @@ fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
 
 /// The textured tick as the judge sees it: the displacement is what the same scene without
 /// texture makes.
-fn seen(plain: &TickRecord, textured: &TickRecord) -> Seen {
+fn seen(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
     let felt = ContactOutput {
         state: textured.state,
         proxy: textured.proxy,
@@ -86,9 +86,9 @@ fn seen(plain: &TickRecord, textured: &TickRecord) -> Seen {
         converged: true,
         ..ContactOutput::default()
     };
-    Seen {
+    ObservedTick {
         textured: Some(textured.force_n * 2.0),
-        ..Seen::new(position(&textured.hip), felt, [0; 3])
+        ..ObservedTick::new(position(&textured.hip), felt, [0; 3])
     }
 }
 

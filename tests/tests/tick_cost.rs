@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use hapterra::link::{
-    Arming, Ask, Emulator, Event, INSTRUCTIONS_PER_COUNT, Session, Timeouts, serve_plant,
+    Arming, Emulator, Event, HostRequest, INSTRUCTIONS_PER_COUNT, Session, Timeouts, serve_plant,
 };
 use hapterra::phantom::PlacedTerrain;
 use hapterra::synth::{Kind, Synth};
@@ -59,7 +59,7 @@ fn felt() -> Option<(Vec<TickRecord>, Status)> {
                 })
                 .expect("goes on");
             if !asked && samples.last().is_some_and(|last| last.tick >= ticks) {
-                session.ask(Ask::Status);
+                session.ask(HostRequest::Status);
                 asked = true;
             }
         }

@@ -10,7 +10,7 @@ use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::scene::TickRecord;
-use hapterra_tests::walk::wander;
+use hapterra_tests::random_paths::wander;
 use hapterra_tests::{UNCONTROLLED, hapterra_binary, shared, terrain_file};
 use heightfield::{OpenOptions, Raster};
 

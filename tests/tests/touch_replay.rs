@@ -4,7 +4,7 @@ use hapterra::materials::{ClassMaterial, Looks, Materials};
 use hapterra::replay::{on_native_at, state_name};
 use hapterra::terrain::{HapticCells, HapticGrid, Scale, Terrain};
 use hapterra_core::rate::TickRate;
-use hapterra_tests::walk::wander;
+use hapterra_tests::random_paths::wander;
 use hapterra_touch as touch;
 use hapterra_touch::{
     Contact, Damping, Friction, Material, Pattern, RowOrder, Shading, State, Surface,

@@ -45,7 +45,7 @@ const ALLOWED: [(&str, &str, &[&str]); 11] = [
         &["Instant", "elapsed", "sleep"],
     ),
     (
-        "tests/src/served.rs",
+        "tests/src/socket_device.rs",
         "the pace of a device that plays a board in real time; it fails nothing",
         &["set_read_timeout"],
     ),

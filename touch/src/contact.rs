@@ -11,11 +11,11 @@ use hapterra_core::scene::{Scene, Source, TickRecord};
 use hapterra_core::terrain::FieldSize;
 
 use crate::checks::TerrainError;
-use crate::cut::NoTile;
 use crate::heights::Unread;
-use crate::surface::{Surface, SurfaceError};
+use crate::surface_params::{Surface, SurfaceError};
 use crate::terrain::Terrain;
 use crate::tick_loop::TickLoop;
+use crate::tile_cutter::NoTile;
 
 /// Ticks in which a force comes in again after a change, at most, at every rate.
 const MAX_SETTLING: u32 = 4_096;

@@ -8,14 +8,14 @@ extern crate std;
 
 mod checks;
 mod contact;
-mod cut;
 mod heights;
 mod scale;
-mod surface;
+mod surface_params;
 mod terrain;
 mod tick_loop;
 pub mod ticks;
-pub mod tiles;
+mod tile_cutter;
+pub mod tile_heights;
 pub mod tip;
 
 pub use checks::TerrainError;
@@ -24,7 +24,7 @@ pub use hapterra_core::contact::Friction;
 pub use hapterra_core::force::{Damping, Material, Pattern, Shading, SurfaceParams, Texture};
 pub use heights::{Block, Height, Heights, RowOrder, Unread};
 pub use scale::{Scale, ScaleError};
-pub use surface::{Surface, SurfaceError};
+pub use surface_params::{Surface, SurfaceError};
 pub use terrain::Terrain;
 
 #[cfg(test)]

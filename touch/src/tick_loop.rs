@@ -12,8 +12,8 @@ use hapterra_core::terrain::{Tile, TileKey};
 use hapterra_core::tick::{Command, Haptics, Outcome, RefusedScene};
 use self_cell::{MutBorrow, self_cell};
 
-use crate::cut::NoTile;
 use crate::terrain::Terrain;
+use crate::tile_cutter::NoTile;
 
 /// Tiles along the side of the window: as many as the `hapterra` command has in memory.
 const WINDOW: usize = 16;

@@ -13,7 +13,7 @@ const TESTS: [&str; 4] = ["--test", "reference", "--test", "docs"];
 /// all pages; builds the book where mdBook is installed. Command lines are run by `cargo xtask test`.
 ///
 /// # Errors
-/// What differs.
+/// The difference.
 pub(crate) fn docs(write: bool) -> Result<()> {
     let mut tests = cargo();
     tests

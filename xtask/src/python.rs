@@ -26,7 +26,7 @@ const VERSION: &str =
 /// where there is no Python.
 ///
 /// # Errors
-/// What failed: the environment, which takes a network the first time, or the build.
+/// A failure of the environment, which takes a network the first time, or of the build.
 pub(crate) fn build() -> Result<Option<(PathBuf, PathBuf)>> {
     build_by(RELEASE)
 }

@@ -52,7 +52,7 @@ pub(crate) fn without_own_variables(command: &mut Command) {
     }
 }
 
-/// What cargo builds for all tests: with other packages or features it would build dependencies anew.
+/// The packages and features of all tests: with others cargo would build dependencies anew.
 /// The image tests need probe-rs anyway, and the command is tested with it, too.
 pub(crate) const OF_TESTS: [&str; 3] = ["--workspace", "--features", "hapterra/probe"];
 

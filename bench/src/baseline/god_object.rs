@@ -8,7 +8,7 @@ use hapterra::published::Line;
 
 use super::triangle::{Facet, Plane};
 use crate::grid::Grid;
-use crate::haptics::{Answer, Haptics, Hip};
+use crate::variant::{Answer, Haptics, Hip};
 
 /// Facets that may hold it at once.
 const PLANES: usize = 3;

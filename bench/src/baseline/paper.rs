@@ -3,7 +3,7 @@
 use hapterra::published::{Heights, Paper, Real};
 
 use crate::grid::Grid;
-use crate::haptics::{Answer, Haptics, Hip};
+use crate::variant::{Answer, Haptics, Hip};
 
 impl Heights for Grid {
     #[inline]

@@ -8,7 +8,7 @@ use parry3d::utils::Array2;
 
 use super::triangle::Facet;
 use crate::grid::Grid;
-use crate::haptics::{Answer, Haptics, Hip};
+use crate::variant::{Answer, Haptics, Hip};
 
 /// Which call finds the nearest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 
 use super::triangle::Facet;
 use crate::grid::Grid;
-use crate::haptics::{Answer, Haptics, Hip};
+use crate::variant::{Answer, Haptics, Hip};
 
 /// Moves in one tick, at most.
 const MOVES: u32 = 4096;

@@ -9,7 +9,7 @@ use super::files::{self, Files, spinner};
 use crate::compare::{Effort, Row, compare};
 use crate::effects::{self, Measured};
 use crate::grid::Grid;
-use crate::{continuity, report, solver, state};
+use crate::{continuity, report, solver, tick_states};
 
 /// Arguments of `hapterra-lab contact`.
 #[derive(Debug, clap::Args)]
@@ -36,7 +36,7 @@ pub struct Args {
 /// Measures and prints tables.
 ///
 /// # Errors
-/// What cannot be read, measured or written.
+/// A file that cannot be read or written, or a failed measurement.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let out = args.files.out.as_ref();
     if args.continuity {
@@ -90,7 +90,7 @@ fn read(args: &Args) -> Result<Vec<Grid>, Failure> {
 /// Measures the effects on the files, and on one synthetic terrain. A file that is too small or too
 /// high for them has its other figures all the same.
 fn measure_effects(args: &Args, files: &[Grid], effort: Effort) -> Result<Measured, Failure> {
-    let synthetic = (!args.files.files_only).then(state::terrain);
+    let synthetic = (!args.files.files_only).then(tick_states::terrain);
     let mut all = Measured::default();
     for grid in files.iter().chain(&synthetic) {
         // Otherwise printed with the other figures.

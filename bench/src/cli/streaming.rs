@@ -32,7 +32,7 @@ pub struct Args {
 /// Measures, and prints a line for each row as soon as it is measured.
 ///
 /// # Errors
-/// What cannot be measured or written.
+/// A failed measurement, or a file that cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(case) = &args.case {
         return streaming::measure_case(case).map_err(Failure::new);

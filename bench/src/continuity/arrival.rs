@@ -10,9 +10,9 @@ use hapterra_core::terrain::{
 use super::row::{DEPTH, Row, SIDE, STEP};
 use crate::compare::SWEPT;
 use crate::grid::Grid;
-use crate::haptics::{Answer, Hip};
 use crate::path::{over, way_in};
 use crate::product::{buffers, empty, fill};
+use crate::variant::{Answer, Hip};
 
 /// Start of the slide, cells before the next tile.
 const BEFORE: f64 = 1.0;

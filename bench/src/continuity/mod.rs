@@ -2,17 +2,17 @@
 //! ground: on smooth ground, over ridges, in valleys, across the edges of
 //! patches, and while a tile arrives.
 //!
-//! What is compared is what is felt, fading included. The HIP slides 0.1 cell
-//! below the surface; how it came there is left out.
+//! The rendered forces are compared, fading included. The HIP slides 0.1 cell below the surface; its
+//! approach is left out.
 
 mod arrival;
 mod ground;
 mod row;
 
 use crate::compare::{Label, opponents, ours};
-use crate::haptics::{Answer, Haptics, Hip};
-use crate::path::{Dice, over, way_in};
+use crate::path::{Random, over, way_in};
 use crate::product;
+use crate::variant::{Answer, Haptics, Hip};
 
 use ground::{GROUNDS, Ground};
 use row::SIDE;
@@ -75,12 +75,12 @@ struct Way {
 /// Straight ways every which way, all of them over the middle of the field.
 fn ways(ground: &Ground) -> Vec<Way> {
     let grid = ground.grid();
-    let mut dice = Dice(17);
+    let mut random = Random(17);
     let middle = [grid.columns as f64 / 2.0, grid.rows as f64 / 2.0];
     (0..WAYS)
         .map(|_| {
-            let heading = dice.between(0.0, std::f64::consts::TAU);
-            let aside = dice.between(-3.0, 3.0);
+            let heading = random.between(0.0, std::f64::consts::TAU);
+            let aside = random.between(-3.0, 3.0);
             let (north, east) = heading.sin_cos();
             let at = |tick: f64| {
                 let along = STEP * (tick - TICKS as f64 / 2.0);

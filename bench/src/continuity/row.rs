@@ -1,8 +1,8 @@
 //! Row of one variant on one ground and one path of the HIP.
 
 use crate::compare::Label;
-use crate::haptics::Answer;
 use crate::stats::{part, quantiles};
+use crate::variant::Answer;
 
 /// Cells the HIP moves in a tick.
 pub const STEP: f64 = 0.01;

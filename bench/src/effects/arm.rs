@@ -14,8 +14,8 @@ use super::effect_tick::EffectTick;
 use super::replay::{self, WINDOW};
 use super::vector::Vector;
 use crate::grid::Grid;
-use crate::haptics::Hip;
-use crate::path::Dice;
+use crate::path::Random;
+use crate::variant::Hip;
 
 /// Reason for which nothing can be measured on a terrain: it is too small, or the arm does not
 /// reach it.
@@ -94,7 +94,7 @@ impl<'g> Arm<'g> {
         ticks: usize,
         height: impl Fn(usize) -> f64,
     ) -> Result<Way, NotMeasured> {
-        let mut dice = Dice(21);
+        let mut random = Random(21);
         let (mut off, mut heading) = ([0.0; 2], 0.3_f64);
         let sides = [self.grid.columns, self.grid.rows];
         let reach = sides.map(|side| 0.5 * side as f64 - MARGIN);
@@ -102,7 +102,7 @@ impl<'g> Arm<'g> {
         let mut there = Vec::with_capacity(ticks);
         for tick in 0..ticks.div_ceil(2) {
             there.push(self.above(off, height(tick))?);
-            heading += dice.between(-0.05, 0.05);
+            heading += random.between(-0.05, 0.05);
             if f64::hypot(off[0], off[1]) > reach - 1.0 {
                 heading = f64::atan2(-off[1], -off[0]);
             }

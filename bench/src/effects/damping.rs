@@ -108,7 +108,7 @@ fn by_foaw(arm: &Arm<'_>, way: &Way, tick: usize) -> Vec<Vector> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::terrain;
+    use crate::tick_states::terrain;
 
     fn worst(errors: Vec<f64>) -> f64 {
         errors.into_iter().fold(0.0, f64::max)

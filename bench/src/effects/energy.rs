@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use hapterra_core::force::Controller;
 
-    use crate::state::terrain;
+    use crate::tick_states::terrain;
 
     /// A spring pushed in and out; coming out it pushes by so much more.
     fn spring(more: f64) -> Vec<Part> {

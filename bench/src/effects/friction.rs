@@ -8,8 +8,8 @@ use super::row::{Error, Place};
 use super::vector::{Vector, dot, length, minus, normal, plus};
 use crate::compare::Effort;
 use crate::grid::Grid;
-use crate::haptics::Hip;
-use crate::path::{self, Dice};
+use crate::path::{self, Random};
+use crate::variant::Hip;
 
 /// Cells a tick, 10 mm/s at 1 kHz, and depth.
 const STEP: f64 = 0.01;
@@ -92,16 +92,16 @@ fn drift(felt: &[EffectTick]) -> Option<f64> {
 /// Down along the normal at places inside of patches, and a HIP that trembles there; and where
 /// each of these begins.
 fn held(grid: &Grid) -> (Vec<Hip>, Vec<usize>) {
-    let mut dice = Dice(23);
+    let mut random = Random(23);
     let sky = f64::from(grid.top()) + 2.0;
     let (mut hips, mut from) = (Vec::new(), Vec::new());
     for _ in 0..PLACES {
-        let inside = |dice: &mut Dice, side: usize| {
-            dice.between(4.0, side as f64 - 4.0).floor() + dice.between(0.2, 0.8)
+        let inside = |random: &mut Random, side: usize| {
+            random.between(4.0, side as f64 - 4.0).floor() + random.between(0.2, 0.8)
         };
         let [x, y] = [
-            inside(&mut dice, grid.columns),
-            inside(&mut dice, grid.rows),
+            inside(&mut random, grid.columns),
+            inside(&mut random, grid.rows),
         ];
         let (place, up) = on(grid, [x, y]);
         let above = plus(place, up, 0.5);
@@ -112,7 +112,7 @@ fn held(grid: &Grid) -> (Vec<Hip>, Vec<usize>) {
         hips.extend(std::iter::repeat_n(pressed, SETTLING));
         from.push(hips.len());
         let mut tremble = || {
-            let aside = [0, 1, 2].map(|_| dice.between(-TREMBLE, TREMBLE));
+            let aside = [0, 1, 2].map(|_| random.between(-TREMBLE, TREMBLE));
             plus(aside, up, -dot(aside, up) - HELD_DEPTH)
         };
         hips.extend((0..HELD).map(|_| Hip::at(plus(place, tremble(), 1.0))));
@@ -135,7 +135,7 @@ fn on(grid: &Grid, [x, y]: [f64; 2]) -> (Vector, Vector) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::terrain;
+    use crate::tick_states::terrain;
 
     #[test]
     fn friction_that_is_five_percent_off_is_seen() {

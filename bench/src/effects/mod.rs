@@ -2,14 +2,15 @@
 //!
 //! - [`Effect`]: the compared effects;
 //! - `time`: the whole tick from encoder counts to currents, all effects in turns;
-//! - `friction`, `shading`, `texture`, `damping`, `energy`, `together`: one judge each, in f64,
-//!   by the formulas of docs/explanation/effects.md. No judge calls what it judges;
-//! - `felt`, `replay`, `arm`: what is judged, and where it comes from: points in lock-step, and an
-//!   arm that is armed.
+//! - `friction`, `shading`, `texture`, `damping`, `energy`, `combined`: one oracle each, in f64,
+//!   by the formulas of docs/explanation/effects.md. No oracle calls what it checks;
+//! - `effect_tick`, `replay`, `arm`: the record of a tick, and its sources: points in lock-step, and
+//!   an armed arm.
 //!
 //! A cell is a millimetre in the hand here.
 
 mod arm;
+mod combined;
 mod damping;
 mod effect;
 mod effect_tick;
@@ -22,7 +23,6 @@ mod row;
 mod shading;
 mod texture;
 mod time;
-mod together;
 mod vector;
 
 use crate::compare::Effort;
@@ -65,14 +65,14 @@ pub fn errors(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeasured> {
     errors.extend(texture::measure(grid, effort));
     errors.extend(damping::measure(grid, effort)?);
     errors.extend(energy::measure(grid)?);
-    errors.extend(together::measure(grid, effort)?);
+    errors.extend(combined::measure(grid, effort)?);
     Ok(errors)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state;
+    use crate::tick_states;
 
     #[test]
     fn a_terrain_that_is_too_small_or_too_high_is_refused() {
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn every_error_is_below_its_documented_bound() {
-        let errors = errors(&state::terrain(), Effort::QUICK).expect("in reach");
+        let errors = errors(&tick_states::terrain(), Effort::QUICK).expect("in reach");
         assert!(errors.iter().all(|error| error.judged > 0));
         let is_above = |error: &&Error| error.bound.is_some_and(|most| error.spread.worst > most);
         let wrong: Vec<_> = errors.iter().filter(is_above).collect();

@@ -10,8 +10,8 @@ use hapterra_core::tick::{Command, Haptics};
 use super::SIDE;
 use super::effect_tick::EffectTick;
 use crate::grid::Grid;
-use crate::haptics::Hip;
 use crate::product::{buffers, fill};
+use crate::variant::Hip;
 
 /// Tiles along the side of the window.
 pub(super) const WINDOW: usize = SIDE / TILE_CELLS;

@@ -121,7 +121,7 @@ fn reach(bend: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::effects::vector::dot;
-    use crate::state::terrain;
+    use crate::tick_states::terrain;
 
     #[test]
     fn a_direction_that_is_a_degree_off_is_seen_and_so_is_none() {
@@ -147,8 +147,8 @@ mod tests {
     /// Bends of all sizes, and turns of more than 60°.
     #[test]
     fn on_rough_ground_the_direction_is_the_documented_one_too() {
-        let mut dice = path::Dice(3);
-        let rough = Grid::from_fn("rough", [64, 64], |_, _| dice.between(0.0, 6.0) as f32);
+        let mut random = path::Random(3);
+        let rough = Grid::from_fn("rough", [64, 64], |_, _| random.between(0.0, 6.0) as f32);
         let slide = path::slide_at(&rough, "", [STEP, DEPTH], 8000);
         let shaded = render(&rough, Effect::Shading.params(), &slide.hips);
         let off = off(&rough, &shaded);

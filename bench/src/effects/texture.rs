@@ -122,7 +122,7 @@ impl Fade {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::terrain;
+    use crate::tick_states::terrain;
 
     fn worst(params: &SurfaceParams, felt: &[EffectTick]) -> [f64; 2] {
         let off = off_percent(params, felt);

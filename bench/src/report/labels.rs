@@ -70,7 +70,7 @@ fn overlap(a: &Rect, b: &Rect) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::path::Dice;
+    use crate::path::Random;
 
     const FRAME: Rect = [0, 0, 1800, 1200];
 
@@ -90,16 +90,16 @@ mod tests {
 
     #[test]
     fn no_name_is_over_another_or_over_a_mark_however_crowded() {
-        let mut dice = Dice(3);
+        let mut random = Random(3);
         for _ in 0..200 {
             let named: Vec<Named> = (0..9)
                 .map(|_| Named {
                     at: (
-                        dice.between(600.0, 1000.0) as i32,
-                        dice.between(500.0, 620.0) as i32,
+                        random.between(600.0, 1000.0) as i32,
+                        random.between(500.0, 620.0) as i32,
                     ),
                     radius: 14,
-                    size: (dice.between(100.0, 420.0) as i32, 40),
+                    size: (random.between(100.0, 420.0) as i32, 40),
                 })
                 .collect();
             let places = place(&named, &[], FRAME, 12);

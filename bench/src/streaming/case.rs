@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Pace, SentTile, board};
 use super::hand::{Hand, Late};
+use super::hip_path::{HipPath, HipPaths};
+use super::measurement::{Reading, Row};
 use super::meter::{Meter, Traffic, peak_bytes};
-use super::row::{Reading, Row};
 use super::run::{self, fastest};
 use super::tick_counts::TickCounts;
-use super::way::{Way, Ways};
 use super::{CELL_MM, NotMeasured, RATES, SPEEDS, USUAL};
 
 /// Case of a measurement.
@@ -73,7 +73,7 @@ impl Case {
     /// # Errors
     /// When the file cannot be read, the arm does not reach the ways, or a session ends.
     pub(super) fn measure(&self, mut done: impl FnMut(Row)) -> Result<(), NotMeasured> {
-        let ways = Ways::read(Path::new(&self.ways))?;
+        let ways = HipPaths::read(Path::new(&self.ways))?;
         let hand = Hand::over(&ways);
         let benches = RATES.map(|kb_per_s| Bench {
             case: self,
@@ -108,7 +108,7 @@ pub(super) fn terrain(raster: &Raster) -> Result<Terrain<'_>, NotMeasured> {
 /// One link's measurements of a case.
 struct Bench<'c> {
     case: &'c Case,
-    ways: &'c Ways,
+    ways: &'c HipPaths,
     hand: &'c Hand,
     kb_per_s: u32,
 }
@@ -159,7 +159,7 @@ impl Bench<'_> {
 
     /// Measures held and missing tiles.
     fn motions(&self, row: &mut Row) -> Result<(), NotMeasured> {
-        let Ways { straight, turning } = self.ways;
+        let HipPaths { straight, turning } = self.ways;
         row.straight_cells = Some(straight.cells() as u32);
         row.turning_cells = Some(turning.cells() as u32);
         let top = self.motion(straight, run::SPEEDS[1], Late::Hole, false)?;
@@ -188,7 +188,7 @@ impl Bench<'_> {
 
     /// Measures ticks over a fallback, and holes.
     fn underlaid(&self, row: &mut Row) -> Result<(), NotMeasured> {
-        let Ways { straight, turning } = self.ways;
+        let HipPaths { straight, turning } = self.ways;
         let fastest = self.motion(straight, run::SPEEDS[1], Late::Fallback, false)?;
         let mut holes = fastest.felt.missing;
         let mut coarse = |way, speed: u32| {
@@ -214,7 +214,7 @@ impl Bench<'_> {
     /// A session of its own, with nothing known of the file before.
     fn motion(
         &self,
-        way: &Way,
+        way: &HipPath,
         speed: f64,
         late: Late,
         to_a_hole: bool,
@@ -308,7 +308,7 @@ fn round(value: f64) -> f64 {
 }
 
 /// Asks the system to forget what it keeps of a file in memory, so that it is read from the disk.
-/// Where the system does not, the file is read from its memory.
+/// If the system keeps them, the file is read from memory.
 #[cfg(unix)]
 fn forget(path: &Path) {
     use rustix::fs::{Advice, fadvise};

@@ -20,7 +20,7 @@ use hapterra_firmware::native::{Device, StoppedClock};
 use hapterra_firmware::store::Stored;
 
 use super::NotMeasured;
-use super::line::Line;
+use super::link::Line;
 
 /// Tiles along the side of the device's window, as on the emulated board.
 const WINDOW: usize = 16;

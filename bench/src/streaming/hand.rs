@@ -8,7 +8,7 @@ use hapterra_core::guard::GuardInputs;
 use hapterra_core::phantom::Calibration;
 use hapterra_core::scene::{Scene, Source};
 
-use super::way::Ways;
+use super::hip_path::HipPaths;
 use super::{CELL_MM, NotMeasured};
 
 /// Depth of the HIP below the surface, cells: half a millimetre of the tip.
@@ -34,7 +34,7 @@ pub(super) struct Hand {
 
 impl Hand {
     /// An arm with the middle of the ways at the tip in its home pose.
-    pub(super) fn over(ways: &Ways) -> Self {
+    pub(super) fn over(ways: &HipPaths) -> Self {
         let model = PhantomModel::premium_1_5();
         let encoders = std::array::from_fn(|joint| Encoder::new(&model.drive[joint]));
         Self {

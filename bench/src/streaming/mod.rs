@@ -2,32 +2,32 @@
 //! of the hand cost against the size of the file and the latency of its server.
 //!
 //! - `relief`, `cog`: terrains of 10⁶ to 10¹⁰ samples, whose blocks repeat;
-//! - `way`, `hand`: where the HIP goes, and what the encoders read there;
-//! - `chain`, `line`: the host's own code, a link of a stated rate in virtual time, and the device's
+//! - `hip_path`, `hand`: the path of the HIP, and the encoder counts along it;
+//! - `chain`, `link`: the host's own code, a link of a stated rate in virtual time, and the device's
 //!   own application;
 //! - `felt`: what its samples say of the ground;
 //! - `run`, `case`: what is measured of one terrain, in a process of its own;
 //! - `server`: a web server with latency, with the feature `remote`;
-//! - `meter`, `parent`: memory and bytes, and all cases one after the other.
+//! - `meter`, `processes`: memory and bytes, and all cases one after the other.
 
 mod case;
 mod chain;
 mod cog;
 mod hand;
-mod line;
+mod hip_path;
+mod link;
+mod measurement;
 mod meter;
-mod parent;
+mod processes;
 mod relief;
-mod row;
 mod run;
 #[cfg(feature = "remote")]
 mod server;
 mod tick_counts;
-mod way;
 
 pub use crate::effects::NotMeasured;
-pub use parent::{measure, measure_case};
-pub use row::{Reading, Row};
+pub use measurement::{Reading, Row};
+pub use processes::{measure, measure_case};
 
 /// Side of a cell in the hand, millimetres: a way of 2,800 cells is 140 mm long, which the arm
 /// reaches, and 20,000 cells a second are 1 m/s.

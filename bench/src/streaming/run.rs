@@ -5,8 +5,8 @@ use hapterra_core::contact::ContactState;
 use super::NotMeasured;
 use super::chain::Chain;
 use super::hand::Hand;
+use super::hip_path::HipPath;
 use super::tick_counts::{TickCounts, lacks_terrain};
-use super::way::Way;
 
 /// Ticks after which nothing more is expected: a server has had its 10 s of silence by then.
 const LONGEST: u64 = 30_000;
@@ -24,7 +24,7 @@ pub(super) const SPEEDS: [f64; 2] = [100.0, 20_000.0];
 ///
 /// # Errors
 /// When there is none, or the session ends.
-pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &Way) -> Result<(), NotMeasured> {
+pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &HipPath) -> Result<(), NotMeasured> {
     let (above, below) = (hand.above(way.at(0.0))?, hand.below(way.at(0.0))?);
     let mut is_touching = false;
     while !is_touching {
@@ -55,7 +55,7 @@ pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &Way) -> Result<(),
 pub(super) fn travel(
     chain: &mut Chain<'_>,
     hand: &Hand,
-    way: &Way,
+    way: &HipPath,
     speed: f64,
     to_a_hole: bool,
 ) -> Result<(TickCounts, [u64; 2]), NotMeasured> {

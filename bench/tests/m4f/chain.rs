@@ -10,9 +10,9 @@ use hapterra_core::grid::Cell;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{CoarseTile, Fallback};
 use hapterra_lab::grid::Grid;
-use hapterra_lab::path::Dice;
-use hapterra_lab::state::{TICKS, terrain};
-use hapterra_tests::counting::{CountingBoard, Samples};
+use hapterra_lab::path::Random;
+use hapterra_lab::tick_states::{TICKS, terrain};
+use hapterra_tests::instruction_counter::{CountingBoard, Samples};
 use hapterra_tests::scene::materials::Materials;
 
 use super::contact::{GridSamples, rough, scene, with_params};
@@ -55,11 +55,11 @@ struct Arm<'g> {
 pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let grid = terrain();
     let arm = Arm::over(&grid);
-    let mut dice = Dice(21);
+    let mut random = Random(21);
     let mut heading = 0.3_f64;
     let mut at = [0.0, 0.0];
     let mut slide = |speed: f64| {
-        heading += dice.between(-0.05, 0.05);
+        heading += random.between(-0.05, 0.05);
         // Within 40 mm of home: turned back at the border of that.
         if f64::hypot(at[0], at[1]) > 40.0 {
             heading = f64::atan2(-at[1], -at[0]);
@@ -71,8 +71,8 @@ pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
     let sliding: Vec<_> = (0..TICKS).map(|_| arm.counts(slide(0.05), -0.4)).collect();
     let fast: Vec<_> = (0..TICKS).map(|_| arm.counts(slide(0.5), -0.4)).collect();
     let rested = arm.counts([3.0, 4.0], -0.4);
-    let mut dice = Dice(22);
-    let mut tremble = || dice.between(-1.5, 1.5).round() as i32;
+    let mut random = Random(22);
+    let mut tremble = || random.between(-1.5, 1.5).round() as i32;
     let resting = (0..TICKS).map(|_| rested.map(|count| count + tremble()));
     let resting: Vec<_> = resting.collect();
     let in_contact = Target {
@@ -339,7 +339,7 @@ impl<'g> Arm<'g> {
 
     fn scene(&self) -> Scene {
         let [x, y, z] = self.placement.home_mm;
-        let home = hapterra_lab::haptics::Hip::at([x, y, z]).grid;
+        let home = hapterra_lab::variant::Hip::at([x, y, z]).grid;
         let arm = Scene {
             home,
             source: Source::Encoders,

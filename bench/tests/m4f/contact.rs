@@ -7,10 +7,10 @@ use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::{Scene, Source};
 use hapterra_core::terrain::{FieldSize, TileKey};
 use hapterra_lab::grid::Grid;
-use hapterra_lab::haptics::Hip;
 use hapterra_lab::path;
-use hapterra_lab::state::{STATES, Step, TICKS, terrain};
-use hapterra_tests::counting::{CountingBoard, Event, Replay, Samples, tiles};
+use hapterra_lab::tick_states::{STATES, Step, TICKS, terrain};
+use hapterra_lab::variant::Hip;
+use hapterra_tests::instruction_counter::{CountingBoard, Event, Replay, Samples, tiles};
 
 use super::table::{Row, Target, Tick};
 
@@ -139,10 +139,10 @@ fn every(hips: &[Hip]) -> Vec<Step> {
 /// Down at the western end, then 5,000 cells east at once, and back.
 fn far(grid: &Grid) -> Vec<Step> {
     let sky = f64::from(grid.top()) + 2.0;
-    let mut dice = path::Dice(16);
+    let mut random = path::Random(16);
     let mut steps = Vec::new();
     for _ in 0..TICKS / 8 {
-        let at = [dice.between(4.0, 60.0), dice.between(4.0, 60.0)];
+        let at = [random.between(4.0, 60.0), random.between(4.0, 60.0)];
         let low = f64::from(grid.top()) - 0.5;
         let mut step = |x: f64, z: f64, counts| {
             let hip = Hip::at([x, at[1], z]);

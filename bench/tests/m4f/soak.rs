@@ -4,8 +4,8 @@
 use std::sync::Mutex;
 use std::thread;
 
-use hapterra_tests::counting::CountingBoard;
-use hapterra_tests::scene::recorded::Recorded;
+use hapterra_tests::instruction_counter::CountingBoard;
+use hapterra_tests::scene::emulator_scene::EmulatorScene;
 use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::terrain::{KINDS, Kind};
 
@@ -59,16 +59,16 @@ pub(crate) fn rows(board: &CountingBoard, scenes: u64) -> Vec<Row> {
 /// Rows over the scenes whose bits the emulated processor is compared by, without materials and on
 /// them.
 pub(crate) fn compared_rows(board: &CountingBoard) -> Vec<Row> {
-    let row = |name: &str, scenes: Vec<(u64, Recorded)>| {
+    let row = |name: &str, scenes: Vec<(u64, EmulatorScene)>| {
         let counted = count_recorded(board, scenes).into_iter();
         let ticks = counted.flat_map(|scene| scene.ticks).collect();
         Row::new(name, Target::default(), ticks)
     };
     vec![
-        row("compared scenes", Recorded::compared()),
+        row("compared scenes", EmulatorScene::compared()),
         row(
             "compared scenes on materials",
-            Recorded::compared_on_materials(),
+            EmulatorScene::compared_on_materials(),
         ),
     ]
 }
@@ -122,12 +122,12 @@ fn count(board: &CountingBoard, scenes: u64, surface: Surface) -> Vec<CountedSce
 /// Replays so many scenes in one run of the emulated processor, which must answer
 /// as this one does.
 fn count_batch(board: &CountingBoard, numbers: &[u64], surface: Surface) -> Vec<CountedScene> {
-    let random = |number: &u64| (*number, Recorded::random(SEED, *number, surface));
+    let random = |number: &u64| (*number, EmulatorScene::random(SEED, *number, surface));
     count_recorded(board, numbers.iter().map(random).collect())
 }
 
 /// The same, of scenes with their numbers: all of them on materials, or none.
-fn count_recorded(board: &CountingBoard, scenes: Vec<(u64, Recorded)>) -> Vec<CountedScene> {
+fn count_recorded(board: &CountingBoard, scenes: Vec<(u64, EmulatorScene)>) -> Vec<CountedScene> {
     let replays: Vec<_> = scenes.iter().map(|(_, scene)| scene.replay()).collect();
     let there = board.contact(&replays);
     let scenes = scenes.iter().zip(&there);

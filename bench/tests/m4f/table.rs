@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use hapterra_tests::counting::Counted;
 use hapterra_tests::cycles::Cycles;
+use hapterra_tests::instruction_counter::Counted;
 use hapterra_tests::repository;
 
 /// The kept table, in the repository.

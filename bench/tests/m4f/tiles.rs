@@ -4,9 +4,9 @@
 use hapterra_core::terrain::TILE_SAMPLES;
 use hapterra_core::terrain::packed::{MAX_PACKED, Step, pack};
 use hapterra_core::wire::message::Heights;
-use hapterra_lab::path::Dice;
-use hapterra_lab::state::terrain;
-use hapterra_tests::counting::CountingBoard;
+use hapterra_lab::path::Random;
+use hapterra_lab::tick_states::terrain;
+use hapterra_tests::instruction_counter::CountingBoard;
 
 use super::contact::scene;
 use super::table::{Row, Target, Tick};
@@ -16,33 +16,35 @@ const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
 /// All of them.
 pub(crate) fn rows(board: &CountingBoard) -> Vec<Row> {
-    let mut dice = Dice(31);
+    let mut random = Random(31);
     // 1/30 of a cell a metre; heights to 1/1,024 m.
     let metres = Step::Cells(1.0 / 30.0);
     let parts = Step::Cells(1.0 / (1024.0 * 30.0));
-    let whole = packed(&[metres], || (3.0 * dice.between(0.0, 1.0)).floor() / 30.0);
-    let mut dice = Dice(32);
-    let between = packed(&[parts], || {
-        (3200.0 * dice.between(0.0, 1.0)).floor() / (1024.0 * 30.0)
+    let whole = packed(&[metres], || {
+        (3.0 * random.between(0.0, 1.0)).floor() / 30.0
     });
-    let mut dice = Dice(33);
+    let mut random = Random(32);
+    let between = packed(&[parts], || {
+        (3200.0 * random.between(0.0, 1.0)).floor() / (1024.0 * 30.0)
+    });
+    let mut random = Random(33);
     let centimetres = Step::Single {
         unit: 0.01,
         cells: 0.999_85,
     };
     let single = packed(&[centimetres], || {
-        0.999_85 * f64::from((80.0 + (40.0 * dice.between(0.0, 1.0)).floor() / 100.0) as f32)
+        0.999_85 * f64::from((80.0 + (40.0 * random.between(0.0, 1.0)).floor() / 100.0) as f32)
     });
-    let mut dice = Dice(34);
+    let mut random = Random(34);
     let floats: Vec<Vec<u8>> = (0..TILES)
         .map(|_| {
             (0..SAMPLES)
-                .flat_map(|_| (dice.between(0.0, 1.0) as f32).to_le_bytes())
+                .flat_map(|_| (random.between(0.0, 1.0) as f32).to_le_bytes())
                 .collect()
         })
         .collect();
-    let mut dice = Dice(35);
-    let hostile = (0..TILES).map(|_| hostile(&mut dice)).collect::<Vec<_>>();
+    let mut random = Random(35);
+    let hostile = (0..TILES).map(|_| hostile(&mut random)).collect::<Vec<_>>();
     let as_floats = |bytes| Heights::Samples { base: 1, bytes };
     let as_packed = |bytes| Heights::Packed { base: 1, bytes };
     vec![
@@ -79,16 +81,16 @@ fn unit(steps: &[Step]) -> f64 {
 
 /// Two lines, holes in runs of one, and long numbers: each sample takes as many steps as
 /// bytes can make it take. It ends with too few bytes, which is told at the end only.
-fn hostile(dice: &mut Dice) -> Vec<u8> {
+fn hostile(random: &mut Random) -> Vec<u8> {
     let mut bytes = vec![2 | 4 | 27 << 3, 0, 0, 0, 0x40];
     for _ in 0..2 {
         bytes.push(20);
-        bytes.extend((0..16).map(|_| (256.0 * dice.between(0.0, 1.0)) as u8));
+        bytes.extend((0..16).map(|_| (256.0 * random.between(0.0, 1.0)) as u8));
     }
     while bytes.len() < MAX_PACKED {
         // Escapes, or one zero after the other.
-        bytes.push(if dice.between(0.0, 1.0) < 0.3 {
-            (256.0 * dice.between(0.0, 1.0)) as u8
+        bytes.push(if random.between(0.0, 1.0) < 0.3 {
+            (256.0 * random.between(0.0, 1.0)) as u8
         } else {
             0
         });

@@ -18,16 +18,16 @@ mod friction;
 mod output;
 mod proxy;
 mod settings;
-mod straight_way;
+mod straight_path;
 mod tolerance;
 
 #[cfg(test)]
-mod basin_tests;
+mod crest_tests;
 #[cfg(test)]
-mod dice;
-#[cfg(test)]
-#[path = "tally_tests.rs"]
+#[path = "cost_tests.rs"]
 mod tally;
+#[cfg(test)]
+mod test_random;
 #[cfg(test)]
 mod tests;
 

@@ -3,8 +3,8 @@
 use std::vec::Vec;
 
 use super::budget::Budget;
-use super::dice::Dice;
 use super::sweep::{Path, Swept};
+use super::test_random::Random;
 use super::*;
 use crate::cases::cases;
 use crate::grid::Cell;
@@ -142,7 +142,7 @@ fn assert_is_nearest(truth: &Ground64, slope: f64, proxy: [f64; 3], hip: [f64; 3
 
 /// A HIP that wanders, at `step` cells a tick, around height `mid` ± `span`.
 fn wander(seed: u64, ticks: u32, step: f64, mid: f64, span: f64) -> Vec<[f64; 3]> {
-    let mut dice = Dice(seed);
+    let mut random = Random(seed);
     let mut p = [30.0, 30.0, mid + span];
     let mut v = [0.0; 3];
     let high = [58.0, 58.0, mid + span];
@@ -150,7 +150,7 @@ fn wander(seed: u64, ticks: u32, step: f64, mid: f64, span: f64) -> Vec<[f64; 3]
     (0..ticks)
         .map(|_| {
             for k in 0..3 {
-                v[k] = 0.9 * v[k] + 0.3 * step * dice.between(-1.0, 1.0);
+                v[k] = 0.9 * v[k] + 0.3 * step * random.between(-1.0, 1.0);
                 p[k] += v[k];
                 if p[k] < low[k] || p[k] > high[k] {
                     p[k] = p[k].clamp(low[k], high[k]);
@@ -164,13 +164,13 @@ fn wander(seed: u64, ticks: u32, step: f64, mid: f64, span: f64) -> Vec<[f64; 3]
 
 /// Jumps anywhere.
 fn teleport(seed: u64, ticks: u32, mid: f64, span: f64) -> Vec<[f64; 3]> {
-    let mut dice = Dice(seed);
+    let mut random = Random(seed);
     let mut path = std::vec![[30.0, 30.0, mid + 3.0 * span]];
     path.extend((0..ticks).map(|_| {
         [
-            dice.between(1.0, 59.0),
-            dice.between(1.0, 59.0),
-            dice.between(mid - span, mid + span),
+            random.between(1.0, 59.0),
+            random.between(1.0, 59.0),
+            random.between(mid - span, mid + span),
         ]
     }));
     path
@@ -192,16 +192,16 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
     let truth = Ground64 { height };
-    let mut dice = Dice(7);
+    let mut random = Random(7);
     let mut seen = [0, 0];
     const WAYS: u32 = cases(4000, 6);
     for _ in 0..WAYS {
-        let from = [dice.between(0.5, 59.5), dice.between(0.5, 59.5), high];
-        let reach = if dice.unit() < 0.5 { 2.0 } else { 60.0 };
+        let from = [random.between(0.5, 59.5), random.between(0.5, 59.5), high];
+        let reach = if random.unit() < 0.5 { 2.0 } else { 60.0 };
         let to = [
-            (from[0] + dice.between(-reach, reach)).clamp(0.5, 59.5),
-            (from[1] + dice.between(-reach, reach)).clamp(0.5, 59.5),
-            dice.between(low, high),
+            (from[0] + random.between(-reach, reach)).clamp(0.5, 59.5),
+            (from[1] + random.between(-reach, reach)).clamp(0.5, 59.5),
+            random.between(low, high),
         ];
         let (a, b) = (point(from), point(to));
         let mut path = Path::through_air(a, b);
@@ -463,9 +463,9 @@ fn steep_ways_in_over_the_border_cross_nothing() {
     let mut tiles = buffers::<8>();
     let mut field = Field::<8>::over(&mut tiles, FieldSize::new(72, 72), |_, _| 0.0);
     field.hold_around(Cell::new(36, 36));
-    let mut dice = Dice(1);
+    let mut random = Random(1);
     for way in 0..cases(1000, 10) {
-        let beside = [dice.between(0.0, 72.0), dice.between(-1.0, 0.0), 0.2].map(|x| x as f32);
+        let beside = [random.between(0.0, 72.0), random.between(-1.0, 0.0), 0.2].map(|x| x as f32);
         let from = GridPoint::new([0; 3], Vec3::from(beside));
         let to = GridPoint::new([3, 3, -100_000_000], Vec3::ZERO);
         let mut path = Path::through_air(from, to);
@@ -519,14 +519,14 @@ fn a_mirrored_way_along_grid_lines_is_felt_mirrored() {
     let size = FieldSize::new(16, 16);
     let plain = Field::<2>::held(plain, size, lopsided);
     let mirrored = Field::<2>::held(mirrored, size, move |x, y| lopsided(16 - x, 16 - y));
-    let mut dice = Dice(5);
+    let mut random = Random(5);
     let mut touched = 0;
     for _ in 0..cases(400, 10) {
         let mut contacts = [(); 2].map(|()| Contact::new(ContactSettings::AT_1_KHZ));
         let mut at = [8.0, 8.0, 4.0_f32];
         for tick in 0..60 {
-            let axis = (dice.between(0.0, 3.0) as usize).min(2);
-            let way = 0.25 * dice.between(-8.0, 9.0).floor() as f32;
+            let axis = (random.between(0.0, 3.0) as usize).min(2);
+            let way = 0.25 * random.between(-8.0, 9.0).floor() as f32;
             let most = if axis == 2 { 4.0 } else { 17.0 };
             at[axis] = (at[axis] + way).clamp(-1.0, most);
             let [x, y, z] = at;

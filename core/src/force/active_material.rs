@@ -84,7 +84,7 @@ impl ActiveMaterial {
     /// One more tick of a contact, which is done with its HIP. Returns whether another texture
     /// is felt from now on.
     ///
-    /// Where the tile of the proxy is not here, the material stays.
+    /// The material stays while the tile of the proxy is missing.
     pub(crate) fn advance<const D: usize>(
         &mut self,
         table: &MaterialTable,

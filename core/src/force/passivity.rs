@@ -7,9 +7,9 @@
 //! act, each at the time when it acted, and compares it with what a spring would hold at this depth;
 //! what is more was created. So it is known while the tip goes in, and not only when it has left.
 //!
-//! What the controller asks for acts a latency later, too. So it looks ahead by that time: the
-//! forces on their way are known, and the tip is taken to go on as it does. It adds the damping that
-//! takes back what will have been created by then: K (T / 2 + L) in an even motion.
+//! The damping of the controller acts a latency later, too. So the controller looks ahead by that
+//! time: the forces to come are known, and the tip is assumed to keep its velocity. It adds the damping
+//! that dissipates the energy created until then: K (T / 2 + L) in an even motion.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! What blocks arming while the amplifiers are off.
+//! Blockers of arming, while the amplifiers are off.
 
 use super::{Blockers, Guard, GuardInputs, SceneKind, Surroundings};
 

@@ -2,7 +2,7 @@
 //!
 //! Sources: `mahilab/Phantom` (a Premium 1.5 measured and driven, CAD and motor
 //! data), Çavuşoğlu, Feygin & Tendick (Presence, 2002), CHAI3D's device limits.
-//! What has one weak source or none is marked *uncertain*: measure it before
+//! A number with one weak source or none is marked *uncertain*: measure it before
 //! the first force.
 
 use glam::Vec3;
@@ -87,7 +87,7 @@ impl Calibration {
     ///
     /// The ratios contradict the resolution of 0.03 mm that is published for this model.
     /// No source says which of the two is wrong, so the ruler of the calibration decides.
-    /// What an encoder counts for a millimetre of the tip near the home pose:
+    /// Encoder counts for a millimetre of the tip near the home pose:
     ///
     /// | axis | with this preset's 13.3, 11.2, 11.2 | with 7.2, 7.2, 7.2 |
     /// | --- | --- | --- |

@@ -1,7 +1,7 @@
 //! Which tiles to ask the host for, and when to ask again.
 //!
-//! What the device asks for follows from the tile that the loop lacks, from where
-//! the proxy and the haptic interface point (HIP) are, and from how the HIP moves.
+//! The requests follow from the tile that the loop lacks, from the positions of the proxy and
+//! the haptic interface point (HIP), and from the motion of the HIP.
 //! A tile that the HIP cannot reach within [`HORIZON_TICKS`] is not asked for, and one
 //! that is held is not asked for again. Over a fallback that time begins when an answer can
 //! come, so what the HIP will have left by then is not asked for either. Time is counted in ticks

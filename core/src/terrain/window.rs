@@ -46,7 +46,7 @@ impl Corners {
 }
 
 /// `D × D` tiles; tile `(col, row)` always lives in slot `(col mod D, row mod D)`.
-/// Where `D` is no power of two, nothing above single tiles is known to be clear.
+/// If `D` is no power of two, there are no maxima above single tiles.
 ///
 /// ```
 /// use hapterra_core::grid::{Altitude, Cell};

@@ -1,5 +1,5 @@
 //! The end of the program. The chip resets itself, and QEMU ends there (`-no-reboot`).
-//! What went wrong is reported on UART2 before; after a good end nothing was.
+//! A failure is reported on UART2 before; a good end reports nothing.
 //!
 //! Semihosting could end the program, too, with an exit code. It could as well read and
 //! write every file of the host, so QEMU runs without it.

@@ -6,8 +6,8 @@
 //! the register in bits 21-19, the channel in bits 18-16, then the value. Outputs A, B and C
 //! command axes 1 to 3; D stays powered down.
 //!
-//! What a frame asks to read comes back during the frame after it. Each tick therefore asks
-//! for one register before it writes the three commands, and compares what comes back with
+//! The converter sends a requested register during the next frame. Each tick therefore requests
+//! one register before it writes the three commands, and compares the answer with
 //! the first of them. A register that does not read back as it was written says that the
 //! converter lost its supply, or that a wire to it is broken.
 

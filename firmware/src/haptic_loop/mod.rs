@@ -6,7 +6,7 @@
 
 mod clutch_input;
 mod liveness;
-mod mark;
+mod mark_pulse;
 mod reporter;
 mod timing;
 
@@ -24,7 +24,7 @@ use crate::motor_memory::{MotorLog, Words};
 use crate::queues::{LoopEnds, LoopReport, QueuedTick};
 use clutch_input::ClutchInput;
 use liveness::Liveness;
-use mark::Mark;
+use mark_pulse::Mark;
 use reporter::Reporter;
 use timing::Timing;
 

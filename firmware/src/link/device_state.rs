@@ -14,7 +14,7 @@ use hapterra_core::wire::status::{BootReport, CalibrationSource};
 use super::requests::LatestRequest;
 use super::session::Session;
 use crate::board::TickClock;
-use crate::press::PressWait;
+use crate::dead_man_press::PressWait;
 
 /// Progress of storing a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]

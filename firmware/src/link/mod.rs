@@ -7,7 +7,7 @@
 //! device call it directly, so that a test can play every fault of a link byte by
 //! byte.
 //!
-//! What it promises:
+//! Guarantees:
 //! - Answers and requests go before telemetry. When the writer is slow,
 //!   telemetry is dropped and counted, nothing else.
 //! - A tile is requested only if there is a buffer to put it in.

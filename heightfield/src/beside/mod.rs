@@ -4,7 +4,7 @@
 
 mod pam;
 mod prj;
-mod unread;
+mod unused_files;
 mod world_file;
 
 use std::ffi::OsString;
@@ -16,7 +16,7 @@ use crate::remote::{is_missing, neighbour};
 
 pub(super) use pam::Notes;
 pub(super) use prj::reference_system;
-pub(super) use unread::remark_unread;
+pub(super) use unused_files::remark_unread;
 pub(super) use world_file::{lay_out_by_world_file, remark_other_place};
 
 /// No neighbour that is text is longer; what is longer is something else.

@@ -33,7 +33,7 @@ impl Notes {
     /// Reads the notes on a band, the first being 1, beside a file on disk or at a URL.
     ///
     /// # Errors
-    /// Where they are elsewhere and cannot be read at present: no-data would be taken for heights.
+    /// If they are remote and cannot be read at present: no-data would be taken for heights.
     pub(crate) fn read(input: &FileBytes, band: u32) -> Result<Self, RasterError> {
         let (text, name) = match super::text_appended(input, "aux.xml") {
             Ok(Some(found)) => found,

@@ -10,7 +10,7 @@ use crate::input::FileBytes;
 /// to be called before the samples are laid out.
 ///
 /// # Errors
-/// Where it is elsewhere and cannot be read at present.
+/// If it is remote and cannot be read at present.
 pub(crate) fn reference_system(
     input: &FileBytes,
     decoded: &mut Decoded,

@@ -5,7 +5,7 @@
 //! (`cache`), and looks at a few of them when the file is opened (`survey`). Coarser
 //! images of the same field, overviews, serve the coarse levels of detail. Of a file that
 //! has none they are made on the way (`coarse`), and what is coarse is kept on disk
-//! (`lasting`).
+//! (`coarse_on_disk`). `block_state` tracks the blocks in memory and those on their way.
 //!
 //! A block that cannot be read is a hole, with a warning: what is wrong in one place of a
 //! file that is larger than memory is no reason to feel nothing of it. What has not come yet
@@ -19,10 +19,10 @@
 //! memory does not wait for one that is being read.
 
 mod background;
+mod block_state;
 mod cache;
 mod coarse;
-mod kept;
-mod lasting;
+mod coarse_on_disk;
 mod reader;
 mod reading;
 mod survey;
@@ -40,9 +40,9 @@ use super::{RasterError, ReadStatus, ReadTracker, Wait, bilinear};
 use crate::disk_cache::DiskCache;
 use crate::remote::without_key;
 use background::{Job, Queue};
+use block_state::BlockState;
 use cache::Key;
 use coarse::{Coarse, Found};
-use kept::Kept;
 pub(super) use reader::{Block, BlockImage, BlockReader, Part, usual_block};
 pub(super) use survey::{Looks, Survey, stored_parts};
 
@@ -67,7 +67,7 @@ pub(super) struct Shared {
     /// The reader's images, and coarse ones that are made of them.
     images: Vec<BlockImage>,
     /// Is not held while a block is read.
-    kept: Mutex<Kept>,
+    kept: Mutex<BlockState>,
     /// Held by a thread that reads a block for a waiting reader.
     turn: Mutex<()>,
     coarse: Mutex<Coarse>,
@@ -95,7 +95,7 @@ impl Blocks {
         let shared = Shared {
             images: reader.images().to_vec(),
             reader,
-            kept: Mutex::new(Kept::new(cache::MAX_BYTES)),
+            kept: Mutex::new(BlockState::new(cache::MAX_BYTES)),
             turn: Mutex::new(()),
             coarse: Mutex::new(Coarse::none()),
             disk: DiskCache::off(),
@@ -225,7 +225,7 @@ impl Shared {
 
     /// Keeps no more than so many bytes of blocks, and counts `unread` blocks as warned of.
     pub(super) fn set_share(&self, most_bytes: usize, unread: u32) {
-        *self.kept() = Kept::new(most_bytes).after(unread);
+        *self.kept() = BlockState::new(most_bytes).after(unread);
     }
 
     /// Bytes that the blocks in memory take, and how many blocks could not be read.
@@ -255,7 +255,7 @@ impl Shared {
         self.kept().outage.take()
     }
 
-    fn kept(&self) -> MutexGuard<'_, Kept> {
+    fn kept(&self) -> MutexGuard<'_, BlockState> {
         // Nothing that panics runs while this is held.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }

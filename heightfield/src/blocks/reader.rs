@@ -25,7 +25,7 @@ pub(crate) trait BlockReader: Send + Sync {
     /// The samples of a part of an image, row after row.
     ///
     /// # Errors
-    /// What is wrong with that part of the file.
+    /// A fault of that part of the file.
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError>;
 
     /// Is told the file's order before anything is read: coarse levels count their samples

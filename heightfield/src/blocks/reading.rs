@@ -4,11 +4,11 @@
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 
-use super::super::guard::guarded;
+use super::super::decoder_panic::guarded;
 use super::background::{Job, Queue};
 use super::cache::Key;
 use super::coarse::Piece;
-use super::{Block, NotHere, Part, Shared, Wait, lasting};
+use super::{Block, NotHere, Part, Shared, Wait, coarse_on_disk};
 use crate::remote::without_key;
 
 /// After so many warnings of blocks that cannot be read one says that there are more.
@@ -47,7 +47,7 @@ impl Shared {
             return Ok(None);
         };
         if wait == Wait::Never {
-            let is_new = match lasting::is_coarse(of) {
+            let is_new = match coarse_on_disk::is_coarse(of) {
                 true => self.queue.want(Job::Fetch(key)),
                 false => self.fine.want_first(Job::Fetch(key)),
             };
@@ -79,13 +79,14 @@ impl Shared {
         };
         let part = image.part(key.at);
         let samples = part.columns as usize * part.rows as usize;
-        let name = || match self.disk.is_on() && lasting::is_coarse(image) {
-            true => lasting::name(&*self.reader, image, &key),
+        let name = || match self.disk.is_on() && coarse_on_disk::is_coarse(image) {
+            true => coarse_on_disk::name(&*self.reader, image, &key),
             false => None,
         };
         let before = name();
-        let found = (before.as_ref()).and_then(|name| lasting::load(&self.disk, name, samples));
-        let block = if let Some(block) = found.and_then(lasting::block_of) {
+        let found =
+            (before.as_ref()).and_then(|name| coarse_on_disk::load(&self.disk, name, samples));
+        let block = if let Some(block) = found.and_then(coarse_on_disk::block_of) {
             Some(Arc::new(block))
         } else {
             let read = self.read(key.image, &part)?;
@@ -93,8 +94,8 @@ impl Shared {
             if let Some(kept_as) = before.filter(|_| !read.is_lacking)
                 && name() == Some(kept_as)
             {
-                let piece = lasting::piece_of(read.block.as_deref(), samples);
-                lasting::keep(&self.disk, &kept_as, piece);
+                let piece = coarse_on_disk::piece_of(read.block.as_deref(), samples);
+                coarse_on_disk::keep(&self.disk, &kept_as, piece);
             }
             if key.image == 0 {
                 self.leave(&part, &read);
@@ -219,10 +220,10 @@ impl Shared {
 
     /// Looks for a piece of a made image on disk.
     pub(super) fn seek(&self, key: Key) {
-        let name = lasting::name(&*self.reader, &self.images[key.image], &key);
+        let name = coarse_on_disk::name(&*self.reader, &self.images[key.image], &key);
         let block = self.images[key.image].block;
         let samples = block[0] as usize * block[1] as usize;
-        let found = name.and_then(|name| lasting::load(&self.disk, &name, samples));
+        let found = name.and_then(|name| coarse_on_disk::load(&self.disk, &name, samples));
         self.coarse().sought(key, found.as_ref());
     }
 
@@ -242,8 +243,8 @@ impl Shared {
     /// Keeps pieces on disk, if the file is what it was.
     pub(super) fn keep(&self, pieces: Vec<(Key, Piece)>) {
         for (key, piece) in pieces.into_iter().filter(|_| self.disk.is_on()) {
-            if let Some(name) = lasting::name(&*self.reader, &self.images[key.image], &key) {
-                lasting::keep(&self.disk, &name, piece);
+            if let Some(name) = coarse_on_disk::name(&*self.reader, &self.images[key.image], &key) {
+                coarse_on_disk::keep(&self.disk, &name, piece);
             }
         }
     }

@@ -3,7 +3,7 @@
 //!
 //! A record is one file. Its name is a hash of what it is about (`Name`): the file it was
 //! made of and the state of that file, so what belongs to a file that was changed since is
-//! never found. `record` says what is in it and checks it; `room` deletes the records used
+//! never found. `record` says what is in it and checks it; `size_limit` deletes the records used
 //! longest ago when all take more than the bound.
 //!
 //! A record appears when it is complete (it is renamed to its name), so that programs that
@@ -11,16 +11,16 @@
 //! line in the log and no error: without it everything is worked out again. A folder in which
 //! others may write is not used (`private`).
 //!
-//! `unnamed` has files for one program's own use, which are no records.
+//! `temporary_files` has files for one program's own use, which are no records.
 
 mod name;
 mod private;
 mod record;
-mod room;
+mod size_limit;
 mod stamp;
+mod temporary_files;
 #[cfg(test)]
 mod tests;
-mod unnamed;
 
 use std::fmt;
 use std::io::{self, Read, Write};
@@ -32,9 +32,9 @@ use std::time::{Duration, SystemTime};
 use etcetera::{BaseStrategy, choose_base_strategy};
 
 pub(crate) use name::Name;
-use room::Room;
+use size_limit::SizeLimit;
 pub(crate) use stamp::FileStamp;
-pub(crate) use unnamed::Unnamed;
+pub(crate) use temporary_files::TemporaryFile;
 
 use crate::regular_file;
 
@@ -56,7 +56,7 @@ struct Folder {
     /// Bytes that files without a name may take.
     unnamed: AtomicU64,
     /// Size of its content; `None` once it could not be written.
-    room: Mutex<Option<Room>>,
+    room: Mutex<Option<SizeLimit>>,
     /// Set once a message has said that it is not used.
     warned: OnceLock<()>,
 }
@@ -79,7 +79,7 @@ impl DiskCache {
             return Self::off();
         }
         let path = folder.join(FORM);
-        let room = Mutex::new(Some(Room::new(most_bytes)));
+        let room = Mutex::new(Some(SizeLimit::new(most_bytes)));
         Self(Some(Arc::new(Folder {
             path,
             most_bytes,
@@ -164,7 +164,7 @@ impl Folder {
         self.check()
     }
 
-    fn write(&self, room: &mut Room, name: &Name, bytes: &[u8]) -> io::Result<()> {
+    fn write(&self, room: &mut SizeLimit, name: &Name, bytes: &[u8]) -> io::Result<()> {
         self.make()?;
         room.look(&self.path);
         let path = self.path.join(name.path());
@@ -172,7 +172,7 @@ impl Folder {
         private::make(parent)?;
         let record = record::made(name, bytes);
         let mut file = tempfile::Builder::new()
-            .prefix(room::UNFINISHED)
+            .prefix(size_limit::UNFINISHED)
             .tempfile_in(parent)?;
         file.write_all(&record)?;
         file.persist(&path)?;

@@ -2,8 +2,8 @@
 //! file with a `FORMAT`, and name it in [`FORMATS`].
 
 mod asc;
+pub(super) mod flt_bil;
 pub(super) mod gdal;
-pub(super) mod headered;
 mod height_name;
 mod hgt;
 mod npy;
@@ -21,7 +21,7 @@ pub(super) const FORMATS: [Format; 6] = [
     npy::FORMAT,
     asc::FORMAT,
     hgt::FORMAT,
-    headered::FORMAT,
+    flt_bil::FORMAT,
 ];
 
 /// Returns true if a file that begins with some bytes is read here, and not by GDAL.

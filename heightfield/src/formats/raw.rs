@@ -2,7 +2,7 @@
 
 use crate::decoded::Decoded;
 use crate::input::FileBytes;
-use crate::plain::Plain;
+use crate::raw_samples::RawSamples;
 use crate::read::Stored;
 use crate::{OpenOptions, RasterError, RawLayout};
 
@@ -34,7 +34,7 @@ pub(crate) fn decode(
         )));
     }
     let stored = Stored::Held(layout.sample);
-    let plain = Plain::packed((columns, rows), stored, layout.endian, 0);
+    let plain = RawSamples::packed((columns, rows), stored, layout.endian, 0);
     let format = format!("raw {}", layout.sample.none().type_name());
     let storage = plain.storage(input, options)?;
     Ok(Decoded::new(format, (columns, rows), storage))

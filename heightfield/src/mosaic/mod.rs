@@ -8,8 +8,8 @@
 //! Layers beside heights, as masks and counts of scenes, are left out (`layers`). Files that overlap
 //! and differ there are reported, and refused where they lie on the same samples (`overlaps`).
 //!
-//! Where no file has a height there is a hole. A file that cannot be read is one, too, with
-//! a warning: one bad file of thousands is no reason to feel nothing.
+//! A place without a height in any file is no-data. So is a file that cannot be read, with a warning:
+//! one bad file of thousands does not make the terrain unusable.
 //!
 //! Level *L* has every 2ᴸ-th sample, as of a raster in memory; of a file that has overviews
 //! it has those.

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use lru::LruCache;
 
-use super::super::guard::guarded;
+use super::super::decoder_panic::guarded;
 use super::super::storage::Storage;
 use super::super::{Decoded, OpenOptions, RasterError};
 use super::source::{Opened, Source};
@@ -56,7 +56,7 @@ impl Pool {
     /// An open file; `None`, with a warning the first time, where it cannot be read.
     ///
     /// # Errors
-    /// Where it is elsewhere, and cannot be read at present.
+    /// If it is remote and cannot be read at present.
     pub(super) fn get(
         &mut self,
         number: usize,

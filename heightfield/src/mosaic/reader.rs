@@ -80,7 +80,7 @@ impl Mosaic {
     /// A file, opened; `None`, with a warning the first time, where it cannot be read.
     ///
     /// # Errors
-    /// Where it is elsewhere, and cannot be read at present.
+    /// If it is remote and cannot be read at present.
     pub(super) fn opened(
         &self,
         number: usize,

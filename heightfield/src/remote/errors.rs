@@ -7,7 +7,7 @@ use object_store::Error as StoreError;
 use super::OUTAGE;
 use super::redirects::RedirectError;
 use super::url::{in_text, is_url};
-use crate::shown::shown;
+use crate::printable_text::printable;
 
 /// No answer of a server is shown at more length than this, characters.
 const SHOWN: usize = 300;
@@ -179,7 +179,7 @@ fn in_short(text: &str) -> String {
         false => word.to_owned(),
     };
     let words: Vec<String> = text.split_whitespace().map(word).collect();
-    shown(&words.join(" ")).chars().take(SHOWN).collect()
+    printable(&words.join(" ")).chars().take(SHOWN).collect()
 }
 
 #[cfg(test)]

@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use tokio::runtime::Runtime;
 
-use super::kept::{KeptPages, joined, missing};
-use super::line::{Held, Line, Trouble, spawn};
 use super::pages;
+use super::pages_on_disk::{PagesOnDisk, joined, missing};
+use super::shared_pages::{Held, SharedPages, Trouble, spawn};
 use super::store::{Object, Opened};
 use super::{LOST, OUTAGE, is_outage};
 use crate::disk_cache::FileStamp;
@@ -25,20 +25,20 @@ const LOOK: Duration = Duration::from_millis(20);
 pub(crate) struct RemoteFile {
     name: String,
     number: u64,
-    line: Arc<Line>,
+    line: Arc<SharedPages>,
     background: &'static Runtime,
     object: Object,
     /// All of it, where it is short or its server knows no ranges.
     all: Option<Vec<u8>>,
     /// Its pages on disk, where they can be kept.
-    kept: Option<KeptPages>,
+    kept: Option<PagesOnDisk>,
 }
 
 impl RemoteFile {
     /// A file that a server has answered for.
     pub(super) fn new(
         name: &str,
-        line: &Arc<Line>,
+        line: &Arc<SharedPages>,
         background: &'static Runtime,
         opened: Opened,
     ) -> Self {
@@ -48,7 +48,7 @@ impl RemoteFile {
             line.held().pages.arrived(number, 0..1, &opened.first);
         }
         let kept = line.disk().zip(opened.object.stamp());
-        let kept = kept.map(|(disk, stamp)| KeptPages::new(disk, stamp, opened.object.len()));
+        let kept = kept.map(|(disk, stamp)| PagesOnDisk::new(disk, stamp, opened.object.len()));
         Self {
             kept: kept.filter(|_| !all),
             name: name.to_owned(),

@@ -1,36 +1,34 @@
-//! Terrain files elsewhere: at URLs, of which only what is touched is fetched.
+//! Terrain files at URLs, of which only the touched parts are fetched.
 //!
 //! ```text
-//! Elsewhere (files known by their URL) ─▶ RemoteFile (its pages) ─▶ store (requests)
+//! fetcher (open files by URL) ─▶ file, pages (64 KiB each) ─▶ store (HTTP requests)
 //! ```
 //!
 //! A file is cut into pages. Pages that are wanted are fetched in the background, several
 //! that follow each other with one request, and those touched last are kept. Every read
 //! waits for them; where a caller must not wait, a thread of the blocks reads ([`crate::Wait`]).
 //!
-//! Pages are kept on disk for another run (`kept`), where the server says by a tag or a time
+//! Pages are kept on disk for another run (`pages_on_disk`), where the server says by a tag or a time
 //! which state of the file they are of.
 //!
 //! A file that was changed at its server is not read on: what was fetched of it and what
 //! would come do not belong together.
 //!
 //! `object_store` makes the requests; it is named in `store`, `servers`, `requests` and `errors` only.
-//! Without the feature `remote` there is no such file (`absent`).
+//! Without the feature `remote` there is no such file (`disabled`).
 
 #[cfg(not(feature = "remote"))]
-mod absent;
-#[cfg(feature = "remote")]
-mod elsewhere;
+mod disabled;
 #[cfg(feature = "remote")]
 mod errors;
 #[cfg(feature = "remote")]
+mod fetcher;
+#[cfg(feature = "remote")]
 mod file;
 #[cfg(feature = "remote")]
-mod kept;
-#[cfg(feature = "remote")]
-mod line;
-#[cfg(feature = "remote")]
 mod pages;
+#[cfg(feature = "remote")]
+mod pages_on_disk;
 mod reader;
 #[cfg(feature = "remote")]
 mod redirects;
@@ -39,17 +37,19 @@ mod requests;
 #[cfg(feature = "remote")]
 mod servers;
 #[cfg(feature = "remote")]
+mod shared_pages;
+#[cfg(feature = "remote")]
 mod store;
 mod url;
 
 use std::io::{Error, ErrorKind};
 
 #[cfg(not(feature = "remote"))]
-pub use absent::RemoteFetcher;
+pub use disabled::RemoteFetcher;
 #[cfg(not(feature = "remote"))]
-pub(crate) use absent::RemoteFile;
+pub(crate) use disabled::RemoteFile;
 #[cfg(feature = "remote")]
-pub use elsewhere::RemoteFetcher;
+pub use fetcher::RemoteFetcher;
 #[cfg(feature = "remote")]
 pub(crate) use file::RemoteFile;
 pub(crate) use reader::RemoteReader;

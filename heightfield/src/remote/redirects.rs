@@ -45,7 +45,7 @@ pub(super) fn has_key(url: &Url, headers: &HeaderMap) -> bool {
 /// Returns the target of a redirect.
 ///
 /// # Errors
-/// Why it is not followed.
+/// The reason for which it is not followed.
 pub(super) fn followed(from: &Url, location: &str, has_key: bool) -> Result<Url, RedirectError> {
     let to = from.join(location).map_err(|_| RedirectError::NoUrl)?;
     let host = match (to.scheme(), to.host_str()) {

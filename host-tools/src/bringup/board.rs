@@ -13,7 +13,7 @@ use hapterra_core::wire::status::Status;
 use super::attendant::{Attendant, Stopped, Task};
 use super::finding::Finding;
 use super::halt::Halt;
-use crate::link::{Dialogue, LinkError};
+use crate::link::{ControlSession, LinkError};
 
 /// Between two looks, ms of the board's time.
 const LOOK_MS: u32 = 100;
@@ -26,7 +26,7 @@ const STILL_COUNTS: u32 = 3;
 
 /// A board on the link.
 pub(super) struct Board<'d, 't> {
-    dialogue: &'d mut Dialogue<'t>,
+    control: &'d mut ControlSession<'t>,
     /// True if the attendant wants to stop.
     stops: fn() -> bool,
     /// It was asked for something that drives, and has not confirmed that it is disarmed
@@ -37,9 +37,9 @@ pub(super) struct Board<'d, 't> {
 impl<'d, 't> Board<'d, 't> {
     /// The board at the other end of a dialogue, for an attendant who wants to stop when
     /// `stops` says so.
-    pub(super) fn new(dialogue: &'d mut Dialogue<'t>, stops: fn() -> bool) -> Self {
+    pub(super) fn new(control: &'d mut ControlSession<'t>, stops: fn() -> bool) -> Self {
         Self {
-            dialogue,
+            control,
             stops,
             may_be_armed: false,
         }
@@ -48,7 +48,7 @@ impl<'d, 't> Board<'d, 't> {
     /// Returns its introduction.
     #[must_use]
     pub(super) fn device(&self) -> &DeviceHello {
-        self.dialogue.device()
+        self.control.device()
     }
 
     /// The record in force.
@@ -56,7 +56,7 @@ impl<'d, 't> Board<'d, 't> {
     /// # Errors
     /// [`Halt::Link`].
     pub(super) fn calibration(&mut self) -> Result<Option<Calibration>, Halt> {
-        Ok(self.dialogue.calibration()?)
+        Ok(self.control.calibration()?)
     }
 
     /// Looks at it after a moment, or as soon as `on` says of a sample that it is enough;
@@ -74,7 +74,7 @@ impl<'d, 't> Board<'d, 't> {
         let is_enough = Cell::new(false);
         let enough = || is_enough.get();
         let passed = self
-            .dialogue
+            .control
             .pass(LOOK_MS, &enough, &mut |message| match message {
                 ToHost::TileRequest { epoch, key } => Some(ToDevice::Tile(TileMessage {
                     epoch: *epoch,
@@ -158,7 +158,7 @@ impl<'d, 't> Board<'d, 't> {
     /// # Errors
     /// [`Finding::NotReady`], [`Finding::Refused`], [`Halt::Link`].
     pub(super) fn ask(&mut self, request: &Request) -> Result<(), Halt> {
-        match self.dialogue.request(request)? {
+        match self.control.request(request)? {
             Ok(()) => Ok(()),
             Err(Refusal::Blocked(why)) => Err(Finding::NotReady(why).into()),
             Err(refusal) => Err(Finding::Refused(refusal).into()),
@@ -184,13 +184,13 @@ impl<'d, 't> Board<'d, 't> {
     /// # Errors
     /// [`Halt::Link`].
     pub(super) fn put(&mut self, scene: Scene) -> Result<(), Halt> {
-        Ok(self.dialogue.put_scene(scene)?)
+        Ok(self.control.put_scene(scene)?)
     }
 
     /// Arms for the scene in force, with the attendant's press.
     ///
     /// # Errors
-    /// What blocks it, or a fault.
+    /// A blocker, or a fault.
     pub(super) fn arm(&mut self, attendant: &mut dyn Attendant) -> Result<(), Halt> {
         self.drive(attendant, &Request::Arm)?;
         let ends = |status: &Status| {
@@ -233,20 +233,20 @@ impl<'d, 't> Board<'d, 't> {
             // The board may be gone; then nothing is left to be done.
             _ => return Ok(()),
         }
-        let latched = self.dialogue.fresh_status().ok();
+        let latched = self.control.fresh_status().ok();
         let seen = latched.and_then(|status| status.health.report.fault);
         for request in [Request::DropScene, Request::ClearFault { seen }] {
             // Whether it does depends on what it still sees.
-            let _ = self.dialogue.request(&request);
+            let _ = self.control.request(&request);
         }
         Ok(())
     }
 
     /// Checks that the board says that it is disarmed, after the command.
     fn disarm(&mut self) -> Result<bool, LinkError> {
-        let answer = self.dialogue.request(&Request::Disarm)?;
+        let answer = self.control.request(&Request::Disarm)?;
         for _ in 0..LOOKS_TO_DISARM {
-            let status = self.dialogue.pass(LOOK_MS, &|| false, &mut |_| None)?;
+            let status = self.control.pass(LOOK_MS, &|| false, &mut |_| None)?;
             if status.health.report.mode == Mode::Disarmed {
                 return Ok(answer.is_ok());
             }

@@ -7,7 +7,7 @@ use super::halt::Halt;
 use super::log::{Identity, Log, LogError};
 use super::step::Step;
 use super::steps;
-use crate::link::Dialogue;
+use crate::link::ControlSession;
 
 /// Progress of a walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,12 +43,12 @@ pub enum BringupError {
 /// # Errors
 /// [`BringupError`].
 pub fn walk(
-    dialogue: &mut Dialogue<'_>,
+    control: &mut ControlSession<'_>,
     attendant: &mut dyn Attendant,
     log: &mut Log,
     keep: &mut dyn FnMut(&Log) -> Result<(), LogError>,
 ) -> Result<Walked, BringupError> {
-    let mut board = Board::new(dialogue, attendant.stops());
+    let mut board = Board::new(control, attendant.stops());
     let record = board.calibration().map_err(BringupError::Halt)?;
     if let Some(why) = log.meet(Identity::of(board.device(), record.as_ref())) {
         attendant.hear(&format!("{why}: what was found of it no longer counts"));

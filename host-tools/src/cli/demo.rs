@@ -101,7 +101,7 @@ pub struct Args {
 /// Runs the demonstration.
 ///
 /// # Errors
-/// What is wrong with the file, the device or the output folder.
+/// A fault of the file, the device or the output folder.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let outputs = Outputs::new(&args.out, &name);

@@ -4,7 +4,7 @@ use hapterra_core::phantom::{Calibration, Model};
 
 use super::bringup::PATIENCE;
 use super::failure::{Failure, OrHint};
-use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
+use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 
 /// Asks a device for its calibration, and leaves its host in place; the preset
 /// of its model where it has none, which is told.
@@ -16,18 +16,18 @@ pub(super) fn calibration_of(
     tell: &dyn Fn(String),
 ) -> Result<Calibration, Failure> {
     let transport = address.connect(|| Native::new(HostClock::default(), None))?;
-    let mut dialogue = Dialogue::look(transport, PATIENCE)?;
-    let calibration = match dialogue.calibration()? {
+    let mut control = ControlSession::look(transport, PATIENCE)?;
+    let calibration = match control.calibration()? {
         Some(calibration) => calibration,
         None => {
-            let model = dialogue.status()?.model.unwrap_or(Model::Premium15);
+            let model = control.status()?.model.unwrap_or(Model::Premium15);
             tell(format!(
                 "the device has no calibration: the terrain is placed for a {model:?}"
             ));
             model.preset()
         }
     };
-    dialogue.end()?;
+    control.end()?;
     calibration
         .validate()
         .map_err(|bad| format!("the device's calibration cannot be used: {bad}"))

@@ -18,7 +18,7 @@ use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::report::put;
 use crate::place::place_in_words;
 use crate::terrain::{Distortion, HapticGrid};
-use heightfield::shown::shown_json;
+use heightfield::printable_text::printable_json;
 use heightfield::without_key;
 use heightfield::{CellSize, CellUnit, Certainty, Fill, ReferenceSystem, SamplesAre};
 use link::LinkFigures;
@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     if args.json {
         let json = serde_json::to_string_pretty(&report).map_err(Failure::new)?;
-        put(&(shown_json(&json) + "\n"))
+        put(&(printable_json(&json) + "\n"))
     } else {
         put(&report.text())
     }

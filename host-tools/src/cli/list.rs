@@ -6,8 +6,8 @@ use super::failure::{Failure, Hint};
 use super::session_summary;
 use crate::board::update::plugged;
 use crate::board::{BOARDS, probes};
-use crate::link::{Dialogue, LinkError, Tcp, Transport, Usb, tcp_address};
-use heightfield::shown::shown;
+use crate::link::{ControlSession, LinkError, Tcp, Transport, Usb, tcp_address};
+use heightfield::printable_text::printable;
 
 /// Arguments of `hapterra list`.
 #[derive(Debug, clap::Args)]
@@ -53,7 +53,7 @@ fn list_usb() {
         println!("  that the cable carries data, and that the board runs hapterra's firmware");
     }
     for info in found {
-        let place = shown(&Usb::place(&info));
+        let place = printable(&Usb::place(&info));
         let known = Usb::open(&info).and_then(|link| who(Box::new(link)));
         println!("  {place}: {}", known.unwrap_or_else(|error| told(&error)));
     }
@@ -72,8 +72,8 @@ fn list_probes() {
         println!("  check the cable to the board's ST-LINK connector");
     }
     for probe in &found {
-        let name = shown(probe.name.as_deref().unwrap_or("no name"));
-        println!("  {} {} ({name})", probe.kind, shown(&probe.selector));
+        let name = printable(probe.name.as_deref().unwrap_or("no name"));
+        println!("  {} {} ({name})", probe.kind, printable(&probe.selector));
     }
     #[cfg(not(feature = "probe"))]
     if !found.is_empty() {
@@ -108,8 +108,8 @@ fn list_emulated(args: &Args) {
 
 /// The device behind a link, in words.
 fn who(link: Box<dyn Transport>) -> Result<String, LinkError> {
-    let dialogue = Dialogue::look(link, PATIENCE)?;
-    Ok(session_summary::device(dialogue.device()))
+    let control = ControlSession::look(link, PATIENCE)?;
+    Ok(session_summary::device(control.device()))
 }
 
 fn told(error: &LinkError) -> String {

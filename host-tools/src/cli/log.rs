@@ -1,5 +1,5 @@
 //! Diagnostics on standard error. A device can cause some of them, as often as it
-//! likes and with words of its own: every line goes through [`shown`], and of each kind
+//! likes and with words of its own: every line goes through [`printable`], and of each kind
 //! of line about the link one a second is written, with the count of those left out. Each
 //! device is served by a thread of its own, and the lines of one device leave none of another's out.
 
@@ -16,7 +16,7 @@ use tracing_subscriber::fmt::MakeWriter;
 
 use super::line_limit::LineLimit;
 use super::terminal::writer;
-use heightfield::shown::shown;
+use heightfield::printable_text::printable;
 
 /// Place where the lines come from that a device can cause.
 const BY_DEVICE: &str = "hapterra::link";
@@ -134,7 +134,7 @@ impl<W: Write> Write for Line<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if let Line(Some(out), left_out) = self {
             let text = String::from_utf8_lossy(bytes);
-            let mut line = shown(text.trim_end_matches('\n'));
+            let mut line = printable(text.trim_end_matches('\n'));
             let left_out = std::mem::take(left_out);
             if left_out > 0 {
                 line += " ";

@@ -1,15 +1,14 @@
 //! The `hapterra` command line: one file a subcommand, each with its `Args`
 //! and a `run`.
 //!
-//! - [`options`]: what several subcommands let their user say;
+//! - [`options`]: options that several subcommands share;
 //! - [`terminal`]: progress, Ctrl-C, and prompts while a command runs;
-//! - [`failure`] and `hints`: what an error looks like, and what to do about it;
-//! - `guardian`: the process that outlives one whose arm may be armed;
-//! - [`report`]: what a command exists to print;
+//! - [`failure`] and `hints`: error messages and their remedies;
+//! - `guardian`: the process that disarms the arm if the serving process dies;
+//! - [`report`]: the result that a command prints;
 //! - `settings`: settings files and recordings in place of options;
-//! - `moved` and `old_options`: what earlier versions had, and what to type now;
-//! - `log` and `line_limit`: diagnostics, and lines that a device can cause kept to so many
-//!   a second.
+//! - `old_subcommands` and `old_options`: names of earlier versions, and their replacements;
+//! - `log` and `line_limit`: diagnostics, and a rate limit for lines that a device can cause.
 
 pub mod bringup;
 pub mod calibrate;
@@ -26,8 +25,8 @@ mod line_limit;
 pub mod list;
 mod log;
 pub mod man;
-mod moved;
 mod old_options;
+mod old_subcommands;
 pub mod options;
 pub mod replay;
 pub mod report;
@@ -155,7 +154,9 @@ pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result
             // It repeats what was typed, which need not be of the user's making.
             true => {
                 let option = || old_options::hint(&words, &error);
-                let moved = moved::hint(&error).or_else(option).unwrap_or_default();
+                let moved = old_subcommands::hint(&error)
+                    .or_else(option)
+                    .unwrap_or_default();
                 if !moved.is_empty() {
                     // The parser's guess would contradict it.
                     error.remove(ContextKind::Suggested);

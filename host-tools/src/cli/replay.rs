@@ -81,7 +81,7 @@ pub struct Args {
 /// Replays the trajectory.
 ///
 /// # Errors
-/// What is wrong with the terrain, the trajectory, the device or the output.
+/// A fault of the terrain, the trajectory, the device or the output.
 pub fn run(args: &Args) -> Result<(), Failure> {
     run_by(args, None)
 }

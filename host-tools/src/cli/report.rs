@@ -6,7 +6,7 @@
 use std::io::{ErrorKind, Write, stdout};
 
 use super::failure::Failure;
-use heightfield::shown::shown_lines;
+use heightfield::printable_text::printable_lines;
 
 /// Prints the report. A reader who goes away wants no more of it; a disk without room has
 /// lost it.
@@ -15,7 +15,7 @@ use heightfield::shown::shown_lines;
 /// Standard output cannot be written.
 pub fn put(report: &str) -> Result<(), Failure> {
     let mut output = stdout().lock();
-    let written = output.write_all(shown_lines(report).as_bytes());
+    let written = output.write_all(printable_lines(report).as_bytes());
     match written.and_then(|()| output.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(Failure::new(format!("cannot write the report: {error}"))

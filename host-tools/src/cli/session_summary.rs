@@ -12,7 +12,7 @@ use crate::place::{Placement, coordinates_in_words};
 use crate::replay::Record;
 use crate::telemetry::Figures;
 use crate::terrain::Terrain;
-use heightfield::shown::shown;
+use heightfield::printable_text::printable;
 
 /// Figures of a session and of its link.
 #[derive(Clone, Debug)]
@@ -196,7 +196,7 @@ pub(super) fn device(hello: &DeviceHello) -> String {
 
 /// A device in words that are also those of others of its kind.
 fn kind_of_device(hello: &DeviceHello) -> String {
-    let [board, version] = [&hello.board, &hello.version].map(|text| shown(text));
+    let [board, version] = [&hello.board, &hello.version].map(|text| printable(text));
     let (w, hz) = (hello.window, hello.tick_hz);
     format!("{board} {version}, window of {w} × {w} tiles, {hz} ticks a second")
 }

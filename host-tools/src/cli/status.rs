@@ -12,7 +12,7 @@ use super::report::put;
 use super::session_summary;
 use super::terminal::writer::{say, show};
 use crate::link::EMULATED;
-use heightfield::shown::shown;
+use heightfield::printable_text::printable;
 
 /// Arguments of `hapterra status`.
 #[derive(Debug, clap::Args)]
@@ -36,20 +36,20 @@ pub struct Args {
 /// No device, one that does not answer, or a status that cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !args.disarm && !args.clear {
-        let status = args.device.look(|dialogue| Ok(dialogue.fresh_status()?))?;
+        let status = args.device.look(|control| Ok(control.fresh_status()?))?;
         return put(&text(&status));
     }
-    args.device.talk(|dialogue| {
+    args.device.talk(|control| {
         if args.disarm {
-            dialogue.request(&Request::Disarm)?.map_err(Failure::new)?;
+            control.request(&Request::Disarm)?.map_err(Failure::new)?;
         }
-        let status = dialogue.fresh_status()?;
+        let status = control.fresh_status()?;
         show(text(&status));
         if args.clear {
             let seen = status.health.report.fault;
-            let answer = dialogue.request(&Request::ClearFault { seen })?;
+            let answer = control.request(&Request::ClearFault { seen })?;
             answer.map_err(Failure::new)?;
-            let cleared = match dialogue.fresh_status()?.health.report.fault {
+            let cleared = match control.fresh_status()?.health.report.fault {
                 None => "no fault is latched any more".to_owned(),
                 Some(fault) => format!("but {fault:?} is there again: {}", fault.what_to_do()),
             };
@@ -137,7 +137,11 @@ fn crashed(crash: &Crash) -> String {
     let (pc, lr, status, tick) = (crash.pc, crash.lr, crash.status, crash.tick);
     let what = match crash.kind {
         CrashKind::Panic => {
-            format!("a panic at line {} of …{}", crash.line, shown(&crash.file))
+            format!(
+                "a panic at line {} of …{}",
+                crash.line,
+                printable(&crash.file)
+            )
         }
         CrashKind::HardFault => format!("a hard fault, status {status:#010x}"),
         CrashKind::UnhandledInterrupt => format!("interrupt {status} without a handler"),

@@ -51,7 +51,7 @@ pub struct Args {
 /// Shows a recording until the viewer is closed.
 ///
 /// # Errors
-/// What is wrong with the recording or the terrain; no viewer.
+/// A fault of the recording or the terrain; no viewer.
 pub fn run(args: &Args) -> Result<(), Failure> {
     check_file(&args.recording)?;
     let rows = RecordingRows::open(&args.recording).map_err(ReplayError::from)?;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use heightfield::shown::shown_json;
+use heightfield::printable_text::printable_json;
 
 /// Version of the lines. Fields may be added in a version; none changes its meaning.
 pub const FORMAT: u32 = 1;
@@ -150,6 +150,6 @@ impl Line<'_> {
     /// The line with its end.
     pub(super) fn text(&self) -> String {
         // Numbers, text and lists always have a form in JSON.
-        shown_json(&serde_json::to_string(self).unwrap_or_default()) + "\n"
+        printable_json(&serde_json::to_string(self).unwrap_or_default()) + "\n"
     }
 }

@@ -16,11 +16,11 @@ use hapterra_core::wire::session::{LastSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
 use super::ahead::{self, Ahead};
-use super::ask::Ask;
-use super::conversation::{Conversation, News, State};
 use super::error::LinkError;
+use super::host_protocol::{HostProtocol, ProtocolEvent, State};
 use super::link_stats::LinkStats;
 use super::messages::{FromDevice, from_device, next_frame};
+use super::request_queue::HostRequest;
 use super::timeouts::Timeouts;
 use crate::materials::{MaterialBuffer, Materials};
 use crate::terrain::{Terrain, TileBuffer};
@@ -76,7 +76,7 @@ pub enum Event<'e> {
     TileSent(TileKey),
     /// A request was given up: the device does not answer it, or was
     /// restarted meanwhile. Whether it was done is not known.
-    Unanswered(&'e Ask),
+    Unanswered(&'e HostRequest),
 }
 
 /// Arming of the device in a session, as soon as the scene is in force. A device that comes
@@ -119,7 +119,7 @@ pub struct Client<'t> {
     next: Option<(SceneChange, Terrain<'t>)>,
     scene: Scene,
     arming: Option<Arming>,
-    talk: Conversation,
+    talk: HostProtocol,
     reader: Box<FrameReader<MAX_FRAME>>,
     tile: TileBuffer,
     materials: MaterialBuffer,
@@ -190,7 +190,7 @@ impl<'t> Client<'t> {
             next: None,
             scene,
             arming,
-            talk: Conversation::new(Some(scene), patience, fastrand::Rng::with_seed(seed))
+            talk: HostProtocol::new(Some(scene), patience, fastrand::Rng::with_seed(seed))
                 .with_materials(terrain.grid().materials().map(Materials::table)),
             reader: Box::default(),
             tile: TileBuffer::default(),
@@ -260,7 +260,7 @@ impl<'t> Client<'t> {
     }
 
     /// Asks for something, after what was asked for before.
-    pub fn ask(&mut self, ask: Ask) {
+    pub fn ask(&mut self, ask: HostRequest) {
         self.talk.ask(ask);
     }
 
@@ -325,7 +325,7 @@ impl<'t> Client<'t> {
         self.repeat_point(now, out);
         for ask in self.talk.take_unanswered() {
             self.tally.unanswered += 1;
-            if matches!(ask, Ask::Request(Request::Zero { .. })) {
+            if matches!(ask, HostRequest::Request(Request::Zero { .. })) {
                 self.hand_over_withheld(out, on);
             }
             on(Event::Unanswered(&ask));
@@ -366,8 +366,8 @@ impl<'t> Client<'t> {
                     if message.session != self.talk.session() {
                         self.tally.foreign_frames += 1;
                     }
-                    if let Some(news) = self.talk.hear(now, message, out)? {
-                        self.on_news(now, news, out, on);
+                    if let Some(event) = self.talk.hear(now, message, out)? {
+                        self.on_protocol_event(now, event, out, on);
                     }
                 }
                 Err(bad) => {
@@ -380,22 +380,22 @@ impl<'t> Client<'t> {
         Ok(())
     }
 
-    fn on_news(
+    fn on_protocol_event(
         &mut self,
         now: Duration,
-        news: News,
+        event: ProtocolEvent,
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
-        match news {
-            News::Greeted { device, restarted } => {
+        match event {
+            ProtocolEvent::Greeted { device, restarted } => {
                 self.on_greeted(device, restarted);
                 self.settle_view(true, on);
             }
-            News::SceneChange => self.settle_view(true, on),
-            News::SceneAck => self.on_scene_taken(now, out, on),
-            News::Answered(ask, message) => self.on_answered(now, ask, &message, out, on),
-            News::Other(message) => self.on_message(now, message, out, on),
+            ProtocolEvent::SceneChange => self.settle_view(true, on),
+            ProtocolEvent::SceneAck => self.on_scene_taken(now, out, on),
+            ProtocolEvent::Answered(ask, message) => self.on_answered(now, ask, &message, out, on),
+            ProtocolEvent::Other(message) => self.on_message(now, message, out, on),
         }
     }
 
@@ -430,9 +430,10 @@ impl<'t> Client<'t> {
         if let Some(Arming { zero }) = self.arming.filter(|a| !again || a.zero.is_some()) {
             if let Some(counts) = zero {
                 self.zeroing = true;
-                self.talk.ask(Ask::Request(Request::Zero { counts }));
+                self.talk
+                    .ask(HostRequest::Request(Request::Zero { counts }));
             }
-            self.talk.ask(Ask::Request(Request::Arm));
+            self.talk.ask(HostRequest::Request(Request::Arm));
             self.talk.say_pending(now, out);
         }
         if let Some(device) = &self.device {
@@ -444,18 +445,18 @@ impl<'t> Client<'t> {
     fn on_answered(
         &mut self,
         now: Duration,
-        ask: Ask,
+        ask: HostRequest,
         message: &ToHost,
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
         // The next goes out at once.
         self.talk.say_pending(now, out);
-        if matches!(ask, Ask::Request(Request::Zero { .. })) {
+        if matches!(ask, HostRequest::Request(Request::Zero { .. })) {
             self.hand_over_withheld(out, on);
         }
         match (ask, message) {
-            (Ask::Request(request), ToHost::Answer(answer)) => on(Event::Answered {
+            (HostRequest::Request(request), ToHost::Answer(answer)) => on(Event::Answered {
                 request: &request,
                 result: answer.result,
             }),

@@ -34,7 +34,7 @@ struct Bench<'t> {
     now: Duration,
     out: Vec<u8>,
     opened: u32,
-    unanswered: Vec<Ask>,
+    unanswered: Vec<HostRequest>,
     /// Reported calibrations.
     told: Vec<Option<Calibration>>,
     /// Views and whether they were taken.
@@ -251,7 +251,7 @@ fn an_arm_that_is_lost_is_repeated_and_then_told_and_taken_back() {
         }
         let said = bench.said();
         assert_eq!(count_of(&said, "1 Arm"), 10);
-        assert_eq!(bench.unanswered, [Ask::Request(Request::Arm)]);
+        assert_eq!(bench.unanswered, [HostRequest::Request(Request::Arm)]);
         assert_eq!(bench.client.tally().unanswered, 1);
         assert_eq!(count_of(&said, "2 Disarm"), 1);
     });
@@ -287,7 +287,7 @@ fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
         let (old, new) = (Calibration::OMNI, Calibration::PREMIUM_3_0);
         for _ in 0..300 {
             bench.said();
-            bench.client.ask(Ask::Calibration);
+            bench.client.ask(HostRequest::Calibration);
             bench.pass(ms(10)).expect("patient");
             let said = bench.said();
             let number = said
@@ -296,7 +296,7 @@ fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
             let number: u8 = number.expect("asked").parse().expect("a number");
             // Said again after 0.4 s: the second answer is still on its way.
             bench.hear(&told(number, Some(old)));
-            bench.client.ask(Ask::Calibration);
+            bench.client.ask(HostRequest::Calibration);
             bench.pass(ms(10)).expect("patient");
             bench.told.clear();
             bench.hear(&told(number, Some(old)));
@@ -312,8 +312,8 @@ fn repeated_query_keeps_its_number() {
     on_bench(None, |bench| {
         bench.open();
         bench.said();
-        bench.client.ask(Ask::Status);
-        bench.client.ask(Ask::Request(Request::Disarm));
+        bench.client.ask(HostRequest::Status);
+        bench.client.ask(HostRequest::Request(Request::Disarm));
         for _ in 0..40 {
             bench.hear(&bench.alive());
             bench.pass(ms(50)).expect("alive");
@@ -625,7 +625,7 @@ fn a_real_arm_that_comes_back_is_not_armed_by_itself() {
             bench.hear(&taken);
             assert_eq!(bench.opened, 2);
             assert_eq!(arms(bench), again, "{arming:?}");
-            bench.client.ask(Ask::Request(Request::Arm));
+            bench.client.ask(HostRequest::Request(Request::Arm));
             bench.pass(ms(50)).expect("answered");
             assert_eq!(arms(bench), 1 - again, "{arming:?}");
         });

@@ -11,8 +11,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use super::tcp::Tcp;
+use heightfield::printable_text::printable_lines;
 use heightfield::regular_file;
-use heightfield::shown::shown_lines;
 
 /// Environment variable that names the image when no option does.
 pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_ELF";
@@ -201,7 +201,7 @@ impl Drop for Emulator {
 fn text(from: impl Read) -> String {
     let mut said = Vec::new();
     let _ = from.take(SAID).read_to_end(&mut said);
-    shown_lines(String::from_utf8_lossy(&said).trim())
+    printable_lines(String::from_utf8_lossy(&said).trim())
 }
 
 fn listen() -> Result<TcpListener, EmulatorError> {

@@ -11,7 +11,7 @@ pub(super) const LOOK: Duration = Duration::from_millis(50);
 /// Time that a device may take over what is said at once before it counts as gone.
 const TAKES: Duration = Duration::from_secs(5);
 
-/// Line on which [`Session`](super::Session) and [`Dialogue`](super::Dialogue) hold their
+/// Line on which [`Session`](super::Session) and [`ControlSession`](super::ControlSession) hold their
 /// conversation over.
 pub(super) struct Line<'t> {
     transport: Box<dyn Transport + 't>,

@@ -6,12 +6,12 @@ use hapterra_core::scene::{HipCommand, Scene, SceneChange};
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::request::Request;
 
-use super::ask::Ask;
 use super::client::{Arming, Client, Event};
-use super::conversation::State;
 use super::error::LinkError;
+use super::host_protocol::State;
 use super::line::{LOOK, Line};
 use super::link_stats::LinkStats;
+use super::request_queue::HostRequest;
 use super::timeouts::Timeouts;
 use super::transport::Transport;
 use crate::terrain::Terrain;
@@ -130,13 +130,13 @@ impl<'t> Session<'t> {
 
     /// Asks for something; an event tells what came of it. It goes out with the next
     /// poll, or when what was asked for before is answered.
-    pub fn ask(&mut self, ask: Ask) {
+    pub fn ask(&mut self, ask: HostRequest) {
         self.client.ask(ask);
     }
 
     /// Asks for something to be done, as [`Session::ask`].
     pub fn request(&mut self, request: Request) {
-        self.ask(Ask::Request(request));
+        self.ask(HostRequest::Request(request));
     }
 
     /// Puts another view of the scene in, of this terrain; the clutch has to be open. An

@@ -6,7 +6,7 @@ use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, ONLY_LOOKS};
 use hapterra_core::wire::status::PRESS_MS;
 
-use super::ask::Ask;
+use super::request_queue::HostRequest;
 
 /// The times of the table in [`hapterra_core::wire`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,10 +55,10 @@ impl Timeouts {
 
     /// Time-out of an answer: the user has to press a switch before a calibration is
     /// stored.
-    pub(super) fn with(&self, ask: &Ask) -> Duration {
+    pub(super) fn with(&self, ask: &HostRequest) -> Duration {
         const PRESS: Duration = Duration::from_millis(PRESS_MS as u64);
         match ask {
-            Ask::Request(Request::StoreCalibration) => self.give_up + PRESS,
+            HostRequest::Request(Request::StoreCalibration) => self.give_up + PRESS,
             _ => self.give_up,
         }
     }
@@ -91,8 +91,8 @@ mod tests {
 
     #[test]
     fn no_real_arm_is_armed_for_long_after_its_host_is_gone() {
-        let dialogue = Timeouts::of_a_dialogue(Duration::from_secs(60));
-        for patience in [Timeouts::REAL_TIME, dialogue] {
+        let control = Timeouts::of_a_dialogue(Duration::from_secs(60));
+        for patience in [Timeouts::REAL_TIME, control] {
             assert!((5..=30).contains(&patience.silence_s), "{patience:?}");
         }
     }

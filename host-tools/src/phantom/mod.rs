@@ -1,6 +1,6 @@
 //! The virtual Phantom and the hand that holds it.
 //!
-//! What a real arm would do between two ticks of the haptic loop, in f64 and
+//! The motion of a real arm between two ticks of the haptic loop, in f64 and
 //! independent of the code under test: motor currents go in, encoder counts
 //! come out. Read it in the direction the data flows:
 //!

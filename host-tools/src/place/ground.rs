@@ -2,7 +2,7 @@
 
 use super::coordinates::Coordinates;
 use super::error::PlaceError;
-use super::words::{
+use super::place_text::{
     asked_in_words, bounds_in_words, box_in_words, own_box_in_words, system_in_words,
 };
 use crate::terrain::HapticGrid;

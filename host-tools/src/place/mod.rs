@@ -10,20 +10,20 @@ mod coordinates;
 mod error;
 mod fit;
 mod ground;
+mod place_text;
 mod placement;
 mod reach;
 mod surface_change;
 mod target;
-mod words;
 
 pub use change::{
     Bounds, ChangeError, Changed, Hand, Laid, PlacementChange, STIFFEST_N_PER_MM, TIPS_MM,
 };
 pub use coordinates::Coordinates;
 pub use error::PlaceError;
+pub use place_text::{bounds_in_words, coordinates_in_words, place_in_words};
 pub(crate) use placement::FELT_MM;
 pub use placement::{Heights, Placement, PlacementOptions, Sizing, suited_height};
 pub use reach::{Reach, ReachBox};
 pub use surface_change::{SurfaceChange, SurfaceError};
 pub use target::Target;
-pub use words::{bounds_in_words, coordinates_in_words, place_in_words};

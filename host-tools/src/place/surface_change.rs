@@ -3,7 +3,7 @@
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Shading, SurfaceParams, Texture};
 
-use crate::surface::NamedSurface;
+use crate::named_surfaces::NamedSurface;
 
 /// Change of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,7 +14,7 @@ use crate::materials::{Looks, Materials};
 use crate::place::Laid;
 use crate::terrain::{HapticCells, HapticGrid, Scale, ScaleError, Terrain};
 use heightfield::ReferenceSystem;
-use heightfield::shown::shown;
+use heightfield::printable_text::printable;
 
 /// Key of the first line of the settings; its value is [`FORMAT`].
 pub const KEY: &str = "hapterra-recording";
@@ -463,8 +463,8 @@ impl Device {
     #[must_use]
     pub fn of(hello: &DeviceHello) -> Self {
         Self {
-            board: shown(&hello.board),
-            firmware: shown(&hello.version),
+            board: printable(&hello.board),
+            firmware: printable(&hello.version),
             tick_hz: hello.tick_hz,
         }
     }

@@ -6,7 +6,7 @@ use hapterra_core::scene::Scene;
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_core::wire::session::SessionEnd;
 
-use super::onlooker::Onlooker;
+use super::session_handler::SessionHandler;
 use crate::link::{Arming, Event, LinkError, LinkStats, Session, Timeouts, Transport};
 use crate::terrain::Terrain;
 
@@ -109,11 +109,11 @@ impl<'s, 't> Service<'s, 't> {
 }
 
 impl<'t> Served<'_, 't> {
-    /// Serves until the onlooker has seen enough, an end is asked for, or an error that
+    /// Serves until the handler has seen enough, an end is asked for, or an error that
     /// waiting does not mend; then says goodbye.
-    pub fn serve(mut self, onlooker: &mut dyn Onlooker<'t>) -> End {
-        let why = self.until_over(onlooker);
-        let disarmed = self.leave(why.as_ref().err(), &mut |event| onlooker.take(event));
+    pub fn serve(mut self, handler: &mut dyn SessionHandler<'t>) -> End {
+        let why = self.until_over(handler);
+        let disarmed = self.leave(why.as_ref().err(), &mut |event| handler.take(event));
         let tally = self.session.tally().clone();
         End {
             why,
@@ -122,20 +122,20 @@ impl<'t> Served<'_, 't> {
         }
     }
 
-    fn until_over(&mut self, onlooker: &mut dyn Onlooker<'t>) -> Result<(), LinkError> {
-        while (self.goes_on)() && !onlooker.is_over() {
-            let polled = self.session.poll(POLL, &mut |event| onlooker.take(event));
-            for ask in onlooker.asks() {
+    fn until_over(&mut self, handler: &mut dyn SessionHandler<'t>) -> Result<(), LinkError> {
+        while (self.goes_on)() && !handler.is_over() {
+            let polled = self.session.poll(POLL, &mut |event| handler.take(event));
+            for ask in handler.asks() {
                 self.session.ask(ask);
             }
             // What is wrong with the line is known in a moment anyway.
-            let put = onlooker
+            let put = handler
                 .view()
                 .map(|(view, terrain)| self.session.put_view(view, terrain));
             let polled = polled.and(put.unwrap_or(Ok(())));
-            onlooker.show(self.session.tally());
+            handler.show(self.session.tally());
             match polled {
-                Err(error) if error.is_passing() => self.wait_for_device(onlooker, &error)?,
+                Err(error) if error.is_passing() => self.wait_for_device(handler, &error)?,
                 other => other?,
             }
         }
@@ -145,25 +145,25 @@ impl<'t> Served<'_, 't> {
     /// The device is gone: says so, waits for it and resumes.
     fn wait_for_device(
         &mut self,
-        onlooker: &mut dyn Onlooker<'t>,
+        handler: &mut dyn SessionHandler<'t>,
         why: &LinkError,
     ) -> Result<(), LinkError> {
         let (why, device) = (described(why), &self.device);
-        onlooker.hear(&format!("{why}; waiting for {device} (Ctrl-C ends)"));
+        handler.hear(&format!("{why}; waiting for {device} (Ctrl-C ends)"));
         let began = Instant::now();
         while (self.goes_on)() {
             // A device that is silent may still be claimed by the line to it.
             self.session.hang_up();
-            match self.resume(onlooker) {
+            match self.resume(handler) {
                 Ok(device) => {
                     let again = match device.epoch == Some(self.session.scene().epoch) {
                         true => "goes on where it was",
                         false => "was restarted and begins anew",
                     };
                     let after = began.elapsed();
-                    onlooker.hear(&format!("the device is back after {after:.1?}: it {again}"));
+                    handler.hear(&format!("the device is back after {after:.1?}: it {again}"));
                     if let Some(line) = told_of_last_end(&device) {
-                        onlooker.hear(line);
+                        handler.hear(line);
                     }
                     return Ok(());
                 }
@@ -175,9 +175,9 @@ impl<'t> Served<'_, 't> {
         Ok(())
     }
 
-    fn resume(&mut self, onlooker: &mut dyn Onlooker<'t>) -> Result<DeviceHello, LinkError> {
+    fn resume(&mut self, handler: &mut dyn SessionHandler<'t>) -> Result<DeviceHello, LinkError> {
         let line = (self.connect)()?;
-        let on = &mut |event: Event<'_>| onlooker.take(event);
+        let on = &mut |event: Event<'_>| handler.take(event);
         self.session.resume(line, self.goes_on, on)
     }
 

@@ -11,9 +11,9 @@ use hapterra_core::grid::GridPoint;
 use hapterra_core::scene::Source;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, SessionEnd};
 
-use super::{End, Onlooker, Served, Service};
+use super::{End, Served, Service, SessionHandler};
 use crate::link::{
-    Arming, Ask, Dialogue, Event, LinkError, LinkStats, Native, Timeouts, Transport,
+    Arming, ControlSession, Event, HostRequest, LinkError, LinkStats, Native, Timeouts, Transport,
 };
 use crate::terrain::{Scale, Terrain};
 use heightfield::Raster;
@@ -126,8 +126,8 @@ impl Bench {
     fn last_end(&self) -> SessionEnd {
         self.deaf.set(false);
         let line = Box::new(self.line());
-        let dialogue = Dialogue::open(line, PATIENCE.give_up).expect("it answers");
-        dialogue.device().last.end
+        let control = ControlSession::open(line, PATIENCE.give_up).expect("it answers");
+        control.device().last.end
     }
 
     fn was_told(&self) -> bool {
@@ -144,7 +144,7 @@ fn absent() -> LinkError {
     }
 }
 
-/// An onlooker that has seen enough after so many looks, and does something at the last
+/// An handler that has seen enough after so many looks, and does something at the last
 /// one.
 struct Looks<'l> {
     left: u32,
@@ -162,14 +162,14 @@ impl<'l> Looks<'l> {
     }
 }
 
-impl Onlooker<'_> for Looks<'_> {
+impl SessionHandler<'_> for Looks<'_> {
     fn take(&mut self, _: Event<'_>) {}
 
     fn hear(&mut self, line: &str) {
         self.heard.push(line.to_owned());
     }
 
-    fn asks(&mut self) -> Vec<Ask> {
+    fn asks(&mut self) -> Vec<HostRequest> {
         vec![]
     }
 
@@ -215,12 +215,12 @@ fn open<'s, 't>(service: Service<'s, 't>) -> Result<Served<'s, 't>, LinkError> {
 
 /// Serves for so many looks; `last` happens at the last.
 fn served(bench: &Bench, looks: u32, last: &mut dyn FnMut()) -> (End, Vec<String>) {
-    let mut onlooker = Looks::times(looks, last);
+    let mut handler = Looks::times(looks, last);
     let end = played(bench, &|| true, &mut || bench.only_line(), |service| {
         let served = open(service).expect("it answers");
-        served.serve(&mut onlooker)
+        served.serve(&mut handler)
     });
-    (end, onlooker.heard)
+    (end, handler.heard)
 }
 
 #[test]
@@ -257,7 +257,7 @@ fn failed_start_closes_the_session_or_warns_the_user() {
         let bench = Bench::new();
         // The host before was killed.
         let line = Box::new(bench.line());
-        let killed = Dialogue::open(line, PATIENCE.give_up).expect("it answers");
+        let killed = ControlSession::open(line, PATIENCE.give_up).expect("it answers");
         bench.deaf.set(deaf);
         drop(killed);
         let began = played(&bench, &|| true, &mut || bench.only_line(), |service| {
@@ -290,7 +290,7 @@ fn an_end_that_is_asked_for_while_it_greets_is_heeded() {
 #[test]
 fn silent_device_is_reopened_once_its_first_line_is_closed() {
     let bench = Bench::new();
-    let mut onlooker = Looks::times(2_000, || {});
+    let mut handler = Looks::times(2_000, || {});
     let mut connect = || {
         // A test that fails does not hang.
         let waits = bench.lines.get() > 0 && bench.made.get() > 0;
@@ -300,10 +300,10 @@ fn silent_device_is_reopened_once_its_first_line_is_closed() {
     let end = played(&bench, &|| true, &mut connect, |service| {
         let served = open(service).expect("it answers");
         bench.dead_up_to.set(1);
-        served.serve(&mut onlooker)
+        served.serve(&mut handler)
     });
     assert!(end.why.is_ok() && end.disarmed.is_ok(), "{end:?}");
-    let heard = onlooker.heard.join("\n");
+    let heard = handler.heard.join("\n");
     assert!(heard.contains("goes on where it was"), "{heard}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
 }
@@ -326,11 +326,11 @@ fn close_during_an_outage_is_sent_after_it() {
                 _ => Err(absent()),
             }
         };
-        let mut onlooker = Looks::times(u32::MAX, || {});
+        let mut handler = Looks::times(u32::MAX, || {});
         let end = played(&bench, &|| goes_on.get(), &mut connect, |service| {
             let served = open(service).expect("it answers");
             bench.dead_up_to.set(1);
-            served.serve(&mut onlooker)
+            served.serve(&mut handler)
         });
         assert!(end.why.is_ok(), "{end:?}");
         assert_eq!(end.disarmed.is_ok(), back, "{end:?}");
@@ -343,12 +343,12 @@ fn close_during_an_outage_is_sent_after_it() {
 fn losing_the_device_warns_of_an_armed_arm() {
     let bench = Bench::new();
     let mut another = None;
-    let mut onlooker = Looks::times(u32::MAX, || {});
+    let mut handler = Looks::times(u32::MAX, || {});
     let end = played(&bench, &|| true, &mut || bench.only_line(), |service| {
         let served = open(service).expect("it answers");
         let line = Box::new(bench.line());
-        another = Some(Dialogue::open(line, PATIENCE.give_up).expect("it answers"));
-        served.serve(&mut onlooker)
+        another = Some(ControlSession::open(line, PATIENCE.give_up).expect("it answers"));
+        served.serve(&mut handler)
     });
     let Err(taken @ LinkError::Taken) = end.why else {
         panic!("{end:?}");

@@ -4,9 +4,9 @@ use hapterra_core::force::{Pattern, Shading, Texture};
 
 use super::marks::text_of;
 use super::{Steer, Wanted};
+use crate::named_surfaces::NamedSurface;
 use crate::place::{PlacementChange, SurfaceChange};
-use crate::surface::NamedSurface;
-use heightfield::shown::shown;
+use heightfield::printable_text::printable;
 
 /// The known commands, for messages.
 pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
@@ -72,7 +72,7 @@ pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
 /// The beginning of a line as a message may show it.
 fn beginning(line: &str) -> String {
     let beginning: String = line.trim().chars().take(SHOWN).collect();
-    shown(&beginning)
+    printable(&beginning)
 }
 
 /// Takes `at SECONDS` from the beginning of a line.

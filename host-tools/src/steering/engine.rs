@@ -9,7 +9,7 @@ use hapterra_core::scene::{SceneChange, Source, TickRecord};
 use hapterra_core::wire::request::Request;
 
 use super::Steer;
-use crate::link::{Ask, Event};
+use crate::link::{Event, HostRequest};
 use crate::place::{Bounds, Changed, Hand, Laid, PlacementChange};
 use crate::terrain::Terrain;
 
@@ -67,7 +67,7 @@ pub struct Steering<'r> {
     /// Since when the ground of another view has been awaited.
     awaits: Option<Instant>,
     stage: Stage<'r>,
-    asks: Vec<Ask>,
+    asks: Vec<HostRequest>,
     put: Option<Put<'r>>,
     lines: Vec<String>,
 }
@@ -136,7 +136,7 @@ impl<'r> Steering<'r> {
     }
 
     /// Returns the requests to the device now.
-    pub fn asks(&mut self) -> Vec<Ask> {
+    pub fn asks(&mut self) -> Vec<HostRequest> {
         std::mem::take(&mut self.asks)
     }
 
@@ -167,7 +167,7 @@ impl<'r> Steering<'r> {
                     *answered = true;
                 }
             }
-            Event::Unanswered(Ask::Request(Request::Clutch { .. })) => {
+            Event::Unanswered(HostRequest::Request(Request::Clutch { .. })) => {
                 self.give_up("the device does not answer: the view stays as it was");
             }
             _ => {}
@@ -183,7 +183,8 @@ impl<'r> Steering<'r> {
 
     fn clutch(&mut self, hold: ClutchHold) {
         self.asked = hold;
-        self.asks.push(Ask::Request(Request::Clutch { hold }));
+        self.asks
+            .push(HostRequest::Request(Request::Clutch { hold }));
     }
 
     /// Holds the clutch: for the user the terrain goes with the hand, for another view alone

@@ -50,7 +50,7 @@ fn samples(steering: &mut Steering<'_>, limits: Limits, count: usize) {
 /// Returns the last request to the clutch.
 fn asked(steering: &mut Steering<'_>) -> Option<ClutchHold> {
     steering.asks().into_iter().rev().find_map(|ask| match ask {
-        Ask::Request(Request::Clutch { hold }) => Some(hold),
+        HostRequest::Request(Request::Clutch { hold }) => Some(hold),
         _ => None,
     })
 }
@@ -126,7 +126,7 @@ fn unopened_clutch_or_silent_device_is_given_up() {
                 answer(steering, hold);
                 samples(steering, Limits::CLUTCH_MOVES, SAMPLES_TO_OPEN as usize + 1);
             } else {
-                let ask = Ask::Request(Request::Clutch { hold });
+                let ask = HostRequest::Request(Request::Clutch { hold });
                 steering.on_event(&Event::Unanswered(&ask));
             }
             let told = steering.lines();

@@ -6,7 +6,7 @@ use std::time::SystemTime;
 
 use hapterra_core::wire::request::Request;
 
-use crate::link::{Ask, Event};
+use crate::link::{Event, HostRequest};
 
 /// Characters of a mark's text, at most.
 pub(super) const MAX_MARK: usize = 200;
@@ -47,7 +47,7 @@ pub(super) fn text_of(text: &str) -> Result<String, &'static str> {
 pub struct Marks {
     /// Text and host clock of those that have not been answered.
     waiting: VecDeque<(String, f64)>,
-    asks: Vec<Ask>,
+    asks: Vec<HostRequest>,
     made: Vec<Made>,
 }
 
@@ -60,7 +60,7 @@ impl Marks {
             ));
         }
         self.waiting.push_back((text, host_unix_s()));
-        self.asks.push(Ask::Request(Request::Mark));
+        self.asks.push(HostRequest::Request(Request::Mark));
         None
     }
 
@@ -72,7 +72,7 @@ impl Marks {
                 request: Request::Mark,
                 ..
             }
-            | Event::Unanswered(Ask::Request(Request::Mark)) => None,
+            | Event::Unanswered(HostRequest::Request(Request::Mark)) => None,
             _ => return,
         };
         // The device answers them in their order.
@@ -89,7 +89,7 @@ impl Marks {
     }
 
     /// Returns the requests to the device now.
-    pub fn asks(&mut self) -> Vec<Ask> {
+    pub fn asks(&mut self) -> Vec<HostRequest> {
         std::mem::take(&mut self.asks)
     }
 
@@ -122,11 +122,11 @@ mod tests {
         for text in ["a", "b", "c"] {
             assert_eq!(marks.mark(text.to_owned()), None);
         }
-        assert_eq!(marks.asks(), [Ask::Request(Request::Mark); 3]);
+        assert_eq!(marks.asks(), [HostRequest::Request(Request::Mark); 3]);
         assert_eq!(marks.asks(), []);
         marks.on_event(&Event::Marked { tick: 7 });
-        marks.on_event(&Event::Unanswered(&Ask::Request(Request::Disarm)));
-        marks.on_event(&Event::Unanswered(&Ask::Request(Request::Mark)));
+        marks.on_event(&Event::Unanswered(&HostRequest::Request(Request::Disarm)));
+        marks.on_event(&Event::Unanswered(&HostRequest::Request(Request::Mark)));
         let made: Vec<_> = (marks.take_made().into_iter())
             .map(|made| (made.text, made.tick))
             .collect();

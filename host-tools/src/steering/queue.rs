@@ -166,7 +166,7 @@ fn hand_out(line: &str, number: u64, ways: &[Way]) -> bool {
 /// where there is no command in it.
 ///
 /// # Errors
-/// What is wrong with it, with its number.
+/// Its fault and its number.
 fn for_each(
     line: &str,
     number: u64,

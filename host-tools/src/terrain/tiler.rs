@@ -12,7 +12,7 @@ use hapterra_core::terrain::{FieldSize, MAX_STEP_CELLS, TILE_CELLS, TILE_SAMPLES
 use hapterra_core::wire::materials::TileMaterials;
 use hapterra_core::wire::message::Heights;
 
-use hapterra_touch::tiles;
+use hapterra_touch::tile_heights;
 use hapterra_touch::tip::{self, Ball, TipError};
 
 use super::steps::steps;
@@ -114,9 +114,9 @@ impl TileBuffer {
     /// The heights, of which these are the lowest and the highest, as they are shortest on the
     /// link.
     pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
-        let base = tiles::base(low, high);
+        let base = tile_heights::base(low, high);
         for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
-            *single = tiles::above(base, *height);
+            *single = tile_heights::above(base, *height);
         }
         self.packed(base, steps)
     }
@@ -368,8 +368,8 @@ impl<'r> Terrain<'r> {
             return self.ground_mm(self.level, [east_mm, north_mm], reads);
         };
         let cell_mm = self.scale.cell_mm();
-        let (column, u) = tiles::place(east_mm / cell_mm, self.size[0])?;
-        let (row, v) = tiles::place(north_mm / cell_mm, self.size[1])?;
+        let (column, u) = tile_heights::place(east_mm / cell_mm, self.size[0])?;
+        let (row, v) = tile_heights::place(north_mm / cell_mm, self.size[1])?;
         let (samples, nodes) = self.samples(ball, [column, row], tip::PATCH, reads);
         let height = ball.between(&samples, nodes, [u, v])?;
         Some(height * cell_mm)
@@ -409,8 +409,8 @@ impl<'r> Terrain<'r> {
         let size = self
             .size
             .map(|patches| (patches / self.parts as i32) >> coarser.min(31));
-        let (column, u) = tiles::place(east_mm / cell_mm, size[0])?;
-        let (row, v) = tiles::place(north_mm / cell_mm, size[1])?;
+        let (column, u) = tile_heights::place(east_mm / cell_mm, size[0])?;
+        let (row, v) = tile_heights::place(north_mm / cell_mm, size[1])?;
         let at = |dx: u32, dy: u32| {
             let height = reads.record(self.grid.read_height(level, column + dx, row + dy));
             height * self.scale.height_mm_per_unit()
@@ -463,8 +463,8 @@ impl<'r> Terrain<'r> {
             return Some(Heights::Hole);
         };
         if low == high && known == self.samples_in(key) {
-            let base = tiles::base(low, high);
-            let height = tiles::above(base, low);
+            let base = tile_heights::base(low, high);
+            let height = tile_heights::above(base, low);
             return Some(Heights::Flat { base, height });
         }
         let steps = match self.step() {
@@ -570,7 +570,7 @@ fn top(raster: &Raster, scale: &Scale) -> Result<i32, TerrainError> {
     if !raster.is_known_whole() {
         return Ok(MAX_CELL + 1);
     }
-    Ok(tiles::top(low, high))
+    Ok(tile_heights::top(low, high))
 }
 
 #[cfg(test)]

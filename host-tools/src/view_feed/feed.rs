@@ -8,10 +8,10 @@ use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::hello::DeviceHello;
 use hapterra_view_stream::{self as stream, Link, Message, Scene, TickCost};
 
+use super::first_placement::ToFirstPlacement;
 use super::program::{Program, ProgramError};
 use super::queue::Queue;
 use super::scene::{Picture, Prepared, home_cells, tick_cost};
-use super::standing::Standing;
 use super::surroundings::Surroundings;
 use super::tiles::Tiles;
 use crate::link::{Event, LinkStats};
@@ -50,7 +50,7 @@ pub struct ViewFeed<'t> {
     /// Place where the terrain of the beginning stands for all of the time.
     stands: bool,
     /// The view in force, where it has other cells than the terrain that stands.
-    standing: Option<Standing<'t>>,
+    standing: Option<ToFirstPlacement<'t>>,
     /// A view that the viewer is still to be told: nothing else is until then.
     scene_due: Option<Box<Scene>>,
     tiles: Tiles,
@@ -164,7 +164,7 @@ impl<'t> ViewFeed<'t> {
     pub fn go_over(&mut self, picture: Picture<'_, 't>) {
         self.flush();
         self.standing = match self.stands {
-            true => Standing::new(&self.first, picture.terrain),
+            true => ToFirstPlacement::new(&self.first, picture.terrain),
             false => None,
         };
         match self.standing.take() {

@@ -9,6 +9,7 @@
 //! The stream's messages are in [`hapterra_view_stream`].
 
 mod feed;
+mod first_placement;
 mod held_tiles;
 mod layers;
 #[cfg(test)]
@@ -16,7 +17,6 @@ mod pipe;
 mod program;
 mod queue;
 mod scene;
-mod standing;
 mod surroundings;
 mod tiles;
 

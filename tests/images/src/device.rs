@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hapterra::link::{Ask, Bulk, BulkEndpoints, Event, Session, Timeouts, Transport};
+use hapterra::link::{Bulk, BulkEndpoints, Event, HostRequest, Session, Timeouts, Transport};
 use hapterra::phantom::{ArmFrame, Encoder, PhantomModel, kinematics};
 use hapterra::terrain::{Scale, Terrain};
 use hapterra_core::force::SurfaceParams;
@@ -195,7 +195,7 @@ impl<'t> Device<'t> {
     /// When there is no answer.
     pub fn ask_status(&mut self) -> Status {
         self.status = None;
-        self.session.ask(Ask::Status);
+        self.session.ask(HostRequest::Status);
         self.run_ms(150);
         self.status.clone().expect("an answer")
     }

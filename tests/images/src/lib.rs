@@ -14,8 +14,8 @@
 //! (ARM DDI 0403E) describe it; each module names its registers. A register that nothing models reads back what
 //! was written last.
 //!
-//! What this shows is what the instructions of the image do. What it cannot
-//! show is electrical, or a fault of the silicon or of these models.
+//! This shows the effects of the image's instructions. It cannot show electrical faults, or
+//! faults of the silicon or of these models.
 
 pub mod adc;
 pub mod bench;

@@ -3,7 +3,7 @@
 //! Modelled: the registers that enable, disable, raise and take back interrupts, their
 //! priorities with four bits, and the reset by AIRCR. Not modelled: priority groups, the active
 //! bits, STIR, SysTick. Of the memory protection unit the regions, as `machine/protection` says.
-//! What else is in the page reads back what was written; the faults and the data cache take theirs
+//! Other registers of the page read back what was written; the faults and the data cache take theirs
 //! from there.
 
 use std::collections::HashMap;

@@ -8,7 +8,7 @@
 mod m4f;
 
 use hapterra_image_tests::counting::follow;
-use hapterra_tests::counting::CountingBoard;
+use hapterra_tests::instruction_counter::CountingBoard;
 use hapterra_tests::repository;
 use m4f::table::Row;
 use m4f::{chain, contact, soak};

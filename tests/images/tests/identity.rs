@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use hapterra::link::{Bulk, BulkEndpoints, Dialogue};
+use hapterra::link::{Bulk, BulkEndpoints, ControlSession};
 use hapterra_firmware::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 use hapterra_image_tests::device::machines;
 use hapterra_tests::timeouts::HANG;
@@ -37,7 +37,7 @@ fn the_serial_number_on_usb_and_on_the_link_is_the_chips_identifier() {
         let configuration = ConfigurationDescriptor::new(&found.configuration);
         let endpoints = BulkEndpoints::find(&configuration.expect("well formed"));
         let pipes = ScriptedPipes::new(Rc::new(RefCell::new(machine)), endpoints.expect("two"));
-        let opened = Dialogue::open(Box::new(Bulk(pipes)), HANG);
+        let opened = ControlSession::open(Box::new(Bulk(pipes)), HANG);
         let told = opened.expect("it answers").device().serial.to_string();
         assert_eq!(told, expected, "{board}");
     }

@@ -5,7 +5,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use hapterra::link::{Bulk, BulkEndpoints, Dialogue};
+use hapterra::link::{Bulk, BulkEndpoints, ControlSession};
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_image_tests::bus::Effect;
 use hapterra_image_tests::device::{Device, machines, on_each_board, rough_ground};
@@ -50,10 +50,10 @@ fn ask_to_enter(mut machine: Machine) -> Machine {
     let endpoints = BulkEndpoints::find(&configuration).expect("the link's");
     let machine = Rc::new(RefCell::new(machine));
     let link = Bulk(ScriptedPipes::new(Rc::clone(&machine), endpoints));
-    let mut dialogue = Dialogue::open(Box::new(link), timeouts::HANG).expect("opened");
-    let answer = dialogue.request(&Request::EnterLoader).expect("an answer");
+    let mut control = ControlSession::open(Box::new(link), timeouts::HANG).expect("opened");
+    let answer = control.request(&Request::EnterLoader).expect("an answer");
     assert_eq!(answer, Ok(()));
-    drop(dialogue);
+    drop(control);
     let mut machine = Rc::try_unwrap(machine).ok().expect("alone").into_inner();
     let _ = machine.take_effects();
     assert_eq!(machine.run_ms(200), Stop::Software);

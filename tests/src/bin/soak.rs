@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use hapterra_tests::scene::run::Surface;
-use hapterra_tests::scene::supply::Buffers;
+use hapterra_tests::scene::tile_supply::Buffers;
 use hapterra_tests::soak::{Found, LinkStats, Until, run, soak};
 
 /// Violations of each invariant that are told in full.

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use hapterra::phantom::{AmplifierFault, ArmFrame, HandModel, PhantomModel, Plant, kinematics};
 use hapterra::terrain::Terrain;
 
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// Range of the hand around the home pose, east and north, mm.
 const REACH_MM: [f64; 2] = [55.0, 30.0];
@@ -52,7 +52,7 @@ impl<'t> Arm<'t> {
     ///
     /// # Panics
     /// When the terrain has a hole in its middle or is out of reach.
-    pub fn new(terrain: &'t Terrain<'t>, chance: &mut Chance) -> Self {
+    pub fn new(terrain: &'t Terrain<'t>, random: &mut Random) -> Self {
         let [east, north] = terrain.size_mm().map(|side| 0.5 * side);
         let ground_mm = terrain
             .height_mm(east, north)
@@ -63,12 +63,12 @@ impl<'t> Arm<'t> {
         let model = PhantomModel::premium_1_5();
         let start = [east, north, ground_mm + LIFTED_MM];
         let q = kinematics::inverse(&model, placement.to_device_m(&model, start));
-        let wave = |chance: &mut Chance| (chance.between(0.05, 0.45), chance.between(0.0, TAU));
+        let wave = |random: &mut Random| (random.between(0.05, 0.45), random.between(0.0, TAU));
         Self {
             terrain,
             plant: Plant::new(model, q.expect("within reach")).held_by(HandModel::default()),
             placement,
-            waves: std::array::from_fn(|_| wave(chance)),
+            waves: std::array::from_fn(|_| wave(random)),
             t_s: 0.0,
             above_mm: LIFTED_MM,
             ground_mm,

@@ -8,7 +8,7 @@ use hapterra_firmware::native::Device;
 use hapterra_firmware::store::Stored;
 
 use super::clock::SetClock;
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// Tiles along the side of the window, as on the smallest board.
 const WINDOW: usize = 4;
@@ -39,10 +39,10 @@ pub fn new(clock: SetClock) -> Board {
 /// The device after a reset: flash and RAM as the one before has left them, the RAM
 /// damaged by chance where the supply was low.
 #[must_use]
-pub fn reset(before: &Board, clock: SetClock, cause: ResetCause, chance: &mut Chance) -> Board {
+pub fn reset(before: &Board, clock: SetClock, cause: ResetCause, random: &mut Random) -> Board {
     let mut ram = *before.retained();
     if cause == ResetCause::BrownOut {
-        damage(&mut ram, chance);
+        damage(&mut ram, random);
     }
     let (tiles, memory) = memory();
     let boot = BootReport {
@@ -53,11 +53,11 @@ pub fn reset(before: &Board, clock: SetClock, cause: ResetCause, chance: &mut Ch
 }
 
 /// Flips a bit of no copy, of one, or of both.
-fn damage(ram: &mut Copies, chance: &mut Chance) {
+fn damage(ram: &mut Copies, random: &mut Random) {
     for copy in ram {
-        if chance.below(2) == 0 {
-            let at = chance.below(copy.len());
-            copy[at] ^= 1 << chance.below(32);
+        if random.below(2) == 0 {
+            let at = random.below(copy.len());
+            copy[at] ^= 1 << random.below(32);
         }
     }
 }

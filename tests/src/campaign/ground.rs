@@ -7,7 +7,7 @@ use hapterra_core::force::{
 };
 use heightfield::Raster;
 
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// Which ground a segment has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,20 +41,20 @@ pub struct Effects {
 }
 
 impl Effects {
-    /// Those of a segment, by dice of its own.
+    /// Those of a segment, by a generator of its own.
     #[must_use]
     pub fn drawn(seed: u64, segment: u64) -> Self {
-        let mut chance = Chance::new(!seed ^ segment.wrapping_mul(0xd134_2543_de82_ef95));
-        let chance = &mut chance;
-        let controller = [Controller::Off, Controller::On][chance.below(2)];
-        let stiffness_n_per_mm = match chance.below(2) {
-            0 => chance.between(0.3, 0.9),
-            _ => chance.between(1.0, 2.0),
+        let mut random = Random::new(!seed ^ segment.wrapping_mul(0xd134_2543_de82_ef95));
+        let random = &mut random;
+        let controller = [Controller::Off, Controller::On][random.below(2)];
+        let stiffness_n_per_mm = match random.below(2) {
+            0 => random.between(0.3, 0.9),
+            _ => random.between(1.0, 2.0),
         };
-        let default = material(chance, stiffness_n_per_mm as f32);
+        let default = material(random, stiffness_n_per_mm as f32);
         let params = SurfaceParams {
-            max_force_n: [8.5, 8.5, 3.0][chance.below(3)],
-            shading: [Shading::None, Shading::None, Shading::Smooth][chance.below(3)],
+            max_force_n: [8.5, 8.5, 3.0][random.below(3)],
+            shading: [Shading::None, Shading::None, Shading::Smooth][random.below(3)],
             ..default.params(&SurfaceParams {
                 damping: Damping {
                     controller,
@@ -63,21 +63,21 @@ impl Effects {
                 ..SurfaceParams::PREMIUM
             })
         };
-        let classes = match chance.below(2) {
+        let classes = match random.below(2) {
             0 => 0,
-            _ => 1 + chance.below(MaterialTable::MOST - 1),
+            _ => 1 + random.below(MaterialTable::MOST - 1),
         };
         // Of one stiffness the ground is a spring, as far as energy goes.
-        let is_even = chance.below(2) == 0;
+        let is_even = random.below(2) == 0;
         let mut class = |_| {
             let times = match is_even {
                 true => 1.0,
-                false => [0.0, 0.2, 0.6, 1.0, 1.7][chance.below(5)],
+                false => [0.0, 0.2, 0.6, 1.0, 1.7][random.below(5)],
             };
-            material(chance, (stiffness_n_per_mm * times) as f32)
+            material(random, (stiffness_n_per_mm * times) as f32)
         };
         let classes = (0..classes).map(&mut class).collect();
-        let pixel = [1, 3, 10, 60][chance.below(4)];
+        let pixel = [1, 3, 10, 60][random.below(4)];
         Self {
             params,
             classes,
@@ -98,7 +98,7 @@ impl Effects {
         let classes = Raster::from_fn(samples, samples, |column, row| {
             let place = u64::from(column / self.pixel) << 32 | u64::from(row / self.pixel);
             // One of them is none of the table's: the default.
-            (Chance::new(place).bits() % (count + 1)) as f32
+            (Random::new(place).bits() % (count + 1)) as f32
         });
         let class = |(class, material): (i64, &Material)| ClassMaterial {
             class,
@@ -124,12 +124,12 @@ impl Effects {
 }
 
 /// A material of such a stiffness.
-fn material(chance: &mut Chance, stiffness_n_per_mm: f32) -> Material {
-    let dynamic_mu = [0.0, 0.0, 0.2, 0.6, 1.5][chance.below(5)];
+fn material(random: &mut Random, stiffness_n_per_mm: f32) -> Material {
+    let dynamic_mu = [0.0, 0.0, 0.2, 0.6, 1.5][random.below(5)];
     let friction = Friction {
         dynamic_mu,
-        static_mu: dynamic_mu * [1.0, 1.0, 1.5][chance.below(3)],
-        viscous_s: [0.0, 0.0, 0.004][chance.below(3)],
+        static_mu: dynamic_mu * [1.0, 1.0, 1.5][random.below(3)],
+        viscous_s: [0.0, 0.0, 0.004][random.below(3)],
     };
     let pattern = [
         Pattern::None,
@@ -137,19 +137,19 @@ fn material(chance: &mut Chance, stiffness_n_per_mm: f32) -> Material {
         Pattern::Grain,
         Pattern::Grating,
     ];
-    let pattern = pattern[chance.below(4)];
-    let wavelength_mm = [0.5, 1.0, 2.5][chance.below(3)];
+    let pattern = pattern[random.below(4)];
+    let wavelength_mm = [0.5, 1.0, 2.5][random.below(3)];
     let texture = Texture {
         pattern,
-        amplitude_mm: wavelength_mm * [0.02, 0.1][chance.below(2)],
+        amplitude_mm: wavelength_mm * [0.02, 0.1][random.below(2)],
         wavelength_mm,
-        direction_deg: chance.between(-180.0, 180.0) as f32,
-        seed: chance.bits() as u32,
+        direction_deg: random.between(-180.0, 180.0) as f32,
+        seed: random.bits() as u32,
     };
     Material {
         stiffness_n_per_mm,
         friction,
-        damping_ns_per_m: [0.0, 0.0, 1.0, 4.0][chance.below(4)],
+        damping_ns_per_m: [0.0, 0.0, 1.0, 4.0][random.below(4)],
         texture: match pattern {
             Pattern::None => Texture::NONE,
             _ => texture,

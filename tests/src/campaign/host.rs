@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hapterra::link::{Ask, Client, Event, LinkError, State, Timeouts};
+use hapterra::link::{Client, Event, HostRequest, LinkError, State, Timeouts};
 use hapterra::terrain::Terrain;
 use hapterra_core::guard::Fault;
 use hapterra_core::scene::{Scene, TickRecord};
@@ -14,8 +14,8 @@ use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{InSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
-use super::pipe::{Pipe, Unkind};
-use crate::chance::Chance;
+use super::faulty_pipe::{Pipe, Unkind};
+use crate::random::Random;
 
 /// Bytes of a tile's samples.
 const TILE_BYTES: usize = 33 * 33 * 4;
@@ -67,49 +67,49 @@ impl<'t> Host<'t> {
     }
 
     /// Forgets everything and begins anew with another scene.
-    pub fn restart(&mut self, scene: Scene, now: u64, chance: &mut Chance) {
-        let seed = chance.bits();
+    pub fn restart(&mut self, scene: Scene, now: u64, random: &mut Random) {
+        let seed = random.bits();
         let patience = Timeouts::REAL_TIME;
         self.client = Client::numbered(self.terrain, scene, None, patience, seed);
         *self.reader = FrameReader::new();
-        self.greet(now, chance);
+        self.greet(now, random);
     }
 
     /// Says hello; the scene follows.
-    pub fn greet(&mut self, now: u64, chance: &mut Chance) {
+    pub fn greet(&mut self, now: u64, random: &mut Random) {
         let mut out = Vec::new();
         self.client.greet(time(now), &mut out);
-        self.to_device.send(&out, now, &Unkind::default(), chance);
+        self.to_device.send(&out, now, &Unkind::default(), random);
     }
 
     /// Says hello where there is no session.
-    pub fn greet_if_closed(&mut self, now: u64, chance: &mut Chance) {
+    pub fn greet_if_closed(&mut self, now: u64, random: &mut Random) {
         if self.client.state() == State::Closed {
-            self.greet(now, chance);
+            self.greet(now, random);
         }
     }
 
     /// Says goodbye.
-    pub fn leave(&mut self, now: u64, chance: &mut Chance) {
+    pub fn leave(&mut self, now: u64, random: &mut Random) {
         let mut out = Vec::new();
         self.client.leave(time(now), &mut out);
-        self.to_device.send(&out, now, &Unkind::default(), chance);
+        self.to_device.send(&out, now, &Unkind::default(), random);
     }
 
     /// Asks for the status.
     pub fn ask_status(&mut self) {
-        self.client.ask(Ask::Status);
+        self.client.ask(HostRequest::Status);
     }
 
     /// Asks for something to be done.
     pub fn request(&mut self, request: Request) {
-        self.client.ask(Ask::Request(request));
+        self.client.ask(HostRequest::Request(request));
     }
 
     /// Sends a message that the client would not send.
-    pub fn say(&mut self, message: &ToDevice<'_>, now: u64, unkind: &Unkind, chance: &mut Chance) {
+    pub fn say(&mut self, message: &ToDevice<'_>, now: u64, unkind: &Unkind, random: &mut Random) {
         let bytes = framed(self.client.session(), message);
-        self.to_device.send(&bytes, now, unkind, chance);
+        self.to_device.send(&bytes, now, unkind, random);
     }
 
     /// Delivers the bytes of this tick to the device; `take` returns how many bytes it
@@ -131,18 +131,18 @@ impl<'t> Host<'t> {
         now: u64,
         unkind: &Unkind,
         tiles: Tiles,
-        chance: &mut Chance,
+        random: &mut Random,
     ) {
-        self.to_host.send(said, now, unkind, chance);
+        self.to_host.send(said, now, unkind, random);
         let mut out = Vec::new();
         while let Some(piece) = self.to_host.receive(now) {
             match tiles {
                 Tiles::Sent => self.understand(&piece, now, &mut out),
-                other => self.mistreat(&piece, other == Tiles::Poisoned, now, &mut out, chance),
+                other => self.mistreat(&piece, other == Tiles::Poisoned, now, &mut out, random),
             }
         }
         self.do_what_is_due(now, &mut out);
-        self.to_device.send(&out, now, unkind, chance);
+        self.to_device.send(&out, now, unkind, random);
     }
 
     /// Repeats what is not answered; a device that is gone is greeted anew.
@@ -182,7 +182,7 @@ impl<'t> Host<'t> {
         poison: bool,
         now: u64,
         out: &mut Vec<u8>,
-        chance: &mut Chance,
+        random: &mut Random,
     ) {
         while !bytes.is_empty() {
             let (taken, frame) = self.reader.push(bytes);
@@ -195,9 +195,9 @@ impl<'t> Host<'t> {
                 if poison {
                     let session = self.client.session();
                     let has_materials = self.terrain.grid().materials().is_some();
-                    out.extend(match has_materials && chance.below(4) > 0 {
-                        true => of_poisoned_materials(session, epoch, key, chance),
-                        false => poisoned(session, epoch, key, chance),
+                    out.extend(match has_materials && random.below(4) > 0 {
+                        true => of_poisoned_materials(session, epoch, key, random),
+                        false => poisoned(session, epoch, key, random),
                     });
                 }
             } else {
@@ -225,20 +225,20 @@ fn of_poisoned_materials(
     session: SessionNumber,
     epoch: u32,
     key: TileKey,
-    chance: &mut Chance,
+    random: &mut Random,
 ) -> Vec<u8> {
-    let bytes = [chance.bits() as u8; MAX_TILE_BYTES];
-    let materials = match chance.below(4) {
-        0 => TileMaterials::One(chance.bits() as u8),
-        1 => TileMaterials::Runs(&bytes[..chance.below(12)]),
-        2 => TileMaterials::Each(&bytes[..MAX_TILE_BYTES - chance.below(2)]),
+    let bytes = [random.bits() as u8; MAX_TILE_BYTES];
+    let materials = match random.below(4) {
+        0 => TileMaterials::One(random.bits() as u8),
+        1 => TileMaterials::Runs(&bytes[..random.below(12)]),
+        2 => TileMaterials::Each(&bytes[..MAX_TILE_BYTES - random.below(2)]),
         // Of the table, whatever it is.
         _ => TileMaterials::One(0),
     };
-    let heights = match chance.below(2) {
+    let heights = match random.below(2) {
         0 => Heights::Hole,
         _ => Heights::Flat {
-            base: chance.below(40) as i32 - 10,
+            base: random.below(40) as i32 - 10,
             height: 0.5,
         },
     };
@@ -252,7 +252,7 @@ fn of_poisoned_materials(
 }
 
 /// A well-formed tile of heights that no terrain has.
-fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, chance: &mut Chance) -> Vec<u8> {
+fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, random: &mut Random) -> Vec<u8> {
     const WORDS: [f32; 6] = [
         f32::INFINITY,
         f32::NEG_INFINITY,
@@ -262,10 +262,10 @@ fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, chance: &mut Chanc
         1e-45,
     ];
     let mut bytes = [0; TILE_BYTES];
-    let heights = match chance.below(4) {
+    let heights = match random.below(4) {
         0 => Heights::Flat {
             base: i32::MAX,
-            height: WORDS[chance.below(6)],
+            height: WORDS[random.below(6)],
         },
         1 => Heights::Samples {
             base: i32::MIN,
@@ -273,7 +273,7 @@ fn poisoned(session: SessionNumber, epoch: u32, key: TileKey, chance: &mut Chanc
         },
         _ => {
             for word in bytes.chunks_exact_mut(4) {
-                word.copy_from_slice(&WORDS[chance.below(6)].to_le_bytes());
+                word.copy_from_slice(&WORDS[random.below(6)].to_le_bytes());
             }
             Heights::Samples {
                 base: 0,

@@ -2,37 +2,37 @@
 //! application, and everything that can go wrong, at random.
 //!
 //! ```text
-//! hand ─ arm ─▶ counts ─ mishap ─▶ device ─▶ currents ─▶ arm
-//!                                    ║ pipes (mishap)
+//! hand ─ arm ─▶ counts ─ fault ─▶ device ─▶ currents ─▶ arm
+//!                                    ║ pipes (fault)
 //!                                   host ── terrain
 //! ```
 //!
-//! In every tick [`watch`] and [`force_watch`] hold the device to its bounds; after every mishap
-//! [`tally`] holds it to what [`kind`] expects. A segment depends on the seed
-//! and its own number alone, so a violation is repeated by itself.
+//! In every tick [`tick_invariants`] and [`force_invariants`] check the device; after every injected
+//! fault [`fault_outcomes`] compares the outcome with that of [`fault_kind`]. A segment depends on the
+//! seed and its own number alone, so a violation can be repeated.
 
 pub mod arm;
 pub mod board;
 pub mod clock;
-pub mod effect;
-pub mod extremes;
-pub mod force_watch;
+pub mod fault_effect;
+pub mod fault_kind;
+pub mod fault_outcomes;
+pub mod faulty_pipe;
+pub mod force_invariants;
+pub mod force_share;
 pub mod ground;
 pub mod host;
-pub mod hostile;
-pub mod kind;
-pub mod levers;
-pub mod pipe;
+pub mod hostile_calibrations;
+pub mod limit_cycle;
+pub mod maxima;
+pub mod motor_forces;
 pub mod report;
 pub mod segment;
-pub mod share;
-pub mod swing;
-pub mod tally;
-pub mod watch;
+pub mod tick_invariants;
 
+pub use fault_outcomes::LinkStats;
 pub use ground::Ground;
 pub use segment::Violation;
-pub use tally::LinkStats;
 
 /// The seed that is used without being told another.
 pub const SEED: u64 = 4;

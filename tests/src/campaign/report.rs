@@ -1,10 +1,10 @@
 //! The report of a campaign: `log/campaign.md`.
 
 use super::LinkStats;
-use super::extremes::OFF_COUNTS;
-use super::kind::{Kind, STALL_TICKS};
-use super::swing::MAX_TURNS;
-use crate::rows;
+use super::fault_kind::{Kind, STALL_TICKS};
+use super::limit_cycle::MAX_TURNS;
+use super::maxima::OFF_COUNTS;
+use crate::campaign_table;
 
 /// The page of a campaign that ran with the source at `commit`.
 #[must_use]
@@ -50,7 +50,7 @@ effects has up to 16 materials, of up to 1.7 times that stiffness. The amplifier
 The pose and the levers are computed in f64. Both forces are the least that explain the currents, with any share of the
 arm's weight. They are not computed within 30° of the links in line or 80 mm of the base's axis.
 
-## Extremes
+## Maxima
 
 The energy was observed in {:.0} s of contact: {:.1} s of them in the ramp, {:.1} s while the clutch moved.
 
@@ -73,7 +73,7 @@ bound it.
 
 ## Faults
 
-The kinds and their expected results are in `tests/src/campaign/kind.rs`. Any other result ends the campaign. The last
+The kinds and their expected results are in `tests/src/campaign/fault_kind.rs`. Any other result ends the campaign. The last
 column is the maximum number of ticks from the first tick of the fault until the amplifiers are off. A hanging task is
 detected within {STALL_TICKS} ticks, before the watchdog resets the board. The arm was near a singular pose for {:.1} s.
 
@@ -104,5 +104,5 @@ detected within {STALL_TICKS} ticks, before the watchdog resets the board. The a
 /// Kinds that a page does not have, or not with a count.
 #[must_use]
 pub fn missing(page: &str) -> Vec<Kind> {
-    rows::missing(page, &Kind::ALL)
+    campaign_table::missing(page, &Kind::ALL)
 }

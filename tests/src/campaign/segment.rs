@@ -19,16 +19,16 @@ use heightfield::Raster;
 use super::arm::{Arm, Mood};
 use super::board::{self, Board};
 use super::clock::{Reading, SetClock};
-use super::effect::{Core, Mishap};
-use super::force_watch::ForceWatch;
+use super::fault_effect::{Core, Mishap};
+use super::fault_kind::Kind;
+use super::fault_outcomes::{LinkStats, Outcome};
+use super::faulty_pipe::Unkind;
+use super::force_invariants::ForceWatch;
 use super::ground::{Effects, Ground, SceneSurfaces};
 use super::host::{Host, Tiles};
-use super::hostile;
-use super::kind::Kind;
-use super::pipe::Unkind;
-use super::tally::{LinkStats, Outcome};
-use super::watch::{Truth, Watch};
-use crate::chance::Chance;
+use super::hostile_calibrations;
+use super::tick_invariants::{Truth, Watch};
+use crate::random::Random;
 
 /// Samples along the side of the terrain, and the side of a cell, mm.
 const SAMPLES: u32 = 512;
@@ -70,17 +70,17 @@ pub fn run(
     ground: Ground,
     tally: &mut LinkStats,
 ) -> Result<(), Violation> {
-    let mut chance = Chance::new(seed ^ segment.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    let raster = terrain(&mut chance);
+    let mut random = Random::new(seed ^ segment.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let raster = terrain(&mut random);
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
-    // By dice of their own, so that a segment on ice stays what it was.
+    // By a generator of their own, so that a segment on ice stays what it was.
     let effects = (ground == Ground::Drawn).then(|| Effects::drawn(seed, segment));
     let materials = effects
         .as_ref()
         .and_then(|effects| effects.materials(&raster, SAMPLES));
     let grid = HapticGrid::new(&raster, HapticCells::default()).with_materials(materials.as_ref());
     let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
-    let mut running = Segment::new(&terrain, effects, chance);
+    let mut running = Segment::new(&terrain, effects, random);
     let played = running.play(tally);
     let felt = &running.felt;
     running.watch.extremes.given_mj = felt.most_given_mj;
@@ -98,11 +98,11 @@ pub fn run(
 }
 
 /// Hills with a hole in them.
-fn terrain(chance: &mut Chance) -> Raster {
+fn terrain(random: &mut Random) -> Raster {
     let looks = [Look::Fractal, Look::Ridge, Look::Steps, Look::Fractal];
-    let amplitude_mm = chance.between(6.0, 20.0);
-    let synth = Synth::new(looks[chance.below(4)], chance.bits(), amplitude_mm);
-    let hole = [150.0, 350.0].map(|at| at + chance.between(-40.0, 40.0));
+    let amplitude_mm = random.between(6.0, 20.0);
+    let synth = Synth::new(looks[random.below(4)], random.bits(), amplitude_mm);
+    let hole = [150.0, 350.0].map(|at| at + random.between(-40.0, 40.0));
     let raster = Raster::from_fn(SAMPLES, SAMPLES, |column, row| {
         let [east, north] = [f64::from(column) - hole[0], f64::from(row) - hole[1]];
         match libm::hypot(east, north) < 25.0 {
@@ -122,7 +122,7 @@ struct Segment<'t> {
     calm_from: u64,
     /// The device may hold tiles that are not the terrain's, whose borders are open.
     poisoned: bool,
-    chance: Chance,
+    random: Random,
     clock: SetClock,
     device: Board,
     host: Host<'t>,
@@ -143,21 +143,21 @@ struct Segment<'t> {
 }
 
 impl<'t> Segment<'t> {
-    fn new(terrain: &'t Terrain<'t>, effects: Option<Effects>, mut chance: Chance) -> Self {
+    fn new(terrain: &'t Terrain<'t>, effects: Option<Effects>, mut random: Random) -> Self {
         let record = Calibration::PREMIUM_1_5;
         let clock = SetClock::default();
         let device = board::new(clock.clone());
-        let arm = Arm::new(terrain, &mut chance);
-        let scene = scene(terrain, &arm, effects.as_ref(), &mut chance);
+        let arm = Arm::new(terrain, &mut random);
+        let scene = scene(terrain, &arm, effects.as_ref(), &mut random);
         let felt = ForceWatch::new(felt(terrain, &scene), scene.cell_mm);
-        let host = Host::new(terrain, scene, chance.bits());
+        let host = Host::new(terrain, scene, random.bits());
         Self {
             terrain,
             effects,
             felt,
             calm_from: 0,
             poisoned: false,
-            chance,
+            random,
             clock,
             device,
             host,
@@ -177,13 +177,13 @@ impl<'t> Segment<'t> {
     fn play(&mut self, tally: &mut LinkStats) -> Result<(), String> {
         let mut deck = Kind::ALL;
         for left in (1..deck.len()).rev() {
-            deck.swap(left, self.chance.below(left + 1));
+            deck.swap(left, self.random.below(left + 1));
         }
         for kind in deck {
             if !self.drive.enabled || self.status()?.health.report.mode != Mode::Armed {
                 self.arm_it()?;
             }
-            let calm = CALM.0 + self.chance.below(CALM.1 - CALM.0);
+            let calm = CALM.0 + self.random.below(CALM.1 - CALM.0);
             for _ in 0..calm {
                 self.tick(None)?;
             }
@@ -202,14 +202,14 @@ impl<'t> Segment<'t> {
     /// Lets one thing go wrong and says what became of it, and for how many
     /// ticks after its first the amplifiers stayed on.
     fn mishap(&mut self, kind: Kind) -> Result<(Outcome, Option<u64>), String> {
-        let mut mishap = Mishap::of(kind, self.now, &mut self.chance);
+        let mut mishap = Mishap::of(kind, self.now, &mut self.random);
         let began = self.now;
         let mut off = None;
         match kind {
-            Kind::Goodbye => self.host.leave(self.now, &mut self.chance),
+            Kind::Goodbye => self.host.leave(self.now, &mut self.random),
             Kind::HostRestarted => {
                 let effects = self.effects.as_ref();
-                self.scene = scene(self.terrain, &self.arm, effects, &mut self.chance);
+                self.scene = scene(self.terrain, &self.arm, effects, &mut self.random);
                 self.bring(self.scene);
             }
             Kind::ReplayThenRun => self.bring(Scene {
@@ -219,7 +219,7 @@ impl<'t> Segment<'t> {
             }),
             // In a session of its own: a misplaced request before may have had any number, and
             // in its session the device hears no older one.
-            Kind::HostileCalibration => self.host.greet(self.now, &mut self.chance),
+            Kind::HostileCalibration => self.host.greet(self.now, &mut self.random),
             _ => {}
         }
         let end = mishap.ticks.end + SETTLE;
@@ -260,10 +260,10 @@ impl<'t> Segment<'t> {
             // The force has gone out.
             Kind::HostileCalibration if at == 180 => self.dead_man = false,
             Kind::HostileCalibration if at > 180 && left > 0 && at.is_multiple_of(20) => {
-                let store = self.chance.below(2) == 0;
-                let calibration = match self.chance.below(5) {
-                    0 => hostile::harmless(),
-                    _ => hostile::calibration(&mut self.chance),
+                let store = self.random.below(2) == 0;
+                let calibration = match self.random.below(5) {
+                    0 => hostile_calibrations::harmless(),
+                    _ => hostile_calibrations::calibration(&mut self.random),
                 };
                 self.ask_past_the_client(Request::SetCalibration { calibration });
                 if store {
@@ -276,14 +276,14 @@ impl<'t> Segment<'t> {
 
     /// Makes a request under any number, as no honest host would.
     fn ask_past_the_client(&mut self, request: Request) {
-        let number = self.chance.bits() as u8;
+        let number = self.random.bits() as u8;
         self.say(&ToDevice::Request { number, request });
     }
 
     /// Sends a message that the client would not send.
     fn say(&mut self, message: &ToDevice<'_>) {
         let (now, kind) = (self.now, Unkind::default());
-        self.host.say(message, now, &kind, &mut self.chance);
+        self.host.say(message, now, &kind, &mut self.random);
     }
 
     /// Checks the conditions after a fault besides [`Kind::expectation`].
@@ -300,7 +300,7 @@ impl<'t> Segment<'t> {
 
     /// The host comes with a scene, as if it were started anew.
     fn bring(&mut self, scene: Scene) {
-        self.host.restart(scene, self.now, &mut self.chance);
+        self.host.restart(scene, self.now, &mut self.random);
         self.watch.forget();
         self.felt.feels(felt(self.terrain, &scene));
         self.poisoned = false;
@@ -309,7 +309,7 @@ impl<'t> Segment<'t> {
     /// The device comes out of a reset. Its encoders count from where the arm is now.
     fn reset(&mut self, cause: ResetCause) {
         let clock = self.clock.clone();
-        self.device = board::reset(&self.device, clock, cause, &mut self.chance);
+        self.device = board::reset(&self.device, clock, cause, &mut self.random);
         self.lost = self.arm.counts().map(i32::wrapping_neg);
         self.watch.forget();
     }
@@ -320,7 +320,7 @@ impl<'t> Segment<'t> {
         let began = self.now;
         while self.now < began + ANSWER {
             if (self.now - began).is_multiple_of(100) {
-                self.host.greet_if_closed(self.now, &mut self.chance);
+                self.host.greet_if_closed(self.now, &mut self.random);
                 self.host.ask_status();
             }
             self.tick(None)?;
@@ -345,7 +345,7 @@ impl<'t> Segment<'t> {
     fn try_to_arm(&mut self) -> Result<bool, String> {
         let began = self.now;
         self.dead_man = false;
-        self.host.greet(self.now, &mut self.chance);
+        self.host.greet(self.now, &mut self.random);
         while self.now < began + TRY {
             let at = self.now - began;
             match at {
@@ -411,16 +411,16 @@ impl<'t> Segment<'t> {
             if mishap.kind != Kind::Clutch {
                 self.calm_from = mishap.ticks.end + SETTLE;
             }
-            mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.chance);
+            mishap.meddle(&mut sense, &mut self.lost, self.now, &mut self.random);
             (unkind, tiles) = (mishap.unkind(), mishap.tiles());
             (reading, stalls) = (mishap.reading(self.now), mishap.stalls());
             self.poisoned |= tiles == Tiles::Poisoned;
             core = mishap.core(self.now);
-            if mishap.unplugs(self.now) || mishap.halts_endpoint(&mut self.chance) {
+            if mishap.unplugs(self.now) || mishap.halts_endpoint(&mut self.random) {
                 self.device.link.interrupted();
             }
-            if let Some(message) = mishap.misplaced(&mut self.chance, self.scene.epoch) {
-                self.host.say(&message, self.now, &unkind, &mut self.chance);
+            if let Some(message) = mishap.misplaced(&mut self.random, self.scene.epoch) {
+                self.host.say(&message, self.now, &unkind, &mut self.random);
             }
         }
         self.clock.set(reading);
@@ -428,7 +428,7 @@ impl<'t> Segment<'t> {
         let length = self.run_core(core, sense, stalls, &mut said);
         let said = &said[..length];
         self.host
-            .hear(said, self.now, &unkind, tiles, &mut self.chance);
+            .hear(said, self.now, &unkind, tiles, &mut self.random);
         self.look(core, &sense)?;
         let currents = self.drive.currents_a.to_array().map(f64::from);
         self.arm.step(currents, mood);
@@ -479,7 +479,7 @@ impl<'t> Segment<'t> {
             self.watch.warmth(believed_c, &truth)?;
             self.device
                 .calibration()
-                .map_or(Ok(()), hostile::keeps_ceilings)?;
+                .map_or(Ok(()), hostile_calibrations::keeps_ceilings)?;
         }
         for sample in std::mem::take(&mut self.host.samples) {
             self.watch.sample(&sample, self.scene.params.max_force_n)?;
@@ -500,9 +500,9 @@ fn scene(
     terrain: &Terrain<'_>,
     arm: &Arm<'_>,
     effects: Option<&Effects>,
-    chance: &mut Chance,
+    random: &mut Random,
 ) -> Scene {
-    let stiffness_n_per_mm = chance.between(0.3, 0.8) as f32;
+    let stiffness_n_per_mm = random.between(0.3, 0.8) as f32;
     let params = match effects {
         // Another scene each time.
         Some(effects) => effects.params(0.5 + stiffness_n_per_mm),

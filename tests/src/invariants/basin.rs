@@ -4,8 +4,8 @@
 use std::collections::HashSet;
 
 use super::Invariant;
-use super::judge::{Judge, Verdict};
-use super::seen::Seen;
+use super::observed_tick::ObservedTick;
+use super::oracle::{TickOracle, Verdict};
 use super::surface::{distance, patches_at};
 
 /// Shorter moves, in cells, pass no crest that is worth a name.
@@ -18,9 +18,9 @@ const COLUMNS: f64 = 256.0;
 /// Tolerance of a channel between two columns, cells.
 const SLACK: f64 = 0.02;
 
-impl Judge<'_> {
+impl TickOracle<'_> {
     /// The proxy is joined with where it was.
-    pub(super) fn stays_in_basin(&self, before: &Seen, seen: &Seen) -> Verdict {
+    pub(super) fn stays_in_basin(&self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         let reach = distance(before.proxy, seen.hip);
         let is_judged = before.is_touching()
             && seen.is_touching()

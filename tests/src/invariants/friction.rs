@@ -3,8 +3,8 @@
 use hapterra_core::contact::ContactState;
 
 use super::Invariant;
-use super::judge::{Judge, Verdict};
-use super::seen::Seen;
+use super::observed_tick::ObservedTick;
+use super::oracle::{TickOracle, Verdict};
 use super::surface::{Patch, distance, patches_at};
 
 /// Part by which a proxy that has slid may be pulled more, or less, than its friction holds.
@@ -33,9 +33,9 @@ struct Pull {
     rounding: f64,
 }
 
-impl Judge<'_> {
+impl TickOracle<'_> {
     /// A proxy that has slid, or was held, is inside the friction cone.
-    pub(super) fn is_in_cone(&mut self, seen: &Seen) -> Verdict {
+    pub(super) fn is_in_cone(&mut self, seen: &ObservedTick) -> Verdict {
         let Some((least, _)) = self.pulls(seen.proxy, seen.hip) else {
             return Ok(());
         };
@@ -66,7 +66,7 @@ impl Judge<'_> {
     }
 
     /// A proxy that has slid goes no farther than friction lets it.
-    pub(super) fn is_held_back(&mut self, seen: &Seen) -> Verdict {
+    pub(super) fn is_held_back(&mut self, seen: &ObservedTick) -> Verdict {
         let Some(start) = self.slid_from(seen) else {
             return Ok(());
         };
@@ -98,7 +98,7 @@ impl Judge<'_> {
 
     /// Returns the position of the proxy when its motion for this HIP began: ticks that were cut
     /// short go on with it.
-    pub(super) fn begun_at(&self, before: &Seen, seen: &Seen) -> [f64; 3] {
+    pub(super) fn begun_at(&self, before: &ObservedTick, seen: &ObservedTick) -> [f64; 3] {
         match before.felt.converged || before.hip != seen.hip {
             true => before.proxy,
             false => self.began,
@@ -107,7 +107,7 @@ impl Judge<'_> {
 
     /// Returns the start of a proxy's slide over the surface alone: around the two the HIP is
     /// clearly below every tangent plane, so that nothing lifts it off.
-    fn slid_from(&self, seen: &Seen) -> Option<[f64; 3]> {
+    fn slid_from(&self, seen: &ObservedTick) -> Option<[f64; 3]> {
         const LOOKS: u32 = 12;
         /// So far beside the straight way, in cells, a slide may lead.
         const BESIDE: f64 = 0.25;
@@ -149,9 +149,9 @@ impl Judge<'_> {
 
     /// A proxy inside the cone does not move. One that was in the air slides at first, also where
     /// it comes back to where it was.
-    pub(super) fn sticks(&mut self, before: &Seen, seen: &Seen) -> Verdict {
+    pub(super) fn sticks(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         let touches =
-            |seen: &Seen| seen.felt.state == ContactState::Touching && seen.felt.converged;
+            |seen: &ObservedTick| seen.felt.state == ContactState::Touching && seen.felt.converged;
         let moved = before.felt.proxy != seen.felt.proxy;
         let still = self.still;
         self.still = if seen.stays(before) { still + 1 } else { 0 };

@@ -1,24 +1,24 @@
 //! Invariants of every tick, on any terrain, for any path of the HIP. They are checked
 //! in f64, by methods that are none of the product's.
 //!
-//! [`judge`] lists the invariants in the order they are judged; [`material`] judges what a loop
-//! feels of a scene with materials. [`seen`] is one tick as
-//! the judge sees it; [`surface`], [`crossing`] and [`descent`] are what the judge
-//! knows about the terrain. All lengths are in cells.
+//! [`oracle`] lists the invariants in the order in which they are checked; [`material`] checks the
+//! forces of a scene with materials. [`observed_tick`] is one tick as the oracle sees it. `single_tick`,
+//! `proxy_position` and `tick_to_tick` check a tick, its proxy, and its change from the tick before.
+//! [`surface`], [`crossing`] and [`descent`] are the terrain in f64. All lengths are in cells.
 
-mod answer;
 mod basin;
-mod change;
 pub mod crossing;
 pub mod descent;
 mod friction;
-pub mod judge;
 pub mod material;
-mod place;
-pub mod seen;
+pub mod observed_tick;
+pub mod oracle;
+mod proxy_position;
 mod shading;
+mod single_tick;
 pub mod surface;
 pub mod texture;
+mod tick_to_tick;
 
 /// Invariant of every tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_PI_4;
 use glam::DVec3;
 
 use super::Invariant;
-use super::judge::{Judge, Verdict};
-use super::seen::Seen;
+use super::observed_tick::ObservedTick;
+use super::oracle::{TickOracle, Verdict};
 use super::surface::Patch;
 use crate::scene::terrain::Terrain;
 
@@ -24,9 +24,9 @@ const MAX_TURN: f64 = 60.0 / 45.0 * FRAC_PI_4;
 const GENTLE: f64 = FRAC_PI_4;
 const SHARP: f64 = 75.0 / 45.0 * FRAC_PI_4;
 
-impl Judge<'_> {
+impl TickOracle<'_> {
     /// As long as without shading; inside of a patch along the smoothed normal, on ice.
-    pub(super) fn is_shaded(&self, seen: &Seen) -> Verdict {
+    pub(super) fn is_shaded(&self, seen: &ObservedTick) -> Verdict {
         let Some(shaded) = seen.shaded else {
             return Ok(());
         };

@@ -5,7 +5,7 @@ use glam::DVec3;
 use hapterra_core::force::{Pattern, Texture};
 use hapterra_core::grid::GridPoint;
 
-use super::seen::Seen;
+use super::observed_tick::ObservedTick;
 
 /// A tick of the soak, s.
 const TICK_S: f64 = 1e-3;
@@ -70,8 +70,8 @@ impl TextureJudge {
     /// Judges the next tick.
     ///
     /// # Errors
-    /// What is wrong with its force.
-    pub fn look(&mut self, seen: &Seen) -> Verdict {
+    /// The fault of its force.
+    pub fn look(&mut self, seen: &ObservedTick) -> Verdict {
         let share = self.share(&seen.felt.proxy);
         let Some(textured) = seen.textured else {
             return Ok(());

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// Bytes that a direction holds at most: a device that finds no room waits, as one does
 /// whose host does not read.
@@ -64,22 +64,22 @@ impl Way {
     }
 
     /// Puts a transfer in at `now`, ms.
-    pub fn send(&mut self, bytes: &[u8], now: u64, chance: &mut Chance) {
+    pub fn send(&mut self, bytes: &[u8], now: u64, random: &mut Random) {
         if bytes.is_empty() || self.harm.cut {
             return;
         }
         let mut transfer = bytes.to_vec();
-        flip(&mut transfer, self.harm.flipped, chance);
-        if happens(self.harm.dropped, chance) {
-            let from = chance.below(transfer.len());
-            let to = (from + 1 + chance.below(80)).min(transfer.len());
+        flip(&mut transfer, self.harm.flipped, random);
+        if happens(self.harm.dropped, random) {
+            let from = random.below(transfer.len());
+            let to = (from + 1 + random.below(80)).min(transfer.len());
             transfer.drain(from..to);
         }
-        let late = chance.below(self.harm.late as usize + 1) as u64;
+        let late = random.below(self.harm.late as usize + 1) as u64;
         // Bytes do not overtake each other.
         let due = self.transfers.back().map_or(0, |(due, _)| *due);
         let due = due.max(now + late);
-        let times = 1 + usize::from(happens(self.harm.twice, chance));
+        let times = 1 + usize::from(happens(self.harm.twice, random));
         for _ in 0..times {
             self.held += transfer.len();
             self.transfers.push_back((due, transfer.clone()));
@@ -106,24 +106,24 @@ impl Way {
     }
 }
 
-fn happens(share: f64, chance: &mut Chance) -> bool {
-    share > 0.0 && chance.between(0.0, 1.0) < share
+fn happens(share: f64, random: &mut Random) -> bool {
+    share > 0.0 && random.between(0.0, 1.0) < share
 }
 
 /// Flips a bit in so many of the bytes.
-fn flip(bytes: &mut [u8], share: f64, chance: &mut Chance) {
+fn flip(bytes: &mut [u8], share: f64, random: &mut Random) {
     if share <= 0.0 {
         return;
     }
     // From one flip to the next it is so many bytes.
-    let stride = |chance: &mut Chance| {
-        let u = chance.between(f64::MIN_POSITIVE, 1.0);
+    let stride = |random: &mut Random| {
+        let u = random.between(f64::MIN_POSITIVE, 1.0);
         (libm::log(u) / libm::log1p(-share)) as usize
     };
-    let mut at = stride(chance);
+    let mut at = stride(random);
     while let Some(byte) = bytes.get_mut(at) {
-        *byte ^= 1 << chance.below(8);
-        at += 1 + stride(chance);
+        *byte ^= 1 << random.below(8);
+        at += 1 + stride(random);
     }
 }
 
@@ -133,11 +133,11 @@ mod tests {
 
     #[test]
     fn as_many_bits_flip_as_are_asked_for() {
-        let mut chance = Chance::new(1);
+        let mut random = Random::new(1);
         let mut flipped = 0;
         for _ in 0..1_000 {
             let mut bytes = [0; 1_000];
-            flip(&mut bytes, 1e-3, &mut chance);
+            flip(&mut bytes, 1e-3, &mut random);
             flipped += bytes.iter().filter(|byte| **byte != 0).count();
         }
         assert!((900..1_100).contains(&flipped), "{flipped}");
@@ -145,14 +145,14 @@ mod tests {
 
     #[test]
     fn what_stalls_comes_later_and_what_is_cut_never() {
-        let mut chance = Chance::new(2);
+        let mut random = Random::new(2);
         let mut way = Way::default();
         let stalled = Harm {
             stalled: true,
             ..Harm::NONE
         };
         way.harm(stalled);
-        way.send(b"held", 1, &mut chance);
+        way.send(b"held", 1, &mut random);
         assert_eq!((way.receive(9), way.room()), (None, CAPACITY - 4));
         way.harm(Harm::NONE);
         assert_eq!(way.receive(9), Some(b"held".to_vec()));
@@ -160,9 +160,9 @@ mod tests {
             cut: true,
             ..Harm::NONE
         };
-        way.send(b"gone", 10, &mut chance);
+        way.send(b"gone", 10, &mut random);
         way.harm(cut);
-        way.send(b"gone", 11, &mut chance);
+        way.send(b"gone", 11, &mut random);
         way.harm(Harm::NONE);
         assert_eq!((way.receive(99), way.room()), (None, CAPACITY));
     }

@@ -12,8 +12,8 @@ use hapterra_firmware::store::Stored;
 
 use super::cable::A_TICK;
 use crate::campaign::arm::{Arm, Mood};
-use crate::campaign::watch::{Truth, Watch};
-use crate::chance::Chance;
+use crate::campaign::tick_invariants::{Truth, Watch};
+use crate::random::Random;
 
 /// Tiles along the side of the window, as on the smallest board.
 const WINDOW: usize = 4;
@@ -38,11 +38,11 @@ pub struct Board<'t> {
 
 impl<'t> Board<'t> {
     /// A board that was just switched on, its arm over the middle of a terrain.
-    pub fn new(terrain: &'t Terrain<'t>, chance: &mut Chance) -> Self {
+    pub fn new(terrain: &'t Terrain<'t>, random: &mut Random) -> Self {
         let record = Calibration::PREMIUM_1_5;
         Self {
             device: start(),
-            arm: Arm::new(terrain, chance),
+            arm: Arm::new(terrain, random),
             watch: Watch::new(record, PhantomModel::premium_1_5()),
             dead_man: false,
             mood: Mood::Lifted,
@@ -85,7 +85,7 @@ impl<'t> Board<'t> {
     /// Runs one tick of device and arm.
     ///
     /// # Errors
-    /// What must not be, by the watch.
+    /// The broken invariant.
     pub fn tick(&mut self) -> Result<(), String> {
         if self.lock_step && self.device.link.may_stand_still() {
             // The link's task runs all the same.

@@ -1,7 +1,7 @@
 //! Faults of the link, and their durations.
 
 use super::cable::Harm;
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// Something that goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,16 +81,16 @@ pub struct Fault {
 impl Fault {
     /// One that begins at `now`, ms.
     #[must_use]
-    pub fn of(kind: Kind, now: u64, chance: &mut Chance) -> Self {
+    pub fn of(kind: Kind, now: u64, random: &mut Random) -> Self {
         let (shortest, longest) = kind.duration();
         // As many short ones as long ones.
-        let segment = chance.between(0.0, 1.0);
+        let segment = random.between(0.0, 1.0);
         let length = (longest - shortest) as f64 * segment * segment;
         Self {
             kind,
             end: now + shortest as u64 + length as u64,
-            share: chance.between(0.0, 1.0),
-            ways: [[true, true], [true, false], [false, true]][chance.below(3)],
+            share: random.between(0.0, 1.0),
+            ways: [[true, true], [true, false], [false, true]][random.below(3)],
         }
     }
 

@@ -5,14 +5,14 @@
 
 use std::time::Duration;
 
-use hapterra::link::{Ask, Client, Event, LinkError, LinkStats, State, Timeouts};
+use hapterra::link::{Client, Event, HostRequest, LinkError, LinkStats, State, Timeouts};
 use hapterra::terrain::Terrain;
 use hapterra_core::guard::{Mode, Report};
 use hapterra_core::scene::{Scene, TickRecord};
 use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{SessionEnd, SessionNumber};
 
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// For how many seconds the device lets an armed arm be while the host is silent: the
 /// least that there is.
@@ -68,10 +68,10 @@ impl<'t> Host<'t> {
         terrain: &'t Terrain<'t>,
         scene: Scene,
         now: u64,
-        chance: &mut Chance,
+        random: &mut Random,
         out: &mut Vec<u8>,
     ) -> Self {
-        let mut client = Client::numbered(terrain, scene, None, PATIENCE, chance.bits());
+        let mut client = Client::numbered(terrain, scene, None, PATIENCE, random.bits());
         client.greet(Duration::from_millis(now), out);
         Self {
             client,
@@ -104,7 +104,7 @@ impl<'t> Host<'t> {
         let seen = self.view.and_then(|view| view.fault);
         let clear = Request::ClearFault { seen };
         for request in [clear, zero, Request::Arm] {
-            self.client.ask(Ask::Request(request));
+            self.client.ask(HostRequest::Request(request));
         }
     }
 
@@ -150,7 +150,7 @@ impl<'t> Host<'t> {
                     Err(_) => Told::No,
                 };
             }
-            Event::Unanswered(Ask::Request(Request::Arm)) => *told = Told::No,
+            Event::Unanswered(HostRequest::Request(Request::Arm)) => *told = Told::No,
             _ => {}
         };
         client.receive(now, bytes, out, &mut on)?;

@@ -8,13 +8,13 @@
 //! ```
 //!
 //! A *run* is one host from its hello to its end, with one fault in it ([`fault`]) that
-//! begins in one of the run's steps ([`play`]). In every tick [`segment`](mod@segment) judges what is
-//! felt: force and currents ([`crate::campaign::watch`]), the proxy against the bilinear
-//! surface ([`surface`]), amplifiers that nobody asked for, a user who sees something
-//! else than what is. At the end of a run [`play`] judges what the host said of it:
+//! begins in one of the run's steps ([`runs`]). In every tick [`segment`](mod@segment) checks force and
+//! currents ([`crate::campaign::tick_invariants`]), the proxy against the bilinear
+//! surface ([`proxy_oracle`]), amplifiers that are on without a request, and wrong
+//! messages to the user. At the end of a run [`runs`] checks the report of the host:
 //! - each step ends within its time, with what it is for or with an error;
 //! - an end that host and device agree on is one with the amplifiers off;
-//! - received, lost and dropped samples are together the samples made ([`tap`]).
+//! - received, lost and dropped samples are together the samples made ([`frame_tap`]).
 //!
 //! A segment depends on the seed and its own number alone, so a violation is repeated by
 //! itself.
@@ -22,26 +22,26 @@
 pub mod cable;
 pub mod device;
 pub mod fault;
+pub mod frame_tap;
+pub mod frames;
 pub mod host;
-pub mod hostile;
-pub mod impostor;
-pub mod play;
+pub mod hostile_programs;
+pub mod not_a_device;
+pub mod proxy_oracle;
 pub mod report;
+pub mod run_outcomes;
+pub mod runs;
 pub mod segment;
-pub mod surface;
-pub mod tally;
-pub mod tap;
-pub mod wire;
 
 use hapterra::synth::{Kind as Look, Synth};
 use hapterra::terrain::{Scale, Terrain};
 use heightfield::Raster;
 
 use crate::campaign::Violation;
-use crate::chance::Chance;
+use crate::random::Random;
 use fault::Kind;
+pub use run_outcomes::LinkStats;
 use segment::Segment;
-pub use tally::LinkStats;
 
 /// The seed that is used without being told another.
 pub const SEED: u64 = 1;
@@ -75,18 +75,18 @@ pub fn run(
 /// # Errors
 /// The first [`Violation`].
 pub fn segment(seed: u64, number: u64, tally: &mut LinkStats) -> Result<(), Violation> {
-    let mut chance = Chance::new(seed ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    let raster = terrain(&mut chance);
+    let mut random = Random::new(seed ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let raster = terrain(&mut random);
     let scale = Scale::new(CELL_MM, 1.0).expect("a scale");
     let terrain = Terrain::new(&raster, scale, 0).expect("a terrain");
-    let mut segment = Segment::new(&terrain, chance);
+    let mut segment = Segment::new(&terrain, random);
     let mut deck = Kind::ALL;
     for left in (1..deck.len()).rev() {
-        deck.swap(left, segment.chance.below(left + 1));
+        deck.swap(left, segment.random.below(left + 1));
     }
     let played = deck
         .into_iter()
-        .try_for_each(|kind| play::run(&mut segment, kind, tally).map_err(|what| (kind, what)));
+        .try_for_each(|kind| runs::run(&mut segment, kind, tally).map_err(|what| (kind, what)));
     let (board, off) = (&segment.board, segment.off_surface);
     tally.add(board.ticks, segment.touching, off, &board.watch.extremes);
     played.map_err(|(kind, what)| Violation {
@@ -98,10 +98,10 @@ pub fn segment(seed: u64, number: u64, tally: &mut LinkStats) -> Result<(), Viol
 }
 
 /// Hills or steps; no sample is higher above a tile's base than the bound of
-/// [`surface::OFF_SURFACE`] has room for.
-fn terrain(chance: &mut Chance) -> Raster {
+/// [`proxy_oracle::OFF_SURFACE`] has room for.
+fn terrain(random: &mut Random) -> Raster {
     let looks = [Look::Fractal, Look::Ridge, Look::Fractal];
-    let amplitude_mm = chance.between(6.0, 16.0);
-    let synth = Synth::new(looks[chance.below(3)], chance.bits(), amplitude_mm);
+    let amplitude_mm = random.between(6.0, 16.0);
+    let synth = Synth::new(looks[random.below(3)], random.bits(), amplitude_mm);
     Raster::from_fn(SAMPLES, SAMPLES, |column, row| synth.height(column, row)).expect("a terrain")
 }

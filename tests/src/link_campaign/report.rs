@@ -1,9 +1,9 @@
 //! The report of a campaign of link faults: `log/link-campaign.md`.
 
 use super::fault::Kind;
-use super::surface::OFF_SURFACE;
-use super::tally::LinkStats;
-use crate::rows;
+use super::proxy_oracle::OFF_SURFACE;
+use super::run_outcomes::LinkStats;
+use crate::campaign_table;
 
 /// The page of a campaign that ran with the source at `commit`.
 #[must_use]
@@ -41,7 +41,7 @@ contact, or while the host closes. In one segment of four the device's clock sto
 - The device does not request a tile again before its time-out, except for requests that were in flight at an opening.
 - A device whose host vanished ramps the force down and disarms within the time that the host had set.
 
-## Extremes
+## Maxima
 
 | quantity | maximum | bound |
 | --- | ---: | ---: |
@@ -67,5 +67,5 @@ contact, or while the host closes. In one segment of four the device's clock sto
 /// Kinds of faults that a page does not have, or not with a count.
 #[must_use]
 pub fn missing(page: &str) -> Vec<Kind> {
-    rows::missing(page, &Kind::ALL)
+    campaign_table::missing(page, &Kind::ALL)
 }

@@ -9,11 +9,11 @@ use hapterra_core::wire::session::SessionEnd;
 use super::cable::{A_TICK, Way};
 use super::device::Board;
 use super::fault::{Fault, Kind};
+use super::frame_tap::{Moment, Tap};
 use super::host::Host;
-use super::hostile;
-use super::surface;
-use super::tap::{Moment, Tap};
-use crate::chance::Chance;
+use super::hostile_programs;
+use super::proxy_oracle;
+use crate::random::Random;
 
 /// Time for which what the user sees may differ from what is, on a line that works, ms; also
 /// where another program has taken the device, which the user is told.
@@ -32,7 +32,7 @@ pub struct Segment<'t> {
     /// The scene that they put in force.
     pub scene: Scene,
     /// Decides everything.
-    pub chance: Chance,
+    pub random: Random,
     /// The device and its arm.
     pub board: Board<'t>,
     /// The direction to the device.
@@ -70,14 +70,14 @@ pub struct Segment<'t> {
 impl<'t> Segment<'t> {
     /// A device that was just switched on, and nobody at the other end.
     #[must_use]
-    pub fn new(terrain: &'t Terrain<'t>, mut chance: Chance) -> Self {
-        let mut board = Board::new(terrain, &mut chance);
-        board.lock_step = chance.below(4) == 0;
-        let scene = scene(terrain, &board, &mut chance);
+    pub fn new(terrain: &'t Terrain<'t>, mut random: Random) -> Self {
+        let mut board = Board::new(terrain, &mut random);
+        board.lock_step = random.below(4) == 0;
+        let scene = scene(terrain, &board, &mut random);
         Self {
             terrain,
             scene,
-            chance,
+            random,
             board,
             to_device: Way::default(),
             to_host: Way::default(),
@@ -100,13 +100,13 @@ impl<'t> Segment<'t> {
     /// Starts an honest host, with another scene or the one that was in force last.
     pub fn start_host(&mut self, other_scene: bool) {
         if other_scene {
-            self.scene = scene(self.terrain, &self.board, &mut self.chance);
+            self.scene = scene(self.terrain, &self.board, &mut self.random);
         }
         self.board.watch.forget();
         self.owed = std::mem::take(&mut self.let_go);
         let mut out = Vec::new();
-        let chance = &mut self.chance;
-        let host = Host::start(self.terrain, self.scene, self.now, chance, &mut out);
+        let random = &mut self.random;
+        let host = Host::start(self.terrain, self.scene, self.now, random, &mut out);
         self.tap.begin(Some(host.session()));
         self.host = Some(host);
         self.send(&out);
@@ -149,7 +149,7 @@ impl<'t> Segment<'t> {
 
     /// Puts bytes on their way to the device.
     pub fn send(&mut self, bytes: &[u8]) {
-        self.to_device.send(bytes, self.now, &mut self.chance);
+        self.to_device.send(bytes, self.now, &mut self.random);
     }
 
     /// Returns the time for which the line and its ends have been as they should be, ms.
@@ -161,7 +161,7 @@ impl<'t> Segment<'t> {
     /// One millisecond of everything.
     ///
     /// # Errors
-    /// What must not be.
+    /// The broken invariant.
     pub fn step(&mut self) -> Result<(), String> {
         self.end_fault();
         self.speak_hostile();
@@ -178,7 +178,7 @@ impl<'t> Segment<'t> {
             flows: self.now > self.full + DRAINS,
         };
         self.tap.hear(said, &when);
-        self.to_host.send(said, self.now, &mut self.chance);
+        self.to_host.send(said, self.now, &mut self.random);
         let mut heard = Vec::new();
         while let Some(transfer) = self.to_host.receive(self.now) {
             heard.extend(transfer);
@@ -207,7 +207,7 @@ impl<'t> Segment<'t> {
             .fault
             .is_some_and(|fault| fault.kind == Kind::HostileHost);
         if hostile && self.to_device.room() > 0 {
-            let said = hostile::host(&mut self.chance);
+            let said = hostile_programs::host(&mut self.random);
             self.send(&said);
         }
     }
@@ -252,7 +252,7 @@ impl<'t> Segment<'t> {
             self.board
                 .watch
                 .sample(&sample, self.scene.params.max_force_n)?;
-            let off = surface::judge(self.terrain, &sample)?;
+            let off = proxy_oracle::judge(self.terrain, &sample)?;
             self.off_surface = self.off_surface.max(off);
             self.touching += u64::from(off > 0.0);
         }
@@ -303,9 +303,9 @@ impl<'t> Segment<'t> {
 }
 
 /// A scene like no other before.
-fn scene(terrain: &Terrain<'_>, board: &Board<'_>, chance: &mut Chance) -> Scene {
+fn scene(terrain: &Terrain<'_>, board: &Board<'_>, random: &mut Random) -> Scene {
     let params = SurfaceParams {
-        stiffness_n_per_mm: chance.between(0.3, 0.8) as f32,
+        stiffness_n_per_mm: random.between(0.3, 0.8) as f32,
         max_force_n: 8.5,
         ..SurfaceParams::PREMIUM
     };

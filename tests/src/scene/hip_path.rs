@@ -1,7 +1,7 @@
 //! Random paths of the HIP over a terrain, wild and gentle.
 
 use super::terrain::Terrain;
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// Positions are whole multiples of this many cells, so that they are exact in
 /// single precision however a scene is mirrored, turned or shifted.
@@ -51,9 +51,9 @@ const HABITS: [Habit; 9] = [
 
 /// `ticks` positions in cells; the first is high above everything.
 #[must_use]
-pub fn random(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
-    walked(terrain, chance, ticks, |walker| {
-        let habit = match walker.chance.below(20) {
+pub fn random(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64; 3]> {
+    walked(terrain, random, ticks, |walker| {
+        let habit = match walker.random.below(20) {
             n if n < HABITS.len() => HABITS[n],
             _ => Habit::Wander,
         };
@@ -64,9 +64,9 @@ pub fn random(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64;
 /// `ticks` positions in cells: down out of the sky, and then far below the surface, as a
 /// hand that presses into small cells: to and fro, slow and fast.
 #[must_use]
-pub fn deep(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3]> {
-    walked(terrain, chance, ticks, |walker| {
-        let turns = 40 + walker.chance.below(160);
+pub fn deep(terrain: &Terrain, random: &mut Random, ticks: usize) -> Vec<[f64; 3]> {
+    walked(terrain, random, ticks, |walker| {
+        let turns = 40 + walker.random.below(160);
         walker.press_deep(turns);
     })
 }
@@ -74,14 +74,14 @@ pub fn deep(terrain: &Terrain, chance: &mut Chance, ticks: usize) -> Vec<[f64; 3
 /// `ticks` positions: out of the sky, and now and then back to it.
 fn walked(
     terrain: &Terrain,
-    chance: &mut Chance,
+    random: &mut Random,
     ticks: usize,
     go_on: impl Fn(&mut Walker<'_>),
 ) -> Vec<[f64; 3]> {
-    let mut walker = Walker::in_the_sky(terrain, chance);
+    let mut walker = Walker::in_the_sky(terrain, random);
     while walker.path.len() < ticks {
         go_on(&mut walker);
-        if walker.chance.below(6) == 0 {
+        if walker.random.below(6) == 0 {
             walker.rise();
         }
     }
@@ -92,20 +92,20 @@ fn walked(
 struct Walker<'a> {
     terrain: &'a Terrain,
     size: [f64; 2],
-    chance: &'a mut Chance,
+    random: &'a mut Random,
     path: Vec<[f64; 3]>,
     at: [f64; 2],
 }
 
 impl<'a> Walker<'a> {
     /// High above the surface, somewhere.
-    fn in_the_sky(terrain: &'a Terrain, chance: &'a mut Chance) -> Self {
+    fn in_the_sky(terrain: &'a Terrain, random: &'a mut Random) -> Self {
         let size = terrain.size.map(f64::from);
-        let at = [chance.between(1.0, size[0]), chance.between(1.0, size[1])];
+        let at = [random.between(1.0, size[0]), random.between(1.0, size[1])];
         let mut walker = Self {
             terrain,
             size,
-            chance,
+            random,
             path: vec![],
             at,
         };
@@ -142,12 +142,12 @@ impl<'a> Walker<'a> {
 
     /// A length over many orders of magnitude, at most `most`.
     fn length(&mut self, most: f64) -> f64 {
-        most * 10_f64.powf(self.chance.between(-4.0, 0.0))
+        most * 10_f64.powf(self.random.between(-4.0, 0.0))
     }
 
     fn anywhere(&mut self) -> [f64; 2] {
         // Off the field, too.
-        [0, 1].map(|axis| self.chance.between(-2.0, self.size[axis] + 2.0))
+        [0, 1].map(|axis| self.random.between(-2.0, self.size[axis] + 2.0))
     }
 
     fn vertex(&mut self) -> [f64; 2] {
@@ -155,7 +155,7 @@ impl<'a> Walker<'a> {
     }
 
     fn go_on(&mut self, habit: Habit) {
-        let ticks = 1 + self.chance.below(40);
+        let ticks = 1 + self.random.below(40);
         match habit {
             Habit::Wander => self.wander(4 * ticks),
             Habit::Teleport => self.teleport(ticks),
@@ -171,11 +171,11 @@ impl<'a> Walker<'a> {
 
     fn wander(&mut self, ticks: usize) {
         let stride = self.length(3.0);
-        let mut heading = self.chance.between(0.0, std::f64::consts::TAU);
-        let mut height = self.chance.between(-1.5, 0.8);
+        let mut heading = self.random.between(0.0, std::f64::consts::TAU);
+        let mut height = self.random.between(-1.5, 0.8);
         for _ in 0..ticks {
-            heading += self.chance.between(-0.4, 0.4);
-            height += 0.1 * stride * self.chance.between(-1.0, 1.0);
+            heading += self.random.between(-0.4, 0.4);
+            height += 0.1 * stride * self.random.between(-1.0, 1.0);
             let x = (self.at[0] + stride * heading.cos()).clamp(-1.0, self.size[0] + 1.0);
             let y = (self.at[1] + stride * heading.sin()).clamp(-1.0, self.size[1] + 1.0);
             self.above(x, y, height);
@@ -184,13 +184,13 @@ impl<'a> Walker<'a> {
 
     fn press_deep(&mut self, ticks: usize) {
         let stride = self.length(3.0);
-        let mut heading = self.chance.between(0.0, std::f64::consts::TAU);
+        let mut heading = self.random.between(0.0, std::f64::consts::TAU);
         let [x, y] = self.at;
-        let depth = self.chance.between(2.0, 100.0);
+        let depth = self.random.between(2.0, 100.0);
         let mut z = self.terrain.height_about(x, y) - depth;
         for _ in 0..ticks {
-            heading += self.chance.between(-0.2, 0.2);
-            z += stride * self.chance.between(-1.0, 1.0);
+            heading += self.random.between(-0.2, 0.2);
+            z += stride * self.random.between(-1.0, 1.0);
             let x = (self.at[0] + stride * heading.cos()).clamp(0.0, self.size[0]);
             let y = (self.at[1] + stride * heading.sin()).clamp(0.0, self.size[1]);
             self.put(x, y, z);
@@ -200,7 +200,7 @@ impl<'a> Walker<'a> {
     fn teleport(&mut self, ticks: usize) {
         for _ in 0..ticks {
             let [x, y] = self.anywhere();
-            let height = self.length(10.0) * if self.chance.below(2) == 0 { 1.0 } else { -1.0 };
+            let height = self.length(10.0) * if self.random.below(2) == 0 { 1.0 } else { -1.0 };
             self.above(x, y, height);
         }
     }
@@ -209,7 +209,7 @@ impl<'a> Walker<'a> {
         let [x, y] = self.at;
         let z = self.terrain.height_about(x, y) - self.length(2.0);
         for _ in 0..ticks {
-            let mut off = || (self.chance.below(3) as f64 - 1.0) * COUNT;
+            let mut off = || (self.random.below(3) as f64 - 1.0) * COUNT;
             let (dx, dy, dz) = (off(), off(), off());
             self.put(x + dx, y + dy, z + dz);
         }
@@ -230,9 +230,9 @@ impl<'a> Walker<'a> {
 
     fn graze(&mut self, ticks: usize) {
         let [x, y] = self.vertex();
-        let above = [0.0, GRAIN, -GRAIN, 1e-3][self.chance.below(4)];
-        let step = [1.0, 0.5, 0.25, 0.125][self.chance.below(4)];
-        let along = self.chance.below(2);
+        let above = [0.0, GRAIN, -GRAIN, 1e-3][self.random.below(4)];
+        let step = [1.0, 0.5, 0.25, 0.125][self.random.below(4)];
+        let along = self.random.below(2);
         self.above(x, y, 1.0);
         for tick in 0..ticks {
             let mut at = [x, y];
@@ -243,12 +243,12 @@ impl<'a> Walker<'a> {
 
     fn on_lines(&mut self, ticks: usize) {
         for _ in 0..ticks {
-            let axis = self.chance.below(2);
+            let axis = self.random.below(2);
             let stride = self.length(2.0);
             let mut at = self.at;
-            at[axis] = at[axis].round() + self.chance.below(3) as f64 - 1.0;
-            at[1 - axis] += stride * self.chance.between(-1.0, 1.0);
-            let height = self.chance.between(-0.7, 0.4);
+            at[axis] = at[axis].round() + self.random.below(3) as f64 - 1.0;
+            at[1 - axis] += stride * self.random.between(-1.0, 1.0);
+            let height = self.random.between(-0.7, 0.4);
             self.above(at[0], at[1], height);
         }
     }
@@ -263,13 +263,13 @@ impl<'a> Walker<'a> {
     }
 
     fn sweep(&mut self, times: usize) {
-        let height = self.chance.between(-0.5, 1.0);
+        let height = self.random.between(-0.5, 1.0);
         for _ in 0..times {
             let [x, y] = self.anywhere();
             self.above(x, y, height);
             let (x, y) = (self.size[0] - x, self.size[1] - y);
             let z = self.path[self.path.len() - 1][2];
-            if self.chance.below(2) == 0 {
+            if self.random.below(2) == 0 {
                 self.put(x, y, z);
             } else {
                 self.above(x, y, height);

@@ -6,7 +6,7 @@ use hapterra_core::force::{Damping, Material, MaterialTable, SurfaceParams, Text
 use super::run::{friction, texture};
 use super::symmetry::Symmetry;
 use super::terrain::Terrain;
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// One scene in so many has materials.
 const EVERY: usize = 4;
@@ -59,21 +59,21 @@ pub struct Materials {
 impl Materials {
     /// The materials of a scene, if it has some: one in four has.
     pub(super) fn drawn(mixed: u64, terrain: &Terrain) -> Option<Self> {
-        // Their own dice, so that all else of a scene stays what it was.
-        let mut chance = Chance::new(mixed ^ 0x3a7e_71a1);
-        (chance.below(EVERY) == 0).then(|| Self::random(&mut chance, terrain))
+        // A generator of their own, so that the rest of a scene stays what it was.
+        let mut random = Random::new(mixed ^ 0x3a7e_71a1);
+        (random.below(EVERY) == 0).then(|| Self::random(&mut random, terrain))
     }
 
-    fn random(chance: &mut Chance, terrain: &Terrain) -> Self {
-        let count = match chance.below(8) {
+    fn random(random: &mut Random, terrain: &Terrain) -> Self {
+        let count = match random.below(8) {
             0 => 1,
             1 | 2 => 2,
             3 | 4 => MaterialTable::MOST,
-            _ => 1 + chance.below(MaterialTable::MOST),
+            _ => 1 + random.below(MaterialTable::MOST),
         };
         let mut table: Vec<Material> = Vec::new();
         for index in 0..count {
-            let material = material(chance, table.last());
+            let material = material(random, table.last());
             table.push(match index {
                 // A default without stiffness is refused.
                 0 if material.stiffness_n_per_mm == 0.0 => Material {
@@ -83,23 +83,23 @@ impl Materials {
                 _ => material,
             });
         }
-        let layout = LAYOUTS[chance.below(LAYOUTS.len())];
-        let scale = [1.0, 1.0, 0.5, 3.0][chance.below(4)];
+        let layout = LAYOUTS[random.below(LAYOUTS.len())];
+        let scale = [1.0, 1.0, 0.5, 3.0][random.below(4)];
         let params = SurfaceParams {
             stiffness_n_per_mm: table[0].stiffness_n_per_mm * scale,
-            max_force_n: [8.5, 8.5, 1.0, 1e4][chance.below(4)],
+            max_force_n: [8.5, 8.5, 1.0, 1e4][random.below(4)],
             ..SurfaceParams::PREMIUM
         };
         let mut materials = Self {
             table,
             layout,
             params,
-            cell_mm: [1.0, 1.0, 0.25, 4.0][chance.below(4)],
+            cell_mm: [1.0, 1.0, 0.25, 4.0][random.below(4)],
             size: terrain.size.map(|patches| patches + 1),
             classes: Vec::new(),
-            seed: chance.bits(),
+            seed: random.bits(),
         };
-        let class_of = classes(layout, count, terrain.size, chance);
+        let class_of = classes(layout, count, terrain.size, random);
         materials.lay(class_of);
         materials
     }
@@ -143,11 +143,11 @@ impl Materials {
     /// The same ground with friction, which follows from the scene; some of it stays like ice.
     #[must_use]
     pub fn roughened(mut self) -> Self {
-        let mut chance = Chance::new(self.seed ^ 0xf71c_7104);
+        let mut random = Random::new(self.seed ^ 0xf71c_7104);
         for material in &mut self.table {
-            material.friction = match chance.below(4) {
+            material.friction = match random.below(4) {
                 0 => Friction::NONE,
-                _ => friction(&mut chance),
+                _ => friction(&mut random),
             };
         }
         self
@@ -194,18 +194,18 @@ impl Materials {
 }
 
 /// A material; now and then with the texture of the one before.
-fn material(chance: &mut Chance, before: Option<&Material>) -> Material {
-    let own = texture(chance.bits());
+fn material(random: &mut Random, before: Option<&Material>) -> Material {
+    let own = texture(random.bits());
     let shared = before.map_or(Texture::NONE, |before| before.texture);
     Material {
-        stiffness_n_per_mm: match chance.below(16) {
+        stiffness_n_per_mm: match random.below(16) {
             0 => 0.0,
-            1..8 => [0.02, 0.5, 0.5, 0.6, 1.0, 5.0][chance.below(6)],
-            _ => 10_f64.powf(chance.between(-2.0, 0.7)) as f32,
+            1..8 => [0.02, 0.5, 0.5, 0.6, 1.0, 5.0][random.below(6)],
+            _ => 10_f64.powf(random.between(-2.0, 0.7)) as f32,
         },
         friction: Friction::NONE,
-        damping_ns_per_m: [0.0, 0.0, 0.0, 1.0, 5.0, Damping::MAX_NS_PER_M][chance.below(6)],
-        texture: [own, own, own, shared][chance.below(4)],
+        damping_ns_per_m: [0.0, 0.0, 0.0, 1.0, 5.0, Damping::MAX_NS_PER_M][random.below(6)],
+        texture: [own, own, own, shared][random.below(4)],
     }
 }
 
@@ -214,59 +214,59 @@ fn classes(
     layout: Layout,
     count: usize,
     size: [i32; 2],
-    chance: &mut Chance,
+    random: &mut Random,
 ) -> Box<dyn Fn(i32, i32) -> u8> {
-    let mut any = || chance.below(count) as u8;
+    let mut any = || random.below(count) as u8;
     let (one, other) = (any(), any());
-    let east = chance.below(2) == 0;
+    let east = random.below(2) == 0;
     let along = move |x: i32, y: i32| if east { x } else { y };
     match layout {
         Layout::One => Box::new(move |_, _| one),
         Layout::Halves => {
             let patches = along(size[0], size[1]);
-            let border = match chance.below(2) {
-                0 => patches / 64 * 32 + [0, 1][chance.below(2)],
-                _ => chance.below(patches as usize) as i32,
+            let border = match random.below(2) {
+                0 => patches / 64 * 32 + [0, 1][random.below(2)],
+                _ => random.below(patches as usize) as i32,
             };
             Box::new(move |x, y| if along(x, y) < border { one } else { other })
         }
         Layout::Checker => Box::new(move |x, y| if (x + y) & 1 == 0 { one } else { other }),
         Layout::Stripes => {
-            let width = [1, 2, 5, 16, 32][chance.below(5)];
+            let width = [1, 2, 5, 16, 32][random.below(5)];
             let count = count as i32;
             Box::new(move |x, y| (along(x, y) / width % count) as u8)
         }
         Layout::Each => {
-            let seed = chance.bits();
-            Box::new(move |x, y| dice(seed, x, y).below(count) as u8)
+            let seed = random.bits();
+            Box::new(move |x, y| random_at(seed, x, y).below(count) as u8)
         }
         Layout::Blobs => {
-            let (seed, side) = (chance.bits(), [3, 8, 20][chance.below(3)]);
+            let (seed, side) = (random.bits(), [3, 8, 20][random.below(3)]);
             Box::new(move |x, y| blob(seed, side, [x, y]).below(count) as u8)
         }
     }
 }
 
-/// The dice of a place.
-fn dice(seed: u64, x: i32, y: i32) -> Chance {
+/// The random numbers of a place.
+fn random_at(seed: u64, x: i32, y: i32) -> Random {
     let place = u64::from(x.cast_unsigned()) << 32 | u64::from(y.cast_unsigned());
-    Chance::new(seed ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+    Random::new(seed ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
-/// The dice of the blob in which a sample lies: each square of so many samples has a middle
+/// The random numbers of the blob in which a sample lies: each square of so many samples has a middle
 /// somewhere, and a sample belongs to the nearest one.
-fn blob(seed: u64, side: i32, [x, y]: [i32; 2]) -> Chance {
+fn blob(seed: u64, side: i32, [x, y]: [i32; 2]) -> Random {
     let (col, row) = (x.div_euclid(side), y.div_euclid(side));
     let squares = (-1..=1).flat_map(|north| (-1..=1).map(move |east| (col + east, row + north)));
     let nearest = squares.min_by(|a, b| {
         let far = |(col, row): &(i32, i32)| {
-            let mut chance = dice(seed, *col, *row);
-            let mut middle = |at: i32| f64::from(side) * (f64::from(at) + chance.between(0.0, 1.0));
+            let mut random = random_at(seed, *col, *row);
+            let mut middle = |at: i32| f64::from(side) * (f64::from(at) + random.between(0.0, 1.0));
             let (east, north) = (middle(*col), middle(*row));
             (east - f64::from(x)).hypot(north - f64::from(y))
         };
         far(a).total_cmp(&far(b))
     });
     let (col, row) = nearest.unwrap_or((col, row));
-    dice(!seed, col, row)
+    random_at(!seed, col, row)
 }

@@ -1,13 +1,13 @@
 //! Scenes: a terrain, a path of the HIP, and how the tiles come.
 
+pub mod checked_run;
+pub mod emulator_scene;
 pub mod hip_path;
-pub mod judged;
+pub mod loop_replay;
+pub mod material_checks;
 pub mod materials;
-pub mod on_materials;
-pub mod recorded;
-pub mod replayed;
+pub mod metamorphic;
 pub mod run;
-pub mod supply;
 pub mod symmetry;
 pub mod terrain;
-pub mod twin;
+pub mod tile_supply;

@@ -11,12 +11,12 @@ use hapterra_core::terrain::TileIndex;
 
 use super::hip_path;
 use super::materials::Materials;
-use super::supply::{Buffers, SIDE, SuppliedWindow, Supply};
 use super::terrain::{KINDS, Terrain};
-use crate::chance::Chance;
-use crate::field::point;
-use crate::invariants::seen::{Seen, Shaded};
+use super::tile_supply::{Buffers, SIDE, SuppliedWindow, Supply};
+use crate::invariants::observed_tick::{ObservedTick, Shaded};
 use crate::invariants::{Invariant, Violation};
+use crate::random::Random;
+use crate::whole_field::point;
 
 /// Units of work of a tick at 10 kHz.
 pub(super) const LEAST_WORK_PER_TICK: u32 = match TickRate::new(10_000) {
@@ -101,10 +101,10 @@ pub(super) fn is_alike(texture: &Texture, cell_mm: f32) -> bool {
 }
 
 /// A friction.
-pub(super) fn friction(chance: &mut Chance) -> Friction {
-    let dynamic_mu = [0.05, 0.3, 0.7, 2.0][chance.below(4)];
-    let static_mu = dynamic_mu * [1.0, 1.0, 1.3, 2.0][chance.below(4)];
-    let viscous_s = [0.0, 0.0, 0.003, 0.05][chance.below(4)];
+pub(super) fn friction(random: &mut Random) -> Friction {
+    let dynamic_mu = [0.05, 0.3, 0.7, 2.0][random.below(4)];
+    let static_mu = dynamic_mu * [1.0, 1.0, 1.3, 2.0][random.below(4)];
+    let viscous_s = [0.0, 0.0, 0.003, 0.05][random.below(4)];
     Friction {
         static_mu,
         dynamic_mu,
@@ -114,20 +114,20 @@ pub(super) fn friction(chance: &mut Chance) -> Friction {
 
 /// The texture of a scene, if any.
 pub(super) fn texture(mixed: u64) -> Texture {
-    // Its own dice, so that all else of a scene stays what it was.
-    let mut chance = Chance::new(mixed ^ 0x7e87_0e5e);
-    let pattern = [Pattern::None, Pattern::Grain, Pattern::Grating][chance.below(3)];
+    // A generator of its own, so that the rest of a scene stays what it was.
+    let mut random = Random::new(mixed ^ 0x7e87_0e5e);
+    let pattern = [Pattern::None, Pattern::Grain, Pattern::Grating][random.below(3)];
     if pattern == Pattern::None {
         return Texture::NONE;
     }
-    let wavelength_mm = [0.25, 0.5, 1.0, 1.7, 8.0, 32.0, 100.0][chance.below(7)];
+    let wavelength_mm = [0.25, 0.5, 1.0, 1.7, 8.0, 32.0, 100.0][random.below(7)];
     let most_mm = (wavelength_mm * Texture::STEEPEST).min(Texture::MAX_AMPLITUDE_MM);
     Texture {
         pattern,
-        amplitude_mm: most_mm * [0.02, 0.4, 1.0][chance.below(3)],
+        amplitude_mm: most_mm * [0.02, 0.4, 1.0][random.below(3)],
         wavelength_mm,
-        direction_deg: [0.0, 0.0, 33.0, -120.0][chance.below(4)],
-        seed: [0, 1, chance.bits() as u32][chance.below(3)],
+        direction_deg: [0.0, 0.0, 33.0, -120.0][random.below(4)],
+        seed: [0, 1, random.bits() as u32][random.below(3)],
     }
 }
 
@@ -145,28 +145,28 @@ impl Scene {
     #[must_use]
     pub fn random(seed: u64, number: u64) -> Self {
         let mixed = seed ^ number.wrapping_mul(0xd134_2543_de82_ef95);
-        let mut chance = Chance::new(mixed);
-        let kind = KINDS[chance.below(KINDS.len())];
+        let mut random = Random::new(mixed);
+        let kind = KINDS[random.below(KINDS.len())];
         // A hundred patches, or so many that the window cannot hold them all;
         // or a strip of thousands.
-        let (size, supply) = match chance.below(4) {
-            0 | 1 => ([70 + chance.below(60) as i32, 90], Supply::Held),
+        let (size, supply) = match random.below(4) {
+            0 | 1 => ([70 + random.below(60) as i32, 90], Supply::Held),
             2 => ([200, 256], Supply::Held),
             _ => {
-                let latency = [0, 3, 40][chance.below(3)];
-                let size = [[1500, 40], [130, 120], [520, 400]][chance.below(3)];
+                let latency = [0, 3, 40][random.below(3)];
+                let size = [[1500, 40], [130, 120], [520, 400]][random.below(3)];
                 (size, Supply::Pulled { latency })
             }
         };
-        let terrain = Terrain::new(kind, size, chance.bits());
-        let ticks = 300 + chance.below(500);
+        let terrain = Terrain::new(kind, size, random.bits());
+        let ticks = 300 + random.below(500);
         // By number, so that a scene of the other kind stays what it was.
         let path = match number % DEEP_EVERY {
-            0 => hip_path::deep(&terrain, &mut chance, ticks),
-            _ => hip_path::random(&terrain, &mut chance, ticks),
+            0 => hip_path::deep(&terrain, &mut random, ticks),
+            _ => hip_path::random(&terrain, &mut random, ticks),
         };
         let materials = Materials::drawn(mixed, &terrain);
-        let execution = if chance.below(2) == 0 {
+        let execution = if random.below(2) == 0 {
             Execution::RealTime
         } else {
             Execution::LockStep
@@ -182,10 +182,10 @@ impl Scene {
             texture: texture(mixed),
             materials,
             fast_paths: true,
-            twins: Twins::One(chance.below(6)),
+            twins: Twins::One(random.below(6)),
             // By number, as the path.
             work_per_tick: [WORK_PER_TICK, LEAST_WORK_PER_TICK][(number / 4 % 2) as usize],
-            seed: chance.bits(),
+            seed: random.bits(),
         }
     }
 
@@ -196,7 +196,7 @@ impl Scene {
             return self;
         }
         Self {
-            friction: friction(&mut Chance::new(self.seed ^ 0xf71c_7104)),
+            friction: friction(&mut Random::new(self.seed ^ 0xf71c_7104)),
             materials: self.materials.map(Materials::roughened),
             ..self
         }
@@ -241,14 +241,14 @@ impl Scene {
     /// each tick.
     ///
     /// # Errors
-    /// What `look` says, or that a tick does not settle.
+    /// The error of `look`, or a tick that does not settle.
     pub fn step(
         &self,
         buffers: &mut Buffers,
         shift: [i32; 3],
         supply: Supply,
-        look: impl FnMut(&Seen) -> Result<(), Violation>,
-    ) -> Result<Vec<Seen>, Violation> {
+        look: impl FnMut(&ObservedTick) -> Result<(), Violation>,
+    ) -> Result<Vec<ObservedTick>, Violation> {
         self.feel_in::<SIDE>(buffers, shift, supply, look)
     }
 
@@ -261,8 +261,8 @@ impl Scene {
         buffers: &mut Buffers,
         shift: [i32; 3],
         supply: Supply,
-        mut look: impl FnMut(&Seen) -> Result<(), Violation>,
-    ) -> Result<Vec<Seen>, Violation> {
+        mut look: impl FnMut(&ObservedTick) -> Result<(), Violation>,
+    ) -> Result<Vec<ObservedTick>, Violation> {
         let mut player = Player::<D>::new(self, buffers, shift, supply);
         let mut all = Vec::with_capacity(self.path.len());
         for (tick, hip) in self.path.iter().enumerate() {
@@ -396,14 +396,14 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
 
     /// Returns the last HIP's answer, for the oracle.
     #[must_use]
-    pub fn seen(&self, hip: [f64; 3], felt: ContactOutput) -> Seen {
-        Seen {
+    pub fn seen(&self, hip: [f64; 3], felt: ContactOutput) -> ObservedTick {
+        ObservedTick {
             shaded: self.shader.as_ref().map(|shader| Shaded {
                 displacement: self.shaded,
                 is_whole: shader.missing().is_none(),
             }),
             textured: self.texturer.as_ref().map(|_| self.textured),
-            ..Seen::new(hip, felt, self.shift)
+            ..ObservedTick::new(hip, felt, self.shift)
         }
     }
 }

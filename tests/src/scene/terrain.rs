@@ -2,7 +2,7 @@
 
 use hapterra_core::terrain::MAX_STEP_CELLS;
 
-use crate::chance::Chance;
+use crate::random::Random;
 
 /// Heights beyond this, in cells, are holes: no position can say them.
 const TALLEST: f32 = (1 << 29) as f32;
@@ -78,14 +78,14 @@ impl Terrain {
     /// One of a kind.
     #[must_use]
     pub fn new(kind: Kind, size: [i32; 2], seed: u64) -> Self {
-        let mut chance = Chance::new(seed);
+        let mut random = Random::new(seed);
         let shape = Shape {
             kind,
             seed,
-            wave: [chance.between(0.1, 0.9), chance.between(0.1, 0.9)],
+            wave: [random.between(0.1, 0.9), random.between(0.1, 0.9)],
             // Powers of ten, as gentle as nothing and as steep as a tile may be.
-            amplitude: 10_f64.powf(chance.between(-9.0, 3.5)),
-            tilt: [chance.between(-2.0, 2.0), chance.between(-2.0, 2.0)],
+            amplitude: 10_f64.powf(random.between(-9.0, 3.5)),
+            tilt: [random.between(-2.0, 2.0), random.between(-2.0, 2.0)],
         };
         Self::from_fn(kind, size, |x, y| shape.height(x, y))
     }
@@ -189,26 +189,26 @@ impl Shape {
         let (fx, fy) = (f64::from(x), f64::from(y));
         let [wx, wy] = self.wave;
         let [tx, ty] = self.tilt;
-        let dice = self.dice(x, y);
+        let random = self.random(x, y);
         let waves = (wx * fx).sin() * (wy * fy).cos();
         let height = match self.kind {
             Kind::Flat => 2.0,
             Kind::Slope => tx * fx + ty * fy,
             Kind::Hills => 3.0 * waves,
-            Kind::Rough => 2.0 * dice,
-            Kind::Noise => 600.0 * dice - 300.0,
+            Kind::Rough => 2.0 * random,
+            Kind::Noise => 600.0 * random - 300.0,
             Kind::Checkerboard => f64::from((x + y) & 1),
-            Kind::Spikes => f64::from(dice > 0.967) * f64::from(MAX_STEP_CELLS),
+            Kind::Spikes => f64::from(random > 0.967) * f64::from(MAX_STEP_CELLS),
             Kind::Denormals => {
-                let tiny = f32::from_bits((dice * 1000.0) as u32);
-                return if self.dice(y, x) > 0.5 { tiny } else { -tiny };
+                let tiny = f32::from_bits((random * 1000.0) as u32);
+                return if self.random(y, x) > 0.5 { tiny } else { -tiny };
             }
-            Kind::Holes => return hole_or(dice, 2.0 * self.dice(y, x)),
+            Kind::Holes => return hole_or(random, 2.0 * self.random(y, x)),
             Kind::Ridges => 4.0 * ((0.25 * (tx * fx + ty * fy)).rem_euclid(2.0) - 1.0).abs(),
             Kind::Steps => 5.0 * (waves * 1.5).round() + f64::from(x / 11 % 3),
             Kind::Twisted => {
                 let sign = if (x + y) & 1 == 0 { 1.0 } else { -1.0 };
-                sign * self.amplitude * (0.5 + dice)
+                sign * self.amplitude * (0.5 + random)
             }
             Kind::Walls => {
                 if x % WALL_EVERY == 0 || y % WALL_EVERY == 0 {
@@ -216,20 +216,20 @@ impl Shape {
                 }
                 waves
             }
-            Kind::Scan => 3.0 * waves + tx * 0.1 * fx + 0.05 * dice,
+            Kind::Scan => 3.0 * waves + tx * 0.1 * fx + 0.05 * random,
         };
         height as f32
     }
 
     /// A number in `[0, 1)` that belongs to a sample.
-    fn dice(&self, x: i32, y: i32) -> f64 {
+    fn random(&self, x: i32, y: i32) -> f64 {
         let place = u64::from(x.cast_unsigned()) << 32 | u64::from(y.cast_unsigned());
-        Chance::new(self.seed ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15)).between(0.0, 1.0)
+        Random::new(self.seed ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15)).between(0.0, 1.0)
     }
 }
 
-fn hole_or(dice: f64, height: f64) -> f32 {
-    match (dice * 100.0) as u32 {
+fn hole_or(random: f64, height: f64) -> f32 {
+    match (random * 100.0) as u32 {
         0 | 1 => f32::NAN,
         2 => f32::INFINITY,
         3 => f32::NEG_INFINITY,

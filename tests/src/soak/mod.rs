@@ -3,7 +3,7 @@
 //! Scenes are numbered, and a scene follows from its seed and number alone, so
 //! whatever was found can be run again.
 
-mod tally;
+mod soak_counts;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
@@ -11,10 +11,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use tally::{Broken, Found, LinkStats, MostWork};
+pub use soak_counts::{Broken, Found, LinkStats, MostWork};
 
 use crate::scene::run::{Scene, Surface};
-use crate::scene::supply::Buffers;
+use crate::scene::tile_supply::Buffers;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]

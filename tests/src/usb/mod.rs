@@ -43,7 +43,7 @@ pub trait Port {
     /// Lets a moment pass, [`MOMENTS_A_MS`] of which are a millisecond.
     ///
     /// # Errors
-    /// What happened to the device.
+    /// The end of the device.
     fn wait(&mut self) -> Result<(), String>;
 }
 

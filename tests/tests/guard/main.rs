@@ -2,9 +2,9 @@
 //! hand on it, the device's own application, and something that goes wrong
 //! between them.
 
-mod bed;
-mod leaving;
+mod host_leaves;
 mod rates;
+mod rig;
 
 use hapterra::phantom::Script;
 use hapterra_core::guard::{Blockers, Fault, Limits, Mode};
@@ -15,7 +15,7 @@ use hapterra_core::wire::status::{BootReport, ResetCause};
 use hapterra_firmware::store::Stored;
 use std::cell::RefCell;
 
-use bed::{BEGIN, Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, Wrong, on_plane, plane, press, rub};
+use rig::{BEGIN, Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, Wrong, on_plane, plane, press, rub};
 
 #[test]
 fn arming_needs_the_switch_and_ramps_over_two_seconds() {

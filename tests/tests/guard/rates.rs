@@ -10,7 +10,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use crate::bed::{MIDDLE_MM, PLANE_MM, PRESSED, on_plane, plane, press};
+use crate::rig::{MIDDLE_MM, PLANE_MM, PRESSED, on_plane, plane, press};
 
 #[test]
 fn at_ten_kilohertz_all_of_it_takes_as_long_and_feels_the_same() {

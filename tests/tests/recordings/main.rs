@@ -1,8 +1,8 @@
 //! Recordings describe themselves: what `run`, `demo` and `replay` write, `replay` feels
 //! again as it was.
 
-mod folder;
 mod marks;
+mod test_folder;
 mod views;
 
 use std::path::Path;
@@ -12,7 +12,7 @@ use hapterra::replay::{COLUMNS, TICK_COLUMNS};
 use hapterra::synth::Kind;
 use hapterra_tests::{UNCONTROLLED, hapterra_binary, terrain_file};
 
-use folder::{Folder, rows, said};
+use test_folder::{Folder, rows, said};
 
 const SETTINGS: [&str; 6] = [
     "--scale=0.7mm/cell",

@@ -4,7 +4,7 @@
 use hapterra::replay::{Mark, Settings, Trajectory};
 use hapterra_tests::timeouts::changed_at_unix_s;
 
-use super::folder::{Folder, rows};
+use super::test_folder::{Folder, rows};
 use super::views::comments;
 
 const COMMANDS: &str = "at 1 mark stimulus #1, \"left\"\nat 2 zoom 1.5\nmark zoomed\n\

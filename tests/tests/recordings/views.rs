@@ -8,7 +8,7 @@ use hapterra::replay::{Settings, Trajectory};
 use hapterra_core::contact::{MAX_PIECE, WORK_PER_TICK};
 use hapterra_tests::{UNCONTROLLED, hapterra_binary};
 
-use super::folder::{Folder, rows, said};
+use super::test_folder::{Folder, rows, said};
 use super::write_degrees;
 
 /// Wide enough to be zoomed and panned.

@@ -7,13 +7,13 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Sender, channel};
 
 use hapterra::bringup::{Attendant, Identity, Log, Step, Task, VirtualUser};
-use hapterra::link::{Dialogue, Tcp};
+use hapterra::link::{ControlSession, Tcp};
 use hapterra::phantom::Wiring;
 use hapterra_core::guard::Mode;
 use hapterra_core::phantom::Calibration;
 use hapterra_tests::hapterra_binary;
 
-use hapterra_tests::served::{Served, signal, told};
+use hapterra_tests::socket_device::{SocketDevice, signal, told};
 use hapterra_tests::timeouts::{HANG, end_of};
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
@@ -22,9 +22,9 @@ const CONFIRMED: [Task; 2] = [Task::ZeroPose, Task::HoldLoosely];
 const SEEN: [Task; 1] = [Task::PressDeadMan];
 
 /// A device at a virtual bench, whose user does the tasks that are sent.
-fn at_a_bench() -> (Served, Sender<Task>) {
+fn at_a_bench() -> (SocketDevice, Sender<Task>) {
     let (send, tasks) = channel();
-    let served = Served::with(move || {
+    let served = SocketDevice::with(move || {
         let mut user = VirtualUser::new(Wiring::RIGHT);
         let device = user.device(RECORD);
         (device, move || {
@@ -35,11 +35,11 @@ fn at_a_bench() -> (Served, Sender<Task>) {
 }
 
 /// A log in which the last step alone is missing.
-fn log(served: &Served, file: &Path) {
+fn log(served: &SocketDevice, file: &Path) {
     let link = Tcp::connect(&served.address.to_string()).expect("there");
-    let dialogue = Dialogue::open(Box::new(link), HANG).expect("answers");
+    let control = ControlSession::open(Box::new(link), HANG).expect("answers");
     let mut log = Log::default();
-    _ = log.meet(Identity::of(dialogue.device(), Some(&RECORD)));
+    _ = log.meet(Identity::of(control.device(), Some(&RECORD)));
     for step in Step::ALL.into_iter().filter(|s| *s != Step::FirstTouch) {
         log.take(step, true, String::new());
     }
@@ -47,7 +47,7 @@ fn log(served: &Served, file: &Path) {
 }
 
 /// Brings up until the arm is armed over the soft plane.
-fn armed(served: &Served, bench: &Sender<Task>, folder: &Path) -> Child {
+fn armed(served: &SocketDevice, bench: &Sender<Task>, folder: &Path) -> Child {
     let file = folder.join("log.toml");
     log(served, &file);
     let mut child = Command::new(hapterra_binary())
@@ -71,7 +71,7 @@ fn armed(served: &Served, bench: &Sender<Task>, folder: &Path) -> Child {
 fn lead(
     lines: &mut impl BufRead,
     keys: &mut ChildStdin,
-    served: &Served,
+    served: &SocketDevice,
     bench: &Sender<Task>,
 ) -> bool {
     let mut line = String::new();

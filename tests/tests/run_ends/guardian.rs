@@ -14,8 +14,8 @@ use std::time::Duration;
 use hapterra::link::Native;
 use hapterra_core::guard::{GuardInputs, GuardOutputs};
 use hapterra_core::wire::session::SessionEnd;
-use hapterra_tests::served::{Served, command, command_over, signal};
-use hapterra_tests::stand_in;
+use hapterra_tests::gdal_stand_in;
+use hapterra_tests::socket_device::{SocketDevice, command, command_over, signal};
 use hapterra_tests::timeouts::{end_of, pass, wait_for, wait_until};
 use rustix::termios::LocalModes;
 
@@ -27,7 +27,7 @@ const SWITCH_OFF: &str = "switch the amplifiers off";
 /// An arm that a user at a terminal has armed, and the processes that serve it.
 struct Armed {
     folder: tempfile::TempDir,
-    served: Served,
+    served: SocketDevice,
     amplifiers: Arc<AtomicBool>,
     window: File,
     end: File,
@@ -46,12 +46,12 @@ impl Armed {
         Self::by(command)
     }
 
-    /// Served by this command, which gets the device's address and a folder.
+    /// A device that is served by this command, which gets the device's address and a folder.
     fn by(command: impl FnOnce(SocketAddr, &Path) -> Command) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let (amplifiers, pressed) = (Arc::default(), Arc::default());
         let (is_on, is_pressed) = (Arc::clone(&amplifiers), Arc::clone(&pressed));
-        let served = Served::with(move || (device(is_on, is_pressed), || {}));
+        let served = SocketDevice::with(move || (device(is_on, is_pressed), || {}));
         let (mut window, end) = terminal();
         let before = modes(&end);
         let command = command(served.address, folder.path());
@@ -129,7 +129,7 @@ impl Armed {
 /// State after the end.
 struct Rest {
     folder: tempfile::TempDir,
-    served: Served,
+    served: SocketDevice,
     amplifiers: Arc<AtomicBool>,
 }
 
@@ -185,8 +185,8 @@ fn worker_killed_while_armed_is_disarmed_by_guardian() {
 #[test]
 fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
     let place = tempfile::tempdir().expect("a folder");
-    let library = stand_in::library(place.path());
-    let ground = stand_in::terrain(place.path());
+    let library = gdal_stand_in::library(place.path());
+    let ground = gdal_stand_in::terrain(place.path());
     let crash = place.path().join("crash");
     let armed = Armed::by(|address, folder| {
         let ground = ground.to_str().expect("a plain path");

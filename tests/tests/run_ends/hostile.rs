@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
-use hapterra_tests::greedy;
-use hapterra_tests::served::{command, has_begun, signal, told};
+use hapterra_tests::greedy_device;
+use hapterra_tests::socket_device::{command, has_begun, signal, told};
 use hapterra_tests::timeouts::{end_of, pass};
 
 #[test]
 fn a_device_that_asks_for_much_and_reads_little_holds_no_end_up() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut command = command(greedy::start(), folder.path());
+    let mut command = command(greedy_device::start(), folder.path());
     let mut child = command.arg("--unchecked").spawn().expect("it runs");
     has_begun(child.stdout.as_mut().expect("piped"));
     // What waits for the device grows.

@@ -14,14 +14,14 @@ use std::time::Duration;
 
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::hapterra_binary;
-use hapterra_tests::served::{Served, command, signal, start, told};
+use hapterra_tests::socket_device::{SocketDevice, command, signal, start, told};
 use hapterra_tests::timeouts::{end_of, pass};
 
 #[test]
 fn a_signal_ends_it_with_a_goodbye_that_the_board_confirms() {
     for name in ["INT", "TERM", "HUP"] {
         let folder = tempfile::tempdir().expect("a folder");
-        let served = Served::start();
+        let served = SocketDevice::start();
         let child = start(&served, folder.path(), &[]);
         signal(&child, name);
         let output = end_of(child);
@@ -36,7 +36,7 @@ fn a_signal_ends_it_with_a_goodbye_that_the_board_confirms() {
 #[test]
 fn the_end_of_the_time_is_a_goodbye_too() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let child = start(&served, folder.path(), &["--duration", "0.5s"]);
     let output = end_of(child);
     assert!(output.status.success(), "{}", told(&output));
@@ -50,7 +50,7 @@ fn the_end_of_the_time_is_a_goodbye_too() {
 fn where_the_board_does_not_confirm_the_user_is_told_and_it_fails() {
     for name in ["INT", "TERM", "HUP"] {
         let folder = tempfile::tempdir().expect("a folder");
-        let served = Served::start();
+        let served = SocketDevice::start();
         let child = start(&served, folder.path(), &[]);
         // Telemetry goes on coming, and nothing gets to the board any more.
         served.deaf.store(true, Ordering::Relaxed);
@@ -68,7 +68,7 @@ fn where_the_board_does_not_confirm_the_user_is_told_and_it_fails() {
 #[test]
 fn the_second_signal_ends_it_at_once_with_the_same_word() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let child = start(&served, folder.path(), &[]);
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
@@ -94,7 +94,7 @@ fn a_silence_that_no_device_keeps_to_is_refused() {
 #[test]
 fn stiffness_that_no_arm_feels_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let output = command(served.address, folder.path())
         .args(["--stiffness", "1e30"])
         .output()
@@ -108,7 +108,7 @@ fn stiffness_that_no_arm_feels_is_refused() {
 #[test]
 fn recording_that_fills_the_disk_is_kept_and_named() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let usual = command(served.address, folder.path());
     let output = Command::new("sh")
         .args(["-c", "trap '' XFSZ; ulimit -f 128; exec \"$0\" \"$@\""])
@@ -137,7 +137,7 @@ fn recording_that_fills_the_disk_is_kept_and_named() {
 #[test]
 fn one_that_cannot_begin_tells_that_the_arm_may_be_armed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let killed = start(&served, folder.path(), &[]);
     signal(&killed, "KILL");
     end_of(killed);
@@ -151,7 +151,7 @@ fn one_that_cannot_begin_tells_that_the_arm_may_be_armed() {
 #[test]
 fn a_signal_before_it_has_begun_is_heeded() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     served.deaf.store(true, Ordering::Relaxed);
     let child = command(served.address, folder.path())
         .arg("--unchecked")

@@ -7,7 +7,7 @@ use std::os::fd::OwnedFd;
 use std::process::{Command, Stdio};
 
 use hapterra_tests::hapterra_binary;
-use hapterra_tests::served::signal;
+use hapterra_tests::socket_device::signal;
 use hapterra_tests::timeouts::end_of;
 
 /// Ground with so many holes that each size of the plan is tried.

@@ -13,7 +13,7 @@ use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
 
-use hapterra_tests::served::{Served, command, has_begun, signal, start, told};
+use hapterra_tests::socket_device::{SocketDevice, command, has_begun, signal, start, told};
 use hapterra_tests::timeouts::{end_of, pass, wait_for, wait_until};
 
 /// Longer than it takes until a line is written to what is no terminal any more.
@@ -33,7 +33,7 @@ pub(super) fn terminal() -> (File, File) {
 }
 
 /// Starts `run` with a terminal's end for all that it reads and writes.
-fn start_in(end: &File, served: &Served, folder: &Path) -> Child {
+fn start_in(end: &File, served: &SocketDevice, folder: &Path) -> Child {
     start_command_in(end, command(served.address, folder))
 }
 
@@ -52,7 +52,7 @@ pub(super) fn modes(end: &File) -> LocalModes {
 #[test]
 fn a_terminal_window_that_is_closed_is_a_goodbye() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let (mut window, end) = terminal();
     let child = start_in(&end, &served, folder.path());
     has_begun(&mut window);
@@ -69,7 +69,7 @@ fn a_terminal_window_that_is_closed_is_a_goodbye() {
 #[test]
 fn a_reader_that_is_gone_costs_its_lines_and_nothing_else() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let mut child = start(&served, folder.path(), &[]);
     drop((child.stderr.take(), child.stdout.take()));
     pass(A_LINE);
@@ -88,7 +88,7 @@ fn a_disk_that_is_full_costs_its_lines_and_nothing_else() {
         return;
     };
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let mut command = command(served.address, folder.path());
     let command = command.args(["--duration", "0.5s"]).stdout(out).stderr(err);
     let child = command.spawn().expect("it runs");
@@ -101,7 +101,7 @@ fn a_disk_that_is_full_costs_its_lines_and_nothing_else() {
 #[test]
 fn unread_output_does_not_stop_the_first_and_second_signal() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let (_unread, mut pipe) = std::io::pipe().expect("a pipe");
     // As much as a pipe takes.
     pipe.write_all(&[b'.'; 1 << 16]).expect("written");
@@ -138,7 +138,7 @@ fn shows_all(window: &mut File, texts: &[&str]) -> String {
 #[test]
 fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = Served::start();
+    let served = SocketDevice::start();
     let (mut window, end) = terminal();
     let before = modes(&end);
     assert!(before.contains(LocalModes::ICANON | LocalModes::ECHO));
@@ -165,7 +165,7 @@ fn keys_change_the_view_ctrl_c_is_a_goodbye_and_the_terminal_is_put_back() {
 fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
     for ends_by in ["interrupts", "signal"] {
         let folder = tempfile::tempdir().expect("a folder");
-        let served = Served::start();
+        let served = SocketDevice::start();
         let (mut window, end) = terminal();
         let before = modes(&end);
         let child = start_in(&end, &served, folder.path());
@@ -195,7 +195,7 @@ fn a_second_ctrl_c_and_a_signal_put_the_terminal_back_too() {
 #[test]
 fn enter_and_keys_go_to_the_device_that_was_chosen_and_to_no_other() {
     let folder = tempfile::tempdir().expect("a folder");
-    let served = [Served::start(), Served::start()];
+    let served = [SocketDevice::start(), SocketDevice::start()];
     let (mut window, end) = terminal();
     let before = modes(&end);
     let of = || Stdio::from(OwnedFd::from(end.try_clone().expect("another")));

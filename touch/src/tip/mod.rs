@@ -3,7 +3,7 @@
 //! A ball that rests on a height field has its centre on another height field: at each place the
 //! highest of the ground under the ball plus the ball's own height there. So a point on this
 //! surface is a ball on the ground, and device and contact stay as they are. It is made on the
-//! host, of a block of samples with a halo of the radius, when a tile is made: in `cut.rs` for arrays, in
+//! host, of a block of samples with a halo of the radius, when a tile is made: in `tile_cutter.rs` for arrays, in
 //! `host-tools/src/terrain/tiler/tile_samples.rs` for files.
 //!
 //! Let `S` be the bilinear surface of the samples and `R` the radius. Then

@@ -11,13 +11,13 @@ use re_sdk_types::AsComponents;
 use re_sdk_types::archetypes::{LineStrips3D, Points3D};
 use re_sdk_types::components::Radius;
 
+use super::captions;
 use super::ground::Ground;
 use super::layers::Layers;
 use super::lengths::{distances, round_below, written};
 use super::log::{Entry, Log};
 use super::map::Map;
 use super::shade::Rgb;
-use super::words;
 
 /// The bar is at most so long, in shares of half of what the eye sees.
 const BAR: f64 = 0.5;
@@ -197,7 +197,7 @@ impl Picture<'_> {
     /// A place in the file's coordinates, or how far it is from the south-west sample.
     fn coordinates(&self, place: [f64; 2]) -> String {
         let [x, y] = place.map(|at| at / self.ground.per_mm);
-        words::coordinates(self.scene, x, y)
+        captions::coordinates(self.scene, x, y)
             .unwrap_or_else(|| distances(place, self.is_on_ground()))
     }
 

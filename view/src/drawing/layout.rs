@@ -21,7 +21,7 @@ use re_sdk_types::datatypes::{self, TimeRange, TimeRangeBoundary, Uuid};
 use super::ground::Ground;
 use super::log::{self, APPLICATION, Entry, TIMELINE};
 use super::shade::Rgb;
-use super::{plots, words};
+use super::{captions, plots};
 
 /// Seconds that the plots show.
 const PLOT_S: f64 = 6.0;
@@ -80,7 +80,7 @@ impl Layout {
         let terrain = self.terrain(ground)?;
         let map = self.view("2D", "Map", "map", 1.0, &[])?;
         let contact = self.contact(ground)?;
-        let words = self.view("TextDocument", "Where", words::WORDS, 1.7, &[])?;
+        let words = self.view("TextDocument", "Where", captions::WORDS, 1.7, &[])?;
         let unit = &scene.height_unit;
         let height = self.plot(&format!("Height ({unit})"), plots::HEIGHT, 1.0)?;
         let force = self.plot("Force (N)", plots::FORCE, 1.0)?;

@@ -7,12 +7,12 @@ use hapterra_view_stream::{Layer, Sample, Scene, Tiles};
 use re_sdk_types::archetypes::{Boxes2D, Image, LineStrips2D, Points2D};
 use re_sdk_types::components::Radius;
 
+use super::captions;
 use super::ground::Ground;
 use super::hand::HIP;
 use super::lengths::{distances, round_below, written};
 use super::log::{Entry, Log};
 use super::shade::{Heights, Rgb, Shade};
-use super::words;
 
 /// Pixels along the longer side of the relief at most.
 const LARGEST: usize = 512;
@@ -123,7 +123,7 @@ impl Frame {
         let [west, south] = self.first;
         let text = |name: &str, cell: [f64; 2]| {
             let [x, y] = cell.map(|cells| cells * scene.cell_mm);
-            let coordinates = words::coordinates(scene, x, y).unwrap_or_else(|| {
+            let coordinates = captions::coordinates(scene, x, y).unwrap_or_else(|| {
                 let place = cell.map(|cells| cells * ground.step(1));
                 distances(place, scene.ground_m_per_mm.is_some())
             });

@@ -15,9 +15,10 @@
 //! Another view of the terrain while it is touched comes as another scene: the terrain stays
 //! where it is on the ground, the eye comes nearer or goes away, and plots and time go on.
 //!
-//! What stands is logged as static, and the latest takes the place of the one before, in
-//! the history as in the page: a session of hours grows by its samples alone.
+//! Entries without a time are logged as static, and the latest replaces the one before, in the history
+//! as in the page: a session of hours grows by its samples alone.
 
+mod captions;
 mod frame;
 mod ground;
 mod hand;
@@ -29,7 +30,6 @@ mod map;
 mod plots;
 mod shade;
 mod tiles;
-mod words;
 
 use std::collections::BTreeSet;
 
@@ -38,6 +38,7 @@ use hapterra_view_stream::{Message, Scene};
 
 pub use log::{APPLICATION, Entry, TIMELINE};
 
+use captions::Words;
 use frame::Frame;
 use ground::Ground;
 use hand::Hand;
@@ -46,7 +47,6 @@ use log::Log;
 use map::Map;
 use plots::Plots;
 use tiles::Tiles;
-use words::Words;
 
 /// State of the drawing of a scene.
 pub struct Drawing {
@@ -69,7 +69,7 @@ impl Drawing {
     /// Draws a message. `drawing` is none before the first scene.
     ///
     /// # Errors
-    /// What cannot be said in rerun's format; it should not happen.
+    /// An entry that rerun's format cannot hold; this should not happen.
     pub fn take(drawing: &mut Option<Self>, message: Message) -> Result<Vec<Entry>> {
         if let Message::Scene(scene) = message {
             let mut entries = Vec::new();

@@ -1,8 +1,8 @@
 //! History for new pages, and the queues of the present ones.
 //!
-//! What stands still (terrain, tiles, layout) is kept once, by key: a later entry takes
-//! the place of an earlier one. What happens in time is put together (`gather`) and kept up to
-//! so many bytes, the oldest forgotten first. Nothing else grows, however long a session lasts.
+//! Static entries (terrain, tiles, layout) are kept once, by key: a later entry replaces an earlier one.
+//! Entries over time are gathered (`gather`) and kept up to a bound of bytes, the oldest dropped first.
+//! Nothing else grows during a session.
 //!
 //! A page whose queue is full is cut off, so that neither this program nor another page
 //! waits for it. It comes back by itself and is told the present state.

@@ -1,7 +1,6 @@
 //! The queue of one page.
 //!
-//! What stands still and waits there is told once: a later entry takes the place of an earlier
-//! one.
+//! A static entry that waits is sent once: a later one replaces an earlier one.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};

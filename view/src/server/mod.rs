@@ -1,9 +1,9 @@
 //! The page and its stream over HTTP, for this machine alone unless told otherwise.
 //!
-//! Who asks is looked at in [`gate`]; only files and the stream can be asked for.
+//! [`access_check`] refuses requests of other origins; there are only files and the stream.
 
+pub mod access_check;
 mod files;
-pub mod gate;
 mod stream;
 
 use std::io::Write as _;
@@ -15,8 +15,8 @@ use anyhow::{Context as _, Result, anyhow};
 use tiny_http::{Header, Request, Response};
 
 use crate::history::{History, Pieces};
+use access_check::Asked;
 use files::Files;
-use gate::Asked;
 
 /// Pages and files under way at the same time, at most.
 const MOST: usize = 24;

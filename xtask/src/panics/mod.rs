@@ -10,7 +10,7 @@
 
 mod calls;
 mod decode;
-mod placed;
+mod fast_memory;
 mod reach;
 
 use std::path::Path;
@@ -30,8 +30,8 @@ pub(crate) fn check(board: &Board, path: &Path) -> Result<()> {
     let (name, list) = (board.name, judged.join(", "));
     say(format!("{name}: no panic can be reached from {list}"));
     if let Some(interrupt) = board.fast_interrupt {
-        let areas = placed::areas(&elf)?;
-        let told = placed::judge(&calls, board, interrupt, &areas);
+        let areas = fast_memory::areas(&elf)?;
+        let told = fast_memory::judge(&calls, board, interrupt, &areas);
         let told = told.with_context(|| format!("image {name}"))?;
         say(format!("{name}: {told}"));
     }

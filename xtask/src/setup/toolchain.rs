@@ -109,7 +109,7 @@ fn own() -> Result<Toolchain> {
 /// Sees to it that the toolchain that runs this program compiles for browsers.
 ///
 /// # Errors
-/// What to type.
+/// The command to type.
 pub(crate) fn with_wasm() -> Result<()> {
     add_target(WASM).with_context(|| {
         format!("type: rustup target add {WASM}\n      (rustup itself is on https://rustup.rs)")

@@ -187,7 +187,7 @@ impl Asking {
     /// Makes `next` the neighbour, of those not asked yet, with the steepest way down.
     ///
     /// # Errors
-    /// Why it cannot be told now.
+    /// The reason for which it is not known now.
     // A call, which fills `next` in place: inlined, its fields are moved to and fro.
     #[inline(never)]
     fn steepest<const D: usize>(

@@ -4,7 +4,7 @@
 use super::super::ruling_search::Rulings;
 use super::*;
 use crate::cases::cases;
-use crate::contact::dice::Dice;
+use crate::contact::test_random::Random;
 
 /// The closest point as the convex patch finds it.
 fn convex(heights: [f32; 4], hip: (f32, f32), from: (f32, f32)) -> Option<(f32, f32)> {
@@ -41,17 +41,17 @@ const CASES: u32 = cases(20_000, 200);
 /// what both ways of solving say: how many were left to the rulings, and how many
 /// not.
 fn agree(slope: f64, depths: [f64; 2], bound: f32) -> [u32; 2] {
-    let mut dice = Dice(41);
+    let mut random = Random(41);
     let mut seen = [0; 2];
     for _ in 0..CASES {
-        let depth = dice.between(depths[0], depths[1]);
-        let heights = core::array::from_fn(|_| (depth + dice.between(0.0, slope)) as f32);
+        let depth = random.between(depths[0], depths[1]);
+        let heights = core::array::from_fn(|_| (depth + random.between(0.0, slope)) as f32);
         let patch = Patch::new(heights);
-        let place = |dice: &mut Dice| dice.between(0.0, 1.0) as f32;
-        let first = (place(&mut dice), place(&mut dice));
+        let place = |random: &mut Random| random.between(0.0, 1.0) as f32;
+        let first = (place(&mut random), place(&mut random));
         let start = by_rulings(&patch, first, first);
-        let moved = |x: f32, dice: &mut Dice| x + dice.between(-0.05, 0.05) as f32;
-        let hip = (moved(first.0, &mut dice), moved(first.1, &mut dice));
+        let moved = |x: f32, random: &mut Random| x + random.between(-0.05, 0.05) as f32;
+        let hip = (moved(first.0, &mut random), moved(first.1, &mut random));
         let found = convex(heights, hip, start);
         seen[usize::from(found.is_some())] += 1;
         let Some((u, v)) = found else { continue };

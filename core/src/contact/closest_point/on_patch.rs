@@ -7,7 +7,7 @@
 //! eliminated exactly: with v fixed, the patch is a straight line, a ruling, whose
 //! closest point is known in closed form (`on_ruling`).
 //!
-//! What remains, F(v) = min over u of D(u, v), is continuously differentiable
+//! The rest, F(v) = min over u of D(u, v), is continuously differentiable
 //! because D is a parabola in u: a minimum of F is a minimum of D over the
 //! square, edges and corners included, and no saddle of D is one.
 //!

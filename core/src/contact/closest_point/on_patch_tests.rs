@@ -3,7 +3,7 @@
 use super::super::MAX_EVALUATIONS;
 use super::*;
 use crate::cases::cases;
-use crate::contact::dice::Dice;
+use crate::contact::test_random::Random;
 
 /// F′(v)/2 and the point of the ruling at `v`, in f64, for coefficients as f32
 /// holds them.
@@ -74,19 +74,19 @@ struct Errors {
 /// Random patches of a slope, HIPs at a depth below them, random starts.
 fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
     const QUERIES: u32 = cases(4000, 1);
-    let mut dice = Dice(0x5EED);
+    let mut random = Random(0x5EED);
     let (mut wrong, mut worst, mut total, mut most) = (0, 0.0_f64, 0_u64, 0);
     for _ in 0..QUERIES {
-        let flat = [0, 1, 2].map(|_| slope * dice.between(-1.0, 1.0));
-        let last = flat[1] + flat[2] - flat[0] + twist * dice.between(-1.0, 1.0);
+        let flat = [0, 1, 2].map(|_| slope * random.between(-1.0, 1.0));
+        let last = flat[1] + flat[2] - flat[0] + twist * random.between(-1.0, 1.0);
         let corners = [flat[0], flat[1], flat[2], last].map(|h| h as f32);
         let above = Patch::new(corners);
-        let (u, v) = (dice.unit() as f32, dice.unit() as f32);
+        let (u, v) = (random.unit() as f32, random.unit() as f32);
         let down = above.normal(u, v).normalize() * depth as f32;
         let hip = (u - down.x, v - down.y);
         let hip_z = above.height(u, v) - down.z;
         let patch = Patch::new(corners.map(|h| h - hip_z));
-        let start = (dice.unit() as f32, dice.unit() as f32);
+        let start = (random.unit() as f32, random.unit() as f32);
         let found = nearest_downhill(&patch, hip, start);
         total += u64::from(found.evaluations);
         most = most.max(found.evaluations);

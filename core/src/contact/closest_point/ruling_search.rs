@@ -12,7 +12,7 @@
 //! so a crest is about as wide as an angle, however narrow it is in v.
 
 use super::on_ruling::Ruling;
-use crate::contact::straight_way::StraightWay;
+use crate::contact::straight_path::StraightWay;
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
 use crate::scalar::{larger, smaller};

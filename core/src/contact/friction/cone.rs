@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use crate::contact::straight_way::steepest;
+use crate::contact::straight_path::steepest;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::contact::tolerance::{BESIDE, RESOLUTION};

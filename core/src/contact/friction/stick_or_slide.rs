@@ -12,7 +12,7 @@ use super::cone::{Cone, Excess, Pull, border};
 use super::cone_root::ConeRoot;
 use crate::contact::budget::{Budget, DIRECTION, LOOK, SLOPE};
 use crate::contact::closest_point::Leave;
-use crate::contact::straight_way::StraightWay;
+use crate::contact::straight_path::StraightWay;
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::scalar::smaller;
@@ -72,7 +72,7 @@ impl Asked {
 }
 
 /// Returns the outcome for a proxy from which the straight path to the HIP leads off the surface.
-/// Where it has just come down from such a path, it is on the ground.
+/// After such a path has ended on the surface, it is on the ground.
 fn off(leave: &Leave, point: &SurfacePoint) -> Option<Walked> {
     match leave {
         leave if leave.is_allowed_at(point) => Some(Walked::Leaves),

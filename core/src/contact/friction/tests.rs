@@ -4,8 +4,8 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
-use crate::contact::dice::Dice;
 use crate::contact::friction::Friction;
+use crate::contact::test_random::Random;
 use crate::contact::{Contact, ContactOutput, ContactSettings, ContactState};
 use crate::grid::GridPoint;
 use crate::rate::TickRate;
@@ -254,8 +254,8 @@ fn what_is_no_friction_is_not_taken() {
 #[test]
 fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
     let mut tiles = buffers::<2>();
-    let mut dice = Dice(7);
-    let mut height = || dice.between(-0.2, 0.2) as f32;
+    let mut random = Random(7);
+    let mut height = || random.between(-0.2, 0.2) as f32;
     let heights: Vec<f32> = (0..61 * 61).map(|_| height()).collect();
     let ground = move |x: i32, y: i32| heights[(y.clamp(0, 60) * 61 + x.clamp(0, 60)) as usize];
     let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), ground);

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::*;
 use crate::cases::cases;
-use crate::contact::dice::Dice;
+use crate::contact::test_random::Random;
 use crate::terrain::FieldSize;
 use crate::terrain::testing::{Field, buffers};
 
@@ -15,7 +15,7 @@ const SIZE: i32 = 128;
 /// Rough ground with holes, around which a HIP goes that leaps now and then.
 #[test]
 fn every_exit_of_a_phase_is_walked_and_no_other() {
-    let mut dice = Dice(39);
+    let mut random = Random(39);
     let holes = |x: i32, y: i32| {
         let hole = (x / 6 + y / 7) % 3 == 0;
         if hole {
@@ -35,13 +35,13 @@ fn every_exit_of_a_phase_is_walked_and_no_other() {
         let mut contact = Contact::new(settings);
         let mut at = [64.0; 2];
         for _ in 0..400 {
-            let way = match dice.unit() {
+            let way = match random.unit() {
                 x if x < 0.01 => 300.0,
                 x if x < 0.1 => 40.0,
                 _ => 1.0,
             };
-            at = at.map(|x| (x + dice.between(-way, way)).clamp(0.0, 126.0));
-            let z = dice.between(-2.0, 5.0);
+            at = at.map(|x| (x + random.between(-way, way)).clamp(0.0, 126.0));
+            let z = random.between(-2.0, 5.0);
             let hip = GridPoint::new([0; 3], Vec3::new(at[0] as f32, at[1] as f32, z as f32));
             let (from, exits) = contact.phase.exits();
             contact.step(&field.window, &hip);

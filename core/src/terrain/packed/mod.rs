@@ -28,7 +28,7 @@
 //! the header. ("North" here is the row before: the one to the south.) A hole has
 //! the number to its west; in the westernmost column, that of the row before.
 //!
-//! What a number is more than its prediction, `d`, is sent as `u = 2d` for `d ≥ 0`, else
+//! The difference of a number and its prediction, `d`, is sent as `u = 2d` for `d ≥ 0`, else
 //! `−2d − 1`. With the Rice parameter `r`: `u >> r` zeros and a one, then the lowest `r` bits of
 //! `u`. Twenty zeros are followed by the 32 bits of `u` instead, without a one.
 //!

@@ -9,7 +9,7 @@ use super::*;
 use crate::grid::Cell;
 use crate::terrain::{TILE_SAMPLES, Tile, TileError, TileKey};
 
-mod by_the_book;
+mod reference_decoder;
 
 const KEY: TileKey = TileKey::new(0, 2, 5);
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
@@ -44,14 +44,14 @@ fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[Step]) -> Option<Vec<u8>
         assert_eq!((tile.key(), tile.base()), (Some(KEY), base));
     }
     assert!(held(&tile) == wanted, "{} bytes", bytes.len());
-    assert!(by_the_book::heights(&bytes) == wanted, "by the book");
+    assert!(reference_decoder::heights(&bytes) == wanted, "by the book");
     Some(bytes)
 }
 
 /// Numbers that look random, the same in every run.
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     fn roll(&mut self) -> u32 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -140,7 +140,7 @@ fn floats_without_a_step_are_whole_too() {
 fn holes_stay_where_they_are() {
     let base = 50;
     let hills = hills(30.0, base);
-    let mut dice = Dice(3);
+    let mut random = Random(3);
     let steps = [Step::Cells(1.0 / 30.0)];
     let holes: [&mut dyn FnMut(usize, usize) -> bool; 6] = [
         &mut |col, row| (col, row) != (17, 4),
@@ -148,7 +148,7 @@ fn holes_stay_where_they_are() {
         &mut |col, row| (col, row) == (32, 32),
         &mut |col, _| col > 20,
         &mut |_, row| row < 9,
-        &mut |_, _| dice.below(3) == 0,
+        &mut |_, _| random.below(3) == 0,
     ];
     for is_hole in holes {
         let heights = by_sample(|col, row| match is_hole(col, row) {
@@ -180,7 +180,7 @@ fn odd_numbers_are_whole_too() {
         -f32::NAN,
         f32::MAX,
     ];
-    let mut dice = Dice(5);
+    let mut random = Random(5);
     let steps = [
         Step::Cells(1e-45),
         Step::Cells(0.0),
@@ -198,9 +198,9 @@ fn odd_numbers_are_whole_too() {
     let mut packs = 0;
     for round in 0..300 {
         let common = odd[round % odd.len()];
-        let rare = 1 + dice.below(60);
-        let heights = by_sample(|_, _| match dice.below(rare) {
-            0 => odd[dice.below(odd.len() as u32) as usize],
+        let rare = 1 + random.below(60);
+        let heights = by_sample(|_, _| match random.below(rare) {
+            0 => odd[random.below(odd.len() as u32) as usize],
             _ => common,
         });
         packs += u32::from(packed(&heights, round as i32 - 150, &steps).is_some());
@@ -210,13 +210,13 @@ fn odd_numbers_are_whole_too() {
 
 #[test]
 fn random_bits_do_not_pay_or_are_whole() {
-    let mut dice = Dice(7);
+    let mut random = Random(7);
     let mut packs = 0;
     for bits in 1..=32 {
         for _ in 0..6 {
-            let from = dice.roll();
+            let from = random.roll();
             let heights =
-                by_sample(|_, _| f32::from_bits(from.wrapping_add(dice.roll() >> (32 - bits))));
+                by_sample(|_, _| f32::from_bits(from.wrapping_add(random.roll() >> (32 - bits))));
             packs += u32::from(packed(&heights, -7, &[]).is_some());
         }
     }
@@ -284,7 +284,7 @@ fn a_damaged_byte_gives_a_tile_or_a_refusal_as_the_book_says() {
                 match tile.unpack(KEY, 0, &bytes) {
                     Ok(()) => {
                         taken += 1;
-                        assert!(held(&tile) == by_the_book::heights(&bytes), "{place}");
+                        assert!(held(&tile) == reference_decoder::heights(&bytes), "{place}");
                     }
                     Err(error) => {
                         refused += 1;
@@ -303,20 +303,20 @@ fn a_damaged_byte_gives_a_tile_or_a_refusal_as_the_book_says() {
 
 #[test]
 fn any_bytes_are_taken_or_refused() {
-    let mut dice = Dice(11);
+    let mut random = Random(11);
     let mut tile = Box::new(Tile::VACANT);
     for _ in 0..3000 {
-        let length = dice.below(5000);
+        let length = random.below(5000);
         // Long zeros and long ones as well.
-        let calm = dice.below(4);
+        let calm = random.below(4);
         let mut bytes: Vec<u8> = (0..length)
-            .map(|_| match dice.below(1 + 8 * calm) {
-                0 => dice.roll() as u8,
+            .map(|_| match random.below(1 + 8 * calm) {
+                0 => random.roll() as u8,
                 _ => [0, 0xFF][calm as usize % 2],
             })
             .collect();
         if let Some(kind) = bytes.first_mut() {
-            *kind = *kind & 0x7C | dice.below(3) as u8;
+            *kind = *kind & 0x7C | random.below(3) as u8;
         }
         let taken = tile.unpack(KEY, 0, &bytes).is_ok();
         assert_eq!(tile.key().is_some(), taken);

@@ -13,7 +13,7 @@ pub(crate) mod feedback;
 pub(crate) mod heartbeat;
 pub(crate) mod injected;
 pub(crate) mod loader;
-pub(crate) mod mark;
+pub(crate) mod mark_pin;
 pub(crate) mod motor_memory;
 pub(crate) mod parts;
 pub(crate) mod priorities;

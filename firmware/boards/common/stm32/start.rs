@@ -14,7 +14,7 @@ use static_cell::ConstStaticCell;
 
 use super::calibration_memory::CalibrationMemory;
 use super::{
-    clock, failure, heartbeat, mark, motor_memory, priorities, stack_guard, supervisor, supply,
+    clock, failure, heartbeat, mark_pin, motor_memory, priorities, stack_guard, supervisor, supply,
     tasks,
 };
 use crate::application::{self, Loop, TICK_DONE};
@@ -36,7 +36,7 @@ static DESCRIPTORS: ConstStaticCell<DescriptorBuffers> =
 pub(crate) fn on_haptic_interrupt(slot: &mut Option<&'static mut Loop>) {
     if let Some((haptic_loop, drive)) = application::tick(slot) {
         heartbeat::beat(&drive);
-        mark::follow(haptic_loop);
+        mark_pin::follow(haptic_loop);
         if let Some(copy) = haptic_loop.motors_to_keep() {
             motor_memory::keep(copy);
         }
@@ -71,7 +71,7 @@ async fn main(spawner: Spawner) {
     let mut led = parts.led;
     supply::wait_and_watch(&mut led);
     heartbeat::set_up(parts.heartbeat);
-    mark::set_up(parts.mark);
+    mark_pin::set_up(parts.mark);
     let (memory, calibration) = CalibrationMemory::open(parts.flash);
     let hardware = Hardware {
         encoders: parts.encoders,

@@ -10,9 +10,9 @@ use super::place::Place;
 use super::{NAME, at_url, fault};
 use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, usual_block};
 use crate::encoding::codes;
-use crate::plain::{transposed, turned};
+use crate::raw_samples::{transposed, turned};
 use crate::samples::{HoleMask, SampleType, with_samples};
-use crate::{RasterError, thinned};
+use crate::{RasterError, subsampled};
 
 /// When a file that stays on disk is opened, so many places each way are looked at.
 const PLACES: u32 = 6;
@@ -213,7 +213,7 @@ impl BlockReader for GdalBlocks {
     fn looks(&self) -> Option<Looks> {
         // Overviews show all of it at once.
         match &self.images[..] {
-            [full] => Some(thinned::places(full, PLACES)),
+            [full] => Some(subsampled::places(full, PLACES)),
             _ => None,
         }
     }
@@ -293,6 +293,6 @@ impl BlockReader for Turned {
     }
 
     fn looks(&self) -> Option<Looks> {
-        Some(thinned::places(&self.images[0], PLACES))
+        Some(subsampled::places(&self.images[0], PLACES))
     }
 }

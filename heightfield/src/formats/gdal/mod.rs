@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 use heightfield_gdal::{Dataset, Error, Library, SampleType as Stored};
 
-use super::{headered, height_name, is_read_here};
+use super::{flt_bil, height_name, is_read_here};
 use crate::blocks::{BlockReader, Part};
 use crate::decoded::{Decoded, sides};
 use crate::encoding::no_codes;
@@ -149,7 +149,7 @@ fn opened(
     };
     place.check_files(&dataset, head)?;
     let driver = dataset.driver();
-    if BY_HEADER.contains(&driver.as_str()) && headered::is_of_another_kind(head) {
+    if BY_HEADER.contains(&driver.as_str()) && flt_bil::is_of_another_kind(head) {
         return Err(RasterError::UnknownFormat);
     }
     if driver == "GRASSASCIIGrid" && has_stars(place, options)? {

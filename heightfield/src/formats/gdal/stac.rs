@@ -1,6 +1,6 @@
 //! STAC items. GDAL's driver STACIT reads a collection of items that say where all their files lie.
-//! What it does not read is refused with the command that makes a VRT of the files themselves, and
-//! so is a collection of which an item lies elsewhere than its file.
+//! Items that it does not read are refused with the command that makes a VRT of the files themselves.
+//! So is a collection with an item that lies elsewhere than its file.
 
 use std::collections::HashSet;
 use std::path::Path;

@@ -5,7 +5,7 @@ mod header;
 use crate::decoded::{Decoded, sides};
 use crate::format::{Claim, Format, Parts};
 use crate::input::FileBytes;
-use crate::plain::Plain;
+use crate::raw_samples::RawSamples;
 use crate::read::Stored;
 use crate::{Endian, OpenOptions, RasterError, SampleType};
 use header::Header;
@@ -104,7 +104,7 @@ impl Array {
             });
         };
         let (columns, rows) = sides(columns, rows)?;
-        let packed = |size| Plain::packed(size, self.stored, self.endian, self.first);
+        let packed = |size| RawSamples::packed(size, self.stored, self.endian, self.first);
         let plain = match self.column_major {
             true => packed((rows, columns)).turned(),
             false => packed((columns, rows)),

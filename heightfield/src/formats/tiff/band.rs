@@ -2,7 +2,7 @@
 
 use tiff_reader::{Ifd, TiffFile, TiffSample};
 
-use super::fault::fault;
+use super::decoder_error::fault;
 use super::images::Directory;
 use crate::RasterError;
 use crate::blocks::Part;

@@ -15,12 +15,12 @@ use super::samples::{heights, holes};
 use super::uncompressed::rows;
 use super::{budget, images, unpack};
 use crate::blocks::{Block, BlockImage, BlockReader, Looks, MAX_BLOCK_BYTES, Part, stored_parts};
+use crate::decoder_panic::guarded;
 use crate::disk_cache::{DiskCache, FileStamp};
-use crate::guard::guarded;
 use crate::input::FileBytes;
 use crate::remote::RemoteFile;
 use crate::samples::{HoleMask, SampleValue, with_samples};
-use crate::unread::Unread;
+use crate::unreadable_parts::UnreadableParts;
 use crate::{RasterError, SampleType};
 
 /// Small strips and tiles are read several at once, samples each way.
@@ -88,7 +88,7 @@ fn ranges(layout: &Layout, part: &Part) -> Vec<Range<u64>> {
 pub(super) struct TiffBlocks {
     /// The main file and the one of overviews beside it, where they are elsewhere.
     remote: Vec<Option<Arc<RemoteFile>>>,
-    unread: Unread,
+    unread: UnreadableParts,
     /// The main file and the mask's, each with its state when it was opened; `None` where one
     /// was changed meanwhile.
     inputs: Option<Vec<(FileBytes, FileStamp)>>,
@@ -145,7 +145,7 @@ impl Image {
     /// Makes it an image of which blocks are read.
     ///
     /// # Errors
-    /// Why that cannot be.
+    /// The reason for which that is impossible.
     pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
         let chunks = self.layout.chunks_name();
         if !suit(&self.layout) {
@@ -221,7 +221,7 @@ impl TiffBlocks {
         Ok(Self {
             blocks: blocks.collect(),
             remote,
-            unread: Unread::of(known.name),
+            unread: UnreadableParts::of(known.name),
             inputs: stamped(inputs)?,
             index: OnceLock::new(),
             images: found,

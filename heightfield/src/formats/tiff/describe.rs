@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use tiff_reader::{Ifd, TiffFile};
 
+use super::gdal_metadata::Metadata;
 use super::layout::Wanted;
-use super::metadata::Metadata;
 use super::{georef, images};
 use crate::beside::{find_appended, lay_out_by_world_file, remark_other_place};
 use crate::decoded::Decoded;

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use tiff_reader::{ByteOrder, Ifd, PhotometricInterpretation};
 
-use super::fault::{fault, unsupported};
+use super::decoder_error::{fault, unsupported};
 use super::images::Directory;
 use super::index::{Chunk, Index};
-use super::unpacked::Unpacked;
+use super::unpacked_on_disk::Unpacked;
 use crate::blocks::Part;
 use crate::encoding::no_codes;
 use crate::read::Stored;

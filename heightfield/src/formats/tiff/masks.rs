@@ -44,7 +44,7 @@ impl Mask {
     /// Makes it a mask of which parts are read. `disk` is where it may be unpacked.
     ///
     /// # Errors
-    /// Why that cannot be.
+    /// The reason for which that is impossible.
     pub(super) fn leave_in_file(&mut self, disk: Result<&DiskCache, &str>) -> Result<(), String> {
         let samples = self.chunk_samples();
         let is_large = samples > MAX_DECODED;

@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
-use super::super::made::{KINDS, Made, ONE_STRIP, PLAIN, Packing, SIZE};
 use super::super::open;
+use super::super::test_files::{KINDS, Made, ONE_STRIP, PLAIN, Packing, SIZE};
 use super::*;
 use crate::input::FileBytes;
 

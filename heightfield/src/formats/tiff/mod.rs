@@ -2,25 +2,34 @@
 //! first full image, in memory or, where it is large, read in blocks when it is touched.
 //!
 //! `tiff-reader` decodes; it is named in this folder only.
+//!
+//! - `images`, `layout`, `index`, `budget`: the directories of a file, the type and arrangement of its
+//!   samples, the offsets of its strips and tiles, and the memory that these lists may take;
+//! - `gdal_metadata`, `georef`, `geo_keys`, `user_defined`, `describe`: no-data, scale and unit; the
+//!   place of the samples and their reference system;
+//! - `band`, `samples`, `masks`: the heights of a band, and which of them are no-data;
+//! - `blocks`, `uncompressed`, `unpack`, `unpacked_on_disk`: parts of large images, read when touched;
+//! - `blended_overviews`: overviews that were averaged with no-data values, and are left out;
+//! - `remote_source`, `decoder_error`: files at URLs, and the decoder's errors.
 
 mod band;
-mod blended;
+mod blended_overviews;
 mod blocks;
 mod budget;
+mod decoder_error;
 mod describe;
-mod fault;
+mod gdal_metadata;
 mod geo_keys;
 mod georef;
 mod images;
 mod index;
 mod layout;
 mod masks;
-mod metadata;
 mod remote_source;
 mod samples;
 mod uncompressed;
 mod unpack;
-mod unpacked;
+mod unpacked_on_disk;
 mod user_defined;
 
 use std::iter::once;
@@ -37,12 +46,12 @@ use crate::format::{Claim, Format, Parts, starts_with_any};
 use crate::input::{Data, FileBytes};
 use crate::storage::Storage;
 use crate::{OpenOptions, RasterError};
-use blended::blended;
+use blended_overviews::blended;
 use blocks::{Image, Known, TiffBlocks};
+use decoder_error::fault;
 use describe::{describe, overview_sizes, wanted};
-use fault::fault;
+use gdal_metadata::Metadata;
 use layout::Layout;
-use metadata::Metadata;
 use remote_source::RemoteSource;
 
 /// TIFF and BigTIFF of either byte order.
@@ -239,7 +248,7 @@ fn open(input: &FileBytes) -> Result<TiffFile, RasterError> {
     };
     TiffFile::from_source_with_options(source, options).map_err(|error| match &error {
         TiffError::InvalidTagValue { reason, .. } if is_long(reason) => {
-            fault::unsupported(format!(
+            decoder_error::unsupported(format!(
                 "an index of more than {} MB, as of very many small tiles,",
                 MAX_LIST >> 20
             ))
@@ -256,9 +265,9 @@ fn is_long(reason: &str) -> bool {
 }
 
 #[cfg(test)]
-mod made;
-#[cfg(test)]
 mod odd_tags_tests;
+#[cfg(test)]
+mod test_files;
 #[cfg(test)]
 mod tests;
 /// TIFFs tag by tag, as the tests of all crates make them.

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use tiff_reader::ByteOrder;
 
-use super::fault::fault;
+use super::decoder_error::fault;
 use super::index::Chunk;
 use super::layout::Layout;
 use super::unpack;

@@ -1,6 +1,6 @@
 //! Large strips and tiles without compression, in all types, orders and arrangements.
 
-use super::super::made::{BANDS, KINDS, Made, ONE_STRIP, SIZE, check, open, value};
+use super::super::test_files::{BANDS, KINDS, Made, ONE_STRIP, SIZE, check, open, value};
 use crate::RasterError;
 
 #[test]

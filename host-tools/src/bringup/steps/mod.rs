@@ -21,7 +21,7 @@ use super::board::Board;
 use super::finding::Finding;
 use super::halt::Halt;
 use super::step::Step;
-use heightfield::shown::shown;
+use heightfield::printable_text::printable;
 
 /// Goes through one step. Returns what the log keeps of it.
 ///
@@ -66,8 +66,8 @@ fn answers(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<Strin
     let device = &status.device;
     Ok(format!(
         "{} with firmware {}, {} ticks a second ({hz:.0} counted), disarmed",
-        shown(&device.board),
-        shown(&device.version),
+        printable(&device.board),
+        printable(&device.version),
         device.tick_hz
     ))
 }

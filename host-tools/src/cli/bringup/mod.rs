@@ -15,7 +15,7 @@ use super::terminal::writer::{say, tell};
 use crate::bringup::{
     Attendant, BringupError, Halt, Log, LogError, Step, VirtualUser, Walked, walk,
 };
-use crate::link::{DeviceAddress, Dialogue, HostClock, LinkError, Native, Transport};
+use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native, Transport};
 use crate::phantom::Wiring;
 use terminal::UserAtTerminal;
 
@@ -78,8 +78,8 @@ fn bring_up<A: Attendant>(
     // A virtual arm's log is written on request only.
     let mut kept = None;
     loop {
-        let mut dialogue = Dialogue::open(connect(user)?, patience)?;
-        let path = place(args, &dialogue)?;
+        let mut control = ControlSession::open(connect(user)?, patience)?;
+        let path = place(args, &control)?;
         let mut log = match (&path, kept.take()) {
             (Some(path), _) => Log::read(path)?,
             (None, kept) => kept.unwrap_or_default(),
@@ -88,19 +88,19 @@ fn bring_up<A: Attendant>(
             log.entries.retain(|entry| entry.step < step);
         }
         let mut keep = |log: &Log| path.as_ref().map_or(Ok(()), |path| log.write(path));
-        let walked = walk(&mut dialogue, user, &mut log, &mut keep);
+        let walked = walk(&mut control, user, &mut log, &mut keep);
         if let Some(path) = &path {
             say(format!("log            {}", path.display()));
         }
-        match (walked, dialogue) {
+        match (walked, control) {
             // The session went with the board's power: there is no session to close.
             (Ok(Walked::BoardWasOff), _) => kept = Some(log),
-            (Ok(Walked::ToTheEnd), dialogue) => {
-                dialogue.end()?;
+            (Ok(Walked::ToTheEnd), control) => {
+                control.end()?;
                 break;
             }
-            (Err(error), dialogue) => {
-                let ended = dialogue.end();
+            (Err(error), control) => {
+                let ended = control.end();
                 if let Err(told @ (LinkError::NotConfirmed | LinkError::Taken)) = ended {
                     tell(told);
                 }
@@ -113,11 +113,11 @@ fn bring_up<A: Attendant>(
 }
 
 /// Returns the place where the log is kept.
-fn place(args: &Args, dialogue: &Dialogue<'_>) -> Result<Option<PathBuf>, Failure> {
+fn place(args: &Args, control: &ControlSession<'_>) -> Result<Option<PathBuf>, Failure> {
     Ok(match (&args.log, &args.device) {
         (Some(path), _) => Some(path.clone()),
         (None, DeviceAddress::Native) => None,
-        (None, _) => Some(Log::place(dialogue.device())?),
+        (None, _) => Some(Log::place(control.device())?),
     })
 }
 

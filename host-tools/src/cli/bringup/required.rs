@@ -9,8 +9,8 @@ use crate::board::BOARDS;
 use crate::bringup::{Identity, Log, Step};
 use crate::cli::failure::Failure;
 use crate::cli::options::device::EMULATED_PATIENCE;
-use crate::link::{Dialogue, Transport};
-use heightfield::shown::shown;
+use crate::link::{ControlSession, Transport};
+use heightfield::printable_text::printable;
 
 /// Asks the device who it is, and refuses a real board whose log is not complete. The
 /// device keeps what it holds.
@@ -18,13 +18,13 @@ use heightfield::shown::shown;
 /// # Errors
 /// The board was not brought up; no answer.
 pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let mut dialogue = Dialogue::look(Box::new(transport), PATIENCE)?;
-    if is_real(&dialogue.device().board) {
-        let record = dialogue.calibration()?;
-        let device = dialogue.device();
+    let mut control = ControlSession::look(Box::new(transport), PATIENCE)?;
+    if is_real(&control.device().board) {
+        let record = control.calibration()?;
+        let device = control.device();
         let log = Log::read(&Log::place(device)?)?;
         if let Some(step) = missing(device, record.as_ref(), log) {
-            let (board, number, title) = (shown(&device.board), step.number(), step.title());
+            let (board, number, title) = (printable(&device.board), step.number(), step.title());
             let serial = device.serial;
             return Err(Failure::new(format!(
                 "{board} {serial} was not brought up with this version of its firmware and this calibration: step {number} ({title}) is not passed"
@@ -32,7 +32,7 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
             .hint("type hapterra bringup; or, at your own risk, --unchecked"));
         }
     }
-    Ok(dialogue.end()?)
+    Ok(control.end()?)
 }
 
 /// Asks the device who it is, and refuses one that may drive a real arm. The device keeps
@@ -41,16 +41,16 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
 /// # Errors
 /// It may; no answer.
 pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
-    let dialogue = Dialogue::look(Box::new(transport), EMULATED_PATIENCE)?;
-    let board = &dialogue.device().board;
+    let control = ControlSession::look(Box::new(transport), EMULATED_PATIENCE)?;
+    let board = &control.device().board;
     if is_real(board) {
-        let board = shown(board);
+        let board = printable(board);
         return Err(Failure::new(format!(
             "{board} is a real board: its arm is not the virtual one that is moved over a plant line"
         ))
         .hint("leave +plant:HOST:PORT out; it is for a board that QEMU emulates"));
     }
-    Ok(dialogue.end()?)
+    Ok(control.end()?)
 }
 
 /// Returns true if a board of this name may drive a real arm: all but those that are known to
@@ -76,11 +76,11 @@ mod tests {
 
     fn device() -> DeviceHello {
         let native = Box::new(Native::for_replay().restless());
-        let dialogue = Dialogue::open(native, PATIENCE).expect("it answers");
+        let control = ControlSession::open(native, PATIENCE).expect("it answers");
         DeviceHello {
             board: "nucleo-g474re".try_into().expect("fits"),
             serial: SerialNumber::new([0x2A; 12]),
-            ..dialogue.device().clone()
+            ..control.device().clone()
         }
     }
 

@@ -19,7 +19,7 @@ use super::report::put;
 use super::terminal::partial_files;
 use super::terminal::writer::say;
 use crate::calibrate::{Attendant, Plan, VirtualUser, file, walk};
-use crate::link::{DeviceAddress, Dialogue, HostClock, Native};
+use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 use crate::output::keep_apart;
 use measure::Measure;
 use questions::UserAtTerminal;
@@ -113,7 +113,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let mut user = UserAtTerminal::new(args.yes);
         return args
             .device
-            .talk(|dialogue| calibrate(args, dialogue, &mut user));
+            .talk(|control| calibrate(args, control, &mut user));
     }
     // In memory: a virtual user shows how it goes.
     let mut user = VirtualUser::with_a_stylus();
@@ -124,13 +124,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.measure.zero {
         say("a virtual user calibrates a virtual Phantom that differs from its preset");
     }
-    let mut dialogue = Dialogue::open(Box::new(device), PATIENCE)?;
-    calibrate(args, &mut dialogue, &mut user)
+    let mut control = ControlSession::open(Box::new(device), PATIENCE)?;
+    calibrate(args, &mut control, &mut user)
 }
 
 /// The record that the device holds.
-fn held(dialogue: &mut Dialogue<'_>) -> Result<Calibration, Failure> {
-    let held = dialogue
+fn held(control: &mut ControlSession<'_>) -> Result<Calibration, Failure> {
+    let held = control
         .calibration()?
         .ok_or("the device holds no calibration");
     held.or_hint("see hapterra status")
@@ -138,10 +138,10 @@ fn held(dialogue: &mut Dialogue<'_>) -> Result<Calibration, Failure> {
 
 fn calibrate(
     args: &Args,
-    dialogue: &mut Dialogue<'_>,
+    control: &mut ControlSession<'_>,
     attendant: &mut dyn Attendant,
 ) -> Result<(), Failure> {
-    let (begin, whence) = begin(args, dialogue)?;
+    let (begin, whence) = begin(args, control)?;
     say(format!("begins with    {whence}"));
     let measure = args.measure;
     if !measure.ratios && !measure.takes_guessed_ratios && begin.has_guessed_ratios() {
@@ -149,7 +149,7 @@ fn calibrate(
             "measure them, too; or accept guesses: --measure zero,gravity,guessed-ratios",
         );
     }
-    if dialogue.status()?.health.report.mode.drives() {
+    if control.status()?.health.report.mode.drives() {
         return Err("the amplifiers are on").or_hint("disarm first: hapterra status --disarm");
     }
     let (mut record, mut zero) = (begin, None);
@@ -158,7 +158,7 @@ fn calibrate(
             ratios: measure.ratios,
             gravity: measure.gravity,
         };
-        let mut counts = || Ok(dialogue.fresh_status()?.health.sense.counts);
+        let mut counts = || Ok(control.fresh_status()?.health.sense.counts);
         let review = walk(&begin, plan, attendant, &mut counts)?;
         (record, zero) = (review.after, Some(review.zero));
     }
@@ -166,9 +166,9 @@ fn calibrate(
         file::write(path, &record).or_hint(OTHER_FILE)?;
         say(format!("written        {}", path.display()));
     }
-    hand_over(args, dialogue, record)?;
+    hand_over(args, control, record)?;
     if let Some(counts) = zero {
-        let zeroed = dialogue.request(&Request::Zero { counts })?;
+        let zeroed = control.request(&Request::Zero { counts })?;
         zeroed.map_err(Failure::new)?;
         say("zeroed         the arm, until the device is switched off");
     }
@@ -176,8 +176,8 @@ fn calibrate(
 }
 
 /// The record to begin with, and where it is from.
-fn begin(args: &Args, dialogue: &mut Dialogue<'_>) -> Result<(Calibration, String), Failure> {
-    let held = dialogue.calibration()?;
+fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, String), Failure> {
+    let held = control.calibration()?;
     let (mut record, whence) = match (&args.from, args.model, held) {
         (Some(path), _, _) => (file::read(path)?, path.display().to_string()),
         (None, Some(model), _) => (model.preset(), format!("the preset of {model:?}")),
@@ -201,20 +201,20 @@ fn begin(args: &Args, dialogue: &mut Dialogue<'_>) -> Result<(Calibration, Strin
 /// `--no-store` says otherwise.
 fn hand_over(
     args: &Args,
-    dialogue: &mut Dialogue<'_>,
+    control: &mut ControlSession<'_>,
     calibration: Calibration,
 ) -> Result<(), Failure> {
     let (answer, until) = match args.no_store {
         true => {
             let request = Request::SetCalibration { calibration };
-            (dialogue.request(&request)?, "until it is switched off")
+            (control.request(&request)?, "until it is switched off")
         }
         false => {
             say(format!(
                 "to store it    press the dead-man switch within {} s",
                 PRESS_MS / 1_000
             ));
-            (dialogue.store(calibration)?, "and stored there")
+            (control.store(calibration)?, "and stored there")
         }
     };
     answer.or_hint("see hapterra status; the record can be kept in a file with -o FILE")?;

@@ -15,7 +15,7 @@ use crate::cli::session_summary;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::questions::ask;
 use crate::cli::terminal::writer::{self, say};
-use crate::link::{DeviceAddress, Dialogue, Usb};
+use crate::link::{ControlSession, DeviceAddress, Usb};
 
 /// Time that the board may take to answer.
 const PATIENCE: Duration = Duration::from_secs(4);
@@ -84,8 +84,8 @@ fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
 /// Has a board that runs its firmware enter its loader, if it is the right one.
 fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
-    let mut dialogue = Dialogue::open(transport, PATIENCE)?;
-    let running = dialogue.device().board.as_str();
+    let mut control = ControlSession::open(transport, PATIENCE)?;
+    let running = control.device().board.as_str();
     if running != args.board.name {
         return Err(UpdateError::OtherBoard {
             image: args.board.name,
@@ -95,9 +95,9 @@ fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
     }
     say(format!(
         "board          {}",
-        session_summary::device(dialogue.device())
+        session_summary::device(control.device())
     ));
-    dialogue
+    control
         .request(&Request::EnterLoader)?
         .or_hint("disarm it (`hapterra status --disarm`) and try again; firmware without this request is flashed through the debug probe once")
 }
@@ -147,10 +147,10 @@ fn greet(place: &str) -> Result<(), Failure> {
         );
     };
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
-    let dialogue = Dialogue::open(transport, PATIENCE)?;
+    let control = ControlSession::open(transport, PATIENCE)?;
     say(format!(
         "started        {}",
-        session_summary::device(dialogue.device())
+        session_summary::device(control.device())
     ));
     Ok(())
 }

@@ -4,7 +4,7 @@ use super::Args;
 use crate::board::{Image, flash};
 use crate::cli::failure::Failure;
 use crate::cli::terminal::progress;
-use heightfield::shown::shown;
+use heightfield::printable_text::printable;
 
 pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     let bar = progress::bar(Some(0), "{bar:30} {bytes} of {total_bytes}");
@@ -14,7 +14,7 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     });
     bar.finish_and_clear();
     let flashed = flashed?;
-    println!("probe          {}", shown(&flashed.probe));
+    println!("probe          {}", printable(&flashed.probe));
     println!(
         "written        {} bytes to {}, read back and equal; it was started",
         flashed.bytes, args.board.name

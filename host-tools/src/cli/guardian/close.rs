@@ -4,7 +4,7 @@ use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::link::{DeviceAddress, Dialogue, HostClock, LinkError, Native};
+use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native};
 
 /// For so long a device is tried.
 const TRIED_FOR: Duration = Duration::from_secs(10);
@@ -38,5 +38,5 @@ fn close(address: &str) -> Result<(), LinkError> {
     };
     let address: DeviceAddress = address.parse().map_err(absent)?;
     let line = address.connect(|| Native::new(HostClock::default(), None))?;
-    Dialogue::open(line, PATIENCE)?.disarm()
+    ControlSession::open(line, PATIENCE)?.disarm()
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! hapterra run ── guardian ──(the same program, again)── worker ── device
-//!                    │  ◀── news: which devices may be armed, which file grows ──┤
+//!                    │  ◀── messages: devices that may be armed, growing files ─────┤
 //!                    └────── presses of Ctrl-C; its end ends the worker ────────▶┘
 //! ```
 //!
@@ -25,15 +25,15 @@
 
 #[cfg(unix)]
 mod close;
-mod news;
 #[cfg(unix)]
 mod process;
 #[cfg(unix)]
 mod worker;
+mod worker_message;
 
 use std::ffi::OsString;
 
-pub(in crate::cli) use news::News;
+pub(in crate::cli) use worker_message::WorkerMessage;
 
 /// Starts this program again as the worker, by the words that do so and its arguments, and returns
 /// its exit code once it has ended; none in the worker itself.
@@ -67,9 +67,9 @@ pub(in crate::cli) fn is_worker() -> bool {
 }
 
 /// Reports to the guardian, if there is one.
-pub(in crate::cli) fn report(news: &News) {
+pub(in crate::cli) fn report(message: &WorkerMessage) {
     #[cfg(unix)]
-    worker::report(news);
+    worker::report(message);
     #[cfg(not(unix))]
-    let _ = news;
+    let _ = message;
 }

@@ -18,7 +18,7 @@ use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::signal_name;
 
-use super::{News, close, worker};
+use super::{WorkerMessage, close, worker};
 use crate::cli::failure::Failure;
 use crate::cli::terminal::interrupt::{self, ASK_FOR_AN_END, INTERRUPTED};
 
@@ -35,7 +35,7 @@ struct Watch {
     child: Child,
     signals: Signals,
     presses: PipeWriter,
-    news: PipeReader,
+    message: PipeReader,
     /// The beginning of a line.
     rest: Vec<u8>,
     terminal: Option<Termios>,
@@ -65,12 +65,12 @@ impl Watch {
     fn begin(program: &[OsString], arguments: &[OsString]) -> io::Result<Self> {
         let signals = Signals::new(ASK_FOR_AN_END)?;
         let (its_presses, presses) = pipe()?;
-        let (news, its_news) = pipe()?;
-        ioctl_fionbio(&news, true)?;
+        let (message, its_messages) = pipe()?;
+        ioctl_fionbio(&message, true)?;
         // These two ends are the worker's.
         fcntl_setfd(&its_presses, FdFlags::empty())?;
-        fcntl_setfd(&its_news, FdFlags::empty())?;
-        let descriptors = (its_presses.as_raw_fd(), its_news.as_raw_fd());
+        fcntl_setfd(&its_messages, FdFlags::empty())?;
+        let descriptors = (its_presses.as_raw_fd(), its_messages.as_raw_fd());
         let (me, (presses_fd, news_fd)) = (std::process::id(), descriptors);
         // Before the worker changes them.
         let terminal = tcgetattr(io::stdin()).ok();
@@ -84,7 +84,7 @@ impl Watch {
             child,
             signals,
             presses,
-            news,
+            message,
             rest: vec![],
             terminal,
             is_listening: false,
@@ -99,7 +99,7 @@ impl Watch {
     fn until_end(&mut self) -> u8 {
         let mut was_killed = false;
         let status = loop {
-            // Before the news: all of what the worker wrote is then there to read.
+            // Before the messages are read: all that the worker wrote is then there.
             let ended = self.child.try_wait();
             self.read_news();
             match ended {
@@ -152,7 +152,7 @@ impl Watch {
     fn read_news(&mut self) {
         let mut chunk = [0; 4096];
         loop {
-            match self.news.read(&mut chunk) {
+            match self.message.read(&mut chunk) {
                 Ok(n @ 1..) => self.rest.extend_from_slice(chunk.get(..n).unwrap_or(&[])),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 _ => break,
@@ -160,21 +160,21 @@ impl Watch {
         }
         while let Some(end) = self.rest.iter().position(|byte| *byte == b'\n') {
             let line: Vec<u8> = self.rest.drain(..=end).collect();
-            if let Some(news) = line.get(..end).and_then(News::read) {
-                self.take(news);
+            if let Some(message) = line.get(..end).and_then(WorkerMessage::read) {
+                self.take(message);
             }
         }
     }
 
-    fn take(&mut self, news: News) {
-        match news {
-            News::Listening => self.is_listening = true,
-            News::Pressed => self.pressed.push(Instant::now()),
-            News::InputEnded => self.input_ended = Some(Instant::now()),
-            News::MayBeArmed(address) => drop(self.may_be_armed.insert(address)),
-            News::Leaving(address) => drop(self.leaving.insert(address)),
-            News::Settled(address) => drop(self.may_be_armed.remove(&address)),
-            News::Recording(path) => self.recordings.push(path),
+    fn take(&mut self, message: WorkerMessage) {
+        match message {
+            WorkerMessage::Listening => self.is_listening = true,
+            WorkerMessage::Pressed => self.pressed.push(Instant::now()),
+            WorkerMessage::InputEnded => self.input_ended = Some(Instant::now()),
+            WorkerMessage::MayBeArmed(address) => drop(self.may_be_armed.insert(address)),
+            WorkerMessage::Leaving(address) => drop(self.leaving.insert(address)),
+            WorkerMessage::Settled(address) => drop(self.may_be_armed.remove(&address)),
+            WorkerMessage::Recording(path) => self.recordings.push(path),
         }
     }
 

@@ -6,23 +6,23 @@ use std::os::unix::process::parent_id;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::Builder;
 
-use super::News;
+use super::WorkerMessage;
 use crate::cli::terminal::interrupt;
 
 /// The variable with the guardian's process number and the descriptors of the two pipes.
 /// Programs that the worker starts have other parents, so it is nothing to them.
 pub(super) const VARIABLE: &str = "HAPTERRA_GUARDIAN";
 
-/// Destination of news; none where this is no worker.
-static NEWS: OnceLock<Mutex<File>> = OnceLock::new();
+/// Destination of messages; none if this is no worker.
+static MESSAGES: OnceLock<Mutex<File>> = OnceLock::new();
 
 /// Connects to the guardian. Returns false if no guardian has started this process.
 pub(super) fn begin() -> bool {
-    let Some([presses, news]) = descriptors() else {
+    let Some([presses, message]) = descriptors() else {
         return false;
     };
-    let connected = pipes(presses, news).and_then(|(presses, news)| {
-        let _ = NEWS.set(Mutex::new(news));
+    let connected = pipes(presses, message).and_then(|(presses, message)| {
+        let _ = MESSAGES.set(Mutex::new(message));
         let listen = move || listen(presses);
         Builder::new().name("guardian".into()).spawn(listen)
     });
@@ -42,25 +42,25 @@ fn descriptors() -> Option<[u32; 2]> {
     let variable = std::env::var(VARIABLE).ok()?;
     let numbers: Vec<u32> = variable.split(':').map_while(|n| n.parse().ok()).collect();
     match numbers[..] {
-        [guardian, presses, news] if guardian == parent_id() => Some([presses, news]),
+        [guardian, presses, message] if guardian == parent_id() => Some([presses, message]),
         _ => None,
     }
 }
 
-fn pipes(presses: u32, news: u32) -> io::Result<(File, File)> {
+fn pipes(presses: u32, message: u32) -> io::Result<(File, File)> {
     let of = |descriptor: u32| format!("/dev/fd/{descriptor}");
     let presses = File::open(of(presses))?;
-    let news = File::options().write(true).open(of(news))?;
-    Ok((presses, news))
+    let message = File::options().write(true).open(of(message))?;
+    Ok((presses, message))
 }
 
 pub(super) fn is_worker() -> bool {
-    NEWS.get().is_some()
+    MESSAGES.get().is_some()
 }
 
-pub(super) fn report(news: &News) {
-    if let Some(to) = NEWS.get() {
-        let line = [news.line(), b"\n".to_vec()].concat();
+pub(super) fn report(message: &WorkerMessage) {
+    if let Some(to) = MESSAGES.get() {
+        let line = [message.line(), b"\n".to_vec()].concat();
         let mut to = to.lock().unwrap_or_else(PoisonError::into_inner);
         // The reader notices a guardian that is gone.
         let _ = to.write_all(&line);

@@ -1,6 +1,6 @@
 //! Hints for a terrain file that does not open.
 //!
-//! Commands of other programs are tried by `tests/tests/converters.rs` where these
+//! Commands of other programs are tried by `tests/tests/conversion_hints.rs` where these
 //! programs are installed.
 
 use std::io::ErrorKind;

@@ -45,7 +45,7 @@ struct Form {
 
 impl LinkFigures {
     /// # Errors
-    /// Where the file cannot be felt true to scale.
+    /// If the file cannot be rendered true to scale.
     pub(super) fn of(grid: &HapticGrid<'_>, mb_per_s: f64) -> Result<Self, TerrainError> {
         let scale = grid.true_scale(1.0)?;
         let terrain = Terrain::over(*grid, scale, 0)?;

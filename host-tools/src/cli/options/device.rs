@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use crate::cli::failure::Failure;
 use crate::link::{
-    DeviceAddress, Dialogue, Emulator, EmulatorError, HostClock, IMAGE_VARIABLE, Lines, LinkError,
-    Native, QEMU, QEMU_VARIABLE, Transport, move_arm_while,
+    ControlSession, DeviceAddress, Emulator, EmulatorError, HostClock, IMAGE_VARIABLE, Lines,
+    LinkError, Native, QEMU, QEMU_VARIABLE, Transport, move_arm_while,
 };
 use crate::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script};
 
@@ -90,7 +90,7 @@ impl EmulatedBoard {
     /// Starts the board and connects its two lines.
     ///
     /// # Errors
-    /// What is missing, and what to type.
+    /// The missing part, and what to type.
     pub(in crate::cli) fn start(&self) -> Result<(Emulator, Lines), Failure> {
         let image = self.image.clone().or_else(|| path_in(IMAGE_VARIABLE));
         let image = image.ok_or(EmulatorError::NoImage)?;
@@ -123,7 +123,7 @@ impl Device {
     /// No device, or what `talk` fails with.
     pub fn talk<T>(
         &self,
-        talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
+        talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
         self.speak(opened, talk)
     }
@@ -134,15 +134,18 @@ impl Device {
     /// As [`Device::talk`].
     pub fn look<T>(
         &self,
-        talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
+        talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
         self.speak(looked_at, talk)
     }
 
     fn speak<T>(
         &self,
-        open: for<'t> fn(Box<dyn Transport + 't>, Duration) -> Result<Dialogue<'t>, LinkError>,
-        talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
+        open: for<'t> fn(
+            Box<dyn Transport + 't>,
+            Duration,
+        ) -> Result<ControlSession<'t>, LinkError>,
+        talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
         let mut arm = resting()?;
         match &self.device {
@@ -162,26 +165,26 @@ impl Device {
 
 /// Talks, and ends the conversation.
 fn converse<T>(
-    mut dialogue: Dialogue<'_>,
-    talk: impl FnOnce(&mut Dialogue<'_>) -> Result<T, Failure>,
+    mut control: ControlSession<'_>,
+    talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
-    let said = talk(&mut dialogue)?;
-    dialogue.end()?;
+    let said = talk(&mut control)?;
+    control.end()?;
     Ok(said)
 }
 
 fn opened<'t>(
     line: Box<dyn Transport + 't>,
     patience: Duration,
-) -> Result<Dialogue<'t>, LinkError> {
-    Dialogue::open(line, patience)
+) -> Result<ControlSession<'t>, LinkError> {
+    ControlSession::open(line, patience)
 }
 
 fn looked_at<'t>(
     line: Box<dyn Transport + 't>,
     patience: Duration,
-) -> Result<Dialogue<'t>, LinkError> {
-    Dialogue::look(line, patience)
+) -> Result<ControlSession<'t>, LinkError> {
+    ControlSession::look(line, patience)
 }
 
 /// A virtual Phantom at rest in its zero pose.
@@ -223,7 +226,7 @@ mod tests {
         let device = Device {
             device: DeviceChoice::There(DeviceAddress::Native),
         };
-        let board = device.talk(|dialogue| Ok(dialogue.device().board.to_string()));
+        let board = device.talk(|control| Ok(control.device().board.to_string()));
         assert_eq!(board.ok().as_deref(), Some("native"));
     }
 }

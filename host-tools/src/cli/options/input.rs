@@ -215,7 +215,7 @@ fn height_unit(text: &str) -> Result<f64, String> {
 /// A size in samples, as `512x400`, or `512` for a square.
 ///
 /// # Errors
-/// What a size is.
+/// The format of a size.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let parts = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
     match (parts.0.trim().parse(), parts.1.trim().parse()) {

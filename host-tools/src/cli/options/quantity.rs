@@ -6,7 +6,7 @@ use std::str::FromStr;
 /// The units that a kind of quantity may carry.
 #[derive(Debug)]
 pub struct Units {
-    /// What the quantity is, for messages.
+    /// The name of the quantity, for messages.
     name: &'static str,
     /// Each unit and its size in the first, which is that of a number alone.
     units: &'static [(&'static str, f64)],

@@ -13,7 +13,7 @@ use crate::cli::terminal::interrupt;
 use crate::cli::terminal::keyboard::keyboard;
 use crate::cli::terminal::raw_mode::RawMode;
 use crate::cli::terminal::shared_keyboard::DeviceKeys;
-use crate::link::{Ask, Event};
+use crate::link::{Event, HostRequest};
 use crate::place::{Bounds, Laid, Reach};
 use crate::replay::Mark;
 use crate::steering::keys::{KEYS, Key, Keys};
@@ -215,7 +215,7 @@ impl<'t> PlacementControl<'t> {
     }
 
     /// Returns the requests to the device now.
-    pub(in crate::cli) fn asks(&mut self) -> Vec<Ask> {
+    pub(in crate::cli) fn asks(&mut self) -> Vec<HostRequest> {
         let mut asks = self.steering.asks();
         asks.extend(self.marks.asks());
         asks

@@ -10,7 +10,7 @@ use crate::cli::failure::{Failure, OrHint};
 use crate::cli::terminal::waiting::shown_meanwhile;
 use crate::terrain::HapticCells;
 use heightfield::disk_cache::DiskCache;
-use heightfield::shown::shown;
+use heightfield::printable_text::printable;
 use heightfield::{CellUnit, Certainty, OpenOptions, Raster, files_read_with};
 use heightfield::{file_name, is_url};
 
@@ -68,11 +68,11 @@ impl TerrainFile {
     /// Opens the terrain, and notes what the user should know of it.
     ///
     /// # Errors
-    /// What is wrong with the file, and what to do next.
+    /// The fault of the file, and what to do next.
     pub fn open(&self) -> Result<Raster, Failure> {
         let raster = self.open_without_remarks()?;
         for remark in raster.remarks() {
-            eprintln!("note: {}", shown(remark));
+            eprintln!("note: {}", printable(remark));
         }
         Ok(raster)
     }
@@ -80,7 +80,7 @@ impl TerrainFile {
     /// Opens the terrain, and shows that it takes a while. The caller shows its remarks.
     ///
     /// # Errors
-    /// What is wrong with the file, and what to do next.
+    /// The fault of the file, and what to do next.
     pub(in crate::cli) fn open_without_remarks(&self) -> Result<Raster, Failure> {
         let options = self.reading.options()?;
         let line = || format!("reading {}", self.name());
@@ -100,10 +100,10 @@ impl TerrainFile {
     /// The file's name without folders, as it is shown: on a page and in a picture, too.
     pub fn name(&self) -> String {
         if let Some(url) = self.file.to_str().filter(|file| is_url(file)) {
-            return shown(file_name(url));
+            return printable(file_name(url));
         }
         let name = self.file.file_name().unwrap_or(self.file.as_os_str());
-        shown(&name.to_string_lossy())
+        printable(&name.to_string_lossy())
     }
 }
 

@@ -12,7 +12,7 @@ use super::watch::Watch;
 use super::{Args, OTHER_FILE};
 use crate::cli::bringup::required::{brought_up, drives_no_arm};
 use crate::cli::failure::{Failure, OrHint};
-use crate::cli::guardian::{self, News};
+use crate::cli::guardian::{self, WorkerMessage};
 use crate::cli::options::placing;
 use crate::cli::options::steering::PlacementControl;
 use crate::cli::session_summary::{self, SessionSummary};
@@ -66,7 +66,7 @@ impl<'t> Serving<'_, 't> {
     /// plant line of an emulated board.
     ///
     /// # Errors
-    /// What has ended it, or that the device did not confirm that it is disarmed.
+    /// The cause of its end, or a device that did not confirm that it is disarmed.
     pub(super) fn serve(self) -> Result<(), Failure> {
         let (Some(address), Some(tour)) = (&self.device.plant, &self.placed.tour) else {
             return self.session();
@@ -265,7 +265,7 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
     let recording = device.record.as_deref().map(|path| {
         let output = Output::create(path)?.of_recording(most_recorded(path));
         if let Some(partial) = output.partial() {
-            guardian::report(&News::Recording(partial.to_owned()));
+            guardian::report(&WorkerMessage::Recording(partial.to_owned()));
         }
         Recording::new(output, &columns)
     });

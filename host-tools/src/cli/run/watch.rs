@@ -15,11 +15,11 @@ use crate::cli::terminal::device_console::DeviceConsole;
 use crate::cli::terminal::shared_keyboard::DeviceKeys;
 use crate::cli::viewing::Shown;
 use crate::events::{Event as Told, Watcher};
-use crate::link::{Ask, Event, LinkStats};
+use crate::link::{Event, HostRequest, LinkStats};
 use crate::output::OutputError;
 use crate::replay::settings::PlacementSettings;
 use crate::replay::{LoopColumns, Record, Recording, Value, is_below_ground, state_name};
-use crate::serving::Onlooker;
+use crate::serving::SessionHandler;
 use crate::telemetry::{Figures, SampleLog};
 use crate::terrain::Terrain;
 
@@ -181,7 +181,7 @@ impl<'t> Watch<'t> {
     }
 }
 
-impl<'t> Onlooker<'t> for Watch<'t> {
+impl<'t> SessionHandler<'t> for Watch<'t> {
     fn take(&mut self, event: Event<'_>) {
         self.prompts.on_event(&event);
         self.control.on_event(&event);
@@ -202,7 +202,7 @@ impl<'t> Onlooker<'t> for Watch<'t> {
         self.device_console.tell(line);
     }
 
-    fn asks(&mut self) -> Vec<Ask> {
+    fn asks(&mut self) -> Vec<HostRequest> {
         let lines = self.prompts.lines();
         lines.iter().for_each(|line| self.device_console.tell(line));
         if let Some(events) = &mut self.events {

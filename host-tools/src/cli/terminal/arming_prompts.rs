@@ -15,7 +15,7 @@ use hapterra_core::wire::request::{Refusal, Request};
 use super::keyboard::keyboard;
 use super::shared_keyboard::DeviceKeys;
 use crate::cli::line_limit::LineLimit;
-use crate::link::{Ask, Event};
+use crate::link::{Event, HostRequest};
 
 /// More than an arm that is armed, faulted and armed again in a second needs.
 const LINES_A_SECOND: u32 = 24;
@@ -95,7 +95,7 @@ pub(in crate::cli) struct ArmingPrompts {
     is_back: bool,
     /// Enter was pressed with the arm in its zero pose: its counts are asked for.
     zeroing: bool,
-    say: Vec<Ask>,
+    say: Vec<HostRequest>,
     /// True if there is a user who arms; a virtual hand follows its script.
     leads: bool,
     /// Lines for the user, in order.
@@ -161,14 +161,14 @@ impl ArmingPrompts {
                 (_, Ok(())) => {}
             },
             Event::Unanswered(ask) => {
-                self.zeroing &= **ask != Ask::Status;
+                self.zeroing &= **ask != HostRequest::Status;
                 self.tell(format!("the device does not answer: {ask:?} was given up"));
             }
             Event::Status(status) if self.zeroing => {
                 self.zeroing = false;
                 let counts = status.health.sense.counts;
                 let requests = [Request::Zero { counts }, Request::Arm];
-                self.say.extend(requests.map(Ask::Request));
+                self.say.extend(requests.map(HostRequest::Request));
                 let [a, b, c] = counts;
                 self.tell(format!("zeroed at {a} {b} {c} counts"));
             }
@@ -249,7 +249,7 @@ impl ArmingPrompts {
     }
 
     /// Returns the messages for the device now.
-    pub(in crate::cli) fn messages(&mut self) -> Vec<Ask> {
+    pub(in crate::cli) fn messages(&mut self) -> Vec<HostRequest> {
         if self.enter.was_pressed()
             && let Some(question) = self.question.take()
         {
@@ -281,12 +281,12 @@ impl ArmingPrompts {
         }
         if fault.is_some() {
             self.say
-                .push(Ask::Request(Request::ClearFault { seen: fault }));
+                .push(HostRequest::Request(Request::ClearFault { seen: fault }));
         }
         self.zeroing = question.zeroes;
         self.say.push(match question.zeroes {
-            true => Ask::Status,
-            false => Ask::Request(Request::Arm),
+            true => HostRequest::Status,
+            false => HostRequest::Request(Request::Arm),
         });
     }
 
@@ -357,7 +357,7 @@ mod tests {
         assert!(prompts.lines().join("\n").contains("press Enter"));
         assert_eq!(prompts.messages(), []);
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), [Ask::Status]);
+        assert_eq!(prompts.messages(), [HostRequest::Status]);
         // It is answered once.
         press.send(()).expect("listening");
         assert_eq!(prompts.messages(), []);
@@ -377,7 +377,7 @@ mod tests {
         let second = prompts.asks().expect("another");
         assert!(!prompts.answer(first), "one that was asked before");
         assert!(prompts.answer(second) && !prompts.answer(second));
-        assert_eq!(prompts.messages(), [Ask::Status]);
+        assert_eq!(prompts.messages(), [HostRequest::Status]);
     }
 
     #[test]
@@ -397,7 +397,7 @@ mod tests {
         assert!(prompts.lines().join("\n").contains("EncoderJump"));
         press.send(()).expect("listening");
         let seen = report.fault;
-        let wanted = [Request::ClearFault { seen }, Request::Arm].map(Ask::Request);
+        let wanted = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
         assert_eq!(prompts.messages(), wanted);
     }
 
@@ -421,7 +421,7 @@ mod tests {
             assert_eq!(told.contains("press Enter to arm"), asks, "{told}");
         }
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), [Ask::Request(Request::Arm)]);
+        assert_eq!(prompts.messages(), [HostRequest::Request(Request::Arm)]);
     }
 
     #[test]
@@ -452,7 +452,7 @@ mod tests {
         );
         assert_eq!(prompts.messages(), []);
         press.send(()).expect("listening");
-        assert_eq!(prompts.messages(), [Ask::Status]);
+        assert_eq!(prompts.messages(), [HostRequest::Status]);
     }
 
     #[test]
@@ -472,7 +472,7 @@ mod tests {
             ..Report::default()
         };
         prompts.on_event(&Event::Guard(&report));
-        prompts.on_event(&Event::Unanswered(&Ask::Request(Request::Arm)));
+        prompts.on_event(&Event::Unanswered(&HostRequest::Request(Request::Arm)));
         let told = prompts.lines().join("\n");
         assert!(
             told.contains("FAULT 3 EncoderJump") && told.contains("does not answer"),
@@ -517,7 +517,7 @@ mod tests {
         assert!(prompts.lines().is_empty());
         press.send(()).expect("listening");
         let seen = report.fault;
-        let wanted = [Request::ClearFault { seen }, Request::Arm].map(Ask::Request);
+        let wanted = [Request::ClearFault { seen }, Request::Arm].map(HostRequest::Request);
         assert_eq!(prompts.messages(), wanted);
     }
 }

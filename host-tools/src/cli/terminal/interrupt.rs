@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use super::raw_mode;
 use super::writer::put;
-use crate::cli::guardian::{self, News};
+use crate::cli::guardian::{self, WorkerMessage};
 use crate::link::DeviceAddress;
 
 /// Signals that ask for an end.
@@ -51,7 +51,7 @@ pub fn listen() {
     ONCE.call_once(|| match handle(on_signal) {
         Ok(()) => {
             IS_LISTENING.store(true, Ordering::Relaxed);
-            guardian::report(&News::Listening);
+            guardian::report(&WorkerMessage::Listening);
         }
         // Then it ends this program the hard way, as without a handler.
         Err(error) => tracing::debug!("cannot listen to Ctrl-C: {error}"),
@@ -100,14 +100,14 @@ pub(in crate::cli) fn end_without_guardian() {
 
 /// Ctrl-C as a key.
 pub(super) fn press_key() {
-    guardian::report(&News::Pressed);
+    guardian::report(&WorkerMessage::Pressed);
     press();
 }
 
 /// Asks for an end because the program that gives commands is gone. A press beside it is the
 /// first: in a terminal Ctrl-C reaches both programs.
 pub(in crate::cli) fn input_ended() {
-    guardian::report(&News::InputEnded);
+    guardian::report(&WorkerMessage::InputEnded);
     REQUESTED.store(true, Ordering::Relaxed);
 }
 
@@ -163,8 +163,8 @@ pub(in crate::cli) fn device_may_be_armed(name: &str, address: &DeviceAddress, m
         let address = address.to_string();
         SERVES.set(may.then(|| address.clone()));
         guardian::report(&match may {
-            true => News::MayBeArmed(address),
-            false => News::Settled(address),
+            true => WorkerMessage::MayBeArmed(address),
+            false => WorkerMessage::Settled(address),
         });
     }
 }
@@ -179,7 +179,7 @@ fn may_be_armed() -> MutexGuard<'static, BTreeSet<String>> {
 pub fn requested() -> bool {
     let requested = REQUESTED.load(Ordering::Relaxed);
     if requested && let Some(address) = SERVES.take() {
-        guardian::report(&News::Leaving(address));
+        guardian::report(&WorkerMessage::Leaving(address));
     }
     requested
 }

@@ -2,7 +2,7 @@
 //! chosen last. Enter goes to a device whose digit was pressed right before it, and else to none:
 //! an Enter for one arm never arms another user's arm.
 //!
-//! Where the terminal gives whole lines, a line that is the number of a device is that digit and
+//! If the terminal sends whole lines, the number of a device on a line of its own is that digit and
 //! Enter.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

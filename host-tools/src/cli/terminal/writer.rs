@@ -1,5 +1,5 @@
 //! Output to the terminal while a board may be armed, and the log. Commands that
-//! hold no device print (`say.rs`).
+//! hold no device print (`print_macros.rs`).
 //!
 //! One thread writes, and whoever speaks does not wait for it. A window that was closed,
 //! a reader that is gone and a disk that is full therefore end nothing. A terminal that
@@ -15,7 +15,7 @@ use std::thread::Builder;
 use indicatif::ProgressBar;
 
 use super::raw_mode;
-use heightfield::shown::shown_lines;
+use heightfield::printable_text::printable_lines;
 
 /// Lines that wait to be written; beyond them, lines are left out.
 const WAITING: usize = 512;
@@ -93,7 +93,7 @@ fn write(said: Said, bottom: &mut Option<ProgressBar>) {
         Said::Err(line) => above(bottom, || put(io::stderr(), &line)),
         Said::Status(Some(line)) => {
             let bar = bottom.get_or_insert_with(ProgressBar::new_spinner);
-            bar.set_message(shown_lines(&line));
+            bar.set_message(printable_lines(&line));
             bar.tick();
         }
         Said::Status(None) => {
@@ -117,7 +117,7 @@ fn above(bottom: &Option<ProgressBar>, put: impl FnOnce()) {
 /// Writes, where that can be written, what a terminal may show. In raw mode a terminal does not go
 /// back to the first column by itself.
 pub(in crate::cli) fn put(mut to: impl Write, text: &str) {
-    let mut text = shown_lines(text);
+    let mut text = printable_lines(text);
     if raw_mode::is_raw() {
         text = text.replace('\n', "\r\n");
     }

@@ -4,8 +4,8 @@
 //! and the same settings.
 
 mod columns;
-mod csv;
-mod parquet;
+mod csv_writer;
+mod parquet_writer;
 
 use std::fmt;
 use std::path::Path;
@@ -130,8 +130,8 @@ pub struct Recording(Form);
 
 /// The two forms.
 enum Form {
-    Csv(csv::Csv),
-    Parquet(Box<parquet::Parquet>),
+    Csv(csv_writer::Csv),
+    Parquet(Box<parquet_writer::Parquet>),
 }
 
 impl Recording {
@@ -142,8 +142,8 @@ impl Recording {
     /// When it cannot be written.
     pub fn new(output: Output, more: &[Column]) -> Result<Self, OutputError> {
         let form = match is_parquet(output.path()) {
-            true => Form::Parquet(Box::new(parquet::Parquet::new(output, more)?)),
-            false => Form::Csv(csv::Csv::new(output, more)),
+            true => Form::Parquet(Box::new(parquet_writer::Parquet::new(output, more)?)),
+            false => Form::Csv(csv_writer::Csv::new(output, more)),
         };
         Ok(Self(form))
     }

@@ -7,9 +7,9 @@
 mod bounded;
 mod columns;
 mod comments;
-mod csv;
+mod csv_reader;
 mod fault;
-mod parquet;
+mod parquet_reader;
 mod recording_rows;
 
 use std::fs::File;
@@ -69,8 +69,8 @@ pub struct Trajectory {
 }
 
 enum Form {
-    Csv(Box<csv::Rows<File>>),
-    Parquet(Box<parquet::Rows>),
+    Csv(Box<csv_reader::Rows<File>>),
+    Parquet(Box<parquet_reader::Rows>),
 }
 
 impl Trajectory {
@@ -89,12 +89,12 @@ impl Trajectory {
         let mut file = File::open(path).map_err(TrajectoryFault::Unreadable)?;
         let (form, text) = match is_parquet(&mut file)? {
             true => {
-                let (rows, text) = parquet::Rows::open(file)?;
+                let (rows, text) = parquet_reader::Rows::open(file)?;
                 (Form::Parquet(Box::new(rows)), text)
             }
             false => {
                 let later = later_remarks(&mut file)?;
-                let (rows, text) = csv::Rows::open(file)?;
+                let (rows, text) = csv_reader::Rows::open(file)?;
                 // Remarks that are no settings are followed by no views.
                 (Form::Csv(Box::new(rows)), text + &later)
             }

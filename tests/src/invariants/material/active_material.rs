@@ -35,7 +35,7 @@ pub(super) struct ActiveMaterial {
     /// The texture of which a share is felt, and so many of [`FADE`] parts of it.
     texture: Texture,
     parts: u32,
-    /// Judge of its texture.
+    /// Oracle of its texture.
     judge: Option<TextureJudge>,
     /// The share that this speed leaves.
     speed_share: f64,

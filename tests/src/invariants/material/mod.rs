@@ -16,11 +16,11 @@ use hapterra_core::force::Shading;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
 
-use super::judge::{Judge, Verdict};
-use super::seen::Seen;
+use super::observed_tick::ObservedTick;
+use super::oracle::{TickOracle, Verdict};
 use super::{Invariant, Violation};
+use crate::scene::loop_replay::Replied;
 use crate::scene::materials::Materials;
-use crate::scene::replayed::Replied;
 use crate::scene::run::Scene;
 use crate::scene::terrain::Kind;
 use active_material::ActiveMaterial;
@@ -64,7 +64,7 @@ impl Judged {
 
 /// Judges the points of one scene in turn.
 pub struct MaterialJudge<'g> {
-    place: Judge<'g>,
+    place: TickOracle<'g>,
     materials: &'g Materials,
     kind: Kind,
     shading: Shading,
@@ -82,7 +82,7 @@ impl<'g> MaterialJudge<'g> {
     #[must_use]
     pub fn new(scene: &'g Scene, materials: &'g Materials, shift: [i32; 3]) -> Self {
         Self {
-            place: Judge::new(&scene.terrain),
+            place: TickOracle::new(&scene.terrain),
             materials,
             kind: scene.terrain.kind,
             shading: scene.shading,
@@ -124,7 +124,7 @@ impl<'g> MaterialJudge<'g> {
     }
 
     /// The proxy is where a friction of the place before lets it be.
-    fn place_is_right(&mut self, seen: &Seen) -> Verdict {
+    fn place_is_right(&mut self, seen: &ObservedTick) -> Verdict {
         let touches = seen.felt.state == ContactState::Touching;
         let is_open = self.courses.is_empty();
         let mut is_rubbed = is_open;
@@ -151,7 +151,7 @@ impl<'g> MaterialJudge<'g> {
     }
 
     /// The force is that of a course which is possible.
-    fn force_is_right(&mut self, replied: &Replied, seen: &Seen) -> Verdict {
+    fn force_is_right(&mut self, replied: &Replied, seen: &ObservedTick) -> Verdict {
         let TickRecord { state, proxy, .. } = replied.sample;
         let touches = state == ContactState::Touching;
         // A place has one class, whichever of two that are equally near it is.
@@ -194,7 +194,7 @@ impl<'g> MaterialJudge<'g> {
         courses: &mut Vec<ActiveMaterial>,
         was_open: bool,
         replied: &Replied,
-        seen: &Seen,
+        seen: &ObservedTick,
     ) -> Verdict {
         self.judged.open += u64::from(was_open);
         if was_open {
@@ -251,7 +251,7 @@ impl<'g> MaterialJudge<'g> {
         Ok(())
     }
 
-    fn felt<'p>(&self, replied: &'p Replied, seen: &Seen) -> TickConditions<'p> {
+    fn felt<'p>(&self, replied: &'p Replied, seen: &ObservedTick) -> TickConditions<'p> {
         let cell_mm = f64::from(self.materials.cell_mm);
         let [hip, proxy] = [replied.hip, replied.proxy].map(DVec3::from_array);
         let from = self.before.map_or(replied.hip, |before| before.hip);
@@ -291,7 +291,7 @@ impl<'g> MaterialJudge<'g> {
 
 /// The contact of a point, as other judges see it. Where all of the spring is felt, the
 /// displacement is the way to the proxy.
-fn seen(replied: &Replied, shift: [i32; 3]) -> Seen {
+fn seen(replied: &Replied, shift: [i32; 3]) -> ObservedTick {
     let TickRecord {
         state, proxy, work, ..
     } = replied.sample;
@@ -307,5 +307,5 @@ fn seen(replied: &Replied, shift: [i32; 3]) -> Seen {
         missing_tile: None,
         work,
     };
-    Seen::new(replied.hip, felt, shift)
+    ObservedTick::new(replied.hip, felt, shift)
 }

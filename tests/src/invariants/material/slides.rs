@@ -8,8 +8,8 @@ use hapterra_core::scene::TickRecord;
 use super::active_material::ActiveMaterial;
 use super::{MaterialJudge, RATE_HZ};
 use crate::invariants::Invariant;
-use crate::invariants::judge::Verdict;
-use crate::invariants::seen::Seen;
+use crate::invariants::observed_tick::ObservedTick;
+use crate::invariants::oracle::Verdict;
 use crate::invariants::surface::{Patch, distance};
 use crate::scene::terrain::Kind;
 
@@ -22,7 +22,7 @@ const SLACK: f64 = 0.031;
 
 impl MaterialJudge<'_> {
     /// On a plane a proxy that slides, not too fast, ends where as much pulls as friction holds.
-    pub(super) fn slides(&mut self, course: &ActiveMaterial, seen: &Seen) -> Verdict {
+    pub(super) fn slides(&mut self, course: &ActiveMaterial, seen: &ObservedTick) -> Verdict {
         let (friction, [_, most]) = (course.friction(), course.frictions());
         let Some(before) = self.before else {
             return Ok(());

@@ -12,10 +12,10 @@ use std::sync::Arc;
 
 use tiff_reader::filters::fix_endianness_and_predict;
 
-use super::fault::fault;
+use super::decoder_error::fault;
 use super::index::Chunk;
 use super::layout::{Layout, MAX_DECODED};
-use super::unpacked::{RowSink, Unpacked};
+use super::unpacked_on_disk::{RowSink, Unpacked};
 use crate::blocks::{MAX_BLOCK_BYTES, Part};
 use crate::disk_cache::DiskCache;
 use crate::samples::{Endian, SampleValue, with_samples};
@@ -40,7 +40,7 @@ pub(super) fn suits(layout: &Layout) -> bool {
 /// within the bound of the cache.
 ///
 /// # Errors
-/// Why that cannot be.
+/// The reason for which that is impossible.
 pub(super) fn into_file(layout: &mut Layout, disk: &DiskCache) -> io::Result<()> {
     if !suits(layout) {
         let what = format!("what {} has packed comes as a whole", layout.compression.0);

@@ -1,6 +1,6 @@
 //! Options that say what a terrain feels like; shared by `replay`, `run`, `demo` and `view`.
 
-mod look;
+mod material_entry;
 mod numbers;
 pub mod table;
 mod texture;
@@ -16,11 +16,11 @@ use super::recording::settings_of;
 use super::terrain_file::ReadingOptions;
 use crate::cli::failure::{Failure, Hint, OrHint};
 use crate::materials::{ClassMaterial, Looks, Materials};
+use crate::named_surfaces::{NAMED_SURFACES, NamedSurface};
 use crate::place::STIFFEST_N_PER_MM;
-use crate::surface::{NAMED_SURFACES, NamedSurface};
 use heightfield::{Raster, files_read_with};
 use numbers::{check, over, rubbed, told};
-use table::{Look, PassivityName, ShadingName, TableFile};
+use table::{MaterialEntry, PassivityName, ShadingName, TableFile};
 
 /// Surface of a terrain.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -203,7 +203,11 @@ impl SurfaceOptions {
 
     /// Checks that a table, which may be a stranger's, asks for no more stiffness than keys may, or
     /// than the command line does.
-    fn check_stiffness(&self, look: &Look, (file, line): (&Path, usize)) -> Result<(), Failure> {
+    fn check_stiffness(
+        &self,
+        look: &MaterialEntry,
+        (file, line): (&Path, usize),
+    ) -> Result<(), Failure> {
         let most = STIFFEST_N_PER_MM.max(self.stiffness.unwrap_or(0.0));
         let Some(stiffness) = look.stiffness.filter(|asked| *asked > most) else {
             return Ok(());
@@ -232,7 +236,7 @@ impl Surface {
     /// them.
     ///
     /// # Errors
-    /// What is wrong with the file of classes or its place; one of file and classes alone.
+    /// A fault of the file of classes or its place; a file without classes, or classes without a file.
     pub(in crate::cli) fn materials(
         &self,
         options: &SurfaceOptions,

@@ -5,7 +5,7 @@ use std::path::Path;
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Material};
 
-use super::table::Look;
+use super::table::MaterialEntry;
 use super::texture;
 use crate::cli::failure::Failure;
 
@@ -21,7 +21,7 @@ pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
 /// part.
 pub(super) fn over(
     material: &Material,
-    look: &Look,
+    look: &MaterialEntry,
     (file, line, what): (&Path, usize, &str),
 ) -> Result<Material, Failure> {
     let before = &material.friction;

@@ -21,10 +21,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
-pub use super::look::{Look, PassivityName, ShadingName, TextureName};
+pub use super::material_entry::{MaterialEntry, PassivityName, ShadingName, TextureName};
 
+use heightfield::printable_text::printable;
 use heightfield::regular_file;
-use heightfield::shown::shown;
 
 /// Most classes that a table names: with the default, as many materials as a device has room
 /// for.
@@ -46,9 +46,9 @@ pub struct TableFile {
     /// The passivity controller, on or off.
     pub passivity: PassivityName,
     /// Entry for samples without a class.
-    pub default: (usize, Look),
+    pub default: (usize, MaterialEntry),
     /// By class.
-    pub classes: Vec<(i64, usize, Look)>,
+    pub classes: Vec<(i64, usize, MaterialEntry)>,
 }
 
 /// Fault of a table.
@@ -88,8 +88,8 @@ pub enum TableError {
 struct Written {
     shading: ShadingName,
     passivity: PassivityName,
-    default: Option<Spanned<Look>>,
-    class: BTreeMap<String, Spanned<Look>>,
+    default: Option<Spanned<MaterialEntry>>,
+    class: BTreeMap<String, Spanned<MaterialEntry>>,
 }
 
 /// A settings file, whose table `surface` is one.
@@ -149,7 +149,7 @@ impl TableFile {
             line,
             why,
         };
-        let mut classes: Vec<(i64, usize, Look)> = Vec::new();
+        let mut classes: Vec<(i64, usize, MaterialEntry)> = Vec::new();
         for (number, look) in written.class {
             let line = line_of(look.span().start);
             let class = number.parse::<i64>().map_err(|_| {
@@ -176,9 +176,9 @@ impl TableFile {
         let default = written.default.map_or_else(Default::default, |look| {
             (line_of(look.span().start), look.into_inner())
         });
-        let is_unprintable = |look: &Look| {
+        let is_unprintable = |look: &MaterialEntry| {
             let name = look.name.as_deref().unwrap_or_default();
-            shown(name) != name
+            printable(name) != name
         };
         let of_classes = classes.iter().map(|(_, line, look)| (*line, look));
         let mut all = std::iter::once((default.0, &default.1)).chain(of_classes);

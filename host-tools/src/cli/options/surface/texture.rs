@@ -2,7 +2,7 @@
 
 use hapterra_core::force::{Pattern, Texture};
 
-use super::table::{Look, TextureName};
+use super::table::{MaterialEntry, TextureName};
 
 /// From ridge to ridge where nothing is stated, mm.
 const USUAL_WAVELENGTH_MM: f32 = 1.0;
@@ -14,7 +14,7 @@ const USUAL_MOST_MM: f32 = 0.2;
 ///
 /// # Errors
 /// Numbers without a texture, or such that no hand could feel or no tick could make.
-pub(super) fn texture(look: &Look, default: &Texture) -> Result<Texture, String> {
+pub(super) fn texture(look: &MaterialEntry, default: &Texture) -> Result<Texture, String> {
     let pattern = look
         .texture
         .map_or(default.pattern, |texture| match texture {
@@ -55,7 +55,7 @@ pub(super) fn texture(look: &Look, default: &Texture) -> Result<Texture, String>
 }
 
 /// The name of the first number that is stated.
-fn first_number(look: &Look) -> Option<&'static str> {
+fn first_number(look: &MaterialEntry) -> Option<&'static str> {
     let stated = [
         (look.texture_amplitude.is_some(), "texture_amplitude"),
         (look.texture_wavelength.is_some(), "texture_wavelength"),
@@ -100,12 +100,12 @@ mod tests {
 
     fn asked(texture: Option<TextureName>, numbers: [Option<f32>; 3]) -> Result<Texture, String> {
         let [texture_amplitude, texture_wavelength, texture_direction] = numbers;
-        let look = Look {
+        let look = MaterialEntry {
             texture,
             texture_amplitude,
             texture_wavelength,
             texture_direction,
-            ..Look::default()
+            ..MaterialEntry::default()
         };
         super::texture(&look, &Texture::NONE)
     }
@@ -126,9 +126,9 @@ mod tests {
     fn a_class_takes_what_it_does_not_state_from_the_default() {
         let numbers = [Some(0.1), Some(1.5), Some(20.0)];
         let default = asked(Some(TextureName::Grating), numbers).expect("valid");
-        let higher = Look {
+        let higher = MaterialEntry {
             texture_amplitude: Some(0.15),
-            ..Look::default()
+            ..MaterialEntry::default()
         };
         let texture = super::texture(&higher, &default).expect("valid");
         let amplitude_mm = 0.15;
@@ -139,9 +139,9 @@ mod tests {
                 ..default
             }
         );
-        let other = Look {
+        let other = MaterialEntry {
             texture: Some(TextureName::Grain),
-            ..Look::default()
+            ..MaterialEntry::default()
         };
         let texture = super::texture(&other, &default).expect("valid");
         assert_eq!((texture.wavelength_mm, texture.direction_deg), (1.0, 0.0));

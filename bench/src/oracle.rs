@@ -1,0 +1,138 @@
+//! The oracle: the exact local closest point of the bilinear surface, in f64, by the
+//! slow and plain descent that judges the product in the tests, which is none of any
+//! variant's.
+
+use hapterra_tests::invariants::descent;
+use hapterra_tests::invariants::surface::{Corners, Patch};
+
+use crate::grid::Grid;
+use crate::variant::{Answer, Hip};
+
+/// Verdict on an answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// Distance from the answer's proxy to the exact closest point, cells.
+    pub error: f64,
+    /// Angle between the answer's force and the exact one, degrees.
+    pub angle: f64,
+}
+
+/// Judges an answer that says "touching": how far is it from the local closest
+/// point that a descent from it ends at? `None` over the border of the field.
+#[must_use]
+pub fn judge(grid: &Grid, hip: &Hip, answer: &Answer) -> Option<Verdict> {
+    let displacement = answer.displacement.map(f64::from);
+    let proxy = [0, 1, 2].map(|i| hip.wide[i] + displacement[i]);
+    let verdict = |from: [f64; 2]| {
+        let exact = closest(grid, &hip.wide, from)?;
+        let off = [0, 1, 2].map(|i| proxy[i] - exact[i]);
+        let force = [0, 1, 2].map(|i| exact[i] - hip.wide[i]);
+        Some(Verdict {
+            error: length(&off),
+            angle: angle(&displacement, &force),
+        })
+    };
+    let (xs, ys) = (sides(proxy[0]), sides(proxy[1]));
+    let places = xs.iter().flat_map(|x| ys.iter().map(|y| [*x, *y]));
+    places
+        .filter_map(verdict)
+        .min_by(|a, b| a.error.total_cmp(&b.error))
+}
+
+/// Returns the starts for a proxy at `x`: there, and on both sides of a border of patches that
+/// single precision cannot tell it from. On a sharp ridge the two sides lead to different valleys,
+/// and rounding is not to choose.
+fn sides(x: f64) -> [f64; 3] {
+    const ROUNDING: f64 = 1e-6;
+    let border = x.round();
+    if (x - border).abs() > ROUNDING {
+        return [x; 3];
+    }
+    [x, border, border - 1e-12]
+}
+
+/// The closest point to `hip` that a descent over the surface from the place
+/// `from` ends at; `None` off the field.
+#[must_use]
+pub fn closest(grid: &Grid, hip: &[f64; 3], from: [f64; 2]) -> Option<[f64; 3]> {
+    let patch = Patch::at(grid, from.map(|x| x.floor() as i32))?;
+    Some(descent::from(grid, *hip, from, patch).at)
+}
+
+impl Corners for Grid {
+    fn corners(&self, cell: [i32; 2]) -> Option<[f64; 4]> {
+        self.has(cell)
+            .then(|| Self::corners(self, cell).map(f64::from))
+    }
+}
+
+pub(crate) fn length(v: &[f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Forces below this, in cells of displacement, have no direction to speak of.
+const LEAST_FORCE: f64 = 1e-3;
+
+/// From the exact force to the one felt, in degrees.
+pub(crate) fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    if length(b) < LEAST_FORCE {
+        return 0.0;
+    }
+    let cross = [0, 1, 2].map(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        a[j] * b[k] - a[k] * b[j]
+    });
+    let dot = (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+    length(&cross).atan2(dot).to_degrees()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path::Random;
+
+    fn rough() -> Grid {
+        let mut random = Random(5);
+        Grid::from_fn("rough", [12, 12], |_, _| random.between(0.0, 3.0) as f32)
+    }
+
+    #[test]
+    fn no_point_around_the_closest_is_nearer() {
+        let grid = rough();
+        let mut random = Random(9);
+        for _ in 0..2000 {
+            let from = [random.between(1.0, 11.0), random.between(1.0, 11.0)];
+            let hip = [
+                from[0] + random.between(-0.5, 0.5),
+                from[1] + random.between(-0.5, 0.5),
+                grid.height(from[0], from[1]) - random.between(0.0, 1.0),
+            ];
+            let exact = closest(&grid, &hip, from).expect("inside");
+            let far = |p: &[f64; 3]| length(&[0, 1, 2].map(|i| p[i] - hip[i]));
+            for i in 0..32 {
+                let turn = f64::from(i) / 32.0 * std::f64::consts::TAU;
+                let (x, y) = (exact[0] + 1e-5 * turn.cos(), exact[1] + 1e-5 * turn.sin());
+                if grid.has([x.floor() as i32, y.floor() as i32]) {
+                    let near = [x, y, grid.height(x, y)];
+                    assert!(far(&near) > far(&exact) - 1e-12, "{hip:?} {exact:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_answer_that_is_off_is_seen_to_be_off() {
+        let flat = Grid::from_fn("flat", [4, 4], |_, _| 2.0);
+        let hip = Hip::at([1.5, 1.5, 1.75]);
+        let exact = judge(&flat, &hip, &Answer::touching([0.0, 0.0, 0.25]));
+        assert_eq!(
+            exact,
+            Some(Verdict {
+                error: 0.0,
+                angle: 0.0
+            })
+        );
+        let off = judge(&flat, &hip, &Answer::touching([0.25, 0.0, 0.25])).expect("inside");
+        assert!((off.error - 0.25).abs() < 1e-9 && (off.angle - 45.0).abs() < 1e-6);
+    }
+}

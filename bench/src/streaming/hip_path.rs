@@ -1,0 +1,224 @@
+//! Path of the HIP over a terrain, at one depth below the surface.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use hapterra::terrain::Terrain;
+
+use super::relief::PERIOD;
+use super::{CELL_MM, NotMeasured};
+
+/// Cells between the way and the border of a field, and that of the square which repeats: more
+/// than a tile and the margin around the HIP.
+const FROM_BORDER: u32 = 130;
+/// Cells of the straight way where the field has room for it.
+const STRAIGHT: u32 = 2800;
+/// Cells along the side of the square that the turning way crosses, where there is room.
+const TURNING: u32 = 1400;
+/// Fewest cells of a way.
+const LEAST: u32 = 200;
+/// The turning way turns by a right angle after so many cells: less than what a HIP of 2,000
+/// cells a second covers in the time that the device looks ahead.
+const LEG: u32 = 150;
+/// Names of the paths in files.
+const NAMES: [&str; 2] = ["straight", "turning"];
+
+/// Places on the surface, a cell apart along the way.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct HipPath {
+    /// Cells east and north of the south-west sample, and height in cells.
+    places: Vec<[f64; 3]>,
+}
+
+/// The two ways of a terrain.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct HipPaths {
+    /// Along a row of tiles, from west to east.
+    pub(super) straight: HipPath,
+    /// In steps: east, north, east, each [`LEG`] cells long.
+    pub(super) turning: HipPath,
+}
+
+impl HipPath {
+    /// Its length, cells.
+    pub(super) fn cells(&self) -> f64 {
+        (self.places.len() - 1) as f64
+    }
+
+    /// The place on the surface so many cells along the way; its end beyond that.
+    pub(super) fn at(&self, cells: f64) -> [f64; 3] {
+        let along = cells.clamp(0.0, self.cells());
+        let first = (along.floor() as usize).min(self.places.len() - 2);
+        let part = along - first as f64;
+        let [from, to] = [self.places[first], self.places[first + 1]];
+        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * part)
+    }
+
+    /// The surface under a line of places.
+    fn over(
+        terrain: &Terrain<'_>,
+        places: impl Iterator<Item = [u32; 2]>,
+    ) -> Result<Self, NotMeasured> {
+        let on_surface = |[east, north]: [u32; 2]| {
+            let [east, north] = [east, north].map(f64::from);
+            let height = terrain.height_mm(east * CELL_MM, north * CELL_MM);
+            let why = || {
+                let place = format!("at column {east} and row {north} from the south-west");
+                NotMeasured(format!("it has no data {place}, where the HIP would move"))
+            };
+            Ok([east, north, height.ok_or_else(why)? / CELL_MM])
+        };
+        Ok(Self {
+            places: places.map(on_surface).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl HipPaths {
+    /// The ways over a terrain: in the middle of it, or where a made terrain of any size has the
+    /// same samples.
+    ///
+    /// # Errors
+    /// When the terrain is too small, or has a hole there.
+    pub(super) fn over(terrain: &Terrain<'_>, is_made: bool) -> Result<Self, NotMeasured> {
+        let size = terrain.size().map(|patches| patches as u32 + 1);
+        let room = size[0].min(size[1]).saturating_sub(2 * FROM_BORDER);
+        if room < LEAST {
+            let least = LEAST + 2 * FROM_BORDER;
+            let [columns, rows] = size;
+            let has = format!("{columns} × {rows} samples; the paths need {least} along each side");
+            return Err(NotMeasured(has));
+        }
+        let (long, side) = (STRAIGHT.min(room), TURNING.min(room));
+        let [west, south] = match is_made {
+            true => in_the_square(size, long),
+            false => size.map(|samples| (samples - long) / 2),
+        };
+        let middle = south + long / 2;
+        let steps = (0..2 * side).scan([west, south], |at, step| {
+            let now = *at;
+            at[(step / LEG % 2) as usize] += 1;
+            Some(now)
+        });
+        let inside = |at: &[u32; 2]| at[0] <= west + side && at[1] <= south + side;
+        Ok(Self {
+            straight: HipPath::over(terrain, (west..=west + long).map(|east| [east, middle]))?,
+            turning: HipPath::over(terrain, steps.take_while(inside))?,
+        })
+    }
+
+    /// The cell in the middle of all places.
+    pub(super) fn middle(&self) -> [f64; 3] {
+        let all = || self.straight.places.iter().chain(&self.turning.places);
+        std::array::from_fn(|axis| {
+            let of_axis = || all().map(|place| place[axis]);
+            0.5 * (of_axis().fold(f64::MAX, f64::min) + of_axis().fold(f64::MIN, f64::max))
+        })
+    }
+
+    /// Writes both down, a place a line.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub(super) fn write(&self, path: &Path) -> std::io::Result<()> {
+        let mut text = String::new();
+        for (name, way) in NAMES.iter().zip([&self.straight, &self.turning]) {
+            for [east, north, height] in &way.places {
+                // Writing to a String cannot fail.
+                let _ = writeln!(text, "{name} {east} {north} {height}");
+            }
+        }
+        std::fs::write(path, text)
+    }
+
+    /// Reads what [`HipPaths::write`] has written.
+    ///
+    /// # Errors
+    /// When the file is not there, or is another.
+    pub(super) fn read(path: &Path) -> Result<Self, NotMeasured> {
+        let wrong = |why: String| NotMeasured(format!("{}: {why}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        let place = |line: &str| {
+            let mut numbers = line.split(' ').map(str::parse::<f64>);
+            let mut next = || numbers.next()?.ok();
+            Some([next()?, next()?, next()?])
+        };
+        let ways = NAMES.map(|name| {
+            let lines = text.lines().filter_map(|line| line.strip_prefix(name));
+            let places: Option<Vec<_>> = lines.map(|line| place(line.trim_start())).collect();
+            let places = places.filter(|places| places.len() > 1);
+            places.map(|places| HipPath { places })
+        });
+        let [Some(straight), Some(turning)] = ways else {
+            return Err(wrong("it has no room for two paths".into()));
+        };
+        Ok(Self { straight, turning })
+    }
+}
+
+/// The south-west corner of the ways in the square around the middle of a made terrain, whose
+/// rows are counted from the north: the same samples in a terrain of any size that has the room.
+fn in_the_square([columns, rows]: [u32; 2], long: u32) -> [u32; 2] {
+    let first = |count: u32| count / 2 / PERIOD * PERIOD + FROM_BORDER;
+    [first(columns), rows - 1 - first(rows) - long]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hapterra::terrain::Scale;
+    use heightfield::Raster;
+
+    fn ways(columns: u32, rows: u32, is_made: bool) -> Result<HipPaths, NotMeasured> {
+        let raster = Raster::from_fn(columns, rows, |x, y| x as f32 + 2.0 * y as f32);
+        let raster = raster.expect("a field");
+        let terrain = Terrain::new(&raster, Scale::new(CELL_MM, 1.0).expect("valid"), 0);
+        HipPaths::over(&terrain.expect("a terrain"), is_made)
+    }
+
+    #[test]
+    fn ways_stay_inside_and_are_read_as_they_were_written() {
+        let ways = ways(700, 640, false).expect("room");
+        assert_eq!(
+            (ways.straight.cells(), ways.turning.cells()),
+            (380.0, 680.0)
+        );
+        let all = ways.straight.places.iter().chain(&ways.turning.places);
+        for [east, north, height] in all {
+            assert!((130.0..=570.0).contains(east) && (130.0..=510.0).contains(north));
+            assert!((height - (east + 2.0 * north) / CELL_MM).abs() < 1e-6);
+        }
+        let near = ways.straight.at(7.25);
+        assert!((near[0] - ways.straight.at(7.0)[0] - 0.25).abs() < 1e-9);
+        assert_eq!(ways.straight.at(1e9), ways.straight.at(380.0));
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("ways");
+        ways.write(&path).expect("written");
+        assert_eq!(HipPaths::read(&path).expect("read"), ways);
+        std::fs::write(&path, "straight 1 2 3\nstraight 2 2").expect("written");
+        assert!(HipPaths::read(&path).is_err());
+    }
+
+    #[test]
+    fn terrain_without_room_for_the_path_is_refused_by_place() {
+        let why = ways(700, 300, false).expect_err("too narrow").to_string();
+        assert!(why.contains("700 × 300 samples"), "{why}");
+        let raster = Raster::from_fn(640, 640, |x, y| if x + y == 700 { f32::NAN } else { 1.0 });
+        let raster = raster.expect("a field");
+        let terrain = Terrain::new(&raster, Scale::new(CELL_MM, 1.0).expect("valid"), 0);
+        let why = HipPaths::over(&terrain.expect("a terrain"), false).expect_err("a hole");
+        assert!(why.to_string().contains("no data at column"), "{why}");
+    }
+
+    #[test]
+    fn made_terrains_of_all_sizes_have_their_ways_over_the_same_samples() {
+        for side in [3168, 10_016, 31_648, 100_000] {
+            let [west, south] = in_the_square([side; 2], STRAIGHT);
+            let top = side - 1 - south - STRAIGHT;
+            assert_eq!([west % PERIOD, top % PERIOD], [FROM_BORDER; 2]);
+            assert!(top + STRAIGHT + FROM_BORDER <= side);
+            // Tiles count from the south: their borders are at the same samples.
+            assert_eq!(side % 32, 0);
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! Runs all cases, each in a process of its own.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{ChildStdin, Command, Stdio};
+
+use heightfield::Raster;
+
+use super::case::{Case, terrain};
+use super::hip_path::HipPaths;
+use super::measurement::{Reading, Row};
+use super::meter::{QUESTION, Traffic};
+use super::relief::Relief;
+use super::{NotMeasured, Plan, SIDES, cog};
+
+#[cfg(feature = "remote")]
+use super::server::Server;
+
+/// A file with no more samples than this is measured as a whole, too: 800 MB of them.
+const MAX_WHOLE: u64 = 200_000_000;
+/// Prefix of a row on standard output of a case's process.
+const ROW: &str = "row ";
+/// Prefix of the reason for its end.
+const WHY: &str = "why ";
+
+/// A terrain that is measured.
+struct Subject<'p> {
+    name: String,
+    path: PathBuf,
+    is_made: bool,
+    plan: &'p Plan,
+}
+
+/// Measures the made terrains of a plan and some files; `tell` hears what is begun, `done` gets
+/// each row. A terrain that cannot be measured is told of in `warn`, and the next one is measured.
+///
+/// # Errors
+/// When there is no room for the made terrains, or no folder.
+pub fn measure(
+    plan: &Plan,
+    files: &[PathBuf],
+    tell: &mut dyn FnMut(&str),
+    warn: &mut dyn FnMut(&str),
+    done: &mut dyn FnMut(Row),
+) -> Result<(), NotMeasured> {
+    let folder = tempfile::Builder::new().prefix("hapterra-lab-").tempdir();
+    let failed = |error: std::io::Error| NotMeasured(format!("a folder for terrains: {error}"));
+    let folder = folder.map_err(failed)?;
+    for file in files {
+        let name = file.file_stem().unwrap_or(file.as_os_str());
+        let subject = Subject {
+            name: name.to_string_lossy().into_owned(),
+            path: file.clone(),
+            is_made: false,
+            plan,
+        };
+        if let Err(why) = subject.measure(folder.path(), tell, done) {
+            warn(&format!("{}: {why}", file.display()));
+        }
+    }
+    let mut relief = None;
+    for exponent in &plan.exponents {
+        let side = SIDES[(exponent - SIDES_FROM) as usize];
+        let path = folder.path().join(format!("made-{side}.tif"));
+        tell(&format!("{side} × {side}: made"));
+        room_for(&path, side)?;
+        let relief = relief.get_or_insert_with(Relief::new);
+        let failed = |error| NotMeasured(format!("{}: {error}", path.display()));
+        cog::write(&path, side, relief).map_err(failed)?;
+        let subject = Subject {
+            name: format!("{side} × {side}"),
+            path,
+            is_made: true,
+            plan,
+        };
+        if let Err(why) = subject.measure(folder.path(), tell, done) {
+            warn(&format!("{}: {why}", subject.name));
+        }
+        // The next one wants its room.
+        let _ = std::fs::remove_file(&subject.path);
+    }
+    Ok(())
+}
+
+/// The exponent of ten of the smallest made terrain.
+const SIDES_FROM: u32 = 6;
+
+/// Checks that the disk has room for a made terrain. Where the system does not tell, writing
+/// decides.
+fn room_for(path: &Path, side: u32) -> Result<(), NotMeasured> {
+    let needed = cog::most_bytes(side);
+    let folder = path.parent().unwrap_or(path);
+    match fs4::available_space(folder) {
+        Ok(free) if free < needed => {
+            let [needed, free] = [needed, free].map(|bytes| bytes as f64 / 1e6);
+            let folder = folder.display();
+            let text = format!(
+                "a made terrain takes up to {needed:.0} MB, and {free:.0} MB are free in {folder}"
+            );
+            Err(NotMeasured(text))
+        }
+        _ => Ok(()),
+    }
+}
+
+impl Subject<'_> {
+    /// All cases of the terrain.
+    fn measure(
+        &self,
+        folder: &Path,
+        tell: &mut dyn FnMut(&str),
+        done: &mut dyn FnMut(Row),
+    ) -> Result<(), NotMeasured> {
+        let path =
+            std::path::absolute(&self.path).map_err(|error| NotMeasured(error.to_string()))?;
+        let (ways, samples, is_whole) = self.ways()?;
+        let file = folder.join("ways");
+        ways.write(&file)
+            .map_err(|error| NotMeasured(format!("{}: {error}", file.display())))?;
+        let case = |reading, latency_ms, source: String| Case {
+            terrain: self.name.clone(),
+            source,
+            ways: file.display().to_string(),
+            reading,
+            latency_ms,
+            halvings: self.plan.halvings,
+            stands_while_reading: self.plan.stands_while_reading && latency_ms == 0,
+        };
+        let on_disk = path.display().to_string();
+        if samples <= MAX_WHOLE && !is_whole {
+            tell(&format!("{}: read as a whole", self.name));
+            let whole = case(Reading::Whole, 0, on_disk.clone());
+            run(&whole, &mut || None, done)?;
+        }
+        for latency_ms in &self.plan.latencies_ms {
+            tell(&format!("{}: {latency_ms} ms", self.name));
+            if *latency_ms == 0 {
+                run(
+                    &case(Reading::Blocks, 0, on_disk.clone()),
+                    &mut || None,
+                    done,
+                )?;
+            } else {
+                self.at_a_server(&path, *latency_ms, &case, done)?;
+            }
+        }
+        Ok(())
+    }
+
+    #[cfg(feature = "remote")]
+    fn at_a_server(
+        &self,
+        path: &Path,
+        latency_ms: u32,
+        case: &dyn Fn(Reading, u32, String) -> Case,
+        done: &mut dyn FnMut(Row),
+    ) -> Result<(), NotMeasured> {
+        let failed = |error: std::io::Error| NotMeasured(format!("a server: {error}"));
+        let server = Server::of(path.parent().unwrap_or(path)).map_err(failed)?;
+        server.set_latency_ms(latency_ms);
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let case = case(Reading::Blocks, latency_ms, server.url(&name));
+        run(&case, &mut || Some(server.traffic()), done)
+    }
+
+    #[cfg(not(feature = "remote"))]
+    fn at_a_server(
+        &self,
+        _: &Path,
+        latency_ms: u32,
+        _: &dyn Fn(Reading, u32, String) -> Case,
+        _: &mut dyn FnMut(Row),
+    ) -> Result<(), NotMeasured> {
+        let text = format!(
+            "{latency_ms} ms need a web server, which this build has not: build it with --features remote"
+        );
+        Err(NotMeasured(text))
+    }
+
+    /// The ways over the terrain, how many samples it has, and whether it is read as a whole
+    /// anyway.
+    fn ways(&self) -> Result<(HipPaths, u64, bool), NotMeasured> {
+        let options = Case::options(Reading::Blocks);
+        let raster = Raster::open(&self.path, &options);
+        let raster = raster.map_err(|error| NotMeasured(error.to_string()))?;
+        let samples = u64::from(raster.columns()) * u64::from(raster.rows());
+        let ways = HipPaths::over(&terrain(&raster)?, self.is_made)?;
+        Ok((ways, samples, raster.is_known_whole()))
+    }
+}
+
+/// Runs a case in a process of its own.
+fn run(
+    case: &Case,
+    seen: &mut dyn FnMut() -> Option<Traffic>,
+    done: &mut dyn FnMut(Row),
+) -> Result<(), NotMeasured> {
+    let failed = |error: std::io::Error| NotMeasured(format!("a process of its own: {error}"));
+    let program = std::env::current_exe().map_err(failed)?;
+    let mut child = Command::new(program)
+        .args(["streaming", "--case", &written(case)?])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(failed)?;
+    let (mut to, from) = (child.stdin.take(), child.stdout.take());
+    let mut why = None;
+    for line in BufReader::new(from.ok_or_else(|| NotMeasured("no pipe".into()))?).lines() {
+        let line = line.map_err(failed)?;
+        if line == QUESTION {
+            answer(to.as_mut(), seen().unwrap_or_default()).map_err(failed)?;
+        } else if let Some(row) = line.strip_prefix(ROW) {
+            done(read(row)?);
+        } else if let Some(text) = line.strip_prefix(WHY) {
+            why = Some(text.to_owned());
+        }
+    }
+    let status = child.wait().map_err(failed)?;
+    match (status.success(), why) {
+        (true, None) => Ok(()),
+        (_, Some(why)) => Err(NotMeasured(why)),
+        (false, None) => Err(NotMeasured(format!("its process ended with {status}"))),
+    }
+}
+
+fn answer(to: Option<&mut ChildStdin>, seen: Traffic) -> std::io::Result<()> {
+    let Some(to) = to else {
+        return Ok(());
+    };
+    writeln!(to, "{} {}", seen.requests, seen.bytes)
+}
+
+/// Measures the case that a process was started for, and writes what comes of it to standard
+/// output.
+///
+/// # Errors
+/// When the case is not understood; what goes wrong with it is written.
+pub fn measure_case(case: &str) -> Result<(), NotMeasured> {
+    let case: Case = read(case)?;
+    let measured = case.measure(|row| match written(&row) {
+        Ok(row) => println!("{ROW}{row}"),
+        Err(why) => println!("{WHY}{why}"),
+    });
+    if let Err(why) = measured {
+        println!("{WHY}{}", why.to_string().replace('\n', " "));
+    }
+    Ok(())
+}
+
+/// A value as a line of CSV.
+fn written(value: &impl serde::Serialize) -> Result<String, NotMeasured> {
+    let mut writer = csv::WriterBuilder::new()
+        .has_headers(false)
+        .from_writer(vec![]);
+    let line = writer.serialize(value);
+    let line = line.and_then(|()| {
+        writer
+            .into_inner()
+            .map_err(|error| error.into_error().into())
+    });
+    let line = line.map_err(|error| NotMeasured(error.to_string()))?;
+    Ok(String::from_utf8_lossy(&line).trim_end().to_owned())
+}
+
+/// The value that [`written`] made a line of.
+fn read<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, NotMeasured> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .from_reader(line.as_bytes());
+    let row = reader.deserialize().next();
+    let row = row.ok_or_else(|| NotMeasured("an empty line".into()))?;
+    row.map_err(|error| NotMeasured(format!("{line:?}: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_and_cases_cross_a_pipe_as_they_are() {
+        let row = Row {
+            terrain: "a, \"b\" × 3".into(),
+            samples: 10_000_000_000,
+            open_ms: 0.25,
+            missing_turning_5000: Some(7),
+            ..Row::default()
+        };
+        let line = written(&row).expect("a line");
+        assert_eq!(line.lines().count(), 1);
+        assert_eq!(read::<Row>(&line).expect("a row"), row);
+        let case = Case {
+            terrain: "x".into(),
+            source: "/a folder/b,c.tif".into(),
+            ways: "ways".into(),
+            reading: Reading::Whole,
+            latency_ms: 20,
+            halvings: 7,
+            stands_while_reading: true,
+        };
+        let line = written(&case).expect("a line");
+        assert_eq!(read::<Case>(&line).expect("a case"), case);
+        assert!(read::<Case>("nothing").is_err());
+    }
+}

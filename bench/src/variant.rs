@@ -1,0 +1,101 @@
+//! Interface of every compared contact rule.
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use hapterra_core::Vec3;
+use hapterra_core::grid::GridPoint;
+
+use crate::clock::Stopwatch;
+
+/// One haptic interface point, ready for every variant's arithmetic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hip {
+    /// Cell and fraction.
+    pub grid: GridPoint,
+    /// The same point, exactly.
+    pub wide: [f64; 3],
+    /// The same point as single floats counted from the origin.
+    pub single: [f32; 3],
+}
+
+impl Hip {
+    /// The point of the grid next to `[x, y, z]` in cells.
+    #[must_use]
+    pub fn at(point: [f64; 3]) -> Self {
+        let cell = point.map(|c| c.floor() as i32);
+        let frac = [0, 1, 2].map(|i| (point[i] - point[i].floor()) as f32);
+        let grid = GridPoint::new(cell, Vec3::from_array(frac));
+        let (cell, frac) = (grid.cell(), grid.frac());
+        let wide = [0, 1, 2].map(|i| f64::from(cell[i]) + f64::from(frac[i]));
+        Self {
+            grid,
+            wide,
+            single: wide.map(|c| c as f32),
+        }
+    }
+}
+
+/// Answer of a variant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Answer {
+    /// True if there is a force.
+    pub touching: bool,
+    /// True if all there was to do for this HIP was done.
+    pub converged: bool,
+    /// From the HIP to the proxy, cells.
+    pub displacement: [f32; 3],
+}
+
+impl Answer {
+    /// Nothing is felt.
+    pub const FREE: Self = Self {
+        touching: false,
+        converged: true,
+        displacement: [0.0; 3],
+    };
+
+    /// The proxy is `displacement` away from the HIP.
+    #[must_use]
+    pub const fn touching(displacement: [f32; 3]) -> Self {
+        Self {
+            touching: true,
+            converged: true,
+            displacement,
+        }
+    }
+}
+
+impl Answer {
+    /// From this displacement to another, cells.
+    #[must_use]
+    pub fn change(&self, other: &Self) -> f64 {
+        let off = |i: usize| f64::from(other.displacement[i]) - f64::from(self.displacement[i]);
+        (0..3).map(|i| off(i).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// A way to render a height field: one of ours or an opponent.
+pub trait Haptics {
+    /// Forgets the last tick.
+    fn forget(&mut self);
+
+    /// One tick.
+    fn tick(&mut self, hip: &Hip) -> Answer;
+
+    /// Time for a whole path, from nothing.
+    fn time(&mut self, path: &[Hip]) -> Duration {
+        self.forget();
+        let watch = Stopwatch::start();
+        for hip in path {
+            black_box(self.tick(black_box(hip)));
+        }
+        watch.elapsed()
+    }
+
+    /// Returns the answers along a path, from nothing.
+    fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
+        self.forget();
+        path.iter().map(|hip| self.tick(hip)).collect()
+    }
+}

@@ -1,0 +1,144 @@
+//! Costs of a tick by the motion of the HIP: patches searched, and
+//! evaluations of the distance there.
+
+use core::cell::Cell;
+use std::vec::Vec;
+
+use glam::Vec3;
+
+use super::budget::FAST_PATH;
+use super::test_random::{Random, wander};
+use super::{Contact, ContactSettings, ContactState};
+use crate::cases::cases;
+use crate::grid::GridPoint;
+use crate::terrain::FieldSize;
+use crate::terrain::testing::{Field, buffers};
+
+std::thread_local! {
+    /// Patches and evaluations of the searches.
+    static SEARCHED: Cell<[u32; 2]> = const { Cell::new([0; 2]) };
+}
+
+/// A patch has been searched.
+pub(super) fn searched(evaluations: u32) {
+    SEARCHED.with(|tally| {
+        let [patches, all] = tally.get();
+        tally.set([patches + 1, all + evaluations]);
+    });
+}
+
+const SIZE: i32 = 60;
+const TICKS: u32 = cases(4_000, 60);
+
+/// Hills three cells high, with a twist of their own in every patch.
+fn height(x: i32, y: i32) -> f32 {
+    let rough = (x * 7 + y * 13) % 10;
+    let hills = (0.2 * f64::from(x)).sin() + (0.3 * f64::from(y)).cos();
+    (1.5 * hills) as f32 + 0.02 * rough as f32
+}
+
+/// A HIP so high over a place, or so deep under it.
+fn hip([x, y]: [f64; 2], above: f64) -> GridPoint {
+    let cell = [x, y].map(|c| c as i32);
+    let [u, v] = [x - x.floor(), y - y.floor()];
+    let post = |i: i32, j: i32| f64::from(height(cell[0] + i, cell[1] + j));
+    let row = |j: i32| post(0, j) * (1.0 - u) + post(1, j) * u;
+    let z = row(0) * (1.0 - v) + row(1) * v + above;
+    GridPoint::new(
+        [cell[0], cell[1], 0],
+        Vec3::new(u as f32, v as f32, z as f32),
+    )
+}
+
+/// Places one after the other, so many cells apart.
+fn places(step: f64) -> impl Iterator<Item = [f64; 2]> {
+    wander(Random(71), TICKS, SIZE, step, 0.05)
+}
+
+/// Median and 99th percentile of the patches and of the evaluations, over the
+/// ticks of these HIPs that end in a state.
+fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
+    let mut tiles = buffers::<2>();
+    let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
+    let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
+    let above = GridPoint::new([30, 30, 9], Vec3::ZERO);
+    let mut step = |hip: &GridPoint| *contact.step(&field.window, hip);
+    step(&above);
+    let (mut patches, mut evaluations) = (Vec::new(), Vec::new());
+    for hip in hips {
+        SEARCHED.set([0; 2]);
+        let felt = step(&hip);
+        let searched = match SEARCHED.get() {
+            // The shortcut: one evaluation.
+            [0, _] if felt.state == ContactState::Touching && felt.work == FAST_PATH => [1, 1],
+            searched => searched,
+        };
+        if felt.state == state {
+            patches.push(searched[0]);
+            evaluations.push(searched[1]);
+        }
+    }
+    [patches, evaluations].map(|mut counts| {
+        counts.sort_unstable();
+        let last = counts.len() - 1;
+        [counts[last / 2], counts[last * 99 / 100]]
+    })
+}
+
+#[test]
+fn a_tick_looks_at_no_more_than_it_needs() {
+    let high = |[x, y]: [f64; 2]| GridPoint::new([x as i32, y as i32, 9], Vec3::ZERO);
+    let flies = |above: f64| places(0.5).map(move |at| hip(at, above));
+    let slides = |step: f64| places(step).map(|at| hip(at, -0.1));
+    let taps = places(0.03).flat_map(|at| [hip(at, 0.2), hip(at, -0.1)]);
+    // An encoder count of 0.03 cell, one way or the other.
+    let mut random = Random(72);
+    let mut count = || 0.03 * random.between(-1.5, 1.5).round();
+    let trembles = (0..TICKS).map(|_| hip([30.4 + count(), 30.5 + count()], count() - 0.1));
+    let rests = (0..TICKS).map(|_| hip([30.4, 30.5], -0.1));
+    let states = [
+        (
+            "unmoved",
+            looked_at(rests, ContactState::Touching),
+            [[0, 0], [0, 0]],
+        ),
+        (
+            "free high",
+            looked_at(places(0.5).map(high), ContactState::Free),
+            [[0, 0], [0, 0]],
+        ),
+        (
+            "free low",
+            looked_at(flies(1.0), ContactState::Free),
+            [[0, 0], [0, 0]],
+        ),
+        (
+            "first contact",
+            looked_at(taps, ContactState::Touching),
+            [[1, 2], [2, 5]],
+        ),
+        (
+            "slides 0.01",
+            looked_at(slides(0.01), ContactState::Touching),
+            [[1, 2], [1, 2]],
+        ),
+        (
+            "slides 0.5",
+            looked_at(slides(0.5), ContactState::Touching),
+            [[2, 4], [2, 8]],
+        ),
+        (
+            "trembles",
+            looked_at(trembles, ContactState::Touching),
+            [[1, 1], [1, 1]],
+        ),
+    ];
+    for (state, [patches, evaluations], most) in states {
+        std::println!("{state}: patches {patches:?}, evaluations {evaluations:?}");
+        let within = |is: [u32; 2], most: [u32; 2]| is[0] <= most[0] && is[1] <= most[1];
+        assert!(
+            within(patches, most[0]) && within(evaluations, most[1]),
+            "{state}"
+        );
+    }
+}

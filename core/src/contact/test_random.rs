@@ -1,0 +1,45 @@
+//! A small seeded generator for tests, the same everywhere (xorshift64*).
+
+/// Its state; any number but zero.
+pub(super) struct Random(pub(super) u64);
+
+impl Random {
+    /// In `[0, 1)`.
+    pub(super) fn unit(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// In `[low, high)`.
+    pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+}
+
+/// So many places `step` cells apart, each a turn of up to `turn` rad from the
+/// way before, within a square field of `size` cells and away from its border.
+pub(super) fn wander(
+    random: Random,
+    ticks: u32,
+    size: i32,
+    step: f64,
+    turn: f64,
+) -> impl Iterator<Item = [f64; 2]> {
+    let (mut random, mut heading) = (random, 0.3_f64);
+    let mut at = [0.5 * f64::from(size); 2];
+    (0..ticks).map(move |_| {
+        heading += random.between(-turn, turn);
+        let next = [at[0] + step * heading.cos(), at[1] + step * heading.sin()];
+        if next
+            .iter()
+            .all(|x| (4.0..f64::from(size) - 4.0).contains(x))
+        {
+            at = next;
+        } else {
+            heading += 1.0;
+        }
+        at
+    })
+}

@@ -1,0 +1,40 @@
+//! Calls of GDAL that have not returned. GDAL's own end would wait for them.
+
+use std::ffi::c_int;
+use std::io::Write;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Calls of GDAL that have not returned.
+static CALLS: AtomicUsize = AtomicUsize::new(0);
+
+/// A call of GDAL, until it is dropped.
+pub(crate) struct Call(());
+
+impl Call {
+    pub(crate) fn begin() -> Self {
+        CALLS.fetch_add(1, Ordering::AcqRel);
+        Self(())
+    }
+}
+
+impl Drop for Call {
+    fn drop(&mut self) {
+        CALLS.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+unsafe extern "C" {
+    /// Ends the process without what libraries do at its end.
+    fn _exit(code: c_int) -> !;
+}
+
+/// Ends the process with an exit code if a call of GDAL has not returned: GDAL's own end would wait
+/// for it. Else does nothing.
+pub fn exit_if_stuck(code: u8) {
+    if CALLS.load(Ordering::Acquire) > 0 {
+        // The process ends: an error here has no reader.
+        let _ = (std::io::stdout().flush(), std::io::stderr().flush());
+        // SAFETY: it does not return, and nothing of this process is used after it.
+        unsafe { _exit(code.into()) }
+    }
+}

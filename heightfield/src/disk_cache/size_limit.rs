@@ -1,0 +1,110 @@
+//! Size of the records in a folder, and their removal.
+
+use std::fs::{self, DirEntry};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+/// A disk gives room in pieces of this size, bytes.
+const PIECE: u64 = 4096;
+/// Beginning of the name of an incomplete record.
+pub(super) const UNFINISHED: &str = ".new-";
+/// No program takes longer to write one: then it was killed.
+const LEFT_BEHIND: Duration = Duration::from_secs(3600);
+
+/// Knowledge of a folder's size.
+pub(super) struct SizeLimit {
+    most_bytes: u64,
+    /// Size of all records at the last look, and of the writes since; `None`
+    /// before the first look.
+    used: Option<u64>,
+    written: u64,
+}
+
+struct Record {
+    path: PathBuf,
+    used: SystemTime,
+    bytes: u64,
+}
+
+impl SizeLimit {
+    pub(super) const fn new(most_bytes: u64) -> Self {
+        Self {
+            most_bytes,
+            used: None,
+            written: 0,
+        }
+    }
+
+    /// Looks at the folder, where that was not done yet.
+    pub(super) fn look(&mut self, folder: &Path) {
+        if self.used.is_none() {
+            self.make(folder);
+        }
+    }
+
+    /// Counts a record that was written, and makes room where all are too many. What other
+    /// programs write is seen when an eighth of the bound was written here.
+    pub(super) fn add(&mut self, folder: &Path, bytes: u64) {
+        let bytes = bytes.next_multiple_of(PIECE);
+        self.written += bytes;
+        let used = self.used.get_or_insert(0);
+        *used += bytes;
+        if *used > self.most_bytes || self.written > self.most_bytes / 8 {
+            self.make(folder);
+        }
+    }
+
+    /// Deletes the records used longest ago until the rest takes seven eighths of the bound,
+    /// where all take more than it.
+    fn make(&mut self, folder: &Path) {
+        let mut records = records(folder);
+        let mut used: u64 = records.iter().map(|record| record.bytes).sum();
+        if used > self.most_bytes {
+            records.sort_by_key(|record| record.used);
+            for record in &records {
+                if used <= self.most_bytes - self.most_bytes / 8 {
+                    break;
+                }
+                // Where another program was faster, it is gone as well.
+                let _ = fs::remove_file(&record.path);
+                used -= record.bytes;
+            }
+        }
+        (self.used, self.written) = (Some(used), 0);
+    }
+}
+
+/// The records of a folder: what else lies there is not looked at.
+fn records(folder: &Path) -> Vec<Record> {
+    let entries = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_hex = |entry: &DirEntry, digits: usize| {
+        let name = entry.file_name();
+        let name = name.as_encoded_bytes();
+        name.len() == digits && name.iter().all(u8::is_ascii_hexdigit)
+    };
+    let mut found = vec![];
+    for inner in entries(folder).filter(|entry| is_hex(entry, 2)) {
+        for entry in entries(&inner.path()) {
+            let Ok(metadata) = entry.metadata() else {
+                continue;
+            };
+            let used = metadata.modified().unwrap_or(SystemTime::UNIX_EPOCH);
+            if is_hex(&entry, 30) && metadata.is_file() {
+                found.push(Record {
+                    path: entry.path(),
+                    used,
+                    bytes: metadata.len().next_multiple_of(PIECE),
+                });
+            } else if is_left_behind(&entry, used) {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+    found
+}
+
+fn is_left_behind(entry: &DirEntry, written: SystemTime) -> bool {
+    let name = entry.file_name();
+    let begins = name.as_encoded_bytes().starts_with(UNFINISHED.as_bytes());
+    begins && written.elapsed().is_ok_and(|since| since > LEFT_BEHIND)
+}

@@ -1,0 +1,279 @@
+//! Packed strips and tiles, unpacked on disk and read by rows, and as a whole.
+
+use std::io::Write;
+use std::sync::Arc;
+
+use flate2::write::ZlibEncoder;
+use ruzstd::encoding::{CompressionLevel, compress_to_vec};
+
+use super::super::images;
+use super::super::layout::{Layout, Wanted};
+use super::super::test_files::{
+    BAND, BANDS, KINDS, Made, ONE_STRIP, Packing, SIZE, check, open, value,
+};
+use super::super::{open as open_file, uncompressed, unpack};
+use super::*;
+use crate::blocks::Part;
+use crate::input::FileBytes;
+use crate::samples::{SampleValue, with_samples};
+
+fn deflated(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(bytes).expect("packed");
+    encoder.finish().expect("packed")
+}
+
+fn lzw(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = weezl::encode::Encoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8);
+    encoder.encode(bytes).expect("packed")
+}
+
+fn zstd(bytes: &[u8]) -> Vec<u8> {
+    compress_to_vec(bytes, CompressionLevel::Fastest)
+}
+
+fn runs(bytes: &[u8]) -> Vec<u8> {
+    let runs = bytes.chunks(100);
+    let packed = runs.flat_map(|run| [&[run.len() as u8 - 1], run].concat());
+    packed.collect()
+}
+
+const DEFLATE: Packing = packing(8, deflated, 1);
+
+const fn packing(code: u16, pack: fn(&[u8]) -> Vec<u8>, predictor: u16) -> Packing {
+    Packing {
+        code,
+        pack,
+        predictor,
+    }
+}
+
+/// A layout whose strips or tiles are unpacked into a folder of so many bytes.
+fn layout(made: &Made, bytes: Vec<u8>, most_bytes: u64) -> (tempfile::TempDir, Layout) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let disk = DiskCache::at(folder.path(), most_bytes);
+    let input = FileBytes::unpacked("test.tif", bytes);
+    let file = Arc::new(open_file(&input).expect("a TIFF"));
+    let full = images::full(&file).expect("an image");
+    let asked = (made.bands > 1).then_some(BAND);
+    let mut layout = Layout::read(&full, Wanted::Heights(asked)).expect("a layout");
+    unpack::into_file(&mut layout, &disk).expect("a file");
+    (folder, layout)
+}
+
+/// Holds parts all over the image against what was written.
+fn check_parts(made: &Made, layout: &Layout) {
+    let part = |column, row, columns, rows| Part {
+        column,
+        row,
+        columns,
+        rows,
+    };
+    for part in [
+        part(0, SIZE[1] - 3, SIZE[0], 3),
+        part(1000, 600, 200, 90),
+        part(0, 0, 7, 2),
+    ] {
+        let samples = uncompressed::read(layout, layout.band, &part).expect("read");
+        let band = if made.bands > 1 { BAND - 1 } else { 0 };
+        let rows = part.row..part.row + part.rows;
+        let places = rows.flat_map(|row| (0..part.columns).map(move |c| [part.column + c, row]));
+        let expected: Vec<f64> = places.map(|place| value(place, band) as f64).collect();
+        let found: Vec<f64> = with_samples!(&samples, values => {
+            values.iter().map(|value| value.widen()).collect()
+        });
+        assert!(found == expected, "{part:?} {made:?}");
+    }
+}
+
+#[test]
+fn each_compression_and_predictor_of_all_types_is_what_was_written() {
+    let mut all = vec![];
+    for (code, pack) in [
+        (5, lzw as fn(&[u8]) -> Vec<u8>),
+        (32946, deflated),
+        (32773, runs),
+        (50000, zstd),
+    ] {
+        let packing = packing(code, pack, 1);
+        all.push(Made {
+            packing,
+            ..ONE_STRIP
+        });
+    }
+    for (index, kind) in KINDS.into_iter().enumerate() {
+        for predictor in if kind.format == 3 { 1..=3 } else { 1..=2 } {
+            all.push(Made {
+                kind,
+                is_big_endian: (index + usize::from(predictor)) % 2 == 0,
+                packing: packing(8, deflated, predictor),
+                ..ONE_STRIP
+            });
+        }
+    }
+    for made in all {
+        check(&made, &open(&made, 1 << 30).expect("in memory"));
+        check_parts(&made, &layout(&made, made.bytes(), 1).1);
+    }
+}
+
+#[test]
+fn strips_and_tiles_of_several_bands_are_what_was_written() {
+    for chunk in [SIZE, [SIZE[0], 640], [1024, 640]] {
+        for (bands, is_planar, predictor) in [(1, false, 2), (BANDS, false, 3), (BANDS, true, 2)] {
+            let made = Made {
+                chunk,
+                bands,
+                is_planar,
+                packing: packing(8, deflated, predictor),
+                ..ONE_STRIP
+            };
+            check(&made, &open(&made, 1 << 30).expect("in memory"));
+            check_parts(&made, &layout(&made, made.bytes(), 1).1);
+        }
+    }
+}
+
+/// Two tiles beside each other, three times.
+const TILES: Made = Made {
+    chunk: [1024, 400],
+    packing: DEFLATE,
+    ..ONE_STRIP
+};
+
+#[test]
+fn two_rows_of_tiles_are_kept_whatever_the_bound_and_more_within_it() {
+    let tile = 1024 * 400 * 4;
+    for (most, kept) in [(1, 4), (5 * tile, 5), (1 << 30, 6)] {
+        let (_folder, layout) = layout(&TILES, TILES.bytes(), most);
+        // Each tile is asked for twice, in turns.
+        check_parts(&TILES, &layout);
+        check_parts(&TILES, &layout);
+        let unpacked = layout.unpacked.as_ref().expect("unpacked");
+        assert_eq!(unpacked.most_bytes(), kept * tile);
+        let file = unpacked.unnamed.file.metadata().expect("told");
+        assert!(file.len() <= kept * tile, "{} {most}", file.len());
+    }
+}
+
+/// Else each block of a row of blocks would unpack both of its strips again.
+#[test]
+fn what_a_row_of_blocks_lies_in_is_at_hand_after_its_first_block() {
+    let at_border = Part {
+        column: 0,
+        row: 300,
+        columns: 10,
+        rows: 200,
+    };
+    let strips = Made {
+        chunk: [SIZE[0], 400],
+        ..TILES
+    };
+    let apart = Made {
+        bands: BANDS,
+        is_planar: true,
+        ..strips
+    };
+    for made in [TILES, strips, apart] {
+        let (folder, mut layout) = layout(&made, made.bytes(), 1);
+        if made.is_planar {
+            // Its third band tells what is transparent.
+            layout.alpha = Some(2);
+            let disk = DiskCache::at(folder.path(), 1);
+            unpack::into_file(&mut layout, &disk).expect("unpacked");
+        }
+        let bands: Vec<_> = layout.bands_read().collect();
+        for column in [0, 1100] {
+            for band in &bands {
+                let part = Part {
+                    column,
+                    ..at_border
+                };
+                uncompressed::read(&layout, *band, &part).expect("read");
+            }
+        }
+        assert!(layout.is_at_hand(&at_border), "{made:?}");
+    }
+}
+
+/// A reader that must not wait never unpacks a tile.
+#[test]
+fn a_tile_is_at_hand_once_it_is_unpacked() {
+    let made = Made {
+        chunk: [1024, 640],
+        packing: DEFLATE,
+        ..ONE_STRIP
+    };
+    let (_folder, layout) = layout(&made, made.bytes(), 1 << 30);
+    let part = |column| Part {
+        column,
+        row: 600,
+        columns: 10,
+        rows: 2,
+    };
+    let is_at_hand = |column| layout.is_at_hand(&part(column));
+    assert!(!is_at_hand(0) && !is_at_hand(1020));
+    uncompressed::read(&layout, 0, &part(0)).expect("read");
+    assert!(is_at_hand(0) && !is_at_hand(1020) && !is_at_hand(1100));
+    uncompressed::read(&layout, 0, &part(1020)).expect("read");
+    assert!(is_at_hand(1020) && is_at_hand(1100));
+}
+
+#[test]
+fn the_tile_that_was_asked_for_longest_ago_goes_first() {
+    let (_folder, layout) = layout(&TILES, TILES.bytes(), 1);
+    let part = |[column, row]: [u32; 2]| Part {
+        column,
+        row,
+        columns: 1,
+        rows: 1,
+    };
+    let tiles = [[0, 0], [1100, 0], [0, 450], [1100, 450], [0, 850]];
+    for tile in [0, 1, 2, 3, 0, 4] {
+        uncompressed::read(&layout, 0, &part(tiles[tile])).expect("read");
+    }
+    let kept = tiles.map(|tile| layout.is_at_hand(&part(tile)));
+    assert_eq!(kept, [true, false, true, true, true]);
+}
+
+#[test]
+fn cut_strip_keeps_its_rows_and_reports_the_missing_ones() {
+    fn cut(bytes: &[u8]) -> Vec<u8> {
+        let packed = runs(bytes);
+        packed[..packed.len() / 2].to_vec()
+    }
+    let made = Made {
+        packing: packing(32773, cut, 1),
+        ..ONE_STRIP
+    };
+    let (_folder, layout) = layout(&made, made.bytes(), 1);
+    let row = |row| Part {
+        column: 0,
+        row,
+        columns: SIZE[0],
+        rows: 1,
+    };
+    let read = |at| uncompressed::read(&layout, 0, &row(at));
+    assert!(read(500).is_ok());
+    let fault = read(600).expect_err("cut").to_string();
+    let is_told = fault.contains("packbits") && fault.contains("from row 551 on");
+    assert!(is_told && fault.contains("ends too early"), "{fault}");
+    let fault = open(&made, 1 << 30).expect_err("all of it is read");
+    assert!(matches!(fault, RasterError::Damaged(_)), "{fault}");
+}
+
+#[test]
+fn what_lerc_has_packed_is_not_unpacked_by_rows() {
+    let made = Made {
+        other: Some((259, &[34887])),
+        ..ONE_STRIP
+    };
+    let input = FileBytes::unpacked("test.tif", made.bytes());
+    let file = Arc::new(open_file(&input).expect("a TIFF"));
+    let full = images::full(&file).expect("an image");
+    let mut layout = Layout::read(&full, Wanted::Heights(None)).expect("a layout");
+    let folder = tempfile::tempdir().expect("a folder");
+    let disk = DiskCache::at(folder.path(), 1);
+    let error = unpack::into_file(&mut layout, &disk).expect_err("it comes as a whole");
+    assert!(error.to_string().contains("lerc"), "{error}");
+}

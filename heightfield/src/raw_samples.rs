@@ -1,0 +1,327 @@
+//! Uncompressed samples at offsets that follow from column and row: raw files, `.hgt`, `.npy`, and
+//! those with a header beside them.
+//!
+//! A small file is read at once. A large one is read in blocks where it is touched; coarse levels have
+//! every 2ᵏ-th sample.
+
+use std::hash::Hasher;
+
+use twox_hash::XxHash64;
+
+use super::blocks::{Block, BlockImage, BlockReader, Looks, Part};
+use super::input::FileBytes;
+use super::read::Stored;
+use super::samples::{Endian, SampleType, Samples, with_samples};
+use super::storage::Storage;
+use super::{OpenOptions, RasterError, subsampled};
+use crate::disk_cache::FileStamp;
+
+/// Samples of a block each way.
+const BLOCK: u32 = 256;
+/// Blocks of coarse images, whose samples lie far apart.
+const COARSE_BLOCK: u32 = 32;
+/// Samples of a block of a file that is elsewhere: long rows, few of them, because what
+/// lies together comes together.
+const WIDE_BLOCK: [u32; 2] = [32_768, 2];
+/// Samples that lie farther apart than this, bytes, are read one by one.
+const FAR: u64 = 4096;
+/// Bytes that are read at once, at most, where rows follow each other.
+const AT_ONCE: u64 = 1 << 20;
+/// Samples of a file at a URL that take no more than this are fetched at once.
+const FEW_BYTES: u64 = 1 << 20;
+/// When a file that is not read as a whole is opened, so many places each way are looked at.
+const PLACES: u32 = 6;
+
+/// Positions of samples in a file, in bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RawSamples {
+    pub(super) columns: u32,
+    pub(super) rows: u32,
+    pub(super) stored: Stored,
+    pub(super) endian: Endian,
+    /// The first sample.
+    pub(super) first: u64,
+    /// From a sample to the one below it.
+    pub(super) row: u64,
+    /// From a sample to the next in its row.
+    pub(super) sample: u64,
+}
+
+impl RawSamples {
+    /// Rows that follow each other, with nothing between.
+    pub(super) fn packed(
+        (columns, rows): (u32, u32),
+        stored: Stored,
+        endian: Endian,
+        first: u64,
+    ) -> Self {
+        Self {
+            columns,
+            rows,
+            stored,
+            endian,
+            first,
+            row: u64::from(columns).saturating_mul(stored.bytes()),
+            sample: stored.bytes(),
+        }
+    }
+
+    /// The same bytes, rows taken for columns.
+    pub(super) const fn turned(self) -> Self {
+        Self {
+            columns: self.rows,
+            rows: self.columns,
+            row: self.sample,
+            sample: self.row,
+            ..self
+        }
+    }
+
+    /// The samples, all of them inside the file: in memory, or in the file where that is
+    /// large.
+    ///
+    /// # Errors
+    /// A file that cannot be read; more samples than memory holds.
+    pub(super) fn storage(
+        self,
+        input: &FileBytes,
+        options: &OpenOptions,
+    ) -> Result<Storage, RasterError> {
+        let count = u64::from(self.columns) * u64::from(self.rows);
+        let bytes = count.saturating_mul(self.stored.bytes());
+        let most = match input.remote() {
+            Some(_) => options.most_in_memory_bytes.min(FEW_BYTES),
+            None => options.most_in_memory_bytes,
+        };
+        if bytes > most
+            && let Some(own) = input.again()?
+        {
+            return Ok(PlainBlocks::new(self, own).into());
+        }
+        if input.is_outline() {
+            return Ok(self.stored.room(0)?.into());
+        }
+        let all = Part::whole(self.columns, self.rows);
+        Ok(self.read(input, &all, Grain::ALL)?.into())
+    }
+
+    /// A part of the image that has such samples.
+    fn read(&self, input: &FileBytes, part: &Part, grain: Grain) -> Result<Samples, RasterError> {
+        if self.sample > self.row {
+            let part = turned(part);
+            let samples = self.turned().read(input, &part, grain.turned())?;
+            return Ok(transposed(&samples, part.rows, part.columns));
+        }
+        let mut samples = self
+            .stored
+            .room(u64::from(part.columns) * u64::from(part.rows))?;
+        let apart = self.sample * u64::from(grain.every);
+        let along = (u64::from(part.columns) - 1) * apart + self.stored.bytes();
+        let is_packed = grain.every == 1 && along == self.row;
+        let rows_at_once = match is_packed {
+            true => (AT_ONCE / along).clamp(1, part.rows.into()) as u32,
+            false => 1,
+        };
+        for row in (0..part.rows).step_by(rows_at_once as usize) {
+            let rows = rows_at_once.min(part.rows - row);
+            let at = self.place(part.column, part.row + row, grain);
+            if apart > FAR {
+                for column in 0..part.columns {
+                    let at = at + u64::from(column) * apart;
+                    let bytes = input.read_at(at, self.stored.bytes())?;
+                    self.append(&mut samples, &bytes, apart);
+                }
+            } else {
+                let bytes = input.read_at(at, (u64::from(rows) - 1) * self.row + along)?;
+                self.append(&mut samples, &bytes, apart);
+            }
+        }
+        Ok(samples)
+    }
+
+    fn append(&self, samples: &mut Samples, bytes: &[u8], apart: u64) {
+        self.stored
+            .append(samples, bytes, apart as usize, self.endian);
+    }
+
+    fn place(&self, column: u32, row: u32, grain: Grain) -> u64 {
+        let [column, row] = [(column, grain.first[0]), (row, grain.first[1])]
+            .map(|(index, first)| u64::from(index) * u64::from(grain.every) + u64::from(first));
+        self.first + row * self.row + column * self.sample
+    }
+
+    /// The bytes that a part takes, in the order in which they are read.
+    fn ranges(&self, part: &Part, grain: Grain) -> Vec<std::ops::Range<u64>> {
+        if self.sample > self.row {
+            return self.turned().ranges(&turned(part), grain.turned());
+        }
+        let is_far = self.sample * u64::from(grain.every) > FAR;
+        let along = if is_far { part.columns } else { 1 };
+        let to = part.columns / along;
+        let size = self.stored.bytes();
+        let rows = part.row..part.row + part.rows;
+        let each = rows.flat_map(|row| (0..along).map(move |column| (part.column + column, row)));
+        let range = |(column, row)| {
+            let last = self.place(column + to - 1, row, grain);
+            self.place(column, row, grain)..last + size
+        };
+        each.map(range).collect()
+    }
+}
+
+/// Which samples an image has: every so many-th, from a first column and row on.
+#[derive(Clone, Copy, Debug)]
+struct Grain {
+    every: u32,
+    first: [u32; 2],
+}
+
+impl Grain {
+    /// All samples.
+    const ALL: Self = Self {
+        every: 1,
+        first: [0; 2],
+    };
+
+    const fn turned(self) -> Self {
+        let [column, row] = self.first;
+        Self {
+            first: [row, column],
+            ..self
+        }
+    }
+}
+
+/// The same, rows taken for columns.
+pub(super) const fn turned(part: &Part) -> Part {
+    Part {
+        column: part.row,
+        row: part.column,
+        columns: part.rows,
+        rows: part.columns,
+    }
+}
+
+/// Rows of columns, of which there are so many of so many samples.
+pub(super) fn transposed(samples: &Samples, columns: u32, rows: u32) -> Samples {
+    fn in_rows<T: Copy>(values: &[T], columns: usize, rows: usize) -> Vec<T> {
+        let row = |row: usize| (0..columns).map(move |column| column * rows + row);
+        let places = (0..rows).flat_map(row);
+        places.map(|index| values[index]).collect()
+    }
+    let (columns, rows) = (columns as usize, rows as usize);
+    with_samples!(samples, values => in_rows(values, columns, rows).into())
+}
+
+/// Plain samples that stay in their file.
+pub(super) struct PlainBlocks {
+    plain: RawSamples,
+    input: FileBytes,
+    /// The file's state when it was opened.
+    stamp: Option<FileStamp>,
+    is_remote: bool,
+    images: Vec<BlockImage>,
+}
+
+impl PlainBlocks {
+    /// Samples that are all inside of the file.
+    pub(super) fn new(plain: RawSamples, input: FileBytes) -> Self {
+        let is_remote = input.remote().is_some();
+        let block = |k: u32| match (k, is_remote) {
+            (0, true) => WIDE_BLOCK,
+            _ => [(BLOCK >> k).max(COARSE_BLOCK); 2],
+        };
+        Self {
+            images: subsampled::images([plain.columns, plain.rows], block),
+            plain,
+            stamp: input.stamp(),
+            input,
+            is_remote,
+        }
+    }
+}
+
+impl PlainBlocks {
+    fn grain(&self, image: usize) -> Grain {
+        Grain {
+            every: 1 << image,
+            first: self.images[image].first,
+        }
+    }
+}
+
+impl BlockReader for PlainBlocks {
+    fn format(&self) -> &'static str {
+        "plain samples"
+    }
+
+    fn images(&self) -> &[BlockImage] {
+        &self.images
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.plain.stored.held()
+    }
+
+    fn is_stored(&self, _: usize, _: &Part) -> bool {
+        true
+    }
+
+    fn set_order(&mut self, south_up: bool, east_first: bool) {
+        subsampled::set_order(&mut self.images, south_up, east_first);
+    }
+
+    fn want(&self, image: usize, parts: &[Part]) {
+        if let Some(remote) = self.input.remote() {
+            let grain = self.grain(image);
+            remote.want(parts.iter().flat_map(|part| self.plain.ranges(part, grain)));
+        }
+    }
+
+    fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError> {
+        self.want(image, std::slice::from_ref(part));
+        Ok(Block {
+            samples: self.plain.read(&self.input, part, self.grain(image))?,
+            holes: None,
+            is_lacking: false,
+        })
+    }
+
+    fn index(&self) -> u64 {
+        let plain = &self.plain;
+        let mut hasher = XxHash64::with_seed(0);
+        for number in [
+            plain.columns.into(),
+            plain.rows.into(),
+            plain.stored.bytes(),
+            plain.first,
+            plain.row,
+            plain.sample,
+        ] {
+            hasher.write_u64(number);
+        }
+        hasher.finish()
+    }
+
+    fn stamp(&self, _: usize, _: &Part) -> Option<String> {
+        let stamp = self.stamp.as_ref()?;
+        let is_same = self.input.stamp().as_ref() == Some(stamp);
+        let settled = stamp.settled().filter(|_| is_same)?;
+        Some(format!("{settled} {:?}", self.plain))
+    }
+
+    fn looks(&self) -> Option<Looks> {
+        Some(subsampled::places(&self.images[0], PLACES))
+    }
+
+    fn kept_bytes(&self) -> usize {
+        match self.is_remote {
+            true => crate::remote::RemoteFile::kept_bytes(),
+            false => 0,
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "raw_samples_tests.rs"]
+mod tests;

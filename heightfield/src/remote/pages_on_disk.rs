@@ -1,0 +1,91 @@
+//! Pages of a file that are kept on disk for another run.
+
+use std::ops::Range;
+
+use super::pages;
+use crate::disk_cache::{DiskCache, Name};
+
+/// The pages of a file in one state.
+#[derive(Clone)]
+pub(super) struct PagesOnDisk {
+    disk: DiskCache,
+    /// The file, its size, and the tag and time that its server tells.
+    stamp: String,
+    len: u64,
+}
+
+impl PagesOnDisk {
+    /// Of a file of `len` bytes in the state that `stamp` tells.
+    pub(super) fn new(disk: &DiskCache, stamp: String, len: u64) -> Self {
+        Self {
+            disk: disk.clone(),
+            stamp,
+            len,
+        }
+    }
+
+    fn name(&self, page: u64) -> Name {
+        Name::of(&["page", &self.stamp, &page.to_string()])
+    }
+
+    /// The pages of a run, each where it was kept.
+    pub(super) fn get(&self, run: Range<u64>) -> Vec<Option<Vec<u8>>> {
+        let page = |page: u64| {
+            let bytes = pages::bytes(&(page..page + 1), self.len);
+            let kept = self.disk.get(&self.name(page))?;
+            (kept.len() as u64 == bytes.end - bytes.start).then_some(kept)
+        };
+        run.map(page).collect()
+    }
+
+    /// Keeps the pages of a run that has come.
+    pub(super) fn put(&self, run: Range<u64>, bytes: &[u8]) {
+        for (page, bytes) in run.zip(bytes.chunks(pages::PAGE as usize)) {
+            self.disk.put(&self.name(page), bytes);
+        }
+    }
+}
+
+/// From the first page that is missing to the last one, as places in their run.
+pub(super) fn missing(kept: &[Option<Vec<u8>>]) -> Option<Range<u64>> {
+    let first = kept.iter().position(Option::is_none)?;
+    let last = kept.iter().rposition(Option::is_none)?;
+    Some(first as u64..last as u64 + 1)
+}
+
+/// The bytes of a run: those of the pages before and behind what came, and what came.
+pub(super) fn joined(kept: &[Option<Vec<u8>>], came: &Range<u64>, bytes: &[u8]) -> Vec<u8> {
+    let pages = |pages: &[Option<Vec<u8>>]| pages.iter().flatten().flatten().copied().collect();
+    let before: Vec<u8> = pages(&kept[..came.start as usize]);
+    let behind: Vec<u8> = pages(&kept[came.end as usize..]);
+    [&before, bytes, &behind].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_joined_of_what_was_kept_and_what_came() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let disk = DiskCache::at(folder.path(), 1 << 24);
+        let page = pages::PAGE as usize;
+        let file: Vec<u8> = (0..5 * page + 100).map(|i| (i / 7) as u8).collect();
+        let kept = PagesOnDisk::new(&disk, "file".into(), file.len() as u64);
+        assert_eq!(missing(&kept.get(0..6)), Some(0..6));
+        kept.put(0..2, &file[..2 * page]);
+        kept.put(5..6, &file[5 * page..]);
+        let found = kept.get(0..6);
+        let gap = missing(&found).expect("some are missing");
+        assert_eq!(gap, 2..5);
+        let came = &file[2 * page..5 * page];
+        assert!(joined(&found, &gap, came) == file);
+        kept.put(2..5, came);
+        let all = kept.get(0..6);
+        assert_eq!(missing(&all), None);
+        assert!(joined(&all, &(6..6), &[]) == file);
+        // Of the same file in another state nothing is found.
+        let other = PagesOnDisk::new(&disk, "file now".into(), file.len() as u64);
+        assert_eq!(missing(&other.get(0..6)), Some(0..6));
+    }
+}

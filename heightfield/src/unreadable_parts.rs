@@ -1,0 +1,58 @@
+//! Tiles, strips, chunks and rows of a file that could not be read: each is warned of once, and is
+//! a hole.
+
+use std::collections::HashSet;
+use std::sync::{Mutex, PoisonError};
+
+use super::RasterError;
+use super::blocks::Part;
+
+/// So many are known at most: what is found beyond is tried, and told of, again.
+const MOST: usize = 1 << 16;
+/// After so many warnings one says that there are more.
+const WARNINGS: usize = 8;
+
+/// Parts of a file that could not be read.
+#[derive(Debug)]
+pub(super) struct UnreadableParts {
+    /// The file's name, for warnings.
+    name: String,
+    known: Mutex<HashSet<(usize, [u32; 2])>>,
+}
+
+impl UnreadableParts {
+    /// Nothing yet of a file of a name.
+    pub(super) fn of(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            known: Mutex::default(),
+        }
+    }
+
+    /// Returns true if what begins at a column and row of an image could not be read before.
+    pub(super) fn has(&self, image: usize, first: [u32; 2]) -> bool {
+        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        known.contains(&(image, first))
+    }
+
+    /// Says once of a part of an image that it cannot be read.
+    pub(super) fn warn(&self, image: usize, part: &Part, fault: &RasterError) {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if known.len() < MOST && !known.insert((image, [part.column, part.row])) {
+            return;
+        }
+        if known.len() <= WARNINGS {
+            tracing::warn!(
+                "columns {} to {}, rows {} to {} of {}{} cannot be read and count as no data: {fault}",
+                part.column,
+                part.column + part.columns - 1,
+                part.row,
+                part.row + part.rows - 1,
+                if image > 0 { "an overview of " } else { "" },
+                self.name
+            );
+        } else if known.len() == WARNINGS + 1 {
+            tracing::warn!("more of {} cannot be read and count as no data", self.name);
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! A table's entry for one material, with its units.
+
+use serde::{Deserialize, Deserializer};
+
+use super::super::quantity::{ANGLE, DAMPING, LENGTH, STIFFNESS, TIME, Units};
+
+/// A table's entry for one material; empty where it states nothing.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MaterialEntry {
+    /// Its name.
+    pub name: Option<String>,
+    /// Stiffness, N/mm.
+    #[serde(deserialize_with = "stiffness")]
+    pub stiffness: Option<f32>,
+    /// Coefficient of friction while the tip slides.
+    pub friction: Option<f32>,
+    /// The same until it begins to slide.
+    pub static_friction: Option<f32>,
+    /// Friction that grows with the speed: the time by which the tip trails, s.
+    #[serde(deserialize_with = "time")]
+    pub viscous_friction: Option<f32>,
+    /// Damping along the force, N·s/m.
+    #[serde(deserialize_with = "damping")]
+    pub damping: Option<f32>,
+    /// The micro-relief.
+    pub texture: Option<TextureName>,
+    /// Height of the micro-relief above and below the surface, mm.
+    #[serde(deserialize_with = "length")]
+    pub texture_amplitude: Option<f32>,
+    /// From ridge to ridge, mm.
+    #[serde(deserialize_with = "length")]
+    pub texture_wavelength: Option<f32>,
+    /// Direction in which the ridges of a grating follow each other, degrees from east to north.
+    #[serde(deserialize_with = "angle")]
+    pub texture_direction: Option<f32>,
+    /// Which of the textures that are alike.
+    pub texture_seed: Option<u32>,
+}
+
+/// A texture by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TextureName {
+    /// The surface is even.
+    None,
+    /// Heights at random.
+    Grain,
+    /// Ridges.
+    Grating,
+}
+
+/// Shading of the force over the edges between patches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShadingName {
+    /// It follows the normals of the patches.
+    #[default]
+    None,
+    /// It turns evenly.
+    Smooth,
+}
+
+/// The passivity controller, on or off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PassivityName {
+    /// Wherever a current may flow.
+    #[default]
+    On,
+    /// Never.
+    Off,
+}
+
+/// A number, or a text with a unit.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a number, or a text with a number and its unit")]
+enum Quantity {
+    Number(f32),
+    Text(String),
+}
+
+fn quantity<'de, D: Deserializer<'de>>(from: D, units: &Units) -> Result<Option<f32>, D::Error> {
+    match Quantity::deserialize(from)? {
+        Quantity::Number(number) => Ok(Some(number)),
+        Quantity::Text(text) => units
+            .read_single(&text)
+            .map(Some)
+            .map_err(serde::de::Error::custom),
+    }
+}
+
+fn stiffness<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &STIFFNESS)
+}
+
+fn time<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &TIME)
+}
+
+fn damping<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &DAMPING)
+}
+
+fn length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &LENGTH)
+}
+
+fn angle<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f32>, D::Error> {
+    quantity(from, &ANGLE)
+}

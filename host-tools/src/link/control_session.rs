@@ -1,0 +1,612 @@
+//! Queries and requests to a device, without a terrain: identity, status, calibration, arming.
+
+use std::time::Duration;
+
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::Scene;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
+use hapterra_core::wire::hello::DeviceHello;
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::request::{Answer, Refusal, Request};
+use hapterra_core::wire::session::ONLY_LOOKS;
+use hapterra_core::wire::status::Status;
+
+use super::error::LinkError;
+use super::host_protocol::{HostProtocol, ProtocolEvent, State};
+use super::line::{LOOK, Line};
+use super::messages::{FromDevice, from_device, next_frame};
+use super::request_queue::HostRequest;
+use super::timeouts::Timeouts;
+use super::transport::Transport;
+
+/// A device sends its telemetry at least once in this time.
+const MOMENT: Duration = Duration::from_millis(150);
+
+/// Handler of an unrequested message; the returned message is sent in answer.
+type OnMessage<'o> = &'o mut dyn FnMut(&ToHost) -> Option<ToDevice<'static>>;
+
+/// A session with a device, without a terrain. Every end of it is sent to the device. A session that
+/// has set a scene or driven the arm closes, which disarms the arm. A session that has only read, or
+/// changed settings, detaches and leaves arm and scene as they are. [`ControlSession::end`] waits for
+/// the answer and returns it. A session that is dropped waits, too, up to [`Timeouts::goodbye`], and
+/// logs that the arm may still be armed if there is no answer.
+pub struct ControlSession<'t> {
+    exchange: Exchange<'t>,
+    device: DeviceHello,
+}
+
+/// Messages both ways, and their end.
+struct Exchange<'t> {
+    line: Line<'t>,
+    talk: HostProtocol,
+    reader: Box<FrameReader<MAX_FRAME>>,
+    /// It has put a scene in force, or asked for something that drives.
+    drives: bool,
+    /// Its end was sent, or the other end is gone.
+    is_over: bool,
+}
+
+impl<'t> ControlSession<'t> {
+    /// Says hello.
+    ///
+    /// # Errors
+    /// [`LinkError`]: no answer within `patience`, or in another protocol.
+    pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
+        Self::with(transport, Timeouts::of_a_dialogue(patience))
+    }
+
+    /// Only looks: the device answers questions for its status and its calibration, hears
+    /// no request, and keeps the host that it has.
+    ///
+    /// # Errors
+    /// As [`ControlSession::open`].
+    pub fn look(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
+        Self::with(transport, Timeouts::of_a_look(patience))
+    }
+
+    fn with(transport: Box<dyn Transport + 't>, patience: Timeouts) -> Result<Self, LinkError> {
+        // Where no session is opened there is none to end.
+        let is_over = patience.silence_s == ONLY_LOOKS;
+        let mut exchange = Exchange {
+            line: Line::new(transport),
+            talk: HostProtocol::new(None, patience, fastrand::Rng::new()),
+            reader: Box::default(),
+            drives: false,
+            is_over,
+        };
+        let line = &mut exchange.line;
+        exchange.talk.greet(line.now(), &mut line.out);
+        let device = exchange.wait_for(|event| match event {
+            ProtocolEvent::Greeted { device, .. } => Some(device),
+            _ => None,
+        })?;
+        Ok(Self { exchange, device })
+    }
+
+    /// Returns the device's introduction.
+    #[must_use]
+    pub const fn device(&self) -> &DeviceHello {
+        &self.device
+    }
+
+    /// Ends the conversation, and returns when the device has said so.
+    ///
+    /// # Errors
+    /// [`LinkError::NotConfirmed`] and [`LinkError::Taken`] where the arm may be armed; else
+    /// [`LinkError`].
+    pub fn end(mut self) -> Result<(), LinkError> {
+        self.exchange.end()
+    }
+
+    /// As [`ControlSession::end`], and the device is disarmed, whoever has armed it.
+    ///
+    /// # Errors
+    /// As [`ControlSession::end`].
+    pub fn disarm(mut self) -> Result<(), LinkError> {
+        self.exchange.drives = true;
+        self.end()
+    }
+
+    /// The state of the device as it answers: guard, calibration, ticks, stack.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn status(&mut self) -> Result<Status, LinkError> {
+        self.exchange
+            .ask(HostRequest::Status, |message| match message {
+                ToHost::Status { status, .. } => Some(status),
+                _ => None,
+            })
+    }
+
+    /// As [`ControlSession::status`], after a moment, so that nothing that happened before is still on
+    /// its way.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn fresh_status(&mut self) -> Result<Status, LinkError> {
+        self.exchange.listen(MOMENT)?;
+        self.status()
+    }
+
+    /// The calibration in force on the device; none where it has none.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn calibration(&mut self) -> Result<Option<Calibration>, LinkError> {
+        self.exchange
+            .ask(HostRequest::Calibration, |message| match message {
+                ToHost::Calibration { calibration, .. } => Some(calibration),
+                _ => None,
+            })
+    }
+
+    /// Asks for something to be done; the device does it, once, or says why not.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn request(&mut self, request: &Request) -> Result<Result<(), Refusal>, LinkError> {
+        if matches!(request, Request::DropScene | Request::Jog(_)) {
+            self.exchange.talk.forget_scene();
+        }
+        self.exchange.drives |= drives(request);
+        self.exchange
+            .ask(HostRequest::Request(*request), |message| match message {
+                ToHost::Answer(Answer { result, .. }) => Some(result),
+                _ => None,
+            })
+            .inspect(|result| {
+                // The device that enters its loader hears nothing more.
+                self.exchange.is_over |= *request == Request::EnterLoader && result.is_ok();
+            })
+    }
+
+    /// Puts a scene in force.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn put_scene(&mut self, scene: Scene) -> Result<(), LinkError> {
+        let exchange = &mut self.exchange;
+        exchange.drives = true;
+        let now = exchange.line.now();
+        exchange.talk.listen_from(now);
+        let out = &mut exchange.line.out;
+        exchange.talk.put_scene(scene, now, out);
+        exchange.wait_for(|event| matches!(event, ProtocolEvent::SceneAck).then_some(()))
+    }
+
+    /// Lets `ms` of the device's time pass, or less where it is `enough`; tells `on` of what
+    /// comes unasked, and says what `on` says to it. Returns the state of the device at the
+    /// end.
+    ///
+    /// # Errors
+    /// [`LinkError`]; also where the device's time stands still.
+    pub fn pass(
+        &mut self,
+        ms: u32,
+        enough: &dyn Fn() -> bool,
+        on: OnMessage<'_>,
+    ) -> Result<Status, LinkError> {
+        let exchange = &mut self.exchange;
+        let began = exchange.line.now();
+        exchange.talk.listen_from(began);
+        let first = exchange.status(on)?;
+        let ticks = ms * (first.device.tick_hz / 1000).max(1);
+        let patience = exchange.talk.patience().give_up + Duration::from_millis(u64::from(ms));
+        loop {
+            exchange.converse(&mut |_| {}, on)?;
+            let status = exchange.status(on)?;
+            if enough() || status.ticks.run.wrapping_sub(first.ticks.run) >= ticks {
+                return Ok(status);
+            }
+            let waited = exchange.line.now().saturating_sub(began);
+            if waited > patience {
+                return Err(LinkError::Silent(waited));
+            }
+        }
+    }
+
+    /// Puts a calibration in force and has it stored, once the user has pressed the
+    /// dead-man switch.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn store(&mut self, calibration: Calibration) -> Result<Result<(), Refusal>, LinkError> {
+        match self.request(&Request::SetCalibration { calibration })? {
+            Ok(()) => self.request(&Request::StoreCalibration),
+            refused => Ok(refused),
+        }
+    }
+}
+
+impl Exchange<'_> {
+    /// Asks for something and waits for the answer.
+    fn ask<T>(
+        &mut self,
+        ask: HostRequest,
+        mut read: impl FnMut(ToHost) -> Option<T>,
+    ) -> Result<T, LinkError> {
+        // Between two questions the line is not read: the user may think for a while.
+        self.talk.listen_from(self.line.now());
+        self.talk.ask(ask);
+        self.wait_for(|event| match event {
+            ProtocolEvent::Answered(asked, message) if asked.is_like(&ask) => read(message),
+            _ => None,
+        })
+    }
+
+    /// Asks for the status and converses until it comes.
+    fn status(&mut self, on: OnMessage<'_>) -> Result<Status, LinkError> {
+        self.talk.ask(HostRequest::Status);
+        loop {
+            let mut found = None;
+            let mut answered = |event| {
+                if let ProtocolEvent::Answered(HostRequest::Status, ToHost::Status { status, .. }) =
+                    event
+                {
+                    found = Some(status);
+                }
+            };
+            self.converse(&mut answered, on)?;
+            if let Some(status) = found {
+                return Ok(status);
+            }
+        }
+    }
+
+    /// Takes what has come, and says what `on` says to what comes unasked.
+    fn converse(
+        &mut self,
+        answered: &mut dyn FnMut(ProtocolEvent),
+        on: OnMessage<'_>,
+    ) -> Result<(), LinkError> {
+        let mut replies = vec![];
+        self.poll(LOOK, &mut |event| match event {
+            ProtocolEvent::Other(message) => replies.extend(on(&message)),
+            event => answered(event),
+        })?;
+        for reply in replies {
+            self.talk.say(&reply, &mut self.line.out);
+        }
+        self.line.flush()
+    }
+
+    fn wait_for<T>(
+        &mut self,
+        mut read: impl FnMut(ProtocolEvent) -> Option<T>,
+    ) -> Result<T, LinkError> {
+        loop {
+            let mut found = None;
+            self.poll(LOOK, &mut |event| {
+                found = found.take().or_else(|| read(event));
+            })?;
+            if let Some(found) = found {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// Hears what the device tells for a while.
+    fn listen(&mut self, time: Duration) -> Result<(), LinkError> {
+        self.talk.listen_from(self.line.now());
+        let end = self.line.now() + time;
+        while self.line.now() < end {
+            self.poll(LOOK, &mut |_| {})?;
+        }
+        Ok(())
+    }
+
+    fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(ProtocolEvent)) -> Result<(), LinkError> {
+        let polled = self.try_poll(wait, on);
+        // Another host has the device: it is not this one's to say an end to.
+        self.is_over |= matches!(polled, Err(LinkError::Taken));
+        polled
+    }
+
+    fn try_poll(
+        &mut self,
+        wait: Duration,
+        on: &mut dyn FnMut(ProtocolEvent),
+    ) -> Result<(), LinkError> {
+        let line = &mut self.line;
+        self.talk.due(line.now(), &mut line.out)?;
+        if let Some(ask) = self.talk.take_unanswered().pop() {
+            tracing::debug!(?ask, "given up");
+            return Err(LinkError::Silent(self.talk.patience().give_up));
+        }
+        line.flush()?;
+        let (now, mut bytes, out) = line.receive(wait)?;
+        while let Some(frame) = next_frame(&mut self.reader, &mut bytes, from_device) {
+            match frame {
+                Ok(FromDevice::Version(check)) => self.talk.on_version_check(check)?,
+                Ok(FromDevice::Message(message)) => {
+                    if let Some(event) = self.talk.hear(now, message, out)? {
+                        on(event);
+                    }
+                }
+                // The rest of something earlier.
+                Err(_) => {}
+            }
+        }
+        line.flush()
+    }
+
+    /// Says the end that fits what was asked for, and waits for the answer, once.
+    fn end(&mut self) -> Result<(), LinkError> {
+        if std::mem::replace(&mut self.is_over, true) {
+            return Ok(());
+        }
+        let has_opened = self.talk.state() != State::Greeting;
+        let line = &mut self.line;
+        match self.drives {
+            true => self.talk.leave(line.now(), &mut line.out),
+            false => self.talk.detach(line.now(), &mut line.out),
+        }
+        if !has_opened {
+            // Whether it was heard is not known, and not worth another wait.
+            return line.flush();
+        }
+        while self.talk.state() != State::Closed {
+            let polled = self.poll(LOOK, &mut |_| {});
+            polled.map_err(|error| {
+                tracing::debug!(%error, "while closing the session");
+                match error {
+                    LinkError::Taken => error,
+                    _ if self.drives => LinkError::NotConfirmed,
+                    _ => error,
+                }
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns true if a request may lead to something being driven.
+const fn drives(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::Arm | Request::Jog(_) | Request::HoldOutputs(Some(_))
+    )
+}
+
+impl Drop for Exchange<'_> {
+    fn drop(&mut self) {
+        if let Err(not_confirmed @ (LinkError::NotConfirmed | LinkError::Taken)) = self.end() {
+            tracing::error!("{not_confirmed}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::{FaultInjector, Native};
+    use crate::terrain::{Scale, Terrain};
+    use crate::timeouts;
+    use hapterra_core::force::SurfaceParams;
+    use hapterra_core::grid::GridPoint;
+    use hapterra_core::scene::Source;
+    use hapterra_core::wire::frame::encode;
+    use hapterra_core::wire::session::SessionEnd;
+    use hapterra_core::wire::version::VersionCheck;
+    use hapterra_firmware::native::StoppedClock;
+    use heightfield::Raster;
+    use std::cell::Cell;
+    use std::io;
+    use std::rc::Rc;
+
+    const PATIENCE: Duration = timeouts::HANG;
+
+    #[test]
+    fn a_device_says_who_and_how_it_is() {
+        let device = Box::new(Native::for_replay().restless());
+        let mut control = ControlSession::open(device, PATIENCE).expect("it answers");
+        assert_eq!(control.device().board.as_str(), "native");
+        let status = control.fresh_status().expect("it answers");
+        assert!(!status.health.report.blockers.is_empty());
+        let known = control.calibration().expect("it answers");
+        assert_eq!(known, Some(Calibration::PREMIUM_1_5));
+    }
+
+    #[test]
+    fn whoever_looks_takes_no_device_from_its_host() {
+        let mut device = Native::for_replay().restless();
+        let mut looks = ControlSession::look(Box::new(&mut device), PATIENCE).expect("it answers");
+        let known = looks.calibration().expect("it answers");
+        assert_eq!(known, Some(Calibration::PREMIUM_1_5));
+        let status = looks.fresh_status().expect("it answers");
+        assert!(!status.health.report.blockers.is_empty());
+        drop(looks);
+        let host = ControlSession::open(Box::new(&mut device), PATIENCE).expect("it answers");
+        let before = host.device().last.end;
+        assert_eq!(before, SessionEnd::None, "nobody was its host before");
+    }
+
+    #[test]
+    fn a_calibration_is_taken_stored_and_refused_with_a_reason() {
+        let press: FaultInjector = Box::new(|tick, sense, _| sense.dead_man = tick % 1_000 >= 500);
+        let device = Box::new(Native::for_replay().restless().meddled_with(press));
+        let mut control = ControlSession::open(device, PATIENCE).expect("it answers");
+        let mut calibration = Calibration::OMNI;
+        assert_eq!(control.store(calibration).expect("it answers"), Ok(()));
+        assert_eq!(control.calibration().expect("answers"), Some(calibration));
+        calibration.l1_mm = -1.0;
+        let refused = control.store(calibration).expect("it answers");
+        assert!(
+            matches!(refused, Err(Refusal::Calibration(_))),
+            "{refused:?}"
+        );
+        let blocked = control.request(&Request::Arm).expect("it answers");
+        assert!(matches!(blocked, Err(Refusal::Blocked(_))), "{blocked:?}");
+    }
+
+    /// A device all of whose answers come again before each new one: as where a line takes
+    /// longer than a question waits to be repeated.
+    struct Late(Native<StoppedClock>, Vec<u8>);
+
+    impl Transport for Late {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.0.send(bytes)
+        }
+
+        fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+            let again = self.1.len().min(into.len() / 2);
+            let (before, rest) = into.split_at_mut(again);
+            before.copy_from_slice(&self.1[self.1.len() - again..]);
+            let new = self.0.receive(rest, wait)?;
+            self.1.extend(&rest[..new]);
+            Ok(again + new)
+        }
+    }
+
+    #[test]
+    fn what_was_told_before_is_not_taken_for_what_is() {
+        let device = Late(Native::for_replay().restless(), vec![]);
+        let mut control = ControlSession::open(Box::new(device), PATIENCE).expect("it answers");
+        let look = |control: &mut ControlSession<'_>, expected: Calibration| {
+            let known = control.calibration().expect("it answers");
+            assert_eq!(known, Some(expected));
+            let status = control.status().expect("it answers");
+            assert_eq!(status.model, Some(expected.model));
+        };
+        look(&mut control, Calibration::PREMIUM_1_5);
+        let calibration = Calibration::OMNI;
+        let request = Request::SetCalibration { calibration };
+        let taken = control.request(&request).expect("it answers");
+        assert_eq!(taken, Ok(()));
+        look(&mut control, calibration);
+    }
+
+    /// A scene for the arm.
+    fn scene() -> Scene {
+        let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
+        let scale = Scale::new(1.0, 1.0).expect("scale");
+        let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
+        let home = GridPoint::default();
+        terrain.scene(SurfaceParams::PREMIUM, Source::Encoders, home)
+    }
+
+    fn open<'t>(device: &'t mut Native<StoppedClock>) -> ControlSession<'t> {
+        ControlSession::open(Box::new(device), PATIENCE).expect("it answers")
+    }
+
+    #[test]
+    fn one_that_drove_says_goodbye_and_one_that_looked_does_not_hide_it() {
+        let mut device = Native::for_replay().restless();
+        open(&mut device).put_scene(scene()).expect("taken");
+        for _ in 0..3 {
+            let mut looking = open(&mut device);
+            let (last, epoch) = (looking.device().last, looking.device().epoch);
+            assert_eq!((last.end, epoch), (SessionEnd::Goodbye, None));
+            assert!(looking.status().is_ok());
+        }
+        // Asked to arm, even in vain, it says goodbye: a session of its own.
+        let before = open(&mut device).device().last.session;
+        let mut arming = open(&mut device);
+        let blocked = arming.request(&Request::Arm).expect("it answers");
+        assert!(blocked.is_err());
+        arming.end().expect("confirmed");
+        let last = open(&mut device).device().last;
+        assert_eq!(last.end, SessionEnd::Goodbye);
+        assert_ne!(last.session, before);
+    }
+
+    #[test]
+    fn one_that_looked_keeps_what_the_device_holds() {
+        let mut device = Native::for_replay().restless();
+        let held = scene();
+        let mut vanishes = open(&mut device);
+        vanishes.put_scene(held).expect("taken");
+        // As where its program is killed.
+        vanishes.exchange.is_over = true;
+        drop(vanishes);
+        for _ in 0..3 {
+            let looking = open(&mut device);
+            let (last, epoch) = (looking.device().last, looking.device().epoch);
+            let kept = (SessionEnd::Replaced, Some(held.epoch));
+            assert_eq!((last.end, epoch), kept);
+            looking.end().expect("confirmed");
+        }
+    }
+
+    /// A device that hears nothing any more after so many sends, and the time.
+    struct Deaf(Native<StoppedClock>, usize, Rc<Cell<Duration>>);
+
+    impl Transport for Deaf {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.1 = self.1.saturating_sub(1);
+            match self.1 {
+                0 => Ok(()),
+                _ => self.0.send(bytes),
+            }
+        }
+
+        fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize> {
+            self.2.set(self.2.get() + wait / 10);
+            self.0.receive(into, wait)
+        }
+
+        fn now(&self) -> Duration {
+            self.2.get()
+        }
+    }
+
+    #[test]
+    fn an_end_that_is_not_heard_is_told_within_its_time() {
+        let patience = Duration::from_millis(300);
+        let time = Rc::new(Cell::new(Duration::ZERO));
+        let open = || {
+            let deaf = Deaf(Native::for_replay().restless(), 3, Rc::clone(&time));
+            ControlSession::open(Box::new(deaf), patience).expect("it answers")
+        };
+        let within = |began: Duration| {
+            let took = time.get() - began;
+            assert!(took >= patience && took < 10 * patience, "{took:?}");
+        };
+        let mut control = open();
+        assert!(control.request(&Request::Arm).is_ok(), "the second send");
+        let began = time.get();
+        let end = control.end();
+        assert!(matches!(end, Err(LinkError::NotConfirmed)), "{end:?}");
+        within(began);
+        let mut control = open();
+        assert!(control.status().is_ok());
+        let began = time.get();
+        drop(control);
+        within(began);
+    }
+
+    /// Something that listens and says one thing.
+    struct Says(Vec<u8>);
+
+    impl Transport for Says {
+        fn send(&mut self, _: &[u8]) -> io::Result<()> {
+            Ok(())
+        }
+
+        fn receive(&mut self, into: &mut [u8], _: Duration) -> io::Result<usize> {
+            let n = self.0.len().min(into.len());
+            into[..n].copy_from_slice(&self.0[..n]);
+            self.0.drain(..n);
+            Ok(n)
+        }
+    }
+
+    #[test]
+    fn one_that_says_nothing_or_nonsense_or_another_protocol_is_told_apart() {
+        let ask = |said: Vec<u8>| {
+            let opened = ControlSession::open(Box::new(Says(said)), Duration::from_millis(5));
+            opened.map(|_| ())
+        };
+        assert!(matches!(ask(vec![]), Err(LinkError::Silent(_))));
+        let nonsense = b"HTTP/1.1 400\0\0".to_vec();
+        assert!(matches!(ask(nonsense), Err(LinkError::Silent(_))));
+        let mut frame = [0; MAX_FRAME];
+        let refused = VersionCheck::Refused { protocol: 77 };
+        let bytes = encode(&refused, &mut frame).expect("fits").to_vec();
+        assert!(matches!(
+            ask(bytes),
+            Err(LinkError::Version { theirs: 77, .. })
+        ));
+    }
+}

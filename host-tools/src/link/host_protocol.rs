@@ -1,0 +1,620 @@
+//! The host's states of [`hapterra_core::wire`], as a state machine without I/O and without a clock:
+//! the caller passes the time.
+
+use std::time::Duration;
+
+use hapterra_core::force::MaterialTable;
+use hapterra_core::scene::{Scene, SceneChange};
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
+use hapterra_core::wire::materials::{MAX_TABLE_BYTES, MaterialScene, table_bytes};
+use hapterra_core::wire::message::{ToDevice, ToHost};
+use hapterra_core::wire::request::Answer;
+use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
+use hapterra_core::wire::version::VersionCheck;
+
+use super::error::LinkError;
+use super::messages::append;
+use super::request_queue::{HostRequest, RequestQueue};
+use super::timeouts::Timeouts;
+
+/// State of the session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Nothing was sent yet, or close or detach was answered.
+    Closed,
+    /// The hello was sent.
+    Greeting,
+    /// The scene was sent.
+    SceneSent,
+    /// The scene is in force.
+    Open,
+    /// The close was sent.
+    Leaving,
+    /// Detach was sent: the arm stays as it is.
+    Detaching,
+}
+
+/// Meaning of a device's message for the session.
+#[derive(Debug)]
+pub(super) enum ProtocolEvent {
+    /// The device has introduced itself: its samples are numbered from zero. `restarted`
+    /// tells that it was in this session before and has lost everything.
+    Greeted {
+        device: DeviceHello,
+        restarted: bool,
+    },
+    /// The scene is in force.
+    SceneAck,
+    /// The view that was said is answered: it is in force, where its scene is the one that
+    /// is to be.
+    SceneChange,
+    /// This message answers the request.
+    Answered(HostRequest, ToHost),
+    /// A message that the protocol itself does not consume.
+    Other(ToHost),
+}
+
+/// The host's side of a session with a device, with or without a scene.
+#[derive(Clone, Debug)]
+pub(super) struct HostProtocol {
+    numbers: fastrand::Rng,
+    session: SessionNumber,
+    /// The hello that opened it; zero until the device has said which.
+    opened_by: u8,
+    /// The session before, and the hello that opened it; its last frames are no other
+    /// host's.
+    previous: Option<(SessionNumber, u8)>,
+    /// The device has answered in this session.
+    confirmed: bool,
+    scene: Option<Scene>,
+    /// The table of its materials, where it has some.
+    materials: Option<MaterialTable>,
+    /// Another view of it that was said and is not answered: since when, and when last.
+    view: Option<(SceneChange, Duration, Duration)>,
+    patience: Timeouts,
+    state: State,
+    /// When the state began, and when its message was said last.
+    since: Duration,
+    said: Duration,
+    /// When something was answered last.
+    heard: Duration,
+    alive_said: Duration,
+    alive_is_due: bool,
+    /// When a frame of another session came last.
+    foreign: Option<Duration>,
+    /// The last hello's number, and whether it was answered.
+    hello: u8,
+    hello_answered: bool,
+    asking: RequestQueue,
+}
+
+impl HostProtocol {
+    pub(super) fn new(
+        scene: Option<Scene>,
+        patience: Timeouts,
+        mut numbers: fastrand::Rng,
+    ) -> Self {
+        let session = SessionNumber::new(numbers.u32(..));
+        Self {
+            numbers,
+            session,
+            opened_by: 0,
+            previous: None,
+            confirmed: false,
+            scene,
+            materials: None,
+            view: None,
+            patience,
+            state: State::Closed,
+            since: Duration::ZERO,
+            said: Duration::ZERO,
+            heard: Duration::ZERO,
+            alive_said: Duration::ZERO,
+            alive_is_due: false,
+            foreign: None,
+            hello: 0,
+            hello_answered: true,
+            asking: RequestQueue::default(),
+        }
+    }
+
+    /// The same about a scene with materials.
+    #[must_use]
+    pub(super) fn with_materials(self, table: Option<&MaterialTable>) -> Self {
+        Self {
+            materials: table.cloned(),
+            ..self
+        }
+    }
+
+    pub(super) const fn state(&self) -> State {
+        self.state
+    }
+
+    pub(super) const fn session(&self) -> SessionNumber {
+        self.session
+    }
+
+    /// The session before the present one, and the hello that opened it.
+    pub(super) const fn previous(&self) -> Option<(SessionNumber, u8)> {
+        self.previous
+    }
+
+    pub(super) const fn patience(&self) -> &Timeouts {
+        &self.patience
+    }
+
+    /// Begins, or begins anew over a new line. Returns whether a new session was
+    /// drawn: one that was never answered is tried again, so that no session is opened
+    /// that nobody knows of.
+    pub(super) fn greet(&mut self, now: Duration, out: &mut Vec<u8>) -> bool {
+        let draws = self.confirmed || self.foreign.is_some();
+        if draws {
+            self.previous = Some((self.session, self.opened_by));
+            self.session = SessionNumber::new(self.numbers.u32(..));
+            self.confirmed = false;
+            self.opened_by = 0;
+        }
+        self.foreign = None;
+        self.asking.begin_session();
+        self.enter(State::Greeting, now);
+        self.say_state(now, out);
+        draws
+    }
+
+    /// Ends the conversation, and has the device disarm.
+    pub(super) fn leave(&mut self, now: Duration, out: &mut Vec<u8>) {
+        self.end_by(State::Leaving, now, out);
+    }
+
+    /// Ends the conversation, and leaves the arm and the scene as they are.
+    pub(super) fn detach(&mut self, now: Duration, out: &mut Vec<u8>) {
+        self.end_by(State::Detaching, now, out);
+    }
+
+    fn end_by(&mut self, state: State, now: Duration, out: &mut Vec<u8>) {
+        if self.state == State::Closed || self.is_ending() {
+            return;
+        }
+        self.asking.give_up();
+        self.asking.take_unanswered();
+        self.enter(state, now);
+        self.say_state(now, out);
+    }
+
+    /// Returns true if its end was said and is not answered.
+    pub(super) const fn is_ending(&self) -> bool {
+        matches!(self.state, State::Leaving | State::Detaching)
+    }
+
+    /// Puts a scene in force, or another one than before.
+    pub(super) fn put_scene(&mut self, scene: Scene, now: Duration, out: &mut Vec<u8>) {
+        self.scene = Some(scene);
+        self.enter(State::SceneSent, now);
+        self.say_state(now, out);
+    }
+
+    /// Puts another view of the scene in, in place of one that is not answered yet. It is
+    /// said until it is answered.
+    pub(super) fn put_view(&mut self, view: SceneChange, now: Duration, out: &mut Vec<u8>) {
+        self.view = Some((view, now, now));
+        if self.state == State::Open {
+            self.say(&ToDevice::SceneChange(view), out);
+        }
+    }
+
+    /// An unanswered placement, once.
+    pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<SceneChange> {
+        let give_up = self.patience.give_up;
+        let is_lost = |since: Duration| now.saturating_sub(since) >= give_up;
+        let lost = self.view.take_if(|(_, since, _)| is_lost(*since));
+        lost.map(|(view, _, _)| view)
+    }
+
+    /// Says the view again, where that is due.
+    fn repeat_view(&mut self, now: Duration, out: &mut Vec<u8>) {
+        if let Some((view, since, said)) = self.view
+            && self.is_due(said, now)
+        {
+            self.view = Some((view, since, now));
+            self.say(&ToDevice::SceneChange(view), out);
+        }
+    }
+
+    /// Determines from the device's scene whether the unanswered placement is in force.
+    fn settle_view(&mut self, epoch: Option<u32>) {
+        if let Some((view, _, _)) = self.view.take()
+            && epoch == Some(view.scene.epoch)
+        {
+            self.scene = Some(view.scene);
+        }
+    }
+
+    /// The scene that is to be in force.
+    pub(super) const fn scene(&self) -> Option<&Scene> {
+        self.scene.as_ref()
+    }
+
+    /// No scene is to be in force any more: the host asks for its end.
+    pub(super) const fn forget_scene(&mut self) {
+        self.scene = None;
+    }
+
+    /// Asks for something, after what was asked for before.
+    pub(super) fn ask(&mut self, ask: HostRequest) {
+        self.asking.ask(ask);
+    }
+
+    /// The line was not read for a while: silence counts from now.
+    pub(super) fn listen_from(&mut self, now: Duration) {
+        self.heard = now;
+        self.alive_said = now;
+    }
+
+    /// Returns the requests that were given up without an answer since the last call.
+    pub(super) fn take_unanswered(&mut self) -> Vec<HostRequest> {
+        self.asking.take_unanswered()
+    }
+
+    /// Says what is due.
+    ///
+    /// # Errors
+    /// When a deadline has passed.
+    pub(super) fn due(&mut self, now: Duration, out: &mut Vec<u8>) -> Result<(), LinkError> {
+        let in_state = now.saturating_sub(self.since);
+        match self.state {
+            State::Closed => return Ok(()),
+            State::Greeting | State::SceneSent if in_state >= self.patience.give_up => {
+                return Err(LinkError::Silent(in_state));
+            }
+            State::Leaving if in_state >= self.patience.goodbye => {
+                return Err(LinkError::NotConfirmed);
+            }
+            State::Detaching if in_state >= self.patience.goodbye => {
+                return Err(LinkError::Silent(in_state));
+            }
+            State::Open => self.check_silence(now)?,
+            _ => {}
+        }
+        let is_quiet = now.saturating_sub(self.heard) >= self.patience.greet_again;
+        if self.is_due(self.said, now) && (self.state != State::Open || is_quiet) {
+            self.say_state(now, out);
+        }
+        if self.state == State::Open {
+            self.say_alive(now, out);
+            self.repeat_view(now, out);
+            self.say_pending(now, out);
+        }
+        Ok(())
+    }
+
+    fn check_silence(&self, now: Duration) -> Result<(), LinkError> {
+        let quiet = now.saturating_sub(self.heard);
+        // What comes right after the last answer may have been on its way before.
+        let late = self.heard + self.patience.greet_again;
+        let others = self.foreign.is_some_and(|at| at > late);
+        if others && quiet >= 2 * self.patience.greet_again {
+            return Err(LinkError::Taken);
+        }
+        match quiet >= self.patience.give_up {
+            true => Err(LinkError::Silent(quiet)),
+            false => Ok(()),
+        }
+    }
+
+    fn is_due(&self, said: Duration, now: Duration) -> bool {
+        now.saturating_sub(said) >= self.patience.again
+    }
+
+    fn enter(&mut self, state: State, now: Duration) {
+        self.state = state;
+        (self.since, self.said) = (now, now);
+    }
+
+    /// Says what the state repeats.
+    fn say_state(&mut self, now: Duration, out: &mut Vec<u8>) {
+        self.said = now;
+        match self.state {
+            State::Closed => {}
+            State::Greeting => {
+                // A zero first ends whatever may have been under way.
+                out.push(0);
+                append(&VersionCheck::Asked { protocol: PROTOCOL }, out);
+                self.say_hello(out);
+            }
+            State::SceneSent => {
+                if let Some(scene) = self.scene {
+                    self.say_scene(scene, out);
+                }
+                if now.saturating_sub(self.heard) >= self.patience.greet_again {
+                    self.say_hello(out);
+                }
+            }
+            State::Open => self.say_hello(out),
+            State::Leaving => {
+                // A device that was restarted, or has not heard of this session yet,
+                // has to before it can say goodbye to it.
+                self.say_hello(out);
+                self.say(&ToDevice::Bye, out);
+            }
+            State::Detaching => {
+                self.say_hello(out);
+                self.say(&ToDevice::Detach, out);
+            }
+        }
+    }
+
+    /// Says a scene, with its materials where it has some.
+    fn say_scene(&self, scene: Scene, out: &mut Vec<u8>) {
+        let Some(table) = self
+            .materials
+            .as_ref()
+            .filter(|_| scene.materials.is_some())
+        else {
+            return self.say(&ToDevice::Scene(scene), out);
+        };
+        let mut room = [0; MAX_TABLE_BYTES];
+        let table = table_bytes(table, &mut room);
+        self.say(
+            &ToDevice::MaterialScene(MaterialScene { scene, table }),
+            out,
+        );
+    }
+
+    fn say_hello(&mut self, out: &mut Vec<u8>) {
+        // Zero stands for a hello that was never answered.
+        self.hello = self.hello.checked_add(1).unwrap_or(1);
+        self.hello_answered = false;
+        out.push(0);
+        let hello = HostHello {
+            protocol: PROTOCOL,
+            number: self.hello,
+            silence_s: self.patience.silence_s,
+        };
+        self.say(&ToDevice::Hello(hello), out);
+    }
+
+    /// Says that the host is there.
+    fn say_alive(&mut self, now: Duration, out: &mut Vec<u8>) {
+        if self.alive_is_due || now.saturating_sub(self.alive_said) >= self.patience.alive {
+            (self.alive_is_due, self.alive_said) = (false, now);
+            self.say(&ToDevice::Heartbeat, out);
+        }
+    }
+
+    /// Says at the next chance that the host is there: time has passed on the device.
+    pub(super) const fn hasten_alive(&mut self) {
+        self.alive_is_due = true;
+    }
+
+    /// Says what is asked for, where it is due.
+    pub(super) fn say_pending(&mut self, now: Duration, out: &mut Vec<u8>) {
+        if self.state != State::Open {
+            return;
+        }
+        if let Some(message) = self.asking.due(now, &self.patience) {
+            self.say(&message, out);
+        }
+    }
+
+    /// Appends a message of this session.
+    pub(super) fn say(&self, message: &ToDevice<'_>, out: &mut Vec<u8>) {
+        let session = self.session;
+        append(&InSession { session, message }, out);
+    }
+
+    /// Takes a refusal. It counts only where it can be meant.
+    pub(super) fn on_version_check(&self, check: VersionCheck) -> Result<(), LinkError> {
+        match check {
+            VersionCheck::Refused { protocol }
+                if self.state == State::Greeting && protocol != PROTOCOL =>
+            {
+                Err(LinkError::version(protocol))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes a frame; none where it belongs to another session or is an answer that is
+    /// not waited for.
+    pub(super) fn hear(
+        &mut self,
+        now: Duration,
+        frame: InSession<ToHost>,
+        out: &mut Vec<u8>,
+    ) -> Result<Option<ProtocolEvent>, LinkError> {
+        if frame.session != self.session || self.state == State::Closed {
+            self.notice(now, &frame);
+            return Ok(None);
+        }
+        self.confirmed = true;
+        Ok(match frame.message {
+            ToHost::Hello(device) => self.on_hello(now, device, out)?,
+            ToHost::SessionClosed { number, end } => self.on_over(now, number, end)?,
+            ToHost::SceneAck { epoch, accepted } => self.on_scene_taken(now, epoch, accepted)?,
+            message @ (ToHost::Answer(Answer { number, .. }) | ToHost::Marked { number, .. }) => {
+                self.on_answer(now, number, message)
+            }
+            message @ ToHost::Status { number, .. } => {
+                self.on_told(now, (HostRequest::Status, number), message)
+            }
+            message @ ToHost::Calibration { number, .. } => {
+                self.on_told(now, (HostRequest::Calibration, number), message)
+            }
+            ToHost::Goodbye(count) => self
+                .on_goodbye(now, out)
+                .then_some(ProtocolEvent::Other(ToHost::Goodbye(count))),
+            ToHost::Detached => {
+                self.on_detached(now);
+                None
+            }
+            message @ ToHost::Heartbeat { .. } => {
+                self.on_alive(now, &message, out);
+                Some(ProtocolEvent::Other(message))
+            }
+            message @ ToHost::PointAnswer { .. } => {
+                self.heard = now;
+                Some(ProtocolEvent::Other(message))
+            }
+            message => Some(ProtocolEvent::Other(message)),
+        })
+    }
+
+    /// A frame of another session tells of another host; not one that says that its
+    /// session is over, nor one that is left of the session before.
+    fn notice(&mut self, now: Duration, frame: &InSession<ToHost>) {
+        let previous = self.previous.map(|(session, _)| session);
+        let is_over = matches!(frame.message, ToHost::SessionClosed { .. });
+        if !is_over && previous != Some(frame.session) {
+            self.foreign = Some(now);
+        }
+    }
+
+    /// Returns true if a message answers the last hello and is the first that does. What answers
+    /// an earlier one, and a double, tells what was.
+    fn answers_hello(&mut self, number: u8) -> bool {
+        number == self.hello && !std::mem::replace(&mut self.hello_answered, true)
+    }
+
+    /// The device has ended this session.
+    fn on_over(
+        &mut self,
+        now: Duration,
+        number: u8,
+        end: SessionEnd,
+    ) -> Result<Option<ProtocolEvent>, LinkError> {
+        if !self.answers_hello(number) {
+            return Ok(None);
+        }
+        self.heard = now;
+        match (self.state, end) {
+            (State::Detaching, _) => self.enter(State::Closed, now),
+            // The goodbye that was said after the hello is answered, too.
+            (State::Leaving, SessionEnd::HostSilent) => {}
+            (_, SessionEnd::HostSilent) => return Err(LinkError::LetGo),
+            _ => return Err(LinkError::Taken),
+        }
+        Ok(None)
+    }
+
+    fn on_hello(
+        &mut self,
+        now: Duration,
+        device: DeviceHello,
+        out: &mut Vec<u8>,
+    ) -> Result<Option<ProtocolEvent>, LinkError> {
+        if !self.answers_hello(device.number) {
+            return Ok(None);
+        }
+        self.heard = now;
+        if device.protocol != PROTOCOL {
+            return Err(LinkError::version(device.protocol));
+        }
+        let is_first = self.opened_by == 0;
+        if self.opened_by == device.opened_by && self.state != State::Greeting {
+            return Ok(None);
+        }
+        self.opened_by = device.opened_by;
+        // Another session, or another life of the device: what it holds tells whether it took
+        // the view.
+        self.settle_view(device.epoch);
+        let restarted = !is_first;
+        if self.is_ending() {
+            return Ok(Some(ProtocolEvent::Greeted { device, restarted }));
+        }
+        if restarted {
+            self.asking.give_up();
+        }
+        let next = match self.scene {
+            Some(_) => State::SceneSent,
+            None => State::Open,
+        };
+        if self.state != next {
+            self.enter(next, now);
+        }
+        if next == State::SceneSent {
+            self.say_state(now, out);
+        }
+        Ok(Some(ProtocolEvent::Greeted { device, restarted }))
+    }
+
+    /// Returns true if there is a scene to be felt and this is not its epoch.
+    fn lacks_scene(&self, epoch: Option<u32>) -> bool {
+        self.scene.is_some_and(|scene| epoch != Some(scene.epoch))
+    }
+
+    fn on_scene_taken(
+        &mut self,
+        now: Duration,
+        epoch: u32,
+        accepted: bool,
+    ) -> Result<Option<ProtocolEvent>, LinkError> {
+        let is_views = |(view, _, _): &mut (SceneChange, _, _)| view.scene.epoch == epoch;
+        if self.state == State::Open
+            && let Some((view, _, _)) = self.view.take_if(is_views)
+        {
+            self.heard = now;
+            if accepted {
+                self.scene = Some(view.scene);
+            }
+            return Ok(Some(ProtocolEvent::SceneChange));
+        }
+        if self.state != State::SceneSent || self.lacks_scene(Some(epoch)) {
+            return Ok(None);
+        }
+        self.heard = now;
+        if !accepted {
+            return Err(LinkError::SceneRefused);
+        }
+        self.enter(State::Open, now);
+        Ok(Some(ProtocolEvent::SceneAck))
+    }
+
+    fn on_answer(&mut self, now: Duration, number: u8, message: ToHost) -> Option<ProtocolEvent> {
+        let ask = self.asking.request_answered(number)?;
+        self.heard = now;
+        Some(ProtocolEvent::Answered(ask, message))
+    }
+
+    fn on_told(
+        &mut self,
+        now: Duration,
+        (asked, number): (HostRequest, u8),
+        message: ToHost,
+    ) -> Option<ProtocolEvent> {
+        let ask = self.asking.question_answered(asked, number)?;
+        self.heard = now;
+        Some(ProtocolEvent::Answered(ask, message))
+    }
+
+    fn on_alive(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {
+        self.heard = now;
+        if let ToHost::Heartbeat { epoch, .. } = message
+            && self.state == State::Open
+            && self.lacks_scene(*epoch)
+            // The answer to a view comes, or is asked for again.
+            && self.view.is_none_or(|(view, _, _)| *epoch != Some(view.scene.epoch))
+        {
+            // The device has taken no scene, or lost it, and its host has missed that.
+            self.enter(State::SceneSent, now);
+            self.say_state(now, out);
+        }
+    }
+
+    fn on_detached(&mut self, now: Duration) {
+        if self.state == State::Detaching {
+            self.heard = now;
+            self.enter(State::Closed, now);
+        }
+    }
+
+    fn on_goodbye(&mut self, now: Duration, out: &mut Vec<u8>) -> bool {
+        let leaves = self.state == State::Leaving;
+        if leaves {
+            self.heard = now;
+            self.enter(State::Closed, now);
+            self.say(&ToDevice::Close, out);
+        }
+        leaves
+    }
+}

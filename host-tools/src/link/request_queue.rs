@@ -1,0 +1,152 @@
+//! Queue of a host's requests: one is sent at a time, repeated until it is answered or its time-out
+//! ends.
+
+use std::collections::VecDeque;
+use std::mem::discriminant;
+use std::time::Duration;
+
+use hapterra_core::wire::message::ToDevice;
+use hapterra_core::wire::request::Request;
+
+use super::timeouts::Timeouts;
+
+/// A host's request, repeated until it is answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HostRequest {
+    /// An action, executed once.
+    Request(Request),
+    /// The device's status.
+    Status,
+    /// The calibration in force.
+    Calibration,
+}
+
+impl HostRequest {
+    /// Returns true if both are of the same kind. Equality would not do: a NaN in a request equals
+    /// nothing.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Request(one), Self::Request(two)) => discriminant(one) == discriminant(two),
+            _ => discriminant(self) == discriminant(other),
+        }
+    }
+}
+
+/// Pending request.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    ask: HostRequest,
+    number: u8,
+    since: Duration,
+    said: Duration,
+}
+
+/// The pending request, the waiting ones, and the unanswered ones.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RequestQueue {
+    pending: Option<Pending>,
+    waiting: VecDeque<HostRequest>,
+    /// Numbers of the last request and of the last query, counted apart: a hundred queries between
+    /// two requests would otherwise make the second look older than the first.
+    request: u8,
+    question: u8,
+    unanswered: Vec<HostRequest>,
+}
+
+impl RequestQueue {
+    /// Adds a request at the end of the queue.
+    pub(super) fn ask(&mut self, ask: HostRequest) {
+        self.waiting.push_back(ask);
+    }
+
+    /// Begins a session: numbers start again, and the requests of the session before are given up.
+    pub(super) fn begin_session(&mut self) {
+        self.request = 0;
+        self.give_up();
+    }
+
+    /// Gives up the pending request and the waiting ones.
+    pub(super) fn give_up(&mut self) {
+        let under_way = self.pending.take().map(|pending| pending.ask);
+        self.unanswered.extend(under_way);
+        self.unanswered.extend(self.waiting.drain(..));
+    }
+
+    /// Returns the requests that were given up without an answer since the last call.
+    pub(super) fn take_unanswered(&mut self) -> Vec<HostRequest> {
+        std::mem::take(&mut self.unanswered)
+    }
+
+    /// Returns the message to send now: the pending request if it is due again, or the next one.
+    pub(super) fn due(&mut self, now: Duration, patience: &Timeouts) -> Option<ToDevice<'static>> {
+        self.give_up_late(now, patience);
+        match &mut self.pending {
+            Some(pending) if now.saturating_sub(pending.said) < patience.again => return None,
+            Some(pending) => pending.said = now,
+            None => {
+                let ask = self.waiting.pop_front()?;
+                self.pending = Some(self.begin(ask, now));
+            }
+        }
+        self.pending.map(|Pending { ask, number, .. }| match ask {
+            HostRequest::Request(request) => ToDevice::Request { number, request },
+            HostRequest::Status => ToDevice::Status { number },
+            HostRequest::Calibration => ToDevice::GetCalibration { number },
+        })
+    }
+
+    fn give_up_late(&mut self, now: Duration, patience: &Timeouts) {
+        let is_late = |pending: &mut Pending| {
+            now.saturating_sub(pending.since) >= patience.with(&pending.ask)
+        };
+        if let Some(pending) = self.pending.take_if(is_late) {
+            self.unanswered.push(pending.ask);
+            if matches!(
+                pending.ask,
+                HostRequest::Request(Request::Arm | Request::Jog(_))
+            ) {
+                // Its number makes the device ignore the first, should that still come.
+                self.waiting
+                    .push_front(HostRequest::Request(Request::Disarm));
+            }
+        }
+    }
+
+    fn begin(&mut self, ask: HostRequest, now: Duration) -> Pending {
+        let number = match ask {
+            HostRequest::Request(_) => &mut self.request,
+            HostRequest::Status | HostRequest::Calibration => &mut self.question,
+        };
+        *number = number.wrapping_add(1);
+        Pending {
+            ask,
+            number: *number,
+            since: now,
+            said: now,
+        }
+    }
+
+    /// Takes the answer with a request's number, and returns that request if it is pending.
+    pub(super) fn request_answered(&mut self, number: u8) -> Option<HostRequest> {
+        self.answered(number, |ask| matches!(ask, HostRequest::Request(_)))
+    }
+
+    /// Takes the answer with a query's number, and returns that query if it is pending.
+    pub(super) fn question_answered(
+        &mut self,
+        asked: HostRequest,
+        number: u8,
+    ) -> Option<HostRequest> {
+        self.answered(number, |ask| *ask == asked)
+    }
+
+    /// Removes and returns the pending request if the answer is to it.
+    fn answered(
+        &mut self,
+        number: u8,
+        is_it: impl Fn(&HostRequest) -> bool,
+    ) -> Option<HostRequest> {
+        let is_it = |pending: &mut Pending| pending.number == number && is_it(&pending.ask);
+        self.pending.take_if(is_it).map(|pending| pending.ask)
+    }
+}

@@ -1,0 +1,251 @@
+//! Invariants of the reported force under all effects, in each mode in which
+//! a current may flow.
+
+use hapterra_core::Vec3;
+use hapterra_core::contact::ContactState;
+use hapterra_core::guard::{Limits, Mode, WORKING_SHARE};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::TickRecord;
+
+use super::force_share::{Share, Shares};
+use super::ground::SceneSurfaces;
+use super::limit_cycle::{MAX_TURNS, Swing};
+
+/// From the beginning of a tick until its force acts, as a part of it
+/// ([`hapterra_firmware::amplifier::CURRENT_LOOP_US`]).
+const LATE: f32 = 0.11;
+/// Energy that a contact may give with the controller on, mJ: a hundredth of what a tap gives
+/// without (docs/explanation/effects.md).
+const GIVEN_MJ: f32 = 0.05;
+/// Additional energy that shaded ground may give, until its force is no longer turned
+/// (docs/explanation/effects.md), mJ: a constant, a part of the largest force times a cell and the depth,
+/// and the bound of both.
+const SHADED_MJ: f32 = 0.2;
+const SHADED_PART: f32 = 0.2;
+const SHADED_MOST_MJ: f32 = 2.0;
+/// Rounding, as a part of a force, and N.
+const ROUNDING: f32 = 1e-4;
+/// The guard's clamp, N.
+const CLAMP_N: f32 = WORKING_SHARE * Calibration::PREMIUM_1_5.max_force_n;
+/// Limits under which a force is another than the scene asks for.
+const NOT_AS_ASKED: Limits = Limits::SLEW_LIMITED.union(Limits::SPEED_LIMITED);
+/// Limits under which a surface is no spring.
+const NO_SPRING: Limits = Limits::SPEED_LIMITED
+    .union(Limits::TERRAIN_MISSING)
+    .union(Limits::EDGE_FADING);
+
+/// Watches what one scene feels like.
+pub struct ForceWatch {
+    felt: SceneSurfaces,
+    cell_mm: f32,
+    last: Option<TickRecord>,
+    /// The force of the tick before that.
+    before_n: Vec3,
+    /// The contact under way, where all of it is known.
+    contact: Option<Touched>,
+    /// The most that a contact had given to the tip with the controller on, mJ.
+    pub most_given_mj: f32,
+    /// Ticks of such contacts.
+    pub watched_ticks: u64,
+    /// Of these, ticks in the ramp.
+    pub ramp_ticks: u64,
+    /// Of these, ticks in which the clutch moved.
+    pub clutch_ticks: u64,
+    share: Share,
+    /// The share of the tick before, where it is known.
+    let_through: Option<Shares>,
+    swing: Swing,
+    /// The most turns back of the tip in a quarter of a second.
+    pub most_turns: usize,
+}
+
+/// Record of a contact.
+#[derive(Clone, Copy, Debug, Default)]
+struct Touched {
+    /// The work of its force at the tip, mJ, less what a spring gets that becomes stiffer.
+    given_mj: f32,
+    deepest_mm: f32,
+}
+
+impl ForceWatch {
+    /// Of a scene.
+    #[must_use]
+    pub fn new(felt: SceneSurfaces, cell_mm: f32) -> Self {
+        Self {
+            felt,
+            cell_mm,
+            last: None,
+            before_n: Vec3::ZERO,
+            contact: None,
+            most_given_mj: 0.0,
+            watched_ticks: 0,
+            ramp_ticks: 0,
+            clutch_ticks: 0,
+            share: Share::UNKNOWN,
+            let_through: None,
+            swing: Swing::default(),
+            most_turns: 0,
+        }
+    }
+
+    /// Another scene is felt from now on.
+    pub fn feels(&mut self, felt: SceneSurfaces) {
+        self.felt = felt;
+        (self.last, self.contact) = (None, None);
+    }
+
+    /// Looks at a sample; `is_calm` where nothing has gone wrong for a while.
+    ///
+    /// # Errors
+    /// The broken invariant.
+    pub fn look(&mut self, sample: &TickRecord, is_calm: bool) -> Result<(), String> {
+        let last = self.last.replace(*sample);
+        let last = last.filter(|last| last.tick.wrapping_add(1) == sample.tick);
+        let before = self.let_through;
+        let share = self.share.of(last.as_ref(), sample);
+        self.let_through = share;
+        if let Some(last) = &last {
+            fades(last, sample)?;
+        }
+        let is_asked = !sample.limits.intersects(NOT_AS_ASKED);
+        if let Some(share) = share.filter(|_| is_asked && sample.state == ContactState::Touching) {
+            let way_mm = sample.hip.to(&sample.proxy) * self.cell_mm;
+            self.is_small(sample, way_mm, share.product())?;
+            self.never_pulls(sample, way_mm)?;
+        }
+        self.gives_nothing(last.as_ref(), sample, before.zip(share), is_calm)
+    }
+
+    /// No force is larger than the stiffest material makes of the depth.
+    fn is_small(&self, sample: &TickRecord, way_mm: Vec3, share: f32) -> Result<(), String> {
+        let depth_mm = way_mm.length();
+        let [high_mm, steep] = self.felt.relief();
+        let stretch_mm = (depth_mm + high_mm.min(depth_mm)).hypot(steep * depth_mm);
+        let spring_n = share * self.felt.stiffest_n_per_mm() * stretch_mm;
+        let is_damped = self.felt.is_damped() || self.felt.is_controlled();
+        let most_n = if is_damped { 2.0 * spring_n } else { spring_n };
+        let force_n = sample.force_n.length();
+        match force_n <= most_n * (1.0 + ROUNDING) + ROUNDING {
+            true => Ok(()),
+            false => Err(format!(
+                "{force_n} N at {depth_mm} mm, at most {most_n}: {sample:?}"
+            )),
+        }
+    }
+
+    /// No force is against the way to the proxy: friction holds, and does not push. What shading
+    /// turns is turned by 60° at most.
+    fn never_pulls(&self, sample: &TickRecord, way_mm: Vec3) -> Result<(), String> {
+        let [high_mm, _] = self.felt.relief();
+        if high_mm > 0.0 && self.felt.is_shaded() {
+            return Ok(());
+        }
+        let along = sample.force_n.dot(way_mm);
+        let least = -ROUNDING * (way_mm.length() + 1e-3) * (sample.force_n.length() + 1e-3);
+        match along >= least {
+            true => Ok(()),
+            false => Err(format!("the force pulls along {way_mm}: {sample:?}")),
+        }
+    }
+
+    /// The energy that the spring which is let through holds at a depth, mJ: the guard clamps what
+    /// the clutch leaves, and the ramp takes its share of that.
+    fn holds_mj(&self, depth_mm: f32, shares: Shares) -> f32 {
+        if shares.clutch == 0.0 {
+            return 0.0;
+        }
+        let most_n = CLAMP_N / shares.clutch;
+        shares.product() * self.felt.stored_mj(depth_mm, most_n)
+    }
+
+    fn shading_mj(&self, deepest_mm: f32) -> f32 {
+        let way_mm = self.cell_mm + deepest_mm;
+        let gives_mj = SHADED_MJ + SHADED_PART * self.felt.most_n(deepest_mm) * way_mm;
+        gives_mj.min(SHADED_MOST_MJ)
+    }
+
+    /// With the controller on no contact has given more than it got, at any time, and the tip does
+    /// not swing; but for what shading and a texture may. `shares` are those of the tick before and
+    /// of this one.
+    fn gives_nothing(
+        &mut self,
+        last: Option<&TickRecord>,
+        sample: &TickRecord,
+        shares: Option<(Shares, Shares)>,
+        is_calm: bool,
+    ) -> Result<(), String> {
+        let before_n =
+            std::mem::replace(&mut self.before_n, last.map_or(Vec3::ZERO, |s| s.force_n));
+        let is_spring = |sample: &TickRecord| !sample.limits.intersects(NO_SPRING);
+        let is_told = self.felt.is_spring() && self.felt.is_controlled() && is_calm;
+        let last = last.filter(|last| is_told && is_spring(last) && is_spring(sample));
+        let Some((last, (before, now))) = last.zip(shares) else {
+            (self.contact, self.swing) = (None, Swing::default());
+            return Ok(());
+        };
+        let acted_n = last.force_n + (before_n - last.force_n) * LATE;
+        let moved_mm = last.hip.to(&sample.hip) * self.cell_mm;
+        let work_mj = acted_n.dot(moved_mm);
+        let depth_mm = sample.hip.to(&sample.proxy).length() * self.cell_mm;
+        // A surface that becomes stiffer is meant to give so much at this depth.
+        let is_felt = sample.state == ContactState::Touching;
+        let meant_mj = match is_felt {
+            true => self.holds_mj(depth_mm, now) - self.holds_mj(depth_mm, before),
+            false => 0.0,
+        };
+        // A force that the guard lets go by and by belongs to the contact before.
+        let begins = last.force_n == Vec3::ZERO
+            && (last.state == ContactState::Free || before.product() == 0.0);
+        self.contact = match begins {
+            true => Some(Touched::default()),
+            false => self.contact,
+        }
+        .map(|so_far| Touched {
+            given_mj: so_far.given_mj + work_mj - meant_mj,
+            deepest_mm: so_far.deepest_mm.max(depth_mm),
+        });
+        let along = sample.force_n.normalize_or_zero();
+        let turns = self.swing.turns(sample.tick, moved_mm, along);
+        self.most_turns = self.most_turns.max(turns);
+        if turns > MAX_TURNS {
+            return Err(format!(
+                "the tip swings, {turns} turns in 0.25 s: {sample:?}"
+            ));
+        }
+        let Some(contact) = self.contact else {
+            return Ok(());
+        };
+        self.watched_ticks += 1;
+        self.ramp_ticks += u64::from(sample.limits.contains(Limits::RAMPING) && is_felt);
+        self.clutch_ticks += u64::from(sample.limits.contains(Limits::CLUTCH_MOVES) && is_felt);
+        self.most_given_mj = self.most_given_mj.max(contact.given_mj);
+        let [high_mm, _] = self.felt.relief();
+        let textures = 2.0 * self.felt.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
+        let shading = match self.felt.is_shaded() {
+            true => self.shading_mj(contact.deepest_mm),
+            false => 0.0,
+        };
+        match contact.given_mj <= GIVEN_MJ + shading + textures {
+            true => Ok(()),
+            false => Err(format!("the ground gave {contact:?}: {sample:?}")),
+        }
+    }
+}
+
+/// The last force goes out on its own: it only becomes less, whatever the tip does. With an open
+/// clutch there is none but what the slew limit leaves.
+fn fades(last: &TickRecord, sample: &TickRecord) -> Result<(), String> {
+    let (was, is) = (last.force_n, sample.force_n);
+    if sample.mode == Mode::Fading && is.length() > was.length() * (1.0 + ROUNDING) {
+        return Err(format!(
+            "a force of {} N grew while it went out: {sample:?}",
+            was.length()
+        ));
+    }
+    let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
+    let is_late = sample.limits.contains(Limits::SLEW_LIMITED) || sample.mode == Mode::Fading;
+    match is_open && !is_late && is != Vec3::ZERO {
+        true => Err(format!("{is} N with an open clutch: {sample:?}")),
+        false => Ok(()),
+    }
+}

@@ -1,0 +1,91 @@
+//! The largest of everything that was seen in a campaign.
+
+use hapterra_core::guard::MAX_COUNTS_PER_S;
+
+/// Counts of the encoder that is farthest off up to which the force at the true tip
+/// is held to the record's: two jumps at 1 kHz that the guard lets pass.
+pub const OFF_COUNTS: u32 = 2 * (MAX_COUNTS_PER_S / 1_000);
+
+/// The force at the true tip while an encoder was wrong by more than
+/// [`OFF_COUNTS`]: told, not judged, as no program can know the arm's levers then.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Misled {
+    /// The force, N.
+    pub force_n: f64,
+    /// Largest error of an encoder by then, counts.
+    pub off_counts: u32,
+}
+
+/// The largest that was seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Maxima {
+    /// Force told by the device, N.
+    pub force_n: f64,
+    /// Force made by the currents with the levers of the pose that the encoders
+    /// tell, N.
+    pub read_force_n: f64,
+    /// Force made by the currents at the true tip while no encoder was off by more
+    /// than [`OFF_COUNTS`], N.
+    pub tip_force_n: f64,
+    /// The same while one was.
+    pub misled: Misled,
+    /// Current of a motor, A.
+    pub current_a: f64,
+    /// Change of force from one tick to the next, N.
+    pub slew_n: f64,
+    /// Temperature of a winding of the virtual arm, °C.
+    pub winding_c: f64,
+    /// Energy that the device said its ticks have created, mJ.
+    pub created_mj: f32,
+    /// The most that a contact had given to the tip with the controller on, mJ.
+    pub given_mj: f32,
+    /// Ticks in which that was worked out.
+    pub watched_ticks: u64,
+    /// Of these, ticks in the ramp, and ticks in which the clutch moved.
+    pub ramp_ticks: u64,
+    /// See [`Self::ramp_ticks`].
+    pub clutch_ticks: u64,
+    /// The most turns back of the tip in a quarter of a second.
+    pub turns: usize,
+    /// Ticks with the amplifiers on and an encoder off by more than [`OFF_COUNTS`].
+    pub misled_ticks: u64,
+    /// Ticks with the amplifiers on near a singular pose, where the force at the tip
+    /// is not worked out.
+    pub singular_ticks: u64,
+}
+
+impl Maxima {
+    /// The larger of each, and all ticks.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            force_n: self.force_n.max(other.force_n),
+            read_force_n: self.read_force_n.max(other.read_force_n),
+            tip_force_n: self.tip_force_n.max(other.tip_force_n),
+            misled: self.misled.or(other.misled),
+            current_a: self.current_a.max(other.current_a),
+            slew_n: self.slew_n.max(other.slew_n),
+            winding_c: self.winding_c.max(other.winding_c),
+            created_mj: self.created_mj.max(other.created_mj),
+            given_mj: self.given_mj.max(other.given_mj),
+            watched_ticks: self.watched_ticks + other.watched_ticks,
+            ramp_ticks: self.ramp_ticks + other.ramp_ticks,
+            clutch_ticks: self.clutch_ticks + other.clutch_ticks,
+            turns: self.turns.max(other.turns),
+            misled_ticks: self.misled_ticks + other.misled_ticks,
+            singular_ticks: self.singular_ticks + other.singular_ticks,
+        }
+    }
+}
+
+impl Misled {
+    /// The one with the larger force.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        if other.force_n > self.force_n {
+            other
+        } else {
+            self
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! Invariants of every tick under any fault.
+//!
+//! The currents are held to three bounds, each worked out in f64 from them alone:
+//! - with the levers of the pose that the encoders tell, the force is within the
+//!   guard's clamp, always;
+//! - with the arm's true levers it is within the record's largest force while no
+//!   encoder is off by more than [`OFF_COUNTS`];
+//! - while one is, no program can know the true levers: that force is told.
+
+use hapterra::phantom::{Encoder, PhantomModel};
+use hapterra_core::Vec3;
+use hapterra_core::guard::{GuardInputs, GuardOutputs, Mode, WORKING_SHARE};
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::TickRecord;
+
+use super::maxima::{Maxima, Misled, OFF_COUNTS};
+use super::motor_forces::{Levers, torques_nm};
+
+/// Largest change of force in a tick, N: the guard's slew limit at 1 kHz.
+const SLEW_N: f32 = 1.0;
+/// The winding of a virtual motor may get this hot, °C. The guard trips at
+/// 110 °C by its own, more careful model.
+const HOTTEST_C: f64 = 112.0;
+/// A winding may be warmer than the device takes it to be by this, K: the arm's motors
+/// and the device's model are not the same formula.
+const COLDER_K: f64 = 1.0;
+/// Bound of the energy that is kept, mJ (docs/explanation/effects.md).
+const MAX_CREATED_MJ: f32 = 2.0;
+/// Room for rounding in comparisons of f32.
+const ROUNDING: f32 = 1e-4;
+
+/// True state of the arm in a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    /// Joint angles, rad.
+    pub q_rad: [f64; 3],
+    /// Counts of faultless encoders there.
+    pub counts: [i32; 3],
+    /// Temperatures of the windings, °C.
+    pub winding_c: [f64; 3],
+}
+
+/// Watches one segment.
+pub struct Watch {
+    record: Calibration,
+    model: PhantomModel,
+    last: Option<TickRecord>,
+    /// True if the host has asked to hold outputs with the amplifiers off.
+    pub may_hold: bool,
+    /// The largest so far.
+    pub extremes: Maxima,
+}
+
+impl Watch {
+    /// For a device with this calibration on such an arm.
+    #[must_use]
+    pub fn new(record: Calibration, model: PhantomModel) -> Self {
+        Self {
+            record,
+            model,
+            last: None,
+            may_hold: false,
+            extremes: Maxima::default(),
+        }
+    }
+
+    /// Looks at what the amplifiers got in a tick in which the device was told
+    /// `sense`, having been told that `zero` are the counts of its zero pose.
+    ///
+    /// # Errors
+    /// The broken invariant.
+    pub fn drive(
+        &mut self,
+        drive: &GuardOutputs,
+        sense: &GuardInputs,
+        zero: [i32; 3],
+        truth: &Truth,
+    ) -> Result<(), String> {
+        self.outputs(drive, truth)?;
+        let told_unfit = sense.hardware_failed || sense.outputs_not_as_set;
+        let unsafe_input = !sense.dead_man || sense.emergency_stop || told_unfit;
+        if drive.enabled && unsafe_input {
+            return Err(format!("amplifiers on with {sense:?}"));
+        }
+        if drive.enabled {
+            let told = std::array::from_fn(|i| sense.counts[i].wrapping_sub(zero[i]));
+            let currents = drive.currents_a.to_array().map(f64::from);
+            let torque = torques_nm(&self.model, currents);
+            self.force_as_read(torque, told)?;
+            self.force_at_the_tip(torque, told, truth)?;
+        }
+        Ok(())
+    }
+
+    /// Looks at a command that a core holds which stands still: nobody reads the
+    /// encoders, so only what is true counts.
+    ///
+    /// # Errors
+    /// The broken invariant.
+    pub fn held(&mut self, drive: &GuardOutputs, truth: &Truth) -> Result<(), String> {
+        self.outputs(drive, truth)?;
+        let currents = drive.currents_a.to_array().map(f64::from);
+        let torque = torques_nm(&self.model, currents);
+        self.force_at_the_tip(torque, truth.counts, truth)
+    }
+
+    /// Looks at what the device takes its motors to be: never colder than they are.
+    ///
+    /// # Errors
+    /// If it does.
+    pub fn warmth(&self, believed_c: Vec3, truth: &Truth) -> Result<(), String> {
+        for (axis, is_c) in truth.winding_c.into_iter().enumerate() {
+            let believed_c = f64::from(believed_c[axis]);
+            if believed_c.is_nan() || believed_c < is_c - COLDER_K {
+                return Err(format!(
+                    "winding {} is at {is_c:.1} °C, and the device takes it to be at {believed_c:.1} °C",
+                    axis + 1
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the outputs for any inputs.
+    fn outputs(&mut self, drive: &GuardOutputs, truth: &Truth) -> Result<(), String> {
+        let currents = drive.currents_a;
+        let largest = currents.abs().max_element();
+        if !currents.is_finite() {
+            return Err(format!("a current is not a number: {currents}"));
+        }
+        if !drive.enabled && largest != 0.0 {
+            return Err(format!("{largest} A commanded with the amplifiers off"));
+        }
+        if drive.enabled && drive.held != Vec3::ZERO {
+            return Err(format!("{} held with the amplifiers on", drive.held));
+        }
+        // Nobody asks to hold outputs while a terrain is served.
+        if drive.held != Vec3::ZERO && !self.may_hold {
+            return Err(format!("{} held although nobody asked", drive.held));
+        }
+        if drive.held.is_nan() || drive.held.abs().cmpgt(Vec3::ONE).any() {
+            return Err(format!("{} held is beyond full scale", drive.held));
+        }
+        if currents.abs().cmpgt(self.record.peak_current_a).any() {
+            return Err(format!("{currents} A is above the peak current"));
+        }
+        self.extremes.current_a = self.extremes.current_a.max(f64::from(largest));
+        let hottest = truth.winding_c.into_iter().fold(0.0, f64::max);
+        self.extremes.winding_c = self.extremes.winding_c.max(hottest);
+        if hottest > HOTTEST_C {
+            return Err(format!("a winding of the arm is at {hottest:.1} °C"));
+        }
+        Ok(())
+    }
+
+    /// With the levers that the device believes in.
+    fn force_as_read(&mut self, torque_nm: [f64; 3], told: [i32; 3]) -> Result<(), String> {
+        let angle = |i: usize| Encoder::new(&self.model.drive[i]).angle_rad(told[i]);
+        let q = std::array::from_fn(angle);
+        let Some(levers) = Levers::at(&self.model, &self.record, q) else {
+            return Ok(());
+        };
+        let force = levers.force_n(torque_nm);
+        self.extremes.read_force_n = self.extremes.read_force_n.max(force);
+        let clamp = f64::from(WORKING_SHARE * self.record.max_force_n * (1.0 + ROUNDING));
+        match force <= clamp {
+            true => Ok(()),
+            false => Err(format!("the motors make {force:.4} N by the encoders")),
+        }
+    }
+
+    /// With the levers that the arm has.
+    fn force_at_the_tip(
+        &mut self,
+        torque_nm: [f64; 3],
+        told: [i32; 3],
+        truth: &Truth,
+    ) -> Result<(), String> {
+        let off = (0..3).map(|i| told[i].abs_diff(truth.counts[i]));
+        let off_counts = off.fold(0, u32::max);
+        let is_misled = off_counts > OFF_COUNTS;
+        self.extremes.misled_ticks += u64::from(is_misled);
+        let Some(levers) = Levers::at(&self.model, &self.record, truth.q_rad) else {
+            self.extremes.singular_ticks += 1;
+            return Ok(());
+        };
+        let force_n = levers.force_n(torque_nm);
+        if is_misled {
+            let misled = Misled {
+                force_n,
+                off_counts,
+            };
+            self.extremes.misled = self.extremes.misled.or(misled);
+            return Ok(());
+        }
+        self.extremes.tip_force_n = self.extremes.tip_force_n.max(force_n);
+        match force_n <= f64::from(self.record.max_force_n) {
+            true => Ok(()),
+            false => Err(format!(
+                "the motors make {force_n:.3} N at the tip, the encoders off by {off_counts} counts"
+            )),
+        }
+    }
+
+    /// Looks at what the device told of a tick.
+    ///
+    /// # Errors
+    /// The broken invariant.
+    pub fn sample(&mut self, sample: &TickRecord, max_force_n: f32) -> Result<(), String> {
+        let force = sample.force_n.length();
+        if !force.is_finite() {
+            return Err(format!("a force is not a number: {sample:?}"));
+        }
+        let off = sample.fault.is_some() || !sample.mode.drives();
+        if off && force != 0.0 {
+            return Err(format!("{force} N with the amplifiers off: {sample:?}"));
+        }
+        let clamp = (WORKING_SHARE * self.record.max_force_n).min(max_force_n);
+        if force > clamp * (1.0 + ROUNDING) {
+            return Err(format!("{force} N is above the clamp of {clamp} N"));
+        }
+        self.extremes.force_n = self.extremes.force_n.max(f64::from(force));
+        let last = self.last.replace(*sample);
+        let Some(last) = last.filter(|last| last.tick.wrapping_add(1) == sample.tick) else {
+            return Ok(());
+        };
+        if off {
+            return Ok(());
+        }
+        let slew = (sample.force_n - last.force_n).length();
+        self.extremes.slew_n = self.extremes.slew_n.max(f64::from(slew));
+        match slew <= SLEW_N + ROUNDING {
+            true => Ok(()),
+            false => Err(format!(
+                "the force changed by {slew} N in a tick: {sample:?}"
+            )),
+        }
+    }
+
+    /// Looks at the energy that the device says its ticks have created.
+    ///
+    /// # Errors
+    /// If it is none, or above the limit.
+    pub fn created(&mut self, mj: f32) -> Result<(), String> {
+        self.extremes.created_mj = self.extremes.created_mj.max(mj);
+        match (0.0..=MAX_CREATED_MJ).contains(&mj) {
+            true => Ok(()),
+            false => Err(format!("{mj} mJ are to be taken back")),
+        }
+    }
+
+    /// The mode that the device told last.
+    #[must_use]
+    pub fn latest(&self) -> Option<Mode> {
+        self.last.map(|sample| sample.mode)
+    }
+
+    /// The next sample follows from nothing before.
+    pub fn forget(&mut self) {
+        self.last = None;
+    }
+}

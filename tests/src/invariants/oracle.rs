@@ -1,0 +1,298 @@
+//! The oracle of every tick: all invariants, in the order in which they are checked.
+//!
+//! `single_tick` checks the output of one tick, `proxy_position` the proxy, and `tick_to_tick` the
+//! change from the tick before.
+
+use hapterra_core::contact::{Friction, WORK_PER_TICK};
+use hapterra_core::force::Texture;
+
+use super::material::Judged;
+use super::observed_tick::ObservedTick;
+use super::texture::TextureJudge;
+use super::{Invariant, Violation};
+use crate::scene::run::Scene;
+use crate::scene::terrain::Terrain;
+
+/// Measurements of the oracle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// Ticks unseeded, free, touching and releasing.
+    pub states: [u64; 4],
+    /// Ticks that left work over.
+    pub unconverged: u64,
+    /// Most units of work in a tick.
+    pub work: u32,
+    /// Largest distance of a proxy from the surface, cells, with the HIP within
+    /// a few cells.
+    pub off_surface: f64,
+    /// Largest distance from the exact closest point, cells, among those within
+    /// the bound of gentle patches.
+    pub off_minimum: f64,
+    /// Answers judged against the exact closest point.
+    pub judged: u64,
+    /// Of those, beyond that bound, where steepness or a badly conditioned
+    /// minimum allows it.
+    pub beyond: u64,
+    /// Ways that met the surface and yet ended free: around a pole.
+    pub around: u64,
+    /// Most ticks in a row in which a proxy in the air came no farther.
+    pub stalled: u32,
+    /// Twins compared to the end: repeated, shifted, in another window, mirrored
+    /// or turned.
+    pub twins: [u64; 4],
+    /// On materials.
+    pub on_materials: Judged,
+    /// Twins on materials compared to the end: in another window, shifted, mirrored or turned.
+    pub twins_on_materials: [u64; 3],
+}
+
+impl Measured {
+    /// Adds what another judge measured.
+    pub fn add(&mut self, other: &Self) {
+        for (own, other) in self.states.iter_mut().zip(other.states) {
+            *own += other;
+        }
+        for (own, other) in self.twins.iter_mut().zip(other.twins) {
+            *own += other;
+        }
+        let twins = self.twins_on_materials.iter_mut();
+        for (own, other) in twins.zip(other.twins_on_materials) {
+            *own += other;
+        }
+        self.on_materials.add(&other.on_materials);
+        self.unconverged += other.unconverged;
+        self.work = self.work.max(other.work);
+        self.off_surface = self.off_surface.max(other.off_surface);
+        self.off_minimum = self.off_minimum.max(other.off_minimum);
+        self.judged += other.judged;
+        self.beyond += other.beyond;
+        self.around += other.around;
+        self.stalled = self.stalled.max(other.stalled);
+    }
+}
+
+/// Looks at the ticks of one scene in turn.
+pub struct TickOracle<'g> {
+    pub(super) terrain: &'g Terrain,
+    pub(super) friction: Friction,
+    texture: Option<TextureJudge>,
+    /// Units of work that a tick may spend.
+    pub(super) work: u32,
+    /// Ticks in a row in which the proxy has not moved.
+    pub(super) still: u32,
+    tick: usize,
+    pub(super) before: Option<ObservedTick>,
+    /// Place where the proxy was when its motion for the last HIP began.
+    pub(super) began: [f64; 3],
+    /// Displacement, cells, when the proxy began to let go.
+    pub(super) let_go_from: f64,
+    /// Ticks in a row in which a proxy in the air came no farther.
+    pub(super) stalled: u32,
+    /// Its measurements.
+    pub measured: Measured,
+}
+
+/// Verdict on a tick.
+pub type Verdict = Result<(), Violation>;
+
+impl<'g> TickOracle<'g> {
+    /// A judge over a terrain.
+    #[must_use]
+    pub fn new(terrain: &'g Terrain) -> Self {
+        Self {
+            terrain,
+            friction: Friction::NONE,
+            texture: None,
+            work: WORK_PER_TICK,
+            still: 0,
+            tick: 0,
+            before: None,
+            began: [0.0; 3],
+            let_go_from: 0.0,
+            stalled: 0,
+            measured: Measured::default(),
+        }
+    }
+
+    /// A judge of a scene.
+    #[must_use]
+    pub fn of(scene: &'g Scene) -> Self {
+        let judge = Self::new(&scene.terrain)
+            .with_friction(scene.friction)
+            .with_texture(scene.texture);
+        Self {
+            work: scene.settings().work_per_tick,
+            ..judge
+        }
+    }
+
+    /// The same of a rough surface.
+    #[must_use]
+    pub fn with_friction(self, friction: Friction) -> Self {
+        Self { friction, ..self }
+    }
+
+    /// The same of a surface with a texture, or an even one.
+    #[must_use]
+    pub fn with_texture(self, texture: Texture) -> Self {
+        let texture = (!texture.is_none()).then(|| TextureJudge::new(texture));
+        Self { texture, ..self }
+    }
+
+    /// Judges the next tick.
+    ///
+    /// # Errors
+    /// The first invariant that it breaks.
+    pub fn look(&mut self, seen: &ObservedTick) -> Verdict {
+        self.all(seen).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Judges where the proxy of the next tick lies and how it came there, and nothing of its
+    /// force; what friction holds of it, where it `is_rubbed`, is judged by
+    /// [`Self::is_held_by`] before.
+    ///
+    /// # Errors
+    /// The first invariant that it breaks.
+    pub fn look_at_place(&mut self, seen: &ObservedTick, is_rubbed: bool) -> Verdict {
+        self.is_finite(seen)?;
+        self.is_within_work(seen)?;
+        if seen.is_touching() {
+            self.is_on_surface(seen)?;
+            if !is_rubbed {
+                self.is_local_minimum(seen)?;
+            }
+            self.is_hip_below(seen)?;
+        }
+        if seen.is_free() {
+            self.is_above(seen, self.before.as_ref())?;
+        }
+        if let Some(before) = self.before {
+            self.was_seen_above(&before, seen)?;
+            self.descends(&before, seen)?;
+            if before.is_free() {
+                self.first_crossing(&before, seen)?;
+            }
+            self.passes_no_wall(&before, seen)?;
+        }
+        let stays = self.before.is_some_and(|before| seen.stays(&before));
+        self.still = if stays { self.still + 1 } else { 0 };
+        self.remembers(seen);
+        Ok(())
+    }
+
+    fn remembers(&mut self, seen: &ObservedTick) {
+        self.began = match self.before {
+            Some(before) => self.begun_at(&before, seen),
+            None => seen.proxy,
+        };
+        self.before = Some(*seen);
+        self.tick += 1;
+    }
+
+    /// Judges whether the proxy of the next tick is where a friction lets it be that is known to
+    /// lie between two.
+    ///
+    /// # Errors
+    /// [`Invariant::Cone`] and [`Invariant::Stuck`].
+    pub fn is_held_by(&mut self, [least, most]: [Friction; 2], seen: &ObservedTick) -> Verdict {
+        self.friction = most;
+        if seen.is_touching() {
+            self.is_in_cone(seen)?;
+        }
+        self.friction = least;
+        if seen.is_touching() {
+            self.is_held_back(seen)?;
+        }
+        let still = self.still;
+        let verdict = match self.before {
+            Some(before) => self.sticks(&before, seen),
+            None => Ok(()),
+        };
+        self.still = still;
+        verdict
+    }
+
+    /// Judges the texture of the next tick, and nothing else.
+    ///
+    /// # Errors
+    /// [`Invariant::Texture`].
+    pub fn look_at_texture(&mut self, seen: &ObservedTick) -> Verdict {
+        let verdict = self.is_textured(seen);
+        self.tick += 1;
+        verdict
+    }
+
+    /// Judges the next tick: everything that it breaks.
+    pub fn all(&mut self, seen: &ObservedTick) -> Vec<Violation> {
+        let felt = &seen.felt;
+        self.measured.states[felt.state as usize] += 1;
+        self.measured.unconverged += u64::from(!felt.converged);
+        self.measured.work = self.measured.work.max(felt.work);
+        let mut told = Vec::new();
+        told.extend(self.is_finite(seen).err());
+        if told.is_empty() {
+            self.finite(seen, &mut told);
+        }
+        self.remembers(seen);
+        told
+    }
+
+    fn finite(&mut self, seen: &ObservedTick, told: &mut Vec<Violation>) {
+        told.extend(self.is_within_work(seen).err());
+        told.extend(self.is_clamped(seen).err());
+        told.extend(self.is_consistent(seen).err());
+        told.extend(self.is_shaded(seen).err());
+        told.extend(self.is_textured(seen).err());
+        if seen.is_touching() {
+            told.extend(self.is_on_surface(seen).err());
+        }
+        if seen.is_touching() && seen.felt.converged {
+            if self.friction.is_none() {
+                told.extend(self.is_local_minimum(seen).err());
+            } else {
+                told.extend(self.is_in_cone(seen).err());
+                told.extend(self.is_held_back(seen).err());
+            }
+            told.extend(self.is_hip_below(seen).err());
+        }
+        if seen.is_free() {
+            told.extend(self.is_above(seen, self.before.as_ref()).err());
+        }
+        if let Some(before) = self.before {
+            self.since(&before, seen, told);
+        }
+    }
+
+    fn since(&mut self, before: &ObservedTick, seen: &ObservedTick, told: &mut Vec<Violation>) {
+        told.extend(self.was_seen_above(before, seen).err());
+        told.extend(self.fades(before, seen).err());
+        told.extend(self.lets_go_gently(before, seen).err());
+        told.extend(self.descends(before, seen).err());
+        told.extend(self.stays_in_basin(before, seen).err());
+        told.extend(self.advances(before, seen).err());
+        if before.is_free() {
+            told.extend(self.first_crossing(before, seen).err());
+        }
+        told.extend(self.passes_no_wall(before, seen).err());
+        if !self.friction.is_none() {
+            told.extend(self.sticks(before, seen).err());
+        }
+    }
+
+    /// The force is the one without texture, and what the texture adds.
+    fn is_textured(&mut self, seen: &ObservedTick) -> Verdict {
+        let judged = self.texture.as_mut().map(|judge| judge.look(seen));
+        match judged {
+            Some(Err(detail)) => self.fail(Invariant::Texture, detail),
+            _ => Ok(()),
+        }
+    }
+
+    pub(super) fn fail(&self, invariant: Invariant, detail: String) -> Verdict {
+        Err(Violation {
+            invariant,
+            tick: self.tick,
+            detail,
+        })
+    }
+}

@@ -1,0 +1,200 @@
+//! Invariants of the proxy's place.
+
+use super::observed_tick::{ERROR, ObservedTick};
+use super::oracle::{TickOracle, Verdict};
+use super::surface::{Patch, distance, patches_at};
+use super::{Invariant, descent};
+
+/// HIPs farther from the surface than this, in cells, are so far that distances
+/// to all that is near the proxy count as equal.
+const FAR: f64 = 1e4;
+
+/// An exact local closest point.
+struct Minimum {
+    at: [f64; 3],
+    /// Distance of the proxy from it, cells.
+    off: f64,
+    /// Start of the path down to it, with its patch.
+    start: [f64; 2],
+    patch: Patch,
+}
+
+impl TickOracle<'_> {
+    pub(super) fn is_on_surface(&mut self, seen: &ObservedTick) -> Verdict {
+        let [x, y, z] = seen.proxy;
+        let rounding = seen.rounding_of_corners(self.terrain);
+        let off = patches_at(self.terrain, x, y).map(|patch| {
+            let above = (z - patch.height(x, y)).abs();
+            (above - rounding).max(0.0) / patch.slope(x, y).hypot(1.0)
+        });
+        let off = off.fold(f64::INFINITY, f64::min);
+        if off > seen.allowed() {
+            let detail = format!("by {off:.3e} of {:.3e}: {seen:?}", seen.allowed());
+            return self.fail(Invariant::OnSurface, detail);
+        }
+        if seen.allowed() == ERROR {
+            self.measured.off_surface = self.measured.off_surface.max(off);
+        }
+        Ok(())
+    }
+
+    pub(super) fn is_local_minimum(&mut self, seen: &ObservedTick) -> Verdict {
+        let minima = self.minima(seen.proxy, seen.hip);
+        let error = minima.first().map(|nearest| nearest.off);
+        let Some(error) = error else {
+            return Ok(()); // off the surface: said before
+        };
+        self.measured.judged += 1;
+        // Within the bound of the HIP itself there is no force to be wrong about.
+        if !(ERROR..=FAR).contains(&distance(seen.proxy, seen.hip)) {
+            return Ok(());
+        }
+        let allowed = seen.allowed();
+        if error <= allowed {
+            if allowed == ERROR {
+                self.measured.off_minimum = self.measured.off_minimum.max(error);
+            }
+            return Ok(());
+        }
+        self.measured.beyond += 1;
+        // Up a wall rounding of the height decides which of two minima is the nearer one.
+        let tie = error + seen.rounding_of_corners(self.terrain);
+        let near = minima.iter().take_while(|minimum| minimum.off <= tie);
+        let verdicts = near.map(|minimum| self.is_near_in_plane(seen, minimum));
+        verdicts.reduce(Verdict::or).unwrap_or(Ok(()))
+    }
+
+    /// On steep ground a unit in the last place of a coordinate is much height: the bound is one in
+    /// the plane. And how far does the truth move for a rounding of the HIP, or of the heights
+    /// above it that are mixed there?
+    fn is_near_in_plane(&self, seen: &ObservedTick, minimum: &Minimum) -> Verdict {
+        let Minimum {
+            at, start, patch, ..
+        } = *minimum;
+        let allowed = seen.allowed();
+        let moved = |axis: usize, by: f64| {
+            let mut hip = seen.hip;
+            hip[axis] += by;
+            level(descent::from(self.terrain, hip, start, patch).at, at)
+        };
+        let heights = patch.mixed_size(at[0], at[1], seen.hip[2]);
+        let up = allowed.max(4.0 * f64::from(f32::EPSILON) * heights);
+        let moves = [(0, allowed), (1, allowed), (2, up)]
+            .into_iter()
+            .flat_map(|(axis, by)| [moved(axis, by), moved(axis, -by)]);
+        let condition = moves.fold(0.0, f64::max);
+        let error = level(at, seen.proxy);
+        if error > 4.0 * (allowed + condition) {
+            let detail = format!(
+                "{error:.3e} of {allowed:.3e} from {at:?}, truth moves {condition:.1e}: {seen:?}"
+            );
+            return self.fail(Invariant::LocalMinimum, detail);
+        }
+        Ok(())
+    }
+
+    /// A contact that pulls holds a HIP which is free to go: from each place that the
+    /// proxy may be at, the straight way to it starts above the ground.
+    pub(super) fn is_hip_below(&self, seen: &ObservedTick) -> Verdict {
+        let above = starts(seen.proxy).map(|start| self.height_of_way(seen, start));
+        let above = above.fold(f64::INFINITY, |least, above| {
+            // Over a hole there is no ground: the proxy is held at its edge.
+            least.min(above.unwrap_or(f64::NEG_INFINITY))
+        });
+        if above > 4.0 * seen.allowed() {
+            return self.fail(Invariant::HipBelow, format!("by {above:.3e}: {seen:?}"));
+        }
+        Ok(())
+    }
+
+    /// Returns the height of the HIP above the tangent plane of the patch that the straight way to
+    /// it leads into from a place; `None` where it leads into none.
+    fn height_of_way(&self, seen: &ObservedTick, start: [f64; 2]) -> Option<f64> {
+        let way = [0, 1, 2].map(|i| seen.hip[i] - seen.proxy[i]);
+        let level = way[0].hypot(way[1]);
+        let patches = patches_at(self.terrain, start[0], start[1]);
+        let above = patches.filter(|patch| leads_into(start, way, patch));
+        let above = above.map(|patch| {
+            let [east, north] = patch.slopes(start[0], start[1]);
+            // Of the heights that are mixed, and of a rounded place the slope's.
+            let heights = patch.mixed_size(start[0], start[1], seen.hip[2]);
+            let rounding = 4.0 * f64::from(f32::EPSILON) * heights;
+            let unsure = rounding + 4.0 * ERROR * patch.twist().abs() * level;
+            let above = way[2] - east * way[0] - north * way[1];
+            (above - unsure) / east.hypot(north).hypot(1.0)
+        });
+        above.reduce(f64::min)
+    }
+
+    /// The patches that single precision cannot tell the proxy's place from, and
+    /// where in them it is.
+    pub(super) fn nearby(&self, proxy: [f64; 3]) -> impl Iterator<Item = ([f64; 2], Patch)> + '_ {
+        starts(proxy).flat_map(|start| {
+            patches_at(self.terrain, start[0], start[1]).map(move |patch| (start, patch))
+        })
+    }
+
+    /// The exact closest points from the patches that single precision cannot tell the proxy's
+    /// place from, the nearest first.
+    fn minima(&self, proxy: [f64; 3], hip: [f64; 3]) -> Vec<Minimum> {
+        let minimum = |(start, patch)| {
+            let at = descent::from(self.terrain, hip, start, patch).at;
+            let off = distance(at, proxy);
+            Minimum {
+                at,
+                off,
+                start,
+                patch,
+            }
+        };
+        let mut minima: Vec<_> = self.nearby(proxy).map(minimum).collect();
+        minima.sort_by(|a, b| a.off.total_cmp(&b.off));
+        minima
+    }
+
+    pub(super) fn is_above(&self, seen: &ObservedTick, before: Option<&ObservedTick>) -> Verdict {
+        let [x, y, z] = seen.hip;
+        // On a line of the grid the HIP is over the patch to the north-east.
+        let Some(patch) = Patch::at(self.terrain, [x.floor() as i32, y.floor() as i32]) else {
+            return Ok(());
+        };
+        let below = (patch.height(x, y) - z) / patch.slope(x, y).hypot(1.0);
+        let before = before.map_or(z, |before| before.hip[2]);
+        let fall = z.abs().max((z - before).abs());
+        if below > ERROR.max(4.0 * f64::from(f32::EPSILON) * fall) {
+            return self.fail(Invariant::AboveSurface, format!("by {below:.3e}: {seen:?}"));
+        }
+        Ok(())
+    }
+}
+
+/// Returns true if a way from a place of a patch leads into it, or along its border.
+fn leads_into(start: [f64; 2], way: [f64; 3], patch: &Patch) -> bool {
+    (0..2).all(|axis| {
+        let place = start[axis] - f64::from(patch.cell[axis]);
+        (place > 0.0 || way[axis] >= 0.0) && (place < 1.0 || way[axis] <= 0.0)
+    })
+}
+
+/// Distance in the plane.
+fn level(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The places that single precision cannot tell a proxy's from.
+fn starts(proxy: [f64; 3]) -> impl Iterator<Item = [f64; 2]> {
+    let [xs, ys] = [sides(proxy[0]), sides(proxy[1])];
+    xs.into_iter()
+        .flat_map(move |x| ys.clone().into_iter().map(move |y| [x, y]))
+}
+
+/// A coordinate, and the border of a patch that single precision cannot tell it
+/// from: on a sharp ridge its two sides lead to different valleys.
+fn sides(x: f64) -> Vec<f64> {
+    const ROUNDING: f64 = 1e-6;
+    let border = x.round();
+    if x == border || (x - border).abs() > ROUNDING {
+        return vec![x];
+    }
+    vec![x, border]
+}

@@ -1,0 +1,86 @@
+//! Invariants of a single tick.
+
+use hapterra_core::contact::ContactState;
+use hapterra_core::grid::MAX_CELL;
+
+use super::Invariant;
+use super::observed_tick::{CELLS_MM, ObservedTick, PARAMS};
+use super::oracle::{TickOracle, Verdict};
+use super::surface::distance;
+
+/// Part by which a force may be off: the clamp keeps eight units in the last
+/// place below its limit.
+const FORCE_ERROR: f64 = 2e-6;
+
+impl TickOracle<'_> {
+    pub(super) fn is_finite(&self, seen: &ObservedTick) -> Verdict {
+        let felt = &seen.felt;
+        let (cell, frac) = (felt.proxy.cell(), felt.proxy.frac());
+        let valid = cell.iter().all(|c| c.abs() <= MAX_CELL)
+            && frac.to_array().iter().all(|f| (0.0..1.0).contains(f));
+        if !felt.displacement.is_finite() || !valid {
+            return self.fail(Invariant::Finite, format!("{felt:?}"));
+        }
+        Ok(())
+    }
+
+    pub(super) fn is_within_work(&self, seen: &ObservedTick) -> Verdict {
+        if seen.felt.work > self.work {
+            return self.fail(Invariant::Work, format!("{:?}", seen.felt));
+        }
+        Ok(())
+    }
+
+    /// No force but of a contact; a free proxy in the HIP; a contact's displacement
+    /// a part of the way to the proxy.
+    pub(super) fn is_consistent(&self, seen: &ObservedTick) -> Verdict {
+        let felt = &seen.felt;
+        let none = felt.displacement.to_array() == [0.0; 3];
+        let free_at_hip = !seen.is_free() || seen.proxy == seen.hip;
+        let may_press = seen.is_touching() || felt.state == ContactState::Releasing;
+        let is_part = !seen.is_touching() || is_part_of_the_way(seen);
+        if (!may_press && !none) || !free_at_hip || !is_part {
+            return self.fail(Invariant::Consistent, format!("{seen:?}"));
+        }
+        Ok(())
+    }
+
+    /// The force is the spring's, or as long as the clamp.
+    pub(super) fn is_clamped(&self, seen: &ObservedTick) -> Verdict {
+        let displacement = seen.felt.displacement.as_dvec3().to_array();
+        let most = f64::from(PARAMS.max_force_n);
+        for (cell_mm, force) in CELLS_MM.iter().zip(seen.force_n) {
+            let rate = f64::from(PARAMS.stiffness_n_per_mm) * f64::from(*cell_mm);
+            let spring = displacement.map(|s| s * rate);
+            let part = (most / length(spring)).min(1.0);
+            let off = distance(force, spring.map(|f| f * part));
+            // Half a unit in the last place is what its own length may be off.
+            let is_long = length(force) > most * (1.0 + 1e-7);
+            let error = FORCE_ERROR * length(spring).min(most) + f64::from(f32::MIN_POSITIVE);
+            let is_off = !(0.0..=error).contains(&off);
+            if is_long || is_off {
+                let detail = format!("{force:?} N at {cell_mm} mm a cell from {displacement:?}");
+                return self.fail(Invariant::Clamp, detail);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    distance(v, [0.0; 3])
+}
+
+/// Returns true if the displacement is the way from the HIP to the proxy, times a boundary fade
+/// in `[0, 1]`.
+fn is_part_of_the_way(seen: &ObservedTick) -> bool {
+    let way = [0, 1, 2].map(|i| seen.proxy[i] - seen.hip[i]);
+    let felt = seen.felt.displacement.as_dvec3().to_array();
+    let whole = length(way);
+    let part = if whole > 0.0 {
+        (length(felt) / whole).min(1.0)
+    } else {
+        0.0
+    };
+    distance(felt, way.map(|c| c * part)) <= seen.allowed()
+}

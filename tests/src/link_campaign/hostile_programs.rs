@@ -1,0 +1,296 @@
+//! Programs that mean no good: one that talks to the device, one that answers a host.
+
+use hapterra_core::clutch::ClutchHold;
+use hapterra_core::contact::Friction;
+use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams, Texture};
+use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::Report;
+use hapterra_core::phantom::Calibration;
+use hapterra_core::scene::{HipCommand, Scene, SceneChange, Source, TickRecord};
+use hapterra_core::terrain::{FieldSize, TileKey};
+use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL, SerialNumber};
+use hapterra_core::wire::materials::{MaterialScene, MaterialTile, TileMaterials};
+use hapterra_core::wire::message::{Heights, Telemetry, TileMessage, ToDevice, ToHost};
+use hapterra_core::wire::request::Request;
+use hapterra_core::wire::session::{LastSession, SampleCount, SessionNumber};
+use hapterra_core::wire::version::VersionCheck;
+
+use super::frames;
+use crate::random::Random;
+
+/// Bytes that a hostile program says in a millisecond, at most.
+const A_MILLISECOND: usize = 2_048;
+
+/// Returns a hostile host's bytes of a millisecond.
+pub fn host(random: &mut Random) -> Vec<u8> {
+    match random.below(6) {
+        0 => noise(random, A_MILLISECOND),
+        1 => vec![0; random.below(A_MILLISECOND)],
+        // The beginning of a frame without its end, or an end without a beginning.
+        2 => {
+            let frame = host_frame(random);
+            let cut = random.below(frame.len().max(1));
+            let part = if random.below(2) == 0 {
+                &frame[..cut]
+            } else {
+                &frame[cut..]
+            };
+            part.to_vec()
+        }
+        _ => {
+            let mut said = Vec::new();
+            for _ in 0..1 + random.below(8) {
+                said.extend(host_frame(random));
+            }
+            said.truncate(A_MILLISECOND);
+            said
+        }
+    }
+}
+
+fn noise(random: &mut Random, most: usize) -> Vec<u8> {
+    let length = random.below(most);
+    (0..length).map(|_| random.bits() as u8).collect()
+}
+
+/// A well-formed frame of one of a few sessions.
+fn host_frame(random: &mut Random) -> Vec<u8> {
+    if random.below(12) == 0 {
+        let protocol = random.bits() as u16;
+        return frames::version_check(VersionCheck::Asked { protocol });
+    }
+    let session = SessionNumber::new(1_000 * random.below(3) as u32);
+    frames::from_host(session, &host_message(random))
+}
+
+/// A well-formed message with content that is not. Calibrations that the device may take
+/// are not among them: a device that is disarmed takes those from anybody.
+fn host_message<'b>(random: &mut Random) -> ToDevice<'b> {
+    let words = [i32::MIN, -1, 0, 1, 1_000_000, i32::MAX];
+    let word = |random: &mut Random| words[random.below(words.len())];
+    let epoch = random.bits() as u32;
+    match random.below(12) {
+        0 | 1 => ToDevice::Hello(HostHello {
+            protocol: [PROTOCOL, random.bits() as u16][random.below(2)],
+            number: random.bits() as u8,
+            silence_s: random.bits() as u16,
+        }),
+        2 => match random.below(2) {
+            0 => ToDevice::Scene(host_scene(random, epoch)),
+            _ => ToDevice::MaterialScene(MaterialScene {
+                scene: host_scene(random, epoch),
+                table: [&[][..], &[1], &[0xFF; 40]][random.below(3)],
+            }),
+        },
+        3 => ToDevice::MaterialTile(MaterialTile {
+            tile: TileMessage {
+                epoch,
+                key: TileKey::new(random.bits() as u8, word(random), word(random)),
+                heights: Heights::Hole,
+            },
+            materials: TileMaterials::Runs(&[200, 255, 0, 0][..random.below(5)]),
+        }),
+        4 => ToDevice::Tile(TileMessage {
+            epoch,
+            key: TileKey::new(random.bits() as u8, word(random), word(random)),
+            heights: Heights::Flat {
+                base: word(random),
+                height: f32::NAN,
+            },
+        }),
+        5 => ToDevice::Hip(HipCommand {
+            seq: random.bits() as u32,
+            hip: GridPoint::default(),
+        }),
+        6 => ToDevice::Status { number: 0 },
+        7 => match random.below(2) {
+            0 => ToDevice::Heartbeat,
+            _ => ToDevice::SceneChange(SceneChange {
+                number: random.bits() as u8,
+                scene: host_scene(random, epoch),
+                hip: GridPoint::default(),
+                keeps_tiles: random.below(2) == 0,
+            }),
+        },
+        8 => {
+            let number = 0;
+            let question = ToDevice::GetCalibration { number };
+            [question, ToDevice::Bye, ToDevice::Close][random.below(3)].clone()
+        }
+        _ => ToDevice::Request {
+            number: random.bits() as u8,
+            request: host_request(random),
+        },
+    }
+}
+
+/// A scene that a device may refuse or take.
+fn host_scene(random: &mut Random, epoch: u32) -> Scene {
+    let words = [i32::MIN, -1, 0, 1, 1_000_000, i32::MAX];
+    let word = |random: &mut Random| words[random.below(words.len())];
+    Scene {
+        epoch,
+        level: random.bits() as u8,
+        size: FieldSize::new(word(random), word(random)),
+        top: word(random),
+        fallback: None,
+        cell_mm: [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5][random.below(6)],
+        home: GridPoint::default(),
+        params: SurfaceParams {
+            stiffness_n_per_mm: [f32::NAN, -1.0, 1e30, 0.5][random.below(4)],
+            max_force_n: [f32::INFINITY, -8.0, 8.5][random.below(3)],
+            friction: Friction::coulomb([0.0, -1.0, f32::NAN][random.below(3)]),
+            damping: Damping {
+                ns_per_m: [0.0, -1.0, f32::NAN, 1e30][random.below(4)],
+                controller: Controller::On,
+            },
+            shading: [Shading::None, Shading::Smooth][random.below(2)],
+            texture: Texture {
+                pattern: [Pattern::None, Pattern::Grain, Pattern::Grating][random.below(3)],
+                amplitude_mm: [0.1, 0.0, -1.0, f32::NAN, 1e30][random.below(5)],
+                wavelength_mm: [1.0, 0.0, f32::NAN, 1e30][random.below(4)],
+                direction_deg: [0.0, 1e30, f32::NAN][random.below(3)],
+                seed: random.bits() as u32,
+            },
+        },
+        source: [Source::Encoders, Source::Points][random.below(2)],
+        hold_clock: random.below(2) == 0,
+        materials: [None, Some(random.bits() as u32)][random.below(2)],
+    }
+}
+
+fn host_request(random: &mut Random) -> Request {
+    let mut calibration = Calibration::PREMIUM_1_5;
+    calibration.l1_mm = -1.0;
+    [
+        Request::Arm,
+        Request::Disarm,
+        Request::SetCalibration { calibration },
+        Request::StoreCalibration,
+        Request::DropScene,
+        Request::ClearFault { seen: None },
+        Request::Clutch {
+            hold: ClutchHold::WithHand,
+        },
+        Request::Clutch {
+            hold: ClutchHold::InPlace,
+        },
+        Request::Clutch {
+            hold: ClutchHold::LetGo,
+        },
+    ][random.below(8)]
+}
+
+/// Behaviour of something that is no device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Behaviour {
+    /// It says nothing.
+    Mute,
+    /// It says noise without end.
+    Noise,
+    /// It says one byte each half second.
+    Drips,
+    /// It greets each hello, and nothing follows.
+    GreetsOnly,
+    /// It takes every scene, and then asks for tiles that there are not, as fast as it
+    /// can.
+    AsksForEverything,
+    /// It takes every scene and then refuses the protocol that both speak, and others.
+    RefusesLate,
+    /// It takes every scene and sends samples with numbers at random.
+    CountsWildly,
+    /// It refuses the scene.
+    RefusesScenes,
+}
+
+impl Behaviour {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Mute,
+        Self::Noise,
+        Self::Drips,
+        Self::GreetsOnly,
+        Self::AsksForEverything,
+        Self::RefusesLate,
+        Self::CountsWildly,
+        Self::RefusesScenes,
+    ];
+
+    /// Returns its bytes in the millisecond `now` to a host that serves a scene and has said
+    /// hello with this number.
+    pub fn say(
+        self,
+        now: u64,
+        scene: &Scene,
+        (session, number): (SessionNumber, u8),
+        random: &mut Random,
+    ) -> Vec<u8> {
+        let often = now.is_multiple_of(10);
+        let mut said = Vec::new();
+        let mut tell = |message: ToHost| said.extend(frames::from_device(session, &message));
+        let greets = !matches!(self, Self::Mute | Self::Noise | Self::Drips);
+        if greets && often {
+            tell(ToHost::Hello(hello(number)));
+        }
+        let epoch = scene.epoch;
+        if greets && often && self != Self::GreetsOnly {
+            let accepted = self != Self::RefusesScenes;
+            tell(ToHost::SceneAck { epoch, accepted });
+        }
+        match self {
+            Self::Noise => return noise(random, A_MILLISECOND),
+            Self::Drips if now.is_multiple_of(500) => return vec![random.bits() as u8],
+            Self::AsksForEverything => {
+                for _ in 0..20 {
+                    let (level, row) = (random.bits() as u8, random.bits() as i32);
+                    let key = TileKey::new(level, i32::MAX, row);
+                    tell(ToHost::TileRequest { epoch, key });
+                }
+            }
+            Self::RefusesLate if now.is_multiple_of(100) => {
+                let protocol = [PROTOCOL, PROTOCOL + 1][random.below(2)];
+                said.extend(frames::version_check(VersionCheck::Refused { protocol }));
+            }
+            Self::CountsWildly => {
+                tell(ToHost::Telemetry(Telemetry {
+                    first: random.bits() as u32,
+                    dropped: random.bits() as u32,
+                    samples: [TickRecord::default(); 8].into_iter().collect(),
+                }));
+                tell(ToHost::Heartbeat {
+                    epoch: Some(epoch),
+                    count: count(random),
+                    report: Report::default(),
+                });
+            }
+            _ => {}
+        }
+        said
+    }
+}
+
+fn count(random: &mut Random) -> SampleCount {
+    SampleCount {
+        sent: random.bits() as u32,
+        dropped: random.bits() as u32,
+    }
+}
+
+/// A greeting whose words a terminal would obey.
+#[must_use]
+pub fn hello(number: u8) -> DeviceHello {
+    DeviceHello {
+        protocol: PROTOCOL,
+        number,
+        board: "\x1b[2J\x1b]0;x\x07".try_into().unwrap_or_default(),
+        serial: SerialNumber::new([0x1B; 12]),
+        version: "\r\n\u{202e}".try_into().unwrap_or_default(),
+        window: 0,
+        tick_hz: 0,
+        latency_us: 0,
+        clock_hz: 0,
+        epoch: None,
+        opened_by: number,
+        last: LastSession::default(),
+    }
+}

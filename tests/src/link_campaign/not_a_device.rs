@@ -1,0 +1,85 @@
+//! A host meets something that is no device.
+
+use hapterra::link::LinkError;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
+use hapterra_core::wire::message::ToDevice;
+
+use super::frames;
+use super::host::{End, Host};
+use super::hostile_programs::Behaviour;
+use super::run_outcomes::Outcome;
+use super::segment::Segment;
+
+/// Time for which the host puts up with it, ms.
+const MEETS: u64 = 12_000;
+/// Time that a session may take to open or to fail, ms.
+const OPENS: u64 = 8_500;
+/// Time that leaving may take, ms.
+const LEAVES: u64 = 3_500;
+/// Bytes that a host may say in a second to whatever it is.
+const A_SECOND: usize = 1 << 20;
+
+/// Lets a host meet one; says how it ended.
+///
+/// # Errors
+/// If it does not end, or sends without bound.
+pub fn meet(segment: &mut Segment<'_>) -> Result<Outcome, String> {
+    let behaviour = Behaviour::ALL[segment.random.below(Behaviour::ALL.len())];
+    let outcome = talk(segment, behaviour);
+    outcome.map_err(|what| format!("{behaviour:?}: {what}"))
+}
+
+fn talk(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcome, String> {
+    let began = segment.now;
+    let chance = &mut segment.random;
+    let mut out = Vec::new();
+    let mut host = Host::start(segment.terrain, segment.scene, began, chance, &mut out);
+    let mut hellos = Hellos::default();
+    let mut said = 0;
+    for now in began..=began + MEETS + LEAVES {
+        if now == began + MEETS {
+            host.leave(now, &mut out);
+        }
+        said += out.len();
+        hellos.hear(&out);
+        out.clear();
+        let told = (host.session(), hellos.last);
+        let heard = behaviour.say(now, &segment.scene, told, chance);
+        host.step(now, &heard, &mut out);
+        host.samples.clear();
+        let seconds = 1 + ((now - began) / 1_000) as usize;
+        if said > seconds * A_SECOND {
+            return Err(format!("the host said {said} bytes in {seconds} s"));
+        }
+        match &host.end {
+            Some(End::Agreed) => return Err("the end was agreed on with no device".into()),
+            Some(End::Told(LinkError::Version { ours, theirs })) if ours == theirs => {
+                return Err(format!("both speak protocol {ours}"));
+            }
+            Some(End::Told(error)) => return Ok(Outcome::Told(error.to_string())),
+            None if !host.opened && now > began + OPENS => return Err("opening hangs".into()),
+            None => {}
+        }
+    }
+    Err("the host does not end".into())
+}
+
+/// Listens for the number of the host's last hello, which an answer has to bear.
+#[derive(Default)]
+struct Hellos {
+    reader: Box<FrameReader<MAX_FRAME>>,
+    last: u8,
+}
+
+impl Hellos {
+    fn hear(&mut self, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let (taken, frame) = self.reader.push(bytes);
+            bytes = bytes.get(taken..).unwrap_or(&[]);
+            let said = frame.and_then(|frame| frames::said_by_host(frame.ok()?));
+            if let Some(ToDevice::Hello(hello)) = said.map(|said| said.message) {
+                self.last = hello.number;
+            }
+        }
+    }
+}

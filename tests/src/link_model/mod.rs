@@ -1,0 +1,23 @@
+//! A checked model of the link: the host's client and the device's link as they ship, tick by tick,
+//! over a line that loses, repeats and delays the frames that a plan names. Later frames overtake a
+//! delayed one.
+//!
+//! ```text
+//! Client ──▶ LossyLine ──▶ Device        `run`: one run
+//!        ◀── LossyLine ◀──               `fault_plan`: its injected faults
+//!                                        `oracle`: checks of every tick
+//! ```
+
+mod fault_plan;
+mod forged_frames;
+mod frame_record;
+mod lossy_line;
+mod oracle;
+mod requests;
+mod run;
+mod status_queries;
+
+pub use fault_plan::{Interruption, Plan};
+pub use lossy_line::{Direction, Harm};
+pub use oracle::Wrong;
+pub use run::{End, Report, check, frames};

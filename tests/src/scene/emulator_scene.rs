@@ -1,0 +1,178 @@
+//! A scene of the soak as the emulated board can replay it: the tiles and HIPs in
+//! the order they came here, and what the contact answered here, or the loop on materials.
+//!
+//! The board's window has room for 16 × 16 tiles, as many as this one, so every
+//! scene can be replayed: also those whose tiles are pulled, late and in parts.
+
+use crate::scene::run::Execution;
+use hapterra_core::force::SurfaceParams;
+use hapterra_core::grid::GridPoint;
+use hapterra_core::scene::{Scene as SceneMessage, Source};
+use hapterra_core::terrain::FieldSize;
+
+use super::loop_replay::noted;
+use super::run::{LEAST_WORK_PER_TICK, Player, Scene, Surface};
+use super::terrain::Terrain;
+use super::tile_supply::Buffers;
+use crate::cycles::Cycles;
+use crate::instruction_counter::{Counted, Event, Replay, Samples, WINDOW};
+use crate::whole_field::point;
+
+/// The seed of scenes by which the emulated processor is compared.
+const COMPARED: u64 = 77;
+
+fn surface(number: u64) -> Surface {
+    match number % 3 {
+        0 => Surface::Rough,
+        _ => Surface::Smooth,
+    }
+}
+
+/// A scene, felt here in real time.
+pub struct EmulatorScene {
+    /// Its settings.
+    pub scene: Scene,
+    /// It was felt on its materials, by the whole loop.
+    is_on_materials: bool,
+    /// As the device is told of it.
+    message: SceneMessage,
+    /// Tiles and HIPs, in the order they came.
+    events: Vec<Event>,
+    /// Answer of each tick here, without costs.
+    answers: Vec<Counted>,
+}
+
+impl EmulatorScene {
+    /// Runs a scene of a seed in real time, as the board does, and notes it down.
+    ///
+    /// # Panics
+    /// When a tick in real time gives no answer.
+    #[must_use]
+    pub fn random(seed: u64, number: u64, surface: Surface) -> Self {
+        let scene = Scene {
+            execution: Execution::RealTime,
+            // As the counting board, which counts at 10 kHz.
+            work_per_tick: LEAST_WORK_PER_TICK,
+            ..Scene::random(seed, number).with_surface(surface)
+        };
+        let mut buffers = Buffers::new(WINDOW);
+        let mut player = Player::<WINDOW>::new(&scene, &mut buffers, [0; 3], scene.supply);
+        let (mut events, mut answers) = (vec![], vec![]);
+        for hip in &scene.path {
+            events.extend(player.supplied.installed.drain(..).map(Event::Tile));
+            events.push(Event::Hip(point(*hip)));
+            let felt = player.step(*hip).expect("one tick is one answer");
+            answers.push(Counted {
+                instructions: 0,
+                cycles: Cycles::default(),
+                state: felt.state as u32,
+                converged: felt.converged,
+                work: felt.work,
+                vector: felt.displacement,
+                proxy: felt.proxy,
+            });
+        }
+        let message = SceneMessage {
+            epoch: 1,
+            level: 0,
+            size: FieldSize::new(scene.terrain.size[0], scene.terrain.size[1]),
+            top: scene.terrain.top(),
+            fallback: None,
+            cell_mm: 1.0,
+            home: GridPoint::default(),
+            params: SurfaceParams {
+                friction: scene.friction,
+                shading: scene.shading,
+                texture: scene.texture,
+                ..SurfaceParams::PREMIUM
+            },
+            source: Source::Points,
+            hold_clock: false,
+            materials: None,
+        };
+        Self {
+            is_on_materials: false,
+            scene,
+            message,
+            events,
+            answers,
+        }
+    }
+
+    /// Replays a scene of a seed on its materials, in lock-step as the board does, and notes it
+    /// down; `None` where it has none.
+    #[must_use]
+    pub fn on_materials(seed: u64, number: u64, surface: Surface) -> Option<Self> {
+        let scene = Scene::random(seed, number).with_surface(surface);
+        let materials = scene.materials.as_ref()?;
+        let (message, events, answers) = noted(&scene, materials);
+        Some(Self {
+            is_on_materials: true,
+            scene,
+            message,
+            events,
+            answers,
+        })
+    }
+
+    /// Scenes by which the emulated processor is compared with this one, with their numbers: a
+    /// third of them with friction.
+    #[must_use]
+    pub fn compared() -> Vec<(u64, Self)> {
+        let random = |number| (number, Self::random(COMPARED, number, surface(number)));
+        (0..40).map(random).collect()
+    }
+
+    /// The same on materials.
+    #[must_use]
+    pub fn compared_on_materials() -> Vec<(u64, Self)> {
+        let on_materials = |number| {
+            let recorded = Self::on_materials(COMPARED, number, surface(number))?;
+            Some((number, recorded))
+        };
+        (0..120).filter_map(on_materials).collect()
+    }
+
+    /// As the counting board takes it.
+    #[must_use]
+    pub fn replay(&self) -> Replay<'_> {
+        Replay {
+            scene: &self.message,
+            field: &self.scene.terrain,
+            events: &self.events,
+            materials: self
+                .scene
+                .materials
+                .as_ref()
+                .filter(|_| self.is_on_materials),
+        }
+    }
+
+    /// The first tick whose answer on the board differs in a bit, or in a unit of
+    /// work, from the one here.
+    #[must_use]
+    pub fn differs(&self, there: &[Counted]) -> Option<usize> {
+        let pairs = self.answers.iter().zip(there);
+        let mut same = pairs.map(|(here, there)| bits(here) == bits(there));
+        same.position(|same| !same)
+    }
+}
+
+impl Samples for Terrain {
+    fn sample(&self, column: i32, row: i32) -> f32 {
+        self.post(column, row)
+    }
+}
+
+type Bits = (u32, bool, u32, [u32; 3], [i32; 3], [u32; 3]);
+
+fn bits(tick: &Counted) -> Bits {
+    (
+        tick.state,
+        tick.converged,
+        tick.work,
+        tick.vector.to_array().map(f32::to_bits),
+        tick.proxy.cell(),
+        tick.proxy.frac().to_array().map(f32::to_bits),
+    )
+}

@@ -1,0 +1,202 @@
+//! The replay of a scene on materials under its judge, and beside twins in which nothing felt may
+//! change.
+
+use super::hip_path::LEAP;
+use super::loop_replay::{Replay, Replied, replay};
+use super::materials::Materials;
+use super::run::{Scene, is_alike};
+use super::symmetry;
+use super::terrain::Kind;
+use super::tile_supply::{Buffers, SIDE, Supply};
+use crate::invariants::material::MaterialJudge;
+use crate::invariants::oracle::Measured;
+use crate::invariants::{Invariant, Violation};
+use crate::random::Random;
+
+/// Range of the HIP of a shifted scene beyond the field, and above or below it, cells.
+const BESIDE: f64 = 128.0;
+const DEEP: f64 = 4e6;
+
+/// Replays a scene on its materials, and adds to what was measured.
+///
+/// # Errors
+/// The first violation.
+pub fn run(
+    scene: &Scene,
+    materials: &Materials,
+    buffers: &mut Buffers,
+    measured: &mut Measured,
+) -> Result<(), Violation> {
+    let mut random = Random::new(scene.seed ^ 0x57ab_1e55);
+    let side = match scene.supply {
+        Supply::Held => SIDE,
+        Supply::Pulled { .. } => [2, 3, 4, SIDE][random.below(4)],
+    };
+    let mut judge = MaterialJudge::new(scene, materials, [0; 3]);
+    let usual = Replay {
+        shift: [0; 3],
+        supply: scene.supply,
+    };
+    let replied = replay_in(side, scene, materials, buffers, usual, |replied| {
+        judge.look(replied)
+    })
+    .map_err(|violation| Violation {
+        detail: format!(
+            "window of {side}², {:?}: {}",
+            scene.supply, violation.detail
+        ),
+        ..violation
+    })?;
+    measured.on_materials = judge.judged;
+    let twin = random.below(6);
+    match twin {
+        0 if fits(&replied) => windowed(scene, materials, &replied, buffers, &mut random)?,
+        1 => shifted(scene, materials, buffers, &mut random)?,
+        // Mirrored walls are elsewhere than the judge of walls takes them to be.
+        2 if scene.terrain.kind != Kind::Walls => turned(scene, materials, buffers, &mut random)?,
+        _ => return Ok(()),
+    }
+    measured.twins_on_materials[twin] = 1;
+    Ok(())
+}
+
+/// [`replay`] in a window of so many tiles each way.
+fn replay_in(
+    side: usize,
+    scene: &Scene,
+    materials: &Materials,
+    buffers: &mut Buffers,
+    how: Replay,
+    look: impl FnMut(&Replied) -> Result<(), Violation>,
+) -> Result<Vec<Replied>, Violation> {
+    match side {
+        2 => replay::<2>(scene, materials, buffers, how, look),
+        3 => replay::<3>(scene, materials, buffers, how, look),
+        4 => replay::<4>(scene, materials, buffers, how, look),
+        6 => replay::<6>(scene, materials, buffers, how, look),
+        _ => replay::<SIDE>(scene, materials, buffers, how, look),
+    }
+}
+
+/// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each
+/// point was felt with all of its terrain: one that needs more tiles than its window holds is not.
+fn fits(replied: &[Replied]) -> bool {
+    let is_near = |ticks: &[Replied]| {
+        let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
+        way(0).max(way(1)) <= 4.0 * LEAP
+    };
+    let is_whole = |replied: &Replied| replied.sample.missing_tile.is_none();
+    replied.iter().all(is_whole) && replied.windows(2).all(is_near)
+}
+
+/// In another window, whose tiles come at other times: the same bits.
+fn windowed(
+    scene: &Scene,
+    materials: &Materials,
+    replied: &[Replied],
+    buffers: &mut Buffers,
+    random: &mut Random,
+) -> Result<(), Violation> {
+    let side = [6, SIDE][random.below(2)];
+    let latency = [0, 1, 5][random.below(3)];
+    let how = Replay {
+        shift: [0; 3],
+        supply: Supply::Pulled { latency },
+    };
+    let other = replay_in(side, scene, materials, buffers, how, |_| Ok(()))?;
+    same_bits(Invariant::Window, replied, &other, [0; 3], true)
+}
+
+/// Elsewhere, by whole tiles: the same bits, but for the force of textures that are others there;
+/// they are judged in both places.
+fn shifted(
+    scene: &Scene,
+    materials: &Materials,
+    buffers: &mut Buffers,
+    random: &mut Random,
+) -> Result<(), Violation> {
+    let far = [1_024, 30_016, 1_000_000, 99_999_968];
+    let mut pick = || far[random.below(far.len())] / 32 * 32;
+    let away = [pick(), pick(), pick() - 50_000_000];
+    let beside = |p: &[f64; 3]| {
+        let within =
+            |axis: usize| p[axis].clamp(-BESIDE, f64::from(scene.terrain.size[axis]) + BESIDE);
+        [within(0), within(1), p[2].clamp(-DEEP, DEEP)]
+    };
+    let path = scene.path.iter().map(beside).collect();
+    let scene = &scene.with(scene.terrain.clone(), path);
+    let mut at = |shift| {
+        let supply = Supply::Pulled { latency: 0 };
+        let mut judge = MaterialJudge::new(scene, materials, shift);
+        let how = Replay { shift, supply };
+        replay_in(4, scene, materials, buffers, how, |replied| {
+            judge.look(replied)
+        })
+    };
+    // Both away from the origin, so that what lies beyond the field is alike.
+    let near = [256, 256, 0];
+    let (here, there) = (at(near)?, at(away)?);
+    let alike = |one: &hapterra_core::force::Material| is_alike(&one.texture, materials.cell_mm);
+    let forces = materials.table.iter().all(alike);
+    let by = [0, 1, 2].map(|i| away[i] - near[i]);
+    same_bits(Invariant::Shift, &here, &there, by, forces)
+}
+
+/// Mirrored or turned, ground and classes: judged as any scene. The bits are others, since a place
+/// half way between two samples has the class of the other one there.
+fn turned(
+    scene: &Scene,
+    materials: &Materials,
+    buffers: &mut Buffers,
+    random: &mut Random,
+) -> Result<(), Violation> {
+    let symmetries = symmetry::all();
+    let symmetry = symmetries[random.below(symmetries.len())];
+    let path = scene.path.iter();
+    let path = path.map(|p| symmetry.point(&scene.terrain, *p)).collect();
+    let twin = scene.with(symmetry.terrain(&scene.terrain), path);
+    let materials = &materials.seen_by(symmetry);
+    let mut judge = MaterialJudge::new(&twin, materials, [0; 3]);
+    let how = Replay {
+        shift: [0; 3],
+        supply: Supply::Pulled { latency: 0 },
+    };
+    replay_in(4, &twin, materials, buffers, how, |replied| {
+        judge.look(replied)
+    })
+    .map(drop)
+}
+
+/// Compares two replays of which the second is `shift` cells away; the forces, too, if that is
+/// asked for.
+fn same_bits(
+    invariant: Invariant,
+    one: &[Replied],
+    other: &[Replied],
+    shift: [i32; 3],
+    forces: bool,
+) -> Result<(), Violation> {
+    let bits = |replied: &Replied, shift: [i32; 3]| {
+        let (proxy, force) = (replied.sample.proxy, replied.sample.force_n);
+        let cell = proxy.cell();
+        (
+            replied.sample.state,
+            [0, 1, 2].map(|i| cell[i] - shift[i]),
+            proxy.frac().to_array().map(f32::to_bits),
+            forces.then(|| force.to_array().map(f32::to_bits)),
+        )
+    };
+    let pairs = one.iter().zip(other);
+    let differs = |(a, b): (&Replied, &Replied)| bits(a, [0; 3]) != bits(b, shift);
+    match pairs.clone().position(differs) {
+        None => Ok(()),
+        Some(tick) => Err(Violation {
+            invariant,
+            tick,
+            detail: format!(
+                "on materials, {shift:?}: {:?} but {:?}",
+                one[tick], other[tick]
+            ),
+        }),
+    }
+}

@@ -1,0 +1,364 @@
+//! Scenes run twice, the second time so that nothing felt may change.
+
+use crate::scene::run::Execution;
+use hapterra_core::contact::ContactState;
+
+use super::hip_path::{GRAIN, LEAP};
+use super::run::{Player, Scene};
+use super::symmetry::{self, Symmetry};
+use super::terrain::Kind;
+use super::tile_supply::{Buffers, SIDE, Supply};
+use crate::invariants::observed_tick::{ERROR, ObservedTick};
+use crate::invariants::oracle::TickOracle;
+use crate::invariants::surface::distance;
+use crate::invariants::{Invariant, Violation};
+use crate::random::Random;
+
+type Verdict = Result<(), Violation>;
+/// Result of a comparison: true if the twin could be compared to the end.
+type Compared = Result<bool, Violation>;
+
+/// The same again, with the contact's shortcuts switched off: the same bits.
+///
+/// # Errors
+/// The difference.
+pub fn repeated(scene: &Scene, seen: &[ObservedTick], buffers: &mut Buffers) -> Compared {
+    let scene = Scene {
+        fast_paths: false,
+        ..scene.clone()
+    };
+    let again = scene.step(buffers, [0; 3], scene.supply, |_| Ok(()))?;
+    same_bits(Invariant::Repeatable, seen, &again, [0; 3]).map(|()| true)
+}
+
+/// Range of a shifted scene's HIP beyond the field, cells.
+const BESIDE: f64 = 128.0;
+/// Range above or below, cells: farther down than any spike reaches up.
+const DEEP: f64 = 4e6;
+
+/// Up to 10⁸ cells away: the same bits, but for textures that are others there.
+///
+/// Both runs are away from the origin, so that what lies beyond the field is
+/// alike: not here, until it is asked for. By whole tiles, and by any whole cells
+/// up and down; in real time, where the work of a tick may run out, by as many as
+/// keep the blocks of tiles the same.
+///
+/// # Errors
+/// The difference.
+pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Compared {
+    let whole = match scene.execution {
+        Execution::RealTime => 256,
+        Execution::LockStep => 32,
+    };
+    let far = [1_000, 30_000, 1_000_000, 100_000_000];
+    let mut pick = || far[random.below(far.len())] / whole * whole;
+    let shift = [pick(), pick(), pick() - 50_000_000];
+    // No farther beyond the field than the nearer one is from the origin: what
+    // lies there is asked for, tile by tile.
+    let beside = |p: &[f64; 3]| {
+        let within =
+            |axis: usize| p[axis].clamp(-BESIDE, f64::from(scene.terrain.size[axis]) + BESIDE);
+        [within(0), within(1), p[2].clamp(-DEEP, DEEP)]
+    };
+    let scene = &scene.with(
+        scene.terrain.clone(),
+        scene.path.iter().map(beside).collect(),
+    );
+    let mut felt = |shift| {
+        // Of grain, and of most gratings, another part is there; it is judged as well.
+        let mut judge = TickOracle::new(&scene.terrain).with_texture(scene.texture);
+        let pulled = Supply::Pulled { latency: 0 };
+        let seen = scene.step(buffers, shift, pulled, |seen| judge.look_at_texture(seen))?;
+        Ok(seen.into_iter().map(|seen| ObservedTick {
+            textured: seen.textured.filter(|_| scene.is_textured_alike()),
+            ..seen
+        }))
+    };
+    let near = Vec::from_iter(felt([256, 256, 0])?);
+    let away = Vec::from_iter(felt(shift)?);
+    let by = [shift[0] - 256, shift[1] - 256, shift[2]];
+    same_bits(Invariant::Shift, &near, &away, by).map(|()| true)
+}
+
+/// With a window of 7 × 7 tiles that waits for them, and with the whole field
+/// held: the same bits, where waiting leaves no trace.
+///
+/// # Errors
+/// The difference.
+pub fn windowed(
+    scene: &Scene,
+    seen: &[ObservedTick],
+    buffers: &mut Buffers,
+    random: &mut Random,
+) -> Compared {
+    let fits = scene.terrain.size.iter().all(|patches| *patches <= 256);
+    // A path from the proxy to the HIP fits into the small window.
+    let is_near = |ticks: &[ObservedTick]| {
+        let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();
+        way(0).max(way(1)) <= 5.0 * LEAP
+    };
+    if scene.execution != Execution::LockStep || !fits || !seen.windows(2).all(is_near) {
+        return Ok(false);
+    }
+    let latency = [0, 1, 5][random.below(3)];
+    let pulled = Supply::Pulled { latency };
+    let small = scene.feel_in::<7>(buffers, [0; 3], pulled, |_| Ok(()))?;
+    same_bits(Invariant::Window, seen, &small, [0; 3])?;
+    if scene.supply != Supply::Held {
+        let whole = scene.step(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+        same_bits(Invariant::Window, seen, &whole, [0; 3])?;
+    }
+    Ok(true)
+}
+
+/// Compares two runs of which the second is `shift` cells away.
+///
+/// # Errors
+/// `invariant`, where a bit of the answers differs.
+pub fn same_bits(
+    invariant: Invariant,
+    seen: &[ObservedTick],
+    other: &[ObservedTick],
+    shift: [i32; 3],
+) -> Verdict {
+    for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
+        let bits = |seen: &ObservedTick, shift: [i32; 3]| {
+            let (cell, frac) = (seen.felt.proxy.cell(), seen.felt.proxy.frac());
+            (
+                seen.felt.state,
+                seen.felt.displacement.to_array().map(f32::to_bits),
+                seen.shaded
+                    .map(|shaded| shaded.displacement.to_array().map(f32::to_bits)),
+                seen.textured
+                    .map(|textured| textured.to_array().map(f32::to_bits)),
+                [0, 1, 2].map(|i| cell[i] - shift[i]),
+                frac.to_array().map(f32::to_bits),
+            )
+        };
+        if bits(a, [0; 3]) != bits(b, shift) {
+            let detail = format!("{shift:?}: {a:?} but {b:?}");
+            return Err(Violation {
+                invariant,
+                tick,
+                detail,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Steps between neighbouring samples up to which mirrored scenes are compared,
+/// cells. On steeper ground rounding decides at nearly every vertex.
+const STEEP: f32 = 10.0;
+
+/// A proxy that moves so many times as far as its HIP was moved is elsewhere.
+const JUMP: f64 = 1e3;
+
+/// Mirrored or turned: the same answers to within rounding.
+///
+/// The core counts from the south-west corner of a patch, so rounding differs.
+/// If two paths are equally good, the two runs may differ; they are not compared until both are free
+/// again. If the rounding decides in one of them, they are not compared any more.
+///
+/// # Errors
+/// A difference for no such reason.
+pub fn turned(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Compared {
+    // On a border of the data a HIP belongs to the patch in the north-east,
+    // mirrored or not; and what is left over of a tick may differ.
+    let settles = scene.execution == Execution::LockStep && scene.supply == Supply::Held;
+    let plain = scene.terrain.steepest() <= STEEP && scene.terrain.kind != Kind::Holes;
+    if !settles || !plain {
+        return Ok(false);
+    }
+    let inside = |p: &[f64; 3]| {
+        let within = |axis: usize| p[axis].clamp(0.5, f64::from(scene.terrain.size[axis]) - 0.5);
+        [within(0), within(1), p[2]]
+    };
+    let path: Vec<_> = scene.path.iter().map(inside).collect();
+    let scene = &scene.with(scene.terrain.clone(), path);
+    let seen = scene.step(buffers, [0; 3], Supply::Held, |_| Ok(()))?;
+    let symmetries = symmetry::all();
+    let symmetry = symmetries[random.below(symmetries.len())];
+    let twin = twin_of(scene, symmetry);
+    let mut judge = TickOracle::of(&twin);
+    let other = twin.step(buffers, [0; 3], Supply::Held, |seen| judge.look(seen))?;
+    same_way(scene, symmetry, &seen, &other, buffers)
+}
+
+/// The scene, mirrored or turned.
+fn twin_of(scene: &Scene, symmetry: Symmetry) -> Scene {
+    let turned = |p: &[f64; 3]| symmetry.point(&scene.terrain, *p);
+    let path = scene.path.iter().map(turned).collect();
+    scene.with(symmetry.terrain(&scene.terrain), path)
+}
+
+/// Compares what was felt with what the mirrored or turned twin felt.
+///
+/// # Errors
+/// A difference that rounding does not explain.
+pub fn same_way(
+    scene: &Scene,
+    symmetry: Symmetry,
+    seen: &[ObservedTick],
+    other: &[ObservedTick],
+    buffers: &mut Buffers,
+) -> Compared {
+    let turned = |p| symmetry.point(&scene.terrain, p);
+    let mut parted = false;
+    for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
+        // Until both are in the HIP again.
+        parted &= a.felt.state != ContactState::Free || b.felt.state != ContactState::Free;
+        if parted {
+            continue;
+        }
+        let agree = |proxy, a: &ObservedTick, b: &ObservedTick| agree(scene, proxy, a, b);
+        if agree(turned(a.proxy), a, b) {
+            parted = !is_near(turned(a.proxy), a, b);
+            if !parted && !is_shaded_likewise(scene, symmetry, a, b) {
+                let detail = format!("{symmetry:?}: shaded {a:?} but {b:?}");
+                return Err(Violation {
+                    invariant: Invariant::Symmetry,
+                    tick,
+                    detail,
+                });
+            }
+            continue;
+        }
+        let decides = |there: &ObservedTick, hair| {
+            is_elsewhere(there, a, hair) || agree(turned(there.proxy), there, b)
+        };
+        if is_undecided(scene, tick, decides, buffers)
+            || is_twin_undecided(scene, symmetry, tick, buffers)
+        {
+            return Ok(false);
+        }
+        let detail = format!("{symmetry:?}: {a:?} but {b:?}");
+        return Err(Violation {
+            invariant: Invariant::Symmetry,
+            tick,
+            detail,
+        });
+    }
+    Ok(true)
+}
+
+/// Tolerance of the direction of a shaded force. A place that is off by as much as rounding allows
+/// turns it by less than this, rad, on ground that mirrored scenes are compared on.
+const TURNED: f32 = 0.01;
+/// A force of a HIP that is farther away is not compared, cells.
+const FAR: f32 = 1e4;
+
+fn is_shaded_likewise(
+    scene: &Scene,
+    symmetry: Symmetry,
+    a: &ObservedTick,
+    b: &ObservedTick,
+) -> bool {
+    let (Some(one), Some(other)) = (a.shaded, b.shaded) else {
+        return true;
+    };
+    // So far away all that is near the proxy is equally near, and each place has its own normal.
+    let length = a.felt.displacement.length();
+    let is_told = (0.1..FAR).contains(&length);
+    if !is_told || !scene.friction.is_none() || a.felt.state != b.felt.state {
+        return true;
+    }
+    let tip = one.displacement.as_dvec3().to_array();
+    let ends = [[0.0; 3], tip].map(|end| symmetry.point(&scene.terrain, end));
+    let [x, y, z] = [0, 1, 2].map(|i| (ends[1][i] - ends[0][i]) as f32);
+    let wanted = hapterra_core::Vec3::new(x, y, z);
+    let along = wanted.dot(other.displacement);
+    let across = wanted.cross(other.displacement).length();
+    across <= TURNED * along
+}
+
+/// A proxy that slid may be pulled by so much more than friction holds, as a part: where
+/// rounding decides whether it slides on, twins are as far apart.
+const SLACK: f64 = 0.03;
+
+/// Rounding apart, the same answer; or another one that is as near to the HIP; or, with
+/// friction, another that a proxy which slid may stop at.
+fn agree(scene: &Scene, proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> bool {
+    let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
+    let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
+    // A HIP in the surface may touch it or be free: nothing is felt either way.
+    let at_hip = |seen: &ObservedTick| {
+        let may = matches!(seen.felt.state, ContactState::Free | ContactState::Touching);
+        may && seen.felt.displacement.length() <= ERROR as f32
+    };
+    let same = a.felt.state == b.felt.state || (at_hip(a) && at_hip(b));
+    let slack = match scene.friction.is_none() {
+        true => 0.0,
+        false => SLACK * f64::from(1.0 + scene.friction.static_mu) * da.max(db),
+    };
+    let slid = distance(proxy, b.proxy) <= slack;
+    same && a.felt.converged == b.felt.converged && (is_near(proxy, a, b) || tie || slid)
+}
+
+fn is_near(proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> bool {
+    distance(proxy, b.proxy) <= 1e-4 * distance(a.proxy, a.hip).max(1.0)
+}
+
+/// Returns true if a proxy that was moved by a hair's breadth, cells, is elsewhere by far more.
+fn is_elsewhere(there: &ObservedTick, here: &ObservedTick, hair: f64) -> bool {
+    distance(there.proxy, here.proxy) > JUMP * hair * distance(here.proxy, here.hip).max(1.0)
+}
+
+/// Returns true if a hair's breadth makes the difference in the mirrored or turned twin, as it is
+/// felt once more.
+fn is_twin_undecided(
+    scene: &Scene,
+    symmetry: Symmetry,
+    tick: usize,
+    buffers: &mut Buffers,
+) -> bool {
+    let twin = twin_of(scene, symmetry);
+    let own = rendered_at(&twin, tick, |_| [0.0; 3], buffers);
+    own.is_some_and(|own| {
+        let decides = |there: &ObservedTick, hair| is_elsewhere(there, &own, hair);
+        is_undecided(&twin, tick, decides, buffers)
+    })
+}
+
+/// Returns true if a hair's breadth on the way to this tick, or in this tick alone, cells, makes
+/// the difference, too.
+fn is_undecided(
+    scene: &Scene,
+    tick: usize,
+    decides: impl Fn(&ObservedTick, f64) -> bool,
+    buffers: &mut Buffers,
+) -> bool {
+    const HAIRS: [f64; 3] = [1.0, 16.0, 256.0];
+    let ways = [0, tick]
+        .into_iter()
+        .flat_map(|first| HAIRS.map(|hair| (first, GRAIN * hair)));
+    for (first, hair) in ways {
+        for corner in 0..8 {
+            let off = [0, 1, 2].map(|bit| if corner >> bit & 1 == 0 { hair } else { -hair });
+            let moved = |now| if now < first { [0.0; 3] } else { off };
+            if rendered_at(scene, tick, moved, buffers).is_some_and(|felt| decides(&felt, hair)) {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// Returns the result of a tick of a path that is shifted by as much in each.
+fn rendered_at(
+    scene: &Scene,
+    tick: usize,
+    moved: impl Fn(usize) -> [f64; 3],
+    buffers: &mut Buffers,
+) -> Option<ObservedTick> {
+    let mut player = Player::<SIDE>::new(scene, buffers, [0; 3], scene.supply);
+    let mut felt = None;
+    for (now, hip) in scene.path[..=tick].iter().enumerate() {
+        let by = moved(now);
+        let hip = [0, 1, 2].map(|i| hip[i] + by[i]);
+        felt = player
+            .step(hip)
+            .map(|felt| ObservedTick::new(hip, felt, [0; 3]));
+    }
+    felt
+}

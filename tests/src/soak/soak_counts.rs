@@ -1,0 +1,160 @@
+//! Counts of a stress test so far.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use hapterra_core::contact::WORK_PER_TICK;
+
+use crate::invariants::material::Judged;
+use crate::invariants::oracle::Measured;
+use crate::scene::terrain::{KINDS, Kind};
+
+/// Outcome of one scene.
+#[derive(Clone, Debug)]
+pub enum Found {
+    /// Everything held.
+    Held(Kind, Measured),
+    /// Something did not: which invariant, and what was found.
+    Broke(Kind, String, String),
+}
+
+/// A scene in which something did not hold.
+#[derive(Clone, Debug)]
+pub struct Broken {
+    /// Its number.
+    pub number: u64,
+    /// Its terrain.
+    pub kind: Kind,
+    /// Which invariant, by name; `Panic` for a panic.
+    pub invariant: String,
+    /// Its details.
+    pub what: String,
+}
+
+/// The largest work of a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MostWork {
+    /// Units.
+    pub units: u32,
+    /// The number of the scene that the tick belongs to.
+    pub number: u64,
+}
+
+/// All scenes so far.
+#[derive(Clone, Debug, Default)]
+pub struct LinkStats {
+    /// Scenes run.
+    pub scenes: u64,
+    /// Violations.
+    pub broken: Vec<Broken>,
+    /// The tick that spent most, among the scenes in which everything held.
+    pub most_work: Option<MostWork>,
+    by_kind: BTreeMap<usize, Measured>,
+    by_invariant: BTreeMap<String, u64>,
+}
+
+impl LinkStats {
+    /// One more scene.
+    pub fn add(&mut self, number: u64, found: Found) {
+        self.scenes += 1;
+        match found {
+            Found::Broke(kind, invariant, what) => {
+                let which = format!("{invariant} on {kind:?}");
+                *self.by_invariant.entry(which).or_default() += 1;
+                self.broken.push(Broken {
+                    number,
+                    kind,
+                    invariant,
+                    what,
+                });
+            }
+            Found::Held(kind, measured) => {
+                let row = KINDS.iter().position(|k| *k == kind).unwrap_or(0);
+                self.by_kind.entry(row).or_default().add(&measured);
+                if self.most_work.is_none_or(|most| measured.work > most.units) {
+                    let units = measured.work;
+                    self.most_work = Some(MostWork { units, number });
+                }
+            }
+        }
+    }
+
+    /// Over all terrains.
+    #[must_use]
+    pub fn total(&self) -> Measured {
+        let mut total = Measured::default();
+        for measured in self.by_kind.values() {
+            total.add(measured);
+        }
+        total
+    }
+
+    /// Ticks judged.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.total().states.iter().sum()
+    }
+}
+
+impl fmt::Display for LinkStats {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "terrain            ticks    waiting       free   touching  unsettled  work  off surface  off minimum     beyond   around  stalled"
+        )?;
+        for (kind, m) in &self.by_kind {
+            row(f, &format!("{:?}", KINDS[*kind]), m)?;
+        }
+        row(f, "all", &self.total())?;
+        writeln!(
+            f,
+            "\n{} scenes, {} ticks, {} wrong answers",
+            self.scenes,
+            self.ticks(),
+            self.broken.len()
+        )?;
+        if let Some(MostWork { units, number }) = self.most_work {
+            writeln!(
+                f,
+                "largest work of a tick: {units} of {WORK_PER_TICK} units, in scene {number}"
+            )?;
+        }
+        let [again, shifted, window, turned] = self.total().twins;
+        writeln!(
+            f,
+            "twins compared: {again} repeated, {shifted} shifted, {window} in another window, {turned} mirrored or turned"
+        )?;
+        on_materials(f, &self.total())?;
+        for (invariant, scenes) in &self.by_invariant {
+            writeln!(f, "    {invariant}: {scenes} scenes")?;
+        }
+        Ok(())
+    }
+}
+
+fn on_materials(f: &mut fmt::Formatter<'_>, m: &Measured) -> fmt::Result {
+    let Judged {
+        in_whole,
+        by_size,
+        open,
+        changing,
+        sliding,
+        rubbed,
+    } = m.on_materials;
+    let [window, shifted, turned] = m.twins_on_materials;
+    writeln!(
+        f,
+        "on materials: force judged in whole at {in_whole} points and by its size at {by_size}, {changing} of them while one changed, {rubbed} rubbed, {sliding} slid over a plane, {open} not judged\n\
+         twins on materials: {window} in another window, {shifted} shifted, {turned} mirrored or turned"
+    )
+}
+
+fn row(f: &mut fmt::Formatter<'_>, name: &str, m: &Measured) -> fmt::Result {
+    let [waiting, free, touching, letting_go] = m.states;
+    let (touching, ticks) = (touching + letting_go, m.states.iter().sum::<u64>());
+    writeln!(
+        f,
+        "{name:13} {ticks:10} {waiting:10} {free:10} {touching:10} {:10} {:5}  {:11.2e}  {:11.2e} {:10} {:8} {:8}",
+        m.unconverged, m.work, m.off_surface, m.off_minimum, m.beyond, m.around, m.stalled
+    )
+}

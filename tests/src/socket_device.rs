@@ -1,0 +1,224 @@
+//! A device behind a socket, and the command that serves it.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+use crate::hapterra_binary;
+use crate::link_campaign::frames::said_by_host;
+use crate::terrain_file;
+use crate::timeouts::{HANG, wait_until};
+use hapterra::link::{ControlSession, Native, Tcp, Transport};
+use hapterra::synth::Kind;
+use hapterra_core::wire::frame::{FrameReader, MAX_FRAME};
+use hapterra_core::wire::message::ToDevice;
+use hapterra_core::wire::session::SessionEnd;
+use hapterra_core::wire::status::Status;
+
+/// A device behind a socket, one host after the other. While it is deaf nothing reaches
+/// it, and what it says still comes.
+pub struct SocketDevice {
+    /// Its place.
+    pub address: SocketAddr,
+    /// True if nothing reaches it.
+    pub deaf: Arc<AtomicBool>,
+    seen: Arc<Seen>,
+}
+
+/// Events for which a test may wait.
+#[derive(Default)]
+struct Seen {
+    /// Ticks of the device.
+    ticks: AtomicU64,
+    /// Hellos and goodbyes that did not reach it, since it is deaf.
+    unheard_hellos: AtomicU64,
+    unheard_byes: AtomicU64,
+}
+
+impl SocketDevice {
+    /// A device whose arm rests.
+    pub fn start() -> Self {
+        Self::with(|| (Native::for_replay().restless(), || {}))
+    }
+
+    /// The device that `make` makes in its own thread, and what is done there each few
+    /// milliseconds of its time.
+    pub fn with<F: FnMut()>(make: impl FnOnce() -> (Native, F) + Send + 'static) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("a port");
+        let deaf = Arc::new(AtomicBool::new(false));
+        let seen = Arc::new(Seen::default());
+        let (is_deaf, to_see) = (Arc::clone(&deaf), Arc::clone(&seen));
+        std::thread::spawn(move || {
+            let (mut device, mut between) = make();
+            for stream in listener.incoming() {
+                let stream = stream.expect("a host");
+                serve(&mut device, stream, &is_deaf, &to_see, &mut between);
+            }
+        });
+        Self {
+            address,
+            deaf,
+            seen,
+        }
+    }
+
+    /// Waits until this many milliseconds of the device's time have passed.
+    pub fn pass_ms(&self, ms: u64) {
+        let ticks = || self.seen.ticks.load(Ordering::Relaxed);
+        let until = ticks() + ms;
+        wait_until("ticks of the device", || ticks() >= until);
+    }
+
+    /// Waits until a host has greeted the device, which is deaf.
+    pub fn wait_for_unheard_hello(&self) {
+        let hellos = &self.seen.unheard_hellos;
+        wait_until("a hello", || hellos.load(Ordering::Relaxed) > 0);
+    }
+
+    /// Waits until a host has said goodbye to the device, which is deaf.
+    pub fn wait_for_unheard_bye(&self) {
+        let byes = &self.seen.unheard_byes;
+        wait_until("a goodbye", || byes.load(Ordering::Relaxed) > 0);
+    }
+
+    /// Waits until a host, or its guardian, has said anything that ends a session to the
+    /// device, which is deaf.
+    pub fn wait_for_unheard_end(&self) {
+        let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
+        let Seen {
+            unheard_hellos,
+            unheard_byes,
+            ..
+        } = &*self.seen;
+        wait_until("an end", || count(unheard_hellos) + count(unheard_byes) > 0);
+    }
+
+    /// Returns the end of the last session, as the next host hears it.
+    pub fn last_end(&self) -> SessionEnd {
+        self.control().device().last.end
+    }
+
+    /// Returns the status of the device.
+    pub fn status(&self) -> Status {
+        self.control().fresh_status().expect("it answers")
+    }
+
+    fn control(&self) -> ControlSession<'static> {
+        self.deaf.store(false, Ordering::Relaxed);
+        let link = Tcp::connect(&self.address.to_string()).expect("there");
+        ControlSession::open(Box::new(link), HANG).expect("answers")
+    }
+}
+
+/// Ticks of the device after each look at its host.
+const TICKS: u32 = 2;
+
+/// Until the host is gone.
+fn serve(
+    device: &mut Native,
+    mut stream: TcpStream,
+    deaf: &AtomicBool,
+    seen: &Seen,
+    between: &mut dyn FnMut(),
+) {
+    let mut unheard = FrameReader::<MAX_FRAME>::new();
+    let wait = Some(Duration::from_millis(1));
+    stream.set_read_timeout(wait).expect("set");
+    let mut chunk = [0; 4096];
+    loop {
+        match stream.read(&mut chunk) {
+            Ok(0) => return,
+            Ok(n) if !deaf.load(Ordering::Relaxed) => device.send(&chunk[..n]).expect("in memory"),
+            Ok(n) => note(seen, &mut unheard, &chunk[..n]),
+            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => {}
+            Err(_) => return,
+        }
+        between();
+        // A few milliseconds of its time go by.
+        device.pass(TICKS);
+        seen.ticks.fetch_add(TICKS.into(), Ordering::Relaxed);
+        let said = device
+            .receive(&mut chunk, Duration::ZERO)
+            .expect("in memory");
+        if stream.write_all(&chunk[..said]).is_err() {
+            return;
+        }
+    }
+}
+
+/// Counts what does not reach the device.
+fn note(seen: &Seen, reader: &mut FrameReader<MAX_FRAME>, mut bytes: &[u8]) {
+    while !bytes.is_empty() {
+        let (taken, content) = reader.push(bytes);
+        bytes = &bytes[taken..];
+        let count = match content.and_then(Result::ok).and_then(said_by_host) {
+            Some(said) if matches!(said.message, ToDevice::Hello(_)) => &seen.unheard_hellos,
+            Some(said) if said.message == ToDevice::Bye => &seen.unheard_byes,
+            _ => continue,
+        };
+        count.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// A terrain in a folder; its path.
+pub fn terrain(folder: &Path) -> String {
+    let file = folder.join("hills.tif");
+    let path = file.to_str().expect("a plain path").to_owned();
+    terrain_file(&file, Kind::Fractal, 64, 1);
+    path
+}
+
+/// The command that serves terrain to the device at this address, and records.
+pub fn command(address: SocketAddr, folder: &Path) -> Command {
+    command_over(&terrain(folder), address, folder)
+}
+
+/// The same for a terrain of this path.
+pub fn command_over(terrain: &str, address: SocketAddr, folder: &Path) -> Command {
+    let mut command = Command::new(hapterra_binary());
+    command
+        .args(["run", terrain, "--scale", "1mm/cell"])
+        .args(["--exaggeration", "0.1mm/unit"])
+        .args(["--device", &format!("tcp:{address}")])
+        .arg("--out")
+        .arg(folder.join("felt.csv"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// Starts serving, and waits until samples have come.
+pub fn start(served: &SocketDevice, folder: &Path, more: &[&str]) -> Child {
+    let mut child = command(served.address, folder)
+        .args(more)
+        .spawn()
+        .expect("it runs");
+    has_begun(child.stdout.as_mut().expect("piped"));
+    child
+}
+
+/// Waits until the command names the terrain, which it does when the session is open.
+pub fn has_begun(stdout: &mut impl Read) {
+    let mut begun = [0; 16];
+    stdout.read_exact(&mut begun).expect("a session");
+}
+
+/// Sends a signal by its name.
+pub fn signal(child: &Child, name: &str) {
+    let sent = Command::new("kill")
+        .args([format!("-{name}"), child.id().to_string()])
+        .status();
+    assert!(sent.expect("kill runs").success());
+}
+
+/// Returns its output and error output.
+pub fn told(output: &Output) -> String {
+    let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
+    String::from_utf8_lossy(&both).into_owned()
+}

@@ -1,0 +1,262 @@
+//! The campaign's watch over what is felt speaks of each thing that must not be: every violation
+//! is forged, and the honest ticks beside it pass.
+
+use hapterra_core::Vec3;
+use hapterra_core::contact::ContactState;
+use hapterra_core::force::{
+    Controller, Damping, Material, MaterialTable, Pattern, Shading, SurfaceParams, Texture,
+};
+use hapterra_core::grid::GridPoint;
+use hapterra_core::guard::{Limits, Mode};
+use hapterra_core::scene::TickRecord;
+use hapterra_tests::campaign::force_invariants::ForceWatch;
+use hapterra_tests::campaign::ground::SceneSurfaces;
+
+const PARAMS: SurfaceParams = SurfaceParams {
+    damping: Damping {
+        controller: Controller::On,
+        ..Damping::NONE
+    },
+    ..SurfaceParams::PREMIUM
+};
+
+const OFF: SurfaceParams = SurfaceParams {
+    damping: Damping {
+        controller: Controller::Off,
+        ..Damping::NONE
+    },
+    ..SurfaceParams::PREMIUM
+};
+
+/// A tick in level ground at height 0, in cells of half a millimetre.
+fn at(tick: u32, height: f32, force_n: Vec3) -> TickRecord {
+    let place = |height| GridPoint::new([20, 20, 0], Vec3::new(0.5, 0.5, height));
+    TickRecord {
+        tick,
+        hip: place(height),
+        proxy: place(height.max(0.0)),
+        force_n,
+        state: match height < 0.0 {
+            true => ContactState::Touching,
+            false => ContactState::Free,
+        },
+        mode: Mode::Armed,
+        ..TickRecord::default()
+    }
+}
+
+fn watch(params: &SurfaceParams, table: Option<&[Material]>) -> ForceWatch {
+    let table = table.map(|all| MaterialTable::new(all).expect("some"));
+    ForceWatch::new(SceneSurfaces::of(params, table.as_ref()), 0.5)
+}
+
+/// Returns the verdict on one tick, 2 mm deep.
+fn said(params: &SurfaceParams, force_n: Vec3, limits: Limits) -> Result<(), String> {
+    let sample = TickRecord {
+        limits,
+        ..at(0, -4.0, force_n)
+    };
+    watch(params, None).look(&sample, true)
+}
+
+#[test]
+fn a_force_that_pulls_is_told_but_where_it_is_on_its_way() {
+    let shaded = SurfaceParams {
+        shading: Shading::Smooth,
+        ..PARAMS
+    };
+    for params in [PARAMS, shaded] {
+        for force_n in [Vec3::Z, Vec3::ZERO, Vec3::new(1.0, 0.0, 0.01)] {
+            assert_eq!(said(&params, force_n, Limits::empty()), Ok(()));
+        }
+        assert!(said(&params, -Vec3::Z * 0.01, Limits::empty()).is_err());
+        assert_eq!(said(&params, -Vec3::Z * 0.01, Limits::SLEW_LIMITED), Ok(()));
+    }
+}
+
+#[test]
+fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
+    let plain = OFF;
+    let textured = SurfaceParams {
+        texture: Texture {
+            pattern: Pattern::Grating,
+            amplitude_mm: 0.1,
+            wavelength_mm: 1.0,
+            ..Texture::NONE
+        },
+        ..plain
+    };
+    let most = |params: &SurfaceParams, most_n: f32| {
+        let force = |newtons: f32| said(params, Vec3::Z * newtons, Limits::empty());
+        assert_eq!(force(most_n), Ok(()), "{params:?}");
+        assert!(force(1.01 * most_n).is_err(), "{params:?}");
+    };
+    most(&plain, 1.0);
+    most(&PARAMS, 2.0);
+    most(&textured, 0.5 * 2.1_f32.hypot(0.2 * std::f32::consts::TAU));
+    // The stiffest of the materials, in a scene that is twice as stiff as its table.
+    let of = |stiffness_n_per_mm| Material {
+        stiffness_n_per_mm,
+        ..Material::of(&plain)
+    };
+    let table = [of(0.25), of(0.4), of(0.1)];
+    let force = |newtons: f32| {
+        let sample = at(0, -4.0, Vec3::Z * newtons);
+        watch(&plain, Some(&table)).look(&sample, true)
+    };
+    assert_eq!(force(1.6), Ok(()));
+    assert!(force(1.61).is_err());
+}
+
+/// In and out of the ground at 50 mm/s, with this much more force on the way out: whether it is
+/// told, and how much was given.
+fn tap(params: &SurfaceParams, more: f32, is_calm: bool) -> (bool, f32) {
+    taps(params, more, is_calm, 1)
+}
+
+/// The same so many times, without leaving the ground between.
+fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool, f32) {
+    let mut watch = watch(params, None);
+    let into = (0..20).map(|i| (0.5 - 0.1 * i as f32, 1.0));
+    let dip = (0..30).map(|i: i32| match i < 15 {
+        true => (-1.5 + 0.08 * i as f32, 1.0 + more),
+        false => (-1.5 + 0.08 * (30 - i) as f32, 1.0),
+    });
+    let out = (0..20).map(|i| (-1.5 + 0.1 * i as f32, 1.0 + more));
+    let dips = dip.cycle().take(30 * (times - 1));
+    let mut told = false;
+    for (tick, (height, times)) in (0..).zip(into.chain(dips).chain(out)) {
+        let spring_n = -0.25 * height.min(0.0);
+        let sample = at(tick, height, Vec3::Z * spring_n * times);
+        told |= watch.look(&sample, is_calm).is_err();
+    }
+    (told, watch.most_given_mj)
+}
+
+#[test]
+fn a_contact_that_gives_is_told_with_the_controller_on() {
+    // A spring that is felt in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s and
+    // twice 0.75 mm.
+    let (told, given) = tap(&PARAMS, 0.0, true);
+    assert!(!told && (given - 0.0229).abs() < 0.001, "{given}");
+    let (told, given) = tap(&PARAMS, 0.5, true);
+    assert!(told && given > 0.05, "{given}");
+    // Not while something goes wrong, or without the controller.
+    assert_eq!(tap(&PARAMS, 0.5, false), (false, 0.0));
+    assert_eq!(tap(&OFF, 0.0, true), (false, 0.0));
+    let shaded = SurfaceParams {
+        shading: Shading::Smooth,
+        ..PARAMS
+    };
+    // Shading may give 0.2 mJ more, and 0.2 times 0.375 N times 0.5 mm and 0.75 mm.
+    let (told, given) = tap(&shaded, 0.99, true);
+    assert!(!told && given > 0.1, "{given}");
+    let (told, given) = taps(&shaded, 0.99, true, 3);
+    assert!(told && given > 0.344, "{given}");
+}
+
+/// A press of 2 mm at rest while the ramp lets force in, from the confirmation on, and then `more`
+/// times the force that it may have.
+fn ramped(times: f32) -> Result<(), String> {
+    let mut watch = watch(&PARAMS, None);
+    let mut look = |tick: u32, mode: Mode, force_n: f32, limits: Limits| {
+        let sample = TickRecord {
+            mode,
+            limits,
+            ..at(tick, -4.0, Vec3::Z * force_n)
+        };
+        watch.look(&sample, true)
+    };
+    look(0, Mode::Confirming, 0.0, Limits::empty())?;
+    for tick in 1..1000 {
+        let spring_n = tick as f32 / 2000.0;
+        look(tick, Mode::Ramping, spring_n * times, Limits::RAMPING)?;
+    }
+    Ok(())
+}
+
+#[test]
+fn a_ramp_is_judged_by_the_share_that_it_lets_through() {
+    assert_eq!(ramped(1.0), Ok(()));
+    // All of the damping may double it.
+    assert_eq!(ramped(1.99), Ok(()));
+    assert!(ramped(2.01).is_err());
+    assert!(ramped(-0.01).is_err());
+}
+
+/// Taps in the ramp, with more force on the way out, as the old tick gave it.
+#[test]
+fn a_tap_in_the_ramp_that_gives_is_told() {
+    let tapped = |more: f32| {
+        let mut watch = watch(&PARAMS, None);
+        let mut told = false;
+        for tick in 0..1500_u32 {
+            let share = tick as f32 / 2000.0;
+            let phase = tick.saturating_sub(1000) % 200;
+            let height = match phase {
+                0..100 => 1.0 - 0.04 * phase as f32,
+                _ => -3.0 + 0.04 * (phase - 100) as f32,
+            };
+            let more = if phase < 100 { 1.0 } else { 1.0 + more };
+            let spring_n = -0.25 * height.min(0.0) * share * more;
+            let sample = TickRecord {
+                mode: match tick {
+                    0 => Mode::Confirming,
+                    _ => Mode::Ramping,
+                },
+                ..at(tick, height, Vec3::Z * spring_n)
+            };
+            told |= watch.look(&sample, true).is_err();
+        }
+        (told, watch.most_given_mj)
+    };
+    let (told, given) = tapped(0.0);
+    assert!(!told, "{given}");
+    assert!(tapped(0.5).0);
+}
+
+#[test]
+fn a_force_that_grows_on_its_way_out_is_told() {
+    let told = |second_n: f32| {
+        let mut watch = watch(&PARAMS, None);
+        let fades = |tick, force_n| TickRecord {
+            mode: Mode::Fading,
+            limits: Limits::FADING,
+            ..at(tick, -4.0, Vec3::Z * force_n)
+        };
+        watch.look(&fades(0, 1.0), true).is_ok() && watch.look(&fades(1, second_n), true).is_err()
+    };
+    assert!(!told(0.99) && !told(1.0) && told(1.01));
+}
+
+#[test]
+fn a_force_with_an_open_clutch_is_told() {
+    let told = |limits| {
+        let mut watch = watch(&PARAMS, None);
+        let open = |tick, force_n| TickRecord {
+            limits,
+            ..at(tick, -4.0, force_n)
+        };
+        let _ = watch.look(&open(0, Vec3::ZERO), true);
+        watch.look(&open(1, Vec3::Z * 0.5), true).is_err()
+    };
+    assert!(told(Limits::CLUTCH_OPEN));
+    assert!(!told(Limits::CLUTCH_OPEN | Limits::SLEW_LIMITED));
+}
+
+#[test]
+fn a_tip_that_swings_is_told_and_tremor_is_not() {
+    let told = |hz: f32, amplitude_mm: f32| {
+        let mut watch = watch(&PARAMS, None);
+        let mut told = false;
+        for tick in 0..1000_u32 {
+            let turn = std::f32::consts::TAU * hz * tick as f32 * 1e-3;
+            let height = -4.0 + 2.0 * amplitude_mm * turn.sin();
+            let sample = at(tick, height, Vec3::Z * -0.25 * height);
+            told |= watch.look(&sample, true).is_err();
+        }
+        told
+    };
+    assert!(told(40.0, 0.4) && told(25.0, 2.0));
+    assert!(!told(11.2, 0.4) && !told(40.0, 0.14));
+}

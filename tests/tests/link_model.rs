@@ -1,0 +1,405 @@
+//! Every frame of a conversation lost, repeated, delayed and overtaken, either end
+//! killed at every moment: the end is agreed or told, nothing is driven that no host
+//! wished, every sample is counted once.
+
+use hapterra_tests::link_model::{Direction, End, Harm, Interruption, Plan, Report, check, frames};
+
+/// Damage to a frame.
+const HARMS: [Harm; 5] = [
+    Harm::Lose,
+    Harm::Repeat(3),
+    Harm::Repeat(900),
+    Harm::Delay(30),
+    Harm::Delay(900),
+];
+/// Ticks between two moments at which an end is killed.
+const MOMENTS: usize = 23;
+
+/// Plays a plan that leaves the line good enough to agree.
+fn agree(plan: &Plan) -> Report {
+    match check(plan) {
+        Ok(report) if report.end == End::Agreed && report.driven => report,
+        other => panic!("{other:?} in {plan:?}"),
+    }
+}
+
+/// Every harm to every frame of an undisturbed run, first those to the device.
+fn single_harms() -> Vec<(Direction, usize, Harm)> {
+    let [to_device, to_host] = frames();
+    let to_device = (0..to_device).map(|number| (Direction::ToDevice, number));
+    let to_host = (0..to_host).map(|number| (Direction::ToHost, number));
+    let all = to_device.chain(to_host);
+    all.flat_map(|(way, number)| HARMS.map(|harm| (way, number, harm)))
+        .collect()
+}
+
+#[test]
+fn undisturbed_it_ends_at_once_and_nothing_is_uncertain() {
+    let report = agree(&Plan::default());
+    eprintln!("{report:?}");
+    assert!(report.ticks < 2_000 && report.uncertain == 0, "{report:?}");
+}
+
+#[test]
+fn any_one_frame_may_be_lost_repeated_or_late() {
+    let harms = single_harms();
+    eprintln!("{} runs", harms.len());
+    for harm in harms {
+        let harms = vec![harm];
+        let report = agree(&Plan {
+            harms,
+            ..Plan::default()
+        });
+        // Sooner than a session that is given up and taken up again.
+        assert!(report.ticks < 3_000, "{harm:?}: {report:?}");
+        assert_eq!(report.uncertain, 0, "{harm:?}");
+    }
+}
+
+#[test]
+fn any_two_frames_of_the_opening_may_be_lost_repeated_or_late() {
+    // The first frames each way: hello, scene, zero, arm, the tile and their answers.
+    let opening: Vec<_> = single_harms()
+        .into_iter()
+        .filter(|(_, number, harm)| {
+            *number < 9 && matches!(harm, Harm::Lose | Harm::Repeat(900) | Harm::Delay(30))
+        })
+        .collect();
+    for (i, first) in opening.iter().enumerate() {
+        for second in &opening[i + 1..] {
+            let harms = vec![*first, *second];
+            agree(&Plan {
+                harms,
+                ..Plan::default()
+            });
+        }
+    }
+}
+
+#[test]
+fn any_two_frames_of_the_end_may_be_lost_repeated_or_late() {
+    let [to_device, to_host] = frames();
+    let last: Vec<_> = single_harms()
+        .into_iter()
+        .filter(|(way, number, harm)| {
+            let count = match way {
+                Direction::ToDevice => to_device,
+                Direction::ToHost => to_host,
+            };
+            number + 8 > count && matches!(harm, Harm::Lose | Harm::Repeat(900) | Harm::Delay(30))
+        })
+        .collect();
+    for (i, first) in last.iter().enumerate() {
+        for second in &last[i + 1..] {
+            let harms = vec![*first, *second];
+            agree(&Plan {
+                harms,
+                ..Plan::default()
+            });
+        }
+    }
+}
+
+/// Interrupts at every moment of a run, alone and with the next frame each way lost or
+/// repeated.
+fn interrupted(what: Interruption) {
+    let ticks = agree(&Plan::default()).ticks;
+    for at in (0..ticks).step_by(MOMENTS) {
+        let interruptions = vec![(at, what)];
+        let plan = Plan {
+            interruptions,
+            ..Plan::default()
+        };
+        let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+        assert_eq!(report.end, End::Agreed, "{plan:?}");
+        // The frames around that moment, by what an undisturbed run had said.
+        for number in 0..12 {
+            for (way, harm) in [
+                (Direction::ToDevice, Harm::Lose),
+                (Direction::ToHost, Harm::Lose),
+                (Direction::ToHost, Harm::Repeat(900)),
+            ] {
+                let plan = Plan {
+                    harms: vec![(way, number, harm)],
+                    ..plan.clone()
+                };
+                let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+                assert_eq!(report.end, End::Agreed, "{plan:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_host_may_be_killed_at_any_moment() {
+    interrupted(Interruption::HostKilled);
+}
+
+#[test]
+fn the_device_may_be_reset_at_any_moment() {
+    interrupted(Interruption::DeviceReset);
+}
+
+#[test]
+fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
+    let abrupt = || Plan {
+        abrupt: true,
+        ..Plan::default()
+    };
+    let (ticks, frames) = (agree(&abrupt()).ticks, agree(&abrupt()).frames);
+    for harm in HARMS {
+        // The last frames each way: bye, goodbye and what is around them.
+        for (way, count) in [Direction::ToDevice, Direction::ToHost]
+            .into_iter()
+            .zip(frames)
+        {
+            for number in count.saturating_sub(12)..count {
+                agree(&Plan {
+                    harms: vec![(way, number, harm)],
+                    ..abrupt()
+                });
+            }
+        }
+    }
+    // A host before had heard its goodbye, and all of that comes again.
+    let killed = (ticks - 2, Interruption::HostKilled);
+    let again = Plan {
+        interruptions: vec![killed],
+        ..abrupt()
+    };
+    let leaves = agree(&again).ticks - 150;
+    for at in leaves..leaves + 150 {
+        for way in [Direction::ToDevice, Direction::ToHost] {
+            agree(&Plan {
+                interruptions: vec![killed, (at, Interruption::Echo(way))],
+                ..abrupt()
+            });
+        }
+    }
+}
+
+/// Returns the histories before a moment, with everything that may be repeated after it.
+fn histories() -> Vec<Vec<(u64, Interruption)>> {
+    let ticks = agree(&Plan::default()).ticks;
+    // While it opens, while it feels, and when everything but the end of the end was said.
+    let killed = [60, ticks / 2, ticks - 2].map(|at| vec![(at, Interruption::HostKilled)]);
+    [vec![]].into_iter().chain(killed).collect()
+}
+
+/// Plays each history with something more at its end and every moment after it. It ends as it would
+/// without, as soon, in as many sessions, and nothing more is uncertain.
+fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interruption) {
+    for history in histories {
+        let plan = |interruptions| Plan {
+            interruptions,
+            ..Plan::default()
+        };
+        let alone = agree(&plan(history.clone()));
+        let begin = history.last().map_or(0, |(at, _)| *at);
+        for at in (begin..alone.ticks).step_by(MOMENTS) {
+            let plan = plan([history.as_slice(), &[(at, what)]].concat());
+            let report = agree(&plan);
+            let (ends, sessions) = (report.uncertain, report.resumptions);
+            assert_eq!((ends, sessions), (alone.uncertain, 0), "{plan:?}");
+            assert!(report.ticks < alone.ticks + 900, "{report:?} in {plan:?}");
+        }
+    }
+}
+
+#[test]
+fn all_that_was_said_may_come_again_at_any_moment() {
+    for way in [Direction::ToDevice, Direction::ToHost] {
+        at_every_moment_after(&histories(), Interruption::Echo(way));
+    }
+}
+
+#[test]
+fn what_a_device_said_before_its_reset_may_come_again_at_any_moment() {
+    let ticks = agree(&Plan::default()).ticks;
+    let reset = [60, ticks / 2].map(|at| vec![(at, Interruption::DeviceReset)]);
+    at_every_moment_after(&reset, Interruption::Echo(Direction::ToHost));
+}
+
+#[test]
+fn a_host_of_another_version_may_speak_at_any_moment() {
+    at_every_moment_after(&histories(), Interruption::OtherHost);
+}
+
+#[test]
+fn a_host_whose_device_is_taken_is_told_so_at_once() {
+    let ticks = agree(&Plan::default()).ticks;
+    let mut told = 0;
+    // Once alone, and once with the word for it lost.
+    for (at, late) in (0..ticks)
+        .step_by(MOMENTS)
+        .flat_map(|at| [(at, 0), (at, 900)])
+    {
+        let interruptions = vec![
+            (at, Interruption::Takeover),
+            (at, Interruption::Cut(Direction::ToHost, late)),
+        ];
+        let plan = Plan {
+            interruptions,
+            ..Plan::default()
+        };
+        let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+        // Silence for 0.75 s, and hello every 0.4 s after that.
+        assert!(report.ticks < at + late + 1_300, "{report:?} in {plan:?}");
+        // Its own hello comes after the other's, or its goodbye before.
+        let is_its_own = at == 0 || at + 200 > ticks;
+        assert!(report.end == End::Told || is_its_own, "{plan:?}");
+        told += u32::from(report.end == End::Told);
+    }
+    assert!(told > 40, "{told}");
+}
+
+#[test]
+fn no_answer_that_comes_late_is_taken_for_that_to_a_later_question() {
+    let mut answers = 0;
+    for seed in 0..60 {
+        let plan = Plan {
+            curious: true,
+            ..Plan::random(seed)
+        };
+        let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+        answers += report.answers;
+    }
+    assert!(answers > 3_000, "{answers}");
+}
+
+/// A host that puts another view in while it feels, asks for the calibration, and then has
+/// outputs held, the record stored and a motor jogged.
+fn with_errands(harms: Vec<(Direction, usize, Harm)>) -> Plan {
+    Plan {
+        harms,
+        errands: true,
+        ..Plan::default()
+    }
+}
+
+#[test]
+fn every_request_is_done_or_refused_once_under_lost_frames() {
+    let whole = agree(&with_errands(vec![]));
+    eprintln!("{whole:?}");
+    assert_eq!(whole.came_of, [10, 0, 0], "all are done");
+    let ways = [Direction::ToDevice, Direction::ToHost];
+    for (way, count) in ways.into_iter().zip(whole.frames) {
+        for number in 0..count {
+            for harm in [Harm::Lose, Harm::Repeat(900), Harm::Delay(900)] {
+                let plan = with_errands(vec![(way, number, harm)]);
+                let report = agree(&plan);
+                assert_eq!(report.came_of, whole.came_of, "{plan:?}");
+                assert_eq!(report.uncertain, 0, "{plan:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn whatever_happens_between_requests_the_end_is_agreed_or_told() {
+    let ticks = agree(&with_errands(vec![])).ticks;
+    for what in [
+        Interruption::HostKilled,
+        Interruption::DeviceReset,
+        Interruption::Echo(Direction::ToHost),
+        Interruption::Cut(Direction::ToDevice, 1_500),
+        Interruption::Cut(Direction::ToHost, 1_500),
+    ] {
+        for at in (0..ticks).step_by(4 * MOMENTS) {
+            let plan = Plan {
+                interruptions: vec![(at, what)],
+                ..with_errands(vec![])
+            };
+            let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+            assert_eq!(report.end, End::Agreed, "{plan:?}");
+        }
+    }
+}
+
+#[test]
+fn a_device_of_another_version_is_told_and_never_driven() {
+    let ticks = agree(&Plan::default()).ticks;
+    let other = (0, Interruption::OtherDevice);
+    let report = check(&Plan {
+        interruptions: vec![other],
+        ..Plan::default()
+    });
+    let report = report.expect("nothing wrong");
+    assert!(report.end == End::Told && !report.driven && report.ticks < 100);
+    // One that was given other firmware meanwhile says so after its reset.
+    for at in (0..ticks).step_by(MOMENTS) {
+        let other = Interruption::OtherDevice;
+        let interruptions = vec![(at, Interruption::DeviceReset), (at, other)];
+        let plan = Plan {
+            interruptions,
+            ..Plan::default()
+        };
+        let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+        let is_late = at + 100 > ticks;
+        assert!(report.end == End::Told || is_late, "{report:?} in {plan:?}");
+        assert!(report.ticks < at + 3_000, "{report:?} in {plan:?}");
+    }
+}
+
+#[test]
+fn a_host_that_is_gone_leaves_an_arm_that_is_let_go_in_time() {
+    let ticks = agree(&Plan::default()).ticks;
+    for at in (0..ticks).step_by(MOMENTS) {
+        let plan = Plan {
+            interruptions: vec![(at, Interruption::HostGone)],
+            ..Plan::default()
+        };
+        check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+    }
+}
+
+#[test]
+fn the_line_may_be_cut_one_way_at_any_moment() {
+    let ticks = agree(&Plan::default()).ticks;
+    for long in [300, 1_500, 5_000] {
+        for way in [Direction::ToDevice, Direction::ToHost] {
+            for at in (0..ticks).step_by(2 * MOMENTS) {
+                let interruptions = vec![(at, Interruption::Cut(way, long))];
+                let plan = Plan {
+                    interruptions,
+                    ..Plan::default()
+                };
+                let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+                // In a cut that is longer than goodbye may take the user is told.
+                assert!(report.end == End::Agreed || long > 3_000, "{plan:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn whatever_goes_wrong_at_random_the_end_is_agreed_or_told() {
+    let (mut agreed, mut told) = (0, 0);
+    for seed in 0..400 {
+        let plan = Plan::random(seed);
+        match check(&plan) {
+            Ok(report) if report.end == End::Agreed => agreed += 1,
+            Ok(_) => told += 1,
+            Err(wrong) => panic!("{wrong:?} in {plan:?}"),
+        }
+    }
+    eprintln!("{agreed} agreed, {told} told");
+    assert!(agreed > 200, "hardly ever agreed: {agreed}");
+}
+
+#[test]
+fn a_dead_line_ends_in_a_word_and_not_in_a_hang() {
+    for way in [Direction::ToDevice, Direction::ToHost] {
+        for at in [0, 200, 400] {
+            let interruptions = vec![(at, Interruption::Cut(way, u64::MAX / 2))];
+            let plan = Plan {
+                interruptions,
+                ..Plan::default()
+            };
+            let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
+            assert_eq!(report.end, End::Told, "{plan:?}");
+            // Four seconds, five times; three for goodbye.
+            assert!(report.ticks < 30_000, "{report:?} in {plan:?}");
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! The judge of materials is fed false observations, one at a time, and speaks of each; of the
+//! honest ones beside them, which the product's loop made, of none.
+
+use hapterra_core::Vec3;
+use hapterra_core::contact::{ContactState, Friction};
+use hapterra_core::force::{Material, Pattern, Shading, Texture};
+use hapterra_tests::invariants::Invariant;
+use hapterra_tests::invariants::material::{Judged, MaterialJudge};
+use hapterra_tests::scene::loop_replay::{Replay, Replied, replay};
+use hapterra_tests::scene::materials::Materials;
+use hapterra_tests::scene::run::{Execution, Scene};
+use hapterra_tests::scene::terrain::{Kind, Terrain};
+use hapterra_tests::scene::tile_supply::{Buffers, Supply};
+use hapterra_tests::whole_field::point;
+
+const SIZE: [i32; 2] = [40, 40];
+const SOFT: Material = Material {
+    stiffness_n_per_mm: 0.4,
+    friction: Friction::NONE,
+    damping_ns_per_m: 0.0,
+    texture: Texture::NONE,
+};
+const HARD: Material = Material {
+    stiffness_n_per_mm: 1.0,
+    ..SOFT
+};
+const GRATING: Texture = Texture {
+    pattern: Pattern::Grating,
+    amplitude_mm: 0.1,
+    wavelength_mm: 1.0,
+    ..Texture::NONE
+};
+
+/// Violated invariant, and the point.
+type Found = (Invariant, usize);
+
+/// A way over flat ground, whose samples from column 20 on are of the second material: down 1.5
+/// cells deep, and eastward by a step in each tick, at the end back again.
+struct Way {
+    scene: Scene,
+    materials: Materials,
+    felt: Vec<Replied>,
+}
+
+impl Way {
+    fn over(table: [Material; 2], [from, step]: [f64; 2], shading: Shading) -> Self {
+        let terrain = Terrain::from_fn(Kind::Flat, SIZE, |_, _| 2.0);
+        let materials = Materials::from_fn(&table, SIZE, |x, _| u8::from(x >= 20));
+        let steps = (0..240).chain((180..240).rev());
+        let along = steps.map(|i| [from + step * f64::from(i), 10.25, 0.5]);
+        let path = [[from, 10.25, 3.0]].into_iter().chain(along).collect();
+        let (execution, supply) = (Execution::LockStep, Supply::Held);
+        let mut scene = Scene::given(terrain, path, execution, supply);
+        scene.shading = shading;
+        let shift = [0; 3];
+        let how = Replay { shift, supply };
+        let mut buffers = Buffers::default();
+        let felt = replay::<4>(&scene, &materials, &mut buffers, how, |_| Ok(()));
+        Self {
+            felt: felt.expect("settles"),
+            scene,
+            materials,
+        }
+    }
+
+    /// Returns the verdict of the judge if one point is changed, and of which point, and what it
+    /// learned.
+    fn with(&self, at: usize, change: impl Fn(&mut Replied)) -> (Option<Found>, Judged) {
+        let mut judge = MaterialJudge::new(&self.scene, &self.materials, [0; 3]);
+        for (point, felt) in self.felt.iter().enumerate() {
+            let mut felt = *felt;
+            if point == at {
+                change(&mut felt);
+            }
+            if let Err(violation) = judge.look(&felt) {
+                return (Some((violation.invariant, point)), judge.judged);
+            }
+        }
+        (None, judge.judged)
+    }
+
+    fn honest(&self) -> Judged {
+        let (found, judged) = self.with(usize::MAX, |_| {});
+        assert_eq!(found, None);
+        judged
+    }
+
+    /// Returns the verdict on another force, at once.
+    fn force(&self, at: usize, change: impl Fn(Vec3) -> Vec3) -> Option<Invariant> {
+        let changed = |felt: &mut Replied| felt.sample.force_n = change(felt.sample.force_n);
+        self.at_once(at, changed)
+    }
+
+    fn at_once(&self, at: usize, change: impl Fn(&mut Replied)) -> Option<Invariant> {
+        let found = self.with(at, change).0;
+        found.map(|(invariant, point)| {
+            assert_eq!(point, at, "{invariant:?}");
+            invariant
+        })
+    }
+
+    /// Of a proxy that is elsewhere, with the force that it has there by a stiffness.
+    fn proxy(&self, at: usize, east: f64, stiffness: f64) -> Option<Invariant> {
+        let moved = |felt: &mut Replied| {
+            felt.proxy[0] += east;
+            felt.sample.proxy = point(felt.proxy);
+            let way = [0, 1, 2].map(|i| ((felt.proxy[i] - felt.hip[i]) * stiffness) as f32);
+            felt.sample.force_n = Vec3::from_array(way);
+        };
+        self.at_once(at, moved)
+    }
+}
+
+/// Start of a path, and its step.
+const SLOW: [f64; 2] = [18.51, 0.02];
+/// The first point of it beyond the border at 19.5; the first of all is above the ground.
+const BORDER: usize = 51;
+
+#[test]
+fn another_stiffness_than_that_on_the_way_is_found() {
+    let way = Way::over([SOFT, HARD], SLOW, Shading::None);
+    let judged = way.honest();
+    assert_eq!((judged.in_whole, judged.open), (300, 0));
+    assert!((100..110).contains(&judged.changing), "{judged:?}");
+    let wrong = Some(Invariant::Material);
+    // In one step, not at all, by one tick too early and too late.
+    assert_eq!(way.force(BORDER, |_| Vec3::Z * 1.5), wrong);
+    assert_eq!(way.force(BORDER + 40, |_| Vec3::Z * 0.6), wrong);
+    assert_eq!(way.force(BORDER - 1, |f| f + Vec3::Z * 0.009), wrong);
+    for at in [BORDER + 1, BORDER + 50, BORDER + 98] {
+        assert_eq!(way.force(at, |f| f + Vec3::Z * 0.009), wrong, "{at}");
+        assert_eq!(way.force(at, |f| f - Vec3::Z * 0.009), wrong, "{at}");
+    }
+    for at in [3, BORDER, 299] {
+        assert_eq!(way.force(at, |f| f * 1.0001), wrong, "{at}");
+        assert_eq!(way.force(at, |f| f + Vec3::X * 1e-3), wrong, "{at}");
+        assert_eq!(way.force(at, |f| -f), wrong, "it pulls");
+        assert_eq!(way.force(at, |f| f * 1e3), wrong, "above the limit");
+    }
+}
+
+#[test]
+fn where_two_are_equally_near_either_is_right_until_the_force_tells() {
+    // To the line half way between two samples, and not on.
+    let way = Way::over([SOFT, HARD], [18.5, 1.0 / 64.0], Shading::None);
+    let on_line = 66;
+    assert_eq!(way.felt[on_line - 1].proxy[0], 19.5);
+    way.honest();
+    // There the class before would have been right, but then the next point is the first of the
+    // change.
+    let before = |felt: &mut Replied| felt.sample.force_n = Vec3::Z * 0.6;
+    let (found, _) = way.with(on_line - 1, before);
+    assert_eq!(found, Some((Invariant::Material, on_line)));
+    let wrong = Some(Invariant::Material);
+    assert_eq!(way.force(on_line - 1, |_| Vec3::Z * 0.61), wrong);
+    assert_eq!(way.force(on_line - 2, |_| Vec3::Z * 0.609), wrong);
+}
+
+#[test]
+fn friction_of_the_place_after_is_found() {
+    let rough = Material {
+        friction: Friction::coulomb(0.5),
+        ..SOFT
+    };
+    let way = Way::over([SOFT, rough], SLOW, Shading::None);
+    let judged = way.honest();
+    assert!(judged.sliding > 150 && judged.open == 0, "{judged:?}");
+    // 1.5 cells deep, each tick of the change holds 0.0075 cells more.
+    let proxy = |at, east| way.proxy(BORDER + at, east, 0.4);
+    let early = proxy(0, -0.0075);
+    assert_eq!(early, Some(Invariant::LocalMinimum), "nothing is held yet");
+    assert_eq!(proxy(10, 0.0), None);
+    assert_eq!(proxy(10, -0.0075), Some(Invariant::Cone), "one tick early");
+    assert_eq!(proxy(10, 0.0075), Some(Invariant::Cone), "one tick late");
+    // On the way back it is held, and does not move.
+    let [stuck, before] = [280, 279].map(|at| way.felt[at].sample.proxy);
+    assert_eq!(stuck, before);
+    assert_eq!(way.proxy(280, 1e-4, 0.4), Some(Invariant::Cone));
+}
+
+#[test]
+fn two_textures_at_once_are_found() {
+    let textured = |wavelength_mm| Material {
+        texture: Texture {
+            wavelength_mm,
+            ..GRATING
+        },
+        ..SOFT
+    };
+    let way = Way::over([textured(1.0), textured(1.7)], SLOW, Shading::None);
+    way.honest();
+    let wrong = Some(Invariant::Material);
+    // In the middle of the change nothing is felt of either.
+    assert_eq!(way.force(BORDER + 50, |f| f + Vec3::Z * 0.004), wrong);
+    for at in [BORDER + 10, BORDER + 90, 280] {
+        assert_eq!(way.force(at, |f| f + Vec3::Z * 4e-3), wrong, "{at}");
+        assert_eq!(way.force(at, |f| f + Vec3::X * 8e-3), wrong, "{at}");
+    }
+}
+
+#[test]
+fn another_damping_is_found() {
+    let damped = Material {
+        damping_ns_per_m: 10.0,
+        ..SOFT
+    };
+    let rough = Material {
+        friction: Friction::coulomb(0.3),
+        ..damped
+    };
+    // 20 mm/s along the force make 0.2 N; with friction a part of that.
+    let way = Way::over([SOFT, rough], SLOW, Shading::None);
+    way.honest();
+    let wrong = Some(Invariant::Material);
+    assert_eq!(way.force(280, |f| f * 1.01), wrong);
+    assert_eq!(way.force(280, |f| f / f.length() * 0.4 * 1.566), wrong);
+}
+
+#[test]
+fn what_is_shaded_or_fades_is_judged_by_its_size() {
+    let way = Way::over([SOFT, HARD], SLOW, Shading::Smooth);
+    let judged = way.honest();
+    assert_eq!((judged.in_whole, judged.by_size), (0, 300));
+    let wrong = Some(Invariant::Material);
+    assert_eq!(way.force(BORDER + 50, |f| f * 1.001), wrong);
+    assert_eq!(way.force(BORDER + 50, |f| f * 0.999), wrong);
+    let turned = |f: Vec3| Vec3::X * f.length();
+    assert_eq!(way.force(BORDER + 50, turned), wrong, "by 90°");
+}
+
+#[test]
+fn a_force_without_a_contact_is_found() {
+    let way = Way::over([SOFT, HARD], SLOW, Shading::None);
+    let found = way.at_once(0, |felt| {
+        assert_eq!(felt.sample.state, ContactState::Free);
+        felt.sample.force_n = Vec3::Z * 1e-3;
+    });
+    assert_eq!(found, Some(Invariant::Material));
+}

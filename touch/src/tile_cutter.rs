@@ -1,0 +1,242 @@
+//! Tiles that are cut from a height field where it is touched.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use hapterra_core::grid::MAX_CELL;
+use hapterra_core::terrain::{MAX_STEP_CELLS, TILE_CELLS, TILE_SAMPLES, Tile, TileKey};
+
+use crate::checks::TerrainError;
+use crate::heights::{Block, Unread};
+use crate::scale::Scale;
+use crate::terrain::Terrain;
+use crate::tile_heights;
+use crate::tip::{self, Ball, Nodes, Samples};
+
+/// A tile that could not be cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoTile {
+    Unread(Unread),
+    Step,
+}
+
+impl Terrain {
+    /// The height of the surface at a place in millimetres, mm: of the ground, or of a ball's centre
+    /// over it ([`Self::with_tip`]). `None` in a hole, off the terrain, and where it cannot be read.
+    #[must_use]
+    pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
+        let (size, cell_mm) = (self.size(), self.haptic_scale().cell_mm());
+        let (column, u) = tile_heights::place(east_mm / cell_mm, size[0])?;
+        let (row, v) = tile_heights::place(north_mm / cell_mm, size[1])?;
+        if let Some(ball) = &self.ball {
+            let mut room = Vec::new();
+            let read = self.samples_around(ball, [column, row], tip::PATCH, &mut room);
+            let (samples, nodes) = read.ok()?;
+            return Some(ball.between(&samples, nodes, [u, v])? * cell_mm);
+        }
+        let mut corners = [f64::NAN; 4];
+        let block = Block {
+            column,
+            row,
+            columns: 2,
+            rows: 2,
+        };
+        self.heights.read(block, &mut corners).ok()?;
+        let mm = corners.map(|height| height * self.scale.height_mm_per_unit());
+        let mix = |a: f64, b: f64, t: f64| a * (1.0 - t) + b * t;
+        let [sw, se, nw, ne] = mm;
+        // Every corner counts: a cell with a hole at one is a hole.
+        let hole = mm.iter().any(|height| !height.is_finite());
+        (!hole).then(|| mix(mix(sw, se, u), mix(nw, ne, u), v))
+    }
+
+    /// Haptic cells a cell of the ground, along a side: 1 for a point.
+    fn parts(&self) -> u32 {
+        self.ball.as_ref().map_or(1, Ball::parts)
+    }
+
+    /// The scale of haptic cells: that of the samples, or a whole part of it under a ball.
+    pub(crate) fn haptic_scale(&self) -> Scale {
+        self.scale.in_parts(self.parts())
+    }
+
+    /// Haptic patches east and north.
+    pub(crate) fn size(&self) -> [i32; 2] {
+        let parts = self.parts() as i32;
+        // Checked: at most MAX_CELL of them.
+        [self.columns, self.rows].map(|count| (count as i32 - 1) * parts)
+    }
+
+    /// A whole height in haptic cells that no sample exceeds.
+    pub(crate) fn top(&self) -> i32 {
+        let Some(range) = self.range else {
+            return MAX_CELL + 1;
+        };
+        let scale = self.haptic_scale();
+        let ends = range.map(|height| scale.height_cells(height));
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        let radius = self.ball.as_ref().map_or(0.0, Ball::radius);
+        (tile_heights::top(low, high) + libm::ceil(radius) as i32).min(MAX_CELL + 1)
+    }
+
+    /// The largest material that a sample has; none where all are of one.
+    pub(crate) fn last_material(&self) -> Option<u8> {
+        let materials = self.materials.as_ref()?;
+        materials.samples.iter().copied().max()
+    }
+
+    /// Checks that the heights can be touched at the scale; those of a callback, and what a ball makes
+    /// of heights, are checked tile by tile.
+    pub(crate) fn check_heights(&self) -> Result<(), TerrainError> {
+        let scale = self.haptic_scale();
+        let cell_mm = scale.cell_mm();
+        for height in self.range.into_iter().flatten() {
+            let cells = scale.height_cells(height);
+            if cells.is_nan() || cells.abs() > f64::from(MAX_CELL) {
+                return Err(TerrainError::TooTall { cells, cell_mm });
+            }
+        }
+        if let Some((step, [column, row])) = self.step {
+            let cells = scale.height_cells(step).abs();
+            if cells > f64::from(MAX_STEP_CELLS) {
+                return Err(TerrainError::Step { column, row, cells });
+            }
+        }
+        Ok(())
+    }
+
+    /// Cuts a tile of the terrain into a buffer, with its materials if the table has any. `room` is
+    /// for its samples.
+    pub(crate) fn cut(
+        &self,
+        key: TileKey,
+        materials: usize,
+        room: &mut Vec<f64>,
+        tile: &mut Tile,
+    ) -> Result<(), NoTile> {
+        let index = [key.index.col, key.index.row];
+        let first = index.map(|index| index.max(0) as u32 * TILE_CELLS as u32);
+        let width = self.read_felt(first, room).map_err(NoTile::Unread)?;
+        let base = base(room);
+        let filled = tile.fill(key, base, |col, row| {
+            let cells = (col < width).then(|| room.get(row * width + col)).flatten();
+            cells.map_or(f32::NAN, |cells| tile_heights::above(base, *cells))
+        });
+        filled.map_err(|_| NoTile::Step)?;
+        if materials > 0
+            && let Some(of) = &self.materials
+        {
+            let part = 1.0 / f64::from(self.parts());
+            // The sample under the middle of a ball.
+            let under = |felt: u32| libm::floor(f64::from(felt) * part + 0.5) as u32;
+            let [column, row] = first;
+            let samples = (0..TILE_SAMPLES as u32).flat_map(|v| {
+                let line = of.row(under(row + v));
+                let at = move |u| line.get(under(column + u) as usize);
+                (0..TILE_SAMPLES as u32).map(move |u| at(u).copied().unwrap_or(0))
+            });
+            // Checked when they were put together.
+            let set = tile.set_materials(materials, samples);
+            set.map_err(|_| NoTile::Step)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the felt heights of a tile, in haptic cells, row by row: NaN in holes. Returns how many a
+    /// row has.
+    fn read_felt(&self, first: [u32; 2], room: &mut Vec<f64>) -> Result<usize, Unread> {
+        let Some(ball) = &self.ball else {
+            let end = [self.columns, self.rows].map(i64::from);
+            let from = first.map(i64::from);
+            let to = [0, 1].map(|axis| (from[axis] + TILE_SAMPLES as i64).min(end[axis]));
+            let block = self.read_cells(from, to, room)?;
+            if self.height_step > 0.0 {
+                for height in room.iter_mut() {
+                    *height = libm::round(*height / self.height_step) * self.height_step;
+                }
+            }
+            return Ok(block.columns as usize);
+        };
+        let (samples, nodes) = self.samples_around(ball, first, TILE_SAMPLES, room)?;
+        *room = ball.centres(&samples, nodes);
+        for height in room.iter_mut() {
+            *height = tip::rounded(within(*height));
+        }
+        Ok(TILE_SAMPLES)
+    }
+
+    /// Reads the samples that a ball's nodes depend on, `side` of them each way from a rendered sample on,
+    /// in haptic cells: NaN in holes and beside the field.
+    fn samples_around(
+        &self,
+        ball: &Ball,
+        first: [u32; 2],
+        side: usize,
+        room: &mut Vec<f64>,
+    ) -> Result<(Samples, Nodes), Unread> {
+        let (from, along, nodes) = ball.around(first, side);
+        let end = [self.columns, self.rows].map(i64::from);
+        let to = [0, 1].map(|axis| (from[axis] + along as i64).min(end[axis]));
+        let block = self.read_cells(from.map(|first| first.max(0)), to, room)?;
+        let mut heights = vec![f64::NAN; along * along];
+        let beside = from.map(|first| first.min(0).unsigned_abs() as usize);
+        let rows = heights.chunks_exact_mut(along).skip(beside[1]);
+        for (row, read) in rows.zip(room.chunks_exact(block.columns.max(1) as usize)) {
+            for (height, cells) in row.iter_mut().skip(beside[0]).zip(read) {
+                *height = *cells;
+            }
+        }
+        let samples = Samples {
+            columns: along,
+            rows: along,
+            heights,
+        };
+        Ok((samples, nodes))
+    }
+
+    /// Reads samples of the field from one to before another, in haptic cells: NaN in holes.
+    fn read_cells(
+        &self,
+        from: [i64; 2],
+        to: [i64; 2],
+        room: &mut Vec<f64>,
+    ) -> Result<Block, Unread> {
+        // Both are within the field.
+        let count = |axis: usize| (to[axis] - from[axis]).max(0) as u32;
+        let block = Block {
+            column: from[0] as u32,
+            row: from[1] as u32,
+            columns: count(0),
+            rows: count(1),
+        };
+        room.clear();
+        room.resize(block.columns as usize * block.rows as usize, f64::NAN);
+        self.heights.read(block, room)?;
+        let scale = self.haptic_scale();
+        for height in room.iter_mut() {
+            *height = within(scale.height_cells(*height));
+        }
+        Ok(block)
+    }
+}
+
+/// A height in cells; NaN where positions cannot say it.
+fn within(cells: f64) -> f64 {
+    match cells.abs() <= f64::from(MAX_CELL) {
+        true => cells,
+        false => f64::NAN,
+    }
+}
+
+/// The whole height that a tile counts from; 0 where all is a hole.
+fn base(cells: &[f64]) -> i32 {
+    let known = cells.iter().copied().filter(|cells| !cells.is_nan());
+    let range = known.fold(None, |range: Option<(f64, f64)>, h| {
+        let (low, high) = range.unwrap_or((h, h));
+        Some((low.min(h), high.max(h)))
+    });
+    let Some((low, high)) = range else {
+        return 0;
+    };
+    tile_heights::base(low, high)
+}

@@ -1,0 +1,128 @@
+//! The text beside the picture: place, scale, and the position of the hand.
+
+use std::fmt::Write as _;
+
+use anyhow::Result;
+use hapterra_view_stream::{Link, Sample, Scene};
+use re_sdk_types::archetypes::TextDocument;
+use re_sdk_types::components::MediaType;
+
+use super::log::{Entry, Log};
+
+/// New words in a second.
+const RATE_HZ: f64 = 4.0;
+/// The entity.
+pub(super) const WORDS: &str = "words";
+
+/// The words that stay the same, and when others are due.
+pub(super) struct Words {
+    facts: String,
+    due_s: f64,
+    link: Option<Link>,
+}
+
+impl Words {
+    pub(super) fn new(scene: &Scene) -> Self {
+        Self {
+            facts: facts(scene),
+            due_s: f64::NEG_INFINITY,
+            link: None,
+        }
+    }
+
+    /// Goes over to another view.
+    pub(super) fn change(&mut self, scene: &Scene) {
+        // Of a recording they are told once.
+        if !scene.facts.is_empty() {
+            self.facts = facts(scene);
+        }
+        self.due_s = f64::NEG_INFINITY;
+    }
+
+    pub(super) fn link(&mut self, link: &Link) {
+        self.link = Some(*link);
+    }
+
+    /// Of a live session the latest words stand; of a recording each has its time.
+    pub(super) fn take(
+        &mut self,
+        log: &Log,
+        scene: &Scene,
+        samples: &[Sample],
+    ) -> Result<Option<Entry>> {
+        let due = samples.iter().rev().find(|sample| sample.t_s >= self.due_s);
+        let Some(sample) = due else {
+            return Ok(None);
+        };
+        self.due_s = sample.t_s + 1.0 / RATE_HZ;
+        let words =
+            TextDocument::new(self.text(scene, sample)).with_media_type(MediaType::markdown());
+        match scene.is_live {
+            true => log.standing(WORDS, "", &words).map(Some),
+            false => {
+                let columns = words.columns_of_unit_batches()?;
+                log.happened(WORDS, &[sample.t_s], columns).map(Some)
+            }
+        }
+    }
+
+    fn text(&self, scene: &Scene, sample: &Sample) -> String {
+        let unit = &scene.height_unit;
+        let [x, y, z] = sample.hip_mm;
+        let height = |mm: f64| mm * scene.height_per_mm;
+        // The first row of a table is its header, in this form of text.
+        let mut text = format!("| {} | |\n|---|---|\n", plain(&scene.title));
+        if let Some(place) = coordinates(scene, x, y) {
+            let _ = writeln!(text, "| HIP at | {place} |");
+        }
+        let surface = match sample.ground_mm.is_finite() {
+            true => format!("{:.1} {unit}", height(sample.ground_mm)),
+            false => "no data".into(),
+        };
+        let _ = writeln!(
+            text,
+            "| HIP, surface | {:.1} {unit}, {surface} |",
+            height(z)
+        );
+        let [fx, fy, fz] = sample.force_n;
+        let force = (fx * fx + fy * fy + fz * fz).sqrt();
+        let touching = if sample.contact { "touching" } else { "free" };
+        let _ = writeln!(text, "| force | {force:.2} N, {touching} |");
+        if let Some(link) = &self.link {
+            let _ = writeln!(
+                text,
+                "| tiles, lost, late | {}, {}, {} |",
+                link.tiles, link.lost, link.late
+            );
+            if link.dropped > 0 {
+                let _ = writeln!(text, "| not shown | {} messages |", link.dropped);
+            }
+        }
+        text.push_str(self.facts.trim_start());
+        text
+    }
+}
+
+fn facts(scene: &Scene) -> String {
+    let mut facts = String::from("\n");
+    for (name, value) in &scene.facts {
+        let _ = writeln!(facts, "| {} | {} |", plain(name), plain(value));
+    }
+    facts
+}
+
+/// The file's coordinates of a place, mm; none where the file knows none.
+pub(super) fn coordinates(scene: &Scene, x: f64, y: f64) -> Option<String> {
+    let known = scene.coordinates.as_ref()?;
+    let at = |axis: usize| {
+        let [origin, east, north] = [&known.origin, &known.east, &known.north];
+        Some(origin.get(axis)? + x * east.get(axis)? + y * north.get(axis)?)
+    };
+    let decimals = usize::from(known.decimals.min(9));
+    Some(format!("{:.decimals$}, {:.decimals$}", at(0)?, at(1)?))
+}
+
+/// Without what ends a cell of a table.
+fn plain(text: &str) -> String {
+    text.replace(['|', '\n', '\r', '<', '>', '*', '`'], " ")
+}

@@ -1,0 +1,157 @@
+//! Check of the origin and the path of a request.
+//!
+//! A page of another site can make this machine's browser ask a server on the loopback
+//! address, and can have its own name point there (DNS rebinding). So the name in `Host`
+//! has to be an address or `localhost`, which no such page can have, and requests that
+//! say they come from elsewhere are refused. There is nothing but reading.
+
+use std::net::IpAddr;
+
+/// The head of a request.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    /// The method.
+    pub method: &'a str,
+    /// `Host`.
+    pub host: Option<&'a str>,
+    /// `Origin`.
+    pub origin: Option<&'a str>,
+    /// `Sec-Fetch-Site`.
+    pub site: Option<&'a str>,
+    /// The path.
+    pub path: &'a str,
+}
+
+impl Asked<'_> {
+    /// Checks that it is answered, by a server on `port`.
+    ///
+    /// # Errors
+    /// The status with which it is refused.
+    pub fn check(&self, port: u16) -> Result<(), u16> {
+        if !matches!(self.method, "GET" | "HEAD") {
+            return Err(405);
+        }
+        let host = self.host.ok_or(400u16)?;
+        if !is_own(host, port) {
+            return Err(421);
+        }
+        // A link to the page may stand anywhere; what the page is made of is asked for by
+        // the page alone.
+        let is_page = self.path == "/";
+        let is_foreign = match self.site {
+            Some(site) => !matches!(site, "same-origin" | "none") && !is_page,
+            None => false,
+        };
+        let from = self.origin.map(|origin| origin.strip_prefix("http://"));
+        let is_elsewhere = from.is_some_and(|from| from != Some(host));
+        match is_foreign || is_elsewhere {
+            true => Err(403),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Returns true if `Host` names an address, or `localhost`, and the server's port.
+fn is_own(host: &str, port: u16) -> bool {
+    let (name, said) = match host.rsplit_once(':') {
+        Some((name, said)) if !said.ends_with(']') => (name, said.parse().ok()),
+        _ => (host, Some(80)),
+    };
+    let inner = name
+        .strip_prefix('[')
+        .and_then(|name| name.strip_suffix(']'));
+    let is_address = match inner {
+        Some(inner) => inner.parse::<std::net::Ipv6Addr>().is_ok(),
+        None => matches!(name.parse(), Ok(IpAddr::V4(_))),
+    };
+    said == Some(port) && (is_address || name.eq_ignore_ascii_case("localhost"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAGE: Asked<'static> = Asked {
+        method: "GET",
+        host: Some("127.0.0.1:8760"),
+        origin: None,
+        site: Some("none"),
+        path: "/",
+    };
+
+    #[test]
+    fn the_page_and_its_parts_are_answered() {
+        let part = Asked {
+            path: "/feed",
+            site: Some("same-origin"),
+            ..PAGE
+        };
+        let with_origin = Asked {
+            origin: Some("http://127.0.0.1:8760"),
+            ..part
+        };
+        let linked = Asked {
+            site: Some("cross-site"),
+            ..PAGE
+        };
+        for asked in [PAGE, part, with_origin, linked] {
+            assert_eq!(asked.check(8760), Ok(()), "{asked:?}");
+        }
+        for host in ["localhost:8760", "[::1]:8760", "192.168.7.7:8760"] {
+            let asked = Asked {
+                host: Some(host),
+                ..PAGE
+            };
+            assert_eq!(asked.check(8760), Ok(()), "{host}");
+        }
+    }
+
+    #[test]
+    fn names_that_can_be_pointed_here_are_refused() {
+        for host in [
+            "evil.example:8760",
+            "127.0.0.1.evil.example:8760",
+            "127.0.0.1:1",
+            "127.0.0.1",
+            "[::1]",
+            "localhost.evil:8760",
+            ":8760",
+            "",
+        ] {
+            let asked = Asked {
+                host: Some(host),
+                ..PAGE
+            };
+            assert_eq!(asked.check(8760), Err(421), "{host}");
+        }
+        let asked = Asked { host: None, ..PAGE };
+        assert_eq!(asked.check(8760), Err(400));
+    }
+
+    #[test]
+    fn other_sites_read_nothing_and_nobody_writes() {
+        let part = Asked {
+            path: "/feed",
+            ..PAGE
+        };
+        for site in ["cross-site", "same-site", "?"] {
+            let asked = Asked {
+                site: Some(site),
+                ..part
+            };
+            assert_eq!(asked.check(8760), Err(403), "{site}");
+        }
+        for origin in ["null", "http://evil.example", "https://127.0.0.1:8760"] {
+            let asked = Asked {
+                origin: Some(origin),
+                site: None,
+                ..part
+            };
+            assert_eq!(asked.check(8760), Err(403), "{origin}");
+        }
+        for method in ["POST", "PUT", "OPTIONS", "CONNECT"] {
+            let asked = Asked { method, ..PAGE };
+            assert_eq!(asked.check(8760), Err(405));
+        }
+    }
+}
