@@ -76,11 +76,11 @@ pub struct Row {
     pub ns: [f64; 3],
     /// Median over the rounds of its time over that of [`PLAIN`].
     pub ratio: f64,
-    /// Of the answers judged; `None` where nothing was felt.
+    /// Of the answers judged; `None` where no force was rendered.
     pub error: Option<Error>,
     /// Largest change of the displacement from one tick to the next, cells.
     pub jump: f64,
-    /// Part of the ticks below the surface that felt nothing.
+    /// Share of the ticks below the surface without a force.
     pub missed: f64,
     /// Part of the ticks in which work was left over.
     pub unconverged: f64,
@@ -254,7 +254,7 @@ fn largest_jump(answers: &[Answer]) -> f64 {
     changes.fold(0.0, f64::max)
 }
 
-/// The first HIP is above the surface, so one below it should be felt.
+/// The first HIP is above the surface, so one below it should be rendered.
 fn missed(grid: &Grid, path: &Path, answers: &[Answer]) -> f64 {
     let below = path.hips.iter().zip(answers).filter(|(hip, _)| {
         let [x, y, z] = hip.wide;

@@ -73,7 +73,7 @@ pub(crate) fn length(v: &[f64; 3]) -> f64 {
 /// Forces below this, in cells of displacement, have no direction to speak of.
 const LEAST_FORCE: f64 = 1e-3;
 
-/// From the exact force to the one felt, in degrees.
+/// From the exact force to the rendered one, in degrees.
 pub(crate) fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     if length(b) < LEAST_FORCE {
         return 0.0;

@@ -95,11 +95,11 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
 
     #[inline]
     fn tick(&mut self, hip: &Hip) -> Answer {
-        let felt = self.contact.step(self.window, &hip.grid);
+        let output = self.contact.step(self.window, &hip.grid);
         Answer {
-            touching: felt.state == ContactState::Touching,
-            converged: felt.converged,
-            displacement: felt.displacement.to_array(),
+            touching: output.state == ContactState::Touching,
+            converged: output.converged,
+            displacement: output.displacement.to_array(),
         }
     }
 
@@ -107,16 +107,16 @@ impl<const D: usize> Haptics for Product<'_, '_, D> {
     fn answers(&mut self, path: &[Hip]) -> Vec<Answer> {
         self.forget();
         let step = |hip: &Hip| {
-            let felt = self.contact.step(self.window, &hip.grid);
-            let touching = felt.state == ContactState::Touching;
+            let output = self.contact.step(self.window, &hip.grid);
+            let touching = output.state == ContactState::Touching;
             let displacement = if touching {
-                hip.grid.to(&felt.proxy)
+                hip.grid.to(&output.proxy)
             } else {
-                felt.displacement
+                output.displacement
             };
             Answer {
                 touching,
-                converged: felt.converged,
+                converged: output.converged,
                 displacement: displacement.to_array(),
             }
         };

@@ -48,7 +48,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Nothing is felt.
+    /// No force is rendered.
     pub const FREE: Self = Self {
         touching: false,
         converged: true,

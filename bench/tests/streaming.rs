@@ -59,7 +59,7 @@ fn what_streaming_takes_does_not_grow_with_the_terrain() {
             "{a} {b}"
         );
         assert!(large.tile_bytes_p99 < Some(1300), "{large:?}");
-        // Nothing is felt of a hand of 500 cells a second but the ground.
+        // A hand at 500 cells a second has only the ground under it.
         for row in [small, large] {
             let [[straight, ..], [turning, ..]] = row.missing();
             assert_eq!([straight, turning], [Some(0); 2], "{row:?}");

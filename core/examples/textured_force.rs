@@ -37,7 +37,7 @@ pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     };
     let mut lines = String::new();
     for (texture, middle) in [(TEXTURE, 90.0), (grain, 230.0)] {
-        let forces = felt(&texture, STEP, (WAY / STEP) as usize)?;
+        let forces = rendered(&texture, STEP, (WAY / STEP) as usize)?;
         for (color, part) in [("#1f5f9e", Vec3::Z), ("#b5482c", Vec3::X)] {
             let points = forces.iter().enumerate().map(|(i, force)| {
                 let off = part.dot(*force - Vec3::Z * STIFFNESS * DEPTH);
@@ -50,7 +50,7 @@ pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     let faded = (0..=120).map(|i| {
         let speed = 0.0025 * i as f32;
         // Not in step with the ticks.
-        let forces = felt(&TEXTURE, (speed + 1.3e-5) * TEXTURE.wavelength_mm, 20_000);
+        let forces = rendered(&TEXTURE, (speed + 1.3e-5) * TEXTURE.wavelength_mm, 20_000);
         let most = forces.map(|forces| forces.iter().fold(0.0, |most, f| f32::max(most, f.z)));
         let share = (most.unwrap_or_default() / STIFFNESS - DEPTH) / TEXTURE.amplitude_mm;
         format!("{:.1},{:.1} ", i as f32 * 5.6, 440.0 - 90.0 * share)
@@ -64,7 +64,7 @@ pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
 <text x="0" y="14">A grating of 0.1 mm every 2 mm, over 10 mm, at 1 mm depth: 0.05 N more and less than 0.5 N</text>
 <text x="0" y="31"><tspan fill="#1f5f9e">along the normal</tspan>, and up to 0.13 N <tspan fill="#b5482c">along the surface</tspan></text>
 <text x="0" y="175">Grain of the same amplitude and wavelength</text>
-<text x="0" y="325">How much of a texture is felt, by the way of the proxy in a tick</text>
+<text x="0" y="325">How much of a texture is rendered, by the way of the proxy in a tick</text>
 <text x="238" y="460">1/8 wavelength</text><text x="518" y="460">1/4 wavelength</text>
 {lines}</svg>"##
     ))
@@ -77,7 +77,7 @@ fn polyline(color: &str, points: &str) -> String {
 }
 
 /// Forces on a way eastward, after a rest at its beginning.
-fn felt(texture: &Texture, step_mm: f32, ticks: usize) -> Result<Vec<Vec3>, &'static str> {
+fn rendered(texture: &Texture, step_mm: f32, ticks: usize) -> Result<Vec<Vec3>, &'static str> {
     let texturer = Texturer::of(texture, 1.0, TickRate::DEFAULT);
     let mut texturer = texturer.ok_or("no texture")?;
     let at = |i: usize| GridPoint::new([0, 7, 0], Vec3::new(i as f32 * step_mm, 0.3, 0.0));

@@ -42,15 +42,15 @@ const IN_MS: u32 = 500;
 const GIVE_MM: f32 = 10.0;
 
 /// The host's use of the clutch. In either way the HIP stays where it is over the terrain,
-/// and nothing is felt.
+/// and no force is rendered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ClutchHold {
     /// Not held.
     #[default]
     LetGo,
-    /// The terrain goes with the hand: it is felt again where the hand is then.
+    /// The terrain goes with the hand: it is rendered again at the new position of the hand.
     WithHand,
-    /// For another view: the terrain is felt again where it was before the arm, however the hand
+    /// For another view: the terrain is rendered again where it was before the arm, however the hand
     /// gave way meanwhile, up to 10 mm.
     InPlace,
 }

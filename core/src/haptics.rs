@@ -144,7 +144,7 @@ pub struct Haptics<'t, const D: usize> {
     pub(crate) zero: Option<[i32; 3]>,
     pub(crate) tick: u32,
     pub(crate) rate: TickRate,
-    /// Number of the view that is felt.
+    /// Number of the view that is rendered.
     pub(crate) view: u8,
     pub(crate) point: Option<HipCommand>,
     pub(crate) renderer: Renderer,
@@ -285,7 +285,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
         }
     }
 
-    /// Puts another view in. Nothing is felt of the change: the clutch of an arm is open,
+    /// Sets another placement. No force shows the change: the clutch of an arm is open,
     /// and in a replay no arm is driven. A proxy that touched begins on the surface
     /// where it was in the hand, as deep as before.
     fn take_view(&mut self, view: &SceneChange) -> Result<(), RefusedScene> {
@@ -350,8 +350,8 @@ impl<'t, const D: usize> Haptics<'t, D> {
             return Some(tile);
         }
         let contact = self.renderer.contact();
-        let felt = [contact.output().proxy, *contact.hip()];
-        self.window.take(tile, felt.map(|point| point.column()))
+        let in_use = [contact.output().proxy, *contact.hip()];
+        self.window.take(tile, in_use.map(|point| point.column()))
     }
 
     /// The scene in force.

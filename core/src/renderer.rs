@@ -24,7 +24,7 @@ const TILES_PER_SLOT: u32 = 4;
 /// Source of the HIP's motion.
 #[derive(Clone, Copy)]
 pub(crate) enum Mover<'a> {
-    /// The host's points, each felt with all of the terrain that it needs.
+    /// The host's points, each rendered with all of the terrain that it needs.
     Points,
     /// An arm.
     Arm {
@@ -106,11 +106,11 @@ struct BegunPoint {
 /// Progress of a replay's point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Progress {
-    /// The point was felt: without this tile where it needs more than the window holds.
+    /// The point was rendered: without this tile where it needs more than the window holds.
     Done(Option<TileIndex>),
     /// Work is left for the next tick.
     GoesOn,
-    /// A tile is missing: the point will be felt again, from the state before it.
+    /// A tile is missing: the point will be rendered again, from the state before it.
     Lacks(TileIndex),
 }
 
@@ -199,15 +199,15 @@ impl Renderer {
     }
 
     fn effects_of(&self, scene: &Scene) -> Option<Effects> {
-        let felt = EffectContext {
+        let context = EffectContext {
             cell_mm: scene.cell_mm,
             rate: self.rate,
             latency_s: self.latency_s,
             arm: scene.source == Source::Encoders,
         };
         match scene.materials {
-            Some(_) => Effects::with_materials(&self.materials, &scene.params, &felt),
-            None => Effects::of(&scene.params, &felt),
+            Some(_) => Effects::with_materials(&self.materials, &scene.params, &context),
+            None => Effects::of(&scene.params, &context),
         }
     }
 
@@ -226,7 +226,7 @@ impl Renderer {
 
     /// The same for a replay's point, as a transaction: where a tile is missing, nothing has
     /// happened but that it is asked for. A point that needs more tiles than the window holds is
-    /// felt as by an arm, with those that are here.
+    /// rendered as for an arm, with those that are here.
     #[inline(never)]
     pub(crate) fn step_to_point<const D: usize>(
         &mut self,
@@ -359,7 +359,7 @@ impl Renderer {
         }
     }
 
-    /// Returns true if a replay's point was felt.
+    /// Returns true if a replay's point was rendered.
     pub(crate) fn is_done(&self) -> bool {
         matches!(self.progress, Progress::Done(_))
     }

@@ -7,7 +7,7 @@ use crate::haptics::Haptics;
 use crate::tick::{Outcome, write_nothing, write_output};
 
 impl<const D: usize> Haptics<'_, D> {
-    /// One tick. It is repeated until the point was felt with all of its terrain; only then is
+    /// One tick. It is repeated until the point was rendered with all of its terrain; only then is
     /// the point answered.
     pub(crate) fn tick_point(&mut self, outcome: &mut Outcome) {
         outcome.drive = GuardOutputs::default();

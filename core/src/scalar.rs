@@ -49,7 +49,7 @@ pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
     if squared.is_normal() && squared <= limit * limit {
         return v;
     }
-    // In the air nothing is felt.
+    // In the air no force is rendered.
     if v == Vec3::ZERO {
         return Vec3::ZERO;
     }

@@ -69,7 +69,7 @@ impl Scene {
 }
 
 /// Another view of the terrain for an arm that stays armed: another place, scale, height
-/// or stiffness. It is put in while the clutch is open, and felt when that has closed.
+/// or stiffness. It is put in while the clutch is open, and rendered when that has closed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneChange {
     /// Counts the views of a scene from 1 on, wrapping; samples carry it.
@@ -112,7 +112,7 @@ pub struct TickRecord {
     /// Force commanded, newtons: east, north, up. Zero unless the amplifiers
     /// are on; in a replay, that of the scene's surface parameters.
     pub force_n: Vec3,
-    /// The view in which this was felt ([`SceneChange::number`]); 0 for the scene as it was taken.
+    /// The view in which this was rendered ([`SceneChange::number`]); 0 for the scene as it was taken.
     pub view: u8,
     /// State of the proxy.
     pub state: ContactState,

@@ -51,7 +51,7 @@ impl<const D: usize> Haptics<'_, D> {
         }
     }
 
-    /// Follows the arm while nothing of it is felt, in place of a tick: an arm that
+    /// Follows the arm while nothing of it is rendered, in place of a tick: an arm that
     /// somebody moves meanwhile keeps its zero, a jump of its encoders is noticed, and
     /// its motors cool. Nothing is driven.
     ///
@@ -108,9 +108,9 @@ impl<const D: usize> Haptics<'_, D> {
         };
         let mut hip = place(mechanism, scene, pose);
         if !self.clutch.is_closed() {
-            let felt = (self.renderer.contact_mut(), &self.window);
+            let in_contact = (self.renderer.contact_mut(), &self.window);
             let drives = self.guard.mode().drives();
-            hip = self.clutch.tick(hip, scene, felt, drives);
+            hip = self.clutch.tick(hip, scene, in_contact, drives);
         }
         let arm = Mover::Arm {
             guard: &self.guard,
@@ -145,7 +145,7 @@ impl<const D: usize> Haptics<'_, D> {
         }
     }
 
-    /// The same without a calibration: nothing is felt, and nothing driven.
+    /// The same without a calibration: no force is rendered, and nothing driven.
     #[cold]
     #[inline(never)]
     fn tick_without_arm(&mut self, outcome: &mut Outcome) {
@@ -218,7 +218,7 @@ fn write_contact(hip: GridPoint, output: &ContactOutput, sample: &mut TickRecord
     sample.work = output.work;
 }
 
-/// Nothing is felt.
+/// No force is rendered.
 #[cold]
 #[inline(never)]
 pub(crate) fn write_nothing(sample: &mut TickRecord) {

@@ -569,7 +569,7 @@ fn a_scene_that_is_not_valid_is_refused() {
 }
 
 /// The window's size, the order in which tiles arrive, and how often the work
-/// of a tick ran out must not show in what is felt.
+/// of a tick ran out must not show in the force.
 #[test]
 fn a_small_window_feels_what_a_whole_one_feels() {
     let mut tiles = buffers::<4>();

@@ -58,7 +58,7 @@
 //! [`link::Link::may_stand_still`] says when that is so. The emulated board then
 //! stops its two timers, which are all it knows of time; the native device is not
 //! ticked; a real board cannot stop time and goes on. So the host's speed changes
-//! nothing that is felt, and a run repeats to the last bit.
+//! nothing that is rendered, and a run repeats to the last bit.
 //!
 //! While time stands still, no time-out comes. The device requests a tile again at
 //! once when a frame arrives damaged, but it cannot notice a frame that is lost

@@ -92,7 +92,7 @@ impl CellSize {
 
     /// The side in metres of the square cell that stands for this one.
     ///
-    /// It has the same area on the ground, so that the mean slope of cells that are felt as
+    /// It has the same area on the ground, so that the mean slope of cells that are rendered as
     /// they are stored is kept.
     pub fn square_metres(&self) -> f64 {
         let (east, north) = self.ground_metres();

@@ -4,7 +4,7 @@ use super::geometry::CellSize;
 use super::globe::Globe;
 
 /// Cosines of angles below this are rounding of a projection's formulas: no shear of a
-/// millionth is felt.
+/// millionth is noticeable.
 const STRAIGHT: f64 = 1e-6;
 /// Cells whose columns lean farther than this over their rows are no cells.
 const FLATTENED: f64 = 0.999;

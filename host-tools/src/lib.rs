@@ -13,12 +13,12 @@
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
 //! - [`stability`]: how stiff a surface may be before a hand on that Phantom feels the ticks;
 //! - [`published`]: the paper's algorithm, for comparison;
-//! - [`replay`]: a trajectory felt in lock-step, and recordings;
+//! - [`replay`]: a trajectory rendered in lock-step, and recordings;
 //! - [`place`]: where a terrain lies in front of the arm, and how large;
 //! - [`steering`]: another view of the terrain while it is touched;
 //! - [`telemetry`]: what a device reports while it is touched, in numbers;
 //! - [`events`]: contacts, materials and marks as lines of JSON on a local socket;
-//! - [`picture`]: what was felt, as PNG files;
+//! - [`picture`]: sessions drawn as PNG files;
 //! - [`view_feed`]: the same, live, to a viewer that never delays the loop;
 //! - [`board`]: boards, probes, and images onto chips;
 //! - [`calibrate`]: from ruler and scale to a calibration record;

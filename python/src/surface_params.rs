@@ -23,7 +23,7 @@ const MAX_AMPLITUDE_MM: f32 = 0.2;
 /// static_friction : the same until it begins to slide; as friction.
 /// viscous_friction : s, 0 to 1; the time by which the proxy trails; 0.
 /// damping : N·s/m along the force, 0 to 20; 0.
-/// shading : "none", edges between cells are felt, or "smooth", the force turns evenly.
+/// shading : "none", edges between cells are rendered, or "smooth", the force turns evenly.
 /// texture : "none", "grain" or "grating".
 /// texture_amplitude : mm above and below the surface, at most 2 and an eighth of the wavelength;
 ///     a tenth of the wavelength, at most 0.2.

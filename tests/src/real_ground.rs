@@ -74,7 +74,7 @@ pub fn all_files() -> Vec<(String, Raster)> {
 /// A raster true to scale, a cell a millimetre.
 ///
 /// # Panics
-/// When it cannot be felt so.
+/// When it cannot be rendered so.
 #[must_use]
 pub fn terrain(raster: &Raster) -> Terrain<'_> {
     let grid = HapticGrid::new(raster, HapticCells::Square);

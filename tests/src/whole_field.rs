@@ -55,9 +55,9 @@ impl FieldContact {
     pub fn step(&mut self, hip: [f64; 3]) -> ContactOutput {
         let hip = point(hip);
         for _ in 0..10_000 {
-            let felt = *self.contact.step(&self.window, &hip);
-            if felt.converged {
-                return felt;
+            let output = *self.contact.step(&self.window, &hip);
+            if output.converged {
+                return output;
             }
         }
         panic!("{hip:?} never settles");

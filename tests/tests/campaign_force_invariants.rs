@@ -1,4 +1,4 @@
-//! The campaign's watch over what is felt speaks of each thing that must not be: every violation
+//! The campaign's checks of the force report each violation: every violation
 //! is forged, and the honest ticks beside it pass.
 
 use hapterra_core::Vec3;
@@ -135,7 +135,7 @@ fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool
 
 #[test]
 fn a_contact_that_gives_is_told_with_the_controller_on() {
-    // A spring that is felt in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s and
+    // A spring that is rendered in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s and
     // twice 0.75 mm.
     let (told, given) = tap(&PARAMS, 0.0, true);
     assert!(!told && (given - 0.0229).abs() < 0.001, "{given}");

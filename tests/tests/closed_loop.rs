@@ -45,7 +45,7 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
     samples
 }
 
-/// A plane 20 mm up, felt with a stiffness, and a hand that presses with 2 N
+/// A plane 20 mm up, rendered with a stiffness, and a hand that presses with 2 N
 /// in its middle and lifts. Returns the samples and when the lift begins.
 fn press(stiffness_n_per_mm: f32) -> (Vec<TickRecord>, usize, Scale) {
     let raster = Raster::from_fn(101, 101, |_, _| 20.0).expect("raster");

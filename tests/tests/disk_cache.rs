@@ -330,7 +330,7 @@ fn another_tour_of_a_large_file_is_planned_without_reading_it() {
         (1..=open(&bed.file, &bed.cache).blocks()).contains(&read),
         "{read}"
     );
-    // Only what lies under the home position is read again: fine, as it is felt.
+    // Only what lies under the home position is read again: fine, as it is rendered.
     let (same, again) = plan();
     assert_eq!(same, home);
     assert!(again <= 1 && again < read, "{again} of {read}");

@@ -245,13 +245,16 @@ fn judge(events: &[Value], record: &Path) {
                 .iter()
                 .find(|of| f64::from(of.number) == number("view"));
             let (cell_mm, height_mm) = view.map_or(
-                (settings.felt.cell_mm, settings.felt.height_mm_per_unit),
+                (
+                    settings.rendered.cell_mm,
+                    settings.rendered.height_mm_per_unit,
+                ),
                 |view| (view.cell_mm, view.height_mm_per_unit),
             );
             let height = event["height_m"].as_f64().expect("m");
             assert!((height * height_mm - proxy[2]).abs() < 1e-6, "{event}");
             // The place goes as far on the ground as the proxy does in the hand.
-            let (place, cell_m) = (numbers(&event["ground"]), settings.felt.cell_m);
+            let (place, cell_m) = (numbers(&event["ground"]), settings.rendered.cell_m);
             let at = [place[0], place[1], proxy[0] / cell_mm, proxy[1] / cell_mm];
             let from = *first.get_or_insert(at);
             let cell_m = cell_m.expect("metres");

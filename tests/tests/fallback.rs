@@ -93,7 +93,7 @@ impl<'t> Slide<'t> {
     }
 
     /// The samples of a slide over a line of this rate, and the client, which has not left.
-    fn felt(
+    fn rendered(
         &self,
         scene: Scene,
         rate: usize,
@@ -258,7 +258,7 @@ fn holds(
 
 fn in_memory(slide: &Slide<'_>, scene: Scene) -> (Vec<TickRecord>, LinkStats) {
     let mut device = InMemory::new(slide.rig.clone());
-    let (samples, client) = slide.felt(scene, BYTES_A_TICK, &mut device);
+    let (samples, client) = slide.rendered(scene, BYTES_A_TICK, &mut device);
     (samples, client.tally().clone())
 }
 
@@ -271,8 +271,8 @@ fn on_board(
 ) -> (Vec<TickRecord>, LinkStats) {
     let (emulator, lines) = Emulator::start(qemu, image).expect("starts");
     let mut board = OnBoard::new(lines.link, lines.plant, slide.rig.clone());
-    let (samples, mut client) = slide.felt(scene, REAL_BYTES_A_TICK, &mut board);
-    let felt = (samples, client.tally().clone());
+    let (samples, mut client) = slide.rendered(scene, REAL_BYTES_A_TICK, &mut board);
+    let rendered = (samples, client.tally().clone());
     let mut out = vec![];
     client.leave(ms(slide.ticks), &mut out);
     move_arm_while(&mut board.plant, &mut board.arm, || {
@@ -289,7 +289,7 @@ fn on_board(
         board.link.send(&out).expect("it is there");
         emulator.finish().expect("ends");
     });
-    felt
+    rendered
 }
 
 fn ms(tick: u32) -> Duration {
@@ -341,6 +341,6 @@ fn on_the_emulated_board_over_real_ground_there_is_none_either() {
     let terrain = Terrain::new(&raster, scale, 0).expect("terrain");
     let slide = Slide::over(&terrain);
     let scene = slide.scene(true);
-    let felt = on_board(&slide, scene, &qemu, &image);
-    holds("real, on the emulated board", &slide, &scene, &felt);
+    let rendered = on_board(&slide, scene, &qemu, &image);
+    holds("real, on the emulated board", &slide, &scene, &rendered);
 }

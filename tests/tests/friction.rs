@@ -29,7 +29,7 @@ fn slide(terrain: &Terrain<'_>, params: SurfaceParams, depth: f64, speed: f64) -
     let mut replayer = on_native(terrain, params).expect("opened");
     let size = terrain.size_mm();
     let radius = size[0].min(size[1]) / 3.0;
-    let mut felt = vec![];
+    let mut rendered = vec![];
     for tick in 0..3_000 {
         let angle = f64::from(tick) * speed / radius;
         let at = [
@@ -40,12 +40,12 @@ fn slide(terrain: &Terrain<'_>, params: SurfaceParams, depth: f64, speed: f64) -
             continue; // over a hole
         };
         let behind = |last: &TickRecord| distance(position(&last.proxy), position(&last.hip));
-        let is_caught = felt.last().is_none_or(|last| behind(last) > CAUGHT_MM);
+        let is_caught = rendered.last().is_none_or(|last| behind(last) > CAUGHT_MM);
         let above = if is_caught { 1.0 } else { -depth };
         let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
-        felt.push(replayer.step(hip.expect("addressable")).expect("felt"));
+        rendered.push(replayer.step(hip.expect("addressable")).expect("rendered"));
     }
-    felt
+    rendered
 }
 
 /// Tangential over normal force at a place of the surface, by the slopes of the terrain
@@ -92,11 +92,11 @@ fn flies(terrain: &Terrain<'_>, way: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
 /// The ratios of the forces of all slides around a terrain, so many millimetres a tick. One that is
 /// off by more than `off` of μ is left out if the proxy flew.
 fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> Vec<f64> {
-    let felt = slide(terrain, params(Friction::coulomb(mu as f32)), depth, speed);
+    let rendered = slide(terrain, params(Friction::coulomb(mu as f32)), depth, speed);
     // The proxy that has just come out of the air has not slid yet, and one that a wall has held, far
     // behind the HIP, comes over many cells at once.
     let trails = 2.0 * depth * (1.0 + mu * mu).sqrt() + 3.0 * speed;
-    let slides = felt.windows(2).filter(|pair| {
+    let slides = rendered.windows(2).filter(|pair| {
         let touches = |sample: &TickRecord| sample.state == ContactState::Touching;
         let behind = distance(position(&pair[0].proxy), position(&pair[0].hip));
         let moves = pair[0].proxy != pair[1].proxy;
@@ -163,7 +163,7 @@ fn an_hour_of_encoder_noise_moves_a_stuck_proxy_by_no_bit() {
         let mut step = |off: [f64; 3]| {
             let hip = [at[0] + off[0], at[1] + off[1], ground + off[2]];
             let hip = terrain.scale().to_grid(hip).expect("addressable");
-            replayer.step(hip).expect("felt")
+            replayer.step(hip).expect("rendered")
         };
         let _ = step([0.0, 0.0, 0.5]);
         let stuck = step([0.0, 0.0, -1.0]).proxy;
@@ -218,10 +218,10 @@ fn live(
         let Some(ground) = ground(at) else { continue };
         let deep = 0.4 + 0.6 * (f64::from(tick) * 3.0 / f64::from(hz)).sin();
         let above = if tick < 2 { 1.0 } else { -deep / cell_mm };
-        let felt = contact.step(&window, &point([at[0], at[1], ground + above]));
-        if felt.state == ContactState::Touching {
+        let rendered = contact.step(&window, &point([at[0], at[1], ground + above]));
+        if rendered.state == ContactState::Touching {
             counted[0] += 1;
-            counted[1] += u32::from(!felt.converged);
+            counted[1] += u32::from(!rendered.converged);
         }
     }
     counted

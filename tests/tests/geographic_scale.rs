@@ -1,4 +1,4 @@
-//! A terrain is felt in its true shape: planes of known slope on the ellipsoid, as a
+//! A terrain is rendered in its true shape: planes of known slope on the ellipsoid, as a
 //! file of degrees stores them.
 
 use std::path::PathBuf;
@@ -50,7 +50,7 @@ fn force(terrain: &Terrain<'_>) -> [f64; 3] {
     let ground = terrain.height_mm(east, north).expect("known");
     for depth in [-2.0, 1.0] {
         let hip = terrain.scale().to_grid([east, north, ground - depth]);
-        let sample = replayer.step(hip.expect("addressable")).expect("felt");
+        let sample = replayer.step(hip.expect("addressable")).expect("rendered");
         if depth > 0.0 {
             assert_eq!(sample.state, ContactState::Touching);
             return sample.force_n.to_array().map(f64::from);
@@ -69,16 +69,16 @@ fn a_slope_of_degrees_feels_as_steep_as_it_is_in_every_direction() {
             let scale = grid.true_scale(1.0).expect("scale");
             let terrain = Terrain::over(grid, scale, 0).expect("terrain");
             let [x, y, z] = force(&terrain);
-            let felt = [-x / z, -y / z];
+            let rendered = [-x / z, -y / z];
             for axis in 0..2 {
-                let off = (felt[axis] - slope[axis]).abs();
-                assert!(off < 1e-3, "at {latitude}°: {felt:?} for {slope:?}");
+                let off = (rendered[axis] - slope[axis]).abs();
+                assert!(off < 1e-3, "at {latitude}°: {rendered:?} for {slope:?}");
             }
         }
     }
 }
 
-/// The same through the command: at 1 mm a cell, a millimetre of the trajectory is a felt
+/// The same through the command: at 1 mm a cell, a millimetre of the trajectory is a rendered
 /// cell, so one place east and one north of it are equally far on the ground.
 #[test]
 fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
@@ -98,24 +98,24 @@ fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
         assert!(run.status.success(), "{told}");
         let text = std::fs::read_to_string(&out).expect("there");
         let last = text.lines().last().expect("a row").split(',');
-        let felt: Vec<f64> = last
+        let rendered: Vec<f64> = last
             .take(11)
             .map(|x| x.parse().expect("a number"))
             .collect();
-        let [proxy, force] = [&felt[5..8], &felt[8..11]];
-        assert_eq!(felt[4], 1.0, "{felt:?}");
+        let [proxy, force] = [&rendered[5..8], &rendered[8..11]];
+        assert_eq!(rendered[4], 1.0, "{rendered:?}");
         assert!(
             (-force[axis] / force[2] - 1.0).abs() < 1e-3,
-            "{slope:?}: {felt:?}"
+            "{slope:?}: {rendered:?}"
         );
         assert!(
             force[1 - axis].abs() < 1e-3 * force[2],
-            "{slope:?}: {felt:?}"
+            "{slope:?}: {rendered:?}"
         );
         // 45°: as high as it is far, in millimetres, and in the middle between below the
         // plane and beside it.
-        assert!((proxy[axis] - 25.0).abs() < 0.05, "{slope:?}: {felt:?}");
-        assert!((proxy[2] - 25.0).abs() < 0.05, "{slope:?}: {felt:?}");
+        assert!((proxy[axis] - 25.0).abs() < 0.05, "{slope:?}: {rendered:?}");
+        assert!((proxy[2] - 25.0).abs() < 0.05, "{slope:?}: {rendered:?}");
     }
 }
 

@@ -186,7 +186,7 @@ fn a_packed_strip_is_felt_in_the_memory_of_a_terrain() {
     let (code, told) = info(&["--cache", "off"]);
     assert_eq!(code, Some(1), "{told}");
     assert!(told.contains("more than memory can hold"), "{told}");
-    // A strip that is cut: the rows before are felt.
+    // A strip that is cut: the rows before are rendered.
     write(&packed[..packed.len() / 10 * 9]);
     let (code, told) = info(&["--cache", cache]);
     assert_eq!(code, Some(0), "{told}");

@@ -47,7 +47,7 @@ fn unit() -> Scale {
     Scale::new(1.0, 1.0).expect("scale")
 }
 
-fn felt(sample: &TickRecord) -> (GridPoint, GridPoint, [u32; 3], ContactState) {
+fn rendered(sample: &TickRecord) -> (GridPoint, GridPoint, [u32; 3], ContactState) {
     let bits = sample.force_n.to_array().map(f32::to_bits);
     (sample.hip, sample.proxy, bits, sample.state)
 }
@@ -62,7 +62,7 @@ fn a_bad_link_changes_nothing_that_is_felt() {
         let hips = path
             .iter()
             .map(|mm| unit().to_grid(*mm).expect("addressable"));
-        hips.map(|hip| felt(&replayer.step(hip).expect("felt")))
+        hips.map(|hip| rendered(&replayer.step(hip).expect("rendered")))
             .collect()
     };
     let mut clean = on_native(&terrain, params).expect("opened");
@@ -79,7 +79,7 @@ fn a_bad_link_changes_nothing_that_is_felt() {
         let mut replayer =
             OfflineDevice::open(&terrain, params, Box::new(link), AT_ONCE).expect("opened");
         let got = walk(&mut replayer);
-        assert!(expected == got, "{fault:?} changed what is felt");
+        assert!(expected == got, "{fault:?} changed the force");
         let tally = replayer.tally();
         eprintln!("{fault:?}: {} transfers harmed, {tally:?}", harmed.borrow());
         assert!(*harmed.borrow() > 50, "no harm, no test");

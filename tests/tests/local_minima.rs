@@ -69,7 +69,7 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
 /// too; `None` where there is nothing to be said.
 fn rests_right(terrain: &Terrain, seen: &ObservedTick) -> Option<bool> {
     let displacement = distance(seen.proxy, seen.hip);
-    let rests = seen.felt.state == ContactState::Touching && seen.felt.converged;
+    let rests = seen.output.state == ContactState::Touching && seen.output.converged;
     if !rests || !(2e-6..=1e4).contains(&displacement) {
         return None;
     }
@@ -103,10 +103,10 @@ fn ways(
     tick: usize,
     found: &mut Found,
 ) {
-    let was_free = before.felt.state == ContactState::Free && before.felt.converged;
+    let was_free = before.output.state == ContactState::Free && before.output.converged;
     let length = distance(before.hip, now.hip);
     // A longer way is looked at no more than so often.
-    if !was_free || !now.felt.converged || length > 500.0 {
+    if !was_free || !now.output.converged || length > 500.0 {
         return;
     }
     let steps = (256.0 * length).ceil().max(1.0) as u32;
@@ -120,7 +120,7 @@ fn ways(
         ground.is_some_and(|ground| p[2] < ground - 1e-3)
     };
     let first = (0..=steps).map(at).find(is_below);
-    match now.felt.state {
+    match now.output.state {
         ContactState::Touching => {
             found.began += 1;
             let most = first.map_or(length, |p| distance(p, now.hip));

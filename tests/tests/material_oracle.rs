@@ -39,7 +39,7 @@ type Found = (Invariant, usize);
 struct Way {
     scene: Scene,
     materials: Materials,
-    felt: Vec<Replied>,
+    rendered: Vec<Replied>,
 }
 
 impl Way {
@@ -55,9 +55,9 @@ impl Way {
         let shift = [0; 3];
         let how = Replay { shift, supply };
         let mut buffers = Buffers::default();
-        let felt = replay::<4>(&scene, &materials, &mut buffers, how, |_| Ok(()));
+        let rendered = replay::<4>(&scene, &materials, &mut buffers, how, |_| Ok(()));
         Self {
-            felt: felt.expect("settles"),
+            rendered: rendered.expect("settles"),
             scene,
             materials,
         }
@@ -67,12 +67,12 @@ impl Way {
     /// learned.
     fn with(&self, at: usize, change: impl Fn(&mut Replied)) -> (Option<Found>, Judged) {
         let mut judge = MaterialJudge::new(&self.scene, &self.materials, [0; 3]);
-        for (point, felt) in self.felt.iter().enumerate() {
-            let mut felt = *felt;
+        for (point, rendered) in self.rendered.iter().enumerate() {
+            let mut rendered = *rendered;
             if point == at {
-                change(&mut felt);
+                change(&mut rendered);
             }
-            if let Err(violation) = judge.look(&felt) {
+            if let Err(violation) = judge.look(&rendered) {
                 return (Some((violation.invariant, point)), judge.judged);
             }
         }
@@ -87,7 +87,8 @@ impl Way {
 
     /// Returns the verdict on another force, at once.
     fn force(&self, at: usize, change: impl Fn(Vec3) -> Vec3) -> Option<Invariant> {
-        let changed = |felt: &mut Replied| felt.sample.force_n = change(felt.sample.force_n);
+        let changed =
+            |rendered: &mut Replied| rendered.sample.force_n = change(rendered.sample.force_n);
         self.at_once(at, changed)
     }
 
@@ -101,11 +102,11 @@ impl Way {
 
     /// Of a proxy that is elsewhere, with the force that it has there by a stiffness.
     fn proxy(&self, at: usize, east: f64, stiffness: f64) -> Option<Invariant> {
-        let moved = |felt: &mut Replied| {
-            felt.proxy[0] += east;
-            felt.sample.proxy = point(felt.proxy);
-            let way = [0, 1, 2].map(|i| ((felt.proxy[i] - felt.hip[i]) * stiffness) as f32);
-            felt.sample.force_n = Vec3::from_array(way);
+        let moved = |rendered: &mut Replied| {
+            rendered.proxy[0] += east;
+            rendered.sample.proxy = point(rendered.proxy);
+            let way = [0, 1, 2].map(|i| ((rendered.proxy[i] - rendered.hip[i]) * stiffness) as f32);
+            rendered.sample.force_n = Vec3::from_array(way);
         };
         self.at_once(at, moved)
     }
@@ -144,11 +145,11 @@ fn where_two_are_equally_near_either_is_right_until_the_force_tells() {
     // To the line half way between two samples, and not on.
     let way = Way::over([SOFT, HARD], [18.5, 1.0 / 64.0], Shading::None);
     let on_line = 66;
-    assert_eq!(way.felt[on_line - 1].proxy[0], 19.5);
+    assert_eq!(way.rendered[on_line - 1].proxy[0], 19.5);
     way.honest();
     // There the class before would have been right, but then the next point is the first of the
     // change.
-    let before = |felt: &mut Replied| felt.sample.force_n = Vec3::Z * 0.6;
+    let before = |rendered: &mut Replied| rendered.sample.force_n = Vec3::Z * 0.6;
     let (found, _) = way.with(on_line - 1, before);
     assert_eq!(found, Some((Invariant::Material, on_line)));
     let wrong = Some(Invariant::Material);
@@ -173,7 +174,7 @@ fn friction_of_the_place_after_is_found() {
     assert_eq!(proxy(10, -0.0075), Some(Invariant::Cone), "one tick early");
     assert_eq!(proxy(10, 0.0075), Some(Invariant::Cone), "one tick late");
     // On the way back it is held, and does not move.
-    let [stuck, before] = [280, 279].map(|at| way.felt[at].sample.proxy);
+    let [stuck, before] = [280, 279].map(|at| way.rendered[at].sample.proxy);
     assert_eq!(stuck, before);
     assert_eq!(way.proxy(280, 1e-4, 0.4), Some(Invariant::Cone));
 }
@@ -190,7 +191,7 @@ fn two_textures_at_once_are_found() {
     let way = Way::over([textured(1.0), textured(1.7)], SLOW, Shading::None);
     way.honest();
     let wrong = Some(Invariant::Material);
-    // In the middle of the change nothing is felt of either.
+    // In the middle of the change no force of either is left.
     assert_eq!(way.force(BORDER + 50, |f| f + Vec3::Z * 0.004), wrong);
     for at in [BORDER + 10, BORDER + 90, 280] {
         assert_eq!(way.force(at, |f| f + Vec3::Z * 4e-3), wrong, "{at}");
@@ -231,9 +232,9 @@ fn what_is_shaded_or_fades_is_judged_by_its_size() {
 #[test]
 fn a_force_without_a_contact_is_found() {
     let way = Way::over([SOFT, HARD], SLOW, Shading::None);
-    let found = way.at_once(0, |felt| {
-        assert_eq!(felt.sample.state, ContactState::Free);
-        felt.sample.force_n = Vec3::Z * 1e-3;
+    let found = way.at_once(0, |rendered| {
+        assert_eq!(rendered.sample.state, ContactState::Free);
+        rendered.sample.force_n = Vec3::Z * 1e-3;
     });
     assert_eq!(found, Some(Invariant::Material));
 }

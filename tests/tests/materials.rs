@@ -109,7 +109,7 @@ const REPLAY: [&str; 4] = ["replay", "level.asc", "way.csv", "--out"];
 const MATERIALS: [&str; 4] = ["--materials", "classes.asc", "--surface", "table.toml"];
 
 /// Place and upward force of each row of a recording in contact.
-fn felt(recording: &str) -> Vec<(f64, f64)> {
+fn rendered(recording: &str) -> Vec<(f64, f64)> {
     let rows = recording.lines().filter(|line| !line.starts_with('#'));
     let mut rows = rows.map(|row| row.split(',').collect::<Vec<_>>());
     let header = rows.next().expect("a header");
@@ -133,32 +133,32 @@ fn classes_in_another_system_and_resolution_are_felt_where_they_lie() {
     assert!(succeeded, "{said}");
     assert!(said.contains("materials      "), "{said}");
     assert!(said.contains("rock") && said.contains("meadow"), "{said}");
-    let felt = felt(&folder.read("a.csv"));
-    assert_eq!(felt.len(), 10 * ROWS_PER_MM as usize);
+    let rendered = rendered(&folder.read("a.csv"));
+    assert_eq!(rendered.len(), 10 * ROWS_PER_MM as usize);
     // 9° east is at 49.7 mm, between the columns 49 and 50: half a cell and half a pixel is the
     // most that a border can be off.
     let border = (500_000.0 - FIRST_COLUMN) / COLUMN;
     let (first, last) = (0.4 * 2.0, 1.0 * 2.0);
-    let changed = felt
+    let changed = rendered
         .iter()
         .position(|(_, force)| (force - first).abs() > 1e-6);
-    let (at, _) = felt[changed.expect("it changes")];
+    let (at, _) = rendered[changed.expect("it changes")];
     assert!(
         (at - border).abs() < 0.5 + 0.5 * 15.7 / COLUMN,
         "{at}, not {border}"
     );
     // By the samples themselves it is half way between 49 and 50.
     assert!((at - 49.5).abs() < 0.011, "{at}");
-    let (_, end) = felt[felt.len() - 1];
+    let (_, end) = rendered[rendered.len() - 1];
     assert!((end - last).abs() < 1e-6, "{end}");
     // 100 ms, evenly.
-    let steps = felt.windows(2).map(|pair| pair[1].1 - pair[0].1);
+    let steps = rendered.windows(2).map(|pair| pair[1].1 - pair[0].1);
     let most = steps.fold(0.0, f64::max);
     assert!(
         (most - (last - first) / 100.0).abs() < 1e-5,
         "{most} N in a tick"
     );
-    let rows = felt
+    let rows = rendered
         .iter()
         .filter(|(_, force)| *force > first + 1e-6 && *force < last - 1e-6);
     assert_eq!(rows.count(), 99);
@@ -182,11 +182,14 @@ fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
     std::fs::remove_file(folder.0.path().join("table.toml")).expect("removed");
     let (again, said) = replay(&[], "b.csv");
     assert!(again && said.contains("rock"), "{said}");
-    assert_eq!(felt(&folder.read("b.csv")), felt(&recorded));
+    assert_eq!(rendered(&folder.read("b.csv")), rendered(&recorded));
     let (again, said) = replay(&["--stiffness", "1"], "c.csv");
     assert!(again, "{said}");
     // Each material is twice as stiff as it was beside the 0.5 N/mm of the recording.
-    for ((_, twice), (_, once)) in felt(&folder.read("c.csv")).iter().zip(felt(&recorded)) {
+    for ((_, twice), (_, once)) in rendered(&folder.read("c.csv"))
+        .iter()
+        .zip(rendered(&recorded))
+    {
         assert!((twice - 2.0 * once).abs() < 1e-5, "{twice} {once}");
     }
     // What each material has its own of cannot be stated beside them.
@@ -202,7 +205,7 @@ fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
     let (again, said) = replay(&["--ignore-settings"], "d.csv");
     assert!(again && !said.contains("rock"), "{said}");
     assert!(
-        felt(&folder.read("d.csv"))
+        rendered(&folder.read("d.csv"))
             .iter()
             .all(|(_, force)| (force - 1.0).abs() < 1e-6)
     );
@@ -380,7 +383,7 @@ fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<(ContactStat
     let scale = *replayer.terrain().scale();
     let step = |mm: &[f64; 3]| {
         let hip = scale.to_grid(*mm).expect("addressable");
-        let sample = replayer.step(hip).expect("felt");
+        let sample = replayer.step(hip).expect("rendered");
         let [x, y, z] = sample.proxy.cell().map(|cell| cell as u32);
         let [u, v, w] = sample.proxy.frac().to_array().map(f32::to_bits);
         let [fx, fy, fz] = sample.force_n.to_array().map(f32::to_bits);
@@ -408,13 +411,13 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
     let expected = walk(&mut native, &path);
     let mut plain = on_native(&one, params).expect("opened");
     let plain = walk(&mut plain, &path);
-    let touching = |felt: &&(ContactState, [u32; 9])| felt.0 == ContactState::Touching;
+    let touching = |rendered: &&(ContactState, [u32; 9])| rendered.0 == ContactState::Touching;
     assert!(expected.iter().filter(touching).count() > 80);
     let differ = expected
         .iter()
         .zip(&plain)
         .filter(|(one, other)| one != other);
-    assert!(differ.count() > 50, "the materials are felt");
+    assert!(differ.count() > 50, "the materials are rendered");
     let Some((qemu, image)) = emulated_board() else {
         return;
     };

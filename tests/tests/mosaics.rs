@@ -348,7 +348,7 @@ fn gaps_are_holes_and_what_lies_outside_is_cut() {
     assert_eq!([found(0, 0), found(1, 1)], [5.0, 5.0]);
 }
 
-/// One bad file is a hole with a warning that names it once, and the others are felt; what the
+/// One bad file is a hole with a warning that names it once, and the others are rendered; what the
 /// index needs is an error.
 #[test]
 fn a_file_that_cannot_be_read_is_a_hole_with_one_warning() {
@@ -365,7 +365,7 @@ fn a_file_that_cannot_be_read_is_a_hole_with_one_warning() {
     let warnings = told(&output);
     assert_eq!(warnings.matches("b.asc").count(), 1, "{warnings}");
     assert!(warnings.contains("counts as no data"), "{warnings}");
-    // Gone while it is felt: nothing but the header had been read.
+    // Gone while it is rendered: nothing but the header had been read.
     two_tiles(at, 2000);
     let many = open(at);
     std::fs::remove_file(at.join("a.asc")).expect("removed");

@@ -29,7 +29,7 @@ type Answer = (
     ContactState,
 );
 
-fn felt(sample: &TickRecord) -> Answer {
+fn rendered(sample: &TickRecord) -> Answer {
     let bits = |v: hapterra_core::Vec3| v.to_array().map(f32::to_bits);
     (
         sample.hip.cell(),
@@ -45,7 +45,7 @@ fn walk(replayer: &mut OfflineDevice<'_>, path: &[[f64; 3]]) -> Vec<Answer> {
     let scale = *replayer.terrain().scale();
     let mut step = |mm: &[f64; 3]| {
         let hip = scale.to_grid(*mm).expect("addressable");
-        felt(&replayer.step(hip).expect("felt"))
+        rendered(&replayer.step(hip).expect("rendered"))
     };
     path.iter().map(&mut step).collect()
 }
@@ -99,7 +99,7 @@ fn a_replay_gives_the_same_bits_on_the_emulated_board() {
         }
         let touched = got
             .iter()
-            .filter(|felt| felt.5 == ContactState::Touching)
+            .filter(|rendered| rendered.5 == ContactState::Touching)
             .count();
         assert!(touched > 50, "{name}: the walk hardly touches");
         board.say_goodbye().expect("said");
@@ -147,7 +147,7 @@ fn the_demonstration_is_the_same_and_never_late_on_the_emulated_board() {
 }
 
 /// Ctrl-C reaches every process of a terminal, the emulator as well: that is an end like any
-/// other, and what was felt until then is kept.
+/// other, and the samples until then are kept.
 #[cfg(unix)]
 #[test]
 fn interrupted_emulated_demo_ends_in_order() {

@@ -192,14 +192,14 @@ fn info_says_what_its_longitudes_and_latitudes_are() {
     }
 }
 
-/// A sheared grid is felt in its true shape, and so it is said.
+/// A sheared grid is rendered in its true shape, with a note.
 #[test]
 fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
     let path = format!("{FOLDER}/sheared.tif");
     let raster = Raster::open(&path, &OpenOptions::default()).expect("a terrain");
     let grid = HapticGrid::new(&raster, HapticCells::Square);
     assert!(grid.is_resampled() && !grid.is_distorted());
-    // 5 cells along a column of the felt grid are straight north on the map.
+    // 5 cells along a column of the haptic grid are straight north on the map.
     let [from, to] = [[2.0, 0.0], [2.0, 4.0]].map(|cell| grid.to_ground(cell));
     assert!(
         (to[0] - from[0]).abs() < 1e-6 && to[1] > from[1],
@@ -214,7 +214,7 @@ fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
     assert!(!said.contains("rotated"), "{said}");
 }
 
-/// A map in feet whose heights have no unit is felt 3.28 times too steep where they are in
+/// A map in feet whose heights have no unit is rendered 3.28 times too steep where they are in
 /// feet, too: every command says so until the unit is stated.
 #[test]
 fn an_assumed_unit_of_height_is_told_until_it_is_stated() {

@@ -42,7 +42,7 @@ fn walls() -> Terrain {
     })
 }
 
-fn felt(state: ContactState, proxy: [f64; 3], displacement: [f64; 3]) -> ContactOutput {
+fn rendered(state: ContactState, proxy: [f64; 3], displacement: [f64; 3]) -> ContactOutput {
     ContactOutput {
         state,
         proxy: point(proxy),
@@ -54,19 +54,19 @@ fn felt(state: ContactState, proxy: [f64; 3], displacement: [f64; 3]) -> Contact
 }
 
 fn waiting(hip: [f64; 3]) -> ObservedTick {
-    ObservedTick::new(hip, felt(ContactState::Unseeded, hip, [0.0; 3]), [0; 3])
+    ObservedTick::new(hip, rendered(ContactState::Unseeded, hip, [0.0; 3]), [0; 3])
 }
 
 fn free(hip: [f64; 3]) -> ObservedTick {
-    ObservedTick::new(hip, felt(ContactState::Free, hip, [0.0; 3]), [0; 3])
+    ObservedTick::new(hip, rendered(ContactState::Free, hip, [0.0; 3]), [0; 3])
 }
 
-/// With that part of the spring felt.
+/// With that part of the spring rendered.
 fn faded(hip: [f64; 3], proxy: [f64; 3], fade: f64) -> ObservedTick {
     let displacement = [0, 1, 2].map(|i| fade * (proxy[i] - hip[i]));
     ObservedTick::new(
         hip,
-        felt(ContactState::Touching, proxy, displacement),
+        rendered(ContactState::Touching, proxy, displacement),
         [0; 3],
     )
 }
@@ -78,16 +78,16 @@ fn touching(hip: [f64; 3], proxy: [f64; 3]) -> ObservedTick {
 fn letting_go(hip: [f64; 3], displacement: [f64; 3]) -> ObservedTick {
     ObservedTick::new(
         hip,
-        felt(ContactState::Releasing, [10.5, 10.5, 2.0], displacement),
+        rendered(ContactState::Releasing, [10.5, 10.5, 2.0], displacement),
         [0; 3],
     )
 }
 
 /// The same answer with something changed, and the forces that follow from it.
 fn with(seen: ObservedTick, change: impl FnOnce(&mut ContactOutput)) -> ObservedTick {
-    let mut felt = seen.felt;
-    change(&mut felt);
-    ObservedTick::new(seen.hip, felt, [0; 3])
+    let mut rendered = seen.output;
+    change(&mut rendered);
+    ObservedTick::new(seen.hip, rendered, [0; 3])
 }
 
 /// A position whose fraction no constructor would make.
@@ -168,8 +168,8 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     assert_eq!(found(&[first, broken]), [], "it slid until just now");
     assert_eq!(found(&[&rest[..], &[broken]].concat()), [Stuck]);
     // In the air it forgets, also where it comes back to where it was.
-    let over = with(free([10.5, 10.5, 2.5]), |felt| {
-        (felt.proxy, felt.converged) = (first.felt.proxy, false);
+    let over = with(free([10.5, 10.5, 2.5]), |rendered| {
+        (rendered.proxy, rendered.converged) = (first.output.proxy, false);
     });
     assert_eq!(found(&[&rest[..], &[over, first, broken]].concat()), []);
     // Over the ridge's edge only the side pulls that the HIP is on.
@@ -270,7 +270,7 @@ fn a_force_that_is_textured_otherwise_is_found() {
         ..Texture::NONE
     };
     // Half a cell deep, on a crest and where the relief rises eastward; there 2π/10 times
-    // the depth at which the part along the surface grows no more is felt, westward.
+    // the depth at which the part along the surface grows no more is rendered, westward.
     let on = |x: f64, [along, up]: [f64; 2]| ObservedTick {
         textured: Some(Vec3::new(along as f32, 0.0, up as f32)),
         ..touching([x, 10.5, 1.5], [x, 10.5, 2.0])

@@ -61,7 +61,7 @@ fn checked(path: &Path, grid: &HapticGrid<'_>, scale: Scale, level: u8) -> usize
     for (row, col) in (0..=last[1]).flat_map(|row| (0..=last[0]).map(move |col| (row, col))) {
         let key = TileKey::new(level, col, row);
         let (heights, _) = terrain.tile(key, &mut buffer).expect("there is one");
-        // One number for all of it, also off the field, where nothing is felt.
+        // One number for all of it, also off the field, where no force is rendered.
         let flat = matches!(heights, Heights::Flat { .. });
         if let Heights::Samples { bytes, .. } | Heights::Packed { bytes, .. } = heights {
             (sum, tiles) = (sum + bytes.len(), tiles + 1);
@@ -74,18 +74,18 @@ fn checked(path: &Path, grid: &HapticGrid<'_>, scale: Scale, level: u8) -> usize
         fill_tile(&mut tile, &message).expect("heights of a tile");
         assert_eq!(tile.key(), Some(key));
         let context = || format!("{} {key:?} {scale:?}", path.display());
-        let felt = flat.then_some(terrain.size());
-        assert_held(&tile, grid, &scale, felt, &context);
+        let rendered = flat.then_some(terrain.size());
+        assert_held(&tile, grid, &scale, rendered, &context);
     }
     sum / tiles.max(1)
 }
 
-/// Holds the samples against the file; where `felt` states a size, those within it.
+/// Holds the samples against the file; where `rendered` states a size, those within it.
 fn assert_held(
     tile: &Tile,
     grid: &HapticGrid<'_>,
     scale: &Scale,
-    felt: Option<[i32; 2]>,
+    rendered: Option<[i32; 2]>,
     context: &dyn Fn() -> String,
 ) {
     let key = tile.key().expect("a tile");
@@ -94,7 +94,7 @@ fn assert_held(
             let place = [key.index.col, key.index.row].map(|i| i.unsigned_abs() * 32);
             let (x, y) = (place[0] + col, place[1] + row);
             let is_off = |[columns, rows]: [i32; 2]| x as i32 > columns || y as i32 > rows;
-            if felt.is_some_and(is_off) {
+            if rendered.is_some_and(is_off) {
                 continue;
             }
             let file = grid.height_of_level(key.level, x, y);

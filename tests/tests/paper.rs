@@ -34,9 +34,9 @@ fn rules(height: fn(i32, i32) -> f32) -> [Box<dyn FnMut([f64; 3]) -> Answer>; 2]
             (displacement.is_some(), [0, 1, 2].map(|i| hip[i] + way[i]))
         }),
         Box::new(move |hip| {
-            let felt = swept.step(hip);
-            let touches = felt.state == ContactState::Touching;
-            (touches, position(&felt.proxy))
+            let rendered = swept.step(hip);
+            let touches = rendered.state == ContactState::Touching;
+            (touches, position(&rendered.proxy))
         }),
     ]
 }
@@ -190,9 +190,9 @@ fn step_4_the_force_is_along_the_way_out_and_proportional_to_its_length() {
     contact.step([30.5, 30.5, 3.0]);
     for depth in [0.01, 0.1, 0.5] {
         let hip = [30.5, 30.5, surface(30.5, 30.5) - depth];
-        let felt = contact.step(hip);
-        let proxy = position(&felt.proxy);
-        let force = params.spring().force_n(felt.displacement);
+        let rendered = contact.step(hip);
+        let proxy = position(&rendered.proxy);
+        let force = params.spring().force_n(rendered.displacement);
         for axis in 0..3 {
             let expected = 0.5 * (proxy[axis] - hip[axis]);
             assert!((f64::from(force[axis]) - expected).abs() < 1e-6);
@@ -209,16 +209,16 @@ fn walls(x: i32, _: i32) -> f32 {
 fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
     let mut contact = FieldContact::new(64, walls);
     contact.step([10.0, 30.3, 3.0]);
-    let felt = contact.step([50.0, 30.7, 3.0]);
-    assert_eq!(felt.state, ContactState::Touching);
-    let proxy = position(&felt.proxy);
+    let rendered = contact.step([50.0, 30.7, 3.0]);
+    assert_eq!(rendered.state, ContactState::Touching);
+    let proxy = position(&rendered.proxy);
     assert!(
         proxy[0] > 19.0 && proxy[0] < 20.0,
         "stopped by the first wall: {proxy:?}"
     );
     // And stays there until the HIP comes back.
-    let felt = contact.step([40.0, 31.0, 3.0]);
-    assert!(position(&felt.proxy)[0] < 20.0);
-    let felt = contact.step([15.0, 31.0, 3.0]);
-    assert_eq!(felt.state, ContactState::Free);
+    let rendered = contact.step([40.0, 31.0, 3.0]);
+    assert!(position(&rendered.proxy)[0] < 20.0);
+    let rendered = contact.step([15.0, 31.0, 3.0]);
+    assert_eq!(rendered.state, ContactState::Free);
 }

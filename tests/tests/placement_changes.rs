@@ -215,14 +215,14 @@ fn judge_press(samples: &[TickRecord], most_n: f32, most_times: f32) {
     );
 }
 
-/// The ground is felt again as it was: the press has come back, and no more than it.
+/// The ground is rendered again as it was: the press is back, and no more than that.
 fn assert_pressed(sample: &TickRecord, before: &TickRecord, what: &str) {
-    assert_felt(sample, what);
+    assert_rendered(sample, what);
     let share = sample.force_n.length() / before.force_n.length();
     assert!((0.98..1.02).contains(&share), "{what}: {share} of before");
 }
 
-fn assert_felt(sample: &TickRecord, what: &str) {
+fn assert_rendered(sample: &TickRecord, what: &str) {
     assert_eq!(sample.state, ContactState::Touching, "{what}");
     // The controller acts on every scene, and encoders of half a millimetre give it work.
     let others = sample.limits.difference(Limits::ENERGY_DISSIPATED);
@@ -247,7 +247,7 @@ fn force_makes_no_step_while_zooming_through_eight_levels() {
     let raster = hills();
     pressed(&raster, 60.0, |touching| {
         let before = touching.last();
-        assert_felt(&before, "at the beginning");
+        assert_rendered(&before, "at the beginning");
         assert!((before.force_n.length() - PUSH_N as f32).abs() < 0.05);
         let began = touching.samples.len();
         assert_eq!(touching.level(), 8);
@@ -293,7 +293,7 @@ fn force_makes_no_step_while_panning_and_scaling() {
         let steeper = touching.change(PlacementChange::Exaggerate(1.5));
         assert_pressed(&steeper, &first, "steeper");
         let softer = touching.change(PlacementChange::Stiffness(0.5));
-        assert_felt(&softer, "softer");
+        assert_rendered(&softer, "softer");
         let (soft, hard) = (0.5 * STIFFNESS, STIFFNESS);
         let share = softer.force_n.length() / steeper.force_n.length();
         assert!((share - in_series(soft, hard)).abs() < 0.02, "{share}");
@@ -388,7 +388,7 @@ fn a_tip_set_while_it_presses_makes_no_step() {
         };
         for (wanted_mm, is_ball) in [(2.0, true), (0.5, true), (0.0, false), (1.0, true)] {
             let sample = touching.change(PlacementChange::Tip(wanted_mm));
-            assert_felt(&sample, &format!("by a tip of {wanted_mm} mm"));
+            assert_rendered(&sample, &format!("by a tip of {wanted_mm} mm"));
             // A ball rests beside a point's place, where the slope is another.
             let share = sample.force_n.length() / first.force_n.length();
             assert!((0.95..1.05).contains(&share), "{wanted_mm} mm: {share}");
@@ -399,7 +399,7 @@ fn a_tip_set_while_it_presses_makes_no_step() {
         assert!(touching.said[0].contains("a tip of -1 mm: from 0 to 100 mm"));
         assert_eq!(tip(touching), (1.0, true), "it stays as it was");
         let reset = touching.change(PlacementChange::Reset);
-        assert_felt(&reset, "by a point again");
+        assert_rendered(&reset, "by a point again");
         assert_eq!(tip(touching), (0.0, false));
         judge(&touching.samples[began..], GENTLE_N);
     });
@@ -425,7 +425,7 @@ fn clutch_carries_the_terrain_with_the_hand() {
         assert!(zoomed.limits.contains(Limits::CLUTCH_OPEN));
         assert_eq!(zoomed.view, 2);
         let closed = touching.steer(Steer::Clutch(false));
-        assert_felt(&closed, "let go");
+        assert_rendered(&closed, "let go");
         // The ground goes with a hand that gives way, and at most all the way to where that
         // wants to be. Then two springs share what one had.
         let share = closed.force_n.length() / before.force_n.length();
@@ -452,7 +452,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
         }
         touching.pedal.set(false);
         let closed = touching.run(700);
-        assert_felt(&closed, "let go");
+        assert_rendered(&closed, "let go");
         let share = closed.force_n.length() / before.force_n.length();
         assert!((all_the_way()..1.0).contains(&share), "{share}");
         // Let go while the host has a view put in: that holds it to the end.
@@ -464,7 +464,7 @@ fn the_boards_clutch_input_opens_it_and_views_are_put_in_meanwhile() {
         touching.poll();
         touching.pedal.set(false);
         let closed = touching.run(900);
-        assert_felt(&closed, "let go meanwhile");
+        assert_rendered(&closed, "let go meanwhile");
         assert_eq!(closed.view, 4);
         assert_eq!(touching.said, [""; 0]);
         judge(&touching.samples[began..], GENTLE_N);
@@ -546,7 +546,7 @@ fn a_far_pan(axis: usize) {
     };
     pressed_at(&raster, &options, 60.0, |touching| {
         let first = touching.last();
-        assert_felt(&first, "at the beginning");
+        assert_rendered(&first, "at the beginning");
         let began = touching.samples.len();
         // What a change that changes nothing does to a hand on such a slope.
         touching.change(PlacementChange::Stiffness(1.0));
@@ -554,12 +554,12 @@ fn a_far_pan(axis: usize) {
         let began = touching.samples.len();
         let wanted = [[1.0, 0.0], [0.0, 1.0]][axis];
         let is_true = |sample: &TickRecord, where_: &str| {
-            let felt = slope_of_force(sample);
-            eprintln!("{where_}: {felt:?}");
-            for (felt, wanted) in felt.iter().zip(wanted) {
+            let rendered = slope_of_force(sample);
+            eprintln!("{where_}: {rendered:?}");
+            for (rendered, wanted) in rendered.iter().zip(wanted) {
                 assert!(
-                    (felt - wanted).abs() < 1e-3,
-                    "{where_}: {felt} for {wanted}"
+                    (rendered - wanted).abs() < 1e-3,
+                    "{where_}: {rendered} for {wanted}"
                 );
             }
         };

@@ -250,7 +250,7 @@ fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
         assert!((54.0..54.5).contains(&latitude), "{all}");
         let off = percent - wanted(47.25, latitude);
         assert!(off.abs() < 0.2, "{percent} for {}", wanted(47.25, latitude));
-        // At a scale at which the arm reaches 20 km to each side cells are as they are felt.
+        // At a scale at which the arm reaches 20 km to each side cells are as they are rendered.
         let near = ["--at", "15,47", "--scale", "5m/mm"];
         let near = said(&hapterra(command, &file, &near));
         assert!(near.contains("place ") && shape(&near).is_none(), "{near}");

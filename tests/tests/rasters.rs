@@ -193,13 +193,13 @@ fn cells_and_units_come_from_the_file() {
         return;
     };
     let raster = open(&folder.join("i16_scale_offset_ft.tif"));
-    let felt = HapticGrid::new(&raster, HapticCells::Stored);
+    let rendered = HapticGrid::new(&raster, HapticCells::Stored);
     // 30 m of the map; UTM shrinks the ground by 0.026 % there.
-    let side = felt.side_m().expect("known");
+    let side = rendered.side_m().expect("known");
     assert!((side - 30.007_77).abs() < 1e-4, "{side}");
-    assert!(!felt.is_resampled());
+    assert!(!rendered.is_resampled());
     assert_eq!(raster.metres_per_vertical_unit(), 0.3048);
-    assert_eq!(felt.cells_per_vertical_unit(), Some(0.3048 / side));
+    assert_eq!(rendered.cells_per_vertical_unit(), Some(0.3048 / side));
 
     let rotated = open(&folder.join("rotated_geotransform.tif"));
     let metres = rotated.cell().expect("a grid").metres();
@@ -207,9 +207,9 @@ fn cells_and_units_come_from_the_file() {
     assert!(rotated.remarks()[0].contains("rotated by 11.3°"));
 
     let picture = open(&folder.join("png_gray16.png"));
-    let felt = HapticGrid::new(&picture, HapticCells::Stored);
+    let rendered = HapticGrid::new(&picture, HapticCells::Stored);
     assert_eq!(
-        (felt.side_m(), felt.cells_per_vertical_unit()),
+        (rendered.side_m(), rendered.cells_per_vertical_unit()),
         (None, None)
     );
 }

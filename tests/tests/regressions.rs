@@ -21,7 +21,7 @@ fn run(
     let mut buffers = Buffers::default();
     scene.run(&mut buffers)?;
     let seen = scene.step(&mut buffers, [0; 3], supply, |_| Ok(()))?;
-    Ok(seen.iter().map(|seen| seen.felt.state).collect())
+    Ok(seen.iter().map(|seen| seen.output.state).collect())
 }
 
 /// A proxy that stood exactly on the east or north border of the data, and left
@@ -206,7 +206,7 @@ fn a_hip_straight_above_its_proxy_is_let_go() {
         let seen = scene.step(&mut buffers, [0; 3], scene.supply, |_| Ok(()));
         for seen in seen.expect("it settles") {
             let [x, y, z] = [0, 1, 2].map(|axis| seen.hip[axis] - seen.proxy[axis]);
-            let touching = seen.felt.state == ContactState::Touching && seen.felt.converged;
+            let touching = seen.output.state == ContactState::Touching && seen.output.converged;
             assert!(!(touching && x == 0.0 && y == 0.0 && z > 1e-3), "{seen:?}");
         }
     }
@@ -328,7 +328,7 @@ fn a_proxy_that_may_leave_no_more_rests_where_it_was_held() {
 }
 
 /// A path of 60 cells close over the ground takes more than a tick; the HIP moved in each,
-/// and the path was begun anew: for as long as the HIP moved nothing was felt.
+/// and the path was begun anew: for as long as the HIP moved no force was rendered.
 #[test]
 fn a_proxy_in_the_air_arrives_while_the_hip_moves() {
     let cliff = field([140, 20], |x, _| match x {

@@ -35,7 +35,7 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Heights of a terrain in cells, from the grid that is felt (`geographic_scale.rs` holds that
+/// Heights of a terrain in cells, from the grid that is rendered (`geographic_scale.rs` holds that
 /// against the ground).
 fn heights<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
     move |x, y| {
@@ -46,7 +46,7 @@ fn heights<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
 
 fn render(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     let hip = replayer.terrain().scale().to_grid(hip_mm);
-    replayer.step(hip.expect("addressable")).expect("felt")
+    replayer.step(hip.expect("addressable")).expect("rendered")
 }
 
 /// Distance from the nearest border of a patch that a place is not on.

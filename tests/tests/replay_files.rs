@@ -43,7 +43,7 @@ impl Folder {
     }
 
     /// Rows of a replay that succeeds, as text.
-    fn felt(&self, more: &[&str]) -> Vec<Vec<String>> {
+    fn replayed(&self, more: &[&str]) -> Vec<Vec<String>> {
         let run = self.replay(more);
         assert!(run.status.success(), "{}", said(&run));
         let text = std::fs::read_to_string(self.path("out.csv")).expect("there");
@@ -88,7 +88,7 @@ const PRESS: &str = "t_s,x_mm,y_mm,z_mm\n0,10.1,7.3,14\n0.001,10.1,7.3,9.6\n0.00
 #[test]
 fn one_row_a_row_with_the_columns_that_were_promised() {
     let folder = Folder::new(PRESS);
-    let rows = folder.felt(&["--scale", "1mm/cell"]);
+    let rows = folder.replayed(&["--scale", "1mm/cell"]);
     assert_eq!(rows.len(), 4);
     let contacts: Vec<_> = rows.iter().map(|row| row[4].as_str()).collect();
     assert_eq!(contacts, ["0", "1", "1", "0"]);
@@ -119,9 +119,9 @@ fn scale_stiffness_and_limit_are_as_stated() {
     let press = "t_s,x_mm,y_mm,z_mm\n0,20,10,90\n0.001,20,10,10\n0.002,20,10,-60\n";
     let folder = Folder::new(press);
     let flat = ["--scale", "2mm/cell", "--exaggeration", "0mm/unit"];
-    let felt = |more: &[&str]| folder.felt(&[&flat, more].concat());
+    let replayed = |more: &[&str]| folder.replayed(&[&flat, more].concat());
     // At no height at all there is a table at zero.
-    let rows = felt(&["--stiffness", "0.125", "--max-force", "5"]);
+    let rows = replayed(&["--stiffness", "0.125", "--max-force", "5"]);
     assert_eq!(rows[1][4], "0");
     assert_eq!(number(&rows[2][7]), 0.0);
     assert!(
@@ -129,25 +129,25 @@ fn scale_stiffness_and_limit_are_as_stated() {
         "limited: {:?}",
         rows[2]
     );
-    let rows = felt(&["--stiffness", "0.125", "--max-force", "50"]);
+    let rows = replayed(&["--stiffness", "0.125", "--max-force", "50"]);
     assert!((number(&rows[2][10]) - 7.5).abs() < 1e-5, "{:?}", rows[2]);
 }
 
 #[test]
 fn the_same_again_byte_for_byte_and_its_own_output_can_be_replayed() {
     let folder = Folder::new(PRESS);
-    let first = folder.felt(&[]);
+    let first = folder.replayed(&[]);
     let bytes = std::fs::read(folder.path("out.csv")).expect("there");
-    assert_eq!(folder.felt(&[]), first);
+    assert_eq!(folder.replayed(&[]), first);
     assert_eq!(std::fs::read(folder.path("out.csv")).expect("there"), bytes);
     std::fs::copy(folder.path("out.csv"), folder.path("in.csv")).expect("copied");
-    assert_eq!(folder.felt(&[]), first);
+    assert_eq!(folder.replayed(&[]), first);
 }
 
 #[test]
 fn an_empty_trajectory_gives_an_empty_recording() {
     let folder = Folder::new("t_s,x_mm,y_mm,z_mm\r\n");
-    assert!(folder.felt(&[]).is_empty());
+    assert!(folder.replayed(&[]).is_empty());
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! `hapterra replay` by time: a path is felt the same however often it has rows, and a recording
+//! `hapterra replay` by time: a path is rendered the same however often it has rows, and a recording
 //! at its own tick rate.
 
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ const DAMPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/damped.
 
 const PARAMS: [&str; 2] = ["--scale=1mm/cell", "--stiffness=0.5"];
 
-/// A row of what was felt.
+/// A row of a replay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row {
     t_s: f64,
@@ -73,7 +73,7 @@ impl Folder {
     }
 
     /// Returns the replay of `in.csv` in `out.csv`, and its messages.
-    fn felt(&self, path: &str, more: &[&str]) -> (Vec<Row>, String) {
+    fn replayed(&self, path: &str, more: &[&str]) -> (Vec<Row>, String) {
         self.write("in.csv", path);
         let run = self.replay("in.csv", "out.csv", more);
         let said = said(&run);
@@ -136,8 +136,8 @@ fn path(rows: &str) -> String {
 
 /// Down into the ground at 20 mm/s: the spring's force, and 5 N s/m times 20 mm/s, at most as much
 /// again, from the second tick in contact on.
-fn pressed(felt: &[Row]) -> usize {
-    let touching: Vec<_> = felt.iter().filter(|row| row.contact).collect();
+fn pressed(replayed: &[Row]) -> usize {
+    let touching: Vec<_> = replayed.iter().filter(|row| row.contact).collect();
     for row in &touching[1..] {
         let spring = STIFFNESS * -row.hip_mm[2];
         let expected = spring + spring.min(5.0 * 20.0 * 1e-3);
@@ -153,9 +153,9 @@ fn damping_is_the_same_however_often_a_path_has_rows() {
     let damped = [&PARAMS[..], &["--surface", DAMPED]].concat();
     for hz in [2, 10, 100, 250, 1_000, 1_600, 8_000, 100_000] {
         let rows = sampled(hz, 0.5, |t| [40.0, 20.0, 2.0 - 20.0 * t]);
-        let (felt, said) = folder.felt(&path(&rows), &damped);
-        assert_eq!(felt.len(), 501, "{hz} Hz: a row a tick");
-        assert!(pressed(&felt) > 390, "{hz} Hz");
+        let (replayed, said) = folder.replayed(&path(&rows), &damped);
+        assert_eq!(replayed.len(), 501, "{hz} Hz: a row a tick");
+        assert!(pressed(&replayed) > 390, "{hz} Hz");
         let resampled = said.contains("1000 ticks a second by t_s, on straight lines");
         assert_eq!(resampled, hz != 1_000, "{hz} Hz: {said}");
     }
@@ -176,8 +176,8 @@ const VISCOUS: [&str; 5] = [
     concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/viscous.toml"),
 ];
 
-fn trails(felt: &[Row]) {
-    let last = felt.last().expect("rows");
+fn trails(replayed: &[Row]) {
+    let last = replayed.last().expect("rows");
     let trail = last.hip_mm[0] - last.proxy_mm[0];
     assert!((trail - 1.3).abs() < 1e-3, "{trail} mm: {last:?}");
 }
@@ -190,21 +190,21 @@ fn a_recording_is_felt_at_its_own_tick_rate() {
     ] {
         let rows = sampled(tick_hz, 0.6, drag);
         let recording = folder.recording(tick_hz, &rows, &VISCOUS);
-        let (felt, said) = folder.felt(&recording, &[]);
-        assert_eq!(felt.len(), rows.lines().count(), "{tick_hz} Hz");
+        let (replayed, said) = folder.replayed(&recording, &[]);
+        assert_eq!(replayed.len(), rows.lines().count(), "{tick_hz} Hz");
         assert!(!said.contains("straight lines"), "{said}");
-        trails(&felt);
-        // What went in comes out, and is felt again byte for byte.
+        trails(&replayed);
+        // The output has the input's rows, and replays byte for byte.
         let output = folder.read("out.csv");
         assert!(
             output.contains(&format!("# tick_hz = {tick_hz}\n")),
             "{output}"
         );
-        for (felt, row) in felt.iter().zip(rows.lines()) {
-            let [x, y, z] = felt.hip_mm;
-            assert_eq!(format!("{},{x},{y},{z}", felt.t_s), row);
+        for (replayed, row) in replayed.iter().zip(rows.lines()) {
+            let [x, y, z] = replayed.hip_mm;
+            assert_eq!(format!("{},{x},{y},{z}", replayed.t_s), row);
         }
-        folder.felt(&output, &[]);
+        folder.replayed(&output, &[]);
         assert!(
             folder.read("out.csv") == output,
             "{tick_hz} Hz: not the same again"
@@ -217,15 +217,15 @@ fn a_recording_is_felt_at_its_own_tick_rate() {
 fn ticks_between_a_recordings_rows_are_filled_in() {
     let folder = Folder::new();
     let rows = sampled(1_000, 0.6, drag);
-    let (felt, said) = folder.felt(&folder.recording(4_000, &rows, &VISCOUS), &[]);
-    assert_eq!(felt.len(), 2_401);
+    let (replayed, said) = folder.replayed(&folder.recording(4_000, &rows, &VISCOUS), &[]);
+    assert_eq!(replayed.len(), 2_401);
     assert!(said.contains("4000 ticks a second by t_s"), "{said}");
-    trails(&felt);
+    trails(&replayed);
     let kept = |(n, row): (usize, &'_ str)| (n % 7 == 0).then(|| format!("{row}\n"));
     let lossy: String = rows.lines().enumerate().filter_map(kept).collect();
-    let (felt, _) = folder.felt(&folder.recording(1_000, &lossy, &VISCOUS), &[]);
-    assert_eq!(felt.len(), 596);
-    trails(&felt);
+    let (replayed, _) = folder.replayed(&folder.recording(1_000, &lossy, &VISCOUS), &[]);
+    assert_eq!(replayed.len(), 596);
+    trails(&replayed);
 }
 
 #[test]
@@ -239,16 +239,17 @@ fn times_that_contradict_a_recordings_rate_are_refused() {
         said.contains(expected) && said.contains("--rows-are-ticks"),
         "{said}"
     );
-    // Row by row it is felt at the rate of its settings, as its path alone by its times.
-    let (felt, said) = folder.felt(&recording, &["--rows-are-ticks"]);
-    assert_eq!((felt.len(), felt[2_400].t_s), (2_401, 2.4));
+    // Row by row it is rendered at the rate of its settings, as its path alone by its times.
+    let (replayed, said) = folder.replayed(&recording, &["--rows-are-ticks"]);
+    assert_eq!((replayed.len(), replayed[2_400].t_s), (2_401, 2.4));
     assert!(
         said.contains("one row of the path a tick, 1000 ticks a second"),
         "{said}"
     );
-    let (felt, _) = folder.felt(&recording, &[&["--ignore-settings"], &VISCOUS[..]].concat());
-    assert_eq!(felt.len(), 601);
-    trails(&felt);
+    let (replayed, _) =
+        folder.replayed(&recording, &[&["--ignore-settings"], &VISCOUS[..]].concat());
+    assert_eq!(replayed.len(), 601);
+    trails(&replayed);
     for tick_hz in [0, 1_500, 44_100] {
         let recording = recording.replace("tick_hz = 1000", &format!("tick_hz = {tick_hz}"));
         let said = folder.fails(&recording, &[]);
@@ -261,34 +262,34 @@ fn rows_without_times_are_ticks_and_that_is_said() {
     let folder = Folder::new();
     let damped = [&PARAMS[..], &["--surface", DAMPED]].concat();
     let timed = sampled(1_000, 0.5, |t| [40.0, 20.0, 2.0 - 20.0 * t]);
-    let (expected, _) = folder.felt(&path(&timed), &damped);
+    let (expected, _) = folder.replayed(&path(&timed), &damped);
     let places = timed
         .lines()
         .map(|row| row.split_once(',').expect("a time").1);
     let places: Vec<_> = places.collect();
     let untimed = format!("x_mm,y_mm,z_mm\n{}\n", places.join("\n"));
-    let (felt, said) = folder.felt(&untimed, &damped);
-    assert!(felt == expected);
+    let (replayed, said) = folder.replayed(&untimed, &damped);
+    assert!(replayed == expected);
     let line = said.lines().last().expect("a line");
     assert!(
         line.ends_with("out.csv; one row of the path a tick, 1000 ticks a second: it has no t_s"),
         "{said}"
     );
     let zero: String = places.iter().map(|place| format!("0,{place}\n")).collect();
-    let (felt, said) = folder.felt(&path(&zero), &damped);
-    assert!(felt == expected);
+    let (replayed, said) = folder.replayed(&path(&zero), &damped);
+    assert!(replayed == expected);
     assert!(said.contains("t_s is 0 in all of them"), "{said}");
     // Times that are not used are those of the ticks.
     let slower = (0..).zip(&places);
     let slower = slower.map(|(row, place)| format!("{},{place}\n", f64::from(row) * 1e-2));
     let slower: String = slower.collect();
-    let (felt, _) = folder.felt(&path(&slower), &damped);
-    assert_eq!(felt.len(), 5_001);
-    let (felt, _) = folder.felt(
+    let (replayed, _) = folder.replayed(&path(&slower), &damped);
+    assert_eq!(replayed.len(), 5_001);
+    let (replayed, _) = folder.replayed(
         &path(&slower),
         &[&damped[..], &["--rows-are-ticks"]].concat(),
     );
-    assert!(felt == expected);
+    assert!(replayed == expected);
 }
 
 #[test]
@@ -317,12 +318,16 @@ fn wrong_times_are_refused_and_odd_ones_remarked_on() {
         assert!(!folder.path("out.csv").exists(), "{rows}");
     }
     // Perhaps milliseconds, perhaps places to go to.
-    let (felt, said) = folder.felt(&path("0,40,20,1\n1,40,20,0\n2,40,20,-1\n"), &PARAMS);
-    assert_eq!(felt.len(), 2_001);
+    let (replayed, said) = folder.replayed(&path("0,40,20,1\n1,40,20,0\n2,40,20,-1\n"), &PARAMS);
+    assert_eq!(replayed.len(), 2_001);
     let remark = "in.csv: 2 times the HIP moves for more than 0.05 s between two rows, 1 s at most";
     assert!(said.contains(remark), "{said}");
-    let (felt, said) = folder.felt(&path(&sampled(1_000, 0.1, drag)), &PARAMS);
-    assert_eq!((felt.len(), said.contains("note")), (101, false), "{said}");
+    let (replayed, said) = folder.replayed(&path(&sampled(1_000, 0.1, drag)), &PARAMS);
+    assert_eq!(
+        (replayed.len(), said.contains("note")),
+        (101, false),
+        "{said}"
+    );
 }
 
 #[test]
@@ -338,8 +343,8 @@ fn a_board_of_another_rate_than_a_recording_is_refused() {
         said.contains("the recording has 4000 ticks a second, and the device has 1000"),
         "{said}"
     );
-    let (felt, _) = folder.felt(&recording, &[&device, "--ignore-settings"]);
-    assert_eq!(felt.len(), 101);
+    let (replayed, _) = folder.replayed(&recording, &[&device, "--ignore-settings"]);
+    assert_eq!(replayed.len(), 101);
 }
 
 /// Paths and recordings of a review, with the values that it worked out.
@@ -349,19 +354,19 @@ fn reviewed_paths_and_recordings_are_felt_by_time() {
         return;
     };
     let folder = Folder::new();
-    let felt = |terrain: &str, path: &str, more: &[&str]| {
+    let replayed = |terrain: &str, path: &str, more: &[&str]| {
         let [terrain, path] = [terrain, path].map(|name| cases.join(name));
         let run = replay(&terrain, &path, &folder.path("out.csv"), more);
         assert!(run.status.success(), "{}", said(&run));
         rows(&folder.read("out.csv"))
     };
-    trails(&felt(
+    trails(&replayed(
         "case2_recording_4khz_t.tif",
         "case2_recording_4khz_rec4k.csv",
         &[],
     ));
-    let damping = |felt: &[Row], from: f64, to: f64| {
-        let moving = felt
+    let damping = |replayed: &[Row], from: f64, to: f64| {
+        let moving = replayed
             .iter()
             .filter(|row| row.contact && row.t_s > from && row.t_s < to);
         let adds: Vec<_> = moving
@@ -371,14 +376,14 @@ fn reviewed_paths_and_recordings_are_felt_by_time() {
         adds
     };
     let adds = damping(
-        &felt("case3_flat33.tif", "case2b_damping_recording_4khz.csv", &[]),
+        &replayed("case3_flat33.tif", "case2b_damping_recording_4khz.csv", &[]),
         0.07,
         0.0995,
     );
     assert!(adds.iter().all(|n| (n - 0.1003).abs() < 2e-4), "{adds:?}");
     let params = ["--surface", DAMPED, "--stiffness=0.5"];
     let adds = damping(
-        &felt("case3_flat33.tif", "case3_path_10ms.csv", &params),
+        &replayed("case3_flat33.tif", "case3_path_10ms.csv", &params),
         2.1,
         3.9,
     );

@@ -34,8 +34,8 @@ fn command(folder: &Path, devices: &[&str], more: &[&str]) -> Command {
 }
 
 fn recorded(folder: &Path, name: &str) -> Vec<String> {
-    let felt = folder.join(name);
-    vec!["--out".into(), felt.to_str().expect("plain").to_owned()]
+    let rendered = folder.join(name);
+    vec!["--out".into(), rendered.to_str().expect("plain").to_owned()]
 }
 
 fn texts(owned: &[String]) -> Vec<&str> {
@@ -60,7 +60,7 @@ impl Pair {
         format!("[{number} tcp:{}]", self.served[number - 1].address)
     }
 
-    fn felt(&self, number: usize) -> PathBuf {
+    fn recording(&self, number: usize) -> PathBuf {
         self.folder.path().join(format!("felt-{number}.csv"))
     }
 
@@ -100,7 +100,7 @@ fn hear<R: std::io::Read>(from: R, beginnings: &[String]) -> R {
 }
 
 /// The rows of a recording without what a tick cost, which is the machine's; and its settings.
-fn felt(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
+fn rendered(path: &Path) -> (Vec<Vec<String>>, Vec<String>) {
     let text = std::fs::read_to_string(path).expect("a recording");
     let (settings, rows): (Vec<&str>, Vec<&str>) =
         text.lines().partition(|line| line.starts_with('#'));
@@ -154,8 +154,8 @@ fn two_arms_in_memory_feel_to_the_bit_what_each_feels_alone() {
     assert!(!folder.path().join("felt.csv").exists());
     for (alone, among_two) in [("plain.csv", "felt-1.csv"), ("zoomed.csv", "felt-2.csv")] {
         let (alone, among_two) = (
-            felt(&folder.path().join(alone)),
-            felt(&folder.path().join(among_two)),
+            rendered(&folder.path().join(alone)),
+            rendered(&folder.path().join(among_two)),
         );
         let touches = alone.0[0].iter().position(|name| name == "contact");
         let touches = touches.expect("a column");
@@ -176,7 +176,7 @@ fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
         let told = told(&output);
         assert!(output.status.success(), "{name}: {told}");
         for number in [1, 2] {
-            assert!(pair.felt(number).exists(), "{name}: {told}");
+            assert!(pair.recording(number).exists(), "{name}: {told}");
             let served = &pair.served[number - 1];
             assert_eq!(served.last_end(), SessionEnd::Goodbye, "{name}");
         }
@@ -201,7 +201,10 @@ fn unconfirmed_board_is_named_beside_a_confirmed_one() {
     // When it happened, and at the end.
     assert_eq!((of(1), of(2)), (0, 2), "{told}");
     assert!(told.contains("error: 1 of 2 devices failed"), "{told}");
-    assert!(pair.felt(1).exists() && pair.felt(2).exists(), "{told}");
+    assert!(
+        pair.recording(1).exists() && pair.recording(2).exists(),
+        "{told}"
+    );
     assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
     assert_eq!(pair.served[1].last_end(), SessionEnd::Replaced);
 }
@@ -264,7 +267,10 @@ fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
         "{told}"
     );
     assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
-    assert!(pair.felt(1).exists() && pair.felt(2).exists(), "{told}");
+    assert!(
+        pair.recording(1).exists() && pair.recording(2).exists(),
+        "{told}"
+    );
 }
 
 #[test]

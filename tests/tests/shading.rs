@@ -33,7 +33,7 @@ struct Circle<'c> {
 
 impl Circle<'_> {
     /// Returns the samples in contact of one round of a HIP.
-    fn felt(&self, terrain: &Terrain<'_>, shading: Shading) -> Vec<TickRecord> {
+    fn rendered(&self, terrain: &Terrain<'_>, shading: Shading) -> Vec<TickRecord> {
         let params = SurfaceParams {
             shading,
             ..SurfaceParams::PREMIUM
@@ -41,7 +41,7 @@ impl Circle<'_> {
         let mut replayer = on_native(terrain, params).expect("opened");
         let size = terrain.size_mm();
         let radius = ROUND / std::f64::consts::TAU;
-        let felt = (0..=self.steps()).filter_map(|tick| {
+        let rendered = (0..=self.steps()).filter_map(|tick| {
             let angle = f64::from(tick) * self.step / radius;
             let at = [
                 size[0] * self.middle[0] + radius * angle.cos(),
@@ -51,10 +51,10 @@ impl Circle<'_> {
             let ground = terrain.height_mm(at[0], at[1])?;
             let above = if tick == 0 { 1.0 } else { -(self.depth)(angle) };
             let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
-            let sample = replayer.step(hip.expect("addressable")).expect("felt");
+            let sample = replayer.step(hip.expect("addressable")).expect("rendered");
             (sample.state == ContactState::Touching).then_some(sample)
         });
-        felt.collect()
+        rendered.collect()
     }
 
     fn steps(&self) -> u32 {
@@ -63,9 +63,9 @@ impl Circle<'_> {
 
     /// Returns the energy of a shaded round, mJ; none where a hole breaks it.
     fn given(&self, terrain: &Terrain<'_>) -> Option<f64> {
-        let felt = self.felt(terrain, Shading::Smooth);
-        let is_whole = felt.len() + 2 >= self.steps() as usize;
-        is_whole.then(|| given_mj(&felt))
+        let rendered = self.rendered(terrain, Shading::Smooth);
+        let is_whole = rendered.len() + 2 >= self.steps() as usize;
+        is_whole.then(|| given_mj(&rendered))
     }
 }
 
@@ -75,16 +75,16 @@ fn degrees(a: Vec3, b: Vec3) -> f32 {
 
 /// Largest change of the force's direction from one HIP to the next, degrees, where the proxy
 /// goes no farther than so many cells: over a ridge it goes as far as it is deep, at once.
-fn largest_turn(felt: &[TickRecord], farthest: f32) -> f32 {
-    let pairs = felt.windows(2);
+fn largest_turn(rendered: &[TickRecord], farthest: f32) -> f32 {
+    let pairs = rendered.windows(2);
     let near = pairs.filter(|pair| pair[0].proxy.to(&pair[1].proxy).length() <= farthest);
     let turns = near.map(|pair| degrees(pair[0].force_n, pair[1].force_n));
     turns.fold(0.0, f32::max)
 }
 
 /// Returns the work of the force on a HIP along its path, mJ.
-fn given_mj(felt: &[TickRecord]) -> f64 {
-    let gives = felt.windows(2).map(|pair| {
+fn given_mj(rendered: &[TickRecord]) -> f64 {
+    let gives = rendered.windows(2).map(|pair| {
         let force = 0.5 * (pair[0].force_n + pair[1].force_n).as_dvec3();
         let (from, to) = (position(&pair[0].hip), position(&pair[1].hip));
         force.dot([0, 1, 2].map(|i| to[i] - from[i]).into())
@@ -103,7 +103,7 @@ fn on_real_ground_the_force_turns_a_tenth_as_fast() {
                 depth: &|_| depth,
             };
             let [plain, shaded] =
-                [Shading::None, Shading::Smooth].map(|shading| circle.felt(&terrain, shading));
+                [Shading::None, Shading::Smooth].map(|shading| circle.rendered(&terrain, shading));
             let sharp = largest_turn(&plain, f32::MAX);
             let [near, even] = [0.05, f32::MAX].map(|farthest| largest_turn(&shaded, farthest));
             println!(

@@ -1,5 +1,5 @@
 //! Content of the quick stress test's scenes, counted: each kind of ground, habit
-//! of the HIP and twin that is promised is there, felt, and judged.
+//! of the HIP and twin that is promised is there, rendered, and judged.
 
 use std::collections::BTreeMap;
 
@@ -34,7 +34,7 @@ fn names(
     let whole = |c: f64| c == c.round();
     let [x, y, z] = now.hip;
     let inside = (0..2).all(|i| (0.0..=f64::from(terrain.size[i])).contains(&now.hip[i]));
-    let rests = now.felt.state == ContactState::Touching && now.felt.converged;
+    let rests = now.output.state == ContactState::Touching && now.output.converged;
     let on = |p: [f64; 3]| usize::from(whole(p[0])) + usize::from(whole(p[1]));
     is("HIP on a grid line", inside && on(now.hip) == 1);
     is("HIP over a vertex", inside && on(now.hip) == 2);
@@ -49,10 +49,10 @@ fn names(
     is("HIP exactly on an edge of the surface", exactly);
     let far = distance(now.hip, now.proxy);
     is("HIP 100 cells inside or more", rests && far >= 100.0);
-    is("tile missing", now.felt.missing_tile.is_some());
+    is("tile missing", now.output.missing_tile.is_some());
     is(
         "work left over",
-        !now.felt.converged && now.felt.missing_tile.is_none(),
+        !now.output.converged && now.output.missing_tile.is_none(),
     );
     if let Some(before) = before {
         let way = distance(before.hip, now.hip);

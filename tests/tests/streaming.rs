@@ -38,7 +38,7 @@ fn a_field_of_4096_by_4096_streams_through_a_window() {
         let ground = terrain.height_mm(x, y).expect("known");
         let above = if i == 0 { 30.0 } else { -0.5 };
         let hip = terrain.scale().to_grid([x, y, ground + above]);
-        let sample = replayer.step(hip.expect("addressable")).expect("felt");
+        let sample = replayer.step(hip.expect("addressable")).expect("rendered");
         touched += u32::from(sample.state == ContactState::Touching);
         assert!(sample.force_n.is_finite());
     }
@@ -73,7 +73,7 @@ fn coarser_levels_feel_the_same_terrain_with_fewer_tiles() {
             let ground = terrain.height_mm(x, y).expect("known");
             let above = if i == 0 { 30.0 } else { -1.0 };
             let hip = terrain.scale().to_grid([x, y, ground + above]);
-            let sample = replayer.step(hip.expect("addressable")).expect("felt");
+            let sample = replayer.step(hip.expect("addressable")).expect("rendered");
             if i > 0 {
                 // A plane is the same at every level: so is its force.
                 let normal = 1.0 / (1.0 + (1.0 / 16.0f64).powi(2) + 0.125f64.powi(2)).sqrt();

@@ -59,7 +59,7 @@ fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
     let radius = STEP * f64::from(STEPS) / std::f64::consts::TAU;
     let radius = radius.min(0.4 * size[0].min(size[1]));
     let mut way = 0.0;
-    let felt = (0..=STEPS).filter_map(|tick| {
+    let rendered = (0..=STEPS).filter_map(|tick| {
         let is_fast = (1_600..1_650).contains(&tick);
         way += if is_fast { 0.3 } else { STEP };
         let angle = way / radius;
@@ -71,15 +71,15 @@ fn circle(terrain: &Terrain<'_>, params: SurfaceParams) -> Vec<TickRecord> {
         let lifts = tick % 1_200 < 20;
         let above = if lifts { 1.0 } else { -0.5 };
         let hip = terrain.scale().to_grid([at[0], at[1], ground + above]);
-        Some(replayer.step(hip.expect("addressable")).expect("felt"))
+        Some(replayer.step(hip.expect("addressable")).expect("rendered"))
     });
-    felt.collect()
+    rendered.collect()
 }
 
 /// The textured tick as the judge sees it: the displacement is what the same scene without
 /// texture makes.
 fn seen(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
-    let felt = ContactOutput {
+    let rendered = ContactOutput {
         state: textured.state,
         proxy: textured.proxy,
         displacement: plain.force_n * 2.0,
@@ -88,7 +88,7 @@ fn seen(plain: &TickRecord, textured: &TickRecord) -> ObservedTick {
     };
     ObservedTick {
         textured: Some(textured.force_n * 2.0),
-        ..ObservedTick::new(position(&textured.hip), felt, [0; 3])
+        ..ObservedTick::new(position(&textured.hip), rendered, [0; 3])
     }
 }
 
@@ -149,8 +149,8 @@ fn a_recording_keeps_its_texture() {
         "--surface",
         concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/grating.toml"),
     ];
-    let (felt, said) = hapterra(&demo);
-    assert!(felt, "{said}");
+    let (rendered, said) = hapterra(&demo);
+    assert!(rendered, "{said}");
     let recording = read("demo/hills.csv");
     assert!(
         recording.contains("# [force.texture]\n# pattern = \"grating\"\n"),

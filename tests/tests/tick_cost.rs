@@ -23,7 +23,7 @@ use hapterra_tests::emulation::emulated_board;
 const IN_CONTACT: f64 = 2_500.0;
 
 /// The demonstration's samples on the emulated board, and how it is afterwards.
-fn felt() -> Option<(Vec<TickRecord>, Status)> {
+fn rendered() -> Option<(Vec<TickRecord>, Status)> {
     let (qemu, image) = emulated_board()?;
     let raster = Synth::new(Kind::Fractal, 1, 30.0)
         .raster(400, 400)
@@ -41,7 +41,7 @@ fn felt() -> Option<(Vec<TickRecord>, Status)> {
     let (emulator, lines) = Emulator::start(&qemu, &image).expect("started");
     let mut plant = lines.plant;
     let ticks = (1e3 * placed.duration_s()) as u32;
-    let felt = std::thread::scope(|scope| {
+    let rendered = std::thread::scope(|scope| {
         // Until the board goes.
         scope.spawn(move || serve_plant(&mut plant, &mut rig, &|| false));
         let link = Box::new(lines.link);
@@ -67,12 +67,12 @@ fn felt() -> Option<(Vec<TickRecord>, Status)> {
         emulator.finish().expect("the board ended well");
         (samples, status.expect("told"))
     });
-    Some(felt)
+    Some(rendered)
 }
 
 #[test]
 fn a_tick_in_contact_stays_within_its_budget_and_the_stack_too() {
-    let Some((samples, status)) = felt() else {
+    let Some((samples, status)) = rendered() else {
         return;
     };
     // A window of 16 x 16 tiles is moved over it when the board starts.

@@ -72,7 +72,7 @@ fn ground<'t>(terrain: &'t Terrain<'_>) -> impl Fn(i64, i64) -> f64 + 't {
 
 fn step(replayer: &mut OfflineDevice<'_>, hip_mm: [f64; 3]) -> TickRecord {
     let hip = replayer.terrain().scale().to_grid(hip_mm);
-    replayer.step(hip.expect("addressable")).expect("felt")
+    replayer.step(hip.expect("addressable")).expect("rendered")
 }
 
 /// The terrain that a ball of a radius in cells feels, and a point.
@@ -177,7 +177,7 @@ fn a_ball_touches_poles_walls_and_pits_a_radius_away() {
 }
 
 /// Of 20 passes over a pole of one sample, 20 cells high, at half of its height, beside it by at
-/// most a part of the radius, those in which it is felt, by speed in cells a tick. Cells are a
+/// most a part of the radius, those in which it is rendered, by speed in cells a tick. Cells are a
 /// millimetre.
 fn passes_touching(radius: f64, speed: f64, (most_beside, friction): (f64, f32)) -> usize {
     let pole = |x: u32, y: u32| if (x, y) == (60, 30) { 20.0 } else { 0.0 };
@@ -188,20 +188,20 @@ fn passes_touching(radius: f64, speed: f64, (most_beside, friction): (f64, f32))
         ..SurfaceParams::PREMIUM
     };
     let mut replayer = on_native(&terrain, params).expect("opened");
-    let is_felt = |pass: &u32| {
+    let is_rendered = |pass: &u32| {
         let share = (f64::from(*pass) + 0.5) / 20.0;
         let beside = radius.max(0.5) * most_beside * (2.0 * share - 1.0);
         let mut x = 15.0 + share * speed;
         step(&mut replayer, [x, 30.0 + beside, 40.0]);
-        let mut felt = 0.0f32;
+        let mut rendered = 0.0f32;
         while x < 105.0 {
             let sample = step(&mut replayer, [x, 30.0 + beside, 10.0]);
-            felt = felt.max(sample.force_n.length());
+            rendered = rendered.max(sample.force_n.length());
             x += speed;
         }
-        felt > 0.0
+        rendered > 0.0
     };
-    (0..20).filter(is_felt).count()
+    (0..20).filter(is_rendered).count()
 }
 
 /// A tick ends within a ball's pole where it is no longer than that is wide. Of a ball of 2 mm this
@@ -247,7 +247,7 @@ fn steps_of_force(terrain: &Terrain<'_>, path: &[[f64; 3]]) -> usize {
     forces.windows(2).filter(is_step).count()
 }
 
-/// A hand's way along a row of a terrain at 30 mm/s, so deep below the mean of what is felt within
+/// A hand's way along a row of a terrain at 30 mm/s, below the mean of the surface within
 /// 1 mm around.
 fn way_over(terrain: &Terrain<'_>, north_mm: f64, deep_mm: f64) -> Vec<[f64; 3]> {
     const AROUND: usize = 33;
@@ -325,7 +325,7 @@ fn runs(folder: &std::path::Path, words: &[&str]) -> String {
 }
 
 /// Rows without the columns that the guard has its part in.
-fn felt(text: &str) -> Vec<String> {
+fn rendered(text: &str) -> Vec<String> {
     let rows = text.lines().filter(|line| !line.starts_with('#'));
     let part = |row: &str| row.split(',').take(8).collect::<Vec<_>>().join(",");
     rows.map(part).collect()
@@ -365,12 +365,12 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
         );
         let again = read("again.csv");
         assert!(again.contains("# tip_mm = 6.0\n"));
-        let (live, again) = (felt(&text), felt(&again));
+        let (live, again) = (rendered(&text), rendered(&again));
         assert!(
             live.iter().filter(|row| row.contains(",1,")).count() > 500,
             "{recording}"
         );
-        assert!(live == again, "{recording} is felt otherwise");
+        assert!(live == again, "{recording} has other forces");
         let said = runs(
             folder,
             &[
@@ -387,7 +387,7 @@ fn recordings_of_a_ball_are_felt_again_with_it() {
             said.contains("--tip 0mm, where the recording has 6mm"),
             "{said}"
         );
-        assert!(!read("point.csv").contains("tip_mm") && felt(&read("point.csv")) != live);
+        assert!(!read("point.csv").contains("tip_mm") && rendered(&read("point.csv")) != live);
     }
 }
 

@@ -89,7 +89,7 @@ fn same(
     let mut touched = 0;
     for (row, hip_mm) in wander(terrain, seed, 4_000, -2.0).into_iter().enumerate() {
         let hip = terrain.scale().to_grid(hip_mm).expect("addressable");
-        let sample = replayer.step(hip).expect("felt");
+        let sample = replayer.step(hip).expect("rendered");
         let proxy_mm = terrain.scale().to_mm(&sample.proxy);
         let step = contact.step(hip_mm).expect("a step");
         let bits = step.force_n.map(f32::to_bits);

@@ -239,8 +239,8 @@ impl Contact {
 
     fn sample(&mut self, hip: GridPoint, hip_mm: [f64; 3]) -> Result<TickRecord, StepError> {
         let [east_mm, north_mm, _] = hip_mm;
-        let felt = self.tick_loop.step(hip, &self.terrain, self.materials);
-        match felt {
+        let output = self.tick_loop.step(hip, &self.terrain, self.materials);
+        match output {
             Ok(Some(sample)) => Ok(sample),
             Ok(None) => Err(StepError::Far { hip_mm }),
             Err(NoTile::Unread(unread)) => Err(unread.into()),

@@ -116,7 +116,7 @@ impl Terrain {
     ) -> Result<(), NoTile> {
         let index = [key.index.col, key.index.row];
         let first = index.map(|index| index.max(0) as u32 * TILE_CELLS as u32);
-        let width = self.read_felt(first, room).map_err(NoTile::Unread)?;
+        let width = self.read_haptic(first, room).map_err(NoTile::Unread)?;
         let base = base(room);
         let filled = tile.fill(key, base, |col, row| {
             let cells = (col < width).then(|| room.get(row * width + col)).flatten();
@@ -128,7 +128,7 @@ impl Terrain {
         {
             let part = 1.0 / f64::from(self.parts());
             // The sample under the middle of a ball.
-            let under = |felt: u32| libm::floor(f64::from(felt) * part + 0.5) as u32;
+            let under = |haptic: u32| libm::floor(f64::from(haptic) * part + 0.5) as u32;
             let [column, row] = first;
             let samples = (0..TILE_SAMPLES as u32).flat_map(|v| {
                 let line = of.row(under(row + v));
@@ -142,9 +142,9 @@ impl Terrain {
         Ok(())
     }
 
-    /// Reads the felt heights of a tile, in haptic cells, row by row: NaN in holes. Returns how many a
+    /// Reads the rendered heights of a tile, in haptic cells, row by row: NaN in holes. Returns how many a
     /// row has.
-    fn read_felt(&self, first: [u32; 2], room: &mut Vec<f64>) -> Result<usize, Unread> {
+    fn read_haptic(&self, first: [u32; 2], room: &mut Vec<f64>) -> Result<usize, Unread> {
         let Some(ball) = &self.ball else {
             let end = [self.columns, self.rows].map(i64::from);
             let from = first.map(i64::from);

@@ -70,7 +70,7 @@ pub fn draw(
             is_told = true;
             break;
         }
-        let is_felt = matches!(message, Message::Samples(_));
+        let has_samples = matches!(message, Message::Samples(_));
         if let (Message::Scene(scene), None) = (&message, &drawing) {
             history.begin(scene.is_live);
         }
@@ -78,7 +78,7 @@ pub fn draw(
         file = file.and_then(|rrd| written(rrd, &entries));
         history.put(entries)?;
         let is_live = drawing.as_ref().is_some_and(Drawing::is_live);
-        if is_felt && is_live && !told {
+        if has_samples && is_live && !told {
             told = true;
             on_scene();
         }

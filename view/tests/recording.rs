@@ -96,17 +96,17 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     let viewed = entities(&at("viewed.rrd"));
     check_views(&csv, &viewed, true);
     check_frames(&csv, &viewed);
-    // What a replay felt is the same, and so is its picture; here as Parquet.
-    let felt = at("felt.parquet");
+    // A replay has the same forces and the same picture; here as Parquet.
+    let rendered = at("felt.parquet");
     let mut replay = hapterra().expect("named");
     replay
         .args(["replay", "--view"])
         .arg(&terrain)
         .arg(&recording);
-    run(replay.arg("-o").arg(&felt), &at("replayed.rrd"));
+    run(replay.arg("-o").arg(&rendered), &at("replayed.rrd"));
     check_views(&csv, &entities(&at("replayed.rrd")), true);
     let mut view = hapterra().expect("named");
-    view.arg("view").arg(&felt).arg(&terrain);
+    view.arg("view").arg(&rendered).arg(&terrain);
     run(&mut view, &at("parquet.rrd"));
     check_views(&csv, &entities(&at("parquet.rrd")), true);
     std::fs::remove_dir_all(folder).expect("it goes");

@@ -36,7 +36,7 @@ pub(super) fn measure() -> Vec<Row> {
         ("0.45 cell late over a coarse fallback", late(0.45), under),
         ("1 cell late over a coarse fallback", late(1.0), under),
     ]
-    .map(|(name, due, fallback)| Row::of(name, SWEPT, &[&felt(due, fallback)]))
+    .map(|(name, due, fallback)| Row::of(name, SWEPT, &[&output(due, fallback)]))
     .to_vec()
 }
 
@@ -62,7 +62,7 @@ fn coarse(grid: &Grid, fallback: &Fallback) -> Tile {
 }
 
 /// Returns the answers from the start of the slide on.
-fn felt(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
+fn output(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
     let grid = Grid::from_fn("two tiles", [2 * TILE_CELLS, TILE_CELLS], |x, y| {
         (1.5 * (0.2 * x as f64).sin() * (0.17 * y as f64).cos()) as f32
     });
@@ -86,15 +86,15 @@ fn felt(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
         if window.settle(SETTLED_A_TICK) {
             contact.surface_moved(&window);
         }
-        let felt = *contact.step(&window, &hip.grid);
+        let output = *contact.step(&window, &hip.grid);
         answers.push(Answer {
-            touching: felt.state == ContactState::Touching,
-            converged: felt.converged,
-            displacement: felt.displacement.to_array(),
+            touching: output.state == ContactState::Touching,
+            converged: output.converged,
+            displacement: output.displacement.to_array(),
         });
         let hint = RequestHint {
-            missing_tile: felt.missing_tile,
-            proxy: felt.proxy.column(),
+            missing_tile: output.missing_tile,
+            proxy: output.proxy.column(),
             hip: hip.grid.column(),
             velocity: [STEP as f32, 0.0],
         };
@@ -104,7 +104,7 @@ fn felt(due: u32, fallback: Option<Fallback>) -> Vec<Answer> {
         for key in coming.extract_if(.., |key| is_here(key)) {
             requester.received(key);
             fill(&grid, key, spare);
-            let at = [felt.proxy.column(), hip.grid.column()];
+            let at = [output.proxy.column(), hip.grid.column()];
             spare = window.take(spare, at).expect("one comes back for one");
         }
     }

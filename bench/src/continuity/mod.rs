@@ -49,14 +49,14 @@ fn over_ground(ground: &Ground) -> Vec<Row> {
     // Of the paper's and parry's settings the best, and no copy, which is no contact.
     entries.retain(|(label, _)| COMPARED.contains(&label.name));
     let row = |(label, variant): &mut (Label, Box<dyn Haptics + '_>)| {
-        let felt: Vec<Vec<Answer>> = ways
+        let rendered: Vec<Vec<Answer>> = ways
             .iter()
             .map(|way| {
                 variant.forget();
                 way.hips.iter().map(|hip| variant.tick(hip)).collect()
             })
             .collect();
-        let slid: Vec<&[Answer]> = felt
+        let slid: Vec<&[Answer]> = rendered
             .iter()
             .zip(&ways)
             .map(|(answers, way)| &answers[way.approach - 1..])

@@ -33,14 +33,14 @@ impl Row {
             .iter()
             .flat_map(|answers| answers.windows(2).map(|pair| pair[0].change(&pair[1])))
             .collect();
-        let felt = pieces.iter().flat_map(|answers| answers.iter());
+        let rendered = pieces.iter().flat_map(|answers| answers.iter());
         let [p99, largest] = quantiles(changes, [0.99, 1.0]);
         Self {
             ground,
             label,
             largest,
             p99,
-            missed: part(felt.map(|answer| !answer.touching)),
+            missed: part(rendered.map(|answer| !answer.touching)),
         }
     }
 }

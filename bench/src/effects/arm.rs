@@ -167,11 +167,11 @@ impl<'g> Arm<'g> {
         for place in &way.down {
             driven.tick(place);
         }
-        let felt = way.there.iter().map(|place| driven.tick(place));
-        let felt = felt
+        let rendered = way.there.iter().map(|place| driven.tick(place));
+        let rendered = rendered
             .map(|outcome| EffectTick::of(&outcome.sample))
             .collect();
-        driven.is_armed().map(|()| felt)
+        driven.is_armed().map(|()| rendered)
     }
 }
 

@@ -20,28 +20,30 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
     let params = Effect::All.params();
     let mut errors = Vec::new();
     for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
-        let felt = arm.render(params, &way)?;
+        let rendered = arm.render(params, &way)?;
         let place = Place(&grid.name, way.name, Effect::All.name());
         let turn = ("force off the spring's direction", "°");
-        errors.extend(place.error(turn, MAX_TURN, off_degrees(&felt)));
+        errors.extend(place.error(turn, MAX_TURN, off_degrees(&rendered)));
         let share = ("size of the force", "% of its bound");
-        errors.extend(place.error(share, WHOLE, shares(&params, &felt)));
+        errors.extend(place.error(share, WHOLE, shares(&params, &rendered)));
     }
     Ok(errors)
 }
 
 /// Between the force and the way from the HIP to the proxy; no force pulls by less than 90°.
-fn off_degrees(felt: &[EffectTick]) -> Vec<f64> {
-    let felt = felt.iter().filter(|felt| felt.whole);
-    let felt = felt.filter(|felt| length(felt.force_n) > 0.0);
-    felt.map(|felt| degrees(felt.force_n, felt.spring()))
+fn off_degrees(rendered: &[EffectTick]) -> Vec<f64> {
+    let rendered = rendered.iter().filter(|record| record.whole);
+    let rendered = rendered.filter(|record| length(record.force_n) > 0.0);
+    rendered
+        .map(|record| degrees(record.force_n, record.spring()))
         .collect()
 }
 
 /// Each force over the most it may be, percent.
-fn shares(params: &SurfaceParams, felt: &[EffectTick]) -> Vec<f64> {
-    let felt = felt.iter().filter(|felt| felt.whole);
-    let share = felt.map(|felt| length(felt.force_n) / most_n(params, length(felt.spring())));
+fn shares(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<f64> {
+    let rendered = rendered.iter().filter(|record| record.whole);
+    let share =
+        rendered.map(|record| length(record.force_n) / most_n(params, length(record.spring())));
     share.map(|share| 100.0 * share).collect()
 }
 
@@ -62,15 +64,15 @@ mod tests {
     #[test]
     fn a_force_that_pulls_or_is_too_large_is_seen() {
         let params = Effect::All.params();
-        let felt = |force_n| EffectTick {
+        let rendered = |force_n| EffectTick {
             hip: [0.0; 3],
             proxy: [0.0, 0.0, 1.0],
             force_n,
             whole: true,
         };
         let seen = |force_n| {
-            let felt = [felt(force_n)];
-            (off_degrees(&felt)[0], shares(&params, &felt)[0])
+            let rendered = [rendered(force_n)];
+            (off_degrees(&rendered)[0], shares(&params, &rendered)[0])
         };
         let (turn, share) = seen([0.1, 0.0, 0.5]);
         assert!(turn < MAX_TURN && share < WHOLE);

@@ -25,13 +25,13 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
     let params = Effect::Damping.params();
     let mut errors = Vec::new();
     for way in [arm.slide(effort.ticks)?, arm.tap(effort.ticks)?] {
-        let felt = arm.render(params, &way)?;
+        let rendered = arm.render(params, &way)?;
         let place = row::Place(&grid.name, way.name, Effect::Damping.name());
-        let own = off_mn(&params, &felt, |tick| by_foaw(&arm, &way, tick));
-        let path = off_mn(&params, &felt, |tick| vec![by_path(&way, tick)]);
+        let own = off_mn(&params, &rendered, |tick| by_foaw(&arm, &way, tick));
+        let path = off_mn(&params, &rendered, |tick| vec![by_path(&way, tick)]);
         errors.extend(place.error(("force off that by FOAW in f64", "mN"), ROUNDING, own));
         errors.extend(place.error(("force off that by the path's velocity", "mN"), None, path));
-        errors.extend(place.error(("pull of the surface", "mN"), 0.0, pulls_mn(&felt)));
+        errors.extend(place.error(("pull of the surface", "mN"), 0.0, pulls_mn(&rendered)));
     }
     Ok(errors)
 }
@@ -40,17 +40,19 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Result<Vec<Error>, NotMeas
 /// velocities.
 fn off_mn(
     params: &SurfaceParams,
-    felt: &[EffectTick],
+    rendered: &[EffectTick],
     velocities_mm_s: impl Fn(usize) -> Vec<Vector>,
 ) -> Vec<f64> {
-    let felt = felt.iter().enumerate().skip(READINGS);
-    let off = felt.filter(|(_, felt)| felt.whole).map(|(tick, felt)| {
-        let off = velocities_mm_s(tick).into_iter().map(|velocity| {
-            let wanted = damped_n(params, felt.spring(), velocity);
-            1e3 * length(minus(felt.force_n, wanted))
+    let rendered = rendered.iter().enumerate().skip(READINGS);
+    let off = rendered
+        .filter(|(_, rendered)| rendered.whole)
+        .map(|(tick, rendered)| {
+            let off = velocities_mm_s(tick).into_iter().map(|velocity| {
+                let wanted = damped_n(params, rendered.spring(), velocity);
+                1e3 * length(minus(rendered.force_n, wanted))
+            });
+            off.fold(f64::INFINITY, f64::min)
         });
-        off.fold(f64::INFINITY, f64::min)
-    });
     off.collect()
 }
 
@@ -69,10 +71,11 @@ fn damped_n(params: &SurfaceParams, spring_mm: Vector, velocity_mm_s: Vector) ->
 }
 
 /// Returns the pull of each force at the tip, mN.
-fn pulls_mn(felt: &[EffectTick]) -> Vec<f64> {
-    let whole = felt.iter().filter(|felt| felt.whole);
-    let pulls = whole.map(|felt| {
-        let along = dot(felt.force_n, felt.spring()) / length(felt.spring()).max(f64::MIN_POSITIVE);
+fn pulls_mn(rendered: &[EffectTick]) -> Vec<f64> {
+    let whole = rendered.iter().filter(|record| record.whole);
+    let pulls = whole.map(|record| {
+        let along =
+            dot(record.force_n, record.spring()) / length(record.spring()).max(f64::MIN_POSITIVE);
         (-1e3 * along).max(0.0)
     });
     pulls.collect()
@@ -120,24 +123,24 @@ mod tests {
         let arm = Arm::over(&grid);
         let way = arm.tap(2000).expect("in reach");
         let params = Effect::Damping.params();
-        let felt = arm.render(params, &way).expect("felt");
-        let off = |params: &SurfaceParams, felt: &[EffectTick]| {
-            worst(off_mn(params, felt, |tick| by_foaw(&arm, &way, tick)))
+        let rendered = arm.render(params, &way).expect("rendered");
+        let off = |params: &SurfaceParams, rendered: &[EffectTick]| {
+            worst(off_mn(params, rendered, |tick| by_foaw(&arm, &way, tick)))
         };
-        assert!(off(&params, &felt) < ROUNDING && worst(pulls_mn(&felt)) == 0.0);
+        assert!(off(&params, &rendered) < ROUNDING && worst(pulls_mn(&rendered)) == 0.0);
         // Five percent more damping.
         let mut more = params;
         more.damping.ns_per_m *= 1.05;
-        assert!(off(&more, &felt) > 10.0 * ROUNDING);
+        assert!(off(&more, &rendered) > 10.0 * ROUNDING);
         // The velocity of the tick before.
-        let late = off_mn(&params, &felt, |tick| by_foaw(&arm, &way, tick - 1));
+        let late = off_mn(&params, &rendered, |tick| by_foaw(&arm, &way, tick - 1));
         assert!(worst(late) > 10.0 * ROUNDING);
         // A damper whose part is not bounded by the spring's force.
-        let mut pulling = felt.clone();
-        for (tick, felt) in pulling.iter_mut().enumerate().skip(1) {
-            let (spring, deep) = (felt.spring(), length(felt.spring()));
+        let mut pulling = rendered.clone();
+        for (tick, rendered) in pulling.iter_mut().enumerate().skip(1) {
+            let (spring, deep) = (rendered.spring(), length(rendered.spring()));
             let speed = dot(by_path(&way, tick), spring) / deep.max(1e-9);
-            felt.force_n = spring.map(|x| x * (0.5 - 2e-3 * speed / deep.max(1e-9)));
+            rendered.force_n = spring.map(|x| x * (0.5 - 2e-3 * speed / deep.max(1e-9)));
         }
         assert!(worst(pulls_mn(&pulling)) > 1.0 && off(&params, &pulling) > 1.0);
     }

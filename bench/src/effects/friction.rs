@@ -66,8 +66,8 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 
 /// Returns the difference of the tangential over the normal force from a coefficient, percent of
 /// that, in each tick in which the proxy slid within a patch.
-fn off_percent(grid: &Grid, mu: f64, felt: &[EffectTick]) -> Vec<f64> {
-    let slid = felt.windows(2).filter(|pair| {
+fn off_percent(grid: &Grid, mu: f64, rendered: &[EffectTick]) -> Vec<f64> {
+    let slid = rendered.windows(2).filter(|pair| {
         let both = pair[0].whole && pair[1].whole;
         both && pair[0].proxy != pair[1].proxy
     });
@@ -81,12 +81,14 @@ fn off_percent(grid: &Grid, mu: f64, felt: &[EffectTick]) -> Vec<f64> {
     off.collect()
 }
 
-/// The farthest that a proxy is from where it was first; none where it was not felt.
-fn drift(felt: &[EffectTick]) -> Option<f64> {
-    let first = felt.first()?.proxy;
-    let is_felt = felt.iter().all(|felt| felt.whole);
-    let far = felt.iter().map(|felt| length(minus(felt.proxy, first)));
-    is_felt.then(|| far.fold(0.0, f64::max))
+/// The farthest that a proxy is from where it was first; none where it was not rendered.
+fn drift(rendered: &[EffectTick]) -> Option<f64> {
+    let first = rendered.first()?.proxy;
+    let is_rendered = rendered.iter().all(|record| record.whole);
+    let far = rendered
+        .iter()
+        .map(|record| length(minus(record.proxy, first)));
+    is_rendered.then(|| far.fold(0.0, f64::max))
 }
 
 /// Down along the normal at places inside of patches, and a HIP that trembles there; and where
@@ -143,8 +145,8 @@ mod tests {
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
         let mut worst = |mu: f32| {
             params.friction.dynamic_mu = mu;
-            let felt = render(&grid, params, &slide.hips);
-            let off = off_percent(&grid, 0.3, &felt[slide.approach..]);
+            let rendered = render(&grid, params, &slide.hips);
+            let off = off_percent(&grid, 0.3, &rendered[slide.approach..]);
             let above = off.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             (above, -off.iter().copied().fold(f64::INFINITY, f64::min))
         };
@@ -156,18 +158,18 @@ mod tests {
 
     #[test]
     fn a_proxy_that_creeps_is_seen() {
-        let felt = EffectTick {
+        let rendered = EffectTick {
             hip: [0.0; 3],
             proxy: [0.0, 0.0, 0.1],
             force_n: [0.0, 0.0, 0.05],
             whole: true,
         };
-        let mut crept = felt;
+        let mut crept = rendered;
         crept.proxy[0] = 1e-6;
-        assert_eq!(drift(&[felt; 3]), Some(0.0));
-        assert_eq!(drift(&[felt, felt, crept]), Some(1e-6));
+        assert_eq!(drift(&[rendered; 3]), Some(0.0));
+        assert_eq!(drift(&[rendered, rendered, crept]), Some(1e-6));
         crept.whole = false;
-        assert_eq!(drift(&[felt, felt, crept]), None);
+        assert_eq!(drift(&[rendered, rendered, crept]), None);
     }
 
     /// Ice slips where friction holds.
@@ -175,8 +177,8 @@ mod tests {
     fn a_proxy_on_ice_drifts() {
         let grid = terrain();
         let (hips, from) = held(&grid);
-        let felt = render(&grid, Effect::None.params(), &hips);
-        let drift = drift(&felt[from[0]..][..HELD]);
+        let rendered = render(&grid, Effect::None.params(), &hips);
+        let drift = drift(&rendered[from[0]..][..HELD]);
         assert!(drift.is_some_and(|drift| drift > 0.01), "{drift:?}");
     }
 }

@@ -32,7 +32,7 @@ pub use arm::NotMeasured;
 pub use effect::Effect;
 pub use row::{Error, Measured, Spread, Time};
 
-/// Cells along the side of what is felt of a terrain: what a device's window holds, and more than
+/// Cells along the side of the rendered part of a terrain: what a device's window holds, and more than
 /// the arm reaches.
 pub const SIDE: usize = 256;
 /// Fewest cells along the side of a terrain that has room for the paths.

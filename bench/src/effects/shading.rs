@@ -24,9 +24,9 @@ const TURNED: f64 = 60.0;
 
 pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
     let slide = path::slide_at(grid, "slide 0.01", [STEP, DEPTH], effort.ticks);
-    let felt =
+    let rendered =
         |effect: Effect| render(grid, effect.params(), &slide.hips).split_off(slide.approach);
-    let (plain, shaded) = (felt(Effect::None), felt(Effect::Shading));
+    let (plain, shaded) = (rendered(Effect::None), rendered(Effect::Shading));
     let [none, own] =
         [Effect::None, Effect::Shading].map(|of| Place(&grid.name, slide.name, of.name()));
     let turn = ("turn of the force from one tick to the next", "°");
@@ -43,21 +43,24 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 }
 
 /// Returns the angle of each force to its expected direction, degrees.
-fn off(grid: &Grid, felt: &[EffectTick]) -> Vec<f64> {
-    let off = felt.iter().filter(|felt| felt.whole).filter_map(|felt| {
-        let own = normal(felt.slopes(grid)?);
-        let [x, y, _] = felt.proxy;
-        let wanted = turned(own, normal(smoothed(grid, [x, y])?));
-        Some(degrees(felt.force_n, wanted))
-    });
+fn off(grid: &Grid, rendered: &[EffectTick]) -> Vec<f64> {
+    let off = rendered
+        .iter()
+        .filter(|record| record.whole)
+        .filter_map(|record| {
+            let own = normal(record.slopes(grid)?);
+            let [x, y, _] = record.proxy;
+            let wanted = turned(own, normal(smoothed(grid, [x, y])?));
+            Some(degrees(record.force_n, wanted))
+        });
     off.collect()
 }
 
 /// Degrees between forces that follow each other while the proxy goes on evenly: shading does not
 /// move a proxy that leaves a ridge.
-fn turns(felt: &[EffectTick]) -> Vec<f64> {
+fn turns(rendered: &[EffectTick]) -> Vec<f64> {
     let goes = |pair: &[EffectTick]| length(minus(pair[1].proxy, pair[0].proxy));
-    let pairs = felt.windows(2);
+    let pairs = rendered.windows(2);
     let pairs = pairs.filter(|pair| pair[0].whole && pair[1].whole && goes(pair) <= FARTHEST);
     let turn = |pair: &[EffectTick]| degrees(pair[0].force_n, pair[1].force_n);
     pairs.map(turn).collect()
@@ -127,14 +130,14 @@ mod tests {
     fn a_direction_that_is_a_degree_off_is_seen_and_so_is_none() {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [STEP, DEPTH], 2000);
-        let worst = |felt: &[EffectTick]| off(&grid, felt).into_iter().fold(0.0, f64::max);
+        let worst = |rendered: &[EffectTick]| off(&grid, rendered).into_iter().fold(0.0, f64::max);
         let shaded = render(&grid, Effect::Shading.params(), &slide.hips);
         assert!(worst(&shaded) < ROUNDING);
         let (sin, cos) = 1_f64.to_radians().sin_cos();
         let mut wrong = shaded.clone();
-        for felt in &mut wrong {
-            let [x, y, z] = felt.force_n;
-            felt.force_n = [x * cos + z * sin, y, z * cos - x * sin];
+        for rendered in &mut wrong {
+            let [x, y, z] = rendered.force_n;
+            rendered.force_n = [x * cos + z * sin, y, z * cos - x * sin];
         }
         // About the axis of the turn a force does not move.
         let least = off(&grid, &wrong).into_iter().fold(f64::INFINITY, f64::min);
@@ -153,9 +156,9 @@ mod tests {
         let shaded = render(&rough, Effect::Shading.params(), &slide.hips);
         let off = off(&rough, &shaded);
         let worst = off.iter().copied().fold(0.0, f64::max);
-        let most = shaded.iter().filter_map(|felt| {
-            let own = normal(felt.slopes(&rough)?);
-            Some(degrees(own, felt.force_n))
+        let most = shaded.iter().filter_map(|record| {
+            let own = normal(record.slopes(&rough)?);
+            Some(degrees(own, record.force_n))
         });
         let most = most.fold(0.0, f64::max);
         assert!(

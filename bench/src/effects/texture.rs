@@ -1,4 +1,4 @@
-//! Texture: the felt height, and the force along the surface, against the documented formulas.
+//! Texture: the rendered height, and the force along the surface, against the documented formulas.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use crate::compare::Effort;
 use crate::grid::Grid;
 use crate::path;
 
-/// Cells a tick: felt in whole, and amid the fade; and a depth at which neither the height nor the
+/// Cells a tick: rendered in full, and amid the fade; and a depth at which neither the height nor the
 /// slope is bounded by the depth.
 const STEPS: [(&str, f64); 2] = [("slide 0.05", 0.05), ("slide 0.18", 0.18)];
 const DEPTH: f64 = 0.3;
@@ -44,7 +44,7 @@ pub(super) fn measure(grid: &Grid, effort: Effort) -> Vec<Error> {
 
 /// Returns the difference of the force from the formula, tick by tick: along the force without
 /// texture, percent of the amplitude, and across it, percent of what the steepest slope does.
-fn off_percent(params: &SurfaceParams, felt: &[EffectTick]) -> Vec<[f64; 2]> {
+fn off_percent(params: &SurfaceParams, rendered: &[EffectTick]) -> Vec<[f64; 2]> {
     let texture = &params.texture;
     let (amplitude, stiffness) = (
         f64::from(texture.amplitude_mm),
@@ -52,13 +52,15 @@ fn off_percent(params: &SurfaceParams, felt: &[EffectTick]) -> Vec<[f64; 2]> {
     );
     let mut fade = Fade::new(f64::from(texture.wavelength_mm));
     // The proxy has a speed in the air, too.
-    let shares = felt.iter().map(|felt| (felt, fade.share(felt.proxy)));
-    let whole = shares.filter(|(felt, _)| felt.whole);
-    let off = whole.map(|(felt, share)| {
-        let spring = felt.spring();
+    let shares = rendered
+        .iter()
+        .map(|record| (record, fade.share(record.proxy)));
+    let whole = shares.filter(|(rendered, _)| rendered.whole);
+    let off = whole.map(|(rendered, share)| {
+        let spring = rendered.spring();
         let depth = length(spring);
-        let added = minus(felt.force_n.map(|x| x / stiffness), spring);
-        let off = minus(added, wanted(texture, felt.proxy, spring, share));
+        let added = minus(rendered.force_n.map(|x| x / stiffness), spring);
+        let off = minus(added, wanted(texture, rendered.proxy, spring, share));
         let normal = spring.map(|x| x / depth);
         let high = dot(off, normal);
         let steepest = TAU * amplitude / f64::from(texture.wavelength_mm);
@@ -85,7 +87,7 @@ fn wanted(texture: &Texture, proxy: Vector, spring: Vector, share: f64) -> Vecto
     plus(high, across, -share * depth.min(deepest(texture)))
 }
 
-/// Share of a texture that is felt, by the proxy's way over the map.
+/// Share of a texture that is rendered, by the proxy's way over the map.
 struct Fade {
     wavelength: f64,
     /// Wavelengths a tick.
@@ -124,8 +126,8 @@ mod tests {
     use super::*;
     use crate::tick_states::terrain;
 
-    fn worst(params: &SurfaceParams, felt: &[EffectTick]) -> [f64; 2] {
-        let off = off_percent(params, felt);
+    fn worst(params: &SurfaceParams, rendered: &[EffectTick]) -> [f64; 2] {
+        let off = off_percent(params, rendered);
         [0, 1].map(|i| off.iter().map(|off| off[i]).fold(0.0, f64::max))
     }
 
@@ -135,8 +137,8 @@ mod tests {
         let slide = path::slide_at(&grid, "", [0.05, DEPTH], 2000);
         for effect in [Effect::Grain, Effect::Grating] {
             let params = effect.params();
-            let felt = render(&grid, params, &slide.hips);
-            let [high, along] = worst(&params, &felt);
+            let rendered = render(&grid, params, &slide.hips);
+            let [high, along] = worst(&params, &rendered);
             assert!(high < MAX_HIGH && along < MAX_ALONG, "{high} {along}");
             let wrong: [fn(&mut Texture); 3] = [
                 |texture| texture.seed += 1,
@@ -146,20 +148,20 @@ mod tests {
             for change in wrong {
                 let mut other = params;
                 change(&mut other.texture);
-                let [high, _] = worst(&other, &felt);
+                let [high, _] = worst(&other, &rendered);
                 assert!(high > 10.0 * MAX_HIGH, "{other:?}: {high}");
             }
             // A hundredth of a wave to the east.
-            let mut shifted = felt.clone();
-            for felt in &mut shifted {
-                felt.hip[0] += 0.01;
-                felt.proxy[0] += 0.01;
+            let mut shifted = rendered.clone();
+            for rendered in &mut shifted {
+                rendered.hip[0] += 0.01;
+                rendered.proxy[0] += 0.01;
             }
             assert!(worst(&params, &shifted)[0] > 10.0 * MAX_HIGH);
             // Valleys where there should be ridges.
-            let mut inverse = felt.clone();
-            for felt in &mut inverse {
-                felt.force_n = minus(felt.spring(), felt.force_n);
+            let mut inverse = rendered.clone();
+            for rendered in &mut inverse {
+                rendered.force_n = minus(rendered.spring(), rendered.force_n);
             }
             assert!(worst(&params, &inverse)[0] > 100.0);
         }
@@ -170,12 +172,12 @@ mod tests {
         let grid = terrain();
         let slide = path::slide_at(&grid, "", [0.18, DEPTH], 2000);
         let params = Effect::Grating.params();
-        let mut felt = render(&grid, params, &slide.hips);
-        assert!(worst(&params, &felt)[0] < MAX_HIGH);
-        for felt in &mut felt {
-            let added = wanted(&params.texture, felt.proxy, felt.spring(), 1.0);
-            felt.force_n = plus(felt.spring(), added, 1.0).map(|x| x * 0.5);
+        let mut rendered = render(&grid, params, &slide.hips);
+        assert!(worst(&params, &rendered)[0] < MAX_HIGH);
+        for rendered in &mut rendered {
+            let added = wanted(&params.texture, rendered.proxy, rendered.spring(), 1.0);
+            rendered.force_n = plus(rendered.spring(), added, 1.0).map(|x| x * 0.5);
         }
-        assert!(worst(&params, &felt)[0] > 10.0);
+        assert!(worst(&params, &rendered)[0] > 10.0);
     }
 }

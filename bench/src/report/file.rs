@@ -26,7 +26,7 @@ pub const HEADER: [&str; 17] = [
     "extra_bytes_per_sample",
 ];
 
-/// Writes all rows; errors are empty where nothing was felt. The force's changes
+/// Writes all rows; errors are empty where no force was rendered. The force's changes
 /// come last, as the path "force", their terrain being the ground; they are of
 /// no time.
 ///

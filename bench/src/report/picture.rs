@@ -15,14 +15,14 @@ use super::labels::{self, Named, Rect};
 use crate::compare::{Family, Row};
 use crate::stats::quantiles;
 
-/// Errors below this are drawn here: nothing finer can be felt or told apart.
+/// Errors below this are drawn here: nothing finer can be felt or distinguished.
 const FLOOR: f64 = 1e-9;
 /// Radius of a variant's point, finished pixels.
 const MARK_PX: i32 = 7;
 /// Radius of a terrain's point, finished pixels.
 const DOT_PX: i32 = 3;
 
-/// Draws one panel for each path on which something is felt. Small points are
+/// Draws one panel for each path on which something is rendered. Small points are
 /// terrains, the large one with the name their median.
 ///
 /// # Errors

@@ -32,7 +32,7 @@ fn line(row: &Row) -> String {
         number(high),
         row.ratio
     );
-    let felt = match &row.error {
+    let errors = match &row.error {
         None => format!(" | {:>35} | {:>25}", "–", "–"),
         Some(error) => format!(
             " | {:>10.1e} {:>8.1e} {:>8.1e}          | {:>14} {:>10}",
@@ -52,7 +52,7 @@ fn line(row: &Row) -> String {
         part => format!("  ({:.1} % of ticks left work over)", 100.0 * part),
     };
     format!(
-        "{timing}{felt} | {:>5.2} | {missed:>6} | {:>8.2}{unconverged}",
+        "{timing}{errors} | {:>5.2} | {missed:>6} | {:>8.2}{unconverged}",
         row.jump, row.label.extra_bytes
     )
 }

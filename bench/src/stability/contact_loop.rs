@@ -55,7 +55,7 @@ pub(super) struct LoopSettings {
 /// Runs an arm in an arming hand until its script ends, and shows every tick with the time since
 /// the script began, s. Ends early where `look` says so.
 pub(super) fn run(
-    felt: &LoopSettings,
+    settings: &LoopSettings,
     mut arm: HeldPhantom,
     look: &mut dyn FnMut(f64, &Step) -> bool,
 ) {
@@ -67,8 +67,8 @@ pub(super) fn run(
     // What the plant's amplifiers take comes on top.
     let lag_s = arm.plant().model().drive[0].motor.current_lag_s;
     let board = Board {
-        rate: felt.rate,
-        latency_s: (felt.delay_s + lag_s) as f32,
+        rate: settings.rate,
+        latency_s: (settings.delay_s + lag_s) as f32,
         motors: None,
         fault: None,
     };
@@ -77,7 +77,7 @@ pub(super) fn run(
     if let Some(mechanism) = mechanism {
         haptics.configure(mechanism);
     }
-    let scene = scene(felt);
+    let scene = scene(settings);
     for command in [Command::Scene(scene), Command::Zero([0; 3]), Command::Arm] {
         let _ = haptics.accept(command);
     }
@@ -85,12 +85,12 @@ pub(super) fn run(
     requester.reset(scene.level, scene.size);
 
     let begin_s = arm.begin_s();
-    let tick_s = 1.0 / f64::from(felt.rate.hz());
-    let mut wire = Wire::new(felt.delay_s, tick_s, arm.plant().model());
+    let tick_s = 1.0 / f64::from(settings.rate.hz());
+    let mut wire = Wire::new(settings.delay_s, tick_s, arm.plant().model());
     let ticks = ((begin_s + arm.script_s()) / tick_s) as u32;
     let at = |s: f64| ((begin_s + s) / tick_s) as u32;
     for tick in 0..ticks {
-        if let Some([held_s, let_go_s]) = felt.clutch_s {
+        if let Some([held_s, let_go_s]) = settings.clutch_s {
             let hold = [
                 (held_s, ClutchHold::WithHand),
                 (let_go_s, ClutchHold::LetGo),
@@ -186,7 +186,7 @@ impl Wire {
     }
 }
 
-fn scene(felt: &LoopSettings) -> Scene {
+fn scene(settings: &LoopSettings) -> Scene {
     let [east, north, up] = HOME.home_mm.map(|mm| mm / CELL_MM);
     Scene {
         epoch: 1,
@@ -197,10 +197,10 @@ fn scene(felt: &LoopSettings) -> Scene {
         cell_mm: CELL_MM as f32,
         home: GridPoint::new([east as i32, north as i32, up as i32], Vec3::ZERO),
         params: SurfaceParams {
-            stiffness_n_per_mm: felt.stiffness_n_per_mm as f32,
+            stiffness_n_per_mm: settings.stiffness_n_per_mm as f32,
             max_force_n: MAX_N,
-            damping: felt.damping,
-            texture: felt.texture,
+            damping: settings.damping,
+            texture: settings.texture,
             ..SurfaceParams::PREMIUM
         },
         source: Source::Encoders,

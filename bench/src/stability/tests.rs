@@ -111,8 +111,9 @@ fn stiff_surface_is_unstable_in_light_grasp_until_rate_rises() {
         let soft = tried(1000, 0.5, grasp);
         assert_eq!(verdict(&soft), Verdict::Still, "{soft:?}");
         // It was touched: an arm that is not armed is still, too.
-        let is_felt = { soft.taps.iter() }.all(|taps| taps.is_some_and(|taps| taps.given_mj > 0.0));
-        assert!(is_felt, "{soft:?}");
+        let is_rendered =
+            { soft.taps.iter() }.all(|taps| taps.is_some_and(|taps| taps.given_mj > 0.0));
+        assert!(is_rendered, "{soft:?}");
     }
     let shaken = tried(1000, 6.0, Grasp::Light);
     assert_eq!(verdict(&shaken), Verdict::Unstable, "{shaken:?}");

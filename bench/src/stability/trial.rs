@@ -171,7 +171,7 @@ impl Setting {
         clutch_s: Option<[f64; 2]>,
         look: &mut dyn FnMut(f64, &contact_loop::Step) -> bool,
     ) {
-        let felt = LoopSettings {
+        let settings = LoopSettings {
             rate: self.rate,
             stiffness_n_per_mm: self.stiffness_n_per_mm,
             damping: self.damping,
@@ -179,7 +179,7 @@ impl Setting {
             delay_s: self.delay_s,
             clutch_s,
         };
-        contact_loop::run(&felt, arm, look);
+        contact_loop::run(&settings, arm, look);
     }
 }
 

@@ -96,7 +96,7 @@ impl Case {
 /// A raster as a terrain true to scale, at the size in the hand that is measured.
 ///
 /// # Errors
-/// When it cannot be felt so.
+/// When it cannot be rendered so.
 pub(super) fn terrain(raster: &Raster) -> Result<Terrain<'_>, NotMeasured> {
     let grid = HapticGrid::new(raster, HapticCells::default());
     let scale = grid
@@ -115,7 +115,7 @@ struct Bench<'c> {
 
 /// A session from the opening of the file to the end of a motion.
 struct Motion {
-    felt: TickCounts,
+    counts: TickCounts,
     tiles: Vec<SentTile>,
     /// The ticks in which the motion began and ended.
     moved: [u64; 2],
@@ -149,8 +149,8 @@ impl Bench<'_> {
         if case.reading == Reading::Blocks {
             chain.set_pace(case.pace(Pace::Virtual));
             let (way, speed) = (&self.ways.straight, f64::from(USUAL));
-            let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, false)?;
-            row.set_tiles(&Motion::of(chain, felt, moved));
+            let (counts, moved) = run::travel(&mut chain, self.hand, way, speed, false)?;
+            row.set_tiles(&Motion::of(chain, counts, moved));
         }
         row.peak_mb = peak_bytes().map(|bytes| round(bytes as f64 / 1e6));
         row.set_traffic(before, opened, meter.traffic()?);
@@ -169,7 +169,7 @@ impl Bench<'_> {
         row.tiles_per_s = Some(round(1e3 * tiles / (moved[1] - moved[0]) as f64));
         let missing = |way, speed: u32| {
             let motion = self.motion(way, speed.into(), Late::Hole, false)?;
-            Ok::<_, NotMeasured>(Some(motion.felt.missing))
+            Ok::<_, NotMeasured>(Some(motion.counts.missing))
         };
         row.missing_straight_500 = missing(straight, SPEEDS[0])?;
         row.missing_straight_2000 = missing(straight, SPEEDS[1])?;
@@ -178,7 +178,7 @@ impl Bench<'_> {
         row.missing_turning_2000 = missing(turning, SPEEDS[1])?;
         row.missing_turning_5000 = missing(turning, SPEEDS[2])?;
         let held = |way| {
-            let holds = |speed| Ok(self.motion(way, speed, Late::Hole, true)?.felt.missing == 0);
+            let holds = |speed| Ok(self.motion(way, speed, Late::Hole, true)?.counts.missing == 0);
             Ok::<_, NotMeasured>(Some(fastest(self.case.halvings, holds)?.round()))
         };
         row.held_straight = held(straight)?;
@@ -190,11 +190,13 @@ impl Bench<'_> {
     fn underlaid(&self, row: &mut Row) -> Result<(), NotMeasured> {
         let HipPaths { straight, turning } = self.ways;
         let fastest = self.motion(straight, run::SPEEDS[1], Late::Fallback, false)?;
-        let mut holes = fastest.felt.missing;
+        let mut holes = fastest.counts.missing;
         let mut coarse = |way, speed: u32| {
-            let felt = self.motion(way, speed.into(), Late::Fallback, false)?.felt;
-            holes += felt.missing;
-            Ok::<_, NotMeasured>(Some(felt.coarse))
+            let counts = self
+                .motion(way, speed.into(), Late::Fallback, false)?
+                .counts;
+            holes += counts.missing;
+            Ok::<_, NotMeasured>(Some(counts.coarse))
         };
         row.coarse_straight_500 = coarse(straight, SPEEDS[0])?;
         row.coarse_straight_2000 = coarse(straight, SPEEDS[1])?;
@@ -226,16 +228,16 @@ impl Bench<'_> {
         let pace = self.case.pace(Pace::Virtual);
         let mut chain = Chain::new(&terrain, scene, board(), self.bytes_a_tick(), pace);
         run::touch(&mut chain, self.hand, way)?;
-        let (felt, moved) = run::travel(&mut chain, self.hand, way, speed, to_a_hole)?;
-        Ok(Motion::of(chain, felt, moved))
+        let (counts, moved) = run::travel(&mut chain, self.hand, way, speed, to_a_hole)?;
+        Ok(Motion::of(chain, counts, moved))
     }
 }
 
 impl Motion {
-    fn of(chain: Chain<'_>, felt: TickCounts, moved: [u64; 2]) -> Self {
+    fn of(chain: Chain<'_>, counts: TickCounts, moved: [u64; 2]) -> Self {
         let host = chain.host.iter().map(|spent| 1e3 * spent.as_secs_f64());
         Self {
-            felt,
+            counts,
             moved,
             host_ms: host.collect(),
             tiles: chain.tiles,

@@ -65,7 +65,7 @@ pub struct Row {
     pub missing_turning_2000: Option<u32>,
     /// At 5,000 cells a second.
     pub missing_turning_5000: Option<u32>,
-    /// With a fallback: ticks that felt it, or a tile that settled from it, of the straight way at
+    /// With a fallback: ticks on it, or a tile that settled from it, of the straight way at
     /// 500 cells a second.
     pub coarse_straight_500: Option<u32>,
     /// At 2,000 cells a second.
@@ -127,7 +127,7 @@ pub enum Reading {
     /// Blocks of it, when they are touched.
     #[default]
     Blocks,
-    /// All of it, into memory, before anything is felt.
+    /// All of it, into memory, before anything is rendered.
     Whole,
 }
 

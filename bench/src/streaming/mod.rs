@@ -5,7 +5,7 @@
 //! - `hip_path`, `hand`: the path of the HIP, and the encoder counts along it;
 //! - `chain`, `link`: the host's own code, a link of a stated rate in virtual time, and the device's
 //!   own application;
-//! - `felt`: what its samples say of the ground;
+//! - `tick_counts`: the ticks on tiles, on the fallback and without ground;
 //! - `run`, `case`: what is measured of one terrain, in a process of its own;
 //! - `server`: a web server with latency, with the feature `remote`;
 //! - `meter`, `processes`: memory and bytes, and all cases one after the other.

@@ -47,7 +47,7 @@ pub(super) fn touch(chain: &mut Chain<'_>, hand: &Hand, way: &HipPath) -> Result
 
 /// Moves along a way at so many cells a second, after a touch and a rest, and up to that speed
 /// within a tenth of a second. Where `to_a_hole`, the
-/// motion ends at the first tick that lacks its terrain. Returns what was felt and the ticks
+/// motion ends at the first tick that lacks its terrain. Returns the counts and the ticks
 /// in which the motion began and ended.
 ///
 /// # Errors
@@ -65,7 +65,7 @@ pub(super) fn travel(
         chain.tick(start, &mut |sample| at_rest = Some(sample.hip))?;
     }
     let ticks = duration(way.cells(), 1e-3 * speed).ceil() as u32;
-    let (mut felt, mut moves) = (TickCounts::default(), false);
+    let (mut counts, mut moves) = (TickCounts::default(), false);
     let began = chain.now();
     let mut ended = began + u64::from(ticks);
     for tick in 1..=ticks + AFTER {
@@ -73,12 +73,12 @@ pub(super) fn travel(
         let mut is_hole = false;
         chain.tick(sense, &mut |sample| {
             moves |= Some(sample.hip) != at_rest;
-            if moves && felt.ticks < ticks {
-                felt.add(sample);
+            if moves && counts.ticks < ticks {
+                counts.add(sample);
                 is_hole |= lacks_terrain(sample);
             }
         })?;
-        if felt.ticks == ticks || to_a_hole && is_hole {
+        if counts.ticks == ticks || to_a_hole && is_hole {
             ended = ended.min(chain.now());
             break;
         }
@@ -89,7 +89,7 @@ pub(super) fn travel(
         let why = format!("{lost} samples were lost, so gaps cannot be counted");
         return Err(NotMeasured(why));
     }
-    Ok((felt, [began, ended]))
+    Ok((counts, [began, ended]))
 }
 
 /// Cells that are covered so many ticks after the hand began to move, at a speed in cells a tick.

@@ -29,7 +29,7 @@ impl TickCounts {
     }
 }
 
-/// Returns true if terrain that might be felt was not on the device: a hole in what is felt.
+/// Returns true if terrain near the HIP was not on the device: a hole in the rendered surface.
 pub(super) fn lacks_terrain(sample: &TickRecord) -> bool {
     sample.limits.contains(Limits::TERRAIN_MISSING)
 }
@@ -45,23 +45,23 @@ mod tests {
             state,
             ..TickRecord::default()
         };
-        let mut felt = TickCounts::default();
+        let mut counts = TickCounts::default();
         let fading = Limits::EDGE_FADING;
-        felt.add(&sample(Limits::empty(), ContactState::Touching));
-        felt.add(&sample(fading, ContactState::Touching));
-        felt.add(&sample(Limits::TERRAIN_COARSE, ContactState::Touching));
-        felt.add(&sample(
+        counts.add(&sample(Limits::empty(), ContactState::Touching));
+        counts.add(&sample(fading, ContactState::Touching));
+        counts.add(&sample(Limits::TERRAIN_COARSE, ContactState::Touching));
+        counts.add(&sample(
             fading | Limits::TERRAIN_MISSING,
             ContactState::Touching,
         ));
-        felt.add(&sample(Limits::TERRAIN_MISSING, ContactState::Free));
-        felt.add(&sample(Limits::empty(), ContactState::Free));
+        counts.add(&sample(Limits::TERRAIN_MISSING, ContactState::Free));
+        counts.add(&sample(Limits::empty(), ContactState::Free));
         let expected = TickCounts {
             ticks: 6,
             missing: 2,
             coarse: 1,
             free: 1,
         };
-        assert_eq!(felt, expected);
+        assert_eq!(counts, expected);
     }
 }

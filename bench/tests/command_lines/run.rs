@@ -58,10 +58,10 @@ fn files(folder: &Path) {
     std::fs::write(folder.join("path.csv"), path).expect("written");
     std::fs::write(folder.join("mine.toml"), "[default]\nfriction = 0.3\n").expect("written");
     std::fs::write(folder.join("scan.raw"), vec![0; 2 * 512 * 400]).expect("written");
-    let felt = [
+    let rendered = [
         "hapterra", "replay", "file.asc", "path.csv", "-o", "felt.csv",
     ];
-    run(folder, &felt.map(str::to_owned)).expect("a recording");
+    run(folder, &rendered.map(str::to_owned)).expect("a recording");
 }
 
 /// Runs the words of a line; the error is what it writes on standard error.

@@ -67,13 +67,13 @@ fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u3
     let (mut patches, mut evaluations) = (Vec::new(), Vec::new());
     for hip in hips {
         SEARCHED.set([0; 2]);
-        let felt = step(&hip);
+        let output = step(&hip);
         let searched = match SEARCHED.get() {
             // The shortcut: one evaluation.
-            [0, _] if felt.state == ContactState::Touching && felt.work == FAST_PATH => [1, 1],
+            [0, _] if output.state == ContactState::Touching && output.work == FAST_PATH => [1, 1],
             searched => searched,
         };
-        if felt.state == state {
+        if output.state == state {
             patches.push(searched[0]);
             evaluations.push(searched[1]);
         }

@@ -36,16 +36,16 @@ impl Single {
             }
         });
         let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
-        let mut felt = vec![];
+        let mut rendered = vec![];
         for hip in hips {
             let hip = GridPoint::new([1, 1, 0], Vec3::from_array(hip.map(|c| c as f32)));
             while !contact.step(&field.window, &hip).converged {}
             let output = contact.output();
             let proxy = GridPoint::new([1, 1, 0], Vec3::ZERO).to(&output.proxy);
             let touches = output.state == ContactState::Touching;
-            felt.push(touches.then(|| proxy.to_array().map(f64::from)));
+            rendered.push(touches.then(|| proxy.to_array().map(f64::from)));
         }
-        let last = felt.last_chunk::<2>()?;
+        let last = rendered.last_chunk::<2>()?;
         Some([last[0]?, last[1]?])
     }
 

@@ -6,14 +6,14 @@
 //! there the contact ends. The HIP slides off an edge as off a
 //! table, without a kick and without being hooked back from underneath.
 //!
-//! The boundary fade is a factor on the force: 1 where all of it is felt, 0 where
+//! The boundary fade is a factor on the force: 1 where all of it is rendered, 0 where
 //! nothing is.
 
 use super::budget::Budget;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::{CellContent, TILE_CELLS, Window};
 
-/// Distance of the HIP from the nearest patch, in cells, at which nothing is felt.
+/// Distance of the HIP from the nearest patch, in cells, at which no force is rendered.
 pub const REACH: f32 = 0.5;
 /// Most that the boundary fade may change in a second, either way: from all to
 /// nothing in 32 ms.
@@ -21,7 +21,7 @@ pub const RATE_PER_S: f32 = 31.25;
 /// Most that it may change in a tick at 1 kHz.
 pub const RATE: f32 = RATE_PER_S / 1_000.0;
 /// Cells, along an axis, from the proxy at which a HIP is too far off for what
-/// lies under it to matter: all of the force is then felt.
+/// lies under it to matter: all of the force is then rendered.
 ///
 /// A tile's side less one: what is looked at, a neighbour of the HIP's patch
 /// included, never shares a slot of the window with the tile under the proxy.
@@ -185,7 +185,7 @@ mod tests {
         assert_eq!(over_patch(at(8.5, 10.5), proxy), (true, 1.0), "its own");
         assert_eq!(over_patch(at(8.5, 9.5), proxy), (true, 1.0), "another");
         assert_eq!(over_patch(at(39.0, 9.5), proxy), (false, 1.0), "a far one");
-        // Exactly on the border of a hole all is felt, but no step farther.
+        // Exactly on the border of a hole all is rendered, but no step farther.
         assert_eq!(over_patch(at(9.0, 10.5), proxy), (false, 1.0), "a border");
     }
 
@@ -212,8 +212,8 @@ mod tests {
         let rate = TickRate::new(1_000 * khz).expect("in range");
         let mut contact = Contact::new(ContactSettings::AT_1_KHZ.at_rate(rate));
         let mut step = |hip: GridPoint| {
-            let felt = *contact.step(&field.window, &hip);
-            (felt.state, contact.edge_fade())
+            let output = *contact.step(&field.window, &hip);
+            (output.state, contact.edge_fade())
         };
         let above = GridPoint::new([0; 3], Vec3::new(8.5, 10.5, 1.0));
         assert_eq!(step(above).0, ContactState::Free);

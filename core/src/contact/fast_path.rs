@@ -29,7 +29,7 @@ pub(super) fn is_free<const D: usize>(
         || window.is_clear_nearby(CellBox::around(from.column(), to.column()), low)
 }
 
-/// A proxy at rest well inside a convex patch, all of its force felt.
+/// A proxy at rest well inside a convex patch, all of its force rendered.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Follow {
     /// Place where it rests.

@@ -80,7 +80,7 @@ struct Sweeping {
 struct OnSurface {
     descent: Descent,
     leave: Leave,
-    /// Share of the force that is felt: less than 1 at the boundary of the surface, and
+    /// Share of the force that is rendered: less than 1 at the boundary of the surface, and
     /// while a contact comes in after a wait.
     fade: f32,
     departures: Departures,
@@ -133,7 +133,7 @@ pub struct Contact {
     settings: ContactSettings,
     phase: Phase,
     /// The last answer: where the proxy was, and the displacement to it, if it touched.
-    felt: Option<(GridPoint, Vec3)>,
+    touched: Option<(GridPoint, Vec3)>,
     /// Another view was put in: the proxy is to begin on its surface. It waits meanwhile.
     landing: Option<Landing>,
     /// Memory of friction, where the surface has some.
@@ -158,7 +158,7 @@ impl Contact {
             hip: GridPoint::default(),
             at_rest: false,
             output: ContactOutput::default(),
-            felt: None,
+            touched: None,
         }
     }
 
@@ -168,8 +168,8 @@ impl Contact {
         &self.output
     }
 
-    /// The last step's answer was not felt, because the next one goes on with it for the same
-    /// HIP: what was felt last is still the answer `before` it.
+    /// The last step's answer was not rendered, because the next step continues it for the same
+    /// HIP: the last rendered answer is still the one `before` it.
     pub const fn resume(&mut self, before: &ContactOutput) {
         (self.output.state, self.output.proxy) = (before.state, before.proxy);
         self.output.displacement = before.displacement;
@@ -244,7 +244,7 @@ impl Contact {
     /// use hapterra_core::grid::GridPoint;
     /// use hapterra_core::terrain::{FieldSize, TileArena};
     ///
-    /// // Flat ground at height 2, felt by a HIP that goes down and along.
+    /// // Flat ground at height 2, touched by a HIP that moves down and along.
     /// let mut field = TileArena::<2>::from_fn(FieldSize::new(40, 40), |_, _| 2.0)?;
     /// let window = field.window();
     /// let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
@@ -361,7 +361,7 @@ impl Contact {
             ..
         } = &self.output;
         let touched = *state == ContactState::Touching;
-        self.felt = touched.then_some((*proxy, *displacement));
+        self.touched = touched.then_some((*proxy, *displacement));
     }
 
     /// The HIP has moved: a way under way now leads to its new place.

@@ -82,20 +82,20 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
     let mut seen = [0; 4];
     for (tick, p) in path.iter().enumerate() {
         let hip = point(*p);
-        let mut felt = contact.step(&field.window, &hip);
+        let mut output = contact.step(&field.window, &hip);
         let mut turns = 0;
-        while !felt.converged {
-            felt = contact.step(&field.window, &hip);
+        while !output.converged {
+            output = contact.step(&field.window, &hip);
             turns += 1;
-            assert!(turns < 5000, "{name} {tick}: never settles {felt:?}");
+            assert!(turns < 5000, "{name} {tick}: never settles {output:?}");
         }
-        let (x, proxy) = (position(&hip), position(&felt.proxy));
-        seen[felt.state as usize] += 1;
-        let at = std::format!("{name} tick {tick} hip {x:?} {felt:?}");
-        assert!(felt.displacement.is_finite(), "{at}");
-        match felt.state {
+        let (x, proxy) = (position(&hip), position(&output.proxy));
+        seen[output.state as usize] += 1;
+        let at = std::format!("{name} tick {tick} hip {x:?} {output:?}");
+        assert!(output.displacement.is_finite(), "{at}");
+        match output.state {
             ContactState::Unseeded | ContactState::Free => {
-                assert_eq!(felt.displacement, Vec3::ZERO, "{at}");
+                assert_eq!(output.displacement, Vec3::ZERO, "{at}");
             }
             // What it was on is not there any more.
             ContactState::Releasing => {}
@@ -106,7 +106,7 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
                 assert_is_nearest(&truth, slope, proxy, x, &at);
             }
         }
-        if let (ContactState::Free, Some(z)) = (felt.state, truth.at(x[0], x[1])) {
+        if let (ContactState::Free, Some(z)) = (output.state, truth.at(x[0], x[1])) {
             let bound = 2e-6 + slope * 3e-7 + z.abs() * 5e-7;
             assert!(x[2] > z - bound, "free below the surface: {at} {z}");
         }
@@ -274,13 +274,13 @@ fn proxy_does_not_tunnel_through_a_wall() {
     let (above, beyond) = (point([10.0, 30.2, 5.0]), point([40.0, 30.7, 5.0]));
     let mut swept = Contact::new(ContactSettings::AT_1_KHZ);
     swept.step(&field.window, &above);
-    let mut felt = *swept.step(&field.window, &beyond);
-    while !felt.converged {
-        felt = *swept.step(&field.window, &beyond);
+    let mut output = *swept.step(&field.window, &beyond);
+    while !output.converged {
+        output = *swept.step(&field.window, &beyond);
     }
-    assert_eq!(felt.state, ContactState::Touching);
-    assert!(position(&felt.proxy)[0] < 20.0, "{felt:?}");
-    assert!(felt.displacement.x < -19.0);
+    assert_eq!(output.state, ContactState::Touching);
+    assert!(position(&output.proxy)[0] < 20.0, "{output:?}");
+    assert!(output.displacement.x < -19.0);
 }
 
 #[test]
@@ -498,13 +498,13 @@ fn straight_down_onto_any_sample_meets_the_surface() {
             let at = |z: f32| GridPoint::new([x, y, 0], Vec3::Z * z);
             let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
             let above = contact.step(&field.window, &at(1.0 + fast)).state;
-            let felt = contact.step(&field.window, &at(0.75));
+            let output = contact.step(&field.window, &at(0.75));
             let expected = match with_a_hole(x, y).is_nan() {
                 true => (above, Vec3::ZERO),
                 false => (ContactState::Touching, Vec3::Z * 0.25),
             };
-            let felt = (felt.state, felt.displacement);
-            assert_eq!(felt, expected, "({x}, {y}) {fast}");
+            let output = (output.state, output.displacement);
+            assert_eq!(output, expected, "({x}, {y}) {fast}");
         }
     }
 }
@@ -531,12 +531,12 @@ fn a_mirrored_way_along_grid_lines_is_felt_mirrored() {
             at[axis] = (at[axis] + way).clamp(-1.0, most);
             let [x, y, z] = at;
             let ways = [[x, y, z], [16.0 - x, 16.0 - y, z]];
-            let mut felt = [ContactOutput::default(); 2];
+            let mut output = [ContactOutput::default(); 2];
             for (index, field) in [&plain, &mirrored].into_iter().enumerate() {
                 let hip = GridPoint::new([0; 3], Vec3::from(ways[index]));
-                felt[index] = *contacts[index].step(&field.window, &hip);
+                output[index] = *contacts[index].step(&field.window, &hip);
             }
-            let [one, other] = felt;
+            let [one, other] = output;
             let back = Vec3::new(-1.0, -1.0, 1.0) * other.displacement;
             assert_eq!(one.state, other.state, "{tick}: {at:?}");
             assert!(
@@ -549,7 +549,7 @@ fn a_mirrored_way_along_grid_lines_is_felt_mirrored() {
     assert!(touched > cases(4000, 20), "{touched}");
 }
 
-/// A ground, the height around which it is felt, and how far up and down from there.
+/// A ground, the height around which it is rendered, and how far up and down from there.
 type TestGround = (fn(i32, i32) -> f32, f64, f64);
 
 /// Ground of every kind.

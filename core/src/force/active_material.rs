@@ -1,10 +1,10 @@
-//! Which material is felt, and how the surface goes from one to the next.
+//! The active material, and the transition from one material to the next.
 //!
 //! The material of the sample nearest to the proxy is wanted. What acts on the force moves there
 //! evenly within [`MATERIAL_CHANGE_S`]: stiffness, damping and friction by as much in each tick,
 //! and a texture by its share: the old one goes out in the first half, and the new one comes
 //! in from then on. A proxy that comes out of the air finds its material as it is, because
-//! nothing was felt before.
+//! no force was rendered before.
 
 use super::material::{MATERIAL_CHANGE_S, Material, MaterialTable};
 use super::{SurfaceParams, Texture, Texturer};
@@ -12,7 +12,7 @@ use crate::contact::{Contact, ContactState, Friction};
 use crate::rate::TickRate;
 use crate::terrain::Window;
 
-/// The material that is felt.
+/// The rendered material.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActiveMaterial {
     /// The one that is wanted.
@@ -26,16 +26,16 @@ pub(crate) struct ActiveMaterial {
     scale: f32,
     /// The surface parameters as rendered. Their texture is the one whose share is rendered.
     params: SurfaceParams,
-    /// Share of that texture that is felt.
+    /// Share of that texture that is rendered.
     texture_share: f32,
     cell_mm: f32,
     rate: TickRate,
     /// The proxy touched in the tick before.
-    was_felt: bool,
+    was_rendered: bool,
 }
 
 impl ActiveMaterial {
-    /// Before anything is felt: the default.
+    /// Before anything is rendered: the default.
     pub(crate) fn of(
         table: &MaterialTable,
         params: &SurfaceParams,
@@ -54,7 +54,7 @@ impl ActiveMaterial {
             texture_share: 1.0,
             cell_mm,
             rate,
-            was_felt: false,
+            was_rendered: false,
         };
         material.feels(&default);
         material.params.texture = default.texture;
@@ -71,18 +71,18 @@ impl ActiveMaterial {
         self.params.friction
     }
 
-    /// Returns the share of the texture that is felt.
+    /// Returns the share of the texture that is rendered.
     pub(crate) const fn texture_share(&self) -> f32 {
         self.texture_share
     }
 
-    /// The texture that is felt, as a scene of its own would have it.
+    /// The texture that is rendered, as a scene of its own would have it.
     pub(crate) fn texturer(&self) -> Option<Texturer> {
         Texturer::of(&self.params.texture, self.cell_mm, self.rate)
     }
 
     /// One more tick of a contact, which is done with its HIP. Returns whether another texture
-    /// is felt from now on.
+    /// is rendered from now on.
     ///
     /// The material stays while the tile of the proxy is missing.
     pub(crate) fn advance<const D: usize>(
@@ -96,7 +96,7 @@ impl ActiveMaterial {
             // What fades out does so as it was.
             ContactState::Releasing => return false,
             ContactState::Unseeded | ContactState::Free => {
-                self.was_felt = false;
+                self.was_rendered = false;
                 return false;
             }
         }
@@ -112,7 +112,7 @@ impl ActiveMaterial {
             return false;
         };
         let wanted = &scaled(wanted, self.scale);
-        if core::mem::replace(&mut self.was_felt, true) {
+        if core::mem::replace(&mut self.was_rendered, true) {
             self.moves_to(wanted)
         } else {
             self.done = 1.0;
@@ -148,7 +148,7 @@ impl ActiveMaterial {
         self.takes_texture(&wanted.texture)
     }
 
-    /// Between what was felt before the change and what is wanted.
+    /// Between the material before the change and the wanted one.
     fn on_the_way_to(&self, wanted: &Material) -> Material {
         let mix = |from: f32, to: f32| from + (to - from) * self.done;
         let (from, to) = (&self.from, wanted);

@@ -77,9 +77,9 @@ impl Damper {
     /// Of a scene. Points have no hand that energy could be given to.
     // A call: it is made by two, once for a scene.
     #[inline(never)]
-    pub(crate) fn of(params: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
-        let is_controlled = felt.arm && params.is_controlled();
-        let controller = is_controlled.then(|| Passivity::new(felt));
+    pub(crate) fn of(params: &SurfaceParams, context: &EffectContext) -> Option<Self> {
+        let is_controlled = context.arm && params.is_controlled();
+        let controller = is_controlled.then(|| Passivity::new(context));
         (controller.is_some() || params.damping.ns_per_m > 0.0).then_some(Self {
             params: *params,
             controller,
@@ -115,7 +115,7 @@ impl Damper {
         smaller(larger(1.0 - over, 0.0), 1.0)
     }
 
-    /// Nothing is felt, or less than the spring's force: what was created before is forgotten.
+    /// No force is rendered, or less than the spring's force: what was created before is forgotten.
     pub(crate) fn rest(&mut self) {
         if let Some(controller) = &mut self.controller {
             controller.rest();

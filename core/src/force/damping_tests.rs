@@ -12,11 +12,11 @@ use crate::rate::TickRate;
 
 /// A scene's damper with an arm.
 fn damper(params: &SurfaceParams, hz: u32) -> Option<Damper> {
-    Damper::of(params, &felt(hz, 0.1e-3))
+    Damper::of(params, &context(hz, 0.1e-3))
 }
 
 /// With an arm.
-fn felt(hz: u32, latency_s: f32) -> EffectContext {
+fn context(hz: u32, latency_s: f32) -> EffectContext {
     EffectContext {
         cell_mm: 1.0,
         rate: TickRate::new(hz).expect("a rate"),
@@ -71,7 +71,7 @@ fn the_controller_acts_on_every_arm_unless_it_is_off() {
     // Points have no hand.
     let points = EffectContext {
         arm: false,
-        ..felt(1000, 0.1e-3)
+        ..context(1000, 0.1e-3)
     };
     let points = Damper::of(&params(4.0, 0.0, Controller::On), &points);
     assert!(points.is_none());
@@ -196,7 +196,7 @@ impl Taps {
     /// The force changes by no more than the guard lets it.
     fn given_mj(self, params: &SurfaceParams) -> Vec<f64> {
         const DEEP_MM: f64 = 3.0;
-        let mut damper = Damper::of(params, &felt(self.hz, self.told_s as f32));
+        let mut damper = Damper::of(params, &context(self.hz, self.told_s as f32));
         let tick_s = 1.0 / f64::from(self.hz);
         let slew_n = 1000.0 * tick_s as f32;
         let height_mm = |t_s: f64| DEEP_MM * libm::cos(TAU * self.tap_hz * t_s);
@@ -273,7 +273,7 @@ fn given_on_circles_mj(params: &SurfaceParams, hz: u32) -> f64 {
         let (sin, cos) = libm::sincos(200.0 / RADIUS_MM * t_s);
         Vec3::new(cos as f32, sin as f32, 0.0) * RADIUS_MM as f32
     };
-    let mut damper = Damper::of(params, &felt(hz, 0.0));
+    let mut damper = Damper::of(params, &context(hz, 0.0));
     let (mut given_mj, mut asked_n) = (0.0, Vec3::ZERO);
     for tick in 0..hz {
         let now_s = f64::from(tick) * tick_s;

@@ -21,17 +21,17 @@ pub(crate) struct Effects {
 impl Effects {
     /// Of a scene without materials.
     #[inline(never)]
-    pub(crate) fn of(params: &SurfaceParams, felt: &EffectContext) -> Option<Self> {
+    pub(crate) fn of(params: &SurfaceParams, context: &EffectContext) -> Option<Self> {
         let shader = Shader::of(params.shading);
-        let texturer = Texturer::of(&params.texture, felt.cell_mm, felt.rate);
-        let damper = Damper::of(params, felt);
+        let texturer = Texturer::of(&params.texture, context.cell_mm, context.rate);
+        let damper = Damper::of(params, context);
         let is_there = shader.is_some() || texturer.is_some() || damper.is_some();
         is_there.then_some(Self {
             shader,
             texturer,
             damper,
             material: None,
-            cell_mm: felt.cell_mm,
+            cell_mm: context.cell_mm,
         })
     }
 
@@ -40,10 +40,10 @@ impl Effects {
     pub(crate) fn with_materials(
         table: &MaterialTable,
         params: &SurfaceParams,
-        felt: &EffectContext,
+        context: &EffectContext,
     ) -> Option<Self> {
-        let material = ActiveMaterial::of(table, params, felt.cell_mm, felt.rate)?;
-        let mut damper = Damper::of(&table.hardest(params), felt);
+        let material = ActiveMaterial::of(table, params, context.cell_mm, context.rate)?;
+        let mut damper = Damper::of(&table.hardest(params), context);
         if let Some(damper) = &mut damper {
             damper.feels(material.params());
         }
@@ -52,7 +52,7 @@ impl Effects {
             texturer: material.texturer(),
             damper,
             material: Some(material),
-            cell_mm: felt.cell_mm,
+            cell_mm: context.cell_mm,
         })
     }
 

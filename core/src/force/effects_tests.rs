@@ -16,7 +16,7 @@ const PARAMS: SurfaceParams = SurfaceParams {
     ..SurfaceParams::PREMIUM
 };
 
-fn felt() -> EffectContext {
+fn context() -> EffectContext {
     EffectContext {
         cell_mm: 1.0,
         rate: TickRate::DEFAULT,
@@ -54,7 +54,7 @@ fn beside_a_ridge(params: &SurfaceParams, created_mj: f32) -> [Vec3; 2] {
             &GridPoint::new([20, 20, 0], Vec3::new(0.2, 0.5, height)),
         );
     }
-    let mut effects = Effects::of(params, &felt()).expect("shaded");
+    let mut effects = Effects::of(params, &context()).expect("shaded");
     created(&mut effects, created_mj);
     let table = MaterialTable::EMPTY;
     let plain = contact.output().displacement;
@@ -92,7 +92,7 @@ fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
 fn what_the_book_holds_at_most_is_enough_to_turn_no_force() {
     // A cell of a metre: an edge gives more than the book holds.
     let damper = |created_mj: f32| {
-        let mut effects = Effects::of(&PARAMS, &felt()).expect("shaded");
+        let mut effects = Effects::of(&PARAMS, &context()).expect("shaded");
         created(&mut effects, created_mj);
         effects.damper.expect("controlled")
     };
@@ -119,8 +119,8 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
     let mut field = TileArena::<2>::from_fn(size, |x, _| height(x as f32)).expect("it fits");
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
-    let mut controlled = Effects::of(&params, &felt()).expect("shaded");
-    let mut free = Effects::of(&uncontrolled, &felt()).expect("shaded");
+    let mut controlled = Effects::of(&params, &context()).expect("shaded");
+    let mut free = Effects::of(&uncontrolled, &context()).expect("shaded");
     let table = MaterialTable::EMPTY;
     let step = mm_s * TickRate::DEFAULT.tick_s();
     let (mut last, mut asked_n) = (None, Vec3::ZERO);
@@ -133,29 +133,29 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
         let hip = GridPoint::new([0, 20, 0], Vec3::new(x, 0.4, height(x) + above));
         contact.step(&window, &hip.normalised());
         let plain = contact.output().displacement;
-        let felt = [&mut controlled, &mut free]
+        let context = [&mut controlled, &mut free]
             .map(|effects| effects.displacement(&window, &contact, &table));
         if let Some(damper) = &mut controlled.damper {
             let tip_mm = Vec3::new(x, 0.4, height(x) + above);
             let moved_mm = last.map_or(Vec3::ZERO, |(before, _): (Vec3, _)| tip_mm - before);
             let velocity_mm_s = moved_mm * TickRate::DEFAULT.hz() as f32;
             damper.observe(&Moment {
-                displacement_mm: felt[0],
+                displacement_mm: context[0],
                 moved_mm,
                 velocity_mm_s,
                 asked_n,
                 most_n: 8.5,
                 shares: Shares::ALL,
             });
-            asked_n = damper.force_n(params.spring().force_n(felt[0]), velocity_mm_s);
-            let forces = felt.map(|displacement| params.spring().force_n(displacement));
+            asked_n = damper.force_n(params.spring().force_n(context[0]), velocity_mm_s);
+            let forces = context.map(|displacement| params.spring().force_n(displacement));
             if let Some((_, before)) = last.replace((tip_mm, forces))
                 && tick > down
             {
                 for (worst, (now, before)) in steps.iter_mut().zip(forces.iter().zip(before)) {
                     *worst = worst.max((*now - before).length());
                 }
-                for (sum, displacement) in turned.iter_mut().zip(felt) {
+                for (sum, displacement) in turned.iter_mut().zip(context) {
                     *sum += plain.angle_between(displacement);
                 }
             }
@@ -186,7 +186,7 @@ fn a_slide_over_facets_is_as_smooth_with_the_controller_as_without() {
         );
         assert!(left > 0.99, "{what}: {left} of the turn");
     }
-    // Where an edge gives more than a millijoule, some of it is felt.
+    // Where an edge gives more than a millijoule, some of it is rendered.
     let [_, _, left] = slid(2.0, 0.3, 3.0, 50.0);
     assert!((0.75..0.9).contains(&left), "{left} of the turn");
 }

@@ -68,7 +68,7 @@ impl Material {
 /// Most materials, the default among them: an index is half a byte.
 const MAX_MATERIALS: usize = 16;
 
-/// The materials of a scene. The first is the default: what is felt where the ground has no
+/// The materials of a scene. The first is the default: the material where the ground has no
 /// class, or one that the table does not name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MaterialTable {

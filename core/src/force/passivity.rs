@@ -1,7 +1,7 @@
 //! The energy leak of the sampled wall at the tip, and the damping that dissipates it
 //! (Hannaford and Ryu 2002).
 //!
-//! A spring gives no more than it was given. One that is felt in ticks does: its force is that of
+//! A spring gives no more than it was given. One that is rendered in ticks does: its force is that of
 //! the tick's beginning and acts a latency L later, too small on the way in and too large on the
 //! way out, and gives K (T / 2 + L) v a metre. The observer adds up the work of the forces that did
 //! act, each at the time when it acted, and compares it with what a spring would hold at this depth;
@@ -122,9 +122,9 @@ impl Shares {
 }
 
 impl Passivity {
-    pub(super) fn new(felt: &EffectContext) -> Self {
-        let tick_s = felt.rate.tick_s();
-        let latency_s = felt.latency_s.max(0.0).min(MAX_LATE as f32 * tick_s);
+    pub(super) fn new(context: &EffectContext) -> Self {
+        let tick_s = context.rate.tick_s();
+        let latency_s = context.latency_s.max(0.0).min(MAX_LATE as f32 * tick_s);
         let late = latency_s / tick_s;
         let whole = late as usize;
         Self {
@@ -140,7 +140,7 @@ impl Passivity {
         }
     }
 
-    /// The share of the spring's force that is felt.
+    /// The share of the spring's force that is rendered.
     pub(super) const fn share(&self) -> f32 {
         self.rate_limit_softening.share()
     }

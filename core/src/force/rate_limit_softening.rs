@@ -4,7 +4,7 @@
 //! The guard lets a force change by [`MAX_SLEW_N_PER_S`]. A spring that is touched faster asks
 //! for more: its force comes late and goes late, and the tip gets back more than it gave. No
 //! damping takes that back, since a damping force is held up by the same limit. A spring that is
-//! felt as softer from the first touch on asks for no more than the guard allows, and gives
+//! rendered as softer from the first touch on asks for no more than the guard allows, and gives
 //! back what it got.
 
 use super::Spring;
@@ -22,7 +22,7 @@ const RESTED_S: f32 = 0.3;
 /// controller takes it back.
 const RECOVERS_MJ_PER_S: f32 = 5.0;
 
-/// The share of the stiffness that is felt.
+/// The share of the stiffness that is rendered.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RateLimitSoftening {
     share: f32,

@@ -18,7 +18,7 @@ use crate::terrain::{TileIndex, Window};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]
 pub enum Shading {
-    /// Those of the patches: an edge between patches is felt as an edge.
+    /// Those of the patches: an edge between patches is rendered as an edge.
     #[default]
     None,
     /// Normals that turn evenly over the edges between patches.
@@ -113,7 +113,7 @@ fn met_by(slopes: &SlopesAt, force: Vec3) -> Slopes {
     [along(force.x, *east), along(force.y, *north)]
 }
 
-/// Cosine and sine of the most that a force is turned: 60°. A bend of 120° is felt evenly.
+/// Cosine and sine of the most that a force is turned: 60°. A bend of 120° is rendered evenly.
 const MAX_COS: f32 = 0.5;
 const MAX_SIN: f32 = 0.866_025_4;
 

@@ -80,14 +80,16 @@ fn degrees(a: Vec3, b: Vec3) -> f32 {
 }
 
 /// Largest change of direction from one HIP to the next, degrees: without shading, and with it.
-fn largest_turns(felt: &[ShadedTick]) -> (f32, f32) {
-    felt.windows(2).fold((0.0, 0.0), |(plain, shaded), pair| {
-        let turned = |of: fn(&ShadedTick) -> Vec3| degrees(of(&pair[0]), of(&pair[1]));
-        (
-            f32::max(plain, turned(|felt| felt.plain)),
-            f32::max(shaded, turned(|felt| felt.shaded)),
-        )
-    })
+fn largest_turns(rendered: &[ShadedTick]) -> (f32, f32) {
+    rendered
+        .windows(2)
+        .fold((0.0, 0.0), |(plain, shaded), pair| {
+            let turned = |of: fn(&ShadedTick) -> Vec3| degrees(of(&pair[0]), of(&pair[1]));
+            (
+                f32::max(plain, turned(|record| record.plain)),
+                f32::max(shaded, turned(|record| record.shaded)),
+            )
+        })
 }
 
 /// A straight way with a HIP every [`STEP`].
@@ -126,10 +128,10 @@ fn a_plane_is_felt_as_without() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), plane);
     let way = straight([3.3, 4.1], [35.2, 36.7]).step_by(cases(1, 100) as usize);
-    for felt in forces_along(&field, plane, Friction::NONE, way) {
-        let off = (felt.shaded - felt.plain).length();
-        assert!(off < 2e-6 * felt.plain.length(), "{off}");
-        assert_eq!(felt.missing, None);
+    for rendered in forces_along(&field, plane, Friction::NONE, way) {
+        let off = (rendered.shaded - rendered.plain).length();
+        assert!(off < 2e-6 * rendered.plain.length(), "{off}");
+        assert_eq!(rendered.missing, None);
     }
 }
 
@@ -139,14 +141,14 @@ fn the_force_turns_evenly_over_valley_and_ridge() {
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(8.0, 16.0), (16.0, 24.0)] {
         let way = straight([from, 9.3], [to, 10.1]);
-        let felt = forces_along(&field, folds, Friction::NONE, way);
-        let (plain, shaded) = largest_turns(&felt);
+        let rendered = forces_along(&field, folds, Friction::NONE, way);
+        let (plain, shaded) = largest_turns(&rendered);
         assert!(
             plain > 20.0 && shaded < 0.1 * plain,
             "{plain}° and {shaded}°"
         );
-        for felt in &felt {
-            let sizes = (felt.shaded.length(), felt.plain.length());
+        for rendered in &rendered {
+            let sizes = (rendered.shaded.length(), rendered.plain.length());
             assert!((sizes.0 - sizes.1).abs() < 1e-6 * sizes.1, "{sizes:?}");
         }
     }
@@ -190,8 +192,8 @@ fn on_rough_ground_no_step_turns_the_force_by_more_than_a_tenth() {
     for i in 0..cases(40, 1) {
         let y = 2.0 + f64::from(i);
         let way = straight([2.1, y], [57.9, y + 13.0 * f64::from(i % 2)]);
-        let felt = forces_along(&field, rough, Friction::NONE, way);
-        let (a, b) = largest_turns(&felt);
+        let rendered = forces_along(&field, rough, Friction::NONE, way);
+        let (a, b) = largest_turns(&rendered);
         (plain, shaded) = (plain.max(a), shaded.max(b));
     }
     assert!(
@@ -204,21 +206,21 @@ fn on_rough_ground_no_step_turns_the_force_by_more_than_a_tenth() {
 fn a_cliff_stays_a_cliff() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), cliff);
-    let felt = forces_along(
+    let rendered = forces_along(
         &field,
         cliff,
         Friction::NONE,
         straight([6.5, 9.5], [9.99, 9.5]),
     );
-    for felt in felt {
-        let to_foot = 10.0 - (felt.proxy.cell()[0] as f32 + felt.proxy.frac().x);
-        let off = degrees(felt.shaded, Vec3::Z);
+    for rendered in rendered {
+        let to_foot = 10.0 - (rendered.proxy.cell()[0] as f32 + rendered.proxy.frac().x);
+        let off = degrees(rendered.shaded, Vec3::Z);
         assert!(
             off < 0.01 || to_foot < NARROW_AT_MOST,
             "{to_foot} before it: {off}°"
         );
     }
-    // Its face: by far most of it is felt as it is.
+    // Its face: by far most of it is rendered as it is.
     for u in [0.21_f32, 0.5, 0.79] {
         let proxy = GridPoint::new([10, 9, 0], Vec3::new(u, 0.4, 8.0 * u));
         let slopes = SlopesAt::point(&field.window, &proxy).expect("a patch");
@@ -254,10 +256,10 @@ fn a_tile_that_is_not_here_is_named_and_felt_as_the_end() {
     let mut tiles = buffers::<2>();
     let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), folds);
     field.install(TileKey::holding(0, Cell::new(5, 5)));
-    let felt = forces_along(&field, folds, Friction::NONE, [[30.5, 5.5], [31.5, 5.5]]);
-    let missing: Vec<_> = felt.iter().map(|felt| felt.missing).collect();
+    let rendered = forces_along(&field, folds, Friction::NONE, [[30.5, 5.5], [31.5, 5.5]]);
+    let missing: Vec<_> = rendered.iter().map(|record| record.missing).collect();
     assert_eq!(missing, [None, Some(TileIndex::new(1, 0))]);
-    assert!(degrees(felt[1].shaded, felt[1].plain) < 1e-3);
+    assert!(degrees(rendered[1].shaded, rendered[1].plain) < 1e-3);
 }
 
 #[test]
@@ -272,13 +274,13 @@ fn next_to_a_hole_the_force_turns_evenly_and_the_pull_back_stays() {
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), holed);
     // Along the hole's southern border, half a cell and a tenth of one beside it.
     for y in [8.5, 8.9] {
-        let felt = forces_along(
+        let rendered = forces_along(
             &field,
             holed,
             Friction::NONE,
             straight([11.1, y], [20.3, y]),
         );
-        let (plain, shaded) = largest_turns(&felt);
+        let (plain, shaded) = largest_turns(&rendered);
         assert!(
             plain > 10.0 && shaded < 0.1 * plain,
             "{plain}° and {shaded}°"
@@ -338,21 +340,21 @@ fn what_friction_holds_is_turned_with_the_rest() {
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), folds);
     for (from, to) in [(11.0, 13.0), (13.0, 11.0)] {
         // Into the valley and out of it.
-        let felt = forces_along(
+        let rendered = forces_along(
             &field,
             folds,
             Friction::coulomb(0.5),
             straight([from, 9.3], [to, 9.3]),
         );
-        let (plain, shaded) = largest_turns(&felt);
+        let (plain, shaded) = largest_turns(&rendered);
         assert!(
             plain > 50.0 && shaded < 1.0,
             "{from}: {plain}° and {shaded}°"
         );
-        for felt in &felt {
-            let sizes = (felt.shaded.length(), felt.plain.length());
+        for rendered in &rendered {
+            let sizes = (rendered.shaded.length(), rendered.plain.length());
             assert!((sizes.0 - sizes.1).abs() < 1e-6 * sizes.1, "{sizes:?}");
-            assert!(felt.shaded.z > 0.0);
+            assert!(rendered.shaded.z > 0.0);
         }
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::rate::TickRate;
 
-/// Part of a wavelength that the proxy may go in a tick while the texture is felt in whole.
+/// Part of a wavelength that the proxy may go in a tick while the texture is rendered in full.
 pub(super) const WHOLE: f32 = 0.125;
 
 /// Pattern of a texture.
@@ -55,7 +55,7 @@ impl Texture {
     pub const MAX_AMPLITUDE_MM: f32 = 2.0;
     /// Most of it to a wavelength: it slopes by up to 38°.
     pub const STEEPEST: f32 = 0.125;
-    /// Speed that a wave has to be felt at in whole, mm/s: of a finger that explores slowly.
+    /// Speed up to which a wave has to be rendered in full, mm/s: that of a finger that explores slowly.
     const SLOW_MM_S: f32 = 50.0;
     /// Wavelengths to a cell that places can be counted in.
     const WAVES_PER_CELL: (f32, f32) = (1.0 / 1_048_576.0, 1_048_576.0);

@@ -1,4 +1,4 @@
-//! Texture: a micro-relief on the surface, felt by the force while the proxy stays where it is
+//! Texture: a micro-relief on the surface, rendered by the force while the proxy stays where it is
 //! (Minsky 1990; Ho, Basdogan and Srinivasan 1999).
 //!
 //! The force is scaled by as much as the relief adds to the depth, and the relief's slope adds
@@ -13,7 +13,7 @@ use crate::grid::GridPoint;
 use crate::rate::TickRate;
 use crate::scalar::{larger, one_over_root, smaller};
 
-/// Part of a wavelength in a tick from which on nothing of the texture is felt.
+/// Part of a wavelength in a tick from which on nothing of the texture is rendered.
 const GONE: f32 = 0.25;
 /// The depth, times the amplitude, in squares of the wavelength, beyond which the part along the
 /// surface grows no more. So its stiffness is at most that of the surface: heights bend by
@@ -80,8 +80,8 @@ impl Texturer {
     /// let mut texturer = Texturer::of(&grating, 1.0, TickRate::DEFAULT).expect("textured");
     /// // A millimetre deep on a crest, a quarter of a wave from the origin.
     /// let crest = GridPoint::new([0; 3], Vec3::X * 0.5);
-    /// let felt = (0..200).map(|_| texturer.add(Vec3::Z, &crest)).last().expect("ticks");
-    /// assert!((felt - Vec3::Z * 1.1).length() < 1e-6);
+    /// let last = (0..200).map(|_| texturer.add(Vec3::Z, &crest)).last().expect("ticks");
+    /// assert!((last - Vec3::Z * 1.1).length() < 1e-6);
     /// ```
     pub fn add(&mut self, displacement: Vec3, proxy: &GridPoint) -> Vec3 {
         let share = self.share_at(proxy);
@@ -89,7 +89,7 @@ impl Texturer {
     }
 
     /// The same with a part of the texture only, from 0 to 1.
-    // Apart, so that a texture that is felt whole costs no more.
+    // Apart, so that a texture that is rendered in full costs no more.
     #[cold]
     #[inline(never)]
     pub(crate) fn add_part(&mut self, displacement: Vec3, proxy: &GridPoint, part: f32) -> Vec3 {
@@ -100,7 +100,7 @@ impl Texturer {
     #[inline]
     fn with_share(&self, displacement: Vec3, proxy: &GridPoint, share: f32) -> Vec3 {
         let squared = displacement.length_squared();
-        // Nothing is felt, or the texture is too fast.
+        // No force is rendered, or the texture is too fast.
         if !squared.is_normal() || share == 0.0 {
             return displacement;
         }
@@ -117,7 +117,7 @@ impl Texturer {
         displacement * times - along * smaller(depth, self.deepest)
     }
 
-    /// Takes the proxy's place in a tick; how much of the texture is felt there.
+    /// Takes the proxy's place in a tick; returns the share of the texture that is rendered there.
     fn share_at(&mut self, proxy: &GridPoint) -> f32 {
         let now = match &self.before {
             Some(before) => {

@@ -42,7 +42,7 @@ fn place(x_mm: f64, y_mm: f64) -> GridPoint {
 
 /// The displacement in millimetres, tick by tick, of a hand `depth_mm` deep in a level plane
 /// that goes east at so many mm/s; the first 100 ms are left out.
-fn felt(texture: &Texture, speed_mm_s: f64, depth_mm: f32, ticks: u32) -> Vec<Vec3> {
+fn rendered(texture: &Texture, speed_mm_s: f64, depth_mm: f32, ticks: u32) -> Vec<Vec3> {
     let mut texturer = texturer(texture);
     let displacement = Vec3::Z * (depth_mm / CELL_MM);
     let all = (0..100 + ticks).map(|tick| {
@@ -53,21 +53,24 @@ fn felt(texture: &Texture, speed_mm_s: f64, depth_mm: f32, ticks: u32) -> Vec<Ve
 }
 
 /// The amplitude of a frequency in Hz.
-fn amplitude(felt: &[Vec3], hz: f64, part: fn(&Vec3) -> f32) -> f64 {
+fn amplitude(rendered: &[Vec3], hz: f64, part: fn(&Vec3) -> f32) -> f64 {
     let turn = std::f64::consts::TAU * hz * TICK_S;
-    let sums = felt.iter().enumerate().fold((0.0, 0.0), |(c, s), (i, v)| {
-        let (value, angle) = (f64::from(part(v)), turn * i as f64);
-        (c + value * angle.cos(), s + value * angle.sin())
-    });
-    2.0 / felt.len() as f64 * sums.0.hypot(sums.1)
+    let sums = rendered
+        .iter()
+        .enumerate()
+        .fold((0.0, 0.0), |(c, s), (i, v)| {
+            let (value, angle) = (f64::from(part(v)), turn * i as f64);
+            (c + value * angle.cos(), s + value * angle.sin())
+        });
+    2.0 / rendered.len() as f64 * sums.0.hypot(sums.1)
 }
 
 #[test]
 fn a_slow_hand_feels_the_amplitude_that_was_asked_for() {
     for (texture, ticks) in [(GRATING, 2_000), (GRAIN, cases(400_000, 200))] {
-        let felt = felt(&texture, 10.0, 1.0, ticks);
-        let most = felt.iter().map(|v| v.z - 1.0).fold(f32::MIN, f32::max);
-        let least = felt.iter().map(|v| v.z - 1.0).fold(f32::MAX, f32::min);
+        let rendered = rendered(&texture, 10.0, 1.0, ticks);
+        let most = rendered.iter().map(|v| v.z - 1.0).fold(f32::MIN, f32::max);
+        let least = rendered.iter().map(|v| v.z - 1.0).fold(f32::MAX, f32::min);
         assert!(most <= 0.100_01 && least >= -0.100_01, "{most} {least}");
         if texture.pattern == Pattern::Grating {
             assert!(most > 0.099 && least < -0.099, "{most} {least}");
@@ -82,13 +85,13 @@ fn a_slow_hand_feels_the_amplitude_that_was_asked_for() {
 fn a_hand_at_speed_feels_the_frequency_of_the_wavelength() {
     for hz in [10.0, 50.0, 100.0, 125.0] {
         // A wave a millimetre.
-        let felt = felt(&GRATING, hz, 1.0, 4_000);
-        let there = amplitude(&felt, hz, |v| v.z);
+        let rendered = rendered(&GRATING, hz, 1.0, 4_000);
+        let there = amplitude(&rendered, hz, |v| v.z);
         assert!((there - 0.1).abs() < 1e-3, "{hz} Hz: {there}");
         for other in (1..=100).map(|i| 5.0 * f64::from(i)).filter(|o| *o != hz) {
             let (up, along) = (
-                amplitude(&felt, other, |v| v.z),
-                amplitude(&felt, other, |v| v.x),
+                amplitude(&rendered, other, |v| v.z),
+                amplitude(&rendered, other, |v| v.x),
             );
             let most = if other == 500.0 { 2e-3 } else { 1e-3 };
             assert!(
@@ -102,9 +105,9 @@ fn a_hand_at_speed_feels_the_frequency_of_the_wavelength() {
 /// Grain has no waves shorter than its wavelength, but for what its even rises need.
 #[test]
 fn grain_is_felt_up_to_the_frequency_of_its_wavelength() {
-    let felt = felt(&GRAIN, 50.0, 1.0, cases(20_000, 400));
+    let rendered = rendered(&GRAIN, 50.0, 1.0, cases(20_000, 400));
     let power = |from: u32, to: u32| -> f64 {
-        let all = (from..to).map(|hz| amplitude(&felt, f64::from(hz), |v| v.z).powi(2));
+        let all = (from..to).map(|hz| amplitude(&rendered, f64::from(hz), |v| v.z).powi(2));
         all.sum()
     };
     let (within, beyond) = (power(1, 60), power(60, 400));
@@ -118,8 +121,8 @@ fn grain_is_felt_up_to_the_frequency_of_its_wavelength() {
 #[test]
 fn texture_fades_before_it_would_alias() {
     let swing = |mm_s| {
-        let felt = felt(&GRATING, mm_s, 1.0, 2_000);
-        let up = felt.iter().map(|v| (v.z - 1.0).abs());
+        let rendered = rendered(&GRATING, mm_s, 1.0, 2_000);
+        let up = rendered.iter().map(|v| (v.z - 1.0).abs());
         up.fold(0.0, f32::max)
     };
     assert!(swing(120.0) > 0.099);
@@ -169,14 +172,14 @@ fn nothing_steps_on_the_way() {
             // Over the border of the tile that ends with column and row 32.
             let (way, depth) = (3.6 + f64::from(i) * 2e-5, depth(f64::from(i)) as f32);
             let normal = Vec3::new(0.6, 0.0, 0.8);
-            let felt = texturer.add(normal * depth, &place(way, way));
+            let rendered = texturer.add(normal * depth, &place(way, way));
             if let Some(before) = before
                 && i > 100
             {
-                let step = (felt - before).length();
+                let step = (rendered - before).length();
                 assert!(step < 4e-4, "{texture:?} {i}: {step:e}");
             }
-            before = Some(felt);
+            before = Some(rendered);
         }
     }
 }
@@ -197,11 +200,11 @@ fn it_never_pulls_and_keeps_its_bounds() {
             let depth_mm = [1e-30, 1e-6, 0.01, 0.1, 0.5, 3.0, 1e3, 1e9][i as usize / 3 % 8];
             let normal = [Vec3::Z, Vec3::X, Vec3::new(-0.48, 0.6, 0.64)][i as usize % 3];
             let plain = normal * (depth_mm / CELL_MM);
-            let felt = texturer.add(plain, &place(0.013 * f64::from(i), 0.007 * f64::from(i)));
-            let more_mm = (felt - plain) * CELL_MM;
+            let rendered = texturer.add(plain, &place(0.013 * f64::from(i), 0.007 * f64::from(i)));
+            let more_mm = (rendered - plain) * CELL_MM;
             let (up, along) = (more_mm.dot(normal), more_mm.reject_from_normalized(normal));
             let rounding = 1e-5 * depth_mm;
-            assert!(felt.dot(normal) >= -1e-30, "{depth_mm} {felt}");
+            assert!(rendered.dot(normal) >= -1e-30, "{depth_mm} {rendered}");
             assert!(
                 up.abs() <= a.min(depth_mm) * 1.000_01 + rounding,
                 "{depth_mm}: {up}"
@@ -239,8 +242,8 @@ fn along_the_surface_it_is_no_stiffer_than_the_surface() {
         },
     ] {
         for depth_mm in [0.05, 0.2, 1.0, 15.0] {
-            let felt = felt(&texture, 1.0, depth_mm, cases(20_000, 200));
-            let pairs = felt.windows(2);
+            let rendered = rendered(&texture, 1.0, depth_mm, cases(20_000, 200));
+            let pairs = rendered.windows(2);
             let changes = pairs.map(|pair| (pair[1].x - pair[0].x).abs() / 1e-3);
             let stiffest = changes.fold(0.0, f32::max);
             assert!(stiffest < 1.02, "{texture:?} {depth_mm} mm: {stiffest}");
@@ -261,19 +264,19 @@ fn a_round_gives_no_energy() {
             let angle = std::f64::consts::TAU * f64::from(i) / f64::from(STEPS);
             let [x, y] = [1.7 * angle.cos(), 1.7 * angle.sin()];
             let depth = 0.15 + 0.04 * (3.0 * angle).sin();
-            let felt = texturer.add(Vec3::Z * (depth as f32 / CELL_MM), &place(x, y)) * CELL_MM;
+            let rendered = texturer.add(Vec3::Z * (depth as f32 / CELL_MM), &place(x, y)) * CELL_MM;
             let here = [x, y, -depth];
             if let Some((there, force)) = before
                 && i > STEPS
             {
-                let force = (0.5 * (felt + force)).to_array();
+                let force = (0.5 * (rendered + force)).to_array();
                 let work: f64 = (0..3)
                     .map(|k| f64::from(force[k]) * (here[k] - there[k]))
                     .sum();
                 given += work;
                 size += work.abs();
             }
-            before = Some((here, felt));
+            before = Some((here, rendered));
         }
         assert!(
             cfg!(miri) || given.abs() < 2e-3 * size,
@@ -330,10 +333,10 @@ fn the_proxy_is_not_moved_and_texture_is_along_the_slopes_normal() {
             Vec3::new(x, 0.5, 0.75 * (20.0 + x)) - normal * 0.3,
         );
         let output = *contact.step(&window, &hip);
-        let felt = texturer.add(output.displacement, &output.proxy);
-        let up = felt.dot(normal) - 0.3;
+        let rendered = texturer.add(output.displacement, &output.proxy);
+        let up = rendered.dot(normal) - 0.3;
         most = most.max(up.abs());
-        assert!(felt.y.abs() < 1e-5, "the ridges lead north: {felt}");
+        assert!(rendered.y.abs() < 1e-5, "the ridges lead north: {rendered}");
     }
     let wanted = GRATING.amplitude_mm / CELL_MM;
     assert!((most - wanted).abs() < 0.01 * wanted, "{most}");
@@ -352,15 +355,21 @@ fn what_no_number_is_gives_none() {
             0.0,
         ] {
             let at = GridPoint::new([i32::MAX; 3], Vec3::splat(bad));
-            let felt = texturer.add(Vec3::new(0.0, bad, 1.0), &at);
-            let force = crate::force::SurfaceParams::PREMIUM.spring().force_n(felt);
+            let rendered = texturer.add(Vec3::new(0.0, bad, 1.0), &at);
+            let force = crate::force::SurfaceParams::PREMIUM
+                .spring()
+                .force_n(rendered);
             assert!(force.is_finite(), "{bad}: {force}");
         }
         // And is forgotten.
-        let felt: Vec<_> = (0..100)
+        let rendered: Vec<_> = (0..100)
             .map(|_| texturer.add(Vec3::Z, &place(0.3, 0.3)))
             .collect();
-        assert!(felt[99].is_finite() && felt[99] != Vec3::Z, "{}", felt[99]);
+        assert!(
+            rendered[99].is_finite() && rendered[99] != Vec3::Z,
+            "{}",
+            rendered[99]
+        );
         // Too deep for a texture: what there is stays.
         let deep = Vec3::new(-3e24, 4e30, 1e20);
         assert_eq!(texturer.add(deep, &place(0.3, 0.3)), deep);

@@ -60,7 +60,7 @@ bitflags! {
         const RAMPING = 1 << 5;
         /// Force is going out before disarming.
         const FADING = 1 << 6;
-        /// Terrain that might be felt here is not on the device yet.
+        /// Terrain that might be rendered here is not on the device yet.
         const TERRAIN_MISSING = 1 << 7;
         /// The force ramps down at the edge of the surface, or up after a wait.
         const EDGE_FADING = 1 << 8;

@@ -1,5 +1,5 @@
 //! A jog: one motor is given a small current for a limited time, and nothing else is
-//! driven. It shows which joint a motor turns, and which way, before anything is felt.
+//! driven. It shows which joint a motor turns, and which way, before any force is rendered.
 //!
 //! A jog goes through arming as a scene does: nothing may block it, and the dead-man
 //! switch has to be pressed after the command. The current then comes in over 2 s,

@@ -54,7 +54,7 @@ impl Guard {
         let change = aim - self.force_n;
         let step = clamp_length(change, self.max_slew_n);
         self.force_n = if step == change {
-            // To the bit, so that a replay gives the force that was felt.
+            // To the bit, so that a replay renders the same force.
             aim
         } else {
             self.limits |= Limits::SLEW_LIMITED;

@@ -95,7 +95,7 @@ impl Calibration {
     /// | 2, tip up | 52 counts (19 µm) | 34 counts (30 µm) |
     /// | 3, tip towards the user | 52 counts (19 µm) | 34 counts (30 µm) |
     ///
-    /// With the wrong ones, motions are felt 1.6 to 1.8 times too large or too small, and
+    /// With the wrong ones, motions are rendered 1.6 to 1.8 times too large or too small, and
     /// so are forces. The absolute limits allow both.
     pub const PREMIUM_1_0: Self = Self {
         model: Model::Premium10,

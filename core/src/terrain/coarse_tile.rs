@@ -2,7 +2,7 @@
 //!
 //! Its 33 × 33 samples lie [`CoarseTile::spacing`] cells of the scene's level apart, linear
 //! between them along rows and columns. Between coarse samples that is a bilinear patch again, also
-//! seen through the finer cells of the level. So where it is felt, contact is as exact as anywhere.
+//! seen through the finer cells of the level. So where it is rendered, contact is as exact as anywhere.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
-//! The fallback: a coarse image of all that the arm reaches, felt where a tile has not come.
+//! The fallback: a coarse image of all that the arm reaches, rendered where a tile is missing.
 //!
 //! It is a wide tile under all of the reach and, within it, a near one of finer samples around the
-//! home pose, where the hand is most of the time. Where both are, the near one is felt. The host
+//! home pose, where the hand is most of the time. Where both are, the near one is rendered. The host
 //! makes the samples on its border those of the wide one, where that has some, so there is no
 //! step between them.
 
@@ -99,9 +99,9 @@ impl<'t> Laid<'t> {
         Some(spent)
     }
 
-    /// The fallback, once all of it has come. A part alone is not felt: the surface would
+    /// The fallback, once all of it has come. A part alone is not rendered: the surface would
     /// move at once when the other comes.
-    pub(super) fn felt(&self) -> Option<Coarse<'_>> {
+    pub(super) fn loaded(&self) -> Option<Coarse<'_>> {
         let place = self.place?;
         let [wide, near] = &self.tiles;
         let near = match place.near {

@@ -1,8 +1,8 @@
 //! Largest distance of each tile of a window from the coarse fallback while it blends in.
 //!
-//! A tile that comes where the fallback was felt does not take its place at once: each sample
+//! A tile that comes where the fallback was rendered does not take its place at once: each sample
 //! moves from the fallback's height to the tile's at a bounded rate. The sample of a tile that may
-//! be `a` cells away from the fallback is felt at
+//! be `a` cells away from the fallback is rendered at
 //!
 //! ```text
 //! c + (f − c brought within ±a)        c: the fallback's height there, f: the tile's
@@ -11,7 +11,7 @@
 //! `a` grows from tick to tick until the tile is the surface as it is. A
 //! sample that several tiles share is that of the tile which may be farthest from the fallback,
 //! and of the fallback where none of them is here. So no border is open, a tile that has settled
-//! is felt by its own samples alone, and what has not come bends to it along its border.
+//! is rendered by its own samples alone, and what has not come bends to it along its border.
 //!
 //! In each tick the surface is bilinear in each cell, so the contact is as exact as over any
 //! other field. Where the fallback knows nothing (beyond it, in its holes, or before it comes) a

@@ -148,7 +148,7 @@ impl<'t, const D: usize> Window<'t, D> {
         self.put(tile, false)
     }
 
-    /// The same of a tile that `settles`, where a fallback was felt.
+    /// The same of a tile that `settles`, where a fallback was rendered.
     pub(super) fn put(&mut self, tile: &'t mut Tile, settles: bool) -> &'t mut Tile {
         let Some(key) = tile.key().filter(|key| self.expects(*key)) else {
             return tile;

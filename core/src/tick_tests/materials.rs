@@ -1,4 +1,4 @@
-//! Materials: what is felt of a border of classes.
+//! Materials: the force at a border of classes.
 
 use std::vec::Vec;
 
@@ -200,9 +200,9 @@ fn friction_changes_evenly_and_a_proxy_is_held_by_its_own_material() {
     let stuck = ground.at([20.2, 0.5, -depth], 0).proxy;
     for x in [20.0, 19.6, 19.2, 18.8] {
         for _ in 0..50 {
-            let felt = ground.at([x, 0.5, -depth], 0);
-            assert_eq!(felt.proxy, stuck, "{x}");
-            assert_eq!(felt.force_n.z, 0.4 * depth);
+            let rendered = ground.at([x, 0.5, -depth], 0);
+            assert_eq!(rendered.proxy, stuck, "{x}");
+            assert_eq!(rendered.force_n.z, 0.4 * depth);
         }
     }
 }
@@ -234,12 +234,12 @@ fn a_texture_goes_out_before_another_one_comes_in() {
             let off = forces[from..to].iter().map(|force| (force.z - 0.4).abs());
             off.fold(0.0, f32::max)
         };
-        // The border is crossed with the 476th; 50 ms later nothing of either is felt.
+        // The border is crossed with the 476th; 50 ms later nothing of either is rendered.
         let (before, between, after) = (swing(100, 470), swing(524, 527), swing(700, 900));
         // An even surface has nothing that would go out first.
         let goes_out = !table[0].texture.is_none();
         assert!(!goes_out || between < 4e-3, "{table:?}: {between}");
-        for (material, felt) in table.iter().zip([before, after]) {
+        for (material, rendered) in table.iter().zip([before, after]) {
             let wanted = if material.texture.is_none() {
                 0.0
             } else {
@@ -247,8 +247,8 @@ fn a_texture_goes_out_before_another_one_comes_in() {
             };
             let least = if wanted > 0.0 { 0.2 } else { 0.0 };
             assert!(
-                felt >= least * wanted && felt < 1.01 * wanted + 1e-6,
-                "{felt}"
+                rendered >= least * wanted && rendered < 1.01 * wanted + 1e-6,
+                "{rendered}"
             );
         }
         // No more than a wave makes by itself: 2π A / λ times the stiffness and the way.
@@ -271,14 +271,17 @@ fn damping_is_that_of_the_material() {
         ground.at([x, 0.5, 1.0], 0);
         ground.at([x, 0.5, -3.0], 0);
         // A cell of a millimetre in a tick of a millisecond, and a tenth of it.
-        let felt = ground.at([x, 0.5, -3.1], 0).force_n.z;
+        let rendered = ground.at([x, 0.5, -3.1], 0).force_n.z;
         let wanted = 0.4 * 3.1 + 1e-3 * ns_per_m * 100.0;
-        assert!((felt - wanted).abs() < 1e-3, "{x}: {felt}, not {wanted}");
+        assert!(
+            (rendered - wanted).abs() < 1e-3,
+            "{x}: {rendered}, not {wanted}"
+        );
     }
 }
 
 /// Returns the forces of points over a tile's border and one of classes, where tiles arrive late.
-fn felt(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) {
+fn rendered(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) {
     let rough = Material {
         friction: Friction::coulomb(0.5),
         texture: GRATING,
@@ -289,21 +292,21 @@ fn felt(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) {
     let mut ground = Ground::of(&mut tiles, &[SOFT, rough], border, shading);
     ground.at([29.0, 0.5, 1.0], 0);
     let way = steps(29.0, 0.02, 300);
-    let felt = way.map(|x| {
+    let rendered = way.map(|x| {
         let mut sample = ground.at([x, 0.5, -1.5], late);
-        // When it was, and how long it took, is not what was felt.
+        // The time of a sample and its cost are not part of the force.
         (sample.tick, sample.work, sample.missing_tile) = (0, 0, None);
         sample
     });
-    (felt.collect(), ground.ticks)
+    (rendered.collect(), ground.ticks)
 }
 
 #[test]
 fn a_tick_that_is_repeated_for_a_tile_leaves_no_trace() {
     for border in [31, 32, 33] {
         for shading in [Shading::None, Shading::Smooth] {
-            let (early, ticks) = felt(0, border, shading);
-            let (late, more) = felt(30, border, shading);
+            let (early, ticks) = rendered(0, border, shading);
+            let (late, more) = rendered(30, border, shading);
             assert!(more >= ticks + 30, "{ticks} {more}");
             assert_eq!(early, late, "{border}");
         }
@@ -356,7 +359,7 @@ fn where_the_tile_has_no_materials_the_one_before_stays() {
 
 #[test]
 fn small_windows_that_wait_for_tiles_give_the_bits_of_a_large_one() {
-    fn felt<const D: usize>() -> Vec<(GridPoint, Vec3)> {
+    fn rendered<const D: usize>() -> Vec<(GridPoint, Vec3)> {
         let rough = Material {
             friction: Friction::coulomb(0.4),
             texture: GRATING,
@@ -387,7 +390,7 @@ fn small_windows_that_wait_for_tiles_give_the_bits_of_a_large_one() {
         });
         way.by_ref().collect()
     }
-    let large = felt::<8>();
+    let large = rendered::<8>();
     assert!(
         large
             .iter()
@@ -395,9 +398,9 @@ fn small_windows_that_wait_for_tiles_give_the_bits_of_a_large_one() {
             .count()
             > cases(2_000, 10) as usize
     );
-    assert_eq!(felt::<2>(), large);
-    assert_eq!(felt::<3>(), large);
-    assert_eq!(felt::<4>(), large);
+    assert_eq!(rendered::<2>(), large);
+    assert_eq!(rendered::<3>(), large);
+    assert_eq!(rendered::<4>(), large);
 }
 
 #[test]

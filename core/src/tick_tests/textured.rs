@@ -11,7 +11,7 @@ const REST: u32 = 60;
 
 /// Returns the forces of points that move by a fifth of a wave a tick over two tiles, the second of which arrives
 /// `late` ticks after it is asked for; and how many ticks it took.
-fn felt(late: u32) -> (Vec<Vec3>, u32) {
+fn rendered(late: u32) -> (Vec<Vec3>, u32) {
     let mut tiles = std::vec![Tile::VACANT; 6];
     let mut spare: Vec<_> = tiles.iter_mut().collect();
     let mut next = || spare.pop().expect("a tile");
@@ -70,11 +70,11 @@ fn felt(late: u32) -> (Vec<Vec3>, u32) {
 
 #[test]
 fn a_tile_that_is_waited_for_leaves_no_trace_in_the_texture() {
-    let (early, ticks) = felt(0);
-    let (late, more) = felt(20);
+    let (early, ticks) = rendered(0);
+    let (late, more) = rendered(20);
     assert_eq!(more, ticks + 20);
     assert_eq!(early, late);
-    // All of them at a speed at which a part of the texture is felt.
+    // All of them at a speed at which a part of the texture is rendered.
     let textured = early
         .iter()
         .skip(REST as usize)

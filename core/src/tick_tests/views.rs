@@ -108,8 +108,8 @@ fn halved(point: GridPoint) -> GridPoint {
 fn held_clutch_has_no_force_and_carries_the_terrain() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
-    let felt = arm.tick();
-    assert!(felt.force_n.z > 2.0, "{}", felt.force_n);
+    let rendered = arm.tick();
+    assert!(rendered.force_n.z > 2.0, "{}", rendered.force_n);
     arm.clutch(WithHand);
     let opening = arm.ticks(99);
     assert!(opening.limits.contains(Limits::CLUTCH_MOVES));
@@ -128,7 +128,7 @@ fn held_clutch_has_no_force_and_carries_the_terrain() {
     let back = arm.ticks(510);
     assert_eq!(back.limits, Limits::empty());
     assert!(open.hip.to(&back.hip).length() < 1e-4, "{:?}", back.hip);
-    assert!((back.force_n - felt.force_n).length() < 1e-3);
+    assert!((back.force_n - rendered.force_n).length() < 1e-3);
     let moved = before.to(&home(&arm));
     assert!(moved.length() > 5.0 && moved.z < -5.0, "{moved}");
     // From here on it stands still again.
@@ -151,7 +151,7 @@ fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
 fn terrain_stays_while_held_for_another_placement() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
-    let felt = arm.tick();
+    let rendered = arm.tick();
     arm.clutch(InPlace);
     let open = arm.ticks(105);
     // The hand gives way, some 2 mm, and then 3 mm to the side.
@@ -167,17 +167,17 @@ fn terrain_stays_while_held_for_another_placement() {
     let deeper = arm.ticks(510);
     assert_eq!(deeper.limits, Limits::empty());
     assert!(
-        deeper.force_n.z > felt.force_n.z + 0.5,
+        deeper.force_n.z > rendered.force_n.z + 0.5,
         "{}",
         deeper.force_n
     );
     // It is pushed back to where it was.
     let back = go(&mut arm, DEEP, 300);
-    let change = back.force_n - felt.force_n;
+    let change = back.force_n - rendered.force_n;
     assert!(
         change.length() < 2e-3,
         "{} and {}",
-        felt.force_n,
+        rendered.force_n,
         back.force_n
     );
 }
@@ -229,7 +229,7 @@ fn taken_along_once_the_terrain_has_gone_with_the_hand() {
 fn the_boards_input_opens_the_clutch_and_all_who_hold_it_have_to_let_go() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, plane);
-    let felt = arm.tick();
+    let rendered = arm.tick();
     arm.device.say(Command::ClutchInput(true));
     let open = arm.ticks(105);
     let limits = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
@@ -249,7 +249,7 @@ fn the_boards_input_opens_the_clutch_and_all_who_hold_it_have_to_let_go() {
     arm.clutch(LetGo);
     let back = arm.ticks(510);
     assert_eq!(back.limits, Limits::empty());
-    assert!((back.force_n - felt.force_n).length() < 1e-3);
+    assert!((back.force_n - rendered.force_n).length() < 1e-3);
 }
 
 #[test]
@@ -465,7 +465,7 @@ fn the_ground_is_not_armed_into_by_holding_the_clutch() {
     assert!(blockers.contains(Blockers::FORCE_TOO_LARGE));
 }
 
-/// A replay of what an arm felt goes through the same change.
+/// A replay of a recording makes the same change.
 #[test]
 fn points_go_on_in_another_view() {
     let mut tiles = buffers::<4>();

@@ -26,7 +26,7 @@ pub struct MaterialScene<'a> {
 }
 
 impl MaterialScene<'_> {
-    /// The table, where it is one that can be felt and the one that the scene names.
+    /// The table, where it is one that can be rendered and the one that the scene names.
     #[must_use]
     pub fn table(&self) -> Option<MaterialTable> {
         let (table, rest) = postcard::take_from_bytes::<MaterialTable>(self.table).ok()?;

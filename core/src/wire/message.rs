@@ -26,7 +26,7 @@ pub enum ToDevice<'a> {
     /// Opens the session of its frame. Where that is open already it is answered
     /// again and changes nothing.
     Hello(HostHello),
-    /// The scene to be felt. Starts afresh, unless the device already holds
+    /// The scene to render. Starts afresh, unless the device already holds
     /// this very scene.
     Scene(Scene),
     /// A tile that was asked for.

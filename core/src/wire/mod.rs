@@ -107,7 +107,7 @@
 //!   ([`Fallback::keys`](crate::terrain::Fallback::keys)); each view brings its own.
 //! - A scene with materials comes with their table
 //!   ([`ToDevice::MaterialScene`](message::ToDevice::MaterialScene)), and is refused where the table is not the one
-//!   that the scene names, or is none that can be felt. Each of its tiles comes with materials
+//!   that the scene names, or is none that can be rendered. Each of its tiles comes with materials
 //!   ([`ToDevice::MaterialTile`](message::ToDevice::MaterialTile)), and its fallback without; any other is a bad frame. Its
 //!   views keep the table, or have none.
 //! - A new session keeps the scene and every tile that is held; samples and requests
@@ -117,7 +117,7 @@
 //!   or is still under way. An older number (by less than 128, wrapping) is not heard.
 //!   To arm is answered when the loop has decided, to store when it is stored.
 //! - Another view of the scene in force ([`ToDevice::SceneChange`](message::ToDevice::SceneChange)) is put in
-//!   only while nothing is felt: with the clutch held ([`Request::Clutch`](request::Request::Clutch)) and
+//!   only while no force is rendered: with the clutch held ([`Request::Clutch`](request::Request::Clutch)) and
 //!   open, as a sample of the view in force says; in a replay between two points. It is answered as a scene is, also where
 //!   it is refused, and nothing is disarmed. The host says it every 0.4 s until it is answered, and gives
 //!   it up after 4 s. A number that is not newer (by less than 128, wrapping) than that of the view in force is

@@ -117,16 +117,16 @@ fn contact(mut scene: Scene, frames: &mut Frames, records: &mut Records) {
                 let hip = black_box(point.hip);
                 // Where they lie is not worked out while the instructions are counted.
                 let (window, contact) = (black_box(&window), black_box(&mut contact));
-                let (cost, felt) = stopwatch.counted(|| step(window, contact, hip));
+                let (cost, output) = stopwatch.counted(|| step(window, contact, hip));
                 records.add(
                     [
                         cost,
-                        felt.state as u32,
-                        u32::from(felt.converged),
-                        felt.work,
+                        output.state as u32,
+                        u32::from(output.converged),
+                        output.work,
                     ],
-                    felt.displacement,
-                    &felt.proxy,
+                    output.displacement,
+                    &output.proxy,
                 );
             }
             _ => panic!("a replay has scenes, tiles and points only"),
@@ -185,7 +185,7 @@ fn fill_material_tile(buffer: &mut Tile, message: &MaterialTile<'_>, count: usiz
     filled.expect("the host made it well");
 }
 
-/// A contact that has felt nothing yet.
+/// A contact without a step yet.
 fn contact_of(scene: &Scene) -> Contact {
     let settings = ContactSettings {
         // What a tick has at 10 kHz: there the instructions count.

@@ -100,7 +100,7 @@ fn the_arm_is_followed_in_every_tick_of_a_replay() {
     assert!(haptic_loop.unsent.is_some(), "the case that is meant");
     drain(&mut link_ends);
     let at = wave(&mut haptic_loop, at, 2);
-    // And then the arm is felt.
+    // And then the arm is rendered.
     assert!(link_ends.commands.enqueue(Command::DropScene).is_ok());
     wave(&mut haptic_loop, at, 2);
     assert_eq!(haptic_loop.haptics.report().fault, None);

@@ -255,7 +255,7 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Drops and counts the samples of a scene that another replaces.
-    fn drop_what_was_felt(&mut self) {
+    fn drop_scene_samples(&mut self) {
         if self.renders_arm() && self.session.is_open() {
             while self.ends.records.dequeue().is_some() {
                 self.dropped = self.dropped.wrapping_add(1);
@@ -268,7 +268,7 @@ impl<const D: usize> Link<'_, D> {
         let accepted = scene.is_valid() && self.has_materials_of(&scene);
         // The very scene in force goes on: its host came back.
         if accepted && self.scene != Some(scene) {
-            self.drop_what_was_felt();
+            self.drop_scene_samples();
             self.requester.reset(scene.level, scene.size);
             self.requester.lay(scene.fallback);
             self.forget_positions();

@@ -18,7 +18,7 @@
 //!   tile that is held, so a host that comes back goes on where it was.
 //! - A host that vanishes leaves the arm rendering what is held, but not for ever:
 //!   after the time that the host named the arm is disarmed.
-//! - Another view of a scene is put in only while nothing is felt; the arm stays armed.
+//! - Another view of a scene is put in only while no force is rendered; the arm stays armed.
 //! - Goodbye is answered when the amplifiers are off.
 
 mod commands;

@@ -34,7 +34,7 @@ impl<const D: usize> Link<'_, D> {
             };
             self.nothing_to_request_at = None;
             let ticks_per_ms = self.device.ticks_per_ms();
-            // What was felt before the view that was put in says nothing about it.
+            // Samples from before the new placement say nothing about it.
             if record.sample.view == self.view {
                 self.request_hint = Some(tiles::request_hint(
                     &self.last_record,

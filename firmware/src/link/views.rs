@@ -70,7 +70,7 @@ impl<const D: usize> Link<'_, D> {
         self.say(&ToHost::SceneAck { epoch, accepted });
     }
 
-    /// Returns true if nothing is felt now: the clutch is open, as the loop has said since it is
+    /// Returns true if no force is rendered now: the clutch is open, as the loop has said since it is
     /// held, or it is a replay between two points.
     fn may_change_view(&self, scene: &Scene) -> bool {
         let latest = &self.last_record.sample;

@@ -108,7 +108,7 @@ fn on_disk(
 }
 
 /// The first of some URLs at which there is a file. If that cannot be determined, the file that
-/// has them as neighbours cannot be read: a mask that is not known of would be felt.
+/// has them as neighbours cannot be read: an unknown mask would be read as heights.
 fn elsewhere(
     own: &str,
     urls: &[String],

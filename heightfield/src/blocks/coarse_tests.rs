@@ -200,7 +200,7 @@ fn a_second_look_reads_no_block_and_a_finer_one_serves_the_coarser() {
     assert!((1..=9 * 5).contains(&first), "{first}");
     check(&raster, 8, USUAL);
     assert_eq!(seen.reads(), 0);
-    // What is felt leaves its coarse samples behind, too.
+    // Touched blocks leave their coarse samples behind, too.
     check(&raster, 0, USUAL);
     assert_eq!(
         seen.reads(),

@@ -45,8 +45,8 @@ impl GravityFit {
 /// [`FitError::NoWeight`]: all poses have joint 2 upright, or joint 3 hanging.
 pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, FitError> {
     let arm = Arm::of(record);
-    // (how much of the weight is felt, torque) of each pose.
-    let felt = |still: &Still| {
+    // (how much of the weight is rendered, torque) of each pose.
+    let torque_of = |still: &Still| {
         let (q_rad, force_n) = (DVec3::from(still.q_rad), DVec3::from(still.force_n));
         let torque = arm.torques_nm(q_rad, force_n);
         [
@@ -54,9 +54,9 @@ pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, 
             (libm::sin(q_rad.z), torque.z),
         ]
     };
-    let felt: Vec<_> = poses.iter().map(felt).collect();
+    let torque_of: Vec<_> = poses.iter().map(torque_of).collect();
     let weight = |joint: usize| {
-        let (share, torque) = felt.iter().fold((0.0, 0.0), |(share, torque), pose| {
+        let (share, torque) = torque_of.iter().fold((0.0, 0.0), |(share, torque), pose| {
             let (s, t) = pose[joint];
             (share + s * s, torque + s * t)
         });
@@ -67,7 +67,7 @@ pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, 
     };
     let (gravity_2_nm, gravity_3_nm) = (weight(0)?, weight(1)?);
     let weights = [gravity_2_nm, gravity_3_nm];
-    let left: f64 = felt
+    let left: f64 = torque_of
         .iter()
         .flat_map(|pose| pose.iter().zip(weights))
         .map(|((share, torque), weight)| (torque - weight * share).powi(2))
@@ -75,7 +75,7 @@ pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, 
     Ok(GravityFit {
         gravity_2_nm,
         gravity_3_nm,
-        off_nm: libm::sqrt(left / (2 * felt.len()) as f64),
+        off_nm: libm::sqrt(left / (2 * torque_of.len()) as f64),
     })
 }
 

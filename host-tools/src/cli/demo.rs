@@ -173,7 +173,7 @@ impl Outputs {
     }
 }
 
-/// Runs the tour and shows what was felt.
+/// Runs the tour and draws its forces.
 fn show(
     args: &Args,
     (placed, view): (&PlacedTerrain<'_>, &Placement),
@@ -273,7 +273,7 @@ fn control<'t>(
     Ok(PlacementControl::new(served, arm, args.commands.open()?))
 }
 
-/// All that was felt on a tour.
+/// The samples of a tour.
 struct Toured<'t> {
     /// The rows of the recording, with what the loop did.
     rows: Vec<(Record, LoopColumns)>,
@@ -282,7 +282,7 @@ struct Toured<'t> {
     summary: SessionSummary,
 }
 
-/// Draws what was felt in the last view: places and heights of another are other places of
+/// Draws the samples of the last placement: places and heights of another are other places of
 /// the hand.
 fn draw(toured: &Toured<'_>, first: &Placement, name: &str, path: &Path) -> Result<(), Failure> {
     let last = toured.rows.last().map_or(0, |(_, of_loop)| of_loop.view());
@@ -291,14 +291,14 @@ fn draw(toured: &Toured<'_>, first: &Placement, name: &str, path: &Path) -> Resu
         .iter()
         .filter(|(_, of_loop)| of_loop.view() == last);
     let records: Vec<Record> = in_last.map(|(record, _)| *record).collect();
-    let felt = toured.views.get(last as usize);
-    let view = felt.laid.as_ref().map_or(*first, |laid| laid.view);
+    let placement = toured.views.get(last as usize);
+    let view = placement.laid.as_ref().map_or(*first, |laid| laid.view);
     let title = match (last, records.first()) {
         (0, _) | (_, None) => name.to_owned(),
         (_, Some(began)) => format!("{name}, view {last}, from {:.1} s on", began.t_s),
     };
     let summary = &toured.summary;
-    summary.draw(path, (&felt.terrain, &view), &title, &records)
+    summary.draw(path, (&placement.terrain, &view), &title, &records)
 }
 
 /// Tours on the board in an emulator, the arm in a thread of its own.
@@ -375,8 +375,8 @@ impl<'t> Tour<'_, 't> {
                         shown.take(sample, &record, log.view());
                     }
                     if let Some(events) = &mut events {
-                        let (view, felt) = log.view();
-                        events.take(sample, &record, (view, &felt.terrain));
+                        let (view, placement) = log.view();
+                        events.take(sample, &record, (view, &placement.terrain));
                     }
                     rows.push((record, LoopColumns::of(sample, log.view().0)));
                 }
@@ -414,7 +414,7 @@ impl<'t> Tour<'_, 't> {
         marks.extend(control.marks(&log, true));
         let figures = log.figures();
         let ticks = log.ticks();
-        // However the tour ended, the board is notified; what it felt after the tour's end
+        // However the tour ended, the board is notified; its samples after the tour's end
         // is not shown.
         let left = session.say_goodbye(&mut |_| {});
         if let Some(events) = &events {
@@ -446,12 +446,12 @@ fn write(toured: &Toured<'_>, settings: &Settings, path: &Path) -> Result<(), Ou
         while let Some(mark) = marks.next_if(|mark| mark.t_s <= record.t_s) {
             recording.mark(mark);
         }
-        let (number, felt) = (columns.view(), toured.views.get(columns.view() as usize));
+        let (number, placement) = (columns.view(), toured.views.get(columns.view() as usize));
         if number > described
-            && let Some(laid) = &felt.laid
+            && let Some(laid) = &placement.laid
         {
             described = number;
-            recording.view(&PlacementSettings::new(number, &felt.terrain, laid))?;
+            recording.view(&PlacementSettings::new(number, &placement.terrain, laid))?;
         }
         recording.write(record, &columns.values())?;
     }

@@ -156,11 +156,11 @@ struct Cell {
     /// Ground length of both sides in metres.
     east_m: f64,
     north_m: f64,
-    /// Side of the square cell that is felt, m on the ground.
+    /// Side of the square cell that is rendered, m on the ground.
     haptic_cell_m: f64,
     /// True if heights are interpolated for that, as the stored cells are not square.
     resampled: bool,
-    /// True if stored cells that are not square are felt as squares.
+    /// True if stored cells that are not square are rendered as squares.
     distorted: bool,
     /// Worst error of slopes and lengths in the field, as a share, if all cells are rendered like
     /// the middle one.
@@ -367,7 +367,7 @@ impl Cell {
             distorted: grid.is_distorted(),
             worst_share: worst.map(|worst| worst.share),
             worst_at: worst.map(|worst| worst.ground),
-            worst: worst.filter(Distortion::is_felt).map(|worst| {
+            worst: worst.filter(Distortion::is_noticeable).map(|worst| {
                 let (off, place) = (off_in_words(&worst), place_in_words(&file, worst.ground));
                 match grid.is_distorted() {
                     true => format!("{off}, at {place}"),

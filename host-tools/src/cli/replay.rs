@@ -110,7 +110,7 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     }
     let rendering = &args.rendering;
     let raster = args.terrain.open()?;
-    let measured_at = recorded.as_ref().and_then(|it| it.felt.measured_at);
+    let measured_at = recorded.as_ref().and_then(|it| it.rendered.measured_at);
     let name = args.terrain.name();
     let (options, reading) = (&rendering.surface, &args.terrain.reading);
     let surface = options.load()?;
@@ -132,10 +132,10 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     ] {
         line.iter().for_each(|line| eprintln!("{line}"));
     }
-    let home_mm = recorded.as_ref().and_then(|it| it.felt.home_mm);
+    let home_mm = recorded.as_ref().and_then(|it| it.rendered.home_mm);
     let later = recorded.map(|it| (it.views, it.marks));
     let (views, marks) = later.unwrap_or_default();
-    let felt = Inputs {
+    let replayed = Inputs {
         terrain: &terrain,
         params: (surface.params, rule),
         file,
@@ -148,8 +148,8 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     };
     let began = Instant::now();
     let (summary, mut ticks) = match &args.device {
-        VirtualDevice::Native => native(args, &felt, trajectory),
-        VirtualDevice::Emulated(board) => emulated(args, board, &felt, trajectory),
+        VirtualDevice::Native => native(args, &replayed, trajectory),
+        VirtualDevice::Emulated(board) => emulated(args, board, &replayed, trajectory),
     }?;
     let seconds = began.elapsed().as_secs_f64();
     for remark in ticks.remarks() {
@@ -293,25 +293,25 @@ fn rate_of(recorded: &Settings) -> Result<TickRate, Failure> {
 
 fn native(
     args: &Args,
-    felt: &Inputs<'_>,
+    replayed: &Inputs<'_>,
     trajectory: Trajectory,
 ) -> Result<(Summary, Ticks), Failure> {
-    let (params, rule) = felt.params;
-    let rate = felt.recorded_at.unwrap_or_default();
-    let mut replayer = on_native_at(rate, felt.terrain, params)?;
+    let (params, rule) = replayed.params;
+    let rate = replayed.recorded_at.unwrap_or_default();
+    let mut replayer = on_native_at(rate, replayed.terrain, params)?;
     if rule == Rule::Paper {
         replayer = replayer.by_published_rule(params);
     }
-    replay(args, felt, trajectory, &mut replayer)
+    replay(args, replayed, trajectory, &mut replayer)
 }
 
 fn emulated(
     args: &Args,
     board: &EmulatedBoard,
-    felt: &Inputs<'_>,
+    replayed: &Inputs<'_>,
     trajectory: Trajectory,
 ) -> Result<(Summary, Ticks), Failure> {
-    let (params, rule) = felt.params;
+    let (params, rule) = replayed.params;
     if rule == Rule::Paper {
         return Err("no device has the published contact rule of this recording")
             .or_hint("leave --device out: the host renders it");
@@ -320,23 +320,23 @@ fn emulated(
     // The other line stays open and silent: points take the arm's place.
     let _plant = lines.plant;
     let link: Box<dyn Transport> = Box::new(lines.link);
-    let mut replayer = OfflineDevice::open(felt.terrain, params, link, Timeouts::EMULATED)?;
-    let felt = replay(args, felt, trajectory, &mut replayer)?;
+    let mut replayer = OfflineDevice::open(replayed.terrain, params, link, Timeouts::EMULATED)?;
+    let replayed = replay(args, replayed, trajectory, &mut replayer)?;
     replayer.say_goodbye()?;
     if let Err(why) = emulator.finish() {
         tracing::info!("the emulated board did not end well: {why}");
     }
-    Ok(felt)
+    Ok(replayed)
 }
 
 /// The trajectory at the ticks of a device.
 fn ticks(
     args: &Args,
-    felt: &Inputs<'_>,
+    replayed: &Inputs<'_>,
     trajectory: Trajectory,
     tick_hz: u32,
 ) -> Result<Ticks, Failure> {
-    let recorded = felt.recorded_at.map(TickRate::hz);
+    let recorded = replayed.recorded_at.map(TickRate::hz);
     if let Some(recorded_hz) = recorded.filter(|hz| *hz != tick_hz) {
         let why =
             format!("the recording has {recorded_hz} ticks a second, and the device has {tick_hz}");
@@ -354,22 +354,28 @@ fn ticks(
 
 fn replay<'t>(
     args: &Args,
-    felt: &Inputs<'t>,
+    replayed: &Inputs<'t>,
     trajectory: Trajectory,
     replayer: &mut OfflineDevice<'t>,
 ) -> Result<(Summary, Ticks), Failure> {
-    let mut ticks = ticks(args, felt, trajectory, replayer.device().tick_hz)?;
+    let mut ticks = ticks(args, replayed, trajectory, replayer.device().tick_hz)?;
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();
-    let materials = felt.terrain.grid().materials();
+    let materials = replayed.terrain.grid().materials();
     let table = materials.map(Materials::table);
-    stability::warn_of(&felt.params.0, table, replayer.device());
+    stability::warn_of(&replayed.params.0, table, replayer.device());
     let device = Device::of(replayer.device());
-    let mut settings = Settings::new(&felt.file, felt.terrain, felt.params, None, device);
-    settings.views.clone_from(&felt.views);
-    settings.marks.clone_from(&felt.marks);
+    let mut settings = Settings::new(
+        &replayed.file,
+        replayed.terrain,
+        replayed.params,
+        None,
+        device,
+    );
+    settings.views.clone_from(&replayed.views);
+    settings.marks.clone_from(&replayed.marks);
     let output = Output::create_or_standard_output(&args.out).map_err(ReplayError::from)?;
-    let mut feed = felt.shown(replayer)?;
+    let mut feed = replayed.shown(replayer)?;
     let mut shown = 0;
     let mut show = |sample: &TickRecord, record: &Record, (view, terrain): (u32, &Terrain<'t>)| {
         let Some(feed) = &mut feed else {
@@ -377,9 +383,9 @@ fn replay<'t>(
         };
         if view != shown {
             shown = view;
-            let settings = felt.views.iter().find(|known| known.number == view);
+            let settings = replayed.views.iter().find(|known| known.number == view);
             let home_mm = settings.map(|settings| settings.home_mm);
-            feed.go_over(felt.picture(terrain, home_mm));
+            feed.go_over(replayed.picture(terrain, home_mm));
         }
         feed.detail(record);
         feed.take(sample, record);

@@ -150,9 +150,9 @@ impl SessionSummary {
 /// The ball that feels a terrain and the level in which it does, in words; none of a point.
 pub(super) fn tip(terrain: &Terrain<'_>) -> Option<String> {
     let (mm, level) = (terrain.grid().tip_mm(), terrain.level());
-    let felt = placing::short(terrain.scale().cell_mm());
+    let cell_size = placing::short(terrain.scale().cell_mm());
     (mm > 0.0).then(|| {
-        format!("rendered with a ball of {mm} mm over level {level}, on cells of {felt} mm")
+        format!("rendered with a ball of {mm} mm over level {level}, on cells of {cell_size} mm")
     })
 }
 
@@ -167,7 +167,7 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     let (columns, rows) = (raster.columns(), raster.rows());
     let of_level = terrain.scale_of_level_0().at_level(terrain.level());
     let cell_mm = placing::short(of_level.cell_mm());
-    let felt = match grid.side_m() {
+    let cell_size = match grid.side_m() {
         Some(side) if grid.is_resampled() => format!(
             " rendered as {} × {} squares of {side:.3} m,",
             grid.columns() - 1,
@@ -183,7 +183,7 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     let tip = tip(terrain)
         .map(|tip| format!(", {tip}"))
         .unwrap_or_default();
-    format!("{columns} × {rows} samples,{felt} {cell_mm} mm a cell, {proportions}{tip}")
+    format!("{columns} × {rows} samples,{cell_size} {cell_mm} mm a cell, {proportions}{tip}")
 }
 
 /// A device in words.

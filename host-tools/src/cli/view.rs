@@ -78,7 +78,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         terrain: &terrain,
         title: &file.name(),
         facts: facts(&args.recording, recorded.as_ref()),
-        home_mm: recorded.as_ref().and_then(|it| it.felt.home_mm),
+        home_mm: recorded.as_ref().and_then(|it| it.rendered.home_mm),
         laid_mm: None,
         is_live: false,
     };
@@ -143,7 +143,7 @@ fn go_over<'t>(
         terrain: &terrain,
         title,
         facts: vec![],
-        home_mm: view.map(|view| view.home_mm).or(recorded.felt.home_mm),
+        home_mm: view.map(|view| view.home_mm).or(recorded.rendered.home_mm),
         laid_mm: None,
         is_live: false,
     });
@@ -156,7 +156,7 @@ fn terrain<'r>(
     raster: &'r Raster,
 ) -> Result<Terrain<'r>, Failure> {
     let (rendering, cells) = (&args.rendering, args.reading.cells());
-    let measured_at = recorded.and_then(|it| it.felt.measured_at);
+    let measured_at = recorded.and_then(|it| it.rendered.measured_at);
     let grid = rendering.grid((raster, cells), measured_at);
     let scale = rendering.scale(&grid)?;
     rendering.terrain(grid, scale)

@@ -130,17 +130,17 @@ impl<'t> Shown<'t> {
         self.feed.on_event(event);
     }
 
-    /// Takes a sample with its row, and the view that it was felt in.
+    /// Takes a sample with its row, and the view that it was rendered in.
     pub(in crate::cli) fn take(
         &mut self,
         sample: &TickRecord,
         record: &Record,
-        (view, felt): (usize, &SessionPlacement<'t>),
+        (view, placement): (usize, &SessionPlacement<'t>),
     ) {
         if view != self.view {
             self.view = view;
-            if let Some(laid) = &felt.laid {
-                let picture = picture(&felt.terrain, &laid.view, &self.title);
+            if let Some(laid) = &placement.laid {
+                let picture = picture(&placement.terrain, &laid.view, &self.title);
                 self.feed.go_over(picture);
             }
         }

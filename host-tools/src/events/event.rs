@@ -45,7 +45,7 @@ pub enum Event<'e> {
         /// Its name in the table.
         name: Option<&'e str>,
     },
-    /// Another view is felt.
+    /// Another placement is in force.
     View {
         /// The view, counted from 0.
         view: usize,

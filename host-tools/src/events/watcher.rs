@@ -78,7 +78,7 @@ impl Watcher {
         Self { every, ..self }
     }
 
-    /// Takes a sample, its row and the view in which it was felt.
+    /// Takes a sample, its row and the view in which it was rendered.
     pub fn take(
         &mut self,
         sample: &TickRecord,

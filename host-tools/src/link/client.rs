@@ -39,7 +39,7 @@ pub enum Event<'e> {
     /// The sample of one tick of a scene whose HIP comes from the encoders.
     Sample(&'e TickRecord),
     /// The sample at one point of a replay.
-    Felt {
+    Rendered {
         /// The number that the host gave the point.
         seq: u32,
         /// HIP, proxy, force and state at the point.
@@ -139,7 +139,7 @@ pub struct Client<'t> {
     /// Ground ahead of the HIP.
     ahead: Ahead,
     zeroing: bool,
-    /// The point of a replay that is to be felt, and when it was said.
+    /// The pending point of a replay, and the time at which it was sent.
     point: Option<(HipCommand, Duration)>,
     tally: LinkStats,
     samples_since_sign: u32,
@@ -297,7 +297,7 @@ impl<'t> Client<'t> {
         }
     }
 
-    /// Has a point felt: says it until it is answered.
+    /// Renders a point: sends it until it is answered.
     pub fn step(&mut self, now: Duration, point: HipCommand, out: &mut Vec<u8>) {
         self.point = Some((point, now));
         self.talk.say(&ToDevice::Hip(point), out);
@@ -507,7 +507,7 @@ impl<'t> Client<'t> {
             }
             ToHost::PointAnswer { seq, sample } => {
                 self.point.take_if(|(point, _)| point.seq == seq);
-                on(Event::Felt {
+                on(Event::Rendered {
                     seq,
                     sample: &sample,
                 });

@@ -538,7 +538,7 @@ impl HostProtocol {
         Ok(Some(ProtocolEvent::Greeted { device, restarted }))
     }
 
-    /// Returns true if there is a scene to be felt and this is not its epoch.
+    /// Returns true if there is a scene to be rendered and this is not its epoch.
     fn lacks_scene(&self, epoch: Option<u32>) -> bool {
         self.scene.is_some_and(|scene| epoch != Some(scene.epoch))
     }

@@ -151,7 +151,7 @@ impl<'t> Session<'t> {
         self.flush()
     }
 
-    /// Has a point felt: an [`Event::Felt`] tells what is felt there.
+    /// Renders a point: an [`Event::Rendered`] reports the force there.
     ///
     /// # Errors
     /// [`LinkError::Gone`].

@@ -1,6 +1,6 @@
 //! Materials: a raster of classes over a terrain, and what each class feels like.
 //!
-//! The raster has a grid and a reference system of its own. Each felt sample of the terrain takes
+//! The raster has a grid and a reference system of its own. Each haptic sample of the terrain takes
 //! the class of the pixel in which it lies. The device gets
 //! the table of the materials ([`MaterialTable`]) and an index of it for each sample, so it knows
 //! nothing of the file's numbers.

@@ -122,14 +122,16 @@ fn a_tile_has_the_classes_of_its_level() {
     for level in [0, 1] {
         let grid = HapticGrid::new(&terrain, HapticCells::Stored).with_materials(Some(&materials));
         let scale = Scale::new(1.0, 1.0).expect("valid");
-        let felt = Terrain::over(grid, scale, level).expect("terrain");
+        let rendered = Terrain::over(grid, scale, level).expect("terrain");
         let key = TileKey::new(level, 1, 0);
-        let (packed, _) = felt.materials_of(key, &mut buffer).expect("it has some");
+        let (packed, _) = rendered
+            .materials_of(key, &mut buffer)
+            .expect("it has some");
         let mut tile = Box::new(Tile::VACANT);
         tile.fill(key, 0, |_, _| 0.0).expect("in range");
         packed.fill(&mut tile, 3).expect("of the table");
         let class = |x: u32, y: u32| ((x / 7 + y / 5) % 3) as u8;
-        let size = felt.size();
+        let size = rendered.size();
         let wanted: Vec<u8> = (0..SAMPLES)
             .map(|i| {
                 let at = |first: i32, i: usize, last: i32| (first + i as i32).min(last) as u32;
@@ -142,7 +144,8 @@ fn a_tile_has_the_classes_of_its_level() {
             .collect();
         assert_eq!(buffer.indices.as_slice(), wanted, "level {level}");
         assert!(
-            felt.materials_of(TileKey::new(level, 9, 0), &mut buffer)
+            rendered
+                .materials_of(TileKey::new(level, 9, 0), &mut buffer)
                 .is_none()
         );
     }
@@ -153,8 +156,9 @@ fn scene_names_its_table_and_its_file_of_classes() {
     let terrain = raster((41, 41), [0.0; 2], 1.0, None, |x, _| x as f32);
     let scene = |materials: Option<&Materials>| {
         let grid = HapticGrid::new(&terrain, HapticCells::Stored).with_materials(materials);
-        let felt = Terrain::over(grid, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
-        felt.scene(SurfaceParams::PREMIUM, Source::Points, GridPoint::default())
+        let rendered =
+            Terrain::over(grid, Scale::new(1.0, 1.0).expect("valid"), 0).expect("terrain");
+        rendered.scene(SurfaceParams::PREMIUM, Source::Points, GridPoint::default())
     };
     let classes = |value| raster((41, 41), [0.0; 2], 1.0, None, move |_, _| value);
     let one = over(&terrain, classes(1.0), looks(&[1])).expect("overlap");

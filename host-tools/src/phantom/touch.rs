@@ -2,7 +2,7 @@
 //!
 //! The hand is a spring, so to press with N newtons it aims below the surface
 //! by what the wall, the grip and the arm give way together. It "knows" the
-//! surface, as a person does who has felt it before.
+//! surface, as a person who knows it would.
 
 use super::hand::HandModel;
 use super::script::Script;

@@ -1,4 +1,4 @@
-//! Pictures of what was felt, as PNG files.
+//! Pictures of sessions, as PNG files.
 //!
 //! `plotters` lays out charts, axes and labels; all it draws ends in [`canvas`], where
 //! `tiny-skia` draws soft edges and `lettering` sets Noto Sans (SIL Open Font License)

@@ -1,4 +1,4 @@
-//! Changes of a view while it is felt: the view before and what is asked for make the next
+//! Changes of a view while it is rendered: the view before and what is asked for make the next
 //! one, or say why not.
 
 use hapterra_core::force::SurfaceParams;
@@ -7,14 +7,14 @@ use super::placement::{Placement, finest_level};
 use super::surface_change::{SurfaceChange, SurfaceError};
 use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 
-/// A sample of the file as large as this in the hand is felt as one even patch, mm.
+/// A sample of the file as large as this in the hand feels like one flat patch, mm.
 const MAX_CELL_MM: f64 = 50.0;
 /// The longer side of a terrain as small as this in the hand tells nothing any more, mm.
 const SMALLEST_TERRAIN_MM: f64 = 5.0;
 /// Above this an arm most likely buzzes or kicks, N/mm: people hold 0.4 to 0.8 N/mm on a
 /// Premium 1.5 (`docs/reference/hardware.md`).
 pub const STIFFEST_N_PER_MM: f32 = 1.0;
-/// Less is not felt, N/mm.
+/// A smaller change is not noticeable, N/mm.
 const SOFTEST_N_PER_MM: f32 = 0.005;
 /// Smallest and largest radius of a ball at the tip, device millimetres; 0 is a point.
 pub const TIPS_MM: [f64; 2] = [0.0, 100.0];
@@ -67,10 +67,10 @@ pub enum ChangeError {
         "a sample of the file would be {cell_mm:.0} mm wide in the hand: it has no more detail"
     )]
     NoDetail {
-        /// Device millimetres a felt cell of level 0.
+        /// Device millimetres a haptic cell of level 0.
         cell_mm: f64,
     },
-    /// Smaller than can be felt.
+    /// Smaller than can be rendered.
     #[error("the whole terrain would be {size_mm:.1} mm wide in the hand")]
     TooSmall {
         /// Its longer side.
@@ -92,7 +92,7 @@ pub enum ChangeError {
     /// A ball that no tip can have.
     #[error("a tip of {0} mm: from {least} to {most} mm can be had", least = TIPS_MM[0], most = TIPS_MM[1])]
     Tip(f64),
-    /// Numbers that no terrain can be felt at.
+    /// Numbers that no terrain can be rendered at.
     #[error(transparent)]
     Terrain(#[from] TerrainError),
     /// A scale that none can have.
@@ -138,7 +138,7 @@ impl Hand {
         self.proxy_mm.unwrap_or(self.hip_mm)
     }
 
-    /// Returns true if the cells of a terrain at this place are others than they are felt
+    /// Returns true if the cells of a terrain at this place are others than they are rendered
     /// ([`HapticGrid::measured_anew`]).
     #[must_use]
     pub fn is_far_from_measure(&self, terrain: &Terrain<'_>) -> bool {
@@ -210,7 +210,7 @@ impl Bounds {
         })
     }
 
-    /// One change, at a place in felt cells of level 0.
+    /// One change, at a place in haptic cells of level 0.
     fn step(
         &self,
         grid: &mut HapticGrid<'_>,
@@ -305,7 +305,7 @@ fn hip_after(
     (hip_mm, before_is_known && after_is_known)
 }
 
-/// The ground at a place, in millimetres and in felt cells of level 0. Where the terrain's level
+/// The ground at a place, in millimetres and in haptic cells of level 0. Where the terrain's level
 /// is coarse and not here yet it is that of the finest level. And whether it is known: no-data is.
 fn ground_of(terrain: &Terrain<'_>, [east, north]: [f64; 2], at: [f64; 2]) -> (Option<f64>, bool) {
     let (ground, status) = terrain.read_height_mm(east, north);

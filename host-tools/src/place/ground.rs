@@ -1,4 +1,4 @@
-//! From the coordinates that a user gives to places in a felt grid.
+//! From the coordinates that a user gives to places in a haptic grid.
 
 use super::coordinates::Coordinates;
 use super::error::PlaceError;
@@ -225,11 +225,11 @@ pub(super) fn spot(
         let (place, bounds) = told();
         return Err(PlaceError::Outside { place, bounds });
     }
-    let felt = grid.of_ground(ground);
+    let haptic = grid.of_ground(ground);
     let most = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
-    let felt = [0, 1].map(|axis| felt[axis].clamp(0.0, most[axis]));
-    match grid.read_surface(felt) {
-        (Some(height), _) => Ok((felt, height)),
+    let haptic = [0, 1].map(|axis| haptic[axis].clamp(0.0, most[axis]));
+    match grid.read_surface(haptic) {
+        (Some(height), _) => Ok((haptic, height)),
         (None, ReadStatus::Pending) => Err(PlaceError::Unread { place: told().0 }),
         (None, ReadStatus::Complete) => {
             let (place, bounds) = told();
@@ -248,8 +248,8 @@ pub(super) fn area(
     let file = grid.raster().georeference();
     let told = || (box_in_words(asked), bounds_in_words(&file));
     let points = outline(&file, asked, coordinates)?;
-    let felt: Vec<_> = points.iter().map(|point| grid.of_ground(*point)).collect();
-    let [west, south, east, north] = around(felt);
+    let haptic: Vec<_> = points.iter().map(|point| grid.of_ground(*point)).collect();
+    let [west, south, east, north] = around(haptic);
     let last = [grid.columns(), grid.rows()].map(|n| f64::from(n) - 1.0);
     let [west, south] = [west.max(0.0), south.max(0.0)];
     let [east, north] = [east.min(last[0]), north.min(last[1])];

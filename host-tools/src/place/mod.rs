@@ -3,7 +3,7 @@
 //! [`Target`] and [`PlacementOptions`] are what the user asks for. [`Reach`] is what an arm can
 //! get to, by its calibration. [`Placement::new`] makes of both and of a grid the one answer: the
 //! place under the home position, scale, level and heights, from which terrain and scene
-//! follow. [`PlacementChange`] makes another view of it while it is felt.
+//! follow. [`PlacementChange`] makes another view of it while it is rendered.
 
 mod change;
 mod coordinates;

@@ -15,7 +15,7 @@ use crate::terrain::{
 /// Relief that a terrain gets in the hand where the file does not know how large its cells
 /// are, so that it has no true proportions, mm.
 const RELIEF_MM: f64 = 25.0;
-/// Relief that can be felt well, mm.
+/// Relief that a hand feels well, mm.
 pub(crate) const FELT_MM: f64 = 15.0;
 /// Device millimetres a haptic cell at a place without a stated scale.
 const CELL_MM: f64 = 1.0;
@@ -51,7 +51,7 @@ impl Default for Heights {
     }
 }
 
-/// Device millimetres a vertical unit for a terrain that may be too flat to be felt: `plain`,
+/// Device millimetres a vertical unit for a terrain that may be too flat to be rendered: `plain`,
 /// which is true to scale, or as much more as makes a `relief` (vertical units) 15 mm high.
 #[must_use]
 pub fn suited_height(plain: f64, relief: f64) -> f64 {
@@ -84,7 +84,7 @@ pub struct Placement {
     pub home_ground: [f64; 2],
     /// Of level 0.
     pub scale: Scale,
-    /// Every 2ᴸ-th rendered sample is felt.
+    /// Level L: every 2ᴸ-th sample is rendered.
     pub level: u8,
     /// Side of a haptic cell of level 0 on the ground, m, where the file knows it.
     pub side_m: Option<f64>,
@@ -117,22 +117,22 @@ impl Placement {
         let wanted = Wanted::new(grid, options)?;
         match (options.target, options.sizing) {
             (Target::At(place, coordinates), _) => {
-                let (felt, height) = ground::spot(grid, place, coordinates)?;
+                let (haptic, height) = ground::spot(grid, place, coordinates)?;
                 let scale = wanted.stated_scale()?;
-                wanted.over(reach, scale, felt, height)
+                wanted.over(reach, scale, haptic, height)
             }
             (Target::Whole, Sizing::CellMm(_) | Sizing::GroundMPerMm(_)) => {
                 let scale = wanted.stated_scale()?;
-                let felt = wanted.last().map(|last| 0.5 * last);
-                // The middle may be a hole; what is around it is felt all the same.
+                let haptic = wanted.last().map(|last| 0.5 * last);
+                // The middle may be a hole; what is around it is rendered all the same.
                 let [low, high] = wanted.whole_heights();
-                let (height, status) = grid.read_surface(felt);
+                let (height, status) = grid.read_surface(haptic);
                 if !status.is_complete() {
                     let place = "the middle of the terrain".into();
                     return Err(PlaceError::Unread { place });
                 }
                 let height = height.unwrap_or(0.5 * (low + high));
-                wanted.over(reach, scale, felt, height)
+                wanted.over(reach, scale, haptic, height)
             }
             (Target::Whole, Sizing::Fit) => {
                 let [east, north] = wanted.last();
@@ -214,10 +214,10 @@ impl Placement {
         let laid = self.laid_mm.map(|mm| mm / before.cell_mm());
         let laid = grid.around_sides_of(grid_before, laid);
         let higher = self.scale.height_mm_per_unit() / before.height_mm_per_unit();
-        let felt = [home_mm[0], home_mm[1]].map(|mm| mm / self.scale.cell_mm());
+        let haptic = [home_mm[0], home_mm[1]].map(|mm| mm / self.scale.cell_mm());
         Self {
             home_mm,
-            home_ground: grid.to_ground(felt),
+            home_ground: grid.to_ground(haptic),
             laid_mm: laid.map(|cells| cells * self.scale.cell_mm()),
             heights_mm: match higher.is_finite() {
                 true => self.heights_mm.map(|mm| mm * higher),
@@ -319,10 +319,10 @@ impl<'g> Wanted<'g> {
         &self,
         reach: &Reach,
         scale: Scale,
-        felt: [f64; 2],
+        haptic: [f64; 2],
         height: f64,
     ) -> Result<Placement, PlaceError> {
-        let [east, north] = felt.map(|cells| cells * scale.cell_mm());
+        let [east, north] = haptic.map(|cells| cells * scale.cell_mm());
         // In the home pose the tip hangs in the air over its place.
         let up = height * scale.height_mm_per_unit() + ABOVE_MM;
         let [columns, rows] = self.last();
@@ -366,11 +366,11 @@ impl<'g> Wanted<'g> {
         cells: [f64; 4],
         heights: [f64; 2],
     ) -> Placement {
-        let felt = [home_mm[0], home_mm[1]].map(|mm| mm / scale.cell_mm());
+        let haptic = [home_mm[0], home_mm[1]].map(|mm| mm / scale.cell_mm());
         let true_height = self.grid.cells_per_vertical_unit();
         Placement {
             home_mm,
-            home_ground: self.grid.to_ground(felt),
+            home_ground: self.grid.to_ground(haptic),
             scale,
             level: self
                 .options

@@ -258,9 +258,15 @@ fn the_scale_is_said_as_it_is_at_the_place_and_level() {
         let (grid, view) = seen(raster, &options).expect(name);
         let found = view.ground_m_per_mm().expect("known");
         assert!((found - 40.0).abs() < 1e-9, "{name}: {found}");
-        let felt = view.haptic_cell_m().expect("known");
-        assert!((felt / (4.0 * side) - 1.0).abs() < 5e-3, "{name}: {felt}");
-        assert!((felt / view.haptic_cell_mm() - 40.0).abs() < 1e-9, "{name}");
+        let haptic = view.haptic_cell_m().expect("known");
+        assert!(
+            (haptic / (4.0 * side) - 1.0).abs() < 5e-3,
+            "{name}: {haptic}"
+        );
+        assert!(
+            (haptic / view.haptic_cell_mm() - 40.0).abs() < 1e-9,
+            "{name}"
+        );
         assert_eq!(
             view.exaggeration.map(|times| (times * 1e6).round()),
             Some(1e6)

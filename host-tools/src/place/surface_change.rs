@@ -115,8 +115,8 @@ impl SurfaceChange {
                     amplitude_mm: texture.amplitude_mm,
                     wavelength_mm: texture.wavelength_mm,
                 };
-                let is_felt = texture.is_none() || texture.amplitude_mm > 0.0;
-                (is_felt && texture.is_valid())
+                let is_rendered = texture.is_none() || texture.amplitude_mm > 0.0;
+                (is_rendered && texture.is_valid())
                     .then_some(params)
                     .ok_or(error)
             }

@@ -20,7 +20,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// The grid in which a raster is felt at this target: its cells are square there.
+    /// The haptic grid of a raster at this target: its cells are square there.
     ///
     /// # Errors
     /// [`PlaceError`] where there is no such place.

@@ -10,7 +10,7 @@ use super::state_name;
 /// The loop's part of a row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LoopColumns {
-    /// The view in which it was felt, counted from 0.
+    /// The view in which it was rendered, counted from 0.
     view: u32,
     state: &'static str,
     mode: &'static str,
@@ -27,7 +27,7 @@ impl LoopColumns {
         Column::Count("view"),
     ];
 
-    /// The loop's part of a sample that was felt in a view of the recording.
+    /// The loop's part of a sample that was rendered in a view of the recording.
     #[must_use]
     pub fn of(sample: &TickRecord, view: usize) -> Self {
         let limits: Vec<_> = sample.limits.iter_names().map(|(name, _)| name).collect();
@@ -39,7 +39,7 @@ impl LoopColumns {
         }
     }
 
-    /// The view in which it was felt, counted from 0.
+    /// The view in which it was rendered, counted from 0.
     #[must_use]
     pub const fn view(&self) -> u32 {
         self.view

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::steering::Made;
 
-/// A moment that the user has named while a terrain was felt.
+/// A moment that the user has named while a terrain was touched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
     /// The tick that was marked, as the column `tick` has it; none where the device has not

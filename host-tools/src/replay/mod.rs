@@ -1,9 +1,9 @@
 //! Replay: a trajectory of the HIP goes through the loop tick by tick, and
-//! what was felt comes out. Also the recording that `run` and `demo` write,
+//! the samples come out. Also the recording that `run` and `demo` write,
 //! which has the same format.
 //!
 //! In lock-step: the device feels one point a tick, answers, and only then gets the
-//! next. Every point is felt exactly once, with all the terrain it needs, so
+//! next. Every point is rendered exactly once, with all the terrain it needs, so
 //! the result depends on nothing but the terrain, the surface parameters, the trajectory
 //! and the tick rate.
 //! [`Ticks`] says where the HIP is in each tick.
@@ -51,7 +51,7 @@ pub enum ReplayError {
     /// The device.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// A view of the recording that its terrain cannot be felt in.
+    /// A view of the recording that its terrain cannot be rendered in.
     #[error("placement {number} of the recording cannot be rendered: {why}")]
     Placement {
         /// The view.
@@ -67,11 +67,11 @@ pub enum ReplayError {
 /// Summary of a replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
-    /// Ticks felt, a row of the output each.
+    /// Ticks rendered, a row of the output each.
     pub rows: u64,
     /// Of those, rows in contact.
     pub in_contact: u64,
-    /// Of those, rows below the ground that were not felt, because the HIP had not been
+    /// Of those, rows below the ground that were not rendered, because the HIP had not been
     /// above it.
     pub below_ground: u64,
     /// Of those, rows whose HIP is more than a window of the device away from the one before:
@@ -84,12 +84,12 @@ pub struct Summary {
 const MORE: [Column; 2] = [Column::Text("state"), Column::Count("view")];
 
 /// Receives each sample and its row, and the number of its view with its terrain.
-pub type OnFelt<'f, 't> = dyn FnMut(&TickRecord, &Record, (u32, &Terrain<'t>)) + 'f;
+pub type OnSample<'f, 't> = dyn FnMut(&TickRecord, &Record, (u32, &Terrain<'t>)) + 'f;
 
-/// Runs a trajectory through a device and writes what was felt to an output, which
+/// Runs a trajectory through a device and writes the samples to an output, which
 /// appears only when it is complete.
 ///
-/// `felt` is told what was felt; `go_on` is asked now and then, with the number of
+/// `on_sample` gets each sample; `go_on` is called now and then, with the number of
 /// rows so far, whether to.
 ///
 /// # Errors
@@ -99,7 +99,7 @@ pub fn replay_trajectory<'t>(
     ticks: &mut Ticks,
     settings: &Settings,
     output: Output,
-    felt: &mut OnFelt<'_, 't>,
+    on_sample: &mut OnSample<'_, 't>,
     go_on: &mut dyn FnMut(u64) -> bool,
 ) -> Result<Summary, ReplayError> {
     const ASK_EVERY: u64 = 512;
@@ -136,7 +136,7 @@ pub fn replay_trajectory<'t>(
         }
         let more = [Value::Text(state_name(sample.state)), Value::Count(view)];
         recording.write(&record, more.get(..columns.len()).unwrap_or(&more))?;
-        felt(&sample, &record, (view, terrain));
+        on_sample(&sample, &record, (view, terrain));
         summary.rows += 1;
         summary.in_contact += u64::from(record.contact);
         summary.below_ground += u64::from(is_below_ground(&sample, &record, terrain));
@@ -187,7 +187,7 @@ fn go_over<'t>(
     Ok(recording.view(view)?)
 }
 
-/// Returns true if nothing is felt because the HIP is below ground and came there from below, from
+/// Returns true if no force is rendered because the HIP is below ground and came there from below, from
 /// a hole or from outside.
 #[must_use]
 pub fn is_below_ground(sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) -> bool {

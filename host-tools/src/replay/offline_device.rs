@@ -21,7 +21,7 @@ pub struct OfflineDevice<'t> {
     terrain: Terrain<'t>,
     /// Tells the epochs of this replay from those of another.
     nonce: u32,
-    /// Number of the view that is felt.
+    /// Number of the view that is rendered.
     view: u8,
     session: Session<'t>,
     device: DeviceHello,
@@ -66,7 +66,7 @@ impl<'t> OfflineDevice<'t> {
         self
     }
 
-    /// The terrain that is felt.
+    /// The terrain that is rendered.
     #[must_use]
     pub const fn terrain(&self) -> &Terrain<'t> {
         &self.terrain
@@ -169,7 +169,7 @@ impl<'t> OfflineDevice<'t> {
         let (mut answer, mut restarted) = (None, false);
         let wait = Duration::from_millis(100);
         self.session.poll(wait, &mut |event| match event {
-            Event::Felt { seq, sample } if seq == expected => answer = Some(*sample),
+            Event::Rendered { seq, sample } if seq == expected => answer = Some(*sample),
             Event::Opened { resumed, .. } => restarted = !resumed,
             _ => {}
         })?;
@@ -216,7 +216,7 @@ mod tests {
                 let again = terrain.clone();
                 replayer.put_view(again, params, hip).expect("taken");
             }
-            let sample = replayer.step(hip).expect("felt");
+            let sample = replayer.step(hip).expect("rendered");
             assert_eq!(u32::from(sample.view), view % 256);
             let epoch = replayer.session.scene().epoch;
             assert!(view == 0 || epoch != last, "view {view}");

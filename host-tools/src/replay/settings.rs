@@ -22,10 +22,10 @@ pub const KEY: &str = "hapterra-recording";
 pub const FORMAT: u32 = 1;
 /// Cells whose sides on the ground differ by less than this share count as the same. Two
 /// machines may round the size of a degree differently, and earlier versions asked a map for
-/// its scale over one metre, which is off by up to 1e-7: what they recorded is felt again.
+/// its scale over one metre, which is off by up to 1e-7: their recordings can be replayed.
 const SAME: f64 = 1e-6;
 
-/// The settings with which something was felt.
+/// The settings of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Version of this format.
@@ -38,7 +38,7 @@ pub struct Settings {
     /// The terrain file.
     pub terrain: TerrainFile,
     /// The rendered part, its place and scale.
-    pub felt: RenderedTerrain,
+    pub rendered: RenderedTerrain,
     /// The surface parameters and the contact rule.
     pub force: Force,
     /// Materials of the ground, where there were several; the surface parameters are then
@@ -47,16 +47,16 @@ pub struct Settings {
     pub materials: Option<MaterialSettings>,
     /// The device.
     pub device: Device,
-    /// The views that were put in while it was felt, in their order; the one of the
-    /// beginning is [`Self::felt`] and [`Self::force`].
+    /// The placements that were set while it was touched, in their order; the one of the
+    /// beginning is [`Self::rendered`] and [`Self::force`].
     #[serde(rename = "view", default, skip_serializing_if = "Vec::is_empty")]
     pub views: Vec<PlacementSettings>,
-    /// The marks that were made while it was felt, in their order.
+    /// The marks that were made while it was touched, in their order.
     #[serde(rename = "mark", default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<Mark>,
 }
 
-/// A view that was put in while a terrain was felt.
+/// A placement that was set while a terrain was touched.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlacementSettings {
     /// Number of this placement in the column `view`, from 1 on.
@@ -195,7 +195,7 @@ pub struct RenderedTerrain {
     pub cell_mm: f64,
     /// Device millimetres a vertical unit of the file.
     pub height_mm_per_unit: f64,
-    /// Radius of the ball that felt it, device millimetres; left out where it was a point. The HIP
+    /// Radius of the ball at the tip, device millimetres; left out where it was a point. The HIP
     /// and the proxy are the ball's centre.
     #[serde(default, skip_serializing_if = "is_point")]
     pub tip_mm: f64,
@@ -203,7 +203,7 @@ pub struct RenderedTerrain {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
     /// The point of the terrain that was at the tip in the arm's home pose, device
-    /// millimetres; none where no arm felt it.
+    /// millimetres; none without an arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home_mm: Option<[f64; 3]>,
 }
@@ -271,7 +271,7 @@ impl MaterialSettings {
     }
 }
 
-/// The device that felt it, as it described itself.
+/// The device, as it described itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Device {
     /// Its board.
@@ -334,7 +334,7 @@ impl Settings {
                     .and_then(ReferenceSystem::code)
                     .map(|code| format!("EPSG:{code}")),
             },
-            felt: RenderedTerrain {
+            rendered: RenderedTerrain {
                 cells: grid.cells(),
                 samples: [grid.columns(), grid.rows()],
                 cell_m: grid.side_m(),
@@ -414,9 +414,9 @@ impl Settings {
         }
     }
 
-    /// Checks that a terrain is the one that was felt; `file` names it.
+    /// Checks that a terrain is the one of the recording; `file` names it.
     ///
-    /// Its heights have to be the same, and where the same cells of it are felt, those
+    /// Its heights have to be the same, and where the same cells of it are rendered, those
     /// have to be as large on the ground.
     ///
     /// # Errors
@@ -434,7 +434,7 @@ impl Settings {
                     recorded[1]
                 ),
             }
-        } else if let Some(difference) = self.felt.difference(terrain.grid()) {
+        } else if let Some(difference) = self.rendered.difference(terrain.grid()) {
             difference
         } else if self.has_other_classes(terrain.grid()) {
             "the classes of its materials are others".to_owned()
@@ -471,7 +471,7 @@ impl Device {
 }
 
 impl RenderedTerrain {
-    /// In what the cells of the same heights differ, where the same kind is felt.
+    /// In what the cells of the same heights differ, where the same kind is rendered.
     fn difference(&self, grid: &HapticGrid<'_>) -> Option<String> {
         if grid.cells() != self.cells {
             return None;

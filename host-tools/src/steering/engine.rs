@@ -26,7 +26,7 @@ const GROUND_WITHIN: Duration = Duration::from_secs(2);
 pub struct Put<'r> {
     /// Message to the device.
     pub view: SceneChange,
-    /// The terrain that it is felt on.
+    /// The terrain that it is rendered on.
     pub terrain: Terrain<'r>,
     /// Place, scale and surface parameters.
     pub laid: Laid,

@@ -1,4 +1,4 @@
-//! Figures of what was felt in a session: means and maxima.
+//! Figures of a session: means and maxima.
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::guard::Fault;

@@ -1,4 +1,4 @@
-//! The views in which samples were felt: each sample names its own by a number.
+//! The views in which samples were rendered: each sample names its own by a number.
 
 use hapterra_core::scene::TickRecord;
 
@@ -6,7 +6,7 @@ use crate::link::Event;
 use crate::place::Laid;
 use crate::terrain::Terrain;
 
-/// A view that is felt.
+/// A view that is rendered.
 pub struct SessionPlacement<'t> {
     /// Its terrain.
     pub terrain: Terrain<'t>,
@@ -44,7 +44,7 @@ impl<'t> Placements<'t> {
     /// Takes what the device tells.
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
-            // Nothing was felt in it.
+            // It has no sample.
             Event::Viewed { taken: false, .. } if self.views.len() > 1 => {
                 self.views.pop();
             }
@@ -60,7 +60,7 @@ impl<'t> Placements<'t> {
         self.views.len()
     }
 
-    /// Which of them a sample was felt in, from 0 on.
+    /// Which of them a sample was rendered in, from 0 on.
     #[must_use]
     pub fn index_of(&self, sample: &TickRecord) -> usize {
         let index = self.of_number.get(usize::from(sample.view));

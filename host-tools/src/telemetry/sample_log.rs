@@ -9,7 +9,7 @@ use super::timeline::Timeline;
 use crate::replay::Record;
 use crate::terrain::Terrain;
 
-/// Keeps time and figures of the samples that were felt on a terrain.
+/// Keeps time and figures of the samples that were rendered on a terrain.
 pub struct SampleLog<'t> {
     views: Placements<'t>,
     /// The view of the latest sample.

@@ -26,7 +26,7 @@ impl Distortion {
 
     /// Returns true if the surface is not true to 0.1 % all over the rectangle.
     #[must_use]
-    pub fn is_felt(&self) -> bool {
+    pub fn is_noticeable(&self) -> bool {
         self.share > Self::TRUE
     }
 }
@@ -101,7 +101,7 @@ mod tests {
         grid.worst_in([-5.0, 2.0, 3.0, 90.0]).expect("known").share
     }
 
-    /// A cell of 40 × 10 is felt as one of 20 × 20: half as long, and twice. One that leans by
+    /// A cell of 40 × 10 is rendered as one of 20 × 20: half as long, and twice. One that leans by
     /// 60° is by the eigenvalues of its metric, 1 ± cos 60°, over its area, sin 60°.
     #[test]
     fn what_stored_cells_are_off_is_what_the_worst_direction_is() {

@@ -30,9 +30,9 @@ fn fallback(terrain: &Terrain<'_>, home: [i32; 2], reach_mm: [f64; 4]) -> (Scene
 }
 
 /// The height at a sample of the level through the tile of a fallback, as its device has it.
-struct Felt(CoarseTile, Vec<f64>);
+struct DeviceTile(CoarseTile, Vec<f64>);
 
-impl Felt {
+impl DeviceTile {
     fn of(terrain: &Terrain<'_>, scene: &Scene, place: CoarseTile) -> Self {
         let key = place.key(scene.level);
         let mut buffer = TileBuffer::default();
@@ -88,7 +88,7 @@ fn the_surface_goes_on_evenly_over_the_border_of_the_near_tile() {
     let (scene, Fallback { wide, near }) =
         fallback(&terrain, [1003, 777], [-500.0, -300.0, 500.0, 400.0]);
     let near = near.expect("a finer one");
-    let [wide, within] = [wide, near].map(|tile| Felt::of(&terrain, &scene, tile));
+    let [wide, within] = [wide, near].map(|tile| DeviceTile::of(&terrain, &scene, tile));
     let side = 32 * near.spacing();
     for along in 0..=side {
         let Cell { x, y } = near.first;
@@ -129,7 +129,7 @@ fn where_the_wide_tile_has_a_hole_the_border_of_the_near_one_is_its_own() {
     let near = near.expect("a finer one");
     assert_eq!((wide.first, wide.shift), (Cell::new(0, 0), 6));
     assert_eq!((near.first, near.shift), (Cell::new(768, 384), 4));
-    let within = Felt::of(&terrain, &scene, near);
+    let within = DeviceTile::of(&terrain, &scene, near);
     let holes = within.1.iter().filter(|height| height.is_nan()).count();
     assert_eq!(holes, 1);
     assert!(within.at(1024, 384).is_nan());

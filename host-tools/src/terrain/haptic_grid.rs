@@ -1,4 +1,4 @@
-//! The grid that is felt: square cells over the samples of a raster.
+//! The haptic grid: square cells over the samples of a raster.
 //!
 //! A patch is a square. Where a file's cells are not (an arc second away from the
 //! equator, 10 m by 30 m, a skewed transform) the finer of its two axes keeps its
@@ -19,7 +19,7 @@ const SQUARE: f64 = 1e-3;
 /// keep their samples may be off, it is less than the 0.1 % to which slopes are true.
 const MEASURED: f64 = 2.5e-4;
 
-/// Which cells of a file are felt.
+/// The cells of a file that are rendered.
 #[derive(
     Clone,
     Copy,
@@ -33,7 +33,7 @@ const MEASURED: f64 = 2.5e-4;
 )]
 #[serde(rename_all = "lowercase")]
 pub enum HapticCells {
-    /// As the file stores them, felt as squares whatever their shape
+    /// As the file stores them, rendered as squares whatever their shape
     Stored,
     /// Square on the ground: true to scale in every direction
     #[default]
@@ -52,7 +52,7 @@ pub struct HapticGrid<'r> {
     measured_at: Option<[f64; 2]>,
     columns: u32,
     rows: u32,
-    /// Side of a felt cell on the ground, metres, where the file knows it.
+    /// Side of a haptic cell on the ground, metres, where the file knows it.
     side_m: Option<f64>,
     /// Place where the samples lie in the file; `None` where they are the file's own.
     resampling: Option<Resampling>,
@@ -64,7 +64,7 @@ pub struct HapticGrid<'r> {
     wait: Wait,
 }
 
-/// Place of felt sample (u, v) in the file: column `first + u · column_step + v · lean`,
+/// Place of haptic sample (u, v) in the file: column `first + u · column_step + v · lean`,
 /// row `v · row_step`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Resampling {
@@ -75,13 +75,13 @@ struct Resampling {
 }
 
 impl<'r> HapticGrid<'r> {
-    /// The grid in which a raster is felt, of cells as they are in the middle of the field.
+    /// The haptic grid of a raster, with cells as they are in the middle of the field.
     #[must_use]
     pub fn new(raster: &'r Raster, cells: HapticCells) -> Self {
         Self::of_cell(raster, cells, raster.cell())
     }
 
-    /// The grid in which a raster is felt, of cells as they are at a place, in the file's
+    /// The haptic grid of a raster, with cells as they are at a place, in the file's
     /// coordinates: cells of degrees get narrower towards the poles, and a map's scale is
     /// true in few places.
     #[must_use]
@@ -128,16 +128,16 @@ impl<'r> HapticGrid<'r> {
         self.materials
     }
 
-    /// The grid of cells as they are at a place in felt cells, where that is another grid: a
-    /// cell there is larger, smaller or of another shape than it is felt, by more than a
+    /// The grid of cells as they are at a place in haptic cells, where that is another grid: a
+    /// cell there is larger, smaller or of another shape than it is rendered, by more than a
     /// quarter of 0.1 %. A place beside the field counts as the next one in it.
     ///
-    /// `None` where cells are felt as they are there, and where square cells there would be
+    /// `None` where cells are rendered as they are there, and where square cells there would be
     /// too many to be counted.
     #[must_use]
-    pub fn measured_anew(&self, felt: [f64; 2]) -> Option<Self> {
+    pub fn measured_anew(&self, haptic: [f64; 2]) -> Option<Self> {
         let last = self.last();
-        let inside = [0, 1].map(|axis| felt[axis].clamp(0.0, last[axis]));
+        let inside = [0, 1].map(|axis| haptic[axis].clamp(0.0, last[axis]));
         let ground = self.to_ground(inside);
         let (now, there) = (self.cell?, self.raster.georeference().cell_at(ground)?);
         if is_alike(&now, &there) {
@@ -175,7 +175,7 @@ impl<'r> HapticGrid<'r> {
         ]
     }
 
-    /// Column and row of the last felt sample.
+    /// Column and row of the last haptic sample.
     fn last(&self) -> [f64; 2] {
         [self.columns, self.rows].map(|count| f64::from(count) - 1.0)
     }
@@ -211,7 +211,7 @@ impl<'r> HapticGrid<'r> {
     /// field; `None` where they are too many to be counted.
     ///
     /// With columns `e` apart and rows `n` apart that lean by the cosine `c` of the
-    /// angle between them (`k` its sine), felt sample (u, v) of side `s` is on row
+    /// angle between them (`k` its sine), haptic sample (u, v) of side `s` is on row
     /// `s v / (n k)` and column `(s u + west − s v c / k) / e`.
     fn squared(self, cell: &CellSize) -> Option<Self> {
         let ((east, north), cosine) = (cell.ground_metres(), cell.lean);
@@ -253,27 +253,27 @@ impl<'r> HapticGrid<'r> {
         self.cells
     }
 
-    /// Returns true if cells that are not square on the ground are felt as squares, which is not
+    /// Returns true if cells that are not square on the ground are rendered as squares, which is not
     /// their true shape.
     #[must_use]
     pub fn is_distorted(&self) -> bool {
         !self.is_resampled() && self.cell.is_some_and(|cell| !is_square(&cell))
     }
 
-    /// The place in the file's coordinates at which cells are as large as they are felt;
+    /// The place in the file's coordinates at which cells are as large as they are rendered;
     /// `None` for the middle of the field.
     #[must_use]
     pub const fn measured_at(&self) -> Option<[f64; 2]> {
         self.measured_at
     }
 
-    /// Felt samples from west to east.
+    /// Haptic samples from west to east.
     #[must_use]
     pub const fn columns(&self) -> u32 {
         self.columns
     }
 
-    /// Felt samples from south to north.
+    /// Haptic samples from south to north.
     #[must_use]
     pub const fn rows(&self) -> u32 {
         self.rows
@@ -285,8 +285,8 @@ impl<'r> HapticGrid<'r> {
         self.resampling.is_some()
     }
 
-    /// Side of a felt cell on the ground in metres, where the file knows it. Cells
-    /// felt as they are stored count as squares of the same area.
+    /// Side of a haptic cell on the ground in metres, where the file knows it. Cells
+    /// rendered as they are stored count as squares of the same area.
     #[must_use]
     pub const fn side_m(&self) -> Option<f64> {
         self.side_m
@@ -321,7 +321,7 @@ impl<'r> HapticGrid<'r> {
         times.is_finite().then_some(rounded)
     }
 
-    /// The file's coordinates of a place in felt cells from the south-west sample.
+    /// The file's coordinates of a place in haptic cells from the south-west sample.
     #[must_use]
     pub fn to_ground(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let sample = match &self.resampling {
@@ -331,7 +331,7 @@ impl<'r> HapticGrid<'r> {
         self.raster.georeference().transform().to_ground(sample)
     }
 
-    /// The place in felt cells of coordinates of the file, which may lie outside of the field.
+    /// The place in haptic cells of coordinates of the file, which may lie outside of the field.
     #[must_use]
     pub fn of_ground(&self, ground: [f64; 2]) -> [f64; 2] {
         let [column, row] = self.raster.georeference().transform().to_samples(ground);
@@ -347,7 +347,7 @@ impl<'r> HapticGrid<'r> {
         }
     }
 
-    /// Columns and rows of the file that a felt cell leads on to the east, and to the north.
+    /// Columns and rows of the file that a haptic cell leads on to the east, and to the north.
     pub(super) fn steps_in_file(&self) -> [[f64; 2]; 2] {
         match &self.resampling {
             None => [[1.0, 0.0], [0.0, 1.0]],
@@ -355,7 +355,7 @@ impl<'r> HapticGrid<'r> {
         }
     }
 
-    /// The height of the bilinear surface at a place in felt cells, in the file's vertical
+    /// The height of the bilinear surface at a place in haptic cells, in the file's vertical
     /// unit; `None` in a hole and off the field.
     #[must_use]
     pub fn surface(&self, place: [f64; 2]) -> Option<f64> {
@@ -374,7 +374,7 @@ impl<'r> HapticGrid<'r> {
         )
     }
 
-    /// The height at a felt sample in the file's vertical unit; NaN in a hole and
+    /// The height at a haptic sample in the file's vertical unit; NaN in a hole and
     /// outside the field.
     #[must_use]
     pub fn height(&self, column: u32, row: u32) -> f64 {
@@ -398,7 +398,7 @@ impl<'r> HapticGrid<'r> {
         self.height_seen(level, [column as f64, row as f64])
     }
 
-    /// The height at a place in felt cells, as the file has it at a level of detail; NaN in a hole
+    /// The height at a place in haptic cells, as the file has it at a level of detail; NaN in a hole
     /// and outside the field. And whether it is known.
     pub(super) fn height_seen(&self, level: u8, [u, v]: [f64; 2]) -> (f64, ReadStatus) {
         let [last_column, last_row] = self.last();
@@ -477,7 +477,7 @@ impl HapticGrid<'_> {
 }
 
 impl Resampling {
-    /// Column and row of the file at a felt sample or between two.
+    /// Column and row of the file at a haptic sample or between two.
     fn in_file(&self, u: f64, v: f64) -> [f64; 2] {
         [
             self.first + u * self.column_step + v * self.lean,
@@ -556,8 +556,8 @@ pub(super) mod tests {
                 }
             }
             let ground = 40.0 * across * 30.0 * along * (1.0 - lean * lean).sqrt();
-            let felt = f64::from(steps) * side * side;
-            assert!(felt > 0.8 * ground, "{felt} of {ground} m²");
+            let haptic = f64::from(steps) * side * side;
+            assert!(haptic > 0.8 * ground, "{haptic} of {ground} m²");
         }
     }
 

@@ -1,4 +1,4 @@
-//! A number that names a scene: what is felt, how large, and by which surface parameters.
+//! The number of a scene: a hash of the terrain, its size and the surface parameters.
 
 use std::hash::{Hash, Hasher};
 

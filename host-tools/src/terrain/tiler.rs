@@ -34,12 +34,12 @@ pub struct Terrain<'r> {
     grid: HapticGrid<'r>,
     /// Of level 0.
     scale_of_level_0: Scale,
-    /// Of felt cells.
+    /// Of haptic cells.
     scale: Scale,
     level: u8,
-    /// Felt cells a cell of the level, along a side: 1 for a point.
+    /// Haptic cells a cell of the level, along a side: 1 for a point.
     parts: u32,
-    /// Felt patches, east and north.
+    /// Haptic patches, east and north.
     size: [i32; 2],
     top: i32,
     /// Ball at the tip, if there is one: heights are then those of its centre.
@@ -49,7 +49,7 @@ pub struct Terrain<'r> {
     steep: OnceLock<()>,
 }
 
-/// Reason for which a raster cannot be felt at a scale.
+/// Reason for which a raster cannot be rendered at a scale.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TerrainError {
     /// The scale itself.
@@ -212,13 +212,13 @@ impl<'r> Terrain<'r> {
         })
     }
 
-    /// Radius of the ball that feels it, in felt cells; 0 for a point.
+    /// Radius of the ball at the tip, in haptic cells; 0 for a point.
     #[must_use]
     pub fn tip_cells(&self) -> f64 {
         self.ball.as_ref().map_or(0.0, Ball::radius)
     }
 
-    /// The same raster in another grid of felt cells, at a scale of level 0 and a level.
+    /// The same raster in another grid of haptic cells, at a scale of level 0 and a level.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -275,19 +275,19 @@ impl<'r> Terrain<'r> {
         self.level
     }
 
-    /// The scale of felt cells: `2^level` times the grid's, or a whole part of that under a ball.
+    /// The scale of haptic cells: `2^level` times the grid's, or a whole part of that under a ball.
     #[must_use]
     pub const fn scale(&self) -> &Scale {
         &self.scale
     }
 
-    /// Felt cells a cell of the level, along a side: 1 for a point.
+    /// Haptic cells a cell of the level, along a side: 1 for a point.
     #[must_use]
     pub const fn parts(&self) -> u32 {
         self.parts
     }
 
-    /// Cells of the grid that are as long as a felt one.
+    /// Cells of the grid that are as long as a haptic cell.
     #[must_use]
     pub fn cells_of_grid(&self) -> f64 {
         f64::from(self.level).exp2() / f64::from(self.parts)
@@ -308,7 +308,7 @@ impl<'r> Terrain<'r> {
         *self.fingerprint.get_or_init(print)
     }
 
-    /// Size in felt patches, east and north.
+    /// Size in haptic patches, east and north.
     #[must_use]
     pub const fn size(&self) -> [i32; 2] {
         self.size
@@ -348,7 +348,7 @@ impl<'r> Terrain<'r> {
         scene
     }
 
-    /// Height of the surface that is felt in device millimetres at a place in device
+    /// Height of the surface that is rendered in device millimetres at a place in device
     /// millimetres, in `f64`: bilinear between samples, or between the heights of a ball's centre
     /// at samples. `None` in a hole and off the data.
     #[must_use]
@@ -500,8 +500,8 @@ impl<'r> Terrain<'r> {
         buffer: &'b mut MaterialBuffer,
     ) -> Option<(TileMaterials<'b>, ReadStatus)> {
         let materials = self.grid.materials().filter(|_| self.has(key))?;
-        let felt = (&self.grid, self.size, self.cells_of_grid());
-        Some(materials.tile(felt, key.index, buffer))
+        let haptic = (&self.grid, self.size, self.cells_of_grid());
+        Some(materials.tile(haptic, key.index, buffer))
     }
 
     /// Checks that every earlier read that waited was complete ([`Raster::check_complete`]).
@@ -514,7 +514,7 @@ impl<'r> Terrain<'r> {
         of_classes.map_or(Ok(()), Raster::check_complete)
     }
 
-    /// The height of the ground at a felt sample, in the file's vertical unit, as the file has it
+    /// The height of the ground at a haptic sample, in the file's vertical unit, as the file has it
     /// at a level of detail; NaN where there is none. And whether it is known.
     pub(crate) fn ground_seen(&self, level: u8, [column, row]: [u32; 2]) -> (f64, ReadStatus) {
         let place = [column, row].map(|index| f64::from(index) * self.cells_of_grid());
@@ -522,18 +522,18 @@ impl<'r> Terrain<'r> {
     }
 
     /// The same in cells, or the height of a ball's centre on flat ground there; NaN where there is
-    /// none that can be felt.
-    pub(super) fn cells_at(&self, level: u8, felt: [u32; 2], reads: &ReadTracker) -> f64 {
-        let height = reads.record(self.ground_seen(level, felt));
+    /// none that can be rendered.
+    pub(super) fn cells_at(&self, level: u8, haptic: [u32; 2], reads: &ReadTracker) -> f64 {
+        let height = reads.record(self.ground_seen(level, haptic));
         self.within(self.scale.height_cells(height)) + self.tip_cells()
     }
 
-    /// Has the samples between two places in felt cells read that are not here yet, both included.
+    /// Has the samples between two places in haptic cells read that are not here yet, both included.
     pub(crate) fn prefetch(&self, from: [i32; 2], to: [i32; 2]) {
         let parts = self.parts as i32;
         let halo = self.ball.as_ref().map_or(0, |ball| ball.halo() as i32);
-        let from = from.map(|felt| felt.div_euclid(parts).saturating_sub(halo));
-        let to = to.map(|felt| felt.div_euclid(parts).saturating_add(halo));
+        let from = from.map(|haptic| haptic.div_euclid(parts).saturating_sub(halo));
+        let to = to.map(|haptic| haptic.div_euclid(parts).saturating_add(halo));
         self.grid.prefetch(self.level, from, to);
     }
 

@@ -42,7 +42,7 @@ pub struct Dropped {
     pub samples: u64,
 }
 
-/// Tells a viewer what is felt, without ever waiting for it.
+/// Sends a session to a viewer, without ever waiting for it.
 pub struct ViewFeed<'t> {
     terrain: Terrain<'t>,
     /// The terrain of the beginning, in whose tiles there is detail for good.
@@ -160,7 +160,7 @@ impl<'t> ViewFeed<'t> {
         self.tiles.on_event(event);
     }
 
-    /// Goes over to another view of the terrain, in which the next sample was felt.
+    /// Goes over to another view of the terrain, in which the next sample was rendered.
     pub fn go_over(&mut self, picture: Picture<'_, 't>) {
         self.flush();
         self.standing = match self.stands {
@@ -221,7 +221,7 @@ impl<'t> ViewFeed<'t> {
     }
 
     /// Shows the tile under a row's HIP in full detail, for good: for rows that are not
-    /// felt by a device with a window.
+    /// rendered by a device with a window.
     pub fn detail(&mut self, record: &Record) {
         let [x, y, _] = self.shown(record).hip_mm;
         let cell_mm = self.terrain.scale_of_level_0().cell_mm();

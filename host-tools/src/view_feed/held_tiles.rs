@@ -29,7 +29,7 @@ impl HeldTiles {
         }
     }
 
-    /// A felt tile was sent: the tile of the level that is shown for it, and the slot that this
+    /// A tile of the haptic grid was sent: the tile of the level that is shown for it, and the slot that this
     /// takes.
     pub(super) fn sent(&mut self, key: TileKey) -> (u32, TileKey) {
         let index = self.of_level(key.index);
@@ -51,9 +51,9 @@ impl HeldTiles {
         self.parts = parts as i32;
     }
 
-    /// The tile of the level around a felt one.
-    fn of_level(&self, felt: TileIndex) -> TileIndex {
-        let [col, row] = [felt.col, felt.row].map(|index| index.div_euclid(self.parts.max(1)));
+    /// The tile of the level around a tile of the haptic grid.
+    fn of_level(&self, haptic: TileIndex) -> TileIndex {
+        let [col, row] = [haptic.col, haptic.row].map(|index| index.div_euclid(self.parts.max(1)));
         TileIndex::new(col, row)
     }
 
@@ -115,7 +115,7 @@ mod tests {
 
     /// A ball's tile is a part of one of the level.
     #[test]
-    fn felt_tiles_are_shown_as_the_tile_around_them() {
+    fn haptic_tiles_are_shown_as_the_tile_around_them() {
         let mut held = HeldTiles::new(4, 3);
         for (col, row, slot, shown) in [(0, 0, 0, (0, 0)), (2, 5, 4, (0, 1)), (3, 3, 5, (1, 1))] {
             let key = TileKey::new(1, shown.0, shown.1);

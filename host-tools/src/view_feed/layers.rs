@@ -16,7 +16,7 @@ const RATIO: i32 = 16;
 const MESH: i32 = 4;
 
 /// Which samples of a terrain a layer has, in cells of level 0: a view of any level may be
-/// felt later.
+/// rendered later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Extent {
     step: i32,

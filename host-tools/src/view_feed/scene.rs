@@ -10,18 +10,18 @@ use heightfield::System;
 
 /// Content of a viewer.
 pub struct Picture<'p, 't> {
-    /// The terrain as it is felt.
+    /// The terrain as it is rendered.
     pub terrain: &'p Terrain<'t>,
     /// The user's name for it.
     pub title: &'p str,
     /// Place and scale: a name and what there is to say, short.
     pub facts: Vec<(String, String)>,
     /// The place under the tip in the arm's home pose, mm; the middle of the terrain where
-    /// no arm felt it.
+    /// there was no arm.
     pub home_mm: Option<[f64; 3]>,
     /// The part in front of the arm, west, south, east, north, mm; else the whole.
     pub laid_mm: Option<[f64; 4]>,
-    /// True if samples come as they are felt.
+    /// True if samples come as they are rendered.
     pub is_live: bool,
 }
 
@@ -90,7 +90,7 @@ impl<'t> Picture<'_, 't> {
             home_mm: self.home_mm.unwrap_or(middle_mm),
             laid_mm: self.laid_mm.unwrap_or([0.0, 0.0, east_mm, north_mm]),
             ground_m_per_mm: terrain.grid().side_m().map(|side| side / level_0_mm),
-            // A terrain that is felt level has no heights to tell.
+            // A terrain that is rendered level has no heights to tell.
             height_per_mm: if height_per_mm.is_finite() {
                 height_per_mm
             } else {

@@ -85,13 +85,13 @@ impl Tiles {
     }
 
     /// Shows the tile at a place (cells) in full detail, for good: under rows that are not
-    /// felt by a device with a window.
+    /// rendered by a device with a window.
     pub(super) fn detail(&mut self, terrain: &Terrain<'_>, cells: [f64; 2]) {
         let side = f64::from(TILE_CELLS) * f64::from(terrain.level()).exp2();
         let [col, row] = cells.map(|cells| (cells / side).floor() as i32);
         let key = TileKey::new(terrain.level(), col, row);
-        let felt = |index: i32| index.saturating_mul(terrain.parts() as i32);
-        let is_there = terrain.has(TileKey::new(key.level, felt(col), felt(row)));
+        let haptic = |index: i32| index.saturating_mul(terrain.parts() as i32);
+        let is_there = terrain.has(TileKey::new(key.level, haptic(col), haptic(row)));
         let has_room = self.detailed.len() < MAX_DETAILED;
         if has_room && is_there && self.detailed.insert(key) {
             self.untold.push((self.detailed.len() as u32, key));

@@ -69,7 +69,7 @@ pub fn rough_ground() -> (Raster, [f64; 3]) {
     (raster.expect("raster"), [128.0, 128.0, 40.0])
 }
 
-/// A device with a session, felt through its encoders.
+/// A device with a session, rendered through its encoders.
 pub struct Device<'t> {
     /// The board.
     pub machine: Rc<RefCell<Machine>>,

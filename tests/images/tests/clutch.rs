@@ -35,8 +35,8 @@ fn a_switch_that_is_closed_lets_the_force_out_and_opened_it_comes_in_again() {
         device.wait_for_full_force();
         device.run_ms(40);
         assert_eq!(limits(device), Limits::empty());
-        let felt = latest(device).force_n;
-        assert!(felt.z > 1.0, "{felt}");
+        let rendered = latest(device).force_n;
+        assert!(rendered.z > 1.0, "{rendered}");
         switch(device, true);
         device.run_ms(150);
         assert_eq!(limits(device), Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN);
@@ -53,7 +53,10 @@ fn a_switch_that_is_closed_lets_the_force_out_and_opened_it_comes_in_again() {
         device.run_ms(600);
         assert_eq!(limits(device), Limits::empty());
         let back = latest(device).force_n;
-        assert!((back - felt).length() < 0.01, "{felt} before, {back} after");
+        assert!(
+            (back - rendered).length() < 0.01,
+            "{rendered} before, {back} after"
+        );
     });
 }
 
@@ -62,7 +65,7 @@ fn a_switch_that_bounces_or_sticks_adds_no_force() {
     Bench::new().on_each(|device| {
         device.wait_for_full_force();
         device.run_ms(40);
-        let felt = latest(device).force_n.length();
+        let rendered = latest(device).force_n.length();
         let mut most: f32 = 0.0;
         // Bounces of every length from 1 to 40 ms.
         for ms in (1..=40).chain((1..=40).rev()) {
@@ -70,7 +73,7 @@ fn a_switch_that_bounces_or_sticks_adds_no_force() {
             device.run_ms(ms);
             most = most.max(latest(device).force_n.length());
         }
-        assert!(most <= felt + 1e-3, "{most} N of {felt} N");
+        assert!(most <= rendered + 1e-3, "{most} N of {rendered} N");
         switch(device, true);
         device.run_ms(2_000);
         assert_eq!(latest(device).force_n.length(), 0.0, "stuck");

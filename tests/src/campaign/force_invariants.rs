@@ -36,7 +36,7 @@ const NO_SPRING: Limits = Limits::SPEED_LIMITED
 
 /// Watches what one scene feels like.
 pub struct ForceWatch {
-    felt: SceneSurfaces,
+    surfaces: SceneSurfaces,
     cell_mm: f32,
     last: Option<TickRecord>,
     /// The force of the tick before that.
@@ -70,9 +70,9 @@ struct Touched {
 impl ForceWatch {
     /// Of a scene.
     #[must_use]
-    pub fn new(felt: SceneSurfaces, cell_mm: f32) -> Self {
+    pub fn new(surfaces: SceneSurfaces, cell_mm: f32) -> Self {
         Self {
-            felt,
+            surfaces,
             cell_mm,
             last: None,
             before_n: Vec3::ZERO,
@@ -88,9 +88,9 @@ impl ForceWatch {
         }
     }
 
-    /// Another scene is felt from now on.
-    pub fn feels(&mut self, felt: SceneSurfaces) {
-        self.felt = felt;
+    /// Sets another scene.
+    pub fn feels(&mut self, surfaces: SceneSurfaces) {
+        self.surfaces = surfaces;
         (self.last, self.contact) = (None, None);
     }
 
@@ -119,10 +119,10 @@ impl ForceWatch {
     /// No force is larger than the stiffest material makes of the depth.
     fn is_small(&self, sample: &TickRecord, way_mm: Vec3, share: f32) -> Result<(), String> {
         let depth_mm = way_mm.length();
-        let [high_mm, steep] = self.felt.relief();
+        let [high_mm, steep] = self.surfaces.relief();
         let stretch_mm = (depth_mm + high_mm.min(depth_mm)).hypot(steep * depth_mm);
-        let spring_n = share * self.felt.stiffest_n_per_mm() * stretch_mm;
-        let is_damped = self.felt.is_damped() || self.felt.is_controlled();
+        let spring_n = share * self.surfaces.stiffest_n_per_mm() * stretch_mm;
+        let is_damped = self.surfaces.is_damped() || self.surfaces.is_controlled();
         let most_n = if is_damped { 2.0 * spring_n } else { spring_n };
         let force_n = sample.force_n.length();
         match force_n <= most_n * (1.0 + ROUNDING) + ROUNDING {
@@ -136,8 +136,8 @@ impl ForceWatch {
     /// No force is against the way to the proxy: friction holds, and does not push. What shading
     /// turns is turned by 60° at most.
     fn never_pulls(&self, sample: &TickRecord, way_mm: Vec3) -> Result<(), String> {
-        let [high_mm, _] = self.felt.relief();
-        if high_mm > 0.0 && self.felt.is_shaded() {
+        let [high_mm, _] = self.surfaces.relief();
+        if high_mm > 0.0 && self.surfaces.is_shaded() {
             return Ok(());
         }
         let along = sample.force_n.dot(way_mm);
@@ -155,12 +155,12 @@ impl ForceWatch {
             return 0.0;
         }
         let most_n = CLAMP_N / shares.clutch;
-        shares.product() * self.felt.stored_mj(depth_mm, most_n)
+        shares.product() * self.surfaces.stored_mj(depth_mm, most_n)
     }
 
     fn shading_mj(&self, deepest_mm: f32) -> f32 {
         let way_mm = self.cell_mm + deepest_mm;
-        let gives_mj = SHADED_MJ + SHADED_PART * self.felt.most_n(deepest_mm) * way_mm;
+        let gives_mj = SHADED_MJ + SHADED_PART * self.surfaces.most_n(deepest_mm) * way_mm;
         gives_mj.min(SHADED_MOST_MJ)
     }
 
@@ -177,7 +177,7 @@ impl ForceWatch {
         let before_n =
             std::mem::replace(&mut self.before_n, last.map_or(Vec3::ZERO, |s| s.force_n));
         let is_spring = |sample: &TickRecord| !sample.limits.intersects(NO_SPRING);
-        let is_told = self.felt.is_spring() && self.felt.is_controlled() && is_calm;
+        let is_told = self.surfaces.is_spring() && self.surfaces.is_controlled() && is_calm;
         let last = last.filter(|last| is_told && is_spring(last) && is_spring(sample));
         let Some((last, (before, now))) = last.zip(shares) else {
             (self.contact, self.swing) = (None, Swing::default());
@@ -188,8 +188,8 @@ impl ForceWatch {
         let work_mj = acted_n.dot(moved_mm);
         let depth_mm = sample.hip.to(&sample.proxy).length() * self.cell_mm;
         // A surface that becomes stiffer is meant to give so much at this depth.
-        let is_felt = sample.state == ContactState::Touching;
-        let meant_mj = match is_felt {
+        let is_rendered = sample.state == ContactState::Touching;
+        let meant_mj = match is_rendered {
             true => self.holds_mj(depth_mm, now) - self.holds_mj(depth_mm, before),
             false => 0.0,
         };
@@ -216,12 +216,12 @@ impl ForceWatch {
             return Ok(());
         };
         self.watched_ticks += 1;
-        self.ramp_ticks += u64::from(sample.limits.contains(Limits::RAMPING) && is_felt);
-        self.clutch_ticks += u64::from(sample.limits.contains(Limits::CLUTCH_MOVES) && is_felt);
+        self.ramp_ticks += u64::from(sample.limits.contains(Limits::RAMPING) && is_rendered);
+        self.clutch_ticks += u64::from(sample.limits.contains(Limits::CLUTCH_MOVES) && is_rendered);
         self.most_given_mj = self.most_given_mj.max(contact.given_mj);
-        let [high_mm, _] = self.felt.relief();
-        let textures = 2.0 * self.felt.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
-        let shading = match self.felt.is_shaded() {
+        let [high_mm, _] = self.surfaces.relief();
+        let textures = 2.0 * self.surfaces.stiffest_n_per_mm() * high_mm * contact.deepest_mm;
+        let shading = match self.surfaces.is_shaded() {
             true => self.shading_mj(contact.deepest_mm),
             false => 0.0,
         };

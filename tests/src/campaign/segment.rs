@@ -82,12 +82,12 @@ pub fn run(
     let terrain = Terrain::over(grid, scale, 0).expect("a terrain");
     let mut running = Segment::new(&terrain, effects, random);
     let played = running.play(tally);
-    let felt = &running.felt;
-    running.watch.extremes.given_mj = felt.most_given_mj;
-    running.watch.extremes.watched_ticks = felt.watched_ticks;
-    running.watch.extremes.ramp_ticks = felt.ramp_ticks;
-    running.watch.extremes.clutch_ticks = felt.clutch_ticks;
-    running.watch.extremes.turns = felt.most_turns;
+    let forces = &running.forces;
+    running.watch.extremes.given_mj = forces.most_given_mj;
+    running.watch.extremes.watched_ticks = forces.watched_ticks;
+    running.watch.extremes.ramp_ticks = forces.ramp_ticks;
+    running.watch.extremes.clutch_ticks = forces.clutch_ticks;
+    running.watch.extremes.turns = forces.most_turns;
     tally.add(running.now, running.armed, &running.watch.extremes);
     played.map_err(|what| Violation {
         segment,
@@ -117,7 +117,7 @@ struct Segment<'t> {
     terrain: &'t Terrain<'t>,
     /// Effects besides the spring.
     effects: Option<Effects>,
-    felt: ForceWatch,
+    forces: ForceWatch,
     /// From this tick on nothing is wrong.
     calm_from: u64,
     /// The device may hold tiles that are not the terrain's, whose borders are open.
@@ -149,12 +149,12 @@ impl<'t> Segment<'t> {
         let device = board::new(clock.clone());
         let arm = Arm::new(terrain, &mut random);
         let scene = scene(terrain, &arm, effects.as_ref(), &mut random);
-        let felt = ForceWatch::new(felt(terrain, &scene), scene.cell_mm);
+        let forces = ForceWatch::new(forces(terrain, &scene), scene.cell_mm);
         let host = Host::new(terrain, scene, random.bits());
         Self {
             terrain,
             effects,
-            felt,
+            forces,
             calm_from: 0,
             poisoned: false,
             random,
@@ -302,7 +302,7 @@ impl<'t> Segment<'t> {
     fn bring(&mut self, scene: Scene) {
         self.host.restart(scene, self.now, &mut self.random);
         self.watch.forget();
-        self.felt.feels(felt(self.terrain, &scene));
+        self.forces.feels(forces(self.terrain, &scene));
         self.poisoned = false;
     }
 
@@ -484,14 +484,14 @@ impl<'t> Segment<'t> {
         for sample in std::mem::take(&mut self.host.samples) {
             self.watch.sample(&sample, self.scene.params.max_force_n)?;
             let is_calm = self.now >= self.calm_from && !self.poisoned;
-            self.felt.look(&sample, is_calm)?;
+            self.forces.look(&sample, is_calm)?;
         }
         Ok(())
     }
 }
 
 /// Returns the possible surfaces of a scene.
-fn felt(terrain: &Terrain<'_>, scene: &Scene) -> SceneSurfaces {
+fn forces(terrain: &Terrain<'_>, scene: &Scene) -> SceneSurfaces {
     let materials = terrain.grid().materials();
     SceneSurfaces::of(&scene.params, materials.map(Materials::table))
 }

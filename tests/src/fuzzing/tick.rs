@@ -62,7 +62,7 @@ pub fn run(data: &[u8]) {
             // A table, and a scene of it or of another.
             _ if kind == 247 || kind == 246 => {
                 let (told, mut scene) = (materials::table(&mut bytes), scene(&mut bytes));
-                // As the link does: what cannot be felt is refused before.
+                // As the link does: a scene that cannot be rendered is refused before.
                 if told.is_valid() && scene.is_valid() {
                     haptics.take_materials(&told);
                     table = told;

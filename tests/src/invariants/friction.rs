@@ -99,7 +99,7 @@ impl TickOracle<'_> {
     /// Returns the position of the proxy when its motion for this HIP began: ticks that were cut
     /// short go on with it.
     pub(super) fn begun_at(&self, before: &ObservedTick, seen: &ObservedTick) -> [f64; 3] {
-        match before.felt.converged || before.hip != seen.hip {
+        match before.output.converged || before.hip != seen.hip {
             true => before.proxy,
             false => self.began,
         }
@@ -113,10 +113,10 @@ impl TickOracle<'_> {
         const BESIDE: f64 = 0.25;
         let before = self.before?;
         let start = self.begun_at(&before, seen);
-        let touches = before.is_touching() && seen.is_touching() && seen.felt.converged;
+        let touches = before.is_touching() && seen.is_touching() && seen.output.converged;
         let way = [0, 1].map(|i| seen.proxy[i] - start[i]);
         let is_near = way[0].hypot(way[1]) < SLIDES;
-        if !touches || !is_near || before.felt.proxy == seen.felt.proxy {
+        if !touches || !is_near || before.output.proxy == seen.output.proxy {
             return None;
         }
         let at = |axis: usize, look: u32| {
@@ -150,9 +150,10 @@ impl TickOracle<'_> {
     /// A proxy inside the cone does not move. One that was in the air slides at first, also where
     /// it comes back to where it was.
     pub(super) fn sticks(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
-        let touches =
-            |seen: &ObservedTick| seen.felt.state == ContactState::Touching && seen.felt.converged;
-        let moved = before.felt.proxy != seen.felt.proxy;
+        let touches = |seen: &ObservedTick| {
+            seen.output.state == ContactState::Touching && seen.output.converged
+        };
+        let moved = before.output.proxy != seen.output.proxy;
         let still = self.still;
         self.still = if seen.stays(before) { still + 1 } else { 0 };
         if !(moved && touches(before) && touches(seen)) {

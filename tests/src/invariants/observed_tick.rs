@@ -24,7 +24,7 @@ pub struct ObservedTick {
     /// The HIP.
     pub hip: [f64; 3],
     /// The answer.
-    pub felt: ContactOutput,
+    pub output: ContactOutput,
     /// The displacement as shading turns it, where there is shading.
     pub shaded: Option<Shaded>,
     /// The same, or the plain displacement, as texture changes it, where there is texture.
@@ -54,38 +54,38 @@ pub fn unshifted(point: &GridPoint, shift: [i32; 3]) -> [f64; 3] {
 impl ObservedTick {
     /// A tick over a terrain that lies `shift` cells away.
     #[must_use]
-    pub fn new(hip: [f64; 3], felt: ContactOutput, shift: [i32; 3]) -> Self {
+    pub fn new(hip: [f64; 3], output: ContactOutput, shift: [i32; 3]) -> Self {
         Self {
             hip,
-            felt,
+            output,
             shaded: None,
             textured: None,
-            proxy: unshifted(&felt.proxy, shift),
+            proxy: unshifted(&output.proxy, shift),
             force_n: CELLS_MM.map(|cell_mm| {
-                let force = PARAMS.spring().force_n(felt.displacement * cell_mm);
+                let force = PARAMS.spring().force_n(output.displacement * cell_mm);
                 force.as_dvec3().to_array()
             }),
         }
     }
 
     pub(super) fn is_free(&self) -> bool {
-        self.felt.state == ContactState::Free && self.felt.converged
+        self.output.state == ContactState::Free && self.output.converged
     }
 
     pub(super) fn is_touching(&self) -> bool {
-        self.felt.state == ContactState::Touching
+        self.output.state == ContactState::Touching
     }
 
     /// Returns true if the proxy has stayed on the ground where it was in the tick before.
     pub(super) fn stays(&self, before: &Self) -> bool {
-        self.is_touching() && before.is_touching() && self.felt.proxy == before.felt.proxy
+        self.is_touching() && before.is_touching() && self.output.proxy == before.output.proxy
     }
 
     /// Returns the rendered share of the spring; `None` if the spring is too short.
     pub(super) fn edge_fade(&self) -> Option<f64> {
         let whole = distance(self.proxy, self.hip);
-        let felt = self.felt.displacement.as_dvec3().length();
-        (self.is_touching() && whole > SHORT).then(|| felt / whole)
+        let output = self.output.displacement.as_dvec3().length();
+        (self.is_touching() && whole > SHORT).then(|| output / whole)
     }
 
     /// Error allowed where the height is not in question: the bound, or four

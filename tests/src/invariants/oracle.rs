@@ -224,10 +224,10 @@ impl<'g> TickOracle<'g> {
 
     /// Judges the next tick: everything that it breaks.
     pub fn all(&mut self, seen: &ObservedTick) -> Vec<Violation> {
-        let felt = &seen.felt;
-        self.measured.states[felt.state as usize] += 1;
-        self.measured.unconverged += u64::from(!felt.converged);
-        self.measured.work = self.measured.work.max(felt.work);
+        let output = &seen.output;
+        self.measured.states[output.state as usize] += 1;
+        self.measured.unconverged += u64::from(!output.converged);
+        self.measured.work = self.measured.work.max(output.work);
         let mut told = Vec::new();
         told.extend(self.is_finite(seen).err());
         if told.is_empty() {
@@ -246,7 +246,7 @@ impl<'g> TickOracle<'g> {
         if seen.is_touching() {
             told.extend(self.is_on_surface(seen).err());
         }
-        if seen.is_touching() && seen.felt.converged {
+        if seen.is_touching() && seen.output.converged {
             if self.friction.is_none() {
                 told.extend(self.is_local_minimum(seen).err());
             } else {

@@ -32,7 +32,7 @@ impl TickOracle<'_> {
         };
         let is_whole = shaded.is_whole;
         let shaded = shaded.displacement.as_dvec3();
-        let plain = seen.felt.displacement.as_dvec3();
+        let plain = seen.output.displacement.as_dvec3();
         let off = (shaded.length() - plain.length()).abs();
         let is_long_enough = off <= LENGTH * plain.length() + 1e-30;
         if !is_long_enough {
@@ -41,7 +41,7 @@ impl TickOracle<'_> {
         let [x, y, _] = seen.proxy;
         let inside = |c: f64| (BORDER..1.0 - BORDER).contains(&(c - c.floor()));
         let is_told =
-            is_whole && seen.is_touching() && seen.felt.converged && plain.length() > SHORT;
+            is_whole && seen.is_touching() && seen.output.converged && plain.length() > SHORT;
         if !is_told || !inside(x) || !inside(y) || !self.friction.is_none() {
             return Ok(());
         }

@@ -14,19 +14,19 @@ const FORCE_ERROR: f64 = 2e-6;
 
 impl TickOracle<'_> {
     pub(super) fn is_finite(&self, seen: &ObservedTick) -> Verdict {
-        let felt = &seen.felt;
-        let (cell, frac) = (felt.proxy.cell(), felt.proxy.frac());
+        let output = &seen.output;
+        let (cell, frac) = (output.proxy.cell(), output.proxy.frac());
         let valid = cell.iter().all(|c| c.abs() <= MAX_CELL)
             && frac.to_array().iter().all(|f| (0.0..1.0).contains(f));
-        if !felt.displacement.is_finite() || !valid {
-            return self.fail(Invariant::Finite, format!("{felt:?}"));
+        if !output.displacement.is_finite() || !valid {
+            return self.fail(Invariant::Finite, format!("{output:?}"));
         }
         Ok(())
     }
 
     pub(super) fn is_within_work(&self, seen: &ObservedTick) -> Verdict {
-        if seen.felt.work > self.work {
-            return self.fail(Invariant::Work, format!("{:?}", seen.felt));
+        if seen.output.work > self.work {
+            return self.fail(Invariant::Work, format!("{:?}", seen.output));
         }
         Ok(())
     }
@@ -34,10 +34,10 @@ impl TickOracle<'_> {
     /// No force but of a contact; a free proxy in the HIP; a contact's displacement
     /// a part of the way to the proxy.
     pub(super) fn is_consistent(&self, seen: &ObservedTick) -> Verdict {
-        let felt = &seen.felt;
-        let none = felt.displacement.to_array() == [0.0; 3];
+        let output = &seen.output;
+        let none = output.displacement.to_array() == [0.0; 3];
         let free_at_hip = !seen.is_free() || seen.proxy == seen.hip;
-        let may_press = seen.is_touching() || felt.state == ContactState::Releasing;
+        let may_press = seen.is_touching() || output.state == ContactState::Releasing;
         let is_part = !seen.is_touching() || is_part_of_the_way(seen);
         if (!may_press && !none) || !free_at_hip || !is_part {
             return self.fail(Invariant::Consistent, format!("{seen:?}"));
@@ -47,7 +47,7 @@ impl TickOracle<'_> {
 
     /// The force is the spring's, or as long as the clamp.
     pub(super) fn is_clamped(&self, seen: &ObservedTick) -> Verdict {
-        let displacement = seen.felt.displacement.as_dvec3().to_array();
+        let displacement = seen.output.displacement.as_dvec3().to_array();
         let most = f64::from(PARAMS.max_force_n);
         for (cell_mm, force) in CELLS_MM.iter().zip(seen.force_n) {
             let rate = f64::from(PARAMS.stiffness_n_per_mm) * f64::from(*cell_mm);
@@ -75,12 +75,12 @@ fn length(v: [f64; 3]) -> f64 {
 /// in `[0, 1]`.
 fn is_part_of_the_way(seen: &ObservedTick) -> bool {
     let way = [0, 1, 2].map(|i| seen.proxy[i] - seen.hip[i]);
-    let felt = seen.felt.displacement.as_dvec3().to_array();
+    let output = seen.output.displacement.as_dvec3().to_array();
     let whole = length(way);
     let part = if whole > 0.0 {
-        (length(felt) / whole).min(1.0)
+        (length(output) / whole).min(1.0)
     } else {
         0.0
     };
-    distance(felt, way.map(|c| c * part)) <= seen.allowed()
+    distance(output, way.map(|c| c * part)) <= seen.allowed()
 }

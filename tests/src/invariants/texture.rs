@@ -18,7 +18,7 @@ const SINE: f64 = 5e-4;
 const SLOPE: f64 = 1e-2;
 /// Grain's rounding, of heights and slopes of 1.
 const GRAIN: f64 = 1e-5;
-/// A force that is felt in whole is so far in the texture's share, by rounding of a speed.
+/// A force that is rendered in full is so far in the texture's share, by rounding of a speed.
 const SHARE: f64 = 1e-3;
 /// Depths whose squares are no normal numbers have no texture, cells.
 const SHALLOW: f64 = 2e-19;
@@ -42,7 +42,7 @@ pub(super) struct Added {
     pub(super) allowed: f64,
 }
 
-/// A texture as it is felt, cells.
+/// A texture as it is rendered, cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TextureBounds {
     /// Height above and below the surface.
@@ -72,12 +72,12 @@ impl TextureJudge {
     /// # Errors
     /// The fault of its force.
     pub fn look(&mut self, seen: &ObservedTick) -> Verdict {
-        let share = self.share(&seen.felt.proxy);
+        let share = self.share(&seen.output.proxy);
         let Some(textured) = seen.textured else {
             return Ok(());
         };
         let shaded = seen.shaded.map(|shaded| shaded.displacement);
-        let plain = shaded.unwrap_or(seen.felt.displacement).as_dvec3();
+        let plain = shaded.unwrap_or(seen.output.displacement).as_dvec3();
         let (textured, depth) = (textured.as_dvec3(), plain.length());
         if !(SHALLOW..DEEP).contains(&depth) {
             let same = (textured - plain).length() <= SHALLOW;
@@ -87,7 +87,7 @@ impl TextureJudge {
         held(textured.dot(normal) >= -PULL * depth, || {
             format!("{textured} pulls, of {plain}")
         })?;
-        let Added { wanted, allowed } = self.adds(plain, &seen.felt.proxy, share);
+        let Added { wanted, allowed } = self.adds(plain, &seen.output.proxy, share);
         let off = (textured - plain - wanted * share).length();
         let told = || {
             format!(
@@ -100,7 +100,7 @@ impl TextureJudge {
     }
 
     /// Returns the contribution of the whole texture to a displacement at a place, cells, where a
-    /// share of it is felt.
+    /// share of it is rendered.
     pub(super) fn adds(&self, plain: DVec3, proxy: &GridPoint, share: f64) -> Added {
         let depth = plain.length();
         let normal = plain / depth;
@@ -108,8 +108,8 @@ impl TextureJudge {
         let (height, slopes) = height_and_slopes(&self.texture, proxy);
         let slopes = slopes - normal * slopes.dot(normal);
         let deepest = wavelength * wavelength / (48.0 * amplitude);
-        let felt = depth.min(deepest);
-        let wanted = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * felt;
+        let output = depth.min(deepest);
+        let wanted = normal * (amplitude * height * (depth / amplitude).min(1.0)) - slopes * output;
         let (high, steep) = match self.texture.pattern {
             Pattern::Grain => (GRAIN, GRAIN),
             _ => (SINE, SLOPE),
@@ -117,8 +117,8 @@ impl TextureJudge {
         let misplaced = std::f64::consts::TAU / wavelength * self.misplaced(proxy);
         let steepest = std::f64::consts::TAU * amplitude / wavelength;
         let allowed = amplitude.min(depth) * (high + misplaced)
-            + felt * steepest * (steep + 8.0 * misplaced)
-            + SHARE * (amplitude.min(depth) + felt * steepest) * f64::from(u8::from(share < 1.0))
+            + output * steepest * (steep + 8.0 * misplaced)
+            + SHARE * (amplitude.min(depth) + output * steepest) * f64::from(u8::from(share < 1.0))
             + ROUNDING * depth;
         Added { wanted, allowed }
     }

@@ -23,7 +23,7 @@ const STALLED: u32 = 4;
 
 impl TickOracle<'_> {
     pub(super) fn was_seen_above(&self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
-        if before.felt.state == ContactState::Unseeded && seen.is_touching() {
+        if before.output.state == ContactState::Unseeded && seen.is_touching() {
             return self.fail(Invariant::SeenAbove, format!("{before:?} then {seen:?}"));
         }
         Ok(())
@@ -39,7 +39,7 @@ impl TickOracle<'_> {
         let broken = match (before.edge_fade(), seen.edge_fade()) {
             (Some(was), Some(is)) => hopped < 2.0 * NEAR && (is - was).abs() > rate,
             // Let go: there was next to nothing left.
-            (Some(was), None) => seen.felt.state == ContactState::Unseeded && was > rate,
+            (Some(was), None) => seen.output.state == ContactState::Unseeded && was > rate,
             (None, _) => false,
         };
         if broken {
@@ -55,16 +55,16 @@ impl TickOracle<'_> {
 
     /// Checks that the last force fades to nothing in equal steps.
     pub(super) fn lets_go_gently(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
-        let felt = |seen: &ObservedTick| seen.felt.displacement.as_dvec3().length();
-        let lets_go = |seen: &ObservedTick| seen.felt.state == ContactState::Releasing;
+        let output = |seen: &ObservedTick| seen.output.displacement.as_dvec3().length();
+        let lets_go = |seen: &ObservedTick| seen.output.state == ContactState::Releasing;
         if lets_go(seen) && !lets_go(before) {
-            self.let_go_from = felt(before);
+            self.let_go_from = output(before);
         }
-        let step = felt(before) - felt(seen);
+        let step = output(before) - output(seen);
         let most = (f64::from(RATE) + 1e-3) * self.let_go_from;
         let ends = lets_go(before) || lets_go(seen);
         // It gets less, and does not turn.
-        let [was, is] = [before, seen].map(|seen| seen.felt.displacement.as_dvec3());
+        let [was, is] = [before, seen].map(|seen| seen.output.displacement.as_dvec3());
         let turned = was.cross(is).length() > 1e-6 * was.length() * is.length().max(1e-6);
         if ends && (turned || !(-1e-6..=most + 1e-6).contains(&step)) {
             let detail = format!("a step of {step:.3e}, {before:?} then {seen:?}");
@@ -75,7 +75,7 @@ impl TickOracle<'_> {
 
     pub(super) fn descends(&self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         // A proxy that waits for a tile goes on from where it entered its patch.
-        let waited = before.felt.missing_tile.is_some();
+        let waited = before.output.missing_tile.is_some();
         if !(before.is_touching() && seen.is_touching()) || waited {
             return Ok(());
         }
@@ -97,8 +97,8 @@ impl TickOracle<'_> {
     /// In real time: a tick that is repeated has [`Invariant::Settles`].
     pub(super) fn advances(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         let flies = |seen: &ObservedTick| {
-            let felt = &seen.felt;
-            felt.state == ContactState::Free && !felt.converged && felt.missing_tile.is_none()
+            let output = &seen.output;
+            output.state == ContactState::Free && !output.converged && output.missing_tile.is_none()
         };
         let moved = distance(before.hip, seen.hip);
         let ahead = moved < AHEAD * distance(seen.proxy, seen.hip);
@@ -148,7 +148,7 @@ impl TickOracle<'_> {
         let inside = |p: [f64; 3]| {
             (0..2).all(|axis| (0.0..f64::from(self.terrain.size[axis])).contains(&p[axis]))
         };
-        let held = |seen: &ObservedTick| seen.felt.state != ContactState::Unseeded;
+        let held = |seen: &ObservedTick| seen.output.state != ContactState::Unseeded;
         // Any place on a wall's top is farther from the HIP than the proxy was.
         let out_of_reach = WALL - seen.hip[2] > distance(before.proxy, seen.hip) + 1.0;
         if self.terrain.kind != Kind::Walls

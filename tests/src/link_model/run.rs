@@ -28,7 +28,7 @@ const LONGEST: u64 = 60_000;
 /// Ticks after the end, in which what was delayed still arrives.
 const AFTER: u64 = 6_500;
 /// Samples with the amplifiers on after which the host goes on.
-const FELT: u32 = 60;
+const RAMP_SAMPLES: u32 = 60;
 /// Times that the host takes up a session that went silent.
 const RESUMPTIONS: u32 = 4;
 
@@ -88,7 +88,7 @@ struct World<'t> {
     /// Sessions that the present host has spoken in.
     sessions: Vec<u32>,
     step: Step,
-    felt: u32,
+    ramp_samples: u32,
     resumptions: u32,
     seed: u64,
     now: u64,
@@ -167,7 +167,7 @@ impl<'t> World<'t> {
             judge: RunOracle::default(),
             sessions: vec![],
             step: Step::Arming,
-            felt: 0,
+            ramp_samples: 0,
             resumptions: 0,
             seed: 1,
             now: 0,
@@ -231,7 +231,7 @@ impl<'t> World<'t> {
                     self.client = host(self.terrain, self.scene, self.seed);
                     self.lines[0].break_off();
                     self.sessions.clear();
-                    (self.step, self.felt, self.resumptions) = (Step::Arming, 0, 0);
+                    (self.step, self.ramp_samples, self.resumptions) = (Step::Arming, 0, 0);
                     self.questions.forget();
                     self.errands = self.errands.is_some().then(errands);
                     self.judge.another_host();
@@ -328,7 +328,7 @@ impl<'t> World<'t> {
     /// The host's program.
     fn host(&mut self) -> Result<(), Wrong> {
         let (mut out, now) = (vec![], time(self.now));
-        let (step, felt) = (&mut self.step, &mut self.felt);
+        let (step, ramp_samples) = (&mut self.step, &mut self.ramp_samples);
         let at = self.now;
         let (mut opened, mut samples) = (None, vec![]);
         let (questions, errands) = (&mut self.questions, &mut self.errands);
@@ -339,7 +339,7 @@ impl<'t> World<'t> {
             match event {
                 Event::Opened { device, .. } => opened = Some(device.clone()),
                 Event::Sample(sample) => {
-                    *felt += u32::from(sample.mode == Mode::Ramping);
+                    *ramp_samples += u32::from(sample.mode == Mode::Ramping);
                     samples.push(sample.tick);
                 }
                 Event::Answered {
@@ -388,10 +388,12 @@ impl<'t> World<'t> {
         self.wonder();
         let is_closed = self.client.state() == State::Closed;
         match self.step {
-            Step::Arming if self.felt > 0 => self.step = Step::Feeling,
-            Step::Feeling if self.felt >= FELT && self.abrupt => self.leave(),
-            Step::Feeling if self.felt >= FELT && self.has_errands(0) => self.run_errands(0),
-            Step::Feeling if self.felt >= FELT => {
+            Step::Arming if self.ramp_samples > 0 => self.step = Step::Feeling,
+            Step::Feeling if self.ramp_samples >= RAMP_SAMPLES && self.abrupt => self.leave(),
+            Step::Feeling if self.ramp_samples >= RAMP_SAMPLES && self.has_errands(0) => {
+                self.run_errands(0)
+            }
+            Step::Feeling if self.ramp_samples >= RAMP_SAMPLES => {
                 self.client.ask(HostRequest::Request(Request::Disarm));
                 self.step = Step::Disarming(None);
             }

@@ -28,11 +28,11 @@ fn surface(number: u64) -> Surface {
     }
 }
 
-/// A scene, felt here in real time.
+/// A scene, rendered here in real time.
 pub struct EmulatorScene {
     /// Its settings.
     pub scene: Scene,
-    /// It was felt on its materials, by the whole loop.
+    /// It was rendered on its materials, by the whole loop.
     is_on_materials: bool,
     /// As the device is told of it.
     message: SceneMessage,
@@ -61,15 +61,15 @@ impl EmulatorScene {
         for hip in &scene.path {
             events.extend(player.supplied.installed.drain(..).map(Event::Tile));
             events.push(Event::Hip(point(*hip)));
-            let felt = player.step(*hip).expect("one tick is one answer");
+            let output = player.step(*hip).expect("one tick is one answer");
             answers.push(Counted {
                 instructions: 0,
                 cycles: Cycles::default(),
-                state: felt.state as u32,
-                converged: felt.converged,
-                work: felt.work,
-                vector: felt.displacement,
-                proxy: felt.proxy,
+                state: output.state as u32,
+                converged: output.converged,
+                work: output.work,
+                vector: output.displacement,
+                proxy: output.proxy,
             });
         }
         let message = SceneMessage {

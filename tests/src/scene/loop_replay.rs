@@ -1,4 +1,4 @@
-//! A scene on materials, felt by the product's whole loop: points go in, samples come out.
+//! A scene on materials, rendered by the product's whole loop: points go in, samples come out.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
@@ -57,7 +57,7 @@ struct Device<'t, 'g, const D: usize> {
 }
 
 /// Replays the path of a scene on materials in a window of `D × D` tiles, and lets `look` see what
-/// was felt of each point.
+/// was rendered of each point.
 ///
 /// # Errors
 /// The error of `look`, or a point without an answer.

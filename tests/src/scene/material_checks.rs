@@ -1,4 +1,4 @@
-//! The replay of a scene on materials under its judge, and beside twins in which nothing felt may
+//! The replay of a scene on materials under its judge, and beside twins in which no force may
 //! change.
 
 use super::hip_path::LEAP;
@@ -79,7 +79,7 @@ fn replay_in(
 }
 
 /// Returns true if each path from the proxy to the HIP fits into a window of 6 × 6 tiles, and each
-/// point was felt with all of its terrain: one that needs more tiles than its window holds is not.
+/// point was rendered with all of its terrain: one that needs more tiles than its window holds is not.
 fn fits(replied: &[Replied]) -> bool {
     let is_near = |ticks: &[Replied]| {
         let way = |axis: usize| (ticks[1].hip[axis] - ticks[0].proxy[axis]).abs();

@@ -1,4 +1,4 @@
-//! Scenes run twice, the second time so that nothing felt may change.
+//! Scenes run twice, the second time so that no force may change.
 
 use crate::scene::run::Execution;
 use hapterra_core::contact::ContactState;
@@ -64,7 +64,7 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
         scene.terrain.clone(),
         scene.path.iter().map(beside).collect(),
     );
-    let mut felt = |shift| {
+    let mut output = |shift| {
         // Of grain, and of most gratings, another part is there; it is judged as well.
         let mut judge = TickOracle::new(&scene.terrain).with_texture(scene.texture);
         let pulled = Supply::Pulled { latency: 0 };
@@ -74,8 +74,8 @@ pub fn shifted(scene: &Scene, buffers: &mut Buffers, random: &mut Random) -> Com
             ..seen
         }))
     };
-    let near = Vec::from_iter(felt([256, 256, 0])?);
-    let away = Vec::from_iter(felt(shift)?);
+    let near = Vec::from_iter(output([256, 256, 0])?);
+    let away = Vec::from_iter(output(shift)?);
     let by = [shift[0] - 256, shift[1] - 256, shift[2]];
     same_bits(Invariant::Shift, &near, &away, by).map(|()| true)
 }
@@ -123,10 +123,10 @@ pub fn same_bits(
 ) -> Verdict {
     for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
         let bits = |seen: &ObservedTick, shift: [i32; 3]| {
-            let (cell, frac) = (seen.felt.proxy.cell(), seen.felt.proxy.frac());
+            let (cell, frac) = (seen.output.proxy.cell(), seen.output.proxy.frac());
             (
-                seen.felt.state,
-                seen.felt.displacement.to_array().map(f32::to_bits),
+                seen.output.state,
+                seen.output.displacement.to_array().map(f32::to_bits),
                 seen.shaded
                     .map(|shaded| shaded.displacement.to_array().map(f32::to_bits)),
                 seen.textured
@@ -192,7 +192,7 @@ fn twin_of(scene: &Scene, symmetry: Symmetry) -> Scene {
     scene.with(symmetry.terrain(&scene.terrain), path)
 }
 
-/// Compares what was felt with what the mirrored or turned twin felt.
+/// Compares the forces with those of the mirrored or turned twin.
 ///
 /// # Errors
 /// A difference that rounding does not explain.
@@ -207,7 +207,7 @@ pub fn same_way(
     let mut parted = false;
     for (tick, (a, b)) in seen.iter().zip(other).enumerate() {
         // Until both are in the HIP again.
-        parted &= a.felt.state != ContactState::Free || b.felt.state != ContactState::Free;
+        parted &= a.output.state != ContactState::Free || b.output.state != ContactState::Free;
         if parted {
             continue;
         }
@@ -258,9 +258,9 @@ fn is_shaded_likewise(
         return true;
     };
     // So far away all that is near the proxy is equally near, and each place has its own normal.
-    let length = a.felt.displacement.length();
+    let length = a.output.displacement.length();
     let is_told = (0.1..FAR).contains(&length);
-    if !is_told || !scene.friction.is_none() || a.felt.state != b.felt.state {
+    if !is_told || !scene.friction.is_none() || a.output.state != b.output.state {
         return true;
     }
     let tip = one.displacement.as_dvec3().to_array();
@@ -281,18 +281,21 @@ const SLACK: f64 = 0.03;
 fn agree(scene: &Scene, proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> bool {
     let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
     let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
-    // A HIP in the surface may touch it or be free: nothing is felt either way.
+    // A HIP in the surface may touch it or be free: no force is rendered either way.
     let at_hip = |seen: &ObservedTick| {
-        let may = matches!(seen.felt.state, ContactState::Free | ContactState::Touching);
-        may && seen.felt.displacement.length() <= ERROR as f32
+        let may = matches!(
+            seen.output.state,
+            ContactState::Free | ContactState::Touching
+        );
+        may && seen.output.displacement.length() <= ERROR as f32
     };
-    let same = a.felt.state == b.felt.state || (at_hip(a) && at_hip(b));
+    let same = a.output.state == b.output.state || (at_hip(a) && at_hip(b));
     let slack = match scene.friction.is_none() {
         true => 0.0,
         false => SLACK * f64::from(1.0 + scene.friction.static_mu) * da.max(db),
     };
     let slid = distance(proxy, b.proxy) <= slack;
-    same && a.felt.converged == b.felt.converged && (is_near(proxy, a, b) || tie || slid)
+    same && a.output.converged == b.output.converged && (is_near(proxy, a, b) || tie || slid)
 }
 
 fn is_near(proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> bool {
@@ -305,7 +308,7 @@ fn is_elsewhere(there: &ObservedTick, here: &ObservedTick, hair: f64) -> bool {
 }
 
 /// Returns true if a hair's breadth makes the difference in the mirrored or turned twin, as it is
-/// felt once more.
+/// rendered once more.
 fn is_twin_undecided(
     scene: &Scene,
     symmetry: Symmetry,
@@ -336,7 +339,8 @@ fn is_undecided(
         for corner in 0..8 {
             let off = [0, 1, 2].map(|bit| if corner >> bit & 1 == 0 { hair } else { -hair });
             let moved = |now| if now < first { [0.0; 3] } else { off };
-            if rendered_at(scene, tick, moved, buffers).is_some_and(|felt| decides(&felt, hair)) {
+            if rendered_at(scene, tick, moved, buffers).is_some_and(|output| decides(&output, hair))
+            {
                 return true;
             }
         }
@@ -352,13 +356,13 @@ fn rendered_at(
     buffers: &mut Buffers,
 ) -> Option<ObservedTick> {
     let mut player = Player::<SIDE>::new(scene, buffers, [0; 3], scene.supply);
-    let mut felt = None;
+    let mut output = None;
     for (now, hip) in scene.path[..=tick].iter().enumerate() {
         let by = moved(now);
         let hip = [0, 1, 2].map(|i| hip[i] + by[i]);
-        felt = player
+        output = player
             .step(hip)
-            .map(|felt| ObservedTick::new(hip, felt, [0; 3]));
+            .map(|output| ObservedTick::new(hip, output, [0; 3]));
     }
-    felt
+    output
 }

@@ -29,7 +29,7 @@ const PATIENCE: usize = 20_000;
 /// Every so many-th scene has a HIP that stays deep.
 const DEEP_EVERY: u64 = 8;
 
-/// A terrain, a path of the HIP, and the settings it is felt with.
+/// A terrain, a path of the HIP, and the settings it is rendered with.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Answer of a variant.
@@ -266,12 +266,12 @@ impl Scene {
         let mut player = Player::<D>::new(self, buffers, shift, supply);
         let mut all = Vec::with_capacity(self.path.len());
         for (tick, hip) in self.path.iter().enumerate() {
-            let felt = player.step(*hip).ok_or_else(|| Violation {
+            let output = player.step(*hip).ok_or_else(|| Violation {
                 invariant: Invariant::Settles,
                 tick,
                 detail: format!("never settles for {hip:?}"),
             })?;
-            let seen = player.seen(*hip, felt);
+            let seen = player.seen(*hip, output);
             look(&seen)?;
             all.push(seen);
         }
@@ -353,25 +353,25 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
         let installed = self.supplied.installed.len();
         for _ in 0..PATIENCE {
             self.contact.step(&self.supplied.window, &hip);
-            let felt = *self.contact.output();
-            work = work.max(felt.work);
+            let output = *self.contact.output();
+            work = work.max(output.work);
             self.shaded = self.shade();
-            // A HIP that needs more tiles than the window holds is felt without them.
+            // A HIP that needs more tiles than the window holds is rendered without them.
             let waits = self.supplied.installed.len() - installed < 4 * D * D;
-            let missing = felt.missing_tile.or(self.missing());
+            let missing = output.missing_tile.or(self.missing());
             let waits_for = ContactOutput {
                 missing_tile: missing,
-                ..felt
+                ..output
             };
             self.supplied
                 .supply(self.now, &self.contact, &waits_for, &hip);
             self.now += 1;
-            let is_done = felt.converged && missing.is_none();
+            let is_done = output.converged && missing.is_none();
             if in_real_time || is_done || (missing.is_some() && !waits) {
                 if let Some(texturer) = &mut self.texturer {
-                    self.textured = texturer.add(self.shaded, &felt.proxy);
+                    self.textured = texturer.add(self.shaded, &output.proxy);
                 }
-                return Some(ContactOutput { work, ..felt });
+                return Some(ContactOutput { work, ..output });
             }
             if missing.is_some() && waits {
                 // As a replay does: a transaction.
@@ -396,14 +396,14 @@ impl<'t, 'g, const D: usize> Player<'t, 'g, D> {
 
     /// Returns the last HIP's answer, for the oracle.
     #[must_use]
-    pub fn seen(&self, hip: [f64; 3], felt: ContactOutput) -> ObservedTick {
+    pub fn seen(&self, hip: [f64; 3], output: ContactOutput) -> ObservedTick {
         ObservedTick {
             shaded: self.shader.as_ref().map(|shader| Shaded {
                 displacement: self.shaded,
                 is_whole: shader.missing().is_none(),
             }),
             textured: self.texturer.as_ref().map(|_| self.textured),
-            ..ObservedTick::new(hip, felt, self.shift)
+            ..ObservedTick::new(hip, output, self.shift)
         }
     }
 }

@@ -127,13 +127,13 @@ impl<'t, 'g, const D: usize> SuppliedWindow<'t, 'g, D> {
     }
 
     /// Asks for what the tick showed to be wanted, and takes what has come.
-    pub fn supply(&mut self, now: u32, contact: &Contact, felt: &ContactOutput, hip: &GridPoint) {
+    pub fn supply(&mut self, now: u32, contact: &Contact, output: &ContactOutput, hip: &GridPoint) {
         let Supply::Pulled { latency } = self.supply else {
             return;
         };
         let focus = RequestHint {
-            missing_tile: felt.missing_tile,
-            proxy: felt.proxy.column(),
+            missing_tile: output.missing_tile,
+            proxy: output.proxy.column(),
             hip: hip.column(),
             velocity: [0.0; 2],
         };

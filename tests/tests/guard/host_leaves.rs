@@ -60,7 +60,7 @@ fn without_its_host_it_goes_on_and_fades_at_the_edge_of_what_it_holds() {
     eprintln!("largest step after the return {step:.3} A");
     assert!(step < 0.06, "{step} A");
     let last = bed.samples.last().expect("samples");
-    // Let go at the edge, the surface is felt again once the hand has been
+    // Let go at the edge, the surface is rendered again once the hand has been
     // above it.
     assert_eq!((last.mode, last.fault), (Mode::Armed, None));
     assert_eq!(

@@ -18,7 +18,7 @@ use hapterra_firmware::store::Stored;
 use hapterra_tests::faulty_links::Shared;
 use heightfield::Raster;
 
-/// The plane that is felt lies here, mm; the hand starts above its middle.
+/// Height of the touched plane, mm; the hand starts above its middle.
 pub(crate) const PLANE_MM: f64 = 20.0;
 pub(crate) const MIDDLE_MM: [f64; 2] = [100.0, 100.0];
 /// When the script begins, in ticks, and when a press has settled.

@@ -28,8 +28,8 @@ fn a_recording_is_replayed_with_its_own_settings() {
     let folder = Folder::new();
     folder.write_trajectory("in.csv");
     let (terrain, input) = (folder.text("hills.tif"), folder.text("in.csv"));
-    let felt = folder.text("felt.csv");
-    let words = ["replay", &terrain, &input, "-o", &felt];
+    let replayed = folder.text("felt.csv");
+    let words = ["replay", &terrain, &input, "-o", &replayed];
     folder.runs(&[&words[..], &SETTINGS].concat());
     let text = folder.read("felt.csv");
     assert!(rows(&text).iter().any(|row| row["contact"] == "1"));
@@ -44,7 +44,7 @@ fn a_recording_is_replayed_with_its_own_settings() {
     }
     folder.replays("felt.csv", "again.csv", &[]);
     assert!(folder.read("again.csv") == text, "not the same again");
-    // Without its settings it is felt as anything else would be.
+    // Without its settings it is rendered as any other path.
     folder.replays("felt.csv", "plain.csv", &["--ignore-settings"]);
     let plain = folder.read("plain.csv");
     assert!(
@@ -73,8 +73,8 @@ fn a_recording_of_another_terrain_is_refused() {
     folder.replays("in.csv", "felt.csv", &[]);
     let other = folder.text("other.tif");
     terrain_file(other.as_ref(), Kind::Fractal, 256, 7);
-    let (felt, out) = (folder.text("felt.csv"), folder.text("out.csv"));
-    let told = folder.fails(&["replay", &other, &felt, "-o", &out]);
+    let (replayed, out) = (folder.text("felt.csv"), folder.text("out.csv"));
+    let told = folder.fails(&["replay", &other, &replayed, "-o", &out]);
     for part in [
         "other.tif",
         "hills.tif",
@@ -84,10 +84,10 @@ fn a_recording_of_another_terrain_is_refused() {
         assert!(told.contains(part), "{part} in {told}");
     }
     assert!(!folder.path("out.csv").exists());
-    folder.runs(&["replay", &other, &felt, "-o", &out, "--ignore-settings"]);
+    folder.runs(&["replay", &other, &replayed, "-o", &out, "--ignore-settings"]);
     // The same heights under another name are the same terrain.
     std::fs::copy(folder.path("hills.tif"), folder.path("copy.tif")).expect("copied");
-    folder.runs(&["replay", &folder.text("copy.tif"), &felt, "-o", &out]);
+    folder.runs(&["replay", &folder.text("copy.tif"), &replayed, "-o", &out]);
     let later = folder
         .read("felt.csv")
         .replacen("recording = 1", "recording = 2", 1);
@@ -100,7 +100,7 @@ fn a_recording_of_another_terrain_is_refused() {
 }
 
 /// Columns that only the terrain and the path determine; the path comes first.
-const FELT: [&str; 9] = [
+const REPLAYED_COLUMNS: [&str; 9] = [
     "t_s",
     "x_mm",
     "y_mm",
@@ -138,12 +138,12 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
     assert_eq!(live.len(), again.len());
     let mut compared = 0;
     for (live, again) in live.iter().zip(&again) {
-        let (path, felt) = FELT.split_at(4);
-        let felt = match live["limits"].contains("TERRAIN_MISSING") {
+        let (path, replayed) = REPLAYED_COLUMNS.split_at(4);
+        let replayed = match live["limits"].contains("TERRAIN_MISSING") {
             true => &[][..],
-            false => felt,
+            false => replayed,
         };
-        for column in path.iter().chain(felt).copied() {
+        for column in path.iter().chain(replayed).copied() {
             assert_eq!(live[column], again[column], "{column} at {} s", live["t_s"]);
         }
         if live["mode"] == "armed" && live["limits"].is_empty() && live["contact"] == "1" {
@@ -301,7 +301,7 @@ fn a_parquet_recording_is_opened_by_polars_or_pandas() {
     };
     let run = Command::new(program)
         .args(["-c", script])
-        .args([folder.path("felt.csv"), folder.path("felt.parquet")])
+        .args([folder.path("replayed.csv"), folder.path("replayed.parquet")])
         .output()
         .expect("started");
     assert!(run.status.success(), "{}", said(&run));
@@ -595,12 +595,12 @@ fn odd_outputs_and_options_are_told() {
     folder.write_trajectory("in.csv");
     let [hills, input] = ["hills.tif", "in.csv"].map(|name| folder.text(name));
     // `-` is standard output, and no file.
-    folder.replays("in.csv", "felt.csv", &[]);
+    folder.replays("in.csv", "replayed.csv", &[]);
     let run = folder.run(&["replay", &hills, &input, "-o", "-"]);
     assert!(run.status.success(), "{}", said(&run));
     assert_eq!(
         String::from_utf8_lossy(&run.stdout),
-        folder.read("felt.csv")
+        folder.read("replayed.csv")
     );
     let told = folder.fails(&["run", &hills, "--device", "native", "--out", "-"]);
     assert!(told.contains("standard output"), "{told}");
@@ -624,18 +624,18 @@ fn odd_outputs_and_options_are_told() {
         told.contains("none.elf") && !folder.path("demo").exists(),
         "{told}"
     );
-    // Who begins below ground is told why nothing is felt.
+    // A path that begins below ground gets a note on the missing force.
     std::fs::write(
         folder.path("in.csv"),
         "t_s,x_mm,y_mm,z_mm\n0,60,60,-900\n0.001,60,60,-901\n",
     )
     .expect("written");
-    let told = folder.replays("in.csv", "felt.csv", &[]);
+    let told = folder.replays("in.csv", "replayed.csv", &[]);
     assert!(told.contains("2 rows are below ground"), "{told}");
     // And the recording tells it from a HIP that is free.
-    let felt = std::fs::read_to_string(folder.path("felt.csv")).expect("written");
-    assert_eq!(felt.matches(",unseeded").count(), 2, "{felt}");
-    assert!(!felt.contains(",free"), "{felt}");
+    let text = std::fs::read_to_string(folder.path("replayed.csv")).expect("written");
+    assert_eq!(text.matches(",unseeded").count(), 2, "{text}");
+    assert!(!text.contains(",free"), "{text}");
 }
 
 #[test]
@@ -671,8 +671,8 @@ fn every_command_takes_one_exaggeration_and_feels_true_to_scale_without() {
         }
     }
     folder.write_trajectory("in.csv");
-    folder.replays("in.csv", "felt.csv", &["--exaggeration=3"]);
-    assert!(folder.read("felt.csv").contains("# exaggeration = 3.0"));
+    folder.replays("in.csv", "replayed.csv", &["--exaggeration=3"]);
+    assert!(folder.read("replayed.csv").contains("# exaggeration = 3.0"));
     let input = folder.text("in.csv");
     let both = ["--exaggeration=2", "--exaggeration=1mm/unit"];
     let out = folder.text("o.csv");

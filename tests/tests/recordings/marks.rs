@@ -12,7 +12,7 @@ const COMMANDS: &str = "at 1 mark stimulus #1, \"left\"\nat 2 zoom 1.5\nmark zoo
 
 const TEXTS: [&str; 3] = ["stimulus #1, \"left\"", "zoomed", "'end'"];
 
-/// Has the hills felt with the commands; what was said.
+/// Runs the hills with the commands; returns the output.
 fn run(folder: &Folder, record: &str) -> String {
     folder.write("commands", COMMANDS);
     let [terrain, commands, record] =

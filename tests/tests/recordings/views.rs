@@ -63,7 +63,7 @@ fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
         panic!("{:?}", settings.views);
     };
     let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
-    assert!(near(zoomed.cell_mm, 1.5 * settings.felt.cell_mm));
+    assert!(near(zoomed.cell_mm, 1.5 * settings.rendered.cell_mm));
     assert!(near(
         higher.height_mm_per_unit,
         1.25 * zoomed.height_mm_per_unit
@@ -74,7 +74,7 @@ fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
     );
     assert_eq!(softer.stiffness_n_per_mm, 0.4);
     let tips = [softer, sharper].map(|view| view.tip_mm);
-    assert_eq!(tips, [Some(settings.felt.tip_mm), Some(3.0)]);
+    assert_eq!(tips, [Some(settings.rendered.tip_mm), Some(3.0)]);
     // Rows name their views, in their order, and there are some of each.
     let live = rows(&text);
     let views: Vec<u32> = live
@@ -178,18 +178,18 @@ fn what_cannot_be_replayed_is_refused_and_named() {
 fn a_parquet_recording_of_views_is_felt_again_too() {
     let folder = Folder::of(SIZE);
     folder.write("commands", "at 3.5 zoom 2\nat 4.5 reset\n");
-    let names = ["hills.tif", "felt.parquet", "commands"].map(|name| folder.text(name));
+    let names = ["hills.tif", "replayed.parquet", "commands"].map(|name| folder.text(name));
     let [terrain, record, commands] = &names;
     let words = ["run", terrain, "--device", "native", "--out", record];
     let more = ["--commands", commands, "--duration", "6s"];
     let run = folder.run(&[&words[..], &more].concat());
     assert!(run.status.success(), "{}", said(&run));
     assert!(said(&run).contains("view 2: "), "{}", said(&run));
-    let trajectory = Trajectory::open(&folder.path("felt.parquet")).expect("opened");
+    let trajectory = Trajectory::open(&folder.path("replayed.parquet")).expect("opened");
     let settings = trajectory.settings().expect("settings");
     assert_eq!(settings.views.len(), 2);
-    assert_eq!(settings.views[1].cell_mm, settings.felt.cell_mm);
-    let run = folder.replay("felt.parquet", "again.csv", &[]);
+    assert_eq!(settings.views[1].cell_mm, settings.rendered.cell_mm);
+    let run = folder.replay("replayed.parquet", "again.csv", &[]);
     assert!(run.status.success(), "{}", said(&run));
     let again = folder.read("again.csv");
     assert_eq!(rows(&again).last().expect("rows")["view"], "2");
@@ -199,7 +199,7 @@ fn a_parquet_recording_of_views_is_felt_again_too() {
 fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     use std::io::Write;
     let folder = Folder::of(SIZE);
-    let [terrain, record] = ["hills.tif", "felt.csv"].map(|name| folder.text(name));
+    let [terrain, record] = ["hills.tif", "replayed.csv"].map(|name| folder.text(name));
     let words = ["run", &terrain, "--device", "native", "--out", &record];
     let more = ["--duration", "4.5s", "--commands"];
     let mut command = Command::new(hapterra_binary());
@@ -224,7 +224,7 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     ] {
         assert!(said(&run).contains(part), "{part} in {}", said(&run));
     }
-    let text = folder.read("felt.csv");
+    let text = folder.read("replayed.csv");
     assert_eq!(rows(&text).last().expect("rows")["view"], "1");
     let none = folder.text("none");
     let run = folder.run(&[&words[..], &more, &[&none]].concat());
@@ -236,7 +236,7 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     );
 }
 
-/// In each view cells are as large as they are at the place that is felt; the recording says
+/// In each view cells are as large as they are at the place that is rendered; the recording says
 /// where that is, and a replay makes the same cells of it.
 #[test]
 fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
@@ -270,7 +270,7 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
     let [north, softer, south] = settings.views[..] else {
         panic!("{:?}", settings.views);
     };
-    let first_m = settings.felt.cell_m.expect("known");
+    let first_m = settings.rendered.cell_m.expect("known");
     let latitude = |view: PlacementSettings| view.measured_at.expect("a place")[1];
     let [up, down] = [latitude(north) - 56.0, latitude(softer) - latitude(south)];
     // The hand goes on meanwhile.
@@ -287,8 +287,8 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
             (narrower / wanted - 1.0).abs() < 1e-3,
             "{narrower} {wanted}"
         );
-        assert!((view.cell_mm / settings.felt.cell_mm / narrower - 1.0).abs() < 1e-9);
-        assert_eq!(view.exaggeration, settings.felt.exaggeration);
+        assert!((view.cell_mm / settings.rendered.cell_mm / narrower - 1.0).abs() < 1e-9);
+        assert_eq!(view.exaggeration, settings.rendered.exaggeration);
     }
     let replay = |from: &str, to: &str| {
         folder.runs(&["replay", terrain, from, "-o", &folder.text(to)]);
@@ -321,7 +321,7 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
     assert!(compared.iter().all(|count| *count > 50), "{compared:?}");
     // A replay of the replay is the same file.
     assert!(replay(&folder.text("again.csv"), "same.csv") == again_text);
-    // Without the places it is another terrain that is felt.
+    // Without the places another terrain is rendered.
     let lines = again_text.split_inclusive('\n');
     let (head, views): (Vec<_>, Vec<_>) = lines.partition(|line| line.contains("measured_at"));
     assert_eq!(head.len(), 4);
@@ -331,7 +331,7 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
             .concat()
             .replacen("# level", &(head[0].to_owned() + "# level"), 1),
     );
-    let blind = replay(&folder.text("blind.csv"), "felt.csv");
+    let blind = replay(&folder.text("blind.csv"), "replayed.csv");
     assert!(
         rows(&blind)
             .iter()
@@ -341,7 +341,7 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
 }
 
 /// On walls a tick has most to do. At 1 kHz its work suffices, also after another view: what was
-/// felt live is what a replay, which does all of a tick at once, gives again but for rounding.
+/// recorded live equals the replay, which does all of a tick at once, but for rounding.
 #[test]
 fn on_a_steep_saw_a_replay_gives_what_was_felt() {
     /// Rounding by the digits of a file, mm.
@@ -349,7 +349,7 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
     let folder = Folder::new();
     write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));
     let [terrain, record, commands, again] =
-        ["hills.asc", "felt.csv", "commands", "again.csv"].map(|name| folder.text(name));
+        ["hills.asc", "replayed.csv", "commands", "again.csv"].map(|name| folder.text(name));
     for pan in ["", "at 4.0 pan 2 1\n"] {
         folder.write("commands", pan);
         let words = [
@@ -358,7 +358,7 @@ fn on_a_steep_saw_a_replay_gives_what_was_felt() {
         let more = ["--duration", "9s", "--at", "13,56", "--exaggeration", "9"];
         folder.runs(&[&words[..], &more, &["--commands", &commands]].concat());
         folder.runs(&["replay", &terrain, &record, "-o", &again]);
-        let [live_text, again_text] = ["felt.csv", "again.csv"].map(|name| folder.read(name));
+        let [live_text, again_text] = ["replayed.csv", "again.csv"].map(|name| folder.read(name));
         let (live, again) = (rows(&live_text), rows(&again_text));
         assert_eq!(live.len(), again.len());
         for (live, again) in live.iter().zip(&again) {
@@ -394,10 +394,10 @@ fn recording_without_measured_places_replays_unchanged() {
     assert_ne!(old, views);
     folder.write("old.csv", &format!("{head}[[view]]{old}"));
     folder.replays("old.csv", "of_old.csv", &[]);
-    let felt = |name: &str| {
+    let rows_of = |name: &str| {
         let text = folder.read(name);
         let rows = text.lines().filter(|line| !line.starts_with('#'));
         rows.collect::<Vec<_>>().join("\n")
     };
-    assert!(felt("of_old.csv") == felt("again.csv"));
+    assert!(rows_of("of_old.csv") == rows_of("again.csv"));
 }

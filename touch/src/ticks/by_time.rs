@@ -16,7 +16,7 @@ pub(super) struct Timed {
     row: Row,
     t_s: f64,
     /// True if a tick was at it or next to it.
-    is_felt: bool,
+    is_rendered: bool,
 }
 
 /// Continuation after a row.
@@ -54,12 +54,12 @@ where
             let late = self.due.late(ahead.t_s);
             if late > ON_TICK {
                 let tick = self.between(&before, &ahead);
-                (before.is_felt, ahead.is_felt) = (true, true);
+                (before.is_rendered, ahead.is_rendered) = (true, true);
                 (self.before, self.ahead) = (Some(before), Some(ahead));
                 return Ok(Some(tick));
             }
-            self.counts.passed_over += u64::from(!before.is_felt);
-            ahead.is_felt |= late >= -ON_TICK;
+            self.counts.passed_over += u64::from(!before.is_rendered);
+            ahead.is_rendered |= late >= -ON_TICK;
             self.before = Some(ahead);
             if late >= -ON_TICK {
                 return Ok(Some(self.tick_at(&ahead.row)));
@@ -89,8 +89,8 @@ where
             return Err(self.mistimed(TimeFault::TooLarge(row.t_s)));
         }
         (self.due.begin_s, self.due.next) = (row.t_s, 0);
-        let is_felt = true;
-        self.before = Some(Timed { is_felt, ..row });
+        let is_rendered = true;
+        self.before = Some(Timed { is_rendered, ..row });
         Ok(self.tick_at(&row.row))
     }
 
@@ -120,7 +120,7 @@ where
         loop {
             let row = self.read()?;
             let Some((row, t_s)) = row.and_then(|row| Some((row, row.t_s?))) else {
-                self.counts.passed_over += u64::from(!before.is_felt);
+                self.counts.passed_over += u64::from(!before.is_rendered);
                 return Ok(match is_begin && repeated > 0 {
                     true => self.without_times(before, repeated, None),
                     false => Next::End,
@@ -141,7 +141,7 @@ where
         }
     }
 
-    /// Feels rows as ticks from now on: the first row was felt, and those after it have its time.
+    /// Takes rows as ticks from now on: the first row was rendered, and those after it have its time.
     fn without_times(&mut self, first: &Timed, repeated: u64, row: Option<Row>) -> Next {
         self.counts.untimed = Some(Untimed::Same(first.t_s));
         self.pace = Pace::RowByRow;
@@ -191,7 +191,7 @@ impl Timed {
         Self {
             row,
             t_s,
-            is_felt: false,
+            is_rendered: false,
         }
     }
 }

@@ -3,10 +3,10 @@
 //! Tick `n` is at `t_s` of the first row plus `n` divided by the tick rate; the last one is not
 //! later than the last row. The HIP of a tick is that of the row at its time, bit for bit, if there
 //! is one within a hundredth of a tick; else it lies on the straight line between the rows before and after
-//! it, passed at a constant speed. Rows between two ticks are not felt, as an arm's encoders are
+//! it, passed at a constant speed. Rows between two ticks are not rendered, as an arm's encoders are
 //! not read between them.
 //!
-//! So a path whose rows are a tick apart is felt row by row. The rows of a recording are whole
+//! So a path whose rows are a tick apart is rendered row by row. The rows of a recording are whole
 //! ticks apart, mostly one: a device sends a sample a millisecond, and some may be lost on the
 //! link.
 
@@ -29,7 +29,7 @@ const ON_TICK: f64 = 0.01;
 pub enum Pace {
     /// By the rows' own times. A file without times has one row a tick.
     ByTime,
-    /// By the rows' own times, which are whole ticks: those of a recording that is felt with its
+    /// By the rows' own times, which are whole ticks: those of a recording that is rendered with its
     /// settings. Nothing is filled in between two views and in gaps of more than 2 s.
     Recorded,
     /// One row a tick, whatever times they have.
@@ -43,7 +43,7 @@ pub struct Row {
     pub t_s: Option<f64>,
     /// Position of the HIP, mm: east, north, up.
     pub hip_mm: [f64; 3],
-    /// The view that it was felt in; 0 for the view of the beginning, or where there is no other.
+    /// The view that it was rendered in; 0 for the view of the beginning, or where there is no other.
     pub view: u32,
 }
 

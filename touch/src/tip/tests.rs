@@ -89,7 +89,7 @@ fn centre(block: &Samples, [u, v]: [f64; 2], radius: f64) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// A ball over heights by column and row, which is felt from the node on the sample at zero on.
+/// A ball over heights by column and row, which is rendered from the node on the sample at zero on.
 struct Rest {
     /// Haptic cells a cell.
     parts: usize,
@@ -117,14 +117,14 @@ impl Rest {
             heights: heights.iter().map(|height| height * scale).collect(),
         };
         let heights: Vec<_> = all.collect();
-        let felt = f64::from(ball.parts());
-        let centres = ball.centres(&block(felt, &heights), nodes);
+        let haptic = f64::from(ball.parts());
+        let centres = ball.centres(&block(haptic, &heights), nodes);
         Self {
             parts,
             halo: ball.halo(),
             block: block(1.0, &heights),
             side,
-            centres: centres.iter().map(|centre| centre / felt).collect(),
+            centres: centres.iter().map(|centre| centre / haptic).collect(),
         }
     }
 

@@ -8,13 +8,13 @@ use hapterra_view_stream::{Layer, Scene, TILE_CELLS};
 ///
 /// Another view of the terrain has other millimetres. In the picture the terrain stays where
 /// it is, and what is told in those millimetres comes to lie on it. Heights are drawn as
-/// they are felt, exaggerated or not.
+/// they are rendered, exaggerated or not.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ground {
     /// The picture's origin, from the south-west sample.
     origin: [f64; 2],
     home_mm: [f64; 3],
-    /// Level of detail that is felt.
+    /// Level of detail that is rendered.
     level: u8,
     /// Side of a cell of level 0.
     cell: f64,
@@ -124,7 +124,7 @@ impl Ground {
         mm.iter().map(|mm| mm * self.up_per_mm as f32).collect()
     }
 
-    /// Cells of level 0 in a felt one, along a side.
+    /// Cells of level 0 in a rendered cell, along a side.
     pub(super) fn haptic_cell(&self) -> i32 {
         1_i32.checked_shl(self.level.into()).unwrap_or(i32::MAX)
     }

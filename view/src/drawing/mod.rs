@@ -4,7 +4,7 @@
 //! | entity | what it is | when |
 //! | --- | --- | --- |
 //! | `/terrain/LAYER/BLOCK` | a block of a coarse layer, with its relief as texture | stands; its triangles change where tiles are shown |
-//! | `/terrain/tiles/SLOT` | a tile as it is felt | stands until another takes its slot |
+//! | `/terrain/tiles/SLOT` | a tile as it is rendered | stands until another takes its slot |
 //! | `/terrain/held/SLOT`, `/terrain/awaited` | outlines of the tiles that the device holds and lacks | stands until they are others |
 //! | `/hand/proxy`, `hip`, `ray`, `force`, `trace` | the hand | 60 a second |
 //! | `/frame/border`, `corners`, `bar` | a frame around the hand, its coordinates, a scale bar | stands until the hand leaves it |
@@ -94,7 +94,7 @@ impl Drawing {
         self.plots.finish(&self.log)
     }
 
-    /// Returns true if samples come as they are felt.
+    /// Returns true if samples come as they are rendered.
     #[must_use]
     pub fn is_live(&self) -> bool {
         self.scene.is_live
@@ -122,7 +122,7 @@ impl Drawing {
         })
     }
 
-    /// Goes over to another view of the same terrain. What was felt before stays.
+    /// Goes over to another view of the same terrain. Earlier samples stay.
     fn change(&mut self, scene: Scene, entries: &mut Vec<Entry>) -> Result<()> {
         let log = &self.log;
         let ground = self.ground.after(&scene);
@@ -142,7 +142,7 @@ impl Drawing {
         Ok(())
     }
 
-    /// The terrain as it is felt from now on, and the eye as near as it is large.
+    /// The terrain as it is rendered from now on, and the eye as near as it is large.
     fn look_at(&mut self, scene: &Scene, ground: &Ground, entries: &mut Vec<Entry>) -> Result<()> {
         let log = &self.log;
         if !scene.keeps_tiles {

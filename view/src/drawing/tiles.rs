@@ -1,4 +1,4 @@
-//! Tiles as they are felt, and outlines of those that the device holds and lacks.
+//! Tiles as they are rendered, and outlines of those that the device holds and lacks.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -16,9 +16,9 @@ pub enum Message {
     /// Scene and its size in the hand; a later one is another view of the same terrain, in whose
     /// millimetres the tiles and samples after it are.
     Scene(Box<Scene>),
-    /// A part of the terrain, coarser than it is felt.
+    /// A part of the terrain, coarser than it is rendered.
     Layer(Layer),
-    /// A tile as it is felt.
+    /// A tile as it is rendered.
     Tile(Tile),
     /// Which tiles the device holds and lacks.
     Tiles(Tiles),
@@ -46,7 +46,7 @@ pub struct Scene {
     pub title: String,
     /// Place, scale and device, for people: a name and what there is to say.
     pub facts: Vec<(String, String)>,
-    /// True if samples come as they are felt. A recording is there as a whole.
+    /// True if samples come as they are rendered. A recording is there as a whole.
     pub is_live: bool,
     /// True if the device keeps the tiles of the view before.
     pub keeps_tiles: bool,
@@ -125,7 +125,7 @@ pub struct Layer {
 pub struct Tile {
     /// Its slot; a later tile in the same slot replaces it.
     pub slot: u32,
-    /// Column and row among the tiles of the felt level.
+    /// Column and row among the tiles of the rendered level.
     pub index: [i32; 2],
     /// [`TILE_POSTS`]² heights, mm, row by row from the south, the first one cell south
     /// and west of the tile's own first; NaN in a hole and off the data.

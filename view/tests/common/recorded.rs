@@ -223,11 +223,11 @@ pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: b
             true => z / unit * first[1] / first[0],
             false => z / cell,
         };
-        let felt = [x / cell, y / cell, upright];
+        let in_cells = [x / cell, y / cell, upright];
         let place = place[0].map(f64::from);
-        let (cells_at, place_at) = *cells.get_or_insert((felt, place));
+        let (cells_at, place_at) = *cells.get_or_insert((in_cells, place));
         let [east, north, up] = [0, 1, 2].map(|i| place[i] - place_at[i]);
-        let [x, y, z] = [0, 1, 2].map(|i| csv.units * (felt[i] - cells_at[i]));
+        let [x, y, z] = [0, 1, 2].map(|i| csv.units * (in_cells[i] - cells_at[i]));
         let off = [east - x, north - y, up - z];
         assert!(
             off.iter().all(|off| off.abs() < 2e-3 * csv.units),
@@ -235,7 +235,7 @@ pub fn check_views(csv: &Csv, shown: &BTreeMap<String, Vec<Chunk>>, stretched: b
         );
     }
     assert!(seen.iter().all(|count: &i32| *count > 10), "{seen:?}");
-    // Heights in the file's unit, whatever the hand felt.
+    // Heights in the file's unit, whatever the exaggeration.
     for (time, values) in &heights {
         let row = rows[time];
         let [_, unit] = csv.scales[csv.number(row, "view") as usize];

@@ -55,12 +55,12 @@ fn check_saved(site: &mut Site, folder: &str, least: usize) -> Option<String> {
     let line = site.text("command");
     let words: Vec<_> = line.split(' ').skip(1).collect();
     program("HAPTERRA", &saved, &words, &[])?;
-    let (felt, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
-    let touching = felt.iter().filter(|force| **force != [0; 3]).count();
-    println!("{} rows, {touching} with a force: {line}", felt.len());
-    assert!(touching > least, "{touching} of {}", felt.len());
-    assert_eq!(felt.len(), replayed.len());
-    let differing = felt.iter().zip(&replayed).position(|(a, b)| a != b);
+    let (rendered, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
+    let touching = rendered.iter().filter(|force| **force != [0; 3]).count();
+    println!("{} rows, {touching} with a force: {line}", rendered.len());
+    assert!(touching > least, "{touching} of {}", rendered.len());
+    assert_eq!(rendered.len(), replayed.len());
+    let differing = rendered.iter().zip(&replayed).position(|(a, b)| a != b);
     assert_eq!(differing, None, "{line}");
     Some(line)
 }

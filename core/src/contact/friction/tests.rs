@@ -1,4 +1,4 @@
-//! Friction as it is felt.
+//! Friction: the rendered forces.
 
 use std::vec::Vec;
 
@@ -31,10 +31,10 @@ fn step(
 }
 
 /// Tangential over normal force on a plane of these slopes.
-fn ratio(felt: &ContactOutput, slope: [f32; 2]) -> f32 {
+fn ratio(output: &ContactOutput, slope: [f32; 2]) -> f32 {
     let normal = Vec3::new(-slope[0], -slope[1], 1.0).normalize();
-    let pressed = felt.displacement.dot(normal);
-    (felt.displacement - normal * pressed).length() / pressed
+    let pressed = output.displacement.dot(normal);
+    (output.displacement - normal * pressed).length() / pressed
 }
 
 #[test]
@@ -49,10 +49,10 @@ fn on_a_plane_of_any_slope_it_slides_at_its_coefficient() {
                 let depth = (tick as f32 * 0.02 - 0.2).min(0.7);
                 (along * (0.013 * tick as f32) - normal * depth).to_array()
             });
-            let felt = step(Friction::coulomb(mu), plane, path);
-            for (hip, felt) in &felt[200..] {
-                assert_eq!(felt.state, ContactState::Touching);
-                let is = ratio(felt, slope);
+            let output = step(Friction::coulomb(mu), plane, path);
+            for (hip, output) in &output[200..] {
+                assert_eq!(output.state, ContactState::Touching);
+                let is = ratio(output, slope);
                 assert!(
                     (is / mu - 1.0).abs() < 1e-3,
                     "{slope:?}: {is} of {mu} at {hip:?}"
@@ -74,13 +74,13 @@ fn a_crease_in_the_middle_of_a_tick_lets_it_go_no_farther() {
                 let depth = (0.2 * tick as f32 - 0.3).min(0.5);
                 [x, 0.5, bend * (x - 4.0).max(0.0) - depth]
             });
-            for (hip, felt) in &step(Friction::coulomb(MU), roof, path)[8..] {
-                let [cell, _, _] = felt.proxy.cell();
-                let x = cell as f32 + felt.proxy.frac().x;
+            for (hip, output) in &step(Friction::coulomb(MU), roof, path)[8..] {
+                let [cell, _, _] = output.proxy.cell();
+                let x = cell as f32 + output.proxy.frac().x;
                 if (x - 24.0).abs() < 1e-3 {
                     continue; // on the crease, where there are two planes
                 }
-                let is = ratio(felt, [if x < 24.0 { 0.0 } else { bend }, 0.0]);
+                let is = ratio(output, [if x < 24.0 { 0.0 } else { bend }, 0.0]);
                 assert!(
                     (is / MU - 1.0).abs() < 0.031,
                     "{bend} {phase}: {is} at {hip:?}"
@@ -102,10 +102,10 @@ fn stuck_is_stuck_to_the_bit() {
             -depth + 0.03 * noise(3),
         ]
     });
-    let felt = step(Friction::coulomb(0.9), twisted, path);
-    let stuck = felt[300].1.proxy;
-    for (hip, felt) in &felt[300..] {
-        assert_eq!(felt.proxy, stuck, "{hip:?}");
+    let output = step(Friction::coulomb(0.9), twisted, path);
+    let stuck = output[300].1.proxy;
+    for (hip, output) in &output[300..] {
+        assert_eq!(output.proxy, stuck, "{hip:?}");
     }
 }
 
@@ -120,12 +120,12 @@ fn static_friction_holds_until_it_breaks_and_comes_back_after_a_rest() {
     let push = (0..200).map(|tick| [0.01 * tick as f32, 0.5, -1.0]);
     let rest = (0..50).map(|_| [1.99, 0.5, -1.0]);
     let again = (0..100).map(|tick| [1.99 + 0.01 * tick as f32, 0.5, -1.0]);
-    let felt = step(
+    let output = step(
         friction,
         |_, _| 0.0,
         press.chain(push).chain(rest).chain(again),
     );
-    let lag = |tick: usize| -felt[tick].1.displacement.x;
+    let lag = |tick: usize| -output[tick].1.displacement.x;
     assert!((lag(178) - 0.78).abs() < 1e-4, "{}", lag(178));
     assert!((lag(190) - 0.3).abs() < 1e-4, "it broke away: {}", lag(190));
     let most = (355..450).map(lag).fold(0.0, f32::max);
@@ -141,9 +141,9 @@ fn an_encoder_count_now_and_then_does_not_make_it_stick() {
     };
     let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
     let push = (0..2_000).map(|tick| [(tick / 8) as f32 * 0.03, 0.5, -1.0]);
-    let felt = step(friction, |_, _| 0.0, press.chain(push));
-    for (hip, felt) in &felt[600..] {
-        assert!(-felt.displacement.x < 0.301, "{hip:?}: {felt:?}");
+    let output = step(friction, |_, _| 0.0, press.chain(push));
+    for (hip, output) in &output[600..] {
+        assert!(-output.displacement.x < 0.301, "{hip:?}: {output:?}");
     }
 }
 
@@ -173,8 +173,8 @@ fn a_steady_hand_breaks_away_once_at_every_cell_size() {
                 };
                 let depth_mm = if tick == 0 { -1.0 } else { 2.0 };
                 let hip = at([at_mm / cell_mm, 0.5, -depth_mm / cell_mm]);
-                let felt = contact.step(&field.window, &hip);
-                let trails_mm = -felt.displacement.x * cell_mm;
+                let output = contact.step(&field.window, &hip);
+                let trails_mm = -output.displacement.x * cell_mm;
                 breaks += i32::from(trailed_mm - trails_mm > 0.3);
                 trailed_mm = trails_mm;
             }
@@ -193,8 +193,8 @@ fn the_viscous_part_grows_with_the_speed() {
     for speed in [0.002_f32, 0.01] {
         let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
         let push = (0..600).map(|tick| [speed * tick as f32, 0.5, -1.0]);
-        let felt = step(friction, |_, _| 0.0, press.chain(push));
-        let lag = -felt[690].1.displacement.x;
+        let output = step(friction, |_, _| 0.0, press.chain(push));
+        let lag = -output[690].1.displacement.x;
         let expected = 0.2 + 0.02 * speed * 1e3;
         assert!((lag / expected - 1.0).abs() < 1e-3, "{lag} for {expected}");
     }
@@ -205,21 +205,21 @@ fn lifting_never_drags() {
     let press = (0..100).map(|tick| [0.0, 0.5, 0.5 - 0.015 * tick as f32]);
     let push = (0..100).map(|tick| [0.01 * tick as f32, 0.5, -1.0]);
     let lift = (0..100).map(|tick| [1.0, 0.5, -1.0 + 0.02 * tick as f32]);
-    let felt = step(
+    let output = step(
         Friction::coulomb(0.5),
         |_, _| 0.0,
         press.chain(push).chain(lift),
     );
-    for (hip, felt) in &felt[200..] {
+    for (hip, output) in &output[200..] {
         let depth = (-hip[2]).max(0.0);
         let most = 0.5 * depth + 1e-5;
         assert!(
-            felt.displacement.truncate().length() <= most,
-            "{hip:?}: {felt:?}"
+            output.displacement.truncate().length() <= most,
+            "{hip:?}: {output:?}"
         );
-        assert!(felt.displacement.z >= 0.0);
+        assert!(output.displacement.z >= 0.0);
     }
-    assert_eq!(felt[299].1.state, ContactState::Free);
+    assert_eq!(output[299].1.state, ContactState::Free);
 }
 
 #[test]
@@ -270,10 +270,10 @@ fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
         let x = 12.0 * (turn * 1.3).sin();
         let z = if tick == 0 { 2.0 } else { -0.3 };
         let hip = at([x, 12.0 * turn.cos(), z]);
-        let felt = contact.step(&field.window, &hip);
-        if felt.state == ContactState::Touching {
+        let output = contact.step(&field.window, &hip);
+        if output.state == ContactState::Touching {
             touches += 1;
-            late += i32::from(!felt.converged);
+            late += i32::from(!output.converged);
         }
     }
     assert!(
@@ -297,8 +297,8 @@ fn a_proxy_that_trails_a_far_hip_does_not_go_for_it() {
         for phase in 0..50 {
             let from = 0.01 * phase as f32;
             let path = [on(from, -1.0), on(from, depth), on(36.0, depth)];
-            let felt = step(friction, plane, path);
-            let trails = felt[2].1.displacement.length();
+            let output = step(friction, plane, path);
+            let trails = output[2].1.displacement.length();
             assert!(trails > 39.0, "{depth} {from}: {trails} of 41");
         }
     }

@@ -23,7 +23,7 @@ pub(super) struct Landing {
 
 impl Contact {
     /// A contact whose proxy begins on the surface over the column of a place, with the
-    /// HIP as far from it as `displacement` says, cells. Nothing is felt before the terrain
+    /// HIP as far from it as `displacement` says, cells. No force is rendered before the terrain
     /// there is known, and [`Contact::land`] has said where that puts the HIP.
     #[must_use]
     pub fn landing(settings: ContactSettings, at: GridPoint, displacement: Vec3) -> Self {

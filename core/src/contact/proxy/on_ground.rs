@@ -25,7 +25,7 @@ pub(super) enum Came {
     AsFarAsWork,
 }
 
-/// A point of the surface that is felt.
+/// The touched point of the surface.
 pub(super) struct SurfaceContact {
     pub(super) point: SurfacePoint,
     /// Its place.
@@ -102,12 +102,12 @@ impl Contact {
         if self.rough.is_some() {
             return self.is_held_at(window, hip, point, came, budget);
         }
-        let felt = SurfaceContact {
+        let touched = SurfaceContact {
             point,
             proxy: view.position(&point, z),
             displacement: view.displacement(&point, z),
         };
-        self.touches_at(window, hip, felt, came, budget)
+        self.touches_at(window, hip, touched, came, budget)
     }
 
     /// The answer in contact, faded where the surface ends.
@@ -115,7 +115,7 @@ impl Contact {
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
-        felt: SurfaceContact,
+        touched: SurfaceContact,
         came: Came,
         budget: &mut Budget,
     ) -> Turn {
@@ -123,7 +123,7 @@ impl Contact {
         let Phase::OnSurface(on) = &mut self.phase else {
             return Turn::Ends;
         };
-        let point = felt.point;
+        let point = touched.point;
         let mut may_follow = self.settings.fast_paths;
         // What is left over of a tick is no tick of its own.
         if came != Came::AsFarAsWork {
@@ -136,7 +136,7 @@ impl Contact {
             }
         }
         let converged = came == Came::ToRest;
-        let displacement = felt.displacement * on.fade;
+        let displacement = touched.displacement * on.fade;
         // A proxy that has stayed in its patch is likely to stay for another tick.
         let [x, y, _] = self.output.proxy.cell();
         let stayed = point.cell == Cell::new(x, y);
@@ -150,20 +150,20 @@ impl Contact {
         }
         // Field by field: a whole answer would be made elsewhere first, and copied.
         self.output.state = ContactState::Touching;
-        self.output.proxy = felt.proxy;
+        self.output.proxy = touched.proxy;
         self.output.displacement = displacement;
         self.output.converged = converged;
         Turn::Ends
     }
 
-    /// The contact is lost: what was felt fades away where it was.
+    /// The contact is lost: its last force fades out in place.
     pub(super) fn loses_contact<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
         hip: GridPoint,
         budget: &mut Budget,
     ) -> Turn {
-        let Some((proxy, displacement)) = self.felt else {
+        let Some((proxy, displacement)) = self.touched else {
             return self.looks_around(window, hip, budget);
         };
         self.phase = Phase::Releasing {

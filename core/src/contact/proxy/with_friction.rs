@@ -243,18 +243,18 @@ impl Contact {
         let Some(proxy) = position_on(window, &point) else {
             return Turn::Ends;
         };
-        let felt = SurfaceContact {
+        let touched = SurfaceContact {
             point,
             proxy,
             displacement: hip.to(&proxy),
         };
-        self.touches_at(window, hip, felt, came, budget)
+        self.touches_at(window, hip, touched, came, budget)
     }
 
     /// Counts how long the proxy has not moved, by the answers that count, and whether the next
     /// answer is this one again.
     fn counts_stillness(&mut self) {
-        let before = self.felt.map(|(proxy, _)| proxy);
+        let before = self.touched.map(|(proxy, _)| proxy);
         let tick_s = self.settings.rate.tick_s();
         let least_way = self.settings.sticks_below * tick_s;
         let Some(rough) = &mut self.rough else { return };

@@ -9,7 +9,7 @@ use crate::terrain::index::{TILE_CELLS, TileIndex};
 use crate::terrain::tile::Tile;
 use crate::terrain::tile_blend::{Allowance, TileBlend, within};
 
-/// A height that is felt at a sample, and whether it is a tile's.
+/// A height that is rendered at a sample, and whether it is a tile's.
 #[derive(Clone, Copy)]
 struct BlendedHeight {
     height: f32,
@@ -45,11 +45,11 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Takes a tile that was asked for: one of the field, or of the fallback. Gives back a buffer,
     /// if one is left over.
     ///
-    /// `felt` are the cells of proxy and HIP. A tile of the field settles where what is felt there
+    /// `blended` are the cells of proxy and HIP. A tile of the field settles where the surface rendered there
     /// depends on it: it, or one beside it that is not the surface, has one of them. Any other
     /// is the surface at once, as with [`Self::install`].
     #[must_use]
-    pub fn take(&mut self, tile: &'t mut Tile, felt: [Cell; 2]) -> Option<&'t mut Tile> {
+    pub fn take(&mut self, tile: &'t mut Tile, blended: [Cell; 2]) -> Option<&'t mut Tile> {
         if !self.fallback.is_wanted() {
             return Some(self.install(tile));
         }
@@ -64,7 +64,7 @@ impl<'t, const D: usize> Window<'t, D> {
         };
         let settles = tile
             .key()
-            .is_some_and(|key| felt.into_iter().any(|cell| depends(cell, key.index)));
+            .is_some_and(|key| blended.into_iter().any(|cell| depends(cell, key.index)));
         Some(self.put(tile, settles))
     }
 
@@ -112,7 +112,7 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// A tile has come into the slot of `index`: it settles if it is to, and the fallback was felt
+    /// A tile has come into the slot of `index`: it settles if it is to, and the fallback was rendered
     /// there. One that was there before goes on as it was.
     pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
         let (row, col) = TileBlend::<D>::slot(index);
@@ -133,7 +133,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Returns the largest distance of a tile's samples from the coarse fallback, cells; `None` where that is not rendered.
     fn far(&self, tile: &Tile, index: TileIndex) -> Option<f32> {
         let [lowest, highest] = tile.range()?;
-        let [low, high] = self.fallback.felt()?.range_over(index, tile.base())?;
+        let [low, high] = self.fallback.loaded()?.range_over(index, tile.base())?;
         let far = larger(highest - low, high - lowest);
         (far > 0.0).then_some(far)
     }
@@ -142,7 +142,7 @@ impl<'t, const D: usize> Window<'t, D> {
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_ground(&self, cell: Cell) -> CellContent {
-        let Some(under) = self.fallback.felt() else {
+        let Some(under) = self.fallback.loaded() else {
             return CellContent::Missing;
         };
         let index = TileIndex::holding(cell);
@@ -153,8 +153,8 @@ impl<'t, const D: usize> Window<'t, D> {
         let alone = match own {
             Some(tile) => {
                 let (own, allowed) = (tile.corners(cell), self.tile_blend.allowed(index));
-                let felt = |corner: usize| within(own[corner], coarse[corner], allowed);
-                [felt(0), felt(1), felt(2), felt(3)]
+                let blended = |corner: usize| within(own[corner], coarse[corner], allowed);
+                [blended(0), blended(1), blended(2), blended(3)]
             }
             None => coarse,
         };
@@ -171,7 +171,7 @@ impl<'t, const D: usize> Window<'t, D> {
         }
     }
 
-    /// Puts the heights that are felt at the corners of a cell which are on its tile's border in the
+    /// Puts the heights that are rendered at the corners of a cell which are on its tile's border in the
     /// place of those that `alone` has, with or without its tile. Returns whether every corner without
     /// a height is one of a tile.
     #[inline(never)]
@@ -186,24 +186,24 @@ impl<'t, const D: usize> Window<'t, D> {
         let mut are_of_tiles = true;
         for (corner, height) in (0..).zip(heights) {
             let sample = cell.offset(corner & 1, corner >> 1);
-            let felt = match is_on_border(sample.x) || is_on_border(sample.y) {
-                true => self.felt(sample, coarse[corner as usize], base),
+            let blended = match is_on_border(sample.x) || is_on_border(sample.y) {
+                true => self.blended(sample, coarse[corner as usize], base),
                 false => BlendedHeight {
                     height: *height,
                     is_of_tile,
                 },
             };
-            *height = felt.height;
-            are_of_tiles &= felt.is_of_tile || !felt.height.is_nan();
+            *height = blended.height;
+            are_of_tiles &= blended.is_of_tile || !blended.height.is_nan();
         }
         are_of_tiles
     }
 
-    /// The height felt at a sample that several tiles may share, in cells above `base`.
+    /// The height rendered at a sample that several tiles may share, in cells above `base`.
     // A call: four copies of it would be a kilobyte.
     #[inline(never)]
-    fn felt(&self, sample: Cell, coarse: f32, base: i32) -> BlendedHeight {
-        let mut felt = BlendedHeight {
+    fn blended(&self, sample: Cell, coarse: f32, base: i32) -> BlendedHeight {
+        let mut blended = BlendedHeight {
             height: coarse,
             is_of_tile: false,
         };
@@ -223,13 +223,13 @@ impl<'t, const D: usize> Window<'t, D> {
                 let (col, row) = (sample.x - first.x, sample.y - first.y);
                 let own =
                     tile.post(col as usize, row as usize) + tile.base().wrapping_sub(base) as f32;
-                felt = BlendedHeight {
+                blended = BlendedHeight {
                     height: within(own, coarse, allowed),
                     is_of_tile: true,
                 };
             }
         }
-        felt
+        blended
     }
 
     /// The tile of the field in its slot, whether it is the surface or not.
@@ -256,11 +256,11 @@ impl<'t, const D: usize> Window<'t, D> {
             .material(patch, far)
     }
 
-    /// Returns true if what is felt in place of a tile is known to lie below `low`, all over the tile.
+    /// Returns true if the surface rendered in place of a tile lies below `low`, all over the tile.
     #[cold]
     #[inline(never)]
     pub(super) fn unsettled_is_below(&self, index: TileIndex, low: Altitude) -> bool {
-        let Some(under) = self.fallback.felt() else {
+        let Some(under) = self.fallback.loaded() else {
             return false;
         };
         // Where neither a tile nor the fallback has heights, anything may be.
@@ -268,7 +268,7 @@ impl<'t, const D: usize> Window<'t, D> {
         if !(is_known && under.is_below(low)) {
             return false;
         }
-        // A border that is shared is felt as the neighbour has it.
+        // A border that is shared is rendered as the neighbour has it.
         (0..9).all(|place| {
             let near = self.tile_here(index.offset(place % 3 - 1, place / 3 - 1));
             near.is_none_or(|tile| tile.is_below(low))

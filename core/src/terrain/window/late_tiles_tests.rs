@@ -124,18 +124,18 @@ impl<'t> Bed<'t> {
     }
 
     /// A tile arrives while the HIP is in that cell.
-    fn comes(&mut self, col: i32, row: i32, felt: Cell) {
+    fn comes(&mut self, col: i32, row: i32, rendered: Cell) {
         let key = TileKey::new(0, col, row);
         let tile = self.spare.pop().expect("a buffer");
         let height = |x, y| (hills(x, y) - f64::from(BASE)) as f32;
         tile.fill_from(key, BASE, SIZE, height).expect("in range");
-        if let Some(spent) = self.window.take(tile, [felt; 2]) {
+        if let Some(spent) = self.window.take(tile, [rendered; 2]) {
             if let Some(key) = spent.key() {
                 self.allowed.remove(&(key.index.col, key.index.row));
             }
             self.spare.push(spent);
         }
-        let at = TileIndex::holding(felt);
+        let at = TileIndex::holding(rendered);
         let apart = (at.col - col).abs().max((at.row - row).abs());
         let beside_one = self.allowed.get(&(at.col, at.row)) != Some(&f64::INFINITY);
         let settles = apart == 0 || (apart == 1 && beside_one);
@@ -155,7 +155,7 @@ impl<'t> Bed<'t> {
     }
 
     /// The model's height at a sample.
-    fn felt(&self, x: i32, y: i32) -> Option<f64> {
+    fn rendered(&self, x: i32, y: i32) -> Option<f64> {
         let sharing =
             [(0, 0), (-1, 0), (0, -1), (-1, -1)].map(|(i, j)| ((x + i) >> 5, (y + j) >> 5));
         let allowed = sharing.iter().filter_map(|tile| self.allowed.get(tile));
@@ -176,7 +176,7 @@ impl<'t> Bed<'t> {
         for x in tiles.start * 32..tiles.end * 32 {
             for y in tiles.start * 32..tiles.end * 32 {
                 let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
-                let model = corners.map(|(i, j)| self.felt(x + i, y + j));
+                let model = corners.map(|(i, j)| self.rendered(x + i, y + j));
                 match self.window.ground(Cell::new(x, y)) {
                     CellContent::Patch(Corners { base, heights }) => {
                         for (height, model) in heights.iter().zip(model) {
@@ -356,7 +356,11 @@ fn no_data_of_a_tile_acts_at_once() {
         })
     };
     assert_eq!(ground(&bed, 135, 150), patch(1.25), "it settles");
-    assert_eq!(ground(&bed, 140, 140), patch(2.0), "nothing was felt there");
+    assert_eq!(
+        ground(&bed, 140, 140),
+        patch(2.0),
+        "nothing was rendered there"
+    );
 }
 
 #[test]
@@ -446,9 +450,10 @@ fn clear_means_clear_over_what_has_not_settled() {
             .flat_map(|x| (span.from.y..=span.to.y + 1).map(move |y| (x, y)))
             .filter(|_| clear)
         {
-            let felt = bed.felt(x, y);
-            let is_below = felt.is_some_and(|felt| felt < f64::from(25 + step % 12) + 0.5);
-            assert!(is_below, "{span:?} {low:?} {x} {y} {felt:?}");
+            let rendered = bed.rendered(x, y);
+            let is_below =
+                rendered.is_some_and(|rendered| rendered < f64::from(25 + step % 12) + 0.5);
+            assert!(is_below, "{span:?} {low:?} {x} {y} {rendered:?}");
         }
     }
     assert!(seen[0] > 100 / EACH && seen[1] > 100 / EACH, "{seen:?}");
@@ -549,9 +554,9 @@ fn a_hand_that_holds_still_feels_the_surface_move_and_no_step() {
             dynamic_mu: mu,
             viscous_s: 0.0,
         };
-        let felt = held_still(friction, up, above);
+        let rendered = held_still(friction, up, above);
         let mut most = 0.0_f64;
-        for (tick, pair) in felt.windows(2).enumerate().skip(2) {
+        for (tick, pair) in rendered.windows(2).enumerate().skip(2) {
             let change = pair[1].0 - pair[0].0;
             let bound = 1.001 * f64::from(STEP) + 1e-5;
             assert!(change < bound, "{mu} {up} {above} {tick}: {pair:?}");
@@ -559,14 +564,14 @@ fn a_hand_that_holds_still_feels_the_surface_move_and_no_step() {
             assert!(mu > 0.0 || change > -bound, "{up} {above} {tick}: {pair:?}");
             most = most.max(change.abs());
         }
-        assert!(most > 1e-3, "something was felt: {most}");
-        let touches = |tick: usize| felt[tick].1 == ContactState::Touching;
+        assert!(most > 1e-3, "there was a force: {most}");
+        let touches = |tick: usize| rendered[tick].1 == ContactState::Touching;
         assert_eq!(touches(49), above < 0.0, "{mu} {up} {above}");
         assert_eq!(
             touches(299),
             up || above < -0.5,
             "{mu} {up} {above} {:?}",
-            felt[299]
+            rendered[299]
         );
     }
 }

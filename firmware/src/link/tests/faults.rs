@@ -16,8 +16,8 @@ use hapterra_core::wire::version::VersionCheck;
 use super::rig::{FIRST, HELLO, Rig, asked, frame, framed, point, scene, tile};
 
 /// Returns the forces of a descent's points; nothing about ticks and costs.
-fn forces(felt: &[(u32, TickRecord)]) -> Vec<(u32, hapterra_core::Vec3)> {
-    felt.iter().map(|(seq, s)| (*seq, s.force_n)).collect()
+fn forces(rendered: &[(u32, TickRecord)]) -> Vec<(u32, hapterra_core::Vec3)> {
+    rendered.iter().map(|(seq, s)| (*seq, s.force_n)).collect()
 }
 
 fn undisturbed() -> Vec<(u32, hapterra_core::Vec3)> {
@@ -490,9 +490,9 @@ fn every_flipped_bit_of_the_first_tile_costs_a_retry_and_nothing_else() {
         }
         rig.send(&bytes);
         rig.answers_tiles = true;
-        let felt = rig.descend(40);
-        assert_eq!(forces(&felt), undisturbed(), "bit {bit}");
-        assert!(felt.last().unwrap().1.tick > RETRY_TICKS, "bit {bit}");
+        let rendered = rig.descend(40);
+        assert_eq!(forces(&rendered), undisturbed(), "bit {bit}");
+        assert!(rendered.last().unwrap().1.tick > RETRY_TICKS, "bit {bit}");
     }
 }
 
@@ -504,9 +504,9 @@ fn a_dropped_byte_costs_a_retry_and_nothing_else() {
         bytes.remove(at);
         rig.send(&bytes);
         rig.answers_tiles = true;
-        let felt = rig.descend(40);
-        assert_eq!(forces(&felt), undisturbed(), "byte {at}");
-        assert!(felt.last().unwrap().1.tick > RETRY_TICKS, "byte {at}");
+        let rendered = rig.descend(40);
+        assert_eq!(forces(&rendered), undisturbed(), "byte {at}");
+        assert!(rendered.last().unwrap().1.tick > RETRY_TICKS, "byte {at}");
     }
 }
 
@@ -519,11 +519,11 @@ fn duplicated_frames_change_nothing() {
         rig.send(&[&*bytes, &*bytes].concat());
         rig.run(600);
     }
-    let mut felt = rig.felt();
+    let mut rendered = rig.rendered();
     // The second of each pair is answered, too, with the same words.
-    assert!(felt.len() >= 40);
-    felt.dedup();
-    assert_eq!(forces(&felt), undisturbed());
+    assert!(rendered.len() >= 40);
+    rendered.dedup();
+    assert_eq!(forces(&rendered), undisturbed());
 }
 
 #[test]
@@ -532,7 +532,7 @@ fn lost_answer_is_repeated_without_another_step() {
     let first = rig.descend(3)[2];
     rig.send(&point(2, 1.8, 3.8));
     rig.run(2);
-    assert_eq!(rig.felt()[3..], [first]);
+    assert_eq!(rig.rendered()[3..], [first]);
 }
 
 #[test]
@@ -542,11 +542,11 @@ fn a_point_repeated_while_it_is_felt_is_felt_once() {
         rig.send(&point(0, 0.0, 2.0));
         rig.run(5);
     }
-    assert_eq!(rig.felt(), [], "its tile is not there yet");
+    assert_eq!(rig.rendered(), [], "its tile is not there yet");
     rig.send(&tile(7, rig.needs()[0]));
     rig.answers_tiles = true;
     rig.run(1000);
-    assert_eq!(rig.felt().len(), 1);
+    assert_eq!(rig.rendered().len(), 1);
 }
 
 #[test]
@@ -566,7 +566,7 @@ fn a_tile_that_was_received_is_not_replaced_by_a_late_double() {
         })));
     }
     // The first point is answered twice.
-    let felt = rig.descend(40);
+    let rendered = rig.descend(40);
     let asked = rig.needs();
     let unique: HashSet<_> = asked
         .iter()
@@ -577,7 +577,7 @@ fn a_tile_that_was_received_is_not_replaced_by_a_late_double() {
         unique.len(),
         "nothing had to be asked for twice"
     );
-    assert_eq!(forces(&felt[1..]), undisturbed());
+    assert_eq!(forces(&rendered[1..]), undisturbed());
 }
 
 #[test]
@@ -674,11 +674,11 @@ fn tiles_of_another_scene_and_tiles_nobody_asked_for_are_dropped() {
     rig.send(&tile(7, unasked));
     rig.send(&point(0, 0.0, 2.0));
     rig.run(20);
-    assert_eq!(rig.felt(), [], "the point still waits for its tile");
+    assert_eq!(rig.rendered(), [], "the point still waits for its tile");
     rig.send(&tile(7, asked));
     rig.answers_tiles = true;
     rig.run(20);
-    assert_eq!(rig.felt().len(), 1);
+    assert_eq!(rig.rendered().len(), 1);
 }
 
 #[test]

@@ -81,15 +81,15 @@ fn answers(rig: &mut Rig, epoch: u32, materials: TileMaterials<'_>) {
 }
 
 /// The force in N, half a cell deep in the plane: half of the stiffness.
-fn felt(rig: &mut Rig) -> f32 {
-    let from = rig.felt().last().map_or(0, |(seq, _)| seq + 1);
+fn rendered(rig: &mut Rig) -> f32 {
+    let from = rig.rendered().last().map_or(0, |(seq, _)| seq + 1);
     for (seq, z) in [(from, 2.0), (from + 1, 1.0)] {
         let hip = GridPoint::new([100, 100, 0], Vec3::new(0.5, 0.5, z));
         rig.say(&ToDevice::Hip(HipCommand { seq, hip }));
         rig.run(4);
     }
-    let felt = rig.felt();
-    let (seq, sample) = felt.last().expect("felt");
+    let rendered = rig.rendered();
+    let (seq, sample) = rendered.last().expect("rendered");
     assert_eq!(*seq, from + 1);
     sample.force_n.z
 }
@@ -102,7 +102,7 @@ fn a_tile_is_felt_by_the_material_that_came_with_it() {
     answers(&mut rig, 9, TileMaterials::One(2));
     assert_eq!(rig.status().bad_frames, 0);
     // The scene is a quarter stiffer than the table's default, and so is all of it.
-    let force = felt(&mut rig);
+    let force = rendered(&mut rig);
     assert!((force - 0.5 * 0.8 * 0.5 / 0.4).abs() < 1e-6, "{force}");
     // Said again, because the answer was lost: what is held stays.
     rig.heard.clear();
@@ -130,7 +130,7 @@ fn tiles_whose_materials_are_missing_or_wrong_are_bad_frames() {
     assert_eq!(rig.status().bad_frames, 4);
     // Each buffer is there again.
     answers(&mut rig, 9, TileMaterials::One(1));
-    assert_eq!(felt(&mut rig), 0.5);
+    assert_eq!(rendered(&mut rig), 0.5);
     // And without materials a tile has none.
     let plain = scene(Source::Points);
     rig.heard.clear();
@@ -191,7 +191,7 @@ fn scenes_that_follow_each_other_at_once_have_each_their_own_table() {
     rig.run(20);
     assert!(is_taken(&rig, 5));
     answers(&mut rig, 5, TileMaterials::One(0));
-    assert_eq!(felt(&mut rig), 0.5);
+    assert_eq!(rendered(&mut rig), 0.5);
 }
 
 #[test]

@@ -186,7 +186,7 @@ impl Rig {
         rig
     }
 
-    /// A session in a scene felt through the arm, armed.
+    /// A session in a scene that is touched by the arm, armed.
     pub(super) fn armed() -> Self {
         let mut rig = Self::in_scene(scene(Source::Encoders));
         rig.arm();
@@ -318,12 +318,12 @@ impl Rig {
         self.heard.iter().filter_map(need).collect()
     }
 
-    pub(super) fn felt(&self) -> Vec<(u32, TickRecord)> {
-        let felt = |m: &ToHost| match m {
+    pub(super) fn rendered(&self) -> Vec<(u32, TickRecord)> {
+        let rendered = |m: &ToHost| match m {
             ToHost::PointAnswer { seq, sample } => Some((*seq, *sample)),
             _ => None,
         };
-        self.heard.iter().filter_map(felt).collect()
+        self.heard.iter().filter_map(rendered).collect()
     }
 
     pub(super) fn telemetry(&self) -> Vec<Telemetry> {
@@ -366,18 +366,18 @@ impl Rig {
         self.heard.iter().rev().find_map(status).expect("answered")
     }
 
-    /// Points from above down into the plane, fed one by one, as felt.
+    /// Points from above down into the plane, sent one by one, each after the answer to the one before.
     pub(super) fn descend(&mut self, points: u32) -> Vec<(u32, TickRecord)> {
         for seq in 0..points {
             let (x, z) = (seq as f32 * 0.9, 4.0 - seq as f32 * 0.1);
             self.send(&point_in(self.session, seq, x, z));
             for _ in 0..2000 {
                 self.run(1);
-                if self.felt().last().is_some_and(|(last, _)| *last == seq) {
+                if self.rendered().last().is_some_and(|(last, _)| *last == seq) {
                     break;
                 }
             }
         }
-        self.felt()
+        self.rendered()
     }
 }

@@ -26,11 +26,11 @@ fn introduces_itself() {
 #[test]
 fn a_replay_feels_every_point_once_and_in_order() {
     let mut rig = Rig::in_scene(scene(Source::Points));
-    let felt = rig.descend(40);
-    let numbers: Vec<u32> = felt.iter().map(|(seq, _)| *seq).collect();
+    let rendered = rig.descend(40);
+    let numbers: Vec<u32> = rendered.iter().map(|(seq, _)| *seq).collect();
     assert_eq!(numbers, Vec::from_iter(0..40));
     // The plane is at 1.5: point 30 is 0.5 below it.
-    let (_, sample) = felt[30];
+    let (_, sample) = rendered[30];
     assert_eq!(sample.state, ContactState::Touching);
     assert!((sample.force_n.z - 0.25).abs() < 1e-5, "{sample:?}");
 }
@@ -43,10 +43,10 @@ fn points_sent_ahead_are_felt_as_points_sent_singly() {
         ahead.send(&point(seq, seq as f32 * 0.9, 4.0 - seq as f32 * 0.1));
     }
     ahead.run(100);
-    let forces = |felt: Vec<(u32, TickRecord)>| -> Vec<_> {
-        felt.iter().map(|(_, s)| (s.proxy, s.force_n)).collect()
+    let forces = |rendered: Vec<(u32, TickRecord)>| -> Vec<_> {
+        rendered.iter().map(|(_, s)| (s.proxy, s.force_n)).collect()
     };
-    assert_eq!(forces(ahead.felt()), forces(singly));
+    assert_eq!(forces(ahead.rendered()), forces(singly));
 }
 
 #[test]

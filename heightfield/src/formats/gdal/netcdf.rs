@@ -88,7 +88,7 @@ impl Conventions {
             "down" => decoded.turn_depths_into_heights("positive is down"),
             "up" if is_depth => decoded.remarks.push(format!(
                 "its standard_name {} is a depth, and its attribute positive says up: heights are \
-                 felt as they are",
+                 rendered as they are",
                 self.name
             )),
             _ if is_depth => decoded.turn_depths_into_heights(&self.name),
@@ -99,14 +99,14 @@ impl Conventions {
         };
         let values = missing.trim_matches(['{', '}']).split(',');
         let numbers = values.filter_map(|value| value.trim().parse::<f64>().ok());
-        let felt: Vec<_> = (numbers.filter(|value| decoded.no_data != Some(*value)))
+        let heights: Vec<_> = (numbers.filter(|value| decoded.no_data != Some(*value)))
             .filter(|value| !value.is_nan())
             .map(|value| value.to_string())
             .collect();
-        if !felt.is_empty() {
+        if !heights.is_empty() {
             decoded.remarks.push(format!(
                 "its missing_value {} is read as a height: GDAL knows one no-data value (--input no-data=VALUE)",
-                felt.join(", ")
+                heights.join(", ")
             ));
         }
     }

@@ -15,7 +15,7 @@ const CELL_MM: f32 = 8.0;
 /// Cells along a side: half a metre, with the arm's zero pose over its middle.
 const CELLS: i32 = 64;
 
-/// Softest stiffness that can be felt, N/mm, and the most that the plane may push, N.
+/// Softest stiffness that can be rendered, N/mm, and the most that the plane may push, N.
 pub(super) const SOFT: SurfaceParams = SurfaceParams {
     stiffness_n_per_mm: 0.05,
     max_force_n: 0.5,

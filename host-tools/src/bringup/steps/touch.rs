@@ -47,12 +47,12 @@ pub(super) fn soft_plane(
     attendant: &mut dyn Attendant,
 ) -> Result<String, Halt> {
     super::armed_over_plane(board, attendant, BELOW_MM)?;
-    let felt = touched(board, attendant)?;
-    let (deep_mm, up_n) = felt.deepest;
+    let contact = touched(board, attendant)?;
+    let (deep_mm, up_n) = contact.deepest;
     let params = plane::SOFT;
     let expected_n = (params.stiffness_n_per_mm * deep_mm).min(params.max_force_n);
     let pushed = (0.5 * expected_n..=1.1 * expected_n).contains(&up_n);
-    if !pushed || felt.most_n > 1.01 * params.max_force_n {
+    if !pushed || contact.most_n > 1.01 * params.max_force_n {
         return Err(Finding::NoFloor.into());
     }
     board.trips(attendant, Task::PressStop, Fault::EmergencyStop)?;
@@ -78,31 +78,31 @@ pub(super) fn soft_plane(
 /// Condition for the end of a move.
 type IsDone = fn(&PlaneContact) -> bool;
 
-/// Lets the tip be lowered until it is deep enough, and lifted until nothing is felt.
+/// Lets the tip be lowered until it is deep enough, and lifted until there is no force.
 fn touched(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<PlaneContact, Halt> {
-    let mut felt = PlaneContact::default();
+    let mut contact = PlaneContact::default();
     // Deep enough, and not on its way any more.
-    let deep = |felt: &PlaneContact| {
-        felt.deepest.0 >= DEEP_MM && felt.deepest.0 - felt.looked_mm < STILL_MM
+    let deep = |contact: &PlaneContact| {
+        contact.deepest.0 >= DEEP_MM && contact.deepest.0 - contact.looked_mm < STILL_MM
     };
-    let free = |felt: &PlaneContact| felt.now_n == 0.0;
+    let free = |contact: &PlaneContact| contact.now_n == 0.0;
     let moves = [Task::LowerTip, Task::LiftTip];
     for (task, done) in moves.into_iter().zip([deep as IsDone, free]) {
         attendant.begin(task);
         for look in 0.. {
-            let status = board.look_with(&mut |sample| felt.take(sample))?;
+            let status = board.look_with(&mut |sample| contact.take(sample))?;
             if let Some(fault) = status.health.report.fault {
                 return Err(Finding::Fault(fault).into());
             }
-            if done(&felt) {
+            if done(&contact) {
                 break;
             }
-            felt.looked_mm = felt.deepest.0;
+            contact.looked_mm = contact.deepest.0;
             if look > LOOKS {
                 board.ask(&Request::Disarm)?;
                 return Err(Finding::NotSeen(task).into());
             }
         }
     }
-    Ok(felt)
+    Ok(contact)
 }

@@ -114,7 +114,7 @@ pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     );
     if let Some(worst) = view
         .worst_reached(terrain.grid())
-        .filter(Distortion::is_felt)
+        .filter(Distortion::is_noticeable)
     {
         let (off, place) = (off_in_words(&worst), place_in_words(&file, worst.ground));
         let remedy = match terrain.grid().is_distorted() {

@@ -235,7 +235,7 @@ impl<'t> PlacementControl<'t> {
         made.into_iter().map(mark).collect()
     }
 
-    /// The view that is to be put in now, which samples may be felt in from now on.
+    /// The view that is to be put in now, which samples may be rendered in from now on.
     pub(in crate::cli) fn put(&mut self, views: &mut Placements<'t>) -> Option<Put<'t>> {
         let put = self.steering.take_put()?;
         views.put(put.view.number, put.terrain.clone(), put.laid);

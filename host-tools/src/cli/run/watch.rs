@@ -149,22 +149,22 @@ impl<'t> Watch<'t> {
 
     fn record(&mut self, sample: &TickRecord) -> Record {
         let record = self.log.take(sample);
-        let (view, felt) = self.log.view();
+        let (view, placement) = self.log.view();
         if let Some(shown) = &mut self.shown {
-            shown.take(sample, &record, (view, felt));
+            shown.take(sample, &record, (view, placement));
         }
         if let Some(events) = &mut self.events {
-            events.take(sample, &record, (view, &felt.terrain));
+            events.take(sample, &record, (view, &placement.terrain));
         }
         if view > self.described
-            && let Some(laid) = &felt.laid
+            && let Some(laid) = &placement.laid
         {
             self.described = view;
             self.device_console
-                .tell(steering::told(view, laid, &felt.terrain));
+                .tell(steering::told(view, laid, &placement.terrain));
             if let Some(recording) = &mut self.recording {
                 let number = u32::try_from(view).unwrap_or(u32::MAX);
-                let settings = PlacementSettings::new(number, &felt.terrain, laid);
+                let settings = PlacementSettings::new(number, &placement.terrain, laid);
                 let failed = recording.view(&settings).err();
                 self.failed = self.failed.take().or(failed);
             }
@@ -242,8 +242,8 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
         let Some((sample, record)) = &self.latest else {
             return;
         };
-        let (_, felt) = self.log.view();
-        let mut line = in_words(sample, record, &felt.terrain, tally);
+        let (_, placement) = self.log.view();
+        let mut line = in_words(sample, record, &placement.terrain, tally);
         if self.log.views().count() > 1 {
             line += &format!("  [{}]", self.control.in_words());
         }

@@ -27,8 +27,8 @@ pub(super) fn settings(
         tip_mm,
         measured_at,
         ..
-    } = &recorded.felt;
-    let exaggeration = height(&recorded.felt, scale, stated_cells.unwrap_or(*cells));
+    } = &recorded.rendered;
+    let exaggeration = height(&recorded.rendered, scale, stated_cells.unwrap_or(*cells));
     let max_force = FORCE.say(recorded.force.max_force_n);
     let mut options: Vec<(&str, OsString)> = vec![
         ("input", in_words(*cells).into()),
@@ -55,14 +55,14 @@ pub(super) fn settings(
 
 /// The recorded height, at the scale that the user states. Cells of another kind have another size on
 /// the ground: there the factor keeps the proportions.
-fn height(felt: &RenderedTerrain, scale: Option<MapScale>, cells: HapticCells) -> Exaggeration {
+fn height(rendered: &RenderedTerrain, scale: Option<MapScale>, cells: HapticCells) -> Exaggeration {
     let cell_mm = match scale {
-        None => Some(felt.cell_mm),
-        Some(scale) => scale.cell_mm(felt.cell_m),
+        None => Some(rendered.cell_mm),
+        Some(scale) => scale.cell_mm(rendered.cell_m),
     };
-    match (felt.exaggeration, cell_mm) {
-        (Some(times), _) if cells != felt.cells => Exaggeration::Times(times),
-        (_, Some(cell_mm)) => Exaggeration::MmPerUnit(felt.height_at_cell_mm(cell_mm)),
+    match (rendered.exaggeration, cell_mm) {
+        (Some(times), _) if cells != rendered.cells => Exaggeration::Times(times),
+        (_, Some(cell_mm)) => Exaggeration::MmPerUnit(rendered.height_at_cell_mm(cell_mm)),
         (times, None) => Exaggeration::Times(times.unwrap_or(1.0)),
     }
 }
@@ -81,7 +81,7 @@ pub(in crate::cli) fn differences(
     cells: HapticCells,
     (path, recorded): (&Path, &Settings),
 ) -> Vec<String> {
-    let (felt, force, surface) = (&recorded.felt, &recorded.force, &rendering.surface);
+    let (rendered, force, surface) = (&recorded.rendered, &recorded.force, &rendering.surface);
     let number = |name: &str, value: Option<f32>, recorded: f32, say: &dyn Fn(f32) -> String| {
         (
             name.to_owned(),
@@ -89,17 +89,17 @@ pub(in crate::cli) fn differences(
             say(recorded),
         )
     };
-    let recorded_height = height(felt, rendering.scale, cells);
+    let recorded_height = height(rendered, rendering.scale, cells);
     let exaggeration = rendering.exaggeration.unwrap_or(recorded_height);
-    let recorded_height = match (exaggeration, felt.exaggeration) {
+    let recorded_height = match (exaggeration, rendered.exaggeration) {
         (Exaggeration::MmPerUnit(_), _) => recorded_height.to_string(),
         (_, Some(times)) => times.to_string(),
         (_, None) => "an unknown one".to_owned(),
     };
-    let scale = MapScale::CellMm(felt.cell_mm);
+    let scale = MapScale::CellMm(rendered.cell_mm);
     let stated_scale = rendering.scale.unwrap_or(scale);
-    let level = rendering.level.unwrap_or(felt.level);
-    let tip_mm = rendering.tip.unwrap_or(felt.tip_mm);
+    let level = rendering.level.unwrap_or(rendered.level);
+    let tip_mm = rendering.tip.unwrap_or(rendered.tip_mm);
     let materials = recorded.materials.as_ref().map(|it| it.file.clone().into());
     let shown = |file: &Option<PathBuf>| {
         let file = file.as_ref().map(|file| file.display().to_string());
@@ -110,7 +110,7 @@ pub(in crate::cli) fn differences(
         (
             "input".into(),
             in_words(cells).into(),
-            in_words(felt.cells).into(),
+            in_words(rendered.cells).into(),
         ),
         ("scale".into(), stated_scale.to_string(), scale.to_string()),
         (
@@ -118,8 +118,16 @@ pub(in crate::cli) fn differences(
             exaggeration.to_string(),
             recorded_height,
         ),
-        ("level".into(), level.to_string(), felt.level.to_string()),
-        ("tip".into(), LENGTH.say(tip_mm), LENGTH.say(felt.tip_mm)),
+        (
+            "level".into(),
+            level.to_string(),
+            rendered.level.to_string(),
+        ),
+        (
+            "tip".into(),
+            LENGTH.say(tip_mm),
+            LENGTH.say(rendered.tip_mm),
+        ),
         (
             "surface".into(),
             surface_in_words(surface.surface.as_ref(), path),

@@ -41,7 +41,7 @@ impl Csv {
         self.remark(&mark.to_toml());
     }
 
-    /// Says between two rows that the rows from here on were felt in another view. What
+    /// Says between two rows that the rows from here on were rendered in another view. What
     /// passes comments over passes it over, and all comments together are the settings.
     pub(super) fn view(&mut self, view: &PlacementSettings) -> Result<(), OutputError> {
         self.flush()?;

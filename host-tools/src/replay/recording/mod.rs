@@ -1,4 +1,4 @@
-//! Recordings: one row a tick, with what was felt, and the settings with which it was.
+//! Recordings: one row a tick, and the settings of the session.
 //!
 //! CSV, or Parquet where the file's name ends in `.parquet`. Both have the same columns
 //! and the same settings.
@@ -148,7 +148,7 @@ impl Recording {
         Ok(Self(form))
     }
 
-    /// Says with which settings the rows were felt: before the first row.
+    /// Says with which settings the rows were rendered: before the first row.
     pub fn describe(&mut self, settings: &Settings) {
         match &mut self.0 {
             Form::Csv(csv) => csv.describe(settings),
@@ -156,7 +156,7 @@ impl Recording {
         }
     }
 
-    /// Says that the rows from here on were felt in another view.
+    /// Says that the rows from here on were rendered in another view.
     ///
     /// # Errors
     /// When the file cannot be written.

@@ -153,8 +153,12 @@ fn rates_from_1_hz_to_100_khz_last_as_long() {
             hz < 20,
             "{hz} Hz: {remarks}"
         );
-        let unfelt = "18000 of 20001 rows lie between two ticks and are not rendered";
-        assert_eq!(remarks.contains(unfelt), hz == 10_000, "{hz} Hz: {remarks}");
+        let not_rendered = "18000 of 20001 rows lie between two ticks and are not rendered";
+        assert_eq!(
+            remarks.contains(not_rendered),
+            hz == 10_000,
+            "{hz} Hz: {remarks}"
+        );
     }
 }
 

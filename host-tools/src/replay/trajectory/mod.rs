@@ -1,7 +1,7 @@
 //! Trajectory files: `t_s,x_mm,y_mm,z_mm` or `x_mm,y_mm,z_mm` as CSV, or a recording in either
 //! form.
 //!
-//! Lengths are millimetres of the arm's tip over the felt terrain: x east, y north, z up,
+//! Lengths are millimetres of the arm's tip over the rendered terrain: x east, y north, z up,
 //! origin at the south-west sample at height zero.
 
 mod bounded;
@@ -44,7 +44,7 @@ fn columns_of<N: AsRef<str>>(header: &[N]) -> Option<&'static [&'static str]> {
     [&COLUMNS[..], PLACE].into_iter().find(|it| begins(it))
 }
 
-/// The column that tells in which view a row was felt.
+/// The column that tells in which view a row was rendered.
 const VIEW: &str = "view";
 
 /// A row of the values of the first columns, of which the time may be missing.

@@ -1,4 +1,4 @@
-//! Rows of a recording with all that was felt, for another display.
+//! Rows of a recording with all columns, for another display.
 
 use std::fs::File;
 use std::io;
@@ -33,7 +33,7 @@ type Values = [Option<f64>; NAMES.len()];
 /// Row of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordingRow {
-    /// The view that it was felt in: [`super::Row::view`].
+    /// The view that it was rendered in: [`super::Row::view`].
     pub view: u32,
     /// Its record. A trajectory has the HIP alone: no contact, and the proxy at the HIP.
     pub record: Record,

@@ -55,8 +55,8 @@ impl Terrain<'_> {
         unit
     }
 
-    /// Samples of the level that a ball's nodes depend on, `side` of them each way from a felt
-    /// sample on, in felt cells, NaN in holes and off the data; and where the nodes are.
+    /// Samples of the level that a ball's nodes depend on, `side` of them each way from a rendered
+    /// sample on, in haptic cells, NaN in holes and off the data; and where the nodes are.
     pub(super) fn samples(
         &self,
         ball: &Ball,

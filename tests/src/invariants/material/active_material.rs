@@ -32,18 +32,18 @@ pub(super) struct ActiveMaterial {
     numbers: Numbers,
     /// By so much the numbers may have been off when the change began.
     unsure: Numbers,
-    /// The texture of which a share is felt, and so many of [`FADE`] parts of it.
+    /// The texture of which a share is rendered, and so many of [`FADE`] parts of it.
     texture: Texture,
     parts: u32,
     /// Oracle of its texture.
     judge: Option<TextureJudge>,
     /// The share that this speed leaves.
     speed_share: f64,
-    was_felt: bool,
+    was_rendered: bool,
 }
 
 impl ActiveMaterial {
-    /// Before anything is felt: the default.
+    /// Before anything is rendered: the default.
     pub(super) fn default(materials: &Materials) -> Self {
         let numbers = numbers(materials, 0);
         let texture = materials.table[0].texture;
@@ -57,7 +57,7 @@ impl ActiveMaterial {
             parts: FADE,
             judge: judge(&texture, materials.cell_mm),
             speed_share: 0.0,
-            was_felt: false,
+            was_rendered: false,
         }
     }
 
@@ -123,7 +123,7 @@ impl ActiveMaterial {
         }
     }
 
-    /// The texture, if any, and how much of it is felt.
+    /// The texture, if any, and how much of it is rendered.
     pub(super) fn texture(&self) -> Option<(&TextureJudge, f64)> {
         let share = self.speed_share * f64::from(self.parts) / f64::from(FADE);
         self.judge.as_ref().map(|judge| (judge, share))
@@ -136,7 +136,7 @@ impl ActiveMaterial {
 
     /// Returns true if it cannot be told from another one from now on.
     pub(super) fn is_same(&self, other: &Self) -> bool {
-        let told = |one: &Self| (one.wanted, one.done, one.parts, one.was_felt);
+        let told = |one: &Self| (one.wanted, one.done, one.parts, one.was_rendered);
         let speed = |one: &Self| one.judge.as_ref().map_or(0.0, TextureJudge::speed);
         let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs());
         let pairs = |of: fn(&Self) -> &Numbers| of(self).iter().zip(of(other)).all(is_near);
@@ -164,7 +164,7 @@ impl ActiveMaterial {
             // What fades out does so as it was.
             ContactState::Releasing => vec![self.clone()],
             ContactState::Unseeded | ContactState::Free => vec![Self {
-                was_felt: false,
+                was_rendered: false,
                 ..self.clone()
             }],
         };
@@ -185,8 +185,8 @@ impl ActiveMaterial {
         }
         let wanted = numbers(materials, class);
         let texture = materials.table[usize::from(class)].texture;
-        if !self.was_felt {
-            (next.done, next.numbers, next.was_felt) = (OVER, wanted, true);
+        if !self.was_rendered {
+            (next.done, next.numbers, next.was_rendered) = (OVER, wanted, true);
             next.takes(&texture, materials.cell_mm, FADE);
             return vec![next];
         }

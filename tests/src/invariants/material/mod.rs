@@ -94,7 +94,7 @@ impl<'g> MaterialJudge<'g> {
         }
     }
 
-    /// Judges what was felt of the next point.
+    /// Checks the force of the next point.
     ///
     /// # Errors
     /// The first invariant that it breaks.
@@ -125,7 +125,7 @@ impl<'g> MaterialJudge<'g> {
 
     /// The proxy is where a friction of the place before lets it be.
     fn place_is_right(&mut self, seen: &ObservedTick) -> Verdict {
-        let touches = seen.felt.state == ContactState::Touching;
+        let touches = seen.output.state == ContactState::Touching;
         let is_open = self.courses.is_empty();
         let mut is_rubbed = is_open;
         let mut wrong = None;
@@ -174,7 +174,7 @@ impl<'g> MaterialJudge<'g> {
             }
         }
         if touches {
-            self.keep_what_is_felt(&mut next, was_open, replied, seen)?;
+            self.keep_rendered(&mut next, was_open, replied, seen)?;
         }
         if next.len() > FOLLOWED {
             next.clear();
@@ -189,7 +189,7 @@ impl<'g> MaterialJudge<'g> {
     }
 
     /// Drops the courses with another force.
-    fn keep_what_is_felt(
+    fn keep_rendered(
         &mut self,
         courses: &mut Vec<ActiveMaterial>,
         was_open: bool,
@@ -200,34 +200,34 @@ impl<'g> MaterialJudge<'g> {
         if was_open {
             return Ok(());
         }
-        let felt = self.felt(replied, seen);
+        let output = self.output(replied, seen);
         let force = replied.sample.force_n.as_dvec3();
         let fades = replied.sample.limits.contains(Limits::EDGE_FADING);
         let is_whole = !fades && self.shading == Shading::None;
         let mut told = String::new();
         let changing = courses.iter().any(|course| !course.is_settled());
         courses.retain(|course| {
-            let (is_felt, wanted) = match is_whole {
+            let (is_rendered, wanted) = match is_whole {
                 true => {
-                    let wanted = felt.force(course);
-                    let is_felt = (force - wanted.force_n).length() <= wanted.allowed_n;
-                    (is_felt, format!("{wanted:?}"))
+                    let wanted = output.force(course);
+                    let is_rendered = (force - wanted.force_n).length() <= wanted.allowed_n;
+                    (is_rendered, format!("{wanted:?}"))
                 }
                 false => {
-                    let [least, most] = felt.sizes(course, fades);
-                    let is_felt = (least..=most).contains(&force.length());
-                    (is_felt, format!("{least} to {most} N"))
+                    let [least, most] = output.sizes(course, fades);
+                    let is_rendered = (least..=most).contains(&force.length());
+                    (is_rendered, format!("{least} to {most} N"))
                 }
             };
-            if !is_felt {
+            if !is_rendered {
                 told = format!("{force} N of {}, {wanted} by {course:?}", force.length());
             }
-            is_felt
+            is_rendered
         });
         if courses.is_empty() {
             return self.fail(Invariant::Material, format!("{told}: {replied:?}"));
         }
-        self.never_pulls(&felt, force, replied)?;
+        self.never_pulls(&output, force, replied)?;
         self.judged.changing += u64::from(changing);
         self.judged.in_whole += u64::from(is_whole);
         self.judged.by_size += u64::from(!is_whole);
@@ -235,23 +235,23 @@ impl<'g> MaterialJudge<'g> {
     }
 
     /// Along the spring no force is against it. Shading turns it by 60° at most.
-    fn never_pulls(&self, felt: &TickConditions<'_>, force: DVec3, replied: &Replied) -> Verdict {
-        let (depth, size) = (felt.way.length(), force.length());
+    fn never_pulls(&self, output: &TickConditions<'_>, force: DVec3, replied: &Replied) -> Verdict {
+        let (depth, size) = (output.way.length(), force.length());
         let is_even = self.materials.table.iter().all(|one| one.texture.is_none());
         let least = match self.shading {
             Shading::None => 0.0,
             Shading::Smooth if is_even => 0.5,
             Shading::Smooth => return Ok(()),
         };
-        let off = (felt.allowed / depth).min(1.0) + 1e-4;
-        if depth > 0.0 && force.dot(felt.way) < (least - 2.0 * off) * depth * size {
-            let detail = format!("{force} N pulls along {}: {replied:?}", felt.way);
+        let off = (output.allowed / depth).min(1.0) + 1e-4;
+        if depth > 0.0 && force.dot(output.way) < (least - 2.0 * off) * depth * size {
+            let detail = format!("{force} N pulls along {}: {replied:?}", output.way);
             return self.fail(Invariant::Material, detail);
         }
         Ok(())
     }
 
-    fn felt<'p>(&self, replied: &'p Replied, seen: &ObservedTick) -> TickConditions<'p> {
+    fn output<'p>(&self, replied: &'p Replied, seen: &ObservedTick) -> TickConditions<'p> {
         let cell_mm = f64::from(self.materials.cell_mm);
         let [hip, proxy] = [replied.hip, replied.proxy].map(DVec3::from_array);
         let from = self.before.map_or(replied.hip, |before| before.hip);
@@ -289,14 +289,14 @@ impl<'g> MaterialJudge<'g> {
     }
 }
 
-/// The contact of a point, as other judges see it. Where all of the spring is felt, the
+/// The contact of a point, as other judges see it. Where all of the spring is rendered, the
 /// displacement is the way to the proxy.
 fn seen(replied: &Replied, shift: [i32; 3]) -> ObservedTick {
     let TickRecord {
         state, proxy, work, ..
     } = replied.sample;
     let way = DVec3::from_array(replied.proxy) - DVec3::from_array(replied.hip);
-    let felt = ContactOutput {
+    let output = ContactOutput {
         state,
         proxy,
         displacement: match state {
@@ -307,5 +307,5 @@ fn seen(replied: &Replied, shift: [i32; 3]) -> ObservedTick {
         missing_tile: None,
         work,
     };
-    ObservedTick::new(replied.hip, felt, shift)
+    ObservedTick::new(replied.hip, output, shift)
 }

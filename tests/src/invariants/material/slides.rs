@@ -37,7 +37,7 @@ impl MaterialJudge<'_> {
         let is_whole = |sample: &TickRecord| !sample.limits.contains(Limits::EDGE_FADING);
         let is_told = is_plane
             && touches(before.sample.state)
-            && touches(seen.felt.state)
+            && touches(seen.output.state)
             && is_whole(&before.sample)
             && [before.proxy, seen.proxy, seen.hip].into_iter().all(inside)
             && SLIDES.contains(&moved)

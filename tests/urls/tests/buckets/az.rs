@@ -60,8 +60,8 @@ fn url() -> String {
 #[test]
 fn a_file_opens_with_the_key_of_its_account_and_is_fetched_in_parts() {
     let microsoft = Microsoft::start(SURVEYORS);
-    let felt = microsoft.said_with_key(&url(), SURVEYORS.key);
-    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let output = microsoft.said_with_key(&url(), SURVEYORS.key);
+    assert!(output.contains("read GeoTIFF"), "{output}");
     assert_fetched_in_parts(&microsoft.server.take_seen(), microsoft.hills.bytes);
 }
 
@@ -75,8 +75,8 @@ fn a_file_opens_with_what_is_set_for_microsofts_command() {
         ("AZURE_STORAGE_ACCOUNT", SURVEYORS.name),
         ("AZURE_STORAGE_KEY", SURVEYORS.key),
     ];
-    let felt = said(&url(), &environment);
-    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let output = said(&url(), &environment);
+    assert!(output.contains("read GeoTIFF"), "{output}");
 }
 
 #[test]
@@ -84,8 +84,8 @@ fn a_file_opens_with_a_shared_access_signature_while_that_holds() {
     let microsoft = Microsoft::start(SURVEYORS);
     let with = |sas: &str| microsoft.said(&url(), &[("AZURE_STORAGE_SAS_TOKEN", sas)]);
     for mark in ["", "?"] {
-        let felt = with(&format!("{mark}{}", SURVEYORS.sas("hills", ONE_DAY)));
-        assert!(felt.contains("felt GeoTIFF"), "{felt}");
+        let output = with(&format!("{mark}{}", SURVEYORS.sas("hills", ONE_DAY)));
+        assert!(output.contains("read GeoTIFF"), "{output}");
     }
     for other in [
         SURVEYORS.sas("hills", LONG_AGO),
@@ -102,7 +102,7 @@ fn a_file_opens_with_a_shared_access_signature_while_that_holds() {
 fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
     let microsoft = Microsoft::start(SURVEYORS);
     let with_token = |token: &str| microsoft.said(&url(), &[("AZURE_STORAGE_TOKEN", token)]);
-    assert!(with_token(TOKEN).contains("felt GeoTIFF"));
+    assert!(with_token(TOKEN).contains("read GeoTIFF"));
     assert_refused(&with_token("eyJ0.other"), "InvalidAuthenticationInfo", HINT);
     let [tenant, name, secret] = PRINCIPAL;
     let with_secret = |secret: &str| {
@@ -115,8 +115,8 @@ fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
         microsoft.said(&url(), &environment)
     };
     let _ = microsoft.server.take_seen();
-    let felt = with_secret(secret);
-    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let output = with_secret(secret);
+    assert!(output.contains("read GeoTIFF"), "{output}");
     // The file and those that it may have beside it share a token.
     let Seen { requests, .. } = microsoft.server.take_seen();
     let changes = requests.iter().filter(|line| line.starts_with("POST"));
@@ -132,8 +132,8 @@ fn a_file_opens_with_a_token_and_with_the_secret_of_a_program() {
 #[test]
 fn a_file_of_an_emulator_opens_with_the_key_that_everybody_knows() {
     let microsoft = Microsoft::start(EMULATOR);
-    let felt = microsoft.said_by_emulator(&url(), &[]);
-    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let output = microsoft.said_by_emulator(&url(), &[]);
+    assert!(output.contains("read GeoTIFF"), "{output}");
     let other = [("AZURE_STORAGE_ACCOUNT_KEY", SURVEYORS.key)];
     let told = microsoft.said_by_emulator(&url(), &other);
     assert_refused(&told, "AuthenticationFailed", HINT);
@@ -143,8 +143,8 @@ fn a_file_of_an_emulator_opens_with_the_key_that_everybody_knows() {
 fn a_file_of_a_public_container_opens_without_a_key_and_no_other_does() {
     let microsoft = Microsoft::start(EMULATOR);
     let nobody = [("AZURE_SKIP_SIGNATURE", "true")];
-    let felt = microsoft.said(&format!("az://{PUBLIC}/{NAME}"), &nobody);
-    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let output = microsoft.said(&format!("az://{PUBLIC}/{NAME}"), &nobody);
+    assert!(output.contains("read GeoTIFF"), "{output}");
     let told = microsoft.said(&url(), &nobody);
     assert_refused(&told, "NoAuthenticationInformation", HINT);
     // Of most accounts nothing is public, which is said with the status of a conflict.

@@ -42,8 +42,8 @@ fn url() -> String {
 #[test]
 fn a_file_opens_with_the_key_of_an_account_and_is_fetched_in_parts() {
     let google = Google::start();
-    let felt = google.said_with_key(&url(), &SURVEYOR.file());
-    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let output = google.said_with_key(&url(), &SURVEYOR.file());
+    assert!(output.contains("read GeoTIFF"), "{output}");
     assert_fetched_in_parts(&google.server.take_seen(), google.hills.bytes);
 }
 
@@ -56,8 +56,8 @@ fn a_file_opens_with_a_token() {
         ("GOOGLE_BEARER_TOKEN", TOKEN),
         ("GCE_METADATA_HOST", address),
     ] {
-        let felt = google.said(&url(), &[given]);
-        assert!(felt.contains("felt GeoTIFF"), "{given:?}: {felt}");
+        let output = google.said(&url(), &[given]);
+        assert!(output.contains("read GeoTIFF"), "{given:?}: {output}");
     }
     let other = google.said(&url(), &[("GOOGLE_BEARER_TOKEN", "ya29.other")]);
     assert_refused(&other, "AuthenticationRequired", HINT);
@@ -67,8 +67,8 @@ fn a_file_opens_with_a_token() {
 fn a_file_of_a_public_bucket_opens_without_a_key_and_no_other_does() {
     let google = Google::start();
     let nobody = [("GOOGLE_SKIP_SIGNATURE", "true")];
-    let felt = google.said(&format!("gs://{PUBLIC}/{NAME}"), &nobody);
-    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let output = google.said(&format!("gs://{PUBLIC}/{NAME}"), &nobody);
+    assert!(output.contains("read GeoTIFF"), "{output}");
     assert_refused(&google.said(&url(), &nobody), "AccessDenied", HINT);
 }
 

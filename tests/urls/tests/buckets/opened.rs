@@ -154,5 +154,5 @@ fn in_another_process() {
         let expected = f64::from(height(column, rows - 1 - row));
         assert_eq!(raster.height(column, row), expected, "{column} {row}");
     }
-    println!("felt {} of {columns} x {rows}", raster.format());
+    println!("read {} of {columns} x {rows}", raster.format());
 }

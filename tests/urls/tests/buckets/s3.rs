@@ -19,8 +19,8 @@ fn a_file_in_a_bucket_opens_with_its_key_and_with_no_other() {
     let hills = hills(&["hills"]);
     let server = Server::of(hills.folder.path());
     let url = format!("s3://hills/{NAME}");
-    let felt = said_with(&server, &url, KEY);
-    assert!(felt.contains("felt GeoTIFF"), "{felt}");
+    let output = said_with(&server, &url, KEY);
+    assert!(output.contains("read GeoTIFF"), "{output}");
     let missing = said_with(&server, "s3://hills/south.tif", KEY);
     assert!(missing.contains("there is no such file"), "{missing}");
     let forbidden = said_with(&server, &url, [KEY[0], "sand"]);

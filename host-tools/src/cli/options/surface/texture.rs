@@ -66,7 +66,7 @@ fn first_number(look: &MaterialEntry) -> Option<&'static str> {
     stated.next().map(|(_, name)| name)
 }
 
-/// A texture whose numbers can be felt and made.
+/// A texture whose numbers a hand can feel and a tick can render.
 fn checked(texture: Texture) -> Result<Texture, String> {
     let Texture {
         amplitude_mm: amplitude,
