@@ -297,7 +297,7 @@ fn an_fallback_that_comes_last_is_kept_whatever_the_proxy_touches() {
 }
 
 #[test]
-fn disarmed_the_same_is_felt_by_nobody() {
+fn disarmed_arm_has_no_force() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     let last = dip().map(|c| device.tick(c)).last().unwrap();
@@ -519,7 +519,7 @@ fn a_replay_drives_nothing_and_says_why_it_cannot_be_armed() {
 }
 
 #[test]
-fn without_a_calibration_nothing_is_felt_and_nothing_arms() {
+fn nothing_is_rendered_or_armed_without_a_calibration() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Encoders, plane);
     device.haptics.mechanism = None;
@@ -638,7 +638,7 @@ fn edge(x: i32, _: i32) -> f32 {
 
 /// The wire checks sums, not sense: a damaged host may send any bits.
 #[test]
-fn a_point_of_any_bits_is_a_valid_one_before_it_is_felt() {
+fn point_of_any_bits_is_made_valid_before_the_contact() {
     let mut tiles = buffers::<4>();
     let mut device = Device::<4>::new(&mut tiles, Source::Points, plane);
     // Cell (i32::MIN, 100, 9) as zigzag varints, then three fractions.

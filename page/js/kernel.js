@@ -67,7 +67,7 @@ export class Kernel {
   }
 
   /** The terrain of contacts that begin from now on, as `fit` of terrain.js makes it, under a ball of
-   * `tipMm`, or a point for 0. A ball is felt on every second, fourth, … sample where its radius is
+   * `tipMm`, or a point for 0. A ball is rendered on every second, fourth, … sample where its radius is
    * more than 8 cells, as in the command. */
   setTerrain(terrain, tipMm) {
     const step = stepOf(terrain.cellMm, tipMm);

@@ -10,7 +10,7 @@ const ON_SAMPLE = 1e-6;
 const MAX_TIP_CELLS = 8;
 /** The longer side in the hand, mm. */
 const SIDE_MM = 240;
-/** Relief that is felt well, mm: a flatter terrain is felt higher than it is. */
+/** Relief that a hand feels well, mm: a flatter terrain is exaggerated up to it. */
 const RELIEF_MM = 26;
 /** Relief where nothing is known of the cells, mm. */
 const UNKNOWN_RELIEF_MM = 32;
@@ -93,7 +93,7 @@ function split(place) {
   return [sample, place - sample];
 }
 
-/** How many samples on a ball of a radius is felt: a power of two, so that it has 8 cells at most. */
+/** The step between used samples under a ball: a power of two, so that its radius has 8 cells at most. */
 export function stepOf(cellMm, tipMm) {
   const times = tipMm / (MAX_TIP_CELLS * cellMm);
   return times > 1 ? 2 ** Math.ceil(Math.log2(times)) : 1;

@@ -3,7 +3,7 @@
 import { Arm } from "./arm.js";
 import { Path } from "./path.js";
 
-/** How far above the ground a path begins, mm: a point that begins below it is not felt. */
+/** How far above the ground a path begins, mm: a point that begins below it has no force. */
 const ABOVE_MM = 0.05;
 /** How far a lifted arm is above the highest ground, mm. */
 const HOVER_MM = 8;
@@ -87,12 +87,12 @@ export class Touch {
     this.arm.step(this.force);
     // A step that cannot happen has no force.
     this.force = [0, 0, 0];
-    const felt = this.kernel.step(this.arm.at);
-    this.force = felt.force;
-    this.proxy = felt.proxy;
-    this.state = felt.state;
-    this.path.add(this.arm.at, felt.force);
+    const step = this.kernel.step(this.arm.at);
+    this.force = step.force;
+    this.proxy = step.proxy;
+    this.state = step.state;
+    this.path.add(this.arm.at, step.force);
     // The ground let go: of a ball's proxy that stays behind by more than 15 radii, or at a hole.
-    if (felt.state === "unseeded") this.#lift();
+    if (step.state === "unseeded") this.#lift();
   }
 }

@@ -31,7 +31,7 @@ test("saved terrain is read again with the same bits", async () => {
   assert.deepEqual(again.heights, heights);
 });
 
-test("command names the surface as it was felt", () => {
+test("command names the surface of the path", () => {
   const surface = { friction: 0.4, stiffness: 0.7, texture: 0.1, wavelength: 2 };
   const words = command({ cellMm: 0.25 }, surface, 0);
   assert.match(words, /--scale 0.25mm\/cell .*--stiffness 0.7 --friction 0.4 --surface surface.toml$/);

@@ -106,7 +106,7 @@ test("cells of degrees become squares of true slopes", () => {
   assert.ok(slopes > 1700, `${slopes}`);
 });
 
-test("large ball is felt on fewer samples, as in the command", () => {
+test("large ball has fewer samples, as in the command", () => {
   assert.deepEqual([-1, 0, 2, 8, 8.1, 16, 40].map((tip) => stepOf(1, tip)), [1, 1, 1, 1, 2, 2, 8]);
   const heights = Float32Array.from({ length: 35 }, (_, i) => i);
   assert.deepEqual(every({ nx: 7, ny: 5, heights, cellMm: 2 }, 4), { nx: 2, ny: 2, heights: Float32Array.from([0, 4, 28, 32]), cellMm: 8 });

@@ -55,9 +55,9 @@ def test_opened_terrain_is_a_replay(tmp_path, surface, flags, make, reading):
     file = make(tmp_path)
     path = stroke(20_000)
     words = [f"--input={name.replace('_', '-')}={value}" for name, value in reading.items()]
-    felt = replayed(tmp_path, file, path, words=[f"--scale={CELL_MM}mm/cell", *flags, *words])
+    columns = replayed(tmp_path, file, path, words=[f"--scale={CELL_MM}mm/cell", *flags, *words])
     terrain = Terrain.open(file, cell_mm=CELL_MM, **reading)
-    touching = same(Contact(terrain, Surface(**surface)).run(path), felt)
+    touching = same(Contact(terrain, Surface(**surface)).run(path), columns)
     assert 2_000 < touching < 18_000, touching
 
 

@@ -67,20 +67,20 @@ def replayed(folder, heights, path, t=None, words=()):
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def same(steps, felt):
+def same(steps, columns):
     """Fails unless they are the same, bit for bit. Returns how many touch."""
-    assert len(steps) == len(felt["t_s"])
-    assert np.array_equal(steps["t_s"], np.array(felt["t_s"], float))
+    assert len(steps) == len(columns["t_s"])
+    assert np.array_equal(steps["t_s"], np.array(columns["t_s"], float))
     touching = steps["state"] == State.TOUCHING
     for field, name in (("hip_mm", "{}_mm"), ("proxy_mm", "proxy_{}_mm"), ("force_n", "force_{}_n")):
         for axis, letter in enumerate("xyz"):
             found = steps[field][:, axis]
-            expected = np.array(felt[name.format(letter)], float).astype(found.dtype)
+            expected = np.array(columns[name.format(letter)], float).astype(found.dtype)
             # Without contact the file has the HIP in place of the proxy, which is rounded.
             differ = found != expected if field != "proxy_mm" else touching & (found != expected)
             rows = np.flatnonzero(differ)
             assert not len(rows), f"{field} {letter}: {len(rows)} rows from {rows[0]} on"
-    for name, state in zip(felt["state"], steps["state"]):
+    for name, state in zip(columns["state"], steps["state"]):
         assert State(state) in NAMES[name]
     return touching.sum()
 
@@ -88,9 +88,9 @@ def same(steps, felt):
 @pytest.mark.parametrize("surface, flags", [({}, []), (ROUGH, FLAGS)], ids=["ice", "rough"])
 def test_run_is_a_replay(tmp_path, surface, flags):
     path = stroke(20_000)
-    felt = replayed(tmp_path, hills(), path, words=[f"--scale={CELL_MM}mm/cell", *flags])
+    columns = replayed(tmp_path, hills(), path, words=[f"--scale={CELL_MM}mm/cell", *flags])
     contact = Contact(Terrain(hills(), cell_mm=CELL_MM), Surface(**surface))
-    touching = same(contact.run(path), felt)
+    touching = same(contact.run(path), columns)
     assert 2_000 < touching < 18_000, touching
 
 
@@ -98,9 +98,9 @@ def test_run_is_a_replay(tmp_path, surface, flags):
 def test_run_under_a_tip_is_a_replay(tmp_path, tip_mm):
     path = stroke(20_000) + [0, 0, tip_mm]
     words = [f"--scale={CELL_MM}mm/cell", f"--tip={tip_mm}mm", *FLAGS]
-    felt = replayed(tmp_path, hills(), path, words=words)
+    columns = replayed(tmp_path, hills(), path, words=words)
     terrain = Terrain(hills(), cell_mm=CELL_MM).with_tip(tip_mm)
-    touching = same(Contact(terrain, Surface(**ROUGH)).run(path), felt)
+    touching = same(Contact(terrain, Surface(**ROUGH)).run(path), columns)
     assert 2_000 < touching < 18_000, touching
 
 
@@ -108,9 +108,9 @@ def test_integers_at_a_scale_are_a_replay(tmp_path):
     heights = np.nan_to_num(hills() * 9).astype(">i2")
     path = stroke(20_000) * [0.42, 0.42, 0.2]
     words = ["--scale=0.3mm/cell", "--exaggeration=0.017mm/unit"]
-    felt = replayed(tmp_path, heights, path, words=words)
+    columns = replayed(tmp_path, heights, path, words=words)
     terrain = Terrain(np.asfortranarray(heights), cell_mm=0.3, height_mm_per_unit=0.017)
-    assert same(Contact(terrain).run(path), felt) > 1_000
+    assert same(Contact(terrain).run(path), columns) > 1_000
 
 
 @pytest.mark.filterwarnings("ignore:.* rows:UserWarning")
@@ -127,14 +127,14 @@ def test_times_are_those_of_a_replay(tmp_path, hz, begin_s):
     t, path = np.maximum.accumulate(t)[repeat], path[repeat]
     path = path[np.r_[True, (np.diff(t) > 0) | (np.diff(path, axis=0) == 0).all(1)]]
     t = t[np.r_[True, (np.diff(t) > 0) | (np.diff(repeat) == 0)]]
-    felt = replayed(tmp_path, hills(), path, t, [f"--scale={CELL_MM}mm/cell", *FLAGS])
+    columns = replayed(tmp_path, hills(), path, t, [f"--scale={CELL_MM}mm/cell", *FLAGS])
     steps = Contact(Terrain(hills(), cell_mm=CELL_MM), Surface(**ROUGH)).run(path, t)
-    same(steps, felt)
+    same(steps, columns)
     assert abs(len(steps) - 1000 * (t[-1] - t[0])) < 2
 
 
 def test_one_time_for_all_rows_is_a_replay(tmp_path):
     path = stroke(3_000)
     t = np.full(3_000, 4.5)
-    felt = replayed(tmp_path, hills(), path, t, [f"--scale={CELL_MM}mm/cell"])
-    same(Contact(Terrain(hills(), cell_mm=CELL_MM)).run(path, t), felt)
+    columns = replayed(tmp_path, hills(), path, t, [f"--scale={CELL_MM}mm/cell"])
+    same(Contact(Terrain(hills(), cell_mm=CELL_MM)).run(path, t), columns)

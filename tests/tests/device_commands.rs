@@ -63,7 +63,7 @@ fn moved_subcommand_is_named_with_its_new_program() {
 /// A terrain is not served to a board that is emulated for the occasion; what is done
 /// instead is said.
 #[test]
-fn run_says_how_a_terrain_is_felt_on_an_emulated_board() {
+fn run_prints_the_rendering_of_an_emulated_board() {
     fails(
         &["run", "hills.tif", "--device", "emulated"],
         2,

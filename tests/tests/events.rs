@@ -151,7 +151,7 @@ impl Telling {
 
 /// All events of a run of five seconds over hills, its recording and what the examples said.
 #[test]
-fn a_run_tells_what_is_felt_and_examples_speak_and_sound_it() {
+fn run_sends_events_that_the_examples_speak_and_sound() {
     let folder = tempfile::tempdir().expect("a folder");
     let hills = hills_in(folder.path(), 256);
     let [record, commands] = ["felt.csv", "commands"].map(|name| folder.path().join(name));

@@ -120,7 +120,7 @@ fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
 }
 
 #[test]
-fn stored_cells_are_felt_as_squares_of_the_same_area() {
+fn stored_cells_are_rendered_as_squares_of_the_same_area() {
     let raster = Raster::open(plane(60.0, [1.0, 0.0]), &OpenOptions::default()).expect("opens");
     let grid = HapticGrid::new(&raster, HapticCells::Stored);
     assert_eq!((grid.columns(), grid.rows()), (SIDE, SIDE));

@@ -147,7 +147,7 @@ fn a_packed_mask_in_one_large_strip_is_unpacked_on_disk_or_it_is_named() {
 
 /// 576 MB of bytes in one packed strip.
 #[test]
-fn a_packed_strip_is_felt_in_the_memory_of_a_terrain() {
+fn packed_strip_is_read_in_the_memory_of_a_terrain() {
     const WIDE: u32 = 24_000;
     let image = |bytes: usize| {
         vec![
@@ -210,7 +210,7 @@ fn a_packed_strip_is_felt_in_the_memory_of_a_terrain() {
 
 /// A file that was cut: its overview, which is all that is looked at when it opens, ends early.
 #[test]
-fn of_an_overview_that_ends_early_the_rows_that_are_there_are_felt() {
+fn rows_of_an_overview_that_ends_early_are_read() {
     const WIDE: u32 = 4000;
     const HALF: u32 = WIDE / 2;
     const THERE: u32 = 600;
@@ -250,7 +250,7 @@ fn of_an_overview_that_ends_early_the_rows_that_are_there_are_felt() {
 }
 
 #[test]
-fn a_strip_of_4_gb_is_felt_in_the_memory_of_a_terrain() {
+fn strip_of_4_gb_is_read_in_the_memory_of_a_terrain() {
     let (_folder, path) = file();
     let output = memory_limit::info(&path, &[]);
     let told = String::from_utf8_lossy(&output.stderr);
@@ -295,7 +295,7 @@ fn a_file_of_nothing_is_looked_through_and_it_says_so() {
 }
 
 #[test]
-fn four_million_tiles_are_felt_in_the_memory_of_a_terrain() {
+fn four_million_tiles_are_read_in_the_memory_of_a_terrain() {
     const TILE: u32 = 64;
     const ACROSS: u32 = 2025;
     let tiles = (ACROSS * ACROSS) as usize;

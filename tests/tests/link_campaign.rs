@@ -5,7 +5,7 @@ use hapterra_tests::link_campaign::{SEED, report, run};
 use hapterra_tests::repository;
 
 #[test]
-fn no_fault_of_the_link_is_felt_hangs_or_goes_untold() {
+fn link_faults_change_no_force_never_hang_and_are_reported() {
     let tally = run(SEED, 60, &mut |_, _| {}).expect("no violation");
     for kind in Kind::ALL {
         assert!(tally.runs_with(kind) > 0, "{kind:?} was not tried");

@@ -53,7 +53,7 @@ fn rendered(sample: &TickRecord) -> (GridPoint, GridPoint, [u32; 3], ContactStat
 }
 
 #[test]
-fn a_bad_link_changes_nothing_that_is_felt() {
+fn force_is_the_same_over_a_bad_link() {
     let raster = fractal();
     let terrain = Terrain::new(&raster, unit(), 0).expect("terrain");
     let params = SurfaceParams::PREMIUM;

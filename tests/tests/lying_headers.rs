@@ -106,7 +106,7 @@ fn ends_well(what: &str, path: &Path, more: &[&str]) -> (bool, String) {
 }
 
 #[test]
-fn an_overview_that_shows_something_else_is_not_felt() {
+fn overview_at_another_place_is_not_used() {
     let elsewhere = |corner: [f64; 2], cell: f64, zone: u16| {
         let mut overview = overview();
         overview.extend(placed(corner, cell, zone));

@@ -127,7 +127,7 @@ fn rendered(recording: &str) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn classes_in_another_system_and_resolution_are_felt_where_they_lie() {
+fn classes_in_another_system_and_resolution_are_in_place() {
     let folder = Folder::new();
     let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
     assert!(succeeded, "{said}");
@@ -165,7 +165,7 @@ fn classes_in_another_system_and_resolution_are_felt_where_they_lie() {
 }
 
 #[test]
-fn a_recording_keeps_its_materials_and_is_felt_with_them_again() {
+fn recording_keeps_its_materials_for_its_replay() {
     let folder = Folder::new();
     let replay = |more: &[&str], output: &str| {
         folder.hapterra(&[&["replay", "level.asc", "a.csv", "--out", output][..], more].concat())
@@ -314,7 +314,7 @@ fn worldcover() -> PathBuf {
 }
 
 #[test]
-fn the_table_for_worldcover_names_all_of_its_classes_and_can_be_felt() {
+fn worldcover_table_names_all_classes_and_is_valid() {
     let table = TableFile::open(&worldcover()).expect("a table");
     let classes: Vec<_> = table.classes.iter().map(|(class, ..)| *class).collect();
     assert_eq!(classes, [10, 20, 30, 40, 50, 60, 70, 80, 90, 95, 100]);

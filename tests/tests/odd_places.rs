@@ -134,7 +134,7 @@ fn cells_are_as_large_as_on_their_own_body() {
 /// A map that is not conformal shears the ground, and a turned grid of degrees is sheared by
 /// itself: haptic cells are square on the ground all the same, in every direction.
 #[test]
-fn what_a_map_shears_is_felt_in_its_true_shape() {
+fn sheared_map_is_rendered_in_its_true_shape() {
     let mut sheared = 0;
     for row in rows() {
         let raster = row.raster();

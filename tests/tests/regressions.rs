@@ -95,7 +95,7 @@ fn a_minimum_just_beyond_an_edge_is_found() {
 /// The force that fades is not the last slide's but that of the last tick that had to be searched
 /// for: a tile came between the two.
 #[test]
-fn a_contact_lost_after_a_late_tile_fades_from_what_was_felt_last() {
+fn contact_lost_after_a_late_tile_fades_from_its_last_force() {
     let terrain = field([128, 20], |x, _| match x {
         ..=32 => 0.0,
         33..=35 => f32::NAN,

@@ -183,7 +183,7 @@ fn trails(replayed: &[Row]) {
 }
 
 #[test]
-fn a_recording_is_felt_at_its_own_tick_rate() {
+fn recording_is_replayed_at_its_own_tick_rate() {
     let folder = Folder::new();
     for tick_hz in [
         1_000, 2_000, 3_000, 4_000, 5_000, 6_000, 7_000, 8_000, 9_000, 10_000,
@@ -349,7 +349,7 @@ fn a_board_of_another_rate_than_a_recording_is_refused() {
 
 /// Paths and recordings of a review, with the values that it worked out.
 #[test]
-fn reviewed_paths_and_recordings_are_felt_by_time() {
+fn reviewed_paths_and_recordings_are_replayed_by_time() {
     let Some(cases) = shared("cases/touch") else {
         return;
     };

@@ -94,7 +94,7 @@ fn samples(terrain: &Terrain, counts: &mut Counts) {
 }
 
 #[test]
-fn all_that_is_promised_is_felt_and_judged() {
+fn every_promised_kind_of_scene_is_touched_and_checked() {
     let mut buffers = Buffers::default();
     let (mut counts, mut settings) = (Counts::new(), Counts::new());
     let mut touched = vec![0_u64; KINDS.len()];

@@ -207,7 +207,7 @@ fn passes_touching(radius: f64, speed: f64, (most_beside, friction): (f64, f32))
 /// A tick ends within a ball's pole where it is no longer than that is wide. Of a ball of 2 mm this
 /// is 3 m/s, at which the guard stops an arm.
 #[test]
-fn a_pole_is_felt_at_steps_of_one_and_a_half_radii() {
+fn pole_is_rendered_at_steps_of_one_and_a_half_radii() {
     for radius in [1.0, 2.0, 4.0, 8.0] {
         for step in [0.1, 0.5 * radius, radius, 1.5 * radius] {
             assert_eq!(
@@ -332,7 +332,7 @@ fn rendered(text: &str) -> Vec<String> {
 }
 
 #[test]
-fn recordings_of_a_ball_are_felt_again_with_it() {
+fn recordings_of_a_ball_are_replayed_with_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("there");

@@ -270,7 +270,7 @@ fn ticks(session: &mut Session<'_>, polls: usize) -> Vec<u32> {
 }
 
 #[test]
-fn tiles_go_in_and_what_is_felt_comes_out() {
+fn tiles_go_in_and_samples_come_out() {
     visit(|session, _| {
         let ticks = ticks(session, 400);
         let gaps = ticks.windows(2).filter(|w| w[1] != w[0] + 1).count();

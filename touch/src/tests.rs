@@ -338,7 +338,7 @@ fn another_surface_keeps_the_contact() {
 }
 
 #[test]
-fn materials_are_felt_where_they_lie() {
+fn materials_are_rendered_in_place() {
     let soft = Material {
         stiffness_n_per_mm: 0.1,
         ..Material::of(&SurfaceParams::PREMIUM)

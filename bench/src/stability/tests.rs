@@ -205,7 +205,7 @@ fn with_the_controller_a_tap_gives_nothing_and_a_stiffer_surface_is_still() {
 }
 
 #[test]
-fn what_is_said_before_a_surface_is_felt_is_what_the_trials_show() {
+fn warning_before_a_surface_agrees_with_the_trials() {
     // The next stiffness of the command's own list is held still no more.
     let next = |still: f32| match still {
         1.0 => 1.5,

@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tick_is_missing_its_terrain_or_felt_or_coarse_or_free() {
+    fn tick_counts_as_missing_touching_coarse_or_free() {
         let sample = |limits, state| TickRecord {
             limits,
             state,

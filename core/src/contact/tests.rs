@@ -512,7 +512,7 @@ fn straight_down_onto_any_sample_meets_the_surface() {
 /// Forces on a path that often lies on grid lines are those on the mirrored path over
 /// the mirrored field.
 #[test]
-fn a_mirrored_way_along_grid_lines_is_felt_mirrored() {
+fn mirrored_path_along_grid_lines_has_mirrored_forces() {
     let mut tiles = [buffers::<2>(), buffers::<2>()];
     let [plain, mirrored] = &mut tiles;
     let lopsided = |x: i32, y: i32| with_a_hole(x - 2, y + 1) + 0.125 * x as f32;

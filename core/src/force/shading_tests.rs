@@ -124,7 +124,7 @@ fn cliff(x: i32, _: i32) -> f32 {
 }
 
 #[test]
-fn a_plane_is_felt_as_without() {
+fn plane_is_the_same_with_and_without_shading() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), plane);
     let way = straight([3.3, 4.1], [35.2, 36.7]).step_by(cases(1, 100) as usize);
@@ -232,7 +232,7 @@ fn a_cliff_stays_a_cliff() {
 const NARROW_AT_MOST: f32 = 0.2;
 
 #[test]
-fn a_tiles_border_is_felt_as_its_inside() {
+fn border_of_a_tile_is_rendered_as_its_inside() {
     // The same ground twice, once moved so that a tile's corner is in it.
     fn moved(x: i32, y: i32) -> f32 {
         rough(x - 22, y - 22)
@@ -252,7 +252,7 @@ fn a_tiles_border_is_felt_as_its_inside() {
 }
 
 #[test]
-fn a_tile_that_is_not_here_is_named_and_felt_as_the_end() {
+fn missing_tile_is_named_and_ends_the_surface() {
     let mut tiles = buffers::<2>();
     let mut field = Field::<2>::over(&mut tiles, FieldSize::new(100, 100), folds);
     field.install(TileKey::holding(0, Cell::new(5, 5)));

@@ -104,7 +104,7 @@ fn a_hand_at_speed_feels_the_frequency_of_the_wavelength() {
 
 /// Grain has no waves shorter than its wavelength, but for what its even rises need.
 #[test]
-fn grain_is_felt_up_to_the_frequency_of_its_wavelength() {
+fn grain_reaches_the_frequency_of_its_wavelength() {
     let rendered = rendered(&GRAIN, 50.0, 1.0, cases(20_000, 400));
     let power = |from: u32, to: u32| -> f64 {
         let all = (from..to).map(|hz| amplitude(&rendered, f64::from(hz), |v| v.z).powi(2));
@@ -377,7 +377,7 @@ fn what_no_number_is_gives_none() {
 }
 
 #[test]
-fn only_textures_that_can_be_felt_are_valid() {
+fn textures_too_small_to_feel_are_invalid() {
     assert!(Texture::NONE.is_valid() && GRATING.is_valid() && GRAIN.is_valid());
     let bad = [f32::NAN, f32::INFINITY, -1.0];
     let with = |change: fn(&mut Texture, f32), value| {

@@ -162,7 +162,7 @@ fn a_border_is_crossed_without_a_step_and_lies_half_way_between_the_samples() {
 }
 
 #[test]
-fn out_of_the_air_the_material_is_felt_as_it_is() {
+fn material_is_rendered_at_once_after_the_air() {
     let mut tiles = tiles();
     let mut ground = Ground::of(&mut tiles, &[SOFT, HARD], 20, Shading::None);
     ground.at([5.0, 0.5, 1.0], 0);

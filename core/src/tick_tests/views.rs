@@ -296,7 +296,7 @@ fn let_go_too_early_it_opens_to_the_end_first() {
 }
 
 #[test]
-fn another_view_is_felt_as_deep_as_the_one_before_and_the_arm_stays_armed() {
+fn placement_keeps_the_depth_and_the_arm_stays_armed() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
     arm.clutch(WithHand);
@@ -367,7 +367,7 @@ fn eight_views_one_after_the_other_make_no_step() {
 }
 
 #[test]
-fn without_its_tiles_a_view_is_not_felt_and_the_clutch_stays_open() {
+fn clutch_stays_open_until_a_placement_has_its_tiles() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
     arm.clutch(WithHand);
@@ -398,7 +398,7 @@ fn without_its_tiles_a_view_is_not_felt_and_the_clutch_stays_open() {
 }
 
 #[test]
-fn a_view_that_comes_while_force_is_felt_disarms_as_another_scene_does() {
+fn placement_during_contact_disarms_as_another_scene_does() {
     let mut tiles = buffers::<4>();
     let mut arm = Watched::pressed(&mut tiles, gentle);
     let before = arm.last.sample.force_n;

@@ -120,7 +120,7 @@ fn a_touched_place_reads_its_block_once_and_nothing_else() {
 }
 
 #[test]
-fn what_is_not_stored_damaged_or_panics_is_a_hole_and_the_rest_is_felt() {
+fn missing_or_damaged_blocks_are_holes_and_the_rest_is_read() {
     let (field, _) = Field::new();
     let raster = raster(field, true, false);
     for (column, row, is_hole) in [

@@ -52,7 +52,7 @@ fn source(folder: &Path, name: &str, column: u32, row: u32) -> Source {
 }
 
 #[test]
-fn few_files_are_open_at_once_and_all_are_felt() {
+fn few_files_are_open_at_once_and_all_are_read() {
     const COUNT: u32 = 9;
     let folder = tempfile::tempdir().expect("a folder");
     tiles(folder.path(), COUNT);

@@ -174,7 +174,7 @@ fn the_same_inputs_give_the_same_bits() {
 }
 
 #[test]
-fn a_current_at_rest_is_felt_by_the_hand() {
+fn hand_feels_a_current_at_rest() {
     let mut plant =
         Plant::new(premium().weightless().frictionless(), [0.0; 3]).held_by(HandModel::default());
     for _ in 0..3000 {

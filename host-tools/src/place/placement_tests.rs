@@ -220,7 +220,7 @@ fn a_fit_lies_in_the_reach_of_every_premium_and_fills_it() {
 }
 
 #[test]
-fn suited_heights_are_true_to_scale_or_as_high_as_can_be_felt() {
+fn suited_heights_are_true_to_scale_or_exaggerated() {
     let metre = CellUnit::Length { metres: 1.0 };
     let options = |sizing| PlacementOptions {
         heights: Heights::Suited,
@@ -277,7 +277,7 @@ fn the_scale_is_said_as_it_is_at_the_place_and_level() {
 }
 
 #[test]
-fn cells_are_square_at_the_place_that_is_felt() {
+fn cells_are_square_at_the_touched_place() {
     let degrees = cell((0.01, 0.01), CellUnit::Degree, 0.0);
     let raster = Raster::from_fn(50, 600, |column, row| (column + row) as f32).expect("raster");
     let ground = GroundTransform::new([10.0, 57.0], [0.01, 0.0], [0.0, 0.01]);

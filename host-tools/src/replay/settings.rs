@@ -38,6 +38,7 @@ pub struct Settings {
     /// The terrain file.
     pub terrain: TerrainFile,
     /// The rendered part, its place and scale.
+    #[serde(rename = "felt")]
     pub rendered: RenderedTerrain,
     /// The surface parameters and the contact rule.
     pub force: Force,

@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_that_is_not_taken_was_not_felt() {
+    fn refused_placement_has_no_sample() {
         with(|mut views, terrain, laid| {
             views.put(1, terrain.clone(), laid);
             let hip = GridPoint::default();

@@ -152,7 +152,7 @@ mod tests {
     use heightfield::Raster;
 
     #[test]
-    fn a_terrain_that_no_arm_felt_is_told_around_its_middle() {
+    fn terrain_without_an_arm_is_sent_around_its_middle() {
         let raster = Raster::from_fn(33, 17, |_, _| 3.0).expect("raster");
         let terrain = Terrain::new(&raster, Scale::new(2.0, 0.5).expect("scale"), 0);
         let terrain = terrain.expect("terrain");

@@ -160,7 +160,7 @@ fn is_reproduced(folder: &Folder, terrain: &str, recording: &str) {
 }
 
 #[test]
-fn what_run_recorded_is_felt_again_bit_by_bit() {
+fn run_recording_replays_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, record) = (folder.text("hills.tif"), folder.text("run.csv"));
     let words = [
@@ -184,7 +184,7 @@ fn what_run_recorded_is_felt_again_bit_by_bit() {
 }
 
 #[test]
-fn what_demo_recorded_is_felt_again_bit_by_bit() {
+fn demo_recording_replays_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, out) = (folder.text("hills.tif"), folder.text("demo"));
     // No image is named, and no device: it runs in the program itself, and says so.
@@ -215,7 +215,7 @@ pub(crate) fn write_degrees(folder: &Folder, height: impl Fn(u32, u32) -> u32) {
 }
 
 #[test]
-fn a_place_far_from_the_middle_is_felt_again_with_its_own_cells() {
+fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
     let folder = Folder::new();
     write_degrees(&folder, |column, row| 500 + 300 * ((column + row) % 9));
     let [terrain, out] = ["hills.asc", "demo"].map(|name| folder.text(name));

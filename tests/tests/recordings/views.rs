@@ -46,7 +46,7 @@ fn demo(folder: &Folder) -> String {
 }
 
 #[test]
-fn a_recording_says_when_and_how_the_view_changed_and_is_felt_again() {
+fn recording_has_each_change_of_placement_and_is_replayed() {
     let folder = Folder::of(SIZE);
     let told = demo(&folder);
     assert!(
@@ -175,7 +175,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
 }
 
 #[test]
-fn a_parquet_recording_of_views_is_felt_again_too() {
+fn parquet_recording_of_placements_is_replayed() {
     let folder = Folder::of(SIZE);
     folder.write("commands", "at 3.5 zoom 2\nat 4.5 reset\n");
     let names = ["hills.tif", "replayed.parquet", "commands"].map(|name| folder.text(name));
@@ -239,7 +239,7 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
 /// In each view cells are as large as they are at the place that is rendered; the recording says
 /// where that is, and a replay makes the same cells of it.
 #[test]
-fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
+fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
     let folder = Folder::new();
     // Hills without edges: where a proxy lands does not hang on how it came there.
     write_degrees(&folder, |column, row| {
@@ -343,7 +343,7 @@ fn after_a_far_pan_cells_are_measured_anew_and_felt_again_to_the_bit() {
 /// On walls a tick has most to do. At 1 kHz its work suffices, also after another view: what was
 /// recorded live equals the replay, which does all of a tick at once, but for rounding.
 #[test]
-fn on_a_steep_saw_a_replay_gives_what_was_felt() {
+fn replay_of_a_steep_saw_equals_the_live_forces() {
     /// Rounding by the digits of a file, mm.
     const ROUNDING_MM: f64 = 1e-5;
     let folder = Folder::new();

@@ -216,7 +216,7 @@ fn what_did_not_come_is_told_before_anything_is_armed() {
 }
 
 #[test]
-fn a_source_of_a_vrt_that_is_not_there_is_a_hole_and_the_others_are_felt() {
+fn missing_source_of_a_vrt_is_a_hole_and_the_others_are_read() {
     if !has_gdal() {
         return;
     }

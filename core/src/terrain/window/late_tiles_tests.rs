@@ -364,7 +364,7 @@ fn no_data_of_a_tile_acts_at_once() {
 }
 
 #[test]
-fn it_is_felt_when_all_of_it_has_come() {
+fn fallback_is_rendered_once_all_of_it_is_here() {
     for near_first in [false, true] {
         let mut room = room();
         let mut bed = Bed::new(&mut room);

@@ -536,7 +536,7 @@ fn lost_answer_is_repeated_without_another_step() {
 }
 
 #[test]
-fn a_point_repeated_while_it_is_felt_is_felt_once() {
+fn point_repeated_before_its_answer_is_rendered_once() {
     let mut rig = Rig::asking(scene(Source::Points));
     for _ in 0..3 {
         rig.send(&point(0, 0.0, 2.0));
@@ -622,7 +622,7 @@ fn a_storm_of_garbage_passes() {
 }
 
 #[test]
-fn a_host_that_dies_is_felt_on_and_one_that_returns_goes_on() {
+fn force_stays_when_the_host_dies_and_the_session_resumes() {
     let mut rig = Rig::armed();
     let asked = rig.needs().len();
     // Gone: nothing is read, nothing is sent.

@@ -95,7 +95,7 @@ fn rendered(rig: &mut Rig) -> f32 {
 }
 
 #[test]
-fn a_tile_is_felt_by_the_material_that_came_with_it() {
+fn tile_is_rendered_with_its_own_material() {
     let mut rig = greeted();
     let table = table(&[0.4, 1.0, 0.8]);
     assert!(sends(&mut rig, scene_of(&table, 9), &table));

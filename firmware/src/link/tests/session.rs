@@ -36,7 +36,7 @@ fn a_replay_feels_every_point_once_and_in_order() {
 }
 
 #[test]
-fn points_sent_ahead_are_felt_as_points_sent_singly() {
+fn points_sent_ahead_equal_points_sent_singly() {
     let singly = Rig::in_scene(scene(Source::Points)).descend(12);
     let mut ahead = Rig::in_scene(scene(Source::Points));
     for seq in 0..12 {
@@ -68,7 +68,7 @@ fn an_invalid_scene_is_refused_and_the_one_before_stays() {
 }
 
 #[test]
-fn the_arm_is_felt_and_reported_without_a_gap() {
+fn arm_is_rendered_and_reported_without_a_gap() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(400);
     let telemetry = rig.telemetry();

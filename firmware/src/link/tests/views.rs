@@ -89,7 +89,7 @@ fn a_view_is_put_in_while_the_clutch_is_open_and_the_arm_stays_armed() {
 }
 
 #[test]
-fn a_view_that_comes_while_something_is_felt_is_refused() {
+fn placement_during_contact_is_refused() {
     let mut rig = Rig::armed();
     rig.run(20);
     let before = latest(&rig);

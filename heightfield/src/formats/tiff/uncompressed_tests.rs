@@ -54,7 +54,7 @@ fn a_tile_that_is_left_out_is_a_hole_and_no_other_is() {
 }
 
 #[test]
-fn rows_that_a_strip_does_not_have_are_holes_and_the_others_are_felt() {
+fn missing_rows_of_a_strip_are_holes_and_the_others_are_read() {
     const ROW: u32 = 4 * SIZE[0];
     // The first strip ends 140 rows early, and the second is said to have as many more.
     let made = Made {

@@ -220,7 +220,7 @@ fn times_that_cannot_be_right_are_errors() {
 }
 
 #[test]
-fn a_rest_is_felt_and_a_repeated_row_left_out() {
+fn rest_is_rendered_and_a_repeated_row_left_out() {
     let rows = [
         ("0", 1.0),
         ("0", 1.0),
