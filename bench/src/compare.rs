@@ -126,7 +126,7 @@ impl Error {
 
 pub(crate) type Entry<'a> = (Label, Box<dyn Haptics + 'a>);
 
-/// Measures every variant on one terrain. `progress` is told each path.
+/// Measures every variant on one terrain. `progress` gets each path.
 pub fn compare(grid: &Grid, effort: Effort, mut progress: impl FnMut(&str)) -> Vec<Row> {
     let mut buffers = product::buffers::<SIDE>();
     let window = product::window::<SIDE>(grid, &mut buffers);

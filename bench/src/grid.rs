@@ -51,7 +51,7 @@ impl Grid {
         Self::from_fn(name, size, |x, y| synth.height(x as u32, y as u32))
     }
 
-    /// A terrain file's field at true proportions where it knows them, else
+    /// A terrain file's field at true proportions if it states them, else
     /// one cell a vertical unit, times `steepness`.
     pub fn from_raster(path: &Path, raster: &Raster, steepness: f64) -> Self {
         let scale = HapticGrid::new(raster, HapticCells::Stored)

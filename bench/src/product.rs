@@ -16,7 +16,7 @@ pub fn buffers<const D: usize>() -> Vec<Tile> {
     vec![Tile::VACANT; D * D + 1]
 }
 
-/// A window over `grid` that holds nothing yet, and a buffer to fill first.
+/// An empty window over `grid`, and a buffer to fill first.
 ///
 /// # Panics
 /// When there are fewer buffers than [`buffers`] makes.

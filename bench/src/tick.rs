@@ -38,7 +38,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// The name by which the counter knows when to count.
+/// The name of the function that is counted.
 #[inline(never)]
 fn counted_tick(product: &mut Product<'_, '_, SIDE>, hip: &Hip) -> Answer {
     product.tick(hip)

@@ -66,7 +66,7 @@ fn steps_are_those_of_the_library() {
 
     let (mut terrain, mut contact) = (hapterra_terrain_new(), hapterra_contact_new());
     let mut steps = vec![MaybeUninit::<HapterraStep>::uninit(); path.len()];
-    // SAFETY: all arrays are as long as is said.
+    // SAFETY: all arrays are as long as stated.
     let status = unsafe {
         [
             hapterra_terrain_set_f64(Some(&mut terrain), heights.as_ptr(), 60, 50, 0.8, 0),

@@ -260,7 +260,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
     }
 
     /// Takes a scene, or drops the one there is: force that was there goes out. Drops it for one that
-    /// it cannot take, too: whoever sent that believes in it.
+    /// it cannot take, too: its sender assumes it to be set.
     fn take_scene(&mut self, scene: Option<Scene>) -> Result<(), RefusedScene> {
         let asked = scene.is_some();
         let scene = scene.filter(|scene| self.renderer.can_take(scene));

@@ -28,7 +28,7 @@ pub(crate) enum Mover<'a> {
     Points,
     /// An arm.
     Arm {
-        /// The guard, which knows velocity, last force and shares.
+        /// The guard, with velocity, last force and shares.
         guard: &'a Guard,
         /// The arm's settings.
         mechanism: &'a Kinematics,

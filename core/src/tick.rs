@@ -52,7 +52,7 @@ impl<const D: usize> Haptics<'_, D> {
     }
 
     /// Follows the arm while nothing of it is rendered, in place of a tick: an arm that
-    /// somebody moves meanwhile keeps its zero, a jump of its encoders is noticed, and
+    /// is moved meanwhile keeps its zero, a jump of its encoders is noticed, and
     /// its motors cool. Nothing is driven.
     ///
     /// A board calls it in every tick of a replay in which no point is under way;

@@ -114,7 +114,7 @@ fn usable(stored: &Stored, full_scale_a: f32) -> (Option<Kinematics>, Calibratio
 }
 
 /// Builds the application in the given memory. `board` is the name by which the
-/// host knows the board.
+/// host identifies the board.
 ///
 /// A stored calibration that cannot be used latches
 /// [`Fault::CalibrationCorrupt`], unless the board starts with a worse fault.

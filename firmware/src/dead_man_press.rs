@@ -1,7 +1,7 @@
 //! A press of the dead-man switch as consent, which no host can give.
 //!
 //! A record that is stored decides what the guard protects from the next start on,
-//! whoever uses the arm then. So the user at the arm has to agree: the switch has to be
+//! for every later user of the arm. So the user at the arm has to agree: the switch has to be
 //! seen open after the request, and then pressed, within [`PRESS_MS`], while the arm is
 //! disarmed.
 

@@ -56,7 +56,7 @@
 //! ticks. In a scene that sets [`hold_clock`], a tile that the host owes takes no
 //! time; in a replay, no time passes between two points.
 //! [`link::Link::may_stand_still`] says when that is so. The emulated board then
-//! stops its two timers, which are all it knows of time; the native device is not
+//! stops its two timers, its only clocks; the native device is not
 //! ticked; a real board cannot stop time and goes on. So the host's speed changes
 //! nothing that is rendered, and a run repeats to the last bit.
 //!

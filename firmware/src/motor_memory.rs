@@ -5,7 +5,7 @@
 //! of two places by turns. A reset in the middle of a write damages that copy, and the
 //! one before it is still whole. The next start takes the newest whole copy ([`begin`]).
 //!
-//! A start that finds none, or that follows a power-up, knows nothing of the motors: it
+//! A start that finds none, or that follows a power-up, has no temperatures: it
 //! takes them to be as hot as derating lets them become ([`Temperatures::HOT`]). That
 //! leaves the continuous current at once and the peak current after about a minute.
 //!

@@ -81,7 +81,7 @@ impl Loaded {
         }
     }
 
-    /// An error in the words that GDAL said last on this thread.
+    /// An error with the last message of GDAL on this thread.
     pub(crate) fn refused(&self, otherwise: &str) -> Error {
         // SAFETY: the text stays until the next call on this thread, and is copied.
         let said = unsafe { from_c((self.functions.CPLGetLastErrorMsg)()) };

@@ -1,4 +1,4 @@
-//! Reference systems that PROJ knows, by their text or code.
+//! Reference systems of PROJ, by their text or code.
 
 use std::ffi::{CStr, c_char, c_int};
 use std::ptr;

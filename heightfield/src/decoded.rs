@@ -39,9 +39,9 @@ pub(super) struct Decoded {
     pub(super) system: Option<ReferenceSystem>,
     /// Source of that.
     pub(super) system_from: Certainty,
-    /// Place of the samples, where the file knows it.
+    /// Place of the samples, if the file states it.
     pub(super) place: Option<Place>,
-    /// Size of a cell, where the file knows it.
+    /// Size of a cell, if the file states it.
     pub(super) cell: Option<CellSize>,
     /// Its stored values are depths, which were turned into heights.
     pub(super) are_depths: bool,

@@ -54,7 +54,7 @@ pub enum RasterError {
         /// Reason for which GDAL cannot be asked.
         why: heightfield_gdal::Error,
     },
-    /// GDAL knows the format, and refuses the file.
+    /// GDAL has the format, and refuses the file.
     #[error("{0}")]
     ByGdal(heightfield_gdal::Error),
     /// Raw samples carry no header, and none was stated.

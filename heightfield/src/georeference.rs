@@ -109,7 +109,7 @@ fn length([x, y]: [f64; 2]) -> f64 {
 /// Kind of a file's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum System {
-    /// The file knows no place: coordinates are the columns and rows of its samples,
+    /// The file states no place: coordinates are the columns and rows of its samples,
     /// counted from the south-west sample.
     Cells,
     /// Lengths or angles of a reference system that the file does not state, or whose

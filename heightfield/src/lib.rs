@@ -9,7 +9,7 @@
 //! | PNG | `png` | grey, grey + alpha, depth in the alpha of a colour picture, encoded in its colours |
 //! | raw samples | here | with a stated [`RawLayout`] |
 //! | NumPy `.npy` | here | |
-//! | all others that GDAL knows | `heightfield-gdal` | where the machine has a libgdal |
+//! | all other formats of GDAL | `heightfield-gdal` | where the machine has a libgdal |
 //!
 //! Each format is one file or folder of `formats`, and one line in its table. From a
 //! path to samples: `open` asks the table, and lets the format
@@ -584,7 +584,7 @@ impl Raster {
     }
 
     /// Outer edges of the cells around all samples, in the units of the file's
-    /// coordinates, where the file knows its place.
+    /// coordinates, if the file states its place.
     pub fn bounds(&self) -> Option<Bounds> {
         self.source.bounds()
     }
@@ -635,7 +635,7 @@ impl Raster {
         self
     }
 
-    /// Size of a cell, where the file knows it.
+    /// Size of a cell, if the file states it.
     pub fn cell(&self) -> Option<CellSize> {
         self.source.cell
     }

@@ -2,8 +2,8 @@
 //!
 //! The author of a file chose the names in it. A terminal obeys control sequences, and characters
 //! that turn the direction of writing hide what a line says, so a name could clear the screen or
-//! write over what was said before. All output goes through here: what is written to the terminal
-//! (`say`, `cli::terminal::voice`, `cli::report`, errors), to the log (`cli::log`), to readers of
+//! write over earlier lines. All output goes through here: what is written to the terminal
+//! (`print_macros`, `cli::terminal::writer`, `cli::report`, errors), to the log (`cli::log`), to readers of
 //! events and to the viewer.
 
 use std::fmt::Write as _;

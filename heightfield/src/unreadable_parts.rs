@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use super::RasterError;
 use super::blocks::Part;
 
-/// So many are known at most: what is found beyond is tried, and told of, again.
+/// Parts that are remembered, at most: further ones are tried, and reported, again.
 const MOST: usize = 1 << 16;
 /// After so many warnings one says that there are more.
 const WARNINGS: usize = 8;

@@ -4,7 +4,7 @@
 //! arm. These go on in silence.
 //!
 //! For commands that hold no device. Where an arm may be armed, `cli::terminal::writer`
-//! writes, for whom nobody waits.
+//! writes, and callers do not wait for it.
 //!
 //! Output that a command was asked to write (files, `replay -o -`), and the report that is a command's
 //! result (`cli::report`), do not use them: there, a write error ends the command. `list` prints each

@@ -79,7 +79,7 @@ pub trait Samples {
 /// come.
 #[derive(Clone, Copy)]
 pub struct Replay<'a> {
-    /// As the device is told of it.
+    /// In the form that the device gets.
     pub scene: &'a Scene,
     /// Source of the tiles.
     pub field: &'a dyn Samples,

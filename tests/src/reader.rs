@@ -37,7 +37,7 @@ impl Reader {
         }
     }
 
-    /// Returns true if it reads a file: GDAL knows no NumPy, and `hapterra` leaves to GDAL what is
+    /// Returns true if it reads a file: GDAL reads no NumPy, and `hapterra` leaves to GDAL what is
     /// rare.
     #[must_use]
     pub fn knows(self, file: &str) -> bool {

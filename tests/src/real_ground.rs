@@ -6,7 +6,7 @@ use heightfield::{OpenOptions, Raster};
 use crate::shared;
 
 /// Three of them by name: mountains, a volcano with sharp ridges, a city. None where they are
-/// not on this machine, which is said.
+/// not on this machine, with a message.
 ///
 /// # Panics
 /// When one of them does not open.
@@ -44,7 +44,7 @@ fn named(names: &[&'static str]) -> Vec<(&'static str, Raster)> {
 }
 
 /// All of them that open, by their names' order. None where they are not on this machine, which
-/// is said, as is what does not open.
+/// is reported, as is a file that does not open.
 ///
 /// # Panics
 /// When their folder cannot be read.

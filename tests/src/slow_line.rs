@@ -67,10 +67,10 @@ impl SlowLine {
 
 /// A device whose time passes tick by tick, when its host says so.
 pub trait Stepped {
-    /// Sends frames in no time of the device. Returns what it said since.
+    /// Sends frames in no time of the device. Returns its messages since.
     fn exchange(&mut self, frames: &[u8]) -> Vec<u8>;
 
-    /// Runs one tick, then takes frames of this session. Returns all that the device said
+    /// Runs one tick, then takes frames of this session. Returns all messages of the device
     /// until it had done with both.
     fn tick(&mut self, session: SessionNumber, frames: &[u8]) -> Vec<u8>;
 }
@@ -194,7 +194,7 @@ impl OnBoard {
         self.link.send(frame).expect("the board is there");
     }
 
-    /// Waits until the board has done with all that it was sent. Returns what it said.
+    /// Waits until the board has processed everything. Returns its messages.
     fn settle(&mut self, session: SessionNumber) -> Vec<u8> {
         self.send(&from_host(session, &ToDevice::Heartbeat));
         let mut said = vec![];

@@ -80,13 +80,13 @@ impl SocketDevice {
         wait_until("a hello", || hellos.load(Ordering::Relaxed) > 0);
     }
 
-    /// Waits until a host has said goodbye to the device, which is deaf.
+    /// Waits until a host has sent a close to the device, which ignores it.
     pub fn wait_for_unheard_bye(&self) {
         let byes = &self.seen.unheard_byes;
         wait_until("a goodbye", || byes.load(Ordering::Relaxed) > 0);
     }
 
-    /// Waits until a host, or its guardian, has said anything that ends a session to the
+    /// Waits until a host, or its guardian, has sent a message that ends a session to the
     /// device, which is deaf.
     pub fn wait_for_unheard_end(&self) {
         let count = |of: &AtomicU64| of.load(Ordering::Relaxed);

@@ -273,7 +273,7 @@ fn an_arm_that_nobody_holds_is_stopped_before_it_is_fast() {
         println!("fastest {fastest:?} rad/s");
         let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;
         assert!(fastest[0] < most, "{fastest:?}");
-        // Which way it went is told all the same.
+        // The direction of its motion is reported all the same.
         let inverted = log
             .entries
             .iter()

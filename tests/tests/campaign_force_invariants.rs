@@ -109,7 +109,7 @@ fn a_force_larger_than_anything_makes_of_the_depth_is_told() {
 }
 
 /// In and out of the ground at 50 mm/s, with this much more force on the way out: whether it is
-/// told, and how much was given.
+/// reported, and the energy that was given.
 fn tap(params: &SurfaceParams, more: f32, is_calm: bool) -> (bool, f32) {
     taps(params, more, is_calm, 1)
 }

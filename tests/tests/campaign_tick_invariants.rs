@@ -15,7 +15,7 @@ const ZERO: [i32; 3] = [100, -200, 300];
 /// A pose in the middle of the workspace, rad.
 const POSE: [f64; 3] = [0.0, 0.2, 0.3];
 
-/// A tick as it may be: what a test changes in it is what must be told.
+/// A valid tick: each change of it by a test has to be reported.
 #[derive(Clone)]
 struct Tick {
     drive: GuardOutputs,
@@ -24,7 +24,7 @@ struct Tick {
 }
 
 impl Tick {
-    /// The motors make this force by the levers of `POSE`, which is told and true.
+    /// The motors make this force by the levers of `POSE`, reported and true.
     fn pushing(force_n: [f64; 3]) -> Self {
         let model = PhantomModel::premium_1_5();
         let counts = counts(&model, POSE);
@@ -84,7 +84,7 @@ fn a_tick_as_it_should_be_passes_and_is_measured() {
     let (watch, said) = Tick::pushing(up(7.6)).judged();
     assert_eq!(said, Ok(()));
     let seen = watch.extremes;
-    // The pose that is told is that of whole counts.
+    // The reported pose is that of whole counts.
     assert!((seen.read_force_n - 7.6).abs() < 0.01, "{seen:?}");
     assert!((seen.tip_force_n - 7.6).abs() < 1e-6, "{seen:?}");
     assert_eq!((seen.misled_ticks, seen.singular_ticks), (0, 0));
@@ -184,7 +184,7 @@ fn a_singular_pose_is_counted_not_judged() {
     assert_eq!(watch.extremes.singular_ticks, 1);
 }
 
-/// Nobody reads switches or encoders while the core stands still; outputs and truth
+/// No tick reads switches or encoders while the core is halted; outputs and truth
 /// count all the same.
 #[test]
 fn a_command_that_is_held_is_judged_by_what_is_true() {
@@ -237,7 +237,7 @@ fn every_hostile_calibration_is_refused_and_would_be_told() {
         assert!(record.validate().is_err(), "{record:?}");
         above += u32::from(hostile_calibrations::keeps_ceilings(&record).is_err());
     }
-    // The others are told apart by the device alone: a length that is none.
+    // Only the device detects the others: a length that is none.
     assert!(above > 1_600, "{above}");
 }
 

@@ -339,7 +339,7 @@ fn what_is_too_large_is_cut_or_made_coarser_by_the_hint() {
     }
 }
 
-/// GDAL knows nothing of NumPy's files; the hint is Python's.
+/// GDAL does not read NumPy's files; the hint is Python's.
 #[test]
 fn arrays_are_converted_by_numpy() {
     if !has_python("numpy") {

@@ -30,7 +30,7 @@ fn fails(words: &[&str], code: i32, says: &[&str]) {
 
 #[test]
 fn list_says_what_it_looked_for() {
-    // Port 1 is nobody's.
+    // Port 1 is unused.
     let output = hapterra(&["list", "--tcp", "127.0.0.1:1"]);
     let told = told(&output);
     assert!(output.status.success(), "{told}");
@@ -61,7 +61,7 @@ fn moved_subcommand_is_named_with_its_new_program() {
 }
 
 /// A terrain is not served to a board that is emulated for the occasion; what is done
-/// instead is said.
+/// instead is printed.
 #[test]
 fn run_prints_the_rendering_of_an_emulated_board() {
     fails(
@@ -115,7 +115,7 @@ fn a_record_goes_to_a_file_and_comes_back() {
     fails(&read, 1, &["no calibration file", "arm.toml", "hint:"]);
 }
 
-/// Nobody has published a Premium 1.0's ratios: a record that never measured them is not
+/// There is no source for a Premium 1.0's ratios: a record that never measured them is not
 /// taken by oversight.
 #[test]
 fn guessed_ratios_are_not_taken_unmeasured_unless_told() {

@@ -26,7 +26,7 @@ fn text(path: &Path) -> &str {
     path.to_str().expect("a plain path")
 }
 
-/// An example that prints, and the line on which it is told events.
+/// An example that prints, and the line from which it reads events.
 struct Example {
     child: Child,
     line: TcpStream,
@@ -149,7 +149,7 @@ impl Telling {
     }
 }
 
-/// All events of a run of five seconds over hills, its recording and what the examples said.
+/// All events of a run of five seconds over hills, its recording and the output of the examples.
 #[test]
 fn run_sends_events_that_the_examples_speak_and_sound() {
     let folder = tempfile::tempdir().expect("a folder");

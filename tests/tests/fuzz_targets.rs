@@ -23,7 +23,7 @@ fn random_bytes(random: &mut Random, length: usize) -> Vec<u8> {
     (0..length).map(|_| random.bits() as u8).collect()
 }
 
-/// Some bytes changed, dropped or said twice.
+/// Some bytes changed, dropped or doubled.
 fn mutated(random: &mut Random, input: &[u8]) -> Vec<u8> {
     let mut bytes = input.to_vec();
     for _ in 0..random.below(6) {

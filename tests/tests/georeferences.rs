@@ -1,4 +1,4 @@
-//! Places of terrain files: reference systems and bounds as GDAL knows them, and what
+//! Places of terrain files: reference systems and bounds as GDAL reads them, and what
 //! `hapterra info` says about each.
 //!
 //! `data/places_by_gdal.csv` was made once by `data/places_by_gdal.py`, which names

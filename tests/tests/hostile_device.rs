@@ -172,7 +172,7 @@ fn nothing_that_a_device_asks_for_floods_the_terminal() {
     let why = String::from_utf8_lossy(&refused.stderr);
     is_plain(&why);
     assert!(why.contains("was not brought up"), "{why}");
-    // Nor is its arm a virtual one because somebody says so.
+    // Nor is its arm a virtual one by its own claim.
     for more in [&[][..], &["--unchecked"]] {
         let refused = run(&with_plant, more);
         assert!(!refused.status.success(), "{refused:?}");

@@ -265,7 +265,7 @@ fn strip_of_4_gb_is_read_in_the_memory_of_a_terrain() {
     }
 }
 
-/// All of it is looked at for a height: that takes no memory, and it is said, because it takes
+/// All of it is searched for a height: that takes no memory, and is reported, because it takes
 /// long.
 #[test]
 fn a_file_of_nothing_is_looked_through_and_it_says_so() {

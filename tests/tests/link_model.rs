@@ -1,5 +1,5 @@
 //! Every frame of a conversation lost, repeated, delayed and overtaken, either end
-//! killed at every moment: the end is agreed or told, nothing is driven that no host
+//! killed at every moment: the end is confirmed or reported, nothing is driven that no host
 //! wished, every sample is counted once.
 
 use hapterra_tests::link_model::{Direction, End, Harm, Interruption, Plan, Report, check, frames};
@@ -112,7 +112,7 @@ fn interrupted(what: Interruption) {
         };
         let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
         assert_eq!(report.end, End::Agreed, "{plan:?}");
-        // The frames around that moment, by what an undisturbed run had said.
+        // The frames around that moment, by the frames of an undisturbed run.
         for number in 0..12 {
             for (way, harm) in [
                 (Direction::ToDevice, Harm::Lose),
@@ -181,7 +181,7 @@ fn a_host_that_leaves_an_armed_arm_hears_goodbye_when_it_is_off() {
 /// Returns the histories before a moment, with everything that may be repeated after it.
 fn histories() -> Vec<Vec<(u64, Interruption)>> {
     let ticks = agree(&Plan::default()).ticks;
-    // While it opens, while it feels, and when everything but the end of the end was said.
+    // While it opens, while it touches, and when everything but the last answer was sent.
     let killed = [60, ticks / 2, ticks - 2].map(|at| vec![(at, Interruption::HostKilled)]);
     [vec![]].into_iter().chain(killed).collect()
 }
@@ -365,7 +365,7 @@ fn the_line_may_be_cut_one_way_at_any_moment() {
                     ..Plan::default()
                 };
                 let report = check(&plan).unwrap_or_else(|wrong| panic!("{wrong:?} in {plan:?}"));
-                // In a cut that is longer than goodbye may take the user is told.
+                // A cut that is longer than the time-out of the close is reported to the user.
                 assert!(report.end == End::Agreed || long > 3_000, "{plan:?}");
             }
         }

@@ -66,7 +66,7 @@ fn look(scene: &Scene, buffers: &mut Buffers) -> Found {
 }
 
 /// Returns true if a proxy at rest is at a local closest point, by the bound that the judge has,
-/// too; `None` where there is nothing to be said.
+/// too; `None` if nothing can be checked.
 fn rests_right(terrain: &Terrain, seen: &ObservedTick) -> Option<bool> {
     let displacement = distance(seen.proxy, seen.hip);
     let rests = seen.output.state == ContactState::Touching && seen.output.converged;

@@ -369,7 +369,7 @@ fn open_options_reach_the_driver_and_unknown_ones_are_refused() {
     assert!(error.to_string().contains("read without GDAL"), "{error}");
 }
 
-/// A packing that a build of GDAL lacks is said in its words: nothing is damaged.
+/// A compression that a build of GDAL lacks is reported in its words: nothing is damaged.
 #[test]
 fn a_packing_that_is_not_read_is_no_damage() {
     if !has_gdal() {

@@ -246,7 +246,7 @@ fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
     assert_eq!(said, "");
 }
 
-/// Projections that nobody here knows are named, with what to do.
+/// Unknown projections are named, with a remedy.
 #[test]
 fn a_projection_that_is_not_known_is_named_with_what_to_do() {
     for (file, name) in [

@@ -1,4 +1,4 @@
-//! Which part of a terrain lies under the hand, as `run` and `demo` are told it, and what
+//! The part of a terrain under the hand, by options of `run` and `demo`, and what
 //! they say where that cannot be.
 
 use std::path::{Path, PathBuf};

@@ -29,7 +29,7 @@ fn terrain(heights: &[f32]) -> Terrain {
     })
 }
 
-/// Ground that a HIP knows: slopes up to four.
+/// Ground with slopes up to four.
 fn gentle() -> impl Strategy<Value = Vec<f32>> {
     let height = prop_oneof![
         Just(0.0_f32),

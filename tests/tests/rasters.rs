@@ -417,7 +417,7 @@ fn every_tiff_reads_the_same_in_blocks_as_at_once() {
     assert!(files > 20, "{files}");
 }
 
-/// Whoever runs out of memory is to know why, and what to do.
+/// An out-of-memory error has its reason and a remedy.
 #[test]
 fn a_large_file_that_is_read_as_a_whole_says_so() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -212,7 +212,7 @@ fn a_device_that_is_not_there_is_an_error_that_says_what_was_looked_for() {
         assert_eq!(run.status.code(), Some(1), "{}", said(&run));
         said(&run)
     };
-    // Port 9 (discard) is served by nobody these days.
+    // Port 9 (discard) has no server these days.
     let tcp = run("tcp:127.0.0.1:9");
     assert!(
         tcp.contains("127.0.0.1:9") && tcp.contains("hint: "),

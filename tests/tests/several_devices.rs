@@ -278,7 +278,7 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let served = SocketDevice::start();
     let there = format!("tcp:{}", served.address);
-    // Nobody listens there any more.
+    // There is no listener any more.
     let absent = {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
         format!("tcp:{}", listener.local_addr().expect("a port"))
@@ -307,7 +307,7 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
 
 #[test]
 fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
-    // A current flows that nobody commanded.
+    // A current flows without a command.
     let conducts = SocketDevice::with(|| {
         let current = Box::new(|_, sense: &mut GuardInputs, _: &_| {
             sense.measured_ma = Some([2_000, 0, 0]);

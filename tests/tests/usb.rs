@@ -70,7 +70,7 @@ fn a_board_is_enumerated_and_found_by_the_client() {
     };
     assert_eq!(endpoints(&found), expected);
     let configuration = ConfigurationDescriptor::new(&found.configuration).expect("well formed");
-    // 100 mA, and not said to have a supply of its own.
+    // 100 mA, and without a supply of its own.
     assert_eq!(
         (configuration.max_power(), configuration.attributes()),
         (50, 0x80)
@@ -317,7 +317,7 @@ fn an_unplugged_board_goes_on_feeling_and_is_there_again() {
         let before = *ticks(session, 200).last().expect("samples");
         half_a_transfer(board);
         board.borrow_mut().unplug();
-        // Two seconds: nobody reads, nobody writes.
+        // Two seconds without a read or a write.
         let mut unplugged = board.borrow_mut();
         for ms in 0..2000 {
             for _ in 0..hapterra_tests::usb::MOMENTS_A_MS {

@@ -44,7 +44,7 @@ impl RrdFile {
 
 /// End of a stream.
 pub struct Ended {
-    /// The writer said that there is no more; it was killed where it did not.
+    /// The writer ended the stream; without that it was killed.
     pub is_told: bool,
     /// Error of the file for rerun's own viewer. The page goes on without it.
     pub rrd: Result<()>,

@@ -6,7 +6,7 @@
 //!
 //! - [`feed`]: messages of `hapterra` from the pipe;
 //! - [`drawing`]: each message as rerun's entities, in ground metres, and the layout;
-//! - [`history`]: what a page that comes now has to be told, bounded; and the pages' queues;
+//! - [`history`]: the entries for a new page, bounded; and the pages' queues;
 //! - [`server`]: the page and its stream, for this machine alone;
 //! - [`options`]: what the command line says.
 //!

@@ -94,7 +94,7 @@ fn watched(has_ended: bool) -> Arc<AtomicBool> {
     is_gone
 }
 
-/// Waits while somebody looks, and for somebody while `hapterra` does.
+/// Waits while a page is open, and for a page while `hapterra` waits.
 fn linger(history: &History, linger: Option<Duration>, is_gone: &AtomicBool) {
     let mut alone_since = Instant::now();
     loop {
@@ -102,7 +102,7 @@ fn linger(history: &History, linger: Option<Duration>, is_gone: &AtomicBool) {
         if kept.pages > 0 {
             alone_since = Instant::now();
         }
-        // A reader of pages that were told everything is not counted any more, so the
+        // A reader of pages that got everything is not counted any more, so the
         // time since it came is what is left to go by.
         let patience = linger.unwrap_or(LINGER);
         let may_go = linger.is_some() || kept.came > 0 || is_gone.load(Ordering::Acquire);

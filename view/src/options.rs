@@ -42,7 +42,7 @@ pub struct Options {
     /// Bytes of a page's memory from which on it begins anew.
     pub page_bytes: u64,
     /// Time for which the page stays after the session's end, once no page is open; none: until
-    /// somebody has, and then the usual time.
+    /// a page has opened, and then the usual time.
     pub linger: Option<Duration>,
     /// A recording for rerun's own viewer.
     pub rrd: Option<PathBuf>,

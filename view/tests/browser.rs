@@ -199,9 +199,9 @@ fn a_page_that_has_grown_too_large_begins_anew_and_goes_on() {
         }
     };
     let first = until(&|_, bytes| bytes > 0.0);
-    // It is told anew what was there, and what comes.
+    // It gets the earlier entries again, and the new ones.
     let again = until(&|began, bytes| began != first && bytes > 0.0);
-    // Not at once: what it is told first may be larger already.
+    // Not at once: its first entries may be larger already.
     assert!(again - first > 20_000.0, "after {} ms", again - first);
     drop(browser);
     assert!(session.viewer.end());

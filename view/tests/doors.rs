@@ -101,7 +101,7 @@ fn pages_that_come_go_and_hang_hold_nothing_up() {
         }
     }
     drop(hanging);
-    // All of a recording's time is there for whoever comes last, and its end.
+    // All of a recording's time is there for the last page, and its end.
     let mut last = reading(port, 1000);
     assert!(viewer.tell(&Message::End));
     let mut rest = Vec::new();
@@ -162,7 +162,7 @@ fn it_ends_by_itself_once_nobody_looks() {
 #[test]
 fn it_ends_by_itself_where_hapterra_was_killed_and_nobody_ever_looked() {
     let (mut viewer, _) = live("");
-    // No end is said. Its own patience is 15 s.
+    // No end is sent. Its own time-out is 15 s.
     viewer.hang_up();
     assert!(viewer.end());
 }

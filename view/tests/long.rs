@@ -20,7 +20,7 @@ const VIEWER_BYTES: u64 = 300 << 20;
 /// Memory bound of `hapterra`: its terrain, its queue, and the rows of ten minutes that a demo
 /// keeps for its picture.
 const HOST_BYTES: u64 = 300 << 20;
-/// Memory bound of a page: from 1 GB on it begins anew, with the next piece that it is told.
+/// Memory bound of a page: from 1 GB on it begins anew, with the next piece that it gets.
 const PAGE_BYTES: u64 = 5 << 28;
 
 /// Memory of a page, and its messages.

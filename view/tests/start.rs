@@ -12,7 +12,7 @@ use common::feed::Feed;
 use common::scene::{batch, greeting, layer, scene};
 use common::{Running, Viewer, folder, hapterra};
 
-/// Entities in the order in which a page is told them, whether each stands, and when the last
+/// Entities in the order in which a page gets them, whether each stands, and when the last
 /// part of the coarsest level was there.
 struct Told {
     entities: Vec<(String, bool)>,

@@ -33,7 +33,7 @@ pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
     })
 }
 
-/// Returns the commit of the source, if git knows it, for the report.
+/// Returns the commit of the source, if git has it, for the report.
 fn commit() -> Option<String> {
     let git = |words: &[&str]| output(Command::new("git").args(words).current_dir(root()));
     let commit = git(&["rev-parse", "--short", "HEAD"])?;

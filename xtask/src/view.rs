@@ -40,7 +40,7 @@ pub(crate) fn build() -> Result<PathBuf> {
 
 /// Lints the viewer, holds its dependencies to `deny.toml`, and runs its tests with
 /// `hapterra` beside them; the page's in a browser where there is one or one can be installed.
-/// All of it is here, so that nobody who does not look waits for it.
+/// All of it is here, so that it is built only for those who use it.
 pub(crate) fn test() -> Result<()> {
     timed("linting the viewer", lint)?;
     timed("checking the viewer's dependencies", || {

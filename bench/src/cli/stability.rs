@@ -104,7 +104,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .chain(&args.picture)
             .map(PathBuf::as_path),
     );
-    // A place that cannot be written to is said before the trials.
+    // An output that cannot be written is reported before the trials.
     if let Some(path) = &args.picture {
         drop(Output::create(path).or_hint(OTHER_PICTURE)?);
     }

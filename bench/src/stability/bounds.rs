@@ -1,4 +1,4 @@
-//! Stiffness that theory says is passive, whoever holds the arm.
+//! Stiffness that is passive by theory, for every hand.
 
 use hapterra_core::rate::TickRate;
 

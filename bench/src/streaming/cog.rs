@@ -159,7 +159,7 @@ fn directory(image: &Image, list: u32, is_overview: bool, stored: &Stored, next:
     // Floats.
     tag(339, short, 1, 3);
     let double = 12;
-    // Cells of an overview are larger; nobody asks an overview for its place.
+    // Cells of an overview are larger; the place of an overview is not used.
     tag(33550, double, 3, 8);
     tag(33922, double, 6, 32);
     tag(34735, short, GEO_KEYS.len() as u32, 80);

@@ -27,7 +27,7 @@ impl Line {
         self.waiting.extend(bytes);
     }
 
-    /// Carries what a tick has time for to somebody who tells how much of it was taken; the rest
+    /// Sends a tick's bytes to a reader, which returns the number of bytes it took; the rest
     /// waits.
     pub(super) fn carry(&mut self, mut take: impl FnMut(&[u8]) -> usize) {
         let mut left = self.bytes_a_tick.min(self.waiting.len());

@@ -32,7 +32,7 @@ struct Subject<'p> {
 }
 
 /// Measures the made terrains of a plan and some files; `tell` hears what is begun, `done` gets
-/// each row. A terrain that cannot be measured is told of in `warn`, and the next one is measured.
+/// each row. A terrain that cannot be measured is reported by `warn`, and the next one is measured.
 ///
 /// # Errors
 /// When there is no room for the made terrains, or no folder.

@@ -80,7 +80,7 @@ fn unit(steps: &[Step]) -> f64 {
 }
 
 /// Two lines, holes in runs of one, and long numbers: each sample takes as many steps as
-/// bytes can make it take. It ends with too few bytes, which is told at the end only.
+/// bytes can make it take. It ends with too few bytes, which shows at the end only.
 fn hostile(random: &mut Random) -> Vec<u8> {
     let mut bytes = vec![2 | 4 | 27 << 3, 0, 0, 0, 0x40];
     for _ in 0..2 {

@@ -92,7 +92,7 @@ struct OnSurface {
 enum FastPath {
     /// It has the answer.
     Taken,
-    /// It has none, but knows the closest point of the patch that the proxy is on.
+    /// It has none, but has the closest point of the patch that the proxy is on.
     Known(Place),
     /// There is none.
     None,

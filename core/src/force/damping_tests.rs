@@ -175,7 +175,7 @@ fn damping_is_that_of_the_spring_which_is_let_through() {
 #[derive(Clone, Copy)]
 struct Taps {
     hz: u32,
-    /// From the beginning of a tick until its force acts, s, and what the damper is told of it.
+    /// From the beginning of a tick until its force acts, s, and the latency that is given to the damper.
     late_s: f64,
     told_s: f64,
     /// Taps a second; at 9 the tip is up to 170 mm/s fast.

@@ -1,7 +1,7 @@
 //! Materials: what a class of ground feels like, and the table of them that a scene has.
 //!
 //! The host sorts the ground into classes, and tells the device which material of the table
-//! each sample has; so the device knows nothing of a file's own classes.
+//! each sample has; so the device needs no classes of the file.
 //! `active_material.rs` beside this file has how one material follows another.
 
 use heapless::Vec;

@@ -3,7 +3,7 @@
 //! A place is counted in waves or grains from the terrain's origin: 32 bits of whole ones, which
 //! wrap, and 32 bits of a fraction. How many there are to a cell is rounded once, to an `f32`; all
 //! that follows is exact. So the relief is as fine 10⁸ cells from the origin as it is there, and
-//! knows nothing of windows and tiles.
+//! depends on no window or tile.
 
 use super::texture::{Pattern, Texture};
 use crate::grid::GridPoint;

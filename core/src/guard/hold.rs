@@ -47,7 +47,7 @@ impl Guard {
     /// Holds the outputs at shares of full scale, each cut to -1..=1, or no longer. Only
     /// while disarmed and without a fault: the enable line stays low, so no current flows.
     /// It ends after [`HOLD_S`] and with whatever arms, disarms, faults or changes
-    /// settings. A share that is not a number holds nothing.
+    /// settings. A share that is not a number holds zero.
     pub fn hold(&mut self, shares: Option<[f32; 3]>) {
         self.hold.end();
         let Some(shares) = shares.map(Vec3::from).filter(|shares| !shares.is_nan()) else {

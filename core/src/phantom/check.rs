@@ -300,7 +300,7 @@ mod tests {
     use super::*;
     use std::format;
 
-    /// A record with one thing wrong, and what should be said of it.
+    /// A record with one fault, and the expected message.
     type Case = (fn(&mut Calibration), CalibrationField, Option<u8>);
 
     #[test]

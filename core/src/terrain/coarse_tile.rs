@@ -128,7 +128,7 @@ impl CoarseTile {
     }
 
     /// Lowest and highest of `tile`, which is this one, over a tile of the scene's level, in cells
-    /// above the base of `tile`; `None` where it knows nothing there.
+    /// above the base of `tile`; `None` if it has no height there.
     pub(super) fn range_over(&self, tile: &Tile, index: TileIndex) -> Option<[f32; 2]> {
         let first = index.first_cell();
         let along = |first: i32, own: i32| {

@@ -14,7 +14,7 @@
 //! is rendered by its own samples alone, and what has not come bends to it along its border.
 //!
 //! In each tick the surface is bilinear in each cell, so the contact is as exact as over any
-//! other field. Where the fallback knows nothing (beyond it, in its holes, or before it comes) a
+//! other field. Where the fallback has no height (beyond it, in its holes, or before it comes) a
 //! tile is the surface at once.
 
 use super::index::{TileIndex, wrap};

@@ -305,7 +305,7 @@ fn placement_keeps_the_depth_and_the_arm_stays_armed() {
     assert!(depth > 3.0, "{depth}");
     let ticks_before = arm.last.sample.tick;
     // Half of the samples, and as large in the hand: zoomed out by two. The height is wrong
-    // on purpose: the device knows it.
+    // on purpose: the device computes its own.
     let hip = halved(arm.last.sample.hip);
     let [x, y, z] = hip.cell();
     let wrong = GridPoint::new([x, y, z + 9], hip.frac());

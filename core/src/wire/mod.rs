@@ -29,7 +29,7 @@
 //! assert_eq!((taken, decode(content)), (frame.len(), Ok(alive)));
 //! ```
 //!
-//! The line may lose, damage, delay, repeat and reorder frames. Whatever is said is
+//! The line may lose, damage, delay, repeat and reorder frames. Every message is
 //! therefore either repeated until it is answered, or makes no difference when it is
 //! lost (telemetry, which is counted) or comes twice.
 //!
@@ -37,25 +37,25 @@
 //!
 //! | state | says | leaves it when | gives up |
 //! | --- | --- | --- | --- |
-//! | closed | nothing | it is told to greet: greeting | |
+//! | closed | nothing | a command to open: greeting | |
 //! | greeting | a version check and hello, every 0.4 s | the device's hello comes: scene sent, or open where there is no scene. A refusal that names another protocol: an error | after 4 s, whatever else is heard |
 //! | scene sent | the scene, every 0.4 s; after 0.75 s without an answer hello, too | the scene is taken: open. It is refused: an error | after 4 s, whatever else is heard |
 //! | open | alive, every 0.5 s of its own or of the device's time; its request, its questions, every 0.4 s; tiles and points; after 0.75 s without an answer hello, every 0.4 s | it is told to leave: leaving. A hello of a device that was restarted (another hello opened the session) or holds another scene: scene sent | after 4 s without an answer; after 1.5 s where frames of another session come meanwhile: another host has taken the device |
-//! | leaving | hello and bye, every 0.4 s; answers requests for tiles no more | goodbye comes: close is said once, and it is closed | after 3 s: the user is told that the board may be armed |
+//! | leaving | hello and bye, every 0.4 s; answers requests for tiles no more | goodbye comes: close is sent once, and it is closed | after 3 s: an error reports that the board may be armed |
 //! | detaching | hello and detach, every 0.4 s | detached comes: closed | after 3 s |
 //!
 //! A host that has put no scene in force and asked for nothing that drives leaves by
 //! detaching: what another host left is none of its business.
 //!
 //! A session that is over on the device is none any more, whatever its host believes. A
-//! host is told so in answer to its hello (over), and heeds that only in its own session
+//! host gets that in answer to its hello (over), and heeds that only in its own session
 //! and only to its last hello: what comes late of an earlier session, or from before a
 //! restart of the device, says nothing about the present one. Where another session was
 //! opened since, another host has taken the device: an error at once, in each state but
 //! detaching, which is closed. Where the device has let go the arm of a host that was
 //! silent, the host goes on in a new session; one that leaves waits for its goodbye.
 //!
-//! An answer is a frame of this session that answers something the host has said:
+//! An answer is a frame of this session that answers a message of the host:
 //! hello, scene taken, point answer, answer, marked, status, calibration, alive, goodbye,
 //! detached, over.
 //! Telemetry is none, because it also comes where the device hears nothing.
@@ -63,7 +63,7 @@
 //!
 //! One request is under way at a time; the next waits for its answer. A request that
 //! is not answered in 4 s (and 10 s more for a press, where it is to store), while
-//! other answers come, is given up and told; where it
+//! other answers come, is given up and reported; where it
 //! was to arm, a request to disarm follows, which makes the device ignore the first
 //! should it still arrive.
 //!
@@ -96,7 +96,7 @@
 //!   comes once for each hello.
 //! - A hello that names no time for silence, of a session that is not open, opens none:
 //!   its host only looks. It is answered, and so are its questions for status and
-//!   calibration, in its own session's number; the last such host is known. Whoever looks
+//!   calibration, in its own session's number; the last such host is known. A host that reads
 //!   takes no arm from its host, and keeps none armed whose host is gone.
 //! - The session before, of which a hello tells, is the last one that was not detached.
 //!   Who looks does not hide what became of it.
@@ -128,7 +128,7 @@
 //!
 //! Nothing is driven before the host has asked for it
 //! ([`Request::Arm`](request::Request::Arm)) and the dead-man switch was pressed after
-//! that; what still blocks it is told in [`ToHost::Guard`](message::ToHost::Guard).
+//! that; the remaining blockers are in [`ToHost::Guard`](message::ToHost::Guard).
 
 pub mod frame;
 pub mod hello;

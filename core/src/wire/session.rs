@@ -50,7 +50,7 @@ pub enum SessionEnd {
     /// There was no session since the device started.
     #[default]
     None,
-    /// The host said goodbye: the arm was disarmed.
+    /// The host closed the session: the arm was disarmed.
     Goodbye,
     /// Another session was opened. The device went on with what it held.
     Replaced,

@@ -10,7 +10,7 @@ use cortex_m::peripheral::SCB;
 
 use crate::registers::{Uart, report_uart};
 
-/// Ends the program: the host said goodbye.
+/// Ends the program: the host closed the session.
 pub(crate) fn done() -> ! {
     SCB::sys_reset()
 }

@@ -3,7 +3,7 @@
 //! QEMU runs with `-icount shift=3,sleep=off`: an instruction takes 8 ns of
 //! emulated time (125 million a second, what a 168 MHz Cortex-M4F does at 1.34
 //! cycles an instruction), and sleeping costs no real time. The board's two timers are
-//! all that it knows of time, so stopping both stops its time. That is how lock-step
+//! its only clocks, so stopping both stops its time. That is how lock-step
 //! works: while the host or the virtual Phantom has to answer first, there is a reason
 //! to [`hold`], and the answer takes no time.
 
@@ -19,7 +19,7 @@ const PERIOD: u32 = TIMER_HZ / 1000;
 /// Reason for which time stands still, as bits.
 #[derive(Clone, Copy)]
 pub(crate) enum Reason {
-    /// The application said so: it has nothing to do, or waits for tiles.
+    /// Requested by the application: it has nothing to do, or waits for tiles.
     Link = 1 << 0,
     /// The virtual Phantom has not answered the last tick.
     Plant = 1 << 1,

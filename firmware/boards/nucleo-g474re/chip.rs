@@ -168,7 +168,7 @@ pub(crate) fn take_reset_cause() -> ResetCause {
     match flags {
         _ if flags.iwdgrstf() || flags.wwdgrstf() => ResetCause::Watchdog,
         _ if flags.sftrstf() => ResetCause::Software,
-        // The chip sets one flag for both. After a short dip its RAM still knows.
+        // The chip sets one flag for both. After a short dip its RAM is still valid.
         _ if flags.borrstf() && ran_before => ResetCause::BrownOut,
         _ if flags.borrstf() => ResetCause::PowerOn,
         _ if flags.pinrstf() => ResetCause::Pin,
@@ -233,7 +233,7 @@ pub(crate) fn resets_below_mv() -> u16 {
 }
 
 /// Lets the watchdog and the clock of embassy's time run on while a debugger halts the core,
-/// whatever that asked for: the one resets the chip, by the other the next tick knows of the
+/// whatever that asked for: the one resets the chip, the other tells the next tick of the
 /// halt.
 pub(crate) fn let_a_halt_stop_the_arm() {
     pac::DBGMCU.apb1lfzr().modify(|w| {

@@ -68,7 +68,7 @@ pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
 impl Stop for EmergencyStop {
     /// Tells a stop that was too short for the tick to see, too. The outputs come back
     /// when the stop is released and the amplifiers are off, which is a tick after it was
-    /// told at the earliest: the compare registers still hold the last command until then.
+    /// reported at the earliest: the compare registers still hold the last command until then.
     fn is_pressed(&mut self) -> bool {
         let is_pressed = self.0.is_high();
         let is_broken_off = !TIM1.bdtr().read().moe();

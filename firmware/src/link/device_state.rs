@@ -66,7 +66,7 @@ pub(crate) struct DeviceState {
 
 impl DeviceState {
     /// Takes the board's name, cut to what the message holds, its serial number, how the
-    /// board started, and the arm that it knows. The window has `D × D` tiles.
+    /// board started, and its arm. The window has `D × D` tiles.
     pub(crate) fn new<C: TickClock, const D: usize>(
         (board, serial): (&str, SerialNumber),
         boot: BootReport,

@@ -239,7 +239,7 @@ impl<const D: usize> Link<'_, D> {
         self.bad_frames = self.bad_frames.saturating_add(1);
     }
 
-    /// Forgets what was said and requested; keeps the scene and what is held.
+    /// Drops pending messages and requests; keeps the scene and the held tiles.
     pub(super) fn forget_conversation(&mut self) {
         self.nothing_to_request_at = None;
         self.tx.clear();

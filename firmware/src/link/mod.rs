@@ -210,7 +210,7 @@ impl<'t, const D: usize> Link<'t, D> {
     ///
     /// True without a scene, between the points of a replay, and, in a scene
     /// that asks for it ([`Scene::hold_clock`]), while the host owes a tile. An
-    /// emulated board then stops its clock, and whoever runs the device in lock-step
+    /// emulated board then stops its clock, and a caller that runs the device in lock-step
     /// does not tick; a real board goes on ticking.
     #[must_use]
     pub fn may_stand_still(&self) -> bool {
@@ -220,8 +220,8 @@ impl<'t, const D: usize> Link<'t, D> {
             Some(scene) if scene.hold_clock && self.requester.in_flight() > 0 => return true,
             Some(_) => false,
         };
-        // What was told to the loop has to reach it, force has to go out, and a host
-        // that leaves has to be told that it has.
+        // Commands have to reach the loop, force has to go out, and a host
+        // that closes has to get its answer.
         let leaves = self.session.is_leaving();
         waits
             && !(leaves && self.device.may_drive)
@@ -268,7 +268,7 @@ impl<'t, const D: usize> Link<'t, D> {
         self.session.state() == SessionState::Gone && self.tx.is_empty()
     }
 
-    /// The session's samples that have gone out before what is said next.
+    /// The session's samples that were sent before the next message.
     fn sample_count(&self) -> SampleCount {
         let waiting = if self.tx.telemetry_waits() {
             self.batch

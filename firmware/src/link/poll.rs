@@ -88,7 +88,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Says goodbye once nothing is driven and everything else was said.
+    /// Sends the close once nothing is driven and everything else was sent.
     fn say_goodbye(&mut self) {
         let leaves = self.session.is_leaving();
         let said = self.samples.is_empty() && self.tx.wants_telemetry();

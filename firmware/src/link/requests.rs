@@ -38,7 +38,7 @@ impl Progress {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LatestRequest {
     latest: Option<(u8, Progress)>,
-    /// The answer is there and has not been said, or was asked for again.
+    /// The answer is there and was not sent yet, or was requested again.
     answer_is_due: bool,
 }
 

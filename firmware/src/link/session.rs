@@ -10,7 +10,7 @@ use heapless::HistoryBuf;
 /// or whose host has heard of no other, opens none.
 const KNOWN: usize = 8;
 
-/// A host that waits for a press says something every half second. One that has said nothing
+/// A host that waits for a press sends something every half second. One that has sent nothing
 /// for so long, ms, is not there to see what the press does.
 const ABSENT_MS: u32 = 2_000;
 
@@ -26,11 +26,11 @@ const ABSENT_MS: u32 = 2_000;
 /// | ended by goodbye | gone | [`Session::close`] |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SessionState {
-    /// No host has said hello.
+    /// No host has sent a hello.
     Closed,
-    /// A host has said hello.
+    /// A host has sent a hello.
     Open,
-    /// The host has said goodbye, and has not been answered.
+    /// The host has sent a close, and was not answered yet.
     Leaving,
     /// It was answered, or the host was silent for too long.
     Ended(SessionEnd),
@@ -49,7 +49,7 @@ pub(super) enum Greeting {
     Again,
     /// Its session is over in a way that its host has not asked for.
     Over(SessionEnd),
-    /// Its host has said the session's end, and is answered to that.
+    /// Its host has closed the session, and gets the answer.
     Stale,
 }
 
@@ -68,7 +68,7 @@ pub(super) struct Session {
     silence_ticks: u32,
     /// The tick of the last frame of this session.
     heard_at: u32,
-    /// It was said that the host has not been heard since.
+    /// The host's silence was reported.
     told_absent: bool,
     /// Samples put into telemetry.
     pub(super) packed: u32,
@@ -113,7 +113,7 @@ impl Session {
         self.state
     }
 
-    /// The host has said goodbye.
+    /// The host has closed the session.
     pub(super) const fn leave(&mut self) {
         self.state = SessionState::Leaving;
     }
@@ -210,7 +210,7 @@ impl Session {
         self.silence_ticks = u32::from(seconds.clamp(least, most)).saturating_mul(tick_hz);
     }
 
-    /// Returns true if the host of the open session has not been heard for [`ABSENT_MS`]; said once
+    /// Returns true if the host of the open session has been silent for [`ABSENT_MS`]; reported once
     /// until it is heard again.
     pub(super) fn is_absent(&mut self, tick: u32, ticks_per_ms: u32) -> bool {
         let silent = tick.wrapping_sub(self.heard_at);

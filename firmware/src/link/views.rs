@@ -14,13 +14,13 @@ use super::Link;
 use super::commands::CommandRoom;
 
 /// Views whose numbers are at most so far ahead are newer than the one in force; others are
-/// late, or said twice.
+/// late, or sent twice.
 const NEWER: u8 = 128;
 
 /// Who holds the clutch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ClutchOfHost {
-    /// Nobody.
+    /// No side.
     #[default]
     LetGo,
     /// The host of this session.
@@ -55,7 +55,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// Puts another view in, and answers; one that was said twice is answered twice.
+    /// Sets another placement, and answers; one that was sent twice is answered twice.
     pub(super) fn take_view(&mut self, view: SceneChange, room: CommandRoom) {
         let (epoch, ahead) = (view.scene.epoch, view.number.wrapping_sub(self.view));
         let is_again = ahead == 0 && self.scene == Some(view.scene);
@@ -70,7 +70,7 @@ impl<const D: usize> Link<'_, D> {
         self.say(&ToHost::SceneAck { epoch, accepted });
     }
 
-    /// Returns true if no force is rendered now: the clutch is open, as the loop has said since it is
+    /// Returns true if no force is rendered now: the clutch is open, as the loop has reported since it is
     /// held, or it is a replay between two points.
     fn may_change_view(&self, scene: &Scene) -> bool {
         let latest = &self.last_record.sample;

@@ -44,7 +44,7 @@ impl Piece {
         }
     }
 
-    /// Takes what another knows of the same samples and this one does not.
+    /// Takes the samples that another piece has and this one lacks.
     pub(super) fn join(&mut self, other: &Self) {
         for index in other.known.difference(&self.known) {
             self.values[index] = other.values[index];
@@ -65,7 +65,7 @@ struct Held {
     lacking: FixedBitSet,
     /// True if it was looked for on disk.
     was_sought: bool,
-    /// True if it knows more than the disk.
+    /// True if it has samples that the disk lacks.
     is_new: bool,
 }
 

@@ -15,7 +15,7 @@
 //!
 //! Several threads may share the blocks, as those of several devices on one terrain do. Of them one
 //! reads at a time, besides the threads in the background, so the bound of the memory does not grow with
-//! them, and a block that one thread has read is not read again for another. Whoever touches blocks in
+//! them, and a block that one thread has read is not read again for another. A read of blocks in
 //! memory does not wait for one that is being read.
 
 mod background;

@@ -28,13 +28,13 @@ pub(crate) trait BlockReader: Send + Sync {
     /// A fault of that part of the file.
     fn read(&self, image: usize, part: &Part) -> Result<Block, RasterError>;
 
-    /// Is told the file's order before anything is read: coarse levels count their samples
+    /// Sets the file's order before anything is read: coarse levels count their samples
     /// from the south and west.
     fn set_order(&mut self, south_up: bool, east_first: bool) {
         let _ = (south_up, east_first);
     }
 
-    /// Is told which parts are going to be read, one after the other: what is elsewhere is
+    /// Announces the parts that are going to be read, one after the other: a remote part is
     /// fetched meanwhile.
     fn want(&self, image: usize, parts: &[Part]) {
         let _ = (image, parts);

@@ -315,7 +315,7 @@ fn whoever_touches_what_is_in_memory_does_not_wait_for_a_block_that_is_being_rea
             );
         });
         begun.wait();
-        // The other thread reads until it is told to go on.
+        // The other thread reads until it gets the signal.
         let is_free = blocks.kept.try_lock().is_ok();
         let sample = is_free.then(|| blocks.stored(0, 1, 1, Wait::UntilRead));
         go_on.wait();

@@ -1,4 +1,4 @@
-//! Reference systems that nothing here knows, through libgdal's PROJ, where there is one.
+//! Reference systems without code here, through libgdal's PROJ, where there is one.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -63,7 +63,7 @@ fn described(found: &SpatialReference) -> Option<ReferenceSystem> {
         Some(projection) => named(&found.name).with_projection(projection),
         None => named(&found.name),
     };
-    // "unknown" tells nobody why it cannot be placed; the method does.
+    // "unknown" does not explain why it cannot be placed; the method does.
     match &found.method {
         Some(method) if !system.has_lonlat() && found.name == "unknown" => {
             Some(named(&method.replace('_', " ")))

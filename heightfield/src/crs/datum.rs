@@ -104,13 +104,13 @@ impl Datum {
         }
     }
 
-    /// Returns true if its own degrees are those that are said, to 4 m.
+    /// Returns true if its own degrees are the reported ones, to 4 m.
     pub(super) fn counts_lonlat(&self) -> bool {
         let is_shifted = matches!(self.shift, Some(Shift::Parameters { .. }));
         self.meridian == 0.0 && !is_shifted
     }
 
-    /// Degrees that are said, of degrees of this datum from Greenwich. Longitudes beyond
+    /// Reported degrees, of degrees of this datum from Greenwich. Longitudes beyond
     /// ±180° stay in their turn.
     pub(super) fn to_lonlat(&self, own: (f64, f64)) -> Option<(f64, f64)> {
         match &self.shift {

@@ -23,7 +23,7 @@ const DEFINED_OTHERWISE: [u16; 5] = [2065, 3167, 5513, 26591, 26592];
 /// (`tests/data/epsg_places.py`).
 const COMPUTED_OTHERWISE: [u16; 8] = [3973, 3974, 3975, 6200, 6996, 6997, 8044, 8045];
 
-/// The system with a code; `None` where nothing here knows it, or it is not one of places.
+/// The system with a code; `None` if it is unknown here, or it is not one of places.
 pub(super) fn of_code(code: u16) -> Option<ReferenceSystem> {
     let here = || defined(code).or_else(|| newer(code));
     let of_gdal = || by_gdal::of_code(code);

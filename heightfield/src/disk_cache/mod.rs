@@ -57,7 +57,7 @@ struct Folder {
     unnamed: AtomicU64,
     /// Size of its content; `None` once it could not be written.
     room: Mutex<Option<SizeLimit>>,
-    /// Set once a message has said that it is not used.
+    /// Set once a message has reported that it is not used.
     warned: OnceLock<()>,
 }
 

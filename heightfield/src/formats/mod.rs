@@ -14,7 +14,7 @@ mod tiff;
 use super::format::{Claim, Format};
 
 /// All formats that are recognised by their content or their extension; the first that
-/// fits decides. Raw samples are not among them: only the user knows those.
+/// fits decides. Raw samples are not among them: only the user can state their layout.
 pub(super) const FORMATS: [Format; 6] = [
     tiff::FORMAT,
     png::FORMAT,

@@ -61,7 +61,7 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, RasterError> {
 fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
     let wrong = |error| RasterError::NoTiles(format!("this pattern cannot be read: {error}"));
     let found = glob::glob(pattern).map_err(wrong)?;
-    // What may not be looked into holds nothing that could be read.
+    // A folder without permission has no file that could be read.
     let found = found.filter_map(Result::ok);
     let asked = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();

@@ -77,7 +77,7 @@ impl Pool {
             Err(fault) if fault.is_of_the_line() => Err(RasterError::in_tile(&source.path, fault)),
             Err(fault) => {
                 self.failed.insert(number);
-                // That it holds nothing is no fault of a file among others.
+                // A file without samples is no fault among others.
                 if !matches!(fault, RasterError::AllNoData { .. }) {
                     let path = without_key(&source.path);
                     tracing::warn!("{path} cannot be read and counts as no data: {fault}");

@@ -28,7 +28,7 @@ pub(crate) struct RemoteFile {
     line: Arc<SharedPages>,
     background: &'static Runtime,
     object: Object,
-    /// All of it, where it is short or its server knows no ranges.
+    /// All of it, where it is short or its server supports no ranges.
     all: Option<Vec<u8>>,
     /// Its pages on disk, where they can be kept.
     kept: Option<PagesOnDisk>,
@@ -217,7 +217,7 @@ impl RemoteFile {
     }
 
     /// Notes what is wrong, and reports it if the caller does not: while a
-    /// terrain is opened, whoever opens it does.
+    /// terrain is opened, the opening thread does.
     fn note(&self, held: &mut Held, why: &Error) {
         let name = &self.name;
         let trouble = match is_outage(why) {

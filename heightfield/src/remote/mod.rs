@@ -77,8 +77,8 @@ pub(crate) fn is_outage(error: &Error) -> bool {
     error.kind() == OUTAGE
 }
 
-/// Returns true if an error says that there is no such file. Who may not list a folder is told of
-/// a missing file that it is forbidden.
+/// Returns true if an error says that there is no such file. To a user without list permission, a
+/// server answers that a missing file is forbidden.
 pub(crate) fn is_missing(error: &Error) -> bool {
     matches!(
         error.kind(),

@@ -59,7 +59,7 @@ pub(super) async fn open(url: &str) -> Result<Opened> {
     }
 }
 
-/// A server that knows no ranges hands over all of a file, which then is held in memory.
+/// A server without ranges sends all of a file, which then is held in memory.
 async fn whole(url: &str, store: Arc<dyn ObjectStore>, path: Path) -> Result<Opened> {
     const LARGEST: u64 = 256 << 20;
     let got = store.get_opts(&path, GetOptions::default()).await;

@@ -24,7 +24,7 @@ pub enum BuildError {
         #[source]
         source: io::Error,
     },
-    /// It ended without an image; it has said why.
+    /// It ended without an image; it has printed the reason.
     #[error("`cargo xtask image {board}` in {} failed", root.display())]
     Failed {
         /// The board.

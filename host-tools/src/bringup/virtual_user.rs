@@ -31,7 +31,7 @@ pub struct VirtualUser {
     scale: (DVec3, f64),
     /// The largest push up while the tip was lowered, N.
     force_n: f64,
-    /// Takes what is said, a line at a time.
+    /// Takes the output, a line at a time.
     pub says: fn(&str),
 }
 

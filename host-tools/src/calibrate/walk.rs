@@ -1,4 +1,4 @@
-//! The steps of a calibration in their order, whoever moves the arm.
+//! The steps of a calibration in their order, for a user or a simulated one.
 
 use hapterra_core::phantom::Calibration;
 

@@ -11,7 +11,7 @@ use super::options::terrain_file::TerrainFile;
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::terrain::HapticGrid;
 
-/// The heights, beside what is said of them.
+/// The heights, beside their description.
 const HEIGHTS: &str = "terrain.npy";
 const ABOUT: &str = "terrain.json";
 

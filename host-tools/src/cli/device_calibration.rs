@@ -7,7 +7,7 @@ use super::failure::{Failure, OrHint};
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 
 /// Asks a device for its calibration, and leaves its host in place; the preset
-/// of its model where it has none, which is told.
+/// of its model if it has none, with a message.
 ///
 /// # Errors
 /// No device, one that does not answer, or a calibration that cannot be used.

@@ -86,7 +86,7 @@ impl Failure {
         text
     }
 
-    /// Prints the failure on standard error, after everything that was said before.
+    /// Prints the failure on standard error, after all earlier output.
     pub fn report(&self) {
         writer::finish();
         writer::put(std::io::stderr(), &format!("{}\n", self.text()));

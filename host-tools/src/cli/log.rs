@@ -25,7 +25,7 @@ const BY_DEVICE: &str = "hapterra::link";
 pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
     let level = match verbose {
         // A probe library warns of each kind of probe that it cannot look for;
-        // what comes of it is said by the error.
+        // the error reports the outcome.
         0 => "warn,probe_rs=error",
         1 => "info",
         2 => "debug",
@@ -45,7 +45,7 @@ pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
     log
 }
 
-/// Has lines written to standard error by the thread that writes there: whoever logs,
+/// Has lines written to standard error by the thread that writes there: the logging thread,
 /// perhaps with an armed arm at the other end of the link, does not wait for a terminal.
 pub(super) struct Spoken;
 
@@ -141,7 +141,7 @@ impl<W: Write> Write for Line<W> {
                 line += &left_out_text(left_out);
             }
             line.push('\n');
-            // What nobody can be told ends nothing: an error here would be written to
+            // A line that cannot be written ends nothing: an error here would be written to
             // standard error, and a program panics that cannot.
             let _ = out.write_all(line.as_bytes());
         }

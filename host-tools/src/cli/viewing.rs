@@ -158,7 +158,7 @@ impl<'t> Shown<'t> {
     }
 }
 
-/// Ends the stream, says what the viewer was not told, and waits until nobody looks any
+/// Ends the stream, reports what was not sent to the viewer, and waits until no page is open any
 /// more or the user has had enough.
 pub(in crate::cli) fn end(feed: ViewFeed<'_>, say: impl Fn(String)) {
     let (dropped, viewer) = feed.finish();

@@ -53,7 +53,7 @@ pub enum Event<'e> {
         level: u8,
         /// Device millimetres a haptic cell of level 0.
         cell_mm: f64,
-        /// Side of such a cell on the ground, m, where the file knows it.
+        /// Side of such a cell on the ground, m, if the file states it.
         cell_m: Option<f64>,
         /// Device millimetres a vertical unit of the file.
         height_mm_per_unit: f64,

@@ -38,11 +38,11 @@ pub struct Watcher {
     device: usize,
     at: At,
     told: Told,
-    /// Readers that had come when something was told last.
+    /// Readers that were connected at the last event.
     readers: u64,
     /// The HIP of the sample before, with its view.
     before: Option<(usize, Record)>,
-    /// The last lines about arming, and readers that had come when they were told.
+    /// The last lines about arming, and the readers that were connected then.
     arming: (Vec<String>, u64),
     /// Interval of reported samples.
     every: Option<NonZeroU32>,
@@ -133,7 +133,7 @@ impl Watcher {
     }
 
     /// Takes new lines about arming, where there are any, and the question that is open now, of
-    /// which readers that come later are told, too.
+    /// which later readers get, too.
     pub fn arming(&mut self, new: Vec<String>, asks: Option<u32>) {
         let Some(readers) = self.sender.readers_so_far() else {
             if !new.is_empty() {

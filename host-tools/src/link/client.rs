@@ -72,7 +72,7 @@ pub enum Event<'e> {
         /// The tick ([`TickRecord::tick`]).
         tick: u32,
     },
-    /// A tile of the scene's level was said to the device, which may lose it and ask again.
+    /// A tile of the scene's level was sent to the device, which may lose it and ask again.
     TileSent(TileKey),
     /// A request was given up: the device does not answer it, or was
     /// restarted meanwhile. Whether it was done is not known.
@@ -83,7 +83,7 @@ pub enum Event<'e> {
 /// back after it was lost is armed again by itself only where the arm is virtual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arming {
-    /// Encoder readings in the zero pose, where the host knows them.
+    /// Encoder readings in the zero pose, if the host has them.
     pub zero: Option<[i32; 3]>,
 }
 
@@ -95,7 +95,7 @@ impl Arming {
 /// Samples after which the host says that it is there: half a second of a device whose
 /// time runs faster than the host's.
 const SAMPLES_A_SIGN: u32 = 500;
-/// Bytes that are said to one reception at most, but for the tile that reaches beyond
+/// Bytes that are sent per reception at most, but for the tile that reaches beyond
 /// them: a device has four requests under way, of 4.5 KiB each. What is left out is asked
 /// for again.
 const SAID_AT_ONCE: usize = 32 * 1024;
@@ -129,7 +129,7 @@ pub struct Client<'t> {
     is_new: bool,
     /// The scene was taken in some session, and the device asked to arm.
     has_armed: bool,
-    /// Tiles that are sent once the device was told its zero: what is done before the
+    /// Tiles that are sent once the device has its zero: work before the
     /// first tick must not depend on how long a message takes.
     withheld: Vec<TileKey>,
     /// Tiles that the present reception was answered with.
@@ -164,7 +164,7 @@ impl<'t> Deref for Lent<'t> {
 }
 
 impl<'t> Client<'t> {
-    /// A client that has not said anything yet. It arms the device at the
+    /// A client that has not sent anything yet. It arms the device at the
     /// beginning of each session, if `arming` says how.
     #[must_use]
     pub fn new(

@@ -121,7 +121,7 @@ impl Bench<'_> {
         scene.epoch
     }
 
-    /// Lets time pass; what is said meanwhile stays in `out`.
+    /// Lets time pass; messages stay in `out` meanwhile.
     fn pass(&mut self, time: Duration) -> Result<(), LinkError> {
         let end = self.now + time;
         while self.now < end {
@@ -666,7 +666,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
     on_bench(None, |bench| {
         bench.open();
         let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
-        // A device that has it already, and whose answer is lost, is told no scene anew.
+        // A device that has it already, and whose answer is lost, gets no scene again.
         bench.out.clear();
         bench.hear(&ToHost::Heartbeat {
             count: SampleCount::default(),

@@ -89,7 +89,7 @@ impl<'t> ControlSession<'t> {
         &self.device
     }
 
-    /// Ends the conversation, and returns when the device has said so.
+    /// Ends the session, and returns when the device has confirmed it.
     ///
     /// # Errors
     /// [`LinkError::NotConfirmed`] and [`LinkError::Taken`] where the arm may be armed; else
@@ -98,7 +98,7 @@ impl<'t> ControlSession<'t> {
         self.exchange.end()
     }
 
-    /// As [`ControlSession::end`], and the device is disarmed, whoever has armed it.
+    /// As [`ControlSession::end`], and disarms the device, even if another host has armed it.
     ///
     /// # Errors
     /// As [`ControlSession::end`].

@@ -92,7 +92,7 @@ impl Emulator {
     /// Starts the board from an image and connects its two lines.
     ///
     /// # Errors
-    /// [`EmulatorError`] says which part is missing or what QEMU said.
+    /// [`EmulatorError`] names the missing part or has QEMU's message.
     pub fn start(qemu: &Path, image: &Path) -> Result<(Self, Lines), EmulatorError> {
         let path = image.to_owned();
         regular_file::open(image).map_err(|source| EmulatorError::Image { path, source })?;

@@ -45,7 +45,7 @@ pub(super) enum ProtocolEvent {
     },
     /// The scene is in force.
     SceneAck,
-    /// The view that was said is answered: it is in force, where its scene is the one that
+    /// The placement that was sent is answered: it is in force, where its scene is the one that
     /// is to be.
     SceneChange,
     /// This message answers the request.
@@ -59,7 +59,7 @@ pub(super) enum ProtocolEvent {
 pub(super) struct HostProtocol {
     numbers: fastrand::Rng,
     session: SessionNumber,
-    /// The hello that opened it; zero until the device has said which.
+    /// The hello that opened it; zero until the device has sent it.
     opened_by: u8,
     /// The session before, and the hello that opened it; its last frames are no other
     /// host's.
@@ -69,11 +69,11 @@ pub(super) struct HostProtocol {
     scene: Option<Scene>,
     /// The table of its materials, where it has some.
     materials: Option<MaterialTable>,
-    /// Another view of it that was said and is not answered: since when, and when last.
+    /// Another placement that was sent without an answer: the first and the last time.
     view: Option<(SceneChange, Duration, Duration)>,
     patience: Timeouts,
     state: State,
-    /// When the state began, and when its message was said last.
+    /// The time when the state began, and when its message was last sent.
     since: Duration,
     said: Duration,
     /// When something was answered last.
@@ -146,7 +146,7 @@ impl HostProtocol {
 
     /// Begins, or begins anew over a new line. Returns whether a new session was
     /// drawn: one that was never answered is tried again, so that no session is opened
-    /// that nobody knows of.
+    /// that no host remembers.
     pub(super) fn greet(&mut self, now: Duration, out: &mut Vec<u8>) -> bool {
         let draws = self.confirmed || self.foreign.is_some();
         if draws {
@@ -182,7 +182,7 @@ impl HostProtocol {
         self.say_state(now, out);
     }
 
-    /// Returns true if its end was said and is not answered.
+    /// Returns true if its close was sent and is not answered.
     pub(super) const fn is_ending(&self) -> bool {
         matches!(self.state, State::Leaving | State::Detaching)
     }
@@ -195,7 +195,7 @@ impl HostProtocol {
     }
 
     /// Puts another view of the scene in, in place of one that is not answered yet. It is
-    /// said until it is answered.
+    /// sent until it is answered.
     pub(super) fn put_view(&mut self, view: SceneChange, now: Duration, out: &mut Vec<u8>) {
         self.view = Some((view, now, now));
         if self.state == State::Open {
@@ -489,7 +489,7 @@ impl HostProtocol {
         self.heard = now;
         match (self.state, end) {
             (State::Detaching, _) => self.enter(State::Closed, now),
-            // The goodbye that was said after the hello is answered, too.
+            // The close that was sent after the hello is answered, too.
             (State::Leaving, SessionEnd::HostSilent) => {}
             (_, SessionEnd::HostSilent) => return Err(LinkError::LetGo),
             _ => return Err(LinkError::Taken),

@@ -1,4 +1,4 @@
-//! A transport, the time that a conversation over it is told, and bytes on their way.
+//! A transport with its clock, and bytes in transit.
 
 use std::io;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use super::transport::{NoLine, Transport};
 
 /// Between two looks at the clock while something is waited for.
 pub(super) const LOOK: Duration = Duration::from_millis(50);
-/// Time that a device may take over what is said at once before it counts as gone.
+/// Time that a device may take for the bytes of one message before it counts as gone.
 const TAKES: Duration = Duration::from_secs(5);
 
 /// Line on which [`Session`](super::Session) and [`ControlSession`](super::ControlSession) hold their
@@ -31,7 +31,7 @@ impl<'t> Line<'t> {
         }
     }
 
-    /// Goes on over another transport; what was not said yet is forgotten.
+    /// Continues over another transport; unsent bytes are dropped.
     pub(super) fn replace(&mut self, transport: Box<dyn Transport + 't>) {
         self.transport = transport;
         self.is_open = true;
@@ -55,13 +55,13 @@ impl<'t> Line<'t> {
         self.is_open
     }
 
-    /// Says what is to be said.
+    /// Sends the pending bytes.
     pub(super) fn flush(&mut self) -> Result<(), LinkError> {
         self.flush_while(None, &|| true)
     }
 
-    /// Says what is to be said. A device that takes none of it for a while, or has not
-    /// taken it by `until`, is gone; where no more is wanted, the rest is not said.
+    /// Sends the pending bytes. A device that takes none of them for a while, or has not
+    /// taken them by `until`, is gone; if no more is wanted, the rest is not sent.
     pub(super) fn flush_while(
         &mut self,
         until: Option<Duration>,

@@ -82,7 +82,7 @@ pub struct Native<C: TickClock = StoppedClock> {
     pending: VecDeque<u8>,
 }
 
-/// Stands between arm and device: is told the number of the next tick and what
+/// Stands between arm and device: gets the number of the next tick and what
 /// the amplifiers got in the last one, and may change what encoders and
 /// switches say. How tests make things go wrong, and see what comes of it.
 pub type FaultInjector = Box<dyn FnMut(u64, &mut GuardInputs, &GuardOutputs)>;

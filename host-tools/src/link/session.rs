@@ -22,12 +22,12 @@ pub struct Session<'t> {
     line: Line<'t>,
     /// True if it is to go on; what a device does not read is not waited for else.
     goes_on: &'t dyn Fn() -> bool,
-    /// Until then goodbye is to be said and answered.
+    /// Until then the close has to be sent and answered.
     leaves_by: Option<Duration>,
 }
 
 impl<'t> Session<'t> {
-    /// A session that has said nothing yet.
+    /// A session that has sent nothing yet.
     #[must_use]
     pub fn new(
         terrain: &'t Terrain<'t>,
@@ -69,7 +69,7 @@ impl<'t> Session<'t> {
         Ok((session, device))
     }
 
-    /// Shakes hands over the line that it has. The session can be said goodbye to where
+    /// Shakes hands over the line that it has. The session can be closed if
     /// that fails, too.
     ///
     /// # Errors

@@ -81,7 +81,7 @@ impl Materials {
     /// Lays the classes of a file over a terrain.
     ///
     /// # Errors
-    /// [`GroundError`] where it cannot be told which class lies where, or none lies on the
+    /// [`GroundError`] if the places of the classes are unknown, or none lies on the
     /// terrain.
     pub fn over(
         terrain: (&str, &Raster),

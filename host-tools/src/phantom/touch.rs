@@ -1,8 +1,8 @@
 //! Plans that follow a terrain: approach, press, slide, tap, lift.
 //!
 //! The hand is a spring, so to press with N newtons it aims below the surface
-//! by what the wall, the grip and the arm give way together. It "knows" the
-//! surface, as a person who knows it would.
+//! by what the wall, the grip and the arm give way together. It uses the
+//! surface itself, as a person who remembers it would.
 
 use super::hand::HandModel;
 use super::script::Script;

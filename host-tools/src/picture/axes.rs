@@ -16,7 +16,7 @@ use super::style::{self, px, stroke};
 
 /// A part of the sheet.
 pub type Area<'a> = DrawingArea<Pen<'a>, Shift>;
-/// A chart, with linear axes unless said otherwise.
+/// A chart, with linear axes by default.
 pub type Chart<'a, X = RangedCoordf64, Y = RangedCoordf64> =
     ChartContext<'a, Pen<'a>, Cartesian2d<X, Y>>;
 

@@ -12,7 +12,7 @@ use super::style::{self, INK, px};
 /// Facts about the ground for a picture.
 #[derive(Clone, Copy)]
 pub struct GroundFacts<'a> {
-    /// Ground metres a device millimetre, where the terrain knows its size.
+    /// Ground metres a device millimetre, if the terrain has a size.
     pub metres_per_mm: Option<f64>,
     /// Coordinates of a place in device millimetres east and north, short.
     pub place_of: &'a dyn Fn(f64, f64) -> String,

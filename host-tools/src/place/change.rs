@@ -56,7 +56,7 @@ pub enum ChangeError {
     /// A place beyond the samples.
     #[error("that place is outside of the terrain")]
     Outside,
-    /// Ground metres, of a file that knows none.
+    /// Ground metres, of a file without a size.
     #[error("the file does not state its cell size on the ground: pan by device millimetres")]
     NoGroundSize,
     /// A factor that is none.

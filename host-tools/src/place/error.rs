@@ -131,7 +131,7 @@ pub enum PlaceError {
         /// Both parts in the file's own coordinates.
         parts: [String; 2],
     },
-    /// Ground metres, of a file that knows none.
+    /// Ground metres, of a file without a size.
     #[error("the file does not state its cell size on the ground")]
     NoGroundSize,
     /// A scale that is none.

@@ -33,7 +33,7 @@ pub(super) struct Fitted {
 
 impl Extent<'_> {
     /// Lays the extent into the reach as large as it fits; `round` makes a cell that fits
-    /// smaller by a little, for a scale that can be said.
+    /// smaller by a little, for a scale in round numbers.
     pub(super) fn fit(
         &self,
         reach: &Reach,

@@ -1,4 +1,4 @@
-//! Places and bounds as they are said to the user.
+//! Places and bounds as text for the user.
 
 use super::coordinates::Coordinates;
 use heightfield::{Georeference, LonLat, Sides, System, around};

@@ -86,10 +86,10 @@ pub struct Placement {
     pub scale: Scale,
     /// Level L: every 2ᴸ-th sample is rendered.
     pub level: u8,
-    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it.
+    /// Side of a haptic cell of level 0 on the ground, m, if the file states it.
     pub side_m: Option<f64>,
     /// Height of the terrain, in its true proportions' height, where the file
-    /// knows them.
+    /// states them.
     pub exaggeration: Option<f64>,
     /// The part in front of the arm, from west, south to east, north, device millimetres;
     /// the whole terrain where only place and scale are stated.
@@ -145,13 +145,13 @@ impl Placement {
         }
     }
 
-    /// Ground metres a device millimetre, where the file knows its size.
+    /// Ground metres a device millimetre, if the file states its size.
     #[must_use]
     pub fn ground_m_per_mm(&self) -> Option<f64> {
         self.side_m.map(|side| side / self.scale.cell_mm())
     }
 
-    /// Ground metres a haptic cell of the view's level, where the file knows its size.
+    /// Ground metres a haptic cell of the view's level, if the file states its size.
     #[must_use]
     pub fn haptic_cell_m(&self) -> Option<f64> {
         self.side_m.map(|side| side * f64::from(self.level).exp2())

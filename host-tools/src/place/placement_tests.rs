@@ -391,7 +391,7 @@ fn box_with_west_and_east_swapped_is_refused() {
     }
 }
 
-/// Fields around the globe end somewhere, and nobody may be given half of a box unasked.
+/// Fields around the globe end somewhere, and half of a box is an error.
 #[test]
 fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
     let globe = |west: f64| {

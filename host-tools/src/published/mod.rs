@@ -3,7 +3,7 @@
 //! candidate patch by the lowest height of the whole segment.
 //!
 //! `hapterra-lab replay --contact paper` renders it, and the speed tables compare with it
-//! ("× plain"). No device knows it. Two properties are the paper's own: the first candidate
+//! ("× plain"). No device implements it. Two properties are the paper's own: the first candidate
 //! may not be the first patch hit, and a fast HIP passes through what is thin.
 
 mod line;

@@ -62,7 +62,7 @@ pub struct Settings {
 pub struct PlacementSettings {
     /// Number of this placement in the column `view`, from 1 on.
     pub number: u32,
-    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it; none also in
+    /// Side of a haptic cell of level 0 on the ground, m, if the file states it; none also in
     /// recordings of earlier versions, whose cells are those of the beginning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
@@ -80,11 +80,11 @@ pub struct PlacementSettings {
     /// versions, whose tip is that of the beginning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_mm: Option<f64>,
-    /// Times that heights are higher than true to scale, where the file knows.
+    /// Times that heights are higher than true to scale, if the file states its units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
     /// The point of the terrain at the tip in the arm's home pose, device millimetres, as far as
-    /// the host knows: a clutch that the user holds moves it.
+    /// known to the host: a clutch that the user holds moves it.
     pub home_mm: [f64; 3],
     /// Newtons for a millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,
@@ -183,7 +183,7 @@ pub struct RenderedTerrain {
     pub cells: HapticCells,
     /// Rendered samples of level 0, west to east and south to north.
     pub samples: [u32; 2],
-    /// Side of a haptic cell of level 0 on the ground, m, where the file knows it.
+    /// Side of a haptic cell of level 0 on the ground, m, if the file states it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
     /// Place where a cell of the file is that large, in the file's coordinates, x and y;
@@ -200,7 +200,7 @@ pub struct RenderedTerrain {
     /// and the proxy are the ball's centre.
     #[serde(default, skip_serializing_if = "is_point")]
     pub tip_mm: f64,
-    /// Times that heights are higher than true to scale, where the file knows.
+    /// Times that heights are higher than true to scale, if the file states its units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
     /// The point of the terrain that was at the tip in the arm's home pose, device

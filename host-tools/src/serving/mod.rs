@@ -10,7 +10,7 @@
 //! end of serving (an error, a panic, the user's wish) closes the device's session. If the device does
 //! not confirm that it is disarmed, this is reported to the user.
 //!
-//! Nothing here knows a terminal or what a line is made of, so the tests play every end
+//! Nothing here depends on a terminal or on a kind of connection, so the tests play every end
 //! against devices in memory.
 
 mod service;

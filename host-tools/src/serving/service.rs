@@ -38,7 +38,7 @@ pub struct Service<'s, 't> {
     pub retry: Duration,
     /// True if the user wants it to go on.
     pub goes_on: &'t dyn Fn() -> bool,
-    /// Tells the user what has to be told whatever else happens.
+    /// Prints the messages that must reach the user in every case.
     pub tell: &'s dyn Fn(&str),
 }
 
@@ -50,7 +50,7 @@ pub struct Served<'s, 't> {
     retry: Duration,
     goes_on: &'t dyn Fn() -> bool,
     tell: &'s dyn Fn(&str),
-    /// Hello was said, or may have been.
+    /// The hello was sent, or may have been.
     has_greeted: bool,
     is_left: bool,
 }
@@ -74,7 +74,7 @@ impl<'s, 't> Service<'s, 't> {
     ///
     /// # Errors
     /// No line; what `check` finds; [`LinkError`]. Once the line stands, the device is
-    /// disarmed before the error is returned, or the user is told that it may not be.
+    /// disarmed before the error is returned, or the user gets a warning that it may not be.
     pub fn open<E: From<LinkError>>(
         mut self,
         check: impl FnOnce(&mut dyn Transport) -> Result<(), E>,

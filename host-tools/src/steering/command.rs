@@ -19,7 +19,7 @@ pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (grou
 #[derive(Clone, Debug, PartialEq)]
 pub struct Command {
     /// Seconds of the device's time since the beginning; as soon as what came before is
-    /// done, where nothing is said.
+    /// done, by default.
     pub at_s: Option<f64>,
     /// Action of the command.
     pub wanted: Wanted,

@@ -34,14 +34,14 @@ pub struct Put<'r> {
 
 /// Stage of a change.
 enum Stage<'r> {
-    /// The clutch is closed, as far as this host knows.
+    /// The clutch is closed, by the last report.
     Idle,
     /// The clutch was asked to open, so many samples ago, and whether that was answered: the
     /// board's clutch input may hold it open already, and let go before the host's request is there.
     Opening { samples: u32, answered: bool },
     /// The clutch is open.
     Open,
-    /// This view was said, of this terrain.
+    /// This placement was sent, of this terrain.
     Putting(Box<(Laid, Terrain<'r>)>),
     /// The clutch was released, and is still reported open.
     Closing,
@@ -94,7 +94,7 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// The view in force, as far as this host knows, and its surface parameters.
+    /// The view in force, by the last report, and its surface parameters.
     #[must_use]
     pub const fn now(&self) -> &Laid {
         &self.now

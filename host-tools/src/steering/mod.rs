@@ -7,7 +7,7 @@
 //!                         └──────────── samples ───────────────────┘
 //! ```
 //!
-//! [`Steer`] is what the user wants, however it is said: [`command`] reads lines of text,
+//! [`Steer`] is the user's wish, from every source: [`command`] reads lines of text,
 //! [`keys`] reads keys. [`Steering`] is the one engine behind both. It has the device
 //! hold its clutch, waits until there is no force, works out the next
 //! view from where HIP and proxy are ([`crate::place::Bounds::apply`]), puts it in, and lets the

@@ -52,7 +52,7 @@ pub struct HapticGrid<'r> {
     measured_at: Option<[f64; 2]>,
     columns: u32,
     rows: u32,
-    /// Side of a haptic cell on the ground, metres, where the file knows it.
+    /// Side of a haptic cell on the ground, metres, if the file states it.
     side_m: Option<f64>,
     /// Place where the samples lie in the file; `None` where they are the file's own.
     resampling: Option<Resampling>,
@@ -285,7 +285,7 @@ impl<'r> HapticGrid<'r> {
         self.resampling.is_some()
     }
 
-    /// Side of a haptic cell on the ground in metres, where the file knows it. Cells
+    /// Side of a haptic cell on the ground in metres, if the file states it. Cells
     /// rendered as they are stored count as squares of the same area.
     #[must_use]
     pub const fn side_m(&self) -> Option<f64> {
@@ -293,7 +293,7 @@ impl<'r> HapticGrid<'r> {
     }
 
     /// Returns the height of one vertical unit in cells at true proportions, if the file
-    /// knows its cell size: with `cell_mm` device millimetres a cell, the true height
+    /// states its cell size: with `cell_mm` device millimetres a cell, the true height
     /// of a unit is `cell_mm` times this.
     #[must_use]
     pub fn cells_per_vertical_unit(&self) -> Option<f64> {

@@ -51,7 +51,7 @@ pub struct ViewFeed<'t> {
     stands: bool,
     /// The view in force, where it has other cells than the terrain that stands.
     standing: Option<ToFirstPlacement<'t>>,
-    /// A view that the viewer is still to be told: nothing else is until then.
+    /// A placement that is still to be sent to the viewer, before anything else.
     scene_due: Option<Box<Scene>>,
     tiles: Tiles,
     surroundings: Surroundings,
@@ -130,7 +130,7 @@ impl<'t> ViewFeed<'t> {
     pub fn take(&mut self, sample: &TickRecord, record: &Record) {
         self.late = sample.late;
         self.tiles.lacks(sample.missing_tile);
-        // The first tick knows of none before it.
+        // The first tick has none before it.
         let cost = (self.has_cost && sample.tick > 1).then_some(sample.cost);
         self.row(record, cost);
     }
@@ -208,7 +208,7 @@ impl<'t> ViewFeed<'t> {
         self.tell_scene();
     }
 
-    /// Returns true if the viewer knows the view in force.
+    /// Returns true if the viewer has the placement in force.
     fn tell_scene(&mut self) -> bool {
         let Some(scene) = self.scene_due.take() else {
             return true;
@@ -256,13 +256,13 @@ impl<'t> ViewFeed<'t> {
     }
 
     /// Waits until the viewer has taken most of its messages: for recordings alone,
-    /// which nobody else waits for. False where it is gone.
+    /// which nothing else waits for. False where it is gone.
     pub fn wait_for_room(&self) -> bool {
         self.queue.wait_for_room(Duration::from_secs(60))
     }
 
     /// Ends the stream. The viewer goes on showing what it has; the child is handed over,
-    /// so that whoever likes can wait for it.
+    /// so that a caller can wait for it.
     #[must_use]
     pub fn finish(mut self) -> (Dropped, Option<Child>) {
         self.flush();

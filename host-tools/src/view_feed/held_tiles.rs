@@ -1,4 +1,4 @@
-//! Which tiles a device holds, as far as its host knows.
+//! The tiles that a device holds, by what its host has sent.
 
 use std::collections::BTreeMap;
 

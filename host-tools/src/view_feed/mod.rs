@@ -4,7 +4,7 @@
 //! samples, tiles ─▶ ViewFeed ─▶ bounded queue ─▶ thread ══ pipe ══▶ hapterra-view
 //! ```
 //!
-//! Whoever serves a device never waits for the viewer. What its queue has no room for is
+//! The serving thread never waits for the viewer. What its queue has no room for is
 //! dropped and counted; a viewer that is slow, hangs or is killed changes nothing else.
 //! The stream's messages are in [`hapterra_view_stream`].
 

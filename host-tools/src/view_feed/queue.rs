@@ -72,7 +72,7 @@ impl Queue {
         sent.map_err(|unsent| unsent.0.0)
     }
 
-    /// Waits for at most `wait` until there is room. For a recording, which nobody else
+    /// Waits for at most `wait` until there is room. For a recording, which nothing else
     /// waits for; false where the viewer is gone.
     pub(super) fn wait_for_room(&self, wait: Duration) -> bool {
         let until = Instant::now() + wait;

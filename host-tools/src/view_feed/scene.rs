@@ -123,7 +123,7 @@ pub(super) fn home_cells(scene: &Scene) -> [f64; 2] {
     [x, y].map(|mm| mm / scene.cell_mm)
 }
 
-/// The file's coordinates along millimetres, where the file knows any.
+/// The file's coordinates along millimetres, if the file states any.
 fn coordinates(terrain: &Terrain<'_>, level_0_mm: f64) -> Option<Coordinates> {
     if terrain.raster().georeference().system() == System::Cells {
         return None;

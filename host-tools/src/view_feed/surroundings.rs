@@ -22,7 +22,7 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Of a terrain whose layers around `home` (cells) are told.
+    /// Of a terrain whose layers around `home` (cells) are sent.
     pub(super) fn new(terrain: &Terrain<'_>, home: [f64; 2]) -> Self {
         Self {
             extents: layers::around(terrain, home),
@@ -97,7 +97,7 @@ mod tests {
         (column % 1000 + 7 * row) as f32
     }
 
-    /// The layers that are told when home goes along these places, and so many looks at each.
+    /// The layers that are sent when home moves along these places, and so many looks at each.
     fn told(homes: &[([f64; 2], usize)]) -> Vec<Layer> {
         let raster = Raster::from_fn(20_001, 65, height).expect("raster");
         let terrain = Terrain::new(&raster, Scale::new(0.5, 0.1).expect("scale"), 0);

@@ -511,7 +511,7 @@ impl Bus {
         }
     }
 
-    /// The stopwatch, if one runs, knows of an access of the core's.
+    /// Reports an access of the core to the stopwatch, if one runs.
     fn touch(&self, address: u32) {
         if let Some(stopwatch) = &self.stopwatch {
             stopwatch.touch(address);

@@ -167,7 +167,7 @@ impl<'t> Device<'t> {
     /// what it holds.
     ///
     /// # Panics
-    /// When somebody else holds the machine.
+    /// When the machine is borrowed already.
     #[must_use]
     pub fn reset(self) -> Machine {
         self.reset_by(Reset::Watchdog)
@@ -176,7 +176,7 @@ impl<'t> Device<'t> {
     /// Pulls the cable and resets the chip. Memory keeps what it holds.
     ///
     /// # Panics
-    /// When somebody else holds the machine.
+    /// When the machine is borrowed already.
     #[must_use]
     pub fn reset_by(self, cause: Reset) -> Machine {
         let Self {

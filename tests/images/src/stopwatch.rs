@@ -33,7 +33,7 @@ struct Following {
     figures: Figures,
 }
 
-/// Shared between the core's hooks, and whoever knows that an interrupt has ended.
+/// Shared between the core's hooks, and the code that sees the end of an interrupt.
 #[derive(Clone, Debug)]
 pub struct Stopwatch(Rc<RefCell<Following>>);
 

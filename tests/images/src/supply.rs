@@ -73,7 +73,7 @@ impl Supply {
 /// Reason for which a chip was reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reset {
-    /// Power came up: memory holds nothing.
+    /// Power came up: memory is empty.
     PowerUp,
     /// The watchdog was not fed.
     Watchdog,

@@ -1,5 +1,5 @@
 //! Loaded and reserved segments lie in the chip's memories, as
-//! probe-rs's registry knows them.
+//! probe-rs's registry lists them.
 
 use std::ops::Range;
 

@@ -59,7 +59,7 @@ fn assert_off_came_first(machine: &mut Machine) {
     assert!(!after.contains(&Effect::Enable(true)), "stays off");
 }
 
-/// The host is told this fault.
+/// The fault that is reported to the host.
 fn assert_told(device: &mut Device<'_>, fault: Fault) {
     device.run_ms(40);
     let told = device.latest.and_then(|sample| sample.fault);
@@ -67,7 +67,7 @@ fn assert_told(device: &mut Device<'_>, fault: Fault) {
 }
 
 /// Asserts that a fault switches the amplifiers off in one tick, and they stay off after `undo`;
-/// the host is told this fault.
+/// this fault is reported to the host.
 fn assert_trips_in_one_tick(
     device: &mut Device<'_>,
     fault: Fault,

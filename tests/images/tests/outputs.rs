@@ -37,7 +37,7 @@ fn has_converter(machine: &Machine) -> bool {
     matches!(machine.chip.commands, Commands::Serial { .. })
 }
 
-/// Whole ticks that pass until the amplifiers are off, and what the host is told then.
+/// Whole ticks that pass until the amplifiers are off, and the report to the host.
 fn ends(device: &mut Device<'_>, at_most: usize) -> (usize, Option<Fault>) {
     let mut machine = device.machine.borrow_mut();
     let board = machine.chip.board;
@@ -93,7 +93,7 @@ fn a_converter_that_does_not_read_back_keeps_the_amplifiers_off() {
         let mut device = Device::open(machine, terrain, scene);
         let blocked = |device: &mut Device<'_>| {
             device.run_ms(150);
-            // What the guard tells by itself may have been told before the session was open.
+            // The guard's own report may have been sent before the session was open.
             let report = device.ask_status().health.report;
             report.blockers.contains(Blockers::OUTPUTS_NOT_AS_SET)
         };

@@ -6,7 +6,7 @@ use hapterra_image_tests::chip::Commands;
 use hapterra_image_tests::device::Device;
 use hapterra_image_tests::machine::Stop;
 
-/// Ticks until the amplifiers are off, at most `max`, and the fault that is told then.
+/// Ticks until the amplifiers are off, at most `max`, and the reported fault.
 fn ends(device: &mut Device<'_>, max: usize) -> (Option<usize>, Option<Fault>) {
     let mut machine = device.machine.borrow_mut();
     let took = (1..=max).find(|_| {

@@ -10,7 +10,7 @@ use hapterra_tests::scene::run::Surface;
 use hapterra_tests::scene::tile_supply::Buffers;
 use hapterra_tests::soak::{Found, LinkStats, Until, run, soak};
 
-/// Violations of each invariant that are told in full.
+/// Violations of each invariant that are printed in full.
 const SHOWN: usize = 3;
 
 struct Wanted {

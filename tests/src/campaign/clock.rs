@@ -1,4 +1,4 @@
-//! A clock that can be told to be late.
+//! A clock that can be made late.
 
 use std::cell::Cell;
 use std::rc::Rc;

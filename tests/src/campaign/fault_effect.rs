@@ -188,7 +188,7 @@ impl Mishap {
         self.kind == Kind::TaskStalled
     }
 
-    /// Returns true if the device is told at `now` that its transport was interrupted, as
+    /// Returns true if the device's transport is interrupted at `now`, as
     /// USB tells it; a silent line tells nothing.
     #[must_use]
     pub fn unplugs(&self, now: u64) -> bool {

@@ -48,7 +48,7 @@ pub enum Kind {
     /// The host says goodbye.
     Goodbye,
     /// Well-formed messages that make no sense now: another calibration,
-    /// another zero pose, points of a replay, tiles that nobody asked for.
+    /// another zero pose, points of a replay, tiles without a request.
     Misplaced,
     /// A tick is not done when the next is due.
     TickOverrun,
@@ -75,7 +75,7 @@ pub enum Kind {
     /// The host replays points while the arm is moved, and then runs a terrain.
     ReplayThenRun,
     /// The host sends calibrations above every ceiling, or of garbage, or wants one
-    /// stored that nobody agreed to.
+    /// stored without consent.
     HostileCalibration,
     /// Endpoints of the USB are halted and cleared in the middle of what is sent.
     EndpointHalt,

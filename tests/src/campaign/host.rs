@@ -43,14 +43,14 @@ pub struct Host<'t> {
     pub samples: Vec<TickRecord>,
     /// The last answer to a question for the status.
     pub status: Option<Status>,
-    /// The fault that was last told.
+    /// The last reported fault.
     pub fault: Option<Fault>,
     /// A link error that no fault of a link may cause.
     pub failed: Option<LinkError>,
 }
 
 impl<'t> Host<'t> {
-    /// A host that has not said anything yet.
+    /// A host that has not sent anything yet.
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, scene: Scene, seed: u64) -> Self {
         Self {

@@ -7,7 +7,7 @@ use hapterra_core::guard::MAX_COUNTS_PER_S;
 pub const OFF_COUNTS: u32 = 2 * (MAX_COUNTS_PER_S / 1_000);
 
 /// The force at the true tip while an encoder was wrong by more than
-/// [`OFF_COUNTS`]: told, not judged, as no program can know the arm's levers then.
+/// [`OFF_COUNTS`]: recorded, not checked, as no program can know the arm's levers then.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Misled {
     /// The force, N.
@@ -19,7 +19,7 @@ pub struct Misled {
 /// The largest that was seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Maxima {
-    /// Force told by the device, N.
+    /// Force reported by the device, N.
     pub force_n: f64,
     /// Force made by the currents with the levers of the pose that the encoders
     /// tell, N.
@@ -35,7 +35,7 @@ pub struct Maxima {
     pub slew_n: f64,
     /// Temperature of a winding of the virtual arm, °C.
     pub winding_c: f64,
-    /// Energy that the device said its ticks have created, mJ.
+    /// Energy that its ticks have created by the device's report, mJ.
     pub created_mj: f32,
     /// The most that a contact had given to the tip with the controller on, mJ.
     pub given_mj: f32,

@@ -34,11 +34,11 @@ pub use fault_outcomes::LinkStats;
 pub use ground::Ground;
 pub use segment::Violation;
 
-/// The seed that is used without being told another.
+/// The default seed.
 pub const SEED: u64 = 4;
 
 /// Runs segments, from the first on, each on ice and with effects, until the amplifiers were on for so many
-/// seconds. `done` is told each segment's number and the tally so far.
+/// seconds. `done` gets each segment's number and the outcomes so far.
 ///
 /// # Errors
 /// The first [`Violation`].

@@ -437,7 +437,7 @@ impl<'t> Segment<'t> {
         Ok(())
     }
 
-    /// Lets the core do what it does in a tick; returns the length of what it said.
+    /// Runs the core for a tick; returns the number of bytes that it sent.
     fn run_core(&mut self, core: Core, sense: GuardInputs, stalls: bool, said: &mut [u8]) -> usize {
         match core {
             Core::Runs if stalls => self.drive = self.device.tick_alone(sense),

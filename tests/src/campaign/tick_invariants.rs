@@ -5,7 +5,7 @@
 //!   guard's clamp, always;
 //! - with the arm's true levers it is within the record's largest force while no
 //!   encoder is off by more than [`OFF_COUNTS`];
-//! - while one is, no program can know the true levers: that force is told.
+//! - while one is, no program can know the true levers: that force is recorded.
 
 use hapterra::phantom::{Encoder, PhantomModel};
 use hapterra_core::Vec3;
@@ -64,8 +64,8 @@ impl Watch {
         }
     }
 
-    /// Looks at what the amplifiers got in a tick in which the device was told
-    /// `sense`, having been told that `zero` are the counts of its zero pose.
+    /// Checks the amplifiers' inputs in a tick in which the device got
+    /// `sense`, with `zero` as the counts of its zero pose.
     ///
     /// # Errors
     /// The broken invariant.
@@ -92,7 +92,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Looks at a command that a core holds which stands still: nobody reads the
+    /// Checks a command that a halted core holds: no tick reads the
     /// encoders, so only what is true counts.
     ///
     /// # Errors
@@ -134,7 +134,7 @@ impl Watch {
         if drive.enabled && drive.held != Vec3::ZERO {
             return Err(format!("{} held with the amplifiers on", drive.held));
         }
-        // Nobody asks to hold outputs while a terrain is served.
+        // No host requests held outputs while a terrain is served.
         if drive.held != Vec3::ZERO && !self.may_hold {
             return Err(format!("{} held although nobody asked", drive.held));
         }
@@ -202,7 +202,7 @@ impl Watch {
         }
     }
 
-    /// Looks at what the device told of a tick.
+    /// Checks the device's report of a tick.
     ///
     /// # Errors
     /// The broken invariant.
@@ -249,7 +249,7 @@ impl Watch {
         }
     }
 
-    /// The mode that the device told last.
+    /// The last reported mode.
     #[must_use]
     pub fn latest(&self) -> Option<Mode> {
         self.last.map(|sample| sample.mode)

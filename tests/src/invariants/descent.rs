@@ -106,8 +106,8 @@ impl Line<'_> {
 
     /// That coordinate, and the height above the HIP there.
     ///
-    /// Up a wall of slope m the place knows its height only to m units in its
-    /// last place; the closed form knows it to one.
+    /// Up a wall of slope m the height of the place is exact only to m units in its
+    /// last place; that of the closed form to one.
     fn nearest(&self, axis: usize, fixed: f64) -> (f64, f64) {
         let low = f64::from(self.patch.cell[axis]);
         let above = |along: f64| {

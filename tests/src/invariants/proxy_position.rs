@@ -42,7 +42,7 @@ impl TickOracle<'_> {
         let minima = self.minima(seen.proxy, seen.hip);
         let error = minima.first().map(|nearest| nearest.off);
         let Some(error) = error else {
-            return Ok(()); // off the surface: said before
+            return Ok(()); // off the surface: reported before
         };
         self.measured.judged += 1;
         // Within the bound of the HIP itself there is no force to be wrong about.

@@ -1,4 +1,4 @@
-//! Tap of the frames that leave the device: what the oracle knows and the host does
+//! Tap of the frames that leave the device: data that the oracle has and the host does
 //! not.
 
 use std::collections::HashMap;
@@ -22,7 +22,7 @@ pub struct Moment {
     /// Ticks that the device has run.
     pub ticks: u64,
     /// True if the line has not stood still lately: otherwise what leaves may have been
-    /// said at any time before.
+    /// sent at any time before.
     pub flows: bool,
 }
 

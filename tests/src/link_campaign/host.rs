@@ -1,4 +1,4 @@
-//! An honest host: the product's own client, and what its user is told.
+//! An honest host: the product's own client, and the messages to its user.
 //!
 //! It goes through the steps of `hapterra run`: it opens a session, zeroes and arms, and
 //! takes its leave. All its deadlines are the client's own; the judge holds it to them.
@@ -27,7 +27,7 @@ const PATIENCE: Timeouts = Timeouts {
 pub enum End {
     /// It has taken its leave, and says that all is well.
     Agreed,
-    /// It told its user that something is wrong.
+    /// It reported a fault to its user.
     Told(LinkError),
 }
 

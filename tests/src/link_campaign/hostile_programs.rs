@@ -216,7 +216,7 @@ impl Behaviour {
         Self::RefusesScenes,
     ];
 
-    /// Returns its bytes in the millisecond `now` to a host that serves a scene and has said
+    /// Returns its bytes in the millisecond `now` to a host that serves a scene and has sent
     /// hello with this number.
     pub fn say(
         self,

@@ -43,14 +43,14 @@ use fault::Kind;
 pub use run_outcomes::LinkStats;
 use segment::Segment;
 
-/// The seed that is used without being told another.
+/// The default seed.
 pub const SEED: u64 = 1;
 /// Samples along the side of the terrain, and the side of a cell, mm.
 const SAMPLES: u32 = 512;
 const CELL_MM: f64 = 0.5;
 
 /// Runs segments, from the first on, until devices have run for so many seconds. `done`
-/// is told each segment's number and the tally so far.
+/// gets each segment's number and the outcomes so far.
 ///
 /// # Errors
 /// The first [`Violation`].

@@ -11,7 +11,7 @@ use crate::campaign_table::Rows;
 pub enum Outcome {
     /// Host and device agreed on the end.
     Agreed,
-    /// The user was told what is wrong.
+    /// The fault was reported to the user.
     Told(String),
     /// The host was killed, and no other came in this run.
     Killed,

@@ -167,7 +167,7 @@ impl Run<'_, '_> {
         self.plan.done || self.plan.step != step
     }
 
-    /// Returns true if arming has come to its end: the user was told that it does not come to
+    /// Returns true if arming has come to its end: the user got a message that it does not come to
     /// that, or sees that the arm is disarmed, or the force is in. Presses the switch
     /// where the user sees that it is waited for.
     fn is_armed(&mut self, pressed: &mut Option<u64>) -> bool {

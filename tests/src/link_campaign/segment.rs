@@ -1,4 +1,4 @@
-//! A stretch of the campaign: one device with its arm, the line, and whoever is at the
+//! A stretch of the campaign: one device with its arm, the line, and the program at the
 //! other end, millisecond by millisecond.
 
 use hapterra::terrain::Terrain;
@@ -16,7 +16,7 @@ use super::proxy_oracle;
 use crate::random::Random;
 
 /// Time for which what the user sees may differ from what is, on a line that works, ms; also
-/// where another program has taken the device, which the user is told.
+/// where another program has taken the device, which is reported to the user.
 const STALE: u64 = 1_500;
 /// Time for which after the line stood still the device may still say what it had to say then,
 /// ms.
@@ -54,10 +54,10 @@ pub struct Segment<'t> {
     was_on: bool,
     /// When the direction to the host had no room last.
     full: u64,
-    /// The device has let an arm go whose host was silent, and nobody has talked to it
+    /// The device has let an arm go whose host was silent, and no host has connected
     /// since.
     pub let_go: bool,
-    /// The present host has to be told so.
+    /// This has to be reported to the present host.
     owed: bool,
     /// Since when the user has seen something else than what is.
     stale: Option<u64>,
@@ -68,7 +68,7 @@ pub struct Segment<'t> {
 }
 
 impl<'t> Segment<'t> {
-    /// A device that was just switched on, and nobody at the other end.
+    /// A device that was just switched on, without a host.
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, mut random: Random) -> Self {
         let mut board = Board::new(terrain, &mut random);
@@ -229,7 +229,7 @@ impl<'t> Segment<'t> {
         self.judge_last_end()
     }
 
-    /// The first host after one that vanished is told why the arm is disarmed.
+    /// The first host after one that vanished gets the reason why the arm is disarmed.
     fn judge_last_end(&mut self) -> Result<(), String> {
         let greeted = self.host.as_ref().and_then(|host| host.last_end);
         match greeted.filter(|_| self.owed) {

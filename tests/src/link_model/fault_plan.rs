@@ -12,7 +12,7 @@ pub enum Interruption {
     DeviceReset,
     /// For so many ticks nothing gets through one way.
     Cut(Direction, u64),
-    /// All that was said one way so far comes again: of this session, and of those before.
+    /// All frames of one direction so far arrive again: of this session, and of those before.
     Echo(Direction),
     /// A host of another version says hello on the same line.
     OtherHost,

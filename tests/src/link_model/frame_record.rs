@@ -14,7 +14,7 @@ use hapterra_core::wire::session::{InSession, SampleCount};
 pub(super) struct FrameRecord {
     reader: Box<FrameReader<MAX_FRAME>>,
     sessions: HashMap<u32, SampleCount>,
-    /// The ticks of the samples that were told in each session.
+    /// The ticks of the samples that were sent in each session.
     ticks: HashMap<u32, HashSet<u32>>,
     /// Each greeting of the device, and its session.
     greetings: Vec<(u32, DeviceHello)>,
@@ -75,7 +75,7 @@ impl FrameRecord {
         of_it.map(|(_, device)| device)
     }
 
-    /// Returns true if the sample of this tick was told in this session.
+    /// Returns true if the sample of this tick was sent in this session.
     pub(super) fn has_told(&self, session: u32, tick: u32) -> bool {
         let ticks = self.ticks.get(&session);
         ticks.is_some_and(|ticks| ticks.contains(&tick))

@@ -59,7 +59,7 @@ impl LossyLine {
         self.frames.extend(again);
     }
 
-    /// A frame of somebody else arrives.
+    /// A frame of another program arrives.
     pub(super) fn slip_in(&mut self, frame: Vec<u8>, now: u64) {
         self.frames.push((now + 1, frame));
     }

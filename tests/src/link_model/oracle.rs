@@ -22,15 +22,15 @@ pub enum Wrong {
     /// The amplifiers went on at this tick in a session whose host had not asked for it.
     Unasked(u64),
     /// The amplifiers were on at this tick, and nothing had come for longer than the host
-    /// had said.
+    /// had sent.
     Forsaken(u64),
-    /// The host took this for the device's words, and the device had not said so in its
+    /// The host took this for a message of the device, which had not sent it in its
     /// session.
     Misled(String),
     /// The host took this tick's status for the answer to a question that it asked at that
     /// tick of the device, which was later.
     Outdated(u32, u32),
-    /// The host was told that the device is disarmed, and it is not.
+    /// The host got a report that the device is disarmed, and it is not.
     NotDisarmed(u64),
     /// Samples were not counted once: what the host counted as here or lost, and as
     /// dropped; what the device had.

@@ -35,7 +35,7 @@ const RESUMPTIONS: u32 = 4;
 /// End of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The host knows that the device is disarmed.
+    /// The host has the confirmation that the device is disarmed.
     Agreed,
     /// The host tells its user that it does not know, and why.
     Told,
@@ -191,7 +191,7 @@ impl<'t> World<'t> {
             if let Step::Over(end) = self.step {
                 break end;
             }
-            // It tells nobody, and what counts is the device.
+            // It reports to no user, and what counts is the device.
             if self.host_gone && !self.enabled {
                 break End::Told;
             }
@@ -294,7 +294,7 @@ impl<'t> World<'t> {
                 self.listen();
             }
         }
-        // Whoever holds the switch presses it until something is driven, and then on.
+        // The user presses the switch until something is driven, and then on.
         let dead_man = self.enabled || self.now % 300 > 60;
         let sense = GuardInputs {
             dead_man,

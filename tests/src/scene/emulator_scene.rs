@@ -34,7 +34,7 @@ pub struct EmulatorScene {
     pub scene: Scene,
     /// It was rendered on its materials, by the whole loop.
     is_on_materials: bool,
-    /// As the device is told of it.
+    /// In the form that the device gets.
     message: SceneMessage,
     /// Tiles and HIPs, in the order they came.
     events: Vec<Event>,

@@ -51,7 +51,7 @@ struct Device<'t, 'g, const D: usize> {
     coming: Vec<(u32, TileKey)>,
     now: u32,
     seq: u32,
-    /// Tiles and points in the order they came, and what each tick told.
+    /// Tiles and points in the order of their arrival, and each tick's report.
     events: Vec<Event>,
     ticks: Vec<Counted>,
 }
@@ -94,7 +94,7 @@ pub fn replay<const D: usize>(
 }
 
 /// Replays the path of a scene on materials in a window as large as the counting board's: the scene
-/// as the device is told of it, tiles and points in the order they came, and what each tick told.
+/// as the device gets it, tiles and points in the order of their arrival, and each tick's report.
 ///
 /// # Panics
 /// As [`replay`], and when a point is never answered.
@@ -256,7 +256,7 @@ impl<'t, 'g, const D: usize> Device<'t, 'g, D> {
     }
 }
 
-/// The scene as the device is told of it.
+/// The scene as the device gets it.
 fn message(scene: &Scene, materials: &Materials, shift: [i32; 3]) -> SceneMessage {
     let [columns, rows] = scene.terrain.size;
     SceneMessage {

@@ -153,7 +153,7 @@ impl Materials {
         self
     }
 
-    /// The table as the device is told of it.
+    /// The table as the device gets it.
     ///
     /// # Panics
     /// When it has none, or too many.
@@ -162,7 +162,7 @@ impl Materials {
         MaterialTable::new(&self.table).expect("as many as fit")
     }
 
-    /// Returns true if no material knows friction.
+    /// Returns true if no material has friction.
     #[must_use]
     pub fn is_like_ice(&self) -> bool {
         self.table.iter().all(|one| one.friction.is_none())

@@ -90,7 +90,7 @@ const GRATING: Texture = Texture {
 /// Returns true if a texture feels the same a multiple of 32 cells away: it lies fast on the
 /// terrain's cells, of so many millimetres.
 pub(super) fn is_alike(texture: &Texture, cell_mm: f32) -> bool {
-    // So many waves can be told without rounding.
+    // Numbers of waves without rounding.
     let fits = [0.25, 0.5, 1.0, 8.0, 32.0].contains(&texture.wavelength_mm)
         && (32.0 * cell_mm / texture.wavelength_mm).fract() == 0.0;
     match texture.pattern {

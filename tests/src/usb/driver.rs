@@ -1,6 +1,6 @@
 //! A USB peripheral for embassy's stack whose other side is the script.
 //!
-//! Nothing here wakes anybody: whoever holds the futures polls them after each
+//! Nothing here calls a waker: the owner of the futures polls them after each
 //! thing the script did.
 
 use std::cell::RefCell;

@@ -53,7 +53,7 @@ fn a_recording_is_replayed_with_its_own_settings() {
             .zip(rows(&text))
             .any(|(a, b)| a["force_z_n"] != b["force_z_n"])
     );
-    // An option of one's own wins, and that is said.
+    // An option on the command line wins, with a note.
     let told = folder.replays("felt.csv", "stiff.csv", &["--stiffness=0.6"]);
     assert!(
         told.contains("--stiffness 0.6N/mm, where the recording has 0.3N/mm"),
@@ -506,7 +506,7 @@ fn a_reader_who_goes_away_is_no_crash() {
     }
 }
 
-/// Nor is a disk without room, for what is said and for what is written.
+/// Nor is a full disk, for messages and for files.
 #[test]
 fn an_output_that_cannot_be_written_is_no_crash() {
     let folder = Folder::new();

@@ -213,7 +213,7 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     stdin
         .write_all(b"zoom 2\nnonsense\nzoom 1e9\n")
         .expect("written");
-    // It goes on when nobody writes any more.
+    // It goes on when the writer is gone.
     drop(stdin);
     let run = child.wait_with_output().expect("it ends");
     assert!(run.status.success(), "{}", said(&run));

@@ -21,7 +21,7 @@ use rustix::termios::LocalModes;
 
 use super::terminal::{modes, shows, start_command_in, terminal};
 
-/// The line in which the user is told.
+/// The line of the message to the user.
 const SWITCH_OFF: &str = "switch the amplifiers off";
 
 /// An arm that a user at a terminal has armed, and the processes that serve it.
@@ -141,7 +141,7 @@ impl Rest {
     }
 }
 
-/// An arm at rest over the terrain, whose user holds the dead-man switch once told to.
+/// An arm at rest over the terrain, whose user holds the dead-man switch on request.
 fn device(is_on: Arc<AtomicBool>, is_pressed: Arc<AtomicBool>) -> Native {
     let hand = move |_, sense: &mut GuardInputs, drive: &GuardOutputs| {
         is_on.store(drive.enabled, Ordering::Relaxed);

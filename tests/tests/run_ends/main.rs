@@ -1,5 +1,5 @@
 //! Every way in which `hapterra run` and `hapterra bringup` end: the board is known to be
-//! disarmed, or the user is told that it may not be; what was recorded is kept.
+//! disarmed, or the user gets a warning that it may not be; what was recorded is kept.
 #![cfg(unix)]
 
 mod bringup;
@@ -157,7 +157,7 @@ fn a_signal_before_it_has_begun_is_heeded() {
         .arg("--unchecked")
         .spawn();
     let child = child.expect("it runs");
-    // It greets a device that does not answer; that is heard, and said goodbye to.
+    // It greets a device that does not answer; its hello arrives, and the session is closed.
     served.wait_for_unheard_hello();
     signal(&child, "INT");
     pass(Duration::from_millis(500));

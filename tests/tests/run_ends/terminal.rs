@@ -57,7 +57,7 @@ fn a_terminal_window_that_is_closed_is_a_goodbye() {
     let child = start_in(&end, &served, folder.path());
     has_begun(&mut window);
     drop(window);
-    // It goes on as long as nobody asks for its end.
+    // It runs until its end is requested.
     pass(A_LINE);
     signal(&child, "HUP");
     let output = end_of(child);

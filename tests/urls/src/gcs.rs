@@ -26,7 +26,7 @@ const SCOPES: [&str; 3] = [
 /// A token may hold so long, seconds.
 const LONGEST: u64 = 3600;
 
-/// A token as `gcloud auth print-access-token` prints it, of somebody who may read all.
+/// A token as `gcloud auth print-access-token` prints it, of an account that may read all.
 pub const TOKEN: &str = "ya29.a0-of-the-surveyor";
 
 /// A service account. Its key was made for these tests and opens nothing else.
@@ -107,7 +107,7 @@ impl Service for Google {
                 _ => Err(denied("Anonymous caller")),
             };
         };
-        // What is said is looked at, even where nothing has to be said.
+        // A token is checked, even where none is needed.
         let said = said.to_str().ok();
         match said.and_then(|said| holder(said.strip_prefix("Bearer ")?)) {
             Some(mail) if mail == SURVEYOR.mail => Ok(file),
@@ -148,7 +148,7 @@ fn denied(who: &str) -> Refusal {
     refusal(StatusCode::FORBIDDEN, "AccessDenied", &message)
 }
 
-/// Whose a token is; `None` where it is nobody's or does not hold.
+/// The account of a token; `None` if it is unknown or invalid.
 fn holder(token: &str) -> Option<&'static str> {
     if token == TOKEN {
         return Some(SURVEYOR.mail);

@@ -34,7 +34,7 @@ pub enum Fault {
     None,
     /// The server says that it cannot answer.
     Error500,
-    /// Nobody may read it.
+    /// It may not be read.
     Forbidden,
     /// The line ends in the middle.
     Cut,

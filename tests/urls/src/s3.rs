@@ -9,7 +9,7 @@ use s3s::service::S3ServiceBuilder;
 use s3s_fs::FileSystem;
 use tokio::runtime::Runtime;
 
-/// The name and the key that the server knows.
+/// The name and the key that the server accepts.
 pub const KEY: [&str; 2] = ["hand", "terrain"];
 
 /// A server on this machine.

@@ -120,7 +120,7 @@ fn a_mask_that_cannot_be_asked_for_is_not_taken_for_none() {
     server.fail_at(".msk", Fault::Error500, usize::MAX);
     let told = open(&server, "hills.tif").expect_err("who knows what is masked");
     assert!(told.contains("500"), "{told}");
-    // Who may not list a folder is told of what is not there that it is forbidden.
+    // A server answers "forbidden" about a missing file to a user without list permission.
     server.fail_at(".msk", Fault::Forbidden, usize::MAX);
     open(&server, "hills.tif").expect("no mask");
 }

@@ -1,4 +1,4 @@
-//! Whoever holds the arm waits for no server.
+//! The hand never waits for a server.
 
 use std::cell::Cell;
 use std::io;

@@ -32,7 +32,7 @@ impl Words {
 
     /// Goes over to another view.
     pub(super) fn change(&mut self, scene: &Scene) {
-        // Of a recording they are told once.
+        // For a recording they are sent once.
         if !scene.facts.is_empty() {
             self.facts = facts(scene);
         }
@@ -111,7 +111,7 @@ fn facts(scene: &Scene) -> String {
     facts
 }
 
-/// The file's coordinates of a place, mm; none where the file knows none.
+/// The file's coordinates of a place, mm; none if the file states none.
 pub(super) fn coordinates(scene: &Scene, x: f64, y: f64) -> Option<String> {
     let known = scene.coordinates.as_ref()?;
     let at = |axis: usize| {

@@ -7,7 +7,7 @@ use hapterra_view_stream::{Layer, Scene, TILE_CELLS};
 /// at height zero, so that single precision is finest where the hand is.
 ///
 /// Another view of the terrain has other millimetres. In the picture the terrain stays where
-/// it is, and what is told in those millimetres comes to lie on it. Heights are drawn as
+/// it is, and data in those millimetres is placed on it. Heights are drawn as
 /// they are rendered, exaggerated or not.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ground {

@@ -22,7 +22,7 @@ const BLOCK_CELLS: usize = 32;
 /// The layers of a terrain.
 #[derive(Default)]
 pub(super) struct Layers {
-    /// As they were told, for a view with other heights.
+    /// As they were received, for a placement with other heights.
     told: Vec<Layer>,
     layers: Vec<Shown>,
     /// Colours, by the coarsest layer: it shows the whole.
@@ -61,7 +61,7 @@ impl Layers {
     pub(super) fn put(&mut self, log: &Log, ground: &Ground, layer: Layer) -> Result<Vec<Entry>> {
         let number = layer.number as usize;
         if number > self.told.len() {
-            // Of a terrain of which nothing coarser was told.
+            // For a terrain without a coarser layer.
             return Ok(Vec::new());
         }
         let gone = self.layers.split_off(number);

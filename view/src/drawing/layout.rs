@@ -91,7 +91,7 @@ impl Layout {
         let top = self.container(across, 4.0, &[map, places])?;
         let third = self.container(across, 1.0, &[depth, energy])?;
         let mut rows = vec![top, height, force, third];
-        // A recording knows nothing of the link, and may know nothing of the cost.
+        // A recording has no data of the link, and may have none of the cost.
         let mut last = Vec::new();
         if let Some(tick) = &scene.tick {
             let name = format!("Tick cost ({})", tick.unit);

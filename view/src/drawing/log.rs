@@ -42,7 +42,7 @@ impl Log {
         }
     }
 
-    /// `what` an entity is, until the same `part` of it is told anew.
+    /// `what` an entity is, until the same `part` of it is sent again.
     pub(super) fn standing(
         &self,
         entity: &str,

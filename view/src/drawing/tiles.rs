@@ -157,7 +157,7 @@ impl Tiles {
         self.slots.values().copied().collect()
     }
 
-    /// Draws around the tiles that the device holds and lacks. Lines around a tile are told
+    /// Draws around the tiles that the device holds and lacks. Lines around a tile are sent
     /// when it comes, and not with every other one again: a window has hundreds.
     pub(super) fn outline(
         &mut self,

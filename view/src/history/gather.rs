@@ -1,7 +1,7 @@
 //! Gathering of events: some time of an entity as one entry.
 //!
-//! The viewer takes about a millisecond for each entry that it is told, however small. A page
-//! that comes late, and one that is drawn by software, are told the same rows in far fewer
+//! The viewer takes about a millisecond for each entry that it gets, however small. A page
+//! that comes late, and one that is drawn by software, get the same rows in far fewer
 //! entries.
 
 use std::collections::BTreeMap;

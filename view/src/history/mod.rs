@@ -5,7 +5,7 @@
 //! Nothing else grows during a session.
 //!
 //! A page whose queue is full is cut off, so that neither this program nor another page
-//! waits for it. It comes back by itself and is told the present state.
+//! waits for it. It reconnects by itself and gets the present state.
 
 mod gather;
 mod page;
@@ -65,7 +65,7 @@ struct State {
 /// End of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// `hapterra` said that there is no more.
+    /// `hapterra` ended the stream.
     Told,
     /// `hapterra` is gone without saying so: it was killed, or crashed.
     Lost,
@@ -209,7 +209,7 @@ impl History {
 }
 
 impl State {
-    /// Tells what happened to the pages that are told it in such pieces.
+    /// Sends the gathered entries to the pages that take such pieces.
     fn tell(&self, pieces: Pieces, blob: &Blob) {
         for page in self.pages.iter().filter(|page| page.pieces() == pieces) {
             page.offer(None, blob);

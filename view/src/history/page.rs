@@ -7,10 +7,10 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use super::{Blob, End, locked};
 
-/// Bytes that may wait for one page, beside those that it is told first.
+/// Bytes that may wait for one page, beside those that it gets first.
 pub(super) const QUEUE_BYTES: usize = 32 << 20;
 
-/// In which pieces a page is told what happens.
+/// Sizes of the pieces in which a page gets the entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pieces {
     /// As it happens.
@@ -72,7 +72,7 @@ impl Page {
         })
     }
 
-    /// In which pieces it is told what happens.
+    /// Sizes of the pieces in which it gets the entries.
     #[must_use]
     pub fn pieces(&self) -> Pieces {
         self.pieces

@@ -1,4 +1,4 @@
-//! The page and its stream over HTTP, for this machine alone unless told otherwise.
+//! The page and its stream over HTTP, for this machine alone by default.
 //!
 //! [`access_check`] refuses requests of other origins; there are only files and the stream.
 

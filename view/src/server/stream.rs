@@ -9,11 +9,11 @@ use std::time::Duration;
 
 use crate::history::{End, Next, Page, Pieces};
 
-/// Time for which nothing may come before the page is told that this program lives, by a
+/// Time for which nothing may come before the page gets a sign of life, by a
 /// length that no piece has.
 const SIGN_EVERY: Duration = Duration::from_secs(2);
 const SIGN: u32 = u32::MAX;
-/// Time for which what comes is gathered, where the page is told what was gathered.
+/// Time for which entries are gathered, for a page that gets gathered entries.
 const GATHERED: Duration = Duration::from_secs(1);
 /// Says that `hapterra` is gone and did not say why: another length that no piece has.
 const LOST: u32 = u32::MAX - 1;

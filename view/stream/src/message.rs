@@ -63,13 +63,13 @@ pub struct Scene {
     /// The part in front of the arm, from west, south to east, north, mm.
     pub laid_mm: [f64; 4],
     /// Ground metres in a millimetre; none where the terrain does not know its size, and
-    /// all lengths are told in millimetres.
+    /// all lengths are in millimetres.
     pub ground_m_per_mm: Option<f64>,
-    /// Units of the heights that are told, in a millimetre.
+    /// Units of the sent heights, in a millimetre.
     pub height_per_mm: f64,
-    /// The unit of the heights that are told, short: `m`.
+    /// The unit of the sent heights, short: `m`.
     pub height_unit: String,
-    /// The file's coordinates of places, where it knows any.
+    /// The file's coordinates of places, if it states any.
     pub coordinates: Option<Coordinates>,
     /// Units of a tick's cost, where they are known.
     pub tick: Option<TickCost>,
@@ -100,10 +100,10 @@ pub struct TickCost {
 }
 
 /// Samples of the terrain at every `step`-th cell of level 0. They belong to all views, up to
-/// one of other cells: all layers are told anew for it, the coarsest first.
+/// one of other cells: all layers are sent again for it, the coarsest first.
 ///
 /// A finer layer is shown in the place of the coarser one below it. One that comes with the
-/// number of another takes its place, and those with higher numbers go: they are told anew.
+/// number of another takes its place, and those with higher numbers go: they are sent again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
     /// Counted from the coarsest, which is 0 and shows the whole.
@@ -135,7 +135,7 @@ pub struct Tile {
 /// Which tiles the device holds and which it lacks, by column and row.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tiles {
-    /// Held, as far as the host knows: it has sent these, and no later one in their place.
+    /// Held, by what the host has sent: it has sent these, and no later one in their place.
     pub held: Vec<[i32; 2]>,
     /// Without these the loop could not complete its tick.
     pub awaited: Vec<[i32; 2]>,

@@ -212,7 +212,7 @@ impl Browser {
         );
     }
 
-    /// Tells a page that nobody can see it, or that somebody can again. A Chromium without a
+    /// Makes a page hidden, or visible again. A Chromium without a
     /// window may take every page to be seen, whichever is in front.
     pub fn set_seen(&mut self, page: &Page, is_seen: bool) {
         let state = if is_seen { "visible" } else { "hidden" };

@@ -15,7 +15,7 @@ type Shown = BTreeMap<String, Vec<Chunk>>;
 const HIP: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 /// Tolerance of single precision, m.
 const OFF: f64 = 0.02;
-/// Coordinates of a file are told to the metre here, and a metre of a map is one on the ground
+/// Coordinates of a file are checked to the metre here, and a metre of a map is one on the ground
 /// up to this share.
 const ROUNDED: f64 = 0.51;
 const MAP_METRE: f64 = 5e-4;

@@ -141,7 +141,7 @@ pub fn signal(which: &str, process: u32) {
     assert!(sent.expect("kill").success());
 }
 
-/// A viewer under test, and what it is told.
+/// A viewer under test, and its input.
 pub struct Viewer {
     running: Running,
     to: Option<ChildStdin>,
@@ -243,7 +243,7 @@ pub fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// `hapterra`, as `cargo xtask view --test` names it; none where nobody does.
+/// `hapterra`, as `cargo xtask view --test` names it; none without it.
 pub fn hapterra() -> Option<Command> {
     let program = std::env::var_os("HAPTERRA")?;
     let mut command = Command::new(program);
@@ -253,7 +253,7 @@ pub fn hapterra() -> Option<Command> {
     Some(command)
 }
 
-/// The emulated board's image, as `cargo xtask view --test` names it; none where nobody does.
+/// The emulated board's image, as `cargo xtask view --test` names it; none without it.
 pub fn emulated() -> Option<std::ffi::OsString> {
     std::env::var_os("HAPTERRA_MPS2_ELF").filter(|image| !image.is_empty())
 }

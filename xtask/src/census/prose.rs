@@ -91,7 +91,7 @@ fn is_word(part: &str) -> bool {
     part.contains(char::is_alphanumeric)
 }
 
-/// A page without its comments, which nobody sees.
+/// A page without its comments, which no reader sees.
 fn without_comments(text: &str) -> String {
     let (mut shown, mut left) = (String::new(), text);
     while let Some((before, comment)) = left.split_once("<!--") {

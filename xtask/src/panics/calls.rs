@@ -14,7 +14,7 @@ pub(crate) struct Function {
     pub(crate) address: u32,
     /// Its readable name.
     pub(crate) name: String,
-    /// All its names as the linker knows them: equal functions may be one.
+    /// All its names in the linker's symbol table: equal functions may be one.
     pub(crate) aliases: Vec<String>,
     /// Functions it branches to, by index.
     pub(crate) callees: Vec<usize>,

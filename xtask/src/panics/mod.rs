@@ -60,7 +60,7 @@ fn judge(calls: &Calls, board: &Board) -> Result<Vec<String>> {
         }
         judged.push(format!("{} ({})", functions[root].name, inner().count()));
     }
-    // What several interrupts reach is told once.
+    // A function that several interrupts reach is reported once.
     wrong.sort_unstable();
     wrong.dedup();
     ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -68,7 +68,7 @@ fn judge(calls: &Calls, board: &Board) -> Result<Vec<String>> {
 }
 
 /// Everything that a vector reaches. What a panic does in turn says nothing new: the walk ends
-/// there. It does not follow what the table knows either.
+/// there. It does not follow the entries of the table either.
 fn reached(calls: &Calls, board: &Board, root: usize) -> Reached {
     let functions = &calls.functions;
     reach::from(root, |i| {

@@ -11,7 +11,7 @@ use crate::run::{on_path, output};
 const PROGRAM: &str = "qemu-system-arm";
 const MACHINE: &str = "mps2-an386";
 
-/// The path of a QEMU that knows the board: `HAPTERRA_QEMU` if set, else the
+/// The path of a QEMU with the board: `HAPTERRA_QEMU` if set, else the
 /// one on the PATH, else a freshly installed one.
 pub(crate) fn ready() -> Result<PathBuf> {
     if let Some(given) = std::env::var_os("HAPTERRA_QEMU") {

@@ -2,7 +2,7 @@
 //!
 //! The distance to the HIP has a slope into each patch that meets there, and its
 //! way goes on in the one into which the slope is steepest: in a mirrored scene
-//! that is the mirrored patch. What a neighbour is said to offer is searched for
+//! that is the mirrored patch. The offer of a neighbour is searched for
 //! before the way goes there.
 
 use super::on_patch::{Nearest, finest_resolution, resolution, search};

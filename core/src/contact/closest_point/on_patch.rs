@@ -174,7 +174,7 @@ pub(super) fn finest_resolution(hip: f32) -> f32 {
     RESOLUTION * (1.0 + 2.0 * hip.abs())
 }
 
-/// A coordinate, put on the border where it is as near to it as can be told for
+/// A coordinate, put on the border if its distance from it is below the rounding for
 /// a HIP at coordinate `hip`.
 fn snapped(x: f32, hip: f32) -> f32 {
     let resolution = resolution(hip);

@@ -63,7 +63,7 @@ impl Ruling {
             let run = 1.0 / m;
             ((free_z - start) * run, (end - free_z) * run)
         };
-        // The larger one adds nothing to what the smaller one knows.
+        // The larger one adds no information to the smaller one.
         if free_u < rest {
             rest = 1.0 - free_u;
         } else {

@@ -175,8 +175,8 @@ struct End {
     is_known: bool,
 }
 
-/// Goes one straight way, from where the pull is in excess by so much; `None`, and nobody knows how
-/// far, where the budget does not reach for all of it.
+/// Goes one straight way, from where the pull is in excess by so much; `None` where
+/// the budget does not reach for all of it.
 #[inline(never)]
 fn straight(
     here: &mut Asked,

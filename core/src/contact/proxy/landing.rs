@@ -24,7 +24,7 @@ pub(super) struct Landing {
 impl Contact {
     /// A contact whose proxy begins on the surface over the column of a place, with the
     /// HIP as far from it as `displacement` says, cells. No force is rendered before the terrain
-    /// there is known, and [`Contact::land`] has said where that puts the HIP.
+    /// there is known, and [`Contact::land`] has set the HIP by it.
     #[must_use]
     pub fn landing(settings: ContactSettings, at: GridPoint, displacement: Vec3) -> Self {
         Self {

@@ -288,7 +288,7 @@ fn blended_samples_keep_their_speed_and_end_at_the_tile() {
         corners.heights[0],
         (hills(140, 140) - f64::from(BASE)) as f32
     );
-    // What was told of the tile's patches before it settled must not be told any more.
+    // Patches of the tile from before it settled must not be used any more.
     let low = Altitude::new(40, 0.0);
     assert!(
         bed.window

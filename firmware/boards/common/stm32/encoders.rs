@@ -15,7 +15,7 @@
 //! | counts a second beyond which counts are lost | 650,000 | 850,000 |
 //!
 //! So the filter takes the longest disturbance that leaves the fastest motion a margin
-//! of five: a speed that is a fault is still counted right, and is told as that fault.
+//! of five: a speed that is a fault is still counted right, and is reported as that fault.
 //! Both channels are late by the same time, so their order stays.
 
 use embassy_stm32::Peri;

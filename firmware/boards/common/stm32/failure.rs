@@ -42,7 +42,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 /// Switches off without a stack, because the fault may be that there is none left. ARM's
 /// manual (DDI 0337, 5.12.1) has the handler run even where its frame could not be
 /// written. Then it goes on on a fresh stack, which is the old one's memory: what the
-/// frame says is read before. The floating-point unit is told to forget the registers
+/// frame says is read before. The floating-point unit discards the registers
 /// that it still owes that frame.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
@@ -135,7 +135,7 @@ fn stop() {
 }
 
 /// Keeps the record, unless there is one of this program already, and resets the chip:
-/// before the watchdog runs nobody else would. A bare record comes first: to make the whole
+/// before the watchdog runs nothing else would. A bare record comes first: to make the whole
 /// one takes code that may be what failed.
 fn end(kind: CrashKind, record: impl FnOnce() -> CrashRecord) -> ! {
     if !HAS_ENDED.swap(true, Ordering::Relaxed) {

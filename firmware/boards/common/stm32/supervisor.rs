@@ -22,7 +22,7 @@ pub(super) static LED: CriticalSectionMutex<Cell<LedPattern>> =
     CriticalSectionMutex::new(Cell::new(LedPattern::Disarmed));
 
 /// Feeds the watchdog while all parts run, measures the stack, and shows the LED's
-/// pattern, for ever. Takes back what a debugger may have said about a halted core.
+/// pattern, for ever. Restores the settings for a halted core, which a debugger may have changed.
 #[embassy_executor::task]
 pub(crate) async fn supervise(
     monitor: &'static Monitor,

@@ -138,7 +138,7 @@ pub(super) struct Rig {
 }
 
 impl Rig {
-    /// A host that has not said anything yet.
+    /// A host that has not sent anything yet.
     pub(super) fn new() -> Self {
         let stored = Stored::Found(Calibration::PREMIUM_1_5);
         Self::started(stored, BootReport::default())

@@ -116,7 +116,7 @@ fn placement_during_contact_is_refused() {
     rig.run(20);
     assert_eq!(taken(&rig), [(1_001, false)]);
     assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
-    // It is open, but what the loop has said is of the view before.
+    // It is open, but the loop's last report is of the placement before.
     let mut rig = with_an_open_clutch();
     rig.say(&ToDevice::SceneChange(view(1, before.hip)));
     rig.say(&ToDevice::SceneChange(view(2, before.hip)));

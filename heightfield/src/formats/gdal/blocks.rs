@@ -161,7 +161,7 @@ impl GdalBlocks {
     }
 }
 
-/// An image as the rest of the program knows it, in blocks of a few of GDAL's.
+/// An image in the program's own terms, in blocks of a few of GDAL's.
 fn image(band: &Band<'_>) -> BlockImage {
     let [columns, rows] = band.size();
     let [across, down] = band.block_size();

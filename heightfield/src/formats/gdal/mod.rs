@@ -44,7 +44,7 @@ const OF_FILES: [&str; 2] = ["VRT", "STACIT"];
 const HEAD_BYTES: u64 = 1024;
 /// Colour pictures have three bands, or four, of bytes.
 const COLOURS: std::ops::RangeInclusive<u32> = 3..=4;
-/// The words with which GDAL says that no driver knows a file.
+/// GDAL's message about a file without a driver.
 const UNKNOWN: [&str; 2] = ["not recognized as", "no driver knows"];
 
 /// Reads a file, folder or whatever else a driver opens.

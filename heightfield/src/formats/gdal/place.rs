@@ -89,7 +89,7 @@ impl Place {
         self.served.is_some()
     }
 
-    /// GDAL's refusal without the folder of the file, which the user has named or knows nothing of.
+    /// GDAL's refusal without the folder of the file, which the user has named or never saw.
     pub(super) fn in_words(&self, refusal: RasterError) -> RasterError {
         let folder = self
             .path

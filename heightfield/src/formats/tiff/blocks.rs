@@ -96,7 +96,7 @@ pub(super) struct TiffBlocks {
     index: OnceLock<u64>,
     /// The full image and its overviews.
     images: Vec<Image>,
-    /// The same as the rest of the program knows them.
+    /// The same in the program's own terms.
     blocks: Vec<BlockImage>,
 }
 
@@ -416,7 +416,7 @@ impl Image {
             return false;
         };
         if (&cell, &tie) == (&full_cell, &full_tie) {
-            // Copied with the other tags of the full image: nothing is said of the overview.
+            // Copied with the other tags of the full image: it does not describe the overview.
             return true;
         }
         (0..2).all(|axis| {

@@ -56,7 +56,7 @@ fn a_tile_that_is_left_out_is_a_hole_and_no_other_is() {
 #[test]
 fn missing_rows_of_a_strip_are_holes_and_the_others_are_read() {
     const ROW: u32 = 4 * SIZE[0];
-    // The first strip ends 140 rows early, and the second is said to have as many more.
+    // The first strip ends 140 rows early, and the second states as many more.
     let made = Made {
         chunk: [SIZE[0], 640],
         other: Some((279, &[500 * ROW, (SIZE[1] - 500) * ROW])),
@@ -78,7 +78,7 @@ fn missing_rows_of_a_strip_are_holes_and_the_others_are_read() {
 
 #[test]
 fn bits_in_another_order_and_differences_are_left_to_the_decoder() {
-    // Of either the decoder knows what to do, or says that it does not.
+    // The decoder reads each, or reports that it cannot.
     let turned = Made {
         kind: KINDS[0],
         other: Some((266, &[2])),

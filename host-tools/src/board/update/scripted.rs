@@ -137,7 +137,7 @@ impl Scripted {
         }
         self.requests += 1;
         if self.state == State::Busy && self.now < self.busy_until {
-            // Whoever does not wait as asked gets no answer.
+            // A caller that does not wait as requested gets no answer.
             return Err(io::ErrorKind::TimedOut.into());
         }
         Ok(())
@@ -154,7 +154,7 @@ impl Scripted {
         (at + bytes <= self.rom.flash_bytes).then_some(at)
     }
 
-    /// Does what the last block said; the status that follows.
+    /// Executes the last block, and returns the next status.
     fn carry_out(&mut self) -> u8 {
         let (block, bytes) = std::mem::take(&mut self.block);
         if block >= 2 {

@@ -58,7 +58,7 @@ fn find_sign(
     for _ in 0..TRIES {
         attendant.finish(Task::HoldLoosely)?;
         board.still(attendant)?;
-        // What a fault tells here is told by where the joints went.
+        // The positions of the joints show what a fault would report here.
         let mut gave = |current_a| jog(board, attendant, (axis, current_a, GIVE_MS), false);
         let (plus, minus) = (gave(current_a)?.0, gave(-current_a)?.0);
         judged = judge_sign(record, axis, plus, minus);

@@ -61,7 +61,7 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     greet(place)
 }
 
-/// Asks whether a loader that nobody named is the board that is meant: a loader does not
+/// Asks whether a loader that the user did not name is the board that is meant: a loader does not
 /// tell what it is wired to.
 fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
     let serial = device.serial.as_deref().unwrap_or("without a number");

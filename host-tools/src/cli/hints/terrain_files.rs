@@ -221,7 +221,7 @@ const FROM_NPZ: &str = "import sys, numpy as n; f = n.load(sys.argv[1]); a = n.s
 const FROM_POINTS: &str = r"import sys, laspy, numpy as n; f, t, d = sys.argv[1:]; d = float(d); p = laspy.read(f); g = p.classification == 2; p = p[g] if g.any() else p; x, y, z = (n.array(v) for v in (p.x, p.y, p.z)); e = [d * n.arange(n.floor(v.min() / d), n.floor(v.max() / d) + 2) for v in (y, x)]; s, c = n.histogram2d(y, x, e, weights=z)[0], n.histogram2d(y, x, e)[0]; n.savetxt(t + '.asc', n.where(c > 0, s / n.maximum(c, 1), -9999)[::-1], '%.3f', comments='', header='ncols %d\nnrows %d\nxllcorner %.10g\nyllcorner %.10g\ncellsize %.10g\nnodata_value -9999' % (*c.shape[::-1], e[1][0], e[0][0], d)); r = p.header.parse_crs(); r and open(t + '.prj', 'w').write(r.to_wkt())";
 
 /// The command that makes a file that is read of one that is not, with GDAL's `options`
-/// where GDAL knows such files.
+/// if GDAL reads such files.
 fn converted(path: &Path, options: &str) -> String {
     let (from, to) = names(path);
     let space = if options.is_empty() { "" } else { " " };

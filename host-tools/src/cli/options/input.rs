@@ -117,7 +117,7 @@ impl InputSetting {
     }
 }
 
-/// Puts what is said about an input into the options of the library.
+/// Converts the options of an input to those of the library.
 pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Failure> {
     let twice = settings.iter().enumerate().find(|(index, setting)| {
         let mut before = settings.iter().take(*index);

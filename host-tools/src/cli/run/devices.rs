@@ -66,7 +66,7 @@ impl OneDevice {
     }
 
     /// The calibration of its arm, as it tells it. Where it does not, why, and that of a
-    /// Premium 1.5: the device is said goodbye to later, because the arm may be armed from before.
+    /// Premium 1.5: the session is closed later, because the arm may be armed from before.
     pub(super) fn meet(&self) -> (Calibration, Result<(), Failure>) {
         // The virtual Phantom is a Premium 1.5.
         let preset = Calibration::PREMIUM_1_5;

@@ -204,7 +204,7 @@ fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
 fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Result<(), Failure> {
     match (&device.plant, &device.address) {
         (_, DeviceAddress::Native) => Ok(()),
-        // Whatever else is said: its zero pose would be taken for known, and its lines for
+        // Regardless of other messages: its zero pose would be taken for known, and its lines for
         // a harmless virtual arm.
         (Some(_), _) => drives_no_arm(line),
         (None, _) if args.unchecked => Ok(()),

@@ -9,7 +9,7 @@ use crate::cli::failure::Failure;
 /// Serves each device until its own end; one device in this thread.
 ///
 /// # Errors
-/// That of the one device. Of several, each that failed, by its name; it was told when it
+/// That of the one device. Of several, each that failed, by its name; it was reported when it
 /// failed, too, because others may go on for long after it.
 pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failure> {
     if servings.len() == 1
@@ -43,7 +43,7 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
 fn failed(
     (name, thread): (String, ScopedJoinHandle<'_, Result<(), Failure>>),
 ) -> Option<(String, Failure)> {
-    // A session that panics has said goodbye, and said so if that was not confirmed.
+    // A session that panics has closed, and has reported a close without confirmation.
     let panicked = |_| {
         Err(Failure::new(
             "the program failed while it served this device",

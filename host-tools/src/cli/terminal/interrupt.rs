@@ -151,7 +151,7 @@ pub(in crate::cli) fn say(line: String) {
 }
 
 /// Says whether a board may be armed by this program from now on: who ends it at once
-/// is then told to switch the amplifiers off. Called by the thread that serves the board,
+/// then gets the message to switch the amplifiers off. Called by the thread that serves the board,
 /// which then calls [`requested`] many times a second. `name` is what lines about the board
 /// begin with: nothing, where there is one.
 pub(in crate::cli) fn device_may_be_armed(name: &str, address: &DeviceAddress, may: bool) {

@@ -98,7 +98,7 @@ impl Keyboard {
     }
 
     /// Returns true if a line was typed, or Enter was pressed, since the last look; never where
-    /// nobody types.
+    /// there is no input.
     pub(in crate::cli) fn was_pressed(&mut self) -> bool {
         self.sort();
         let pressed = mem::take(&mut self.enters) > 0;

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A bar over `length` steps, or a spinner where nobody knows how many there
+/// A bar over `length` steps, or a spinner if it is unknown how many there
 /// are, drawn as the template says.
 #[must_use]
 pub fn bar(length: Option<u64>, template: &str) -> ProgressBar {

@@ -98,7 +98,7 @@ impl SharedKeyboard {
         state
     }
 
-    /// Hands out what was pressed. What is to be told of it, where anything is.
+    /// Distributes a pressed key. Returns the message about it, if there is one.
     fn take(&self, state: &mut State, pressed: Pressed) -> Option<String> {
         let number = match pressed {
             Pressed::Key(Key::Char(digit)) => digit.to_digit(10).unwrap_or(0) as usize,

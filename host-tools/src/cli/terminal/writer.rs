@@ -1,9 +1,9 @@
 //! Output to the terminal while a board may be armed, and the log. Commands that
 //! hold no device print (`print_macros.rs`).
 //!
-//! One thread writes, and whoever speaks does not wait for it. A window that was closed,
+//! One thread writes, and callers do not wait for it. A window that was closed,
 //! a reader that is gone and a disk that is full therefore end nothing. A terminal that
-//! was stopped (Ctrl-S), or a reader that does not read, holds nothing up: the lines that
+//! was stopped (Ctrl-S), or a reader that does not read, delays nothing: the lines that
 //! do not fit any more are left out.
 
 use std::fmt::Display;
@@ -55,7 +55,7 @@ pub(in crate::cli) fn status(line: Option<String>) {
     speak(Said::Status(line));
 }
 
-/// Waits until everything is written that was said.
+/// Waits until all output is written.
 pub(in crate::cli) fn finish() {
     if let Some(Some(writer)) = WRITER.get() {
         let (done, is_done) = sync_channel(1);

@@ -62,7 +62,7 @@ const LATER: [&[u8]; 2] = [b"[[view]]", b"[[mark]]"];
 const MOST: usize = 1 << 24;
 
 /// Reads the comments between rows that tell of other views and of marks, without their `#` and a
-/// space after it; other remarks are passed over, and so is one that no row follows: whoever wrote
+/// space after it; other remarks are passed over, and so is one that no row follows: the writer of
 /// it may have been killed in the middle.
 pub(super) fn later(stream: impl Read) -> io::Result<String> {
     let (mut reader, mut line) = (

@@ -42,7 +42,7 @@ pub struct RecordingRow {
 /// Rows of a recording or a trajectory, in the order of the file.
 pub struct RecordingRows {
     path: PathBuf,
-    /// The same rows as a replay reads them: it knows what is wrong with them, where a
+    /// The same rows as a replay reads them: it reports their faults, where a
     /// recording was cut, and the view.
     trajectory: Trajectory,
     form: Form,

@@ -48,7 +48,7 @@ impl Terrain<'_> {
             reads.add(self.grid.read_row(self.level, row, west, line));
             for height in line {
                 unit = unit.with(*height);
-                // Where not all heights were read before, one may leave what can be said.
+                // If not all heights were read before, one may exceed the range of a tile.
                 *height = self.rounded(self.within(self.scale.height_cells(*height)));
             }
         }

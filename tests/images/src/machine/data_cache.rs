@@ -2,7 +2,7 @@
 //! and the memory behind it does not is lost at a reset.
 //!
 //! Modelled: DC of CCR, and cleaning by address (DCCMVAC, DCCIMVAC), over the AXI SRAM. The
-//! worst cache is assumed: it writes nothing back that it was not told to, and keeps everything.
+//! worst cache is assumed: it writes nothing back without a command, and keeps everything.
 //! The worst memory, too: its buffer (RM0433, 2.4) holds the last line that was written, until
 //! the next one, and not only a word that is incomplete.
 //! Not modelled: sets and ways, an invalidation that drops what was written, other masters of

@@ -79,7 +79,7 @@ pub struct Machine {
 
 impl Machine {
     /// A powered-up chip with `image` in its flash, the switches as they are
-    /// when nobody is near: emergency stop not pressed, dead-man and clutch not held; amplifiers that are
+    /// when unattended: emergency stop not pressed, dead-man and clutch not held; amplifiers that are
     /// ready and have no current monitors.
     #[must_use]
     pub fn new(chip: &'static Chip, image: Image) -> Self {
@@ -139,7 +139,7 @@ impl Machine {
     }
 
     /// Resets the chip. Memory keeps what it holds, but not what only the data cache did, and what
-    /// is outside of the chip knows of no reset but a power-up.
+    /// is outside of the chip sees no reset but a power-up.
     pub fn reset(&mut self, cause: Reset) {
         let inputs = self.chip;
         let before = self.bus.replace(Bus::new(self.chip, cause));

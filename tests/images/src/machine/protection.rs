@@ -1,5 +1,5 @@
 //! The memory protection unit (ARM DDI 0403E, B3.5) as far as an image uses it: regions with no
-//! access at all, and regions that nobody may store to, over the default map. Not modelled: other
+//! access at all, and read-only regions, over the default map. Not modelled: other
 //! access, subregions, XN, and regions over each other. And exception entry where the stack cannot
 //! be written: the handler runs all the same (ARM DDI 0337, 5.12.1), and its frame holds
 //! what was there.

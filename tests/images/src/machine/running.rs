@@ -94,7 +94,7 @@ impl Machine {
         None
     }
 
-    /// Erases at once what the flash was told to erase; the flash stays busy for a while.
+    /// Erases the commanded pages at once; the flash stays busy for a while.
     fn erase(&mut self) {
         let sectors = std::mem::take(&mut self.bus().erased);
         for (address, bytes) in sectors {

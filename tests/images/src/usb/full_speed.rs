@@ -186,7 +186,7 @@ impl Peripheral for FullSpeed {
         };
         let expected = self.endpoints[index] & DTOG_RX != 0;
         match (self.endpoints[index] & STAT_RX) >> 12 {
-            // Taken for the last packet, sent again: nothing is stored or told.
+            // Taken for the last packet, sent again: nothing is stored or reported.
             VALID if toggle != expected => return Handshake::Ack,
             VALID if self.store(index, packet) => {}
             STALL => return Handshake::Stall,

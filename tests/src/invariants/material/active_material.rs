@@ -134,7 +134,7 @@ impl ActiveMaterial {
         self.done >= OVER && self.parts == FADE
     }
 
-    /// Returns true if it cannot be told from another one from now on.
+    /// Returns true if it behaves as another one from now on.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let told = |one: &Self| (one.wanted, one.done, one.parts, one.was_rendered);
         let speed = |one: &Self| one.judge.as_ref().map_or(0.0, TextureJudge::speed);

@@ -7,7 +7,7 @@ use super::active_material::ActiveMaterial;
 
 /// Rounding, as a part of a force.
 const ROUNDING: f64 = 1e-5;
-/// Forces below this, N, are not told from none.
+/// Forces below this, N, count as none.
 const LEAST_N: f64 = 1e-12;
 
 /// Conditions of a tick.

@@ -1,7 +1,7 @@
 //! Oracle of scenes with materials, by docs/how-to/materials.md and
 //! docs/explanation/effects.md.
 //!
-//! The judge knows the class of each sample itself, and follows in f64 what may be in force. Where
+//! The oracle has the class of each sample, and computes in f64 the possible materials. Where
 //! a proxy lies on the line half way between two samples either class is right: then it follows
 //! both, until the force tells which one it is.
 

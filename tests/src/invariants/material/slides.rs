@@ -13,7 +13,7 @@ use crate::invariants::oracle::Verdict;
 use crate::invariants::surface::{Patch, distance};
 use crate::scene::terrain::Kind;
 
-/// Ways of a proxy in a tick by which its friction is told, and distances from the HIP, cells:
+/// Displacements of a proxy in a tick that show its friction, and distances from the HIP, cells:
 /// friction over half a cell a tick is less exact (docs/explanation/effects.md).
 const SLIDES: std::ops::Range<f64> = 1e-4..0.5;
 const PRESSES: std::ops::Range<f64> = 1e-3..100.0;

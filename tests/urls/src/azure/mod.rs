@@ -1,7 +1,7 @@
 //! A server of containers that speaks Azure Blob Storage.
 //!
 //! A request is signed with the account's key (`shared_key`), carries a shared access
-//! signature that somebody made with that key (`sas`), or the token of a program that is
+//! signature made with that key (`sas`), or the token of a program that is
 //! known by name (`principal`). The server computes signatures again by Microsoft's
 //! documented rules, and shares no code with the client.
 
@@ -39,7 +39,7 @@ pub const SURVEYORS: Account = Account {
     key: "c3VydmV5b3JzIGtub3cgdGhlIGhpbGxzIGJ5IHRoZWlyIGhlaWdodHMsIGFuZCB0aGUgaGlsbHMgZG8gbm90Lg==",
     is_public_allowed: false,
 };
-/// The account of Microsoft's emulators, whose key everybody knows.
+/// The account of Microsoft's emulators, whose key is public.
 pub const EMULATOR: Account = Account {
     name: "devstoreaccount1",
     key: "Eby8vdM02xNOcqFlqUwJPLlmEtlCDXJ1OUzFT50uSRZ6IFsuFq2UVErCz4I6tq/K1SZFPTOtr/KBHBeksoGMGw==",
@@ -116,7 +116,7 @@ impl Service for Microsoft {
     }
 }
 
-/// Checks that somebody without a key may read a container.
+/// Checks that a container may be read without a key.
 fn check_public(account: &Account, container: &str) -> Result<(), Refusal> {
     if !account.is_public_allowed {
         let why = "Public access is not permitted on this storage account.";

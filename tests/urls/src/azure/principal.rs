@@ -1,4 +1,4 @@
-//! A service principal: a program that Microsoft knows by a name, and that changes its secret
+//! A service principal: a program with a name at Microsoft, which exchanges its secret
 //! for a token, by the rule of
 //! <https://learn.microsoft.com/entra/identity-platform/v2-oauth2-client-creds-grant-flow>.
 

@@ -65,7 +65,7 @@ fn a_file_opens_with_the_key_of_its_account_and_is_fetched_in_parts() {
     assert_fetched_in_parts(&microsoft.server.take_seen(), microsoft.hills.bytes);
 }
 
-/// The names of the environment that Microsoft's own command knows.
+/// The names of the environment of Microsoft's own command.
 #[test]
 fn a_file_opens_with_what_is_set_for_microsofts_command() {
     let microsoft = Microsoft::start(SURVEYORS);
@@ -147,7 +147,7 @@ fn a_file_of_a_public_container_opens_without_a_key_and_no_other_does() {
     assert!(output.contains("read GeoTIFF"), "{output}");
     let told = microsoft.said(&url(), &nobody);
     assert_refused(&told, "NoAuthenticationInformation", HINT);
-    // Of most accounts nothing is public, which is said with the status of a conflict.
+    // Of most accounts nothing is public, which is answered with the status of a conflict.
     let microsoft = Microsoft::start(SURVEYORS);
     let told = microsoft.said(&url(), &nobody);
     assert_refused(&told, "PublicAccessNotPermitted", HINT);

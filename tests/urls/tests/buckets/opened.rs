@@ -74,7 +74,7 @@ pub(crate) fn mosaic(folder: &Path, files: [&str; 2]) -> String {
 pub(crate) fn said(name: &str, environment: &[(&str, &str)]) -> String {
     let mut process = Command::new(std::env::current_exe().expect("this program"));
     process.args(["--exact", "opened::in_another_process", "--nocapture"]);
-    // Whoever runs the tests may have keys, too.
+    // The user who runs the tests may have keys, too.
     for (key, _) in std::env::vars_os() {
         let key = key.to_string_lossy();
         if ["AWS_", "AZURE_", "GOOGLE_"]
@@ -86,7 +86,7 @@ pub(crate) fn said(name: &str, environment: &[(&str, &str)]) -> String {
     }
     let nobodys = std::env::temp_dir().join("hapterra-nobody");
     process.env("HOME", nobodys);
-    // Nobody hands out keys at these places, as on a computer that is no cloud's.
+    // There are no keys at these places, as on a computer that is no cloud's.
     process.env("GCE_METADATA_HOST", "127.0.0.1:1");
     process.env("GCE_METADATA_IP", "127.0.0.1:1");
     process.env("AWS_METADATA_ENDPOINT", "http://127.0.0.1:1");
@@ -119,7 +119,7 @@ pub(crate) fn assert_fetched_in_parts(seen: &Seen, of: usize) {
     );
 }
 
-/// A user is told what, in which word of the server's, of which file, and what to do next.
+/// The message has the fault, the server's word, the file and the remedy.
 pub(crate) fn assert_refused(told: &str, word: &str, hint: &str) {
     let why = format!(
         "error: cannot read what is there: it may not be read without a key that opens it: the server says {word} ("
