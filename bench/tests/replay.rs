@@ -11,8 +11,8 @@ fn replay(folder: &Path, trajectory: &str, out: &str, words: &[&str]) -> String 
     command.current_dir(folder);
     command.args(["replay", "hills.tif", trajectory, "-o", out]);
     let output = command.args(words).output().expect("it runs");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{text}");
     std::fs::read_to_string(folder.join(out)).expect("written")
 }
 

@@ -8,7 +8,7 @@ fn stability(words: &[&str]) -> Output {
     output.expect("it runs")
 }
 
-fn told(output: &Output) -> String {
+fn output_text(output: &Output) -> String {
     let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
     String::from_utf8_lossy(&both).into_owned()
 }
@@ -20,7 +20,7 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
     let [to_csv, to_png] = [&csv, &png].map(|path| path.to_str().expect("text"));
     let words = ["--rate", "2000,1000", "--stiffness", "0.5", "-o", to_csv];
     let output = stability(&[&words[..], &["--picture", to_png]].concat());
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", output_text(&output));
     for part in [
         "  1000 Hz, no damping:                0.1 of the arm's friction: light 0.5 / 0.5 / none",
         "  1000 Hz, no damping:                1 of the arm's friction: light 0.5 / 0.5 / none",
@@ -29,7 +29,11 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
         "  2000 Hz, no damping:",
         "Colgate",
     ] {
-        assert!(told(&output).contains(part), "{}", told(&output));
+        assert!(
+            output_text(&output).contains(part),
+            "{}",
+            output_text(&output)
+        );
     }
     let rows = std::fs::read_to_string(csv).expect("a table");
     assert_eq!(rows.lines().count(), 1 + 2 * 2 * 2 * 3, "{rows}");
@@ -46,9 +50,9 @@ fn it_says_limits_and_writes_every_trial_and_a_picture() {
 fn what_cannot_be_tried_or_written_is_said_at_once() {
     let twice = stability(&["-o", "both", "--picture", "both"]);
     assert!(
-        told(&twice).contains("cannot be one file"),
+        output_text(&twice).contains("cannot be one file"),
         "{}",
-        told(&twice)
+        output_text(&twice)
     );
     for (words, code, part) in [
         (["--rate", "1500"], 2, "whole kilohertz"),
@@ -71,7 +75,11 @@ fn what_cannot_be_tried_or_written_is_said_at_once() {
         ),
     ] {
         let output = stability(&words);
-        assert_eq!(output.status.code(), Some(code), "{}", told(&output));
-        assert!(told(&output).contains(part), "{}", told(&output));
+        assert_eq!(output.status.code(), Some(code), "{}", output_text(&output));
+        assert!(
+            output_text(&output).contains(part),
+            "{}",
+            output_text(&output)
+        );
     }
 }

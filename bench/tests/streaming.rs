@@ -29,15 +29,15 @@ fn streamed(name: &str, arguments: &[&str]) -> (bool, String, PathBuf) {
         .args(arguments)
         .output()
         .expect("it runs");
-    let said =
+    let text =
         [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    (output.status.success(), said.concat(), csv)
+    (output.status.success(), text.concat(), csv)
 }
 
 #[test]
 fn what_streaming_takes_does_not_grow_with_the_terrain() {
-    let (done, said, csv) = streamed("flat.csv", &["--sizes", "7,10"]);
-    assert!(done, "{said}");
+    let (done, text, csv) = streamed("flat.csv", &["--sizes", "7,10"]);
+    assert!(done, "{text}");
     let rows = rows(&csv);
     let of = |samples: u64, link: u32| {
         let is = |row: &&Row| {
@@ -109,14 +109,14 @@ fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
     field(90, &small);
     let png = folder.path().join("streaming.png");
     let names = [&hills, &small, &png].map(|path| path.to_str().expect("text"));
-    let (done, said, csv) = streamed(
+    let (done, text, csv) = streamed(
         "files.csv",
         &["--files-only", names[0], names[1], "--picture", names[2]],
     );
-    assert!(done, "{said}");
+    assert!(done, "{text}");
     assert!(
-        said.contains("small.asc: 90 × 90 samples; the paths need 460"),
-        "{said}"
+        text.contains("small.asc: 90 × 90 samples; the paths need 460"),
+        "{text}"
     );
     let rows = rows(&csv);
     assert_eq!(rows.len(), RATES.len());
@@ -127,8 +127,8 @@ fn a_file_is_measured_where_it_lies_and_one_that_cannot_be_is_told_of() {
     }
     let picture = std::fs::read(&png).expect("drawn");
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
-    let (done, said, _) = streamed("none.csv", &["--files-only", names[1]]);
-    assert!(!done && said.contains("nothing was measured"), "{said}");
+    let (done, text, _) = streamed("none.csv", &["--files-only", names[1]]);
+    assert!(!done && text.contains("nothing was measured"), "{text}");
 }
 
 #[test]
@@ -138,10 +138,10 @@ fn latencies_without_a_server_are_refused_with_the_build_that_has_one() {
         .args(["streaming", "--latency", "0ms,50ms"])
         .output()
         .expect("it runs");
-    let said = String::from_utf8_lossy(&output.stderr);
+    let text = String::from_utf8_lossy(&output.stderr);
     assert!(
-        !output.status.success() && said.contains("--features remote"),
-        "{said}"
+        !output.status.success() && text.contains("--features remote"),
+        "{text}"
     );
 }
 

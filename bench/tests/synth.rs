@@ -15,7 +15,7 @@ fn synth(words: &[&str], file: &Path) -> Output {
     end_of(child.expect("it starts"))
 }
 
-fn said(output: &Output) -> String {
+fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&[&output.stdout[..], &output.stderr].concat()).into_owned()
 }
 
@@ -24,7 +24,7 @@ fn file_is_that_of_the_library() {
     let folder = tempfile::tempdir().expect("a folder");
     let [here, there] = ["a.tif", "b.tif"].map(|name| folder.path().join(name));
     let made = synth(&["crater", "--size", "40", "--seed", "3"], &here);
-    assert!(made.status.success(), "{}", said(&made));
+    assert!(made.status.success(), "{}", output_text(&made));
     terrain_file(&there, hapterra::synth::Kind::Crater, 40, 3);
     let [here, there] = [here, there].map(|file| std::fs::read(file).expect("there"));
     assert!(here == there);
@@ -35,7 +35,7 @@ fn terrain_that_no_disk_holds_is_refused_before_it_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let huge = ["plane", "--size", "4000000000x4000000000"];
     let refused = synth(&huge, &folder.path().join("huge.tif"));
-    let said = said(&refused);
+    let said = output_text(&refused);
     assert_eq!(refused.status.code(), Some(1), "{said}");
     assert!(
         said.contains("GB are free") && said.contains("hint:"),
@@ -50,7 +50,7 @@ fn file_name_reaches_the_terminal_without_control_characters() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("x\u{1b}]0;owned\u{7}\u{202e}.tif");
     let made = synth(&["plane", "--size", "8"], &file);
-    let said = said(&made);
+    let said = output_text(&made);
     assert!(made.status.success() && said.contains("wrote"), "{said}");
     let controls = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
     assert!(!said.contains(controls), "{said:?}");
@@ -67,7 +67,7 @@ fn report_that_cannot_be_printed_is_a_failure() {
         .arg(folder.path().join("plane.tif"))
         .stdout(full.expect("a full device"));
     let output = command.output().expect("it runs");
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(1), "{}", output_text(&output));
 }
 
 /// Its name is that of what a killed command left: nothing waits for a writer of the pipe.
@@ -79,5 +79,5 @@ fn pipe_named_as_a_partial_file_holds_nothing_up() {
     let made = Command::new("mkfifo").arg(&pipe).status();
     assert!(made.expect("mkfifo runs").success());
     let made = synth(&["fractal", "--size", "16"], &folder.path().join("out.tif"));
-    assert!(made.status.success(), "{}", said(&made));
+    assert!(made.status.success(), "{}", output_text(&made));
 }

@@ -12,7 +12,7 @@ fn check(board: &str, image: &str) -> Output {
         .expect("it runs")
 }
 
-fn told(output: &Output) -> String {
+fn output_text(output: &Output) -> String {
     let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
     String::from_utf8_lossy(&both).into_owned()
 }
@@ -32,12 +32,12 @@ fn an_image_fits_its_board_and_no_other() {
             continue;
         };
         let output = check(board, &image);
-        let said = told(&output);
+        let said = output_text(&output);
         assert!(output.status.success(), "{board}: {said}");
         assert!(said.contains("flash") && said.contains("RAM"), "{said}");
         for (other, _) in images.iter().filter(|(other, _)| *other != board) {
             let output = check(other, &image);
-            let said = told(&output);
+            let said = output_text(&output);
             assert_eq!(output.status.code(), Some(1), "{board} as {other}: {said}");
             assert!(said.contains("built for"), "{said}");
             assert!(said.contains("--board"), "{said}");
@@ -68,7 +68,7 @@ fn own_checkout_is_built_wherever_it_is_run() {
         .env("CARGO", &cargo)
         .output()
         .expect("it runs");
-    let said = told(&output);
+    let said = output_text(&output);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     let root = fs::canonicalize(root.expect("a folder above")).expect("there");
     let started = format!("\n{}\n", root.display());

@@ -218,7 +218,7 @@ pub fn signal(child: &Child, name: &str) {
 }
 
 /// Returns its output and error output.
-pub fn told(output: &Output) -> String {
+pub fn output_text(output: &Output) -> String {
     let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
     String::from_utf8_lossy(&both).into_owned()
 }

@@ -29,7 +29,7 @@ thread_local! {
 
 fn say(line: &str) {
     println!("{line}");
-    SAID.with_borrow_mut(|said| *said += &format!("{line}\n"));
+    SAID.with_borrow_mut(|text| *text += &format!("{line}\n"));
 }
 
 /// Walks with a user, and looks at how fast the joints were.
@@ -131,18 +131,18 @@ fn it_goes_on_where_it_was_and_again_where_the_record_is_another() {
     // The next start is at the very step, with an arm that has to be zeroed anew.
     let ended = walked(&mut user, RECORD, &mut log);
     assert!(ended.is_err());
-    let said = SAID.take();
+    let text = SAID.take();
     assert!(
-        said.starts_with("step 8 of 11") && said.contains("zero pose"),
-        "{said}"
+        text.starts_with("step 8 of 11") && text.contains("zero pose"),
+        "{text}"
     );
     // With the sign that it named, the record is another one: it is measured again.
     let mut record = RECORD;
     record.motor_sign.y = -1.0;
     walked(&mut user, record, &mut log).expect("to the end");
-    let said = SAID.take();
-    assert!(said.starts_with("the calibration is another one"), "{said}");
-    assert!(said.contains("step 6 of 11") && !said.contains("step 5 of 11"));
+    let text = SAID.take();
+    assert!(text.starts_with("the calibration is another one"), "{text}");
+    assert!(text.contains("step 6 of 11") && !text.contains("step 5 of 11"));
 }
 
 /// A user who does and answers some things in another way.
@@ -267,8 +267,8 @@ fn an_arm_that_nobody_holds_is_stopped_before_it_is_fast() {
             let device = user.user.device(RECORD);
             ended = walked_once(&mut user, device, &mut log);
         }
-        let said = SAID.take();
-        assert!(said.contains("the jog ended with fault 22"), "{said}");
+        let text = SAID.take();
+        assert!(text.contains("the jog ended with fault 22"), "{text}");
         let fastest = user.user.bench().borrow().fastest_rad_s();
         println!("fastest {fastest:?} rad/s");
         let most = f64::from(JOG_FAST_RAD_S) + LATE_RAD_S;

@@ -13,7 +13,7 @@ fn hapterra(words: &[&str]) -> Output {
         .expect("it runs")
 }
 
-fn told(output: &Output) -> String {
+fn output_text(output: &Output) -> String {
     let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
     String::from_utf8_lossy(&both).into_owned()
 }
@@ -21,10 +21,10 @@ fn told(output: &Output) -> String {
 /// Runs a command that has to fail with `code`, saying each of these.
 fn fails(words: &[&str], code: i32, says: &[&str]) {
     let output = hapterra(words);
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(code), "{words:?}: {told}");
+    let text = output_text(&output);
+    assert_eq!(output.status.code(), Some(code), "{words:?}: {text}");
     for part in says {
-        assert!(told.contains(part), "{words:?}: no {part:?} in\n{told}");
+        assert!(text.contains(part), "{words:?}: no {part:?} in\n{text}");
     }
 }
 
@@ -32,8 +32,8 @@ fn fails(words: &[&str], code: i32, says: &[&str]) {
 fn list_says_what_it_looked_for() {
     // Port 1 is unused.
     let output = hapterra(&["list", "--tcp", "127.0.0.1:1"]);
-    let told = told(&output);
-    assert!(output.status.success(), "{told}");
+    let text = output_text(&output);
+    assert!(output.status.success(), "{text}");
     for part in [
         "nucleo-g474re",
         "STM32H743ZITx",
@@ -41,7 +41,7 @@ fn list_says_what_it_looked_for() {
         "debug probes",
         "none at tcp:127.0.0.1:1",
     ] {
-        assert!(told.contains(part), "no {part:?} in\n{told}");
+        assert!(text.contains(part), "no {part:?} in\n{text}");
     }
 }
 
@@ -78,8 +78,8 @@ fn run_prints_the_rendering_of_an_emulated_board() {
 #[test]
 fn status_of_the_device_in_memory_names_what_blocks_it() {
     let output = hapterra(&["status", "--device", "native"]);
-    let told = told(&output);
-    assert!(output.status.success(), "{told}");
+    let text = output_text(&output);
+    assert!(output.status.success(), "{text}");
     for part in [
         "native",
         "Disarmed",
@@ -89,7 +89,7 @@ fn status_of_the_device_in_memory_names_what_blocks_it() {
         "fault          none",
         "protocol",
     ] {
-        assert!(told.contains(part), "no {part:?} in\n{told}");
+        assert!(text.contains(part), "no {part:?} in\n{text}");
     }
 }
 
@@ -101,12 +101,12 @@ fn a_record_goes_to_a_file_and_comes_back() {
     let base = ["calibrate", "--device", "native", "--measure", "none"];
     let write = [&base[..], &["--set", "ratio-2=10.5", "--out", file]].concat();
     let output = hapterra(&write);
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", output_text(&output));
     let again = folder.path().join("again.toml");
     let again = again.to_str().expect("a plain path");
     let read = [&base[..], &["--from", file, "--out", again]].concat();
     let output = hapterra(&read);
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", output_text(&output));
     let bytes = |path: &str| std::fs::read(path).expect("written");
     assert_eq!(bytes(file), bytes(again));
     let whole = bytes(file);
@@ -138,7 +138,7 @@ fn guessed_ratios_are_not_taken_unmeasured_unless_told() {
     ];
     for words in [&agreed[..], &known[..], &measured[..]] {
         let output = hapterra(&[&base[..], words].concat());
-        assert!(output.status.success(), "{}", told(&output));
+        assert!(output.status.success(), "{}", output_text(&output));
     }
 }
 

@@ -346,14 +346,14 @@ fn blocks_of_run(file: &Path, cache: &Path, megabytes: &str) -> u64 {
         .env("HAPTERRA_CACHE_MB", megabytes)
         .output()
         .expect("it runs");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{told}");
-    let line = told.lines().find(|line| line.contains(" blocks of "));
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{text}");
+    let line = text.lines().find(|line| line.contains(" blocks of "));
     let words = line.map(|line| line.split_whitespace().collect::<Vec<_>>());
-    let words = words.unwrap_or_else(|| panic!("{told}"));
+    let words = words.unwrap_or_else(|| panic!("{text}"));
     let at = words.iter().position(|word| *word == "blocks");
     let number = words[at.expect("found") - 1].parse();
-    number.unwrap_or_else(|_| panic!("{told}"))
+    number.unwrap_or_else(|_| panic!("{text}"))
 }
 
 #[test]

@@ -94,8 +94,8 @@ fn a_plane_at_60_degrees_feels_the_same_both_ways_through_replay() {
             .arg(&out)
             .output()
             .expect("started");
-        let told = String::from_utf8_lossy(&run.stderr);
-        assert!(run.status.success(), "{told}");
+        let printed = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{printed}");
         let text = std::fs::read_to_string(&out).expect("there");
         let last = text.lines().last().expect("a row").split(',');
         let rendered: Vec<f64> = last

@@ -59,24 +59,24 @@ fn rename(hello: &mut DeviceHello) {
 /// Returns the substitute for a frame of the device.
 fn instead(frame: &[u8], epoch: &mut u32) -> Vec<u8> {
     let mut has_samples = false;
-    let said = frames::changed(frame, |message| match message {
+    let printed = frames::changed(frame, |message| match message {
         ToHost::Hello(hello) => rename(hello),
         ToHost::Status { status, .. } => rename(&mut status.device),
         ToHost::SceneAck { epoch: taken, .. } => *epoch = *taken,
         ToHost::Telemetry(_) => has_samples = true,
         _ => {}
     });
-    let mut said = said.expect("the device's own");
+    let mut printed = printed.expect("the device's own");
     if has_samples {
         for column in 0..REQUESTS {
             let key = TileKey::new(9, i32::MAX - column, i32::MIN);
             let request = frames::changed(frame, |message| {
                 *message = ToHost::TileRequest { epoch: *epoch, key };
             });
-            said.extend(request.expect("the device's own"));
+            printed.extend(request.expect("the device's own"));
         }
     }
-    said
+    printed
 }
 
 /// Lets the device talk until the host is gone.
@@ -117,10 +117,10 @@ fn started() -> String {
     address
 }
 
-fn said(run: &Output) -> String {
+fn output_text(run: &Output) -> String {
     assert!(run.status.success(), "{run:?}");
-    let said = [&run.stdout, &run.stderr].map(|text| String::from_utf8_lossy(text));
-    said.concat()
+    let printed = [&run.stdout, &run.stderr].map(|text| String::from_utf8_lossy(text));
+    printed.concat()
 }
 
 /// Nothing in it that a terminal obeys but the ends of its lines.
@@ -142,7 +142,7 @@ fn nothing_that_a_device_says_controls_the_terminal() {
     let device = started();
     let hapterra = |words: &[&str]| {
         let run = Command::new(hapterra_binary()).args(words).output();
-        said(&run.expect("started"))
+        output_text(&run.expect("started"))
     };
     let status = hapterra(&["status", "--device", &format!("tcp:{device}")]);
     is_plain(&status);
@@ -180,9 +180,9 @@ fn nothing_that_a_device_asks_for_floods_the_terminal() {
         is_plain(&why);
         assert!(why.contains("is a real board"), "{why}");
     }
-    let said = said(&run(&device, &["--unchecked"]));
-    is_plain(&said);
-    let lines = said.lines().count();
+    let printed = output_text(&run(&device, &["--unchecked"]));
+    is_plain(&printed);
+    let lines = printed.lines().count();
     // Some lines of its own, and one a second: it does not take minutes.
-    assert!(lines < 200, "{lines} lines: {said}");
+    assert!(lines < 200, "{lines} lines: {printed}");
 }

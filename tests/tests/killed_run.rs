@@ -19,7 +19,7 @@ fn terrain(folder: &Path) -> PathBuf {
     path
 }
 
-fn said(run: &Output) -> String {
+fn output_text(run: &Output) -> String {
     String::from_utf8_lossy(&run.stderr).into_owned()
 }
 
@@ -65,11 +65,11 @@ fn killed(folder: &Path, terrain: &Path) -> PathBuf {
 
 /// Fails unless a command named the partial file and its size, and left it alone.
 fn names_it(run: &Output, left: &Path, content: &[u8]) {
-    let said = said(run);
-    assert!(run.status.success(), "{said}");
+    let printed = output_text(run);
+    assert!(run.status.success(), "{printed}");
     let size = format!("({} bytes)", content.len());
     for part in [&*left.to_string_lossy(), &size, "to keep it"] {
-        assert!(said.contains(part), "{part} in {said}");
+        assert!(printed.contains(part), "{part} in {printed}");
     }
     assert_eq!(fs::read(left).expect("still there"), content);
 }

@@ -171,41 +171,41 @@ fn packed_strip_is_read_in_the_memory_of_a_terrain() {
     };
     let info = |options: &[&str]| {
         let output = memory_limit::info(&path, options);
-        let told = [output.stdout, output.stderr].concat();
+        let text = [output.stdout, output.stderr].concat();
         (
             output.status.code(),
-            String::from_utf8_lossy(&told).into_owned(),
+            String::from_utf8_lossy(&text).into_owned(),
         )
     };
     let packed = zstd_bomb((WIDE * WIDE).div_ceil(128 * 1024) as usize);
     write(&packed);
-    let (code, told) = info(&["--cache", cache]);
-    assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains("unpacked on disk"), "{told}");
+    let (code, text) = info(&["--cache", cache]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("unpacked on disk"), "{text}");
     // Without a place on disk it needs the memory, and there is too little.
-    let (code, told) = info(&["--cache", "off"]);
-    assert_eq!(code, Some(1), "{told}");
-    assert!(told.contains("more than memory can hold"), "{told}");
+    let (code, text) = info(&["--cache", "off"]);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("more than memory can hold"), "{text}");
     // A strip that is cut: the rows before are rendered.
     write(&packed[..packed.len() / 10 * 9]);
-    let (code, told) = info(&["--cache", cache]);
-    assert_eq!(code, Some(0), "{told}");
+    let (code, text) = info(&["--cache", cache]);
+    assert_eq!(code, Some(0), "{text}");
     assert!(
-        told.contains("cannot be read and count as no data"),
-        "{told}"
+        text.contains("cannot be read and count as no data"),
+        "{text}"
     );
     // One of which nothing can be unpacked.
     let mut damaged = packed.clone();
     damaged[0] = 0;
     write(&damaged);
-    let (code, told) = info(&["--cache", cache]);
-    assert_eq!(code, Some(1), "{told}");
-    let is_told = told.contains("packed.tif") && told.contains("cannot be unpacked from row 0 on");
-    assert!(is_told && !told.contains("no surface"), "{told}");
+    let (code, text) = info(&["--cache", cache]);
+    assert_eq!(code, Some(1), "{text}");
+    let is_told = text.contains("packed.tif") && text.contains("cannot be unpacked from row 0 on");
+    assert!(is_told && !text.contains("no surface"), "{text}");
     write(&packed[..3]);
-    let (code, told) = info(&["--cache", cache]);
-    assert_eq!(code, Some(1), "{told}");
-    assert!(told.contains("absurd size"), "{told}");
+    let (code, text) = info(&["--cache", cache]);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("absurd size"), "{text}");
 }
 
 /// A file that was cut: its overview, which is all that is looked at when it opens, ends early.
@@ -253,9 +253,9 @@ fn rows_of_an_overview_that_ends_early_are_read() {
 fn strip_of_4_gb_is_read_in_the_memory_of_a_terrain() {
     let (_folder, path) = file();
     let output = memory_limit::info(&path, &[]);
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{told}");
-    assert!(!told.contains("whole"), "{told}");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{text}");
+    assert!(!text.contains("whole"), "{text}");
     let raster = Raster::open(&path, &OpenOptions::default()).expect("opens");
     for row in [0, EVERY, EVERY + 1, 17 * EVERY, 31_904, SIDE - 1] {
         for column in [0, 1, 2999, 3000, SIDE - 1] {
@@ -281,17 +281,17 @@ fn a_file_of_nothing_is_looked_through_and_it_says_so() {
     file.set_len(u64::from(FIRST) + u64::from(WIDE * WIDE) * 4)
         .expect("a sparse file");
     let output = memory_limit::info(&path, &["--input", "no-data=0"]);
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    let search = told.find("32 places of").expect("it says that it searches");
-    let end = told.find("no surface").expect("it says what came of it");
-    assert!(search < end, "{told}");
-    assert!(told.contains("all 144000000 samples"), "{told}");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    let search = text.find("32 places of").expect("it says that it searches");
+    let end = text.find("no surface").expect("it says what came of it");
+    assert!(search < end, "{text}");
+    assert!(text.contains("all 144000000 samples"), "{text}");
     // Where zeros are heights, the first places have some.
     let output = memory_limit::info(&path, &[]);
     assert!(output.status.success());
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(!told.contains("places of"), "nothing is to be searched for");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(!text.contains("places of"), "nothing is to be searched for");
 }
 
 #[test]
@@ -327,13 +327,13 @@ fn four_million_tiles_are_read_in_the_memory_of_a_terrain() {
         file.set_len(u64::from(ACROSS * TILE).pow(2))
             .expect("a sparse file");
         let output = memory_limit::info_without_gdal(&path, &[]);
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        (output.status.code(), told)
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), text)
     };
-    let (code, told) = info(&[image(0)]);
-    assert_eq!(code, Some(0), "{told}");
+    let (code, text) = info(&[image(0)]);
+    assert_eq!(code, Some(0), "{text}");
     // Five such lists are more than is kept: that is no damage.
-    let (code, told) = info(&[0, 1, 1, 1, 1].map(image));
-    assert_eq!(code, Some(1), "{told}");
-    assert!(told.contains("very many small tiles"), "{told}");
+    let (code, text) = info(&[0, 1, 1, 1, 1].map(image));
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("very many small tiles"), "{text}");
 }

@@ -89,20 +89,20 @@ fn open(path: &Path) -> Raster {
 fn ends_well(what: &str, path: &Path, more: &[&str]) -> (bool, String) {
     let options = [&["--input", "in-memory=0MB"], more].concat();
     let output = memory_limit::info(path, &options);
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    println!("{what}: {:?} {told}", output.status.code());
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    println!("{what}: {:?} {printed}", output.status.code());
     match output.status.code() {
         Some(0) => {}
         Some(1) => {
             // Warnings of what is a hole may come before.
-            let error = told.find("error: ").map_or("", |at| &told[at..]);
-            assert!(error.contains("hint: "), "{what}: {told}");
+            let error = printed.find("error: ").map_or("", |at| &printed[at..]);
+            assert!(error.contains("hint: "), "{what}: {printed}");
             let name = path.file_name().expect("a name").to_string_lossy();
-            assert!(told.contains(name.as_ref()), "{what}: {told}");
+            assert!(printed.contains(name.as_ref()), "{what}: {printed}");
         }
-        code => panic!("{what}: {code:?} {told}"),
+        code => panic!("{what}: {code:?} {printed}"),
     }
-    (output.status.success(), told)
+    (output.status.success(), printed)
 }
 
 #[test]
@@ -214,10 +214,10 @@ fn an_overview_whose_tiles_are_not_there_leaves_the_full_image() {
         assert_eq!(raster.height(3, 250), f64::from(HEIGHT), "{what}");
         assert!(raster.surface(1, [3.0, 250.0]).is_nan(), "{what}");
         assert_eq!(raster.surface(1, [200.0, 3.0]), f64::from(OTHER), "{what}");
-        let (is_open, told) = ends_well(what, &path, &[]);
+        let (is_open, printed) = ends_well(what, &path, &[]);
         assert!(
-            is_open && told.contains("cannot be read and count as no data") == warns,
-            "{what}: {told}"
+            is_open && printed.contains("cannot be read and count as no data") == warns,
+            "{what}: {printed}"
         );
     }
 }
@@ -233,8 +233,8 @@ fn tiles_that_are_not_where_they_are_said_to_be_are_holes() {
     let raster = open(&path);
     assert!(raster.height(3, 250).is_nan());
     assert_eq!(raster.height(3, 3), f64::from(HEIGHT));
-    let (is_open, told) = ends_well("behind the end", &path, &[]);
-    assert!(is_open && told.contains("columns 0 to "), "{told}");
+    let (is_open, printed) = ends_well("behind the end", &path, &[]);
+    assert!(is_open && printed.contains("columns 0 to "), "{printed}");
     // At the place of the header nothing is stored, whatever its size: no heights of zero.
     for options in [windows(), OpenOptions::default()] {
         let (_folder, path) = written("lie.tif", &tiff(&data(), &[places(0)]));

@@ -100,8 +100,9 @@ impl Folder {
             .args(args)
             .output()
             .expect("started");
-        let [said, complained] = [&run.stdout, &run.stderr].map(|out| String::from_utf8_lossy(out));
-        (run.status.success(), format!("{said}{complained}"))
+        let [printed, complained] =
+            [&run.stdout, &run.stderr].map(|out| String::from_utf8_lossy(out));
+        (run.status.success(), format!("{printed}{complained}"))
     }
 }
 
@@ -129,10 +130,13 @@ fn rendered(recording: &str) -> Vec<(f64, f64)> {
 #[test]
 fn classes_in_another_system_and_resolution_are_in_place() {
     let folder = Folder::new();
-    let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
-    assert!(succeeded, "{said}");
-    assert!(said.contains("materials      "), "{said}");
-    assert!(said.contains("rock") && said.contains("meadow"), "{said}");
+    let (succeeded, printed) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
+    assert!(succeeded, "{printed}");
+    assert!(printed.contains("materials      "), "{printed}");
+    assert!(
+        printed.contains("rock") && printed.contains("meadow"),
+        "{printed}"
+    );
     let rendered = rendered(&folder.read("a.csv"));
     assert_eq!(rendered.len(), 10 * ROWS_PER_MM as usize);
     // 9° east is at 49.7 mm, between the columns 49 and 50: half a cell and half a pixel is the
@@ -170,8 +174,8 @@ fn recording_keeps_its_materials_for_its_replay() {
     let replay = |more: &[&str], output: &str| {
         folder.hapterra(&[&["replay", "level.asc", "a.csv", "--out", output][..], more].concat())
     };
-    let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
-    assert!(succeeded, "{said}");
+    let (succeeded, printed) = folder.hapterra(&[&REPLAY[..], &["a.csv"], &MATERIALS].concat());
+    assert!(succeeded, "{printed}");
     let recorded = folder.read("a.csv");
     assert!(
         recorded.contains("# [materials]\n# file = \"classes.asc\"\n"),
@@ -180,11 +184,11 @@ fn recording_keeps_its_materials_for_its_replay() {
     assert!(recorded.contains("name = \"rock\""));
     // The table is in the recording; the classes are read again.
     std::fs::remove_file(folder.0.path().join("table.toml")).expect("removed");
-    let (again, said) = replay(&[], "b.csv");
-    assert!(again && said.contains("rock"), "{said}");
+    let (again, printed) = replay(&[], "b.csv");
+    assert!(again && printed.contains("rock"), "{printed}");
     assert_eq!(rendered(&folder.read("b.csv")), rendered(&recorded));
-    let (again, said) = replay(&["--stiffness", "1"], "c.csv");
-    assert!(again, "{said}");
+    let (again, printed) = replay(&["--stiffness", "1"], "c.csv");
+    assert!(again, "{printed}");
     // Each material is twice as stiff as it was beside the 0.5 N/mm of the recording.
     for ((_, twice), (_, once)) in rendered(&folder.read("c.csv"))
         .iter()
@@ -194,16 +198,16 @@ fn recording_keeps_its_materials_for_its_replay() {
     }
     // What each material has its own of cannot be stated beside them.
     for option in [["--friction", "0.4"], ["--surface", "sand"]] {
-        let (again, said) = replay(&option, "no.csv");
-        assert!(!again && said.contains("hint: "), "{said}");
+        let (again, printed) = replay(&option, "no.csv");
+        assert!(!again && printed.contains("hint: "), "{printed}");
         assert!(
-            said.contains(option[0]) && said.contains("materials"),
-            "{said}"
+            printed.contains(option[0]) && printed.contains("materials"),
+            "{printed}"
         );
     }
     // The path alone has no materials.
-    let (again, said) = replay(&["--ignore-settings"], "d.csv");
-    assert!(again && !said.contains("rock"), "{said}");
+    let (again, printed) = replay(&["--ignore-settings"], "d.csv");
+    assert!(again && !printed.contains("rock"), "{printed}");
     assert!(
         rendered(&folder.read("d.csv"))
             .iter()
@@ -211,10 +215,10 @@ fn recording_keeps_its_materials_for_its_replay() {
     );
     // The same classes elsewhere are others.
     folder.classes("classes.asc", 8.9902);
-    let (again, said) = replay(&[], "e.csv");
+    let (again, printed) = replay(&[], "e.csv");
     assert!(
-        !again && said.contains("classes of its materials are others"),
-        "{said}"
+        !again && printed.contains("classes of its materials are others"),
+        "{printed}"
     );
 }
 
@@ -229,8 +233,11 @@ fn the_demo_and_run_feel_materials_too() {
         "--duration",
         "3s",
     ];
-    let (succeeded, said) = folder.hapterra(&[&demo[..], &MATERIALS].concat());
-    assert!(succeeded && said.contains("materials      "), "{said}");
+    let (succeeded, printed) = folder.hapterra(&[&demo[..], &MATERIALS].concat());
+    assert!(
+        succeeded && printed.contains("materials      "),
+        "{printed}"
+    );
     assert!(folder.read("demo/level.csv").contains("# [materials]\n"));
     let run = [
         "run",
@@ -242,8 +249,11 @@ fn the_demo_and_run_feel_materials_too() {
         "--out",
         "r.csv",
     ];
-    let (succeeded, said) = folder.hapterra(&[&run[..], &MATERIALS].concat());
-    assert!(succeeded && said.contains("materials      "), "{said}");
+    let (succeeded, printed) = folder.hapterra(&[&run[..], &MATERIALS].concat());
+    assert!(
+        succeeded && printed.contains("materials      "),
+        "{printed}"
+    );
     assert!(folder.read("r.csv").contains("# [materials]\n"));
 }
 
@@ -252,18 +262,18 @@ fn no_view_makes_one_of_the_materials_stiffer_than_a_view_may_be() {
     // The default has 0.5 N/mm and rock 1.0.
     let folder = Folder::new();
     let run = ["run", "level.asc", "--device", "native", "--duration", "3s"];
-    let said = |factor: &str| {
+    let output_of = |factor: &str| {
         folder.write("steps.txt", &format!("at 1 stiffness {factor}\n"));
-        let (_, said) =
+        let (_, printed) =
             folder.hapterra(&[&run[..], &["--commands", "steps.txt"], &MATERIALS].concat());
-        said
+        printed
     };
-    let refused = said("1.5");
+    let refused = output_of("1.5");
     assert!(
         refused.contains("the stiffest of the materials would have 1.500 N/mm"),
         "{refused}"
     );
-    let softer = said("0.8");
+    let softer = output_of("0.8");
     assert!(!softer.contains("would have"), "{softer}");
 }
 
@@ -272,10 +282,10 @@ fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
     let folder = Folder::new();
     let fails = |materials: &str, table: &str, wanted: &[&str]| {
         let options = ["x.csv", "--materials", materials, "--surface", table];
-        let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &options].concat());
-        assert!(!succeeded && said.contains("hint: "), "{said}");
+        let (succeeded, printed) = folder.hapterra(&[&REPLAY[..], &options].concat());
+        assert!(!succeeded && printed.contains("hint: "), "{printed}");
         for part in wanted {
-            assert!(said.contains(part), "{part}: {said}");
+            assert!(printed.contains(part), "{part}: {printed}");
         }
     };
     folder.classes("elsewhere.asc", 12.0);
@@ -298,13 +308,15 @@ fn what_cannot_be_laid_over_the_terrain_is_told_with_what_to_do() {
         "wild.toml",
         &["wild.toml, line 2, class 10", "friction of 30"],
     );
-    let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["x.csv"], &MATERIALS[..2]].concat());
-    assert!(!succeeded && said.contains("--surface"), "{said}");
+    let (succeeded, printed) =
+        folder.hapterra(&[&REPLAY[..], &["x.csv"], &MATERIALS[..2]].concat());
+    assert!(!succeeded && printed.contains("--surface"), "{printed}");
     // No output may be one of them.
-    let (succeeded, said) = folder.hapterra(&[&REPLAY[..], &["table.toml"], &MATERIALS].concat());
+    let (succeeded, printed) =
+        folder.hapterra(&[&REPLAY[..], &["table.toml"], &MATERIALS].concat());
     assert!(
         !succeeded && folder.read("table.toml").contains("rock"),
-        "{said}"
+        "{printed}"
     );
 }
 
@@ -323,11 +335,11 @@ fn worldcover_table_names_all_classes_and_is_valid() {
     let file = worldcover();
     let options = ["w.csv", "--materials", "classes.asc", "--surface"];
     let replay = [&REPLAY[..], &options, &[file.to_str().expect("text")]].concat();
-    let (succeeded, said) = folder.hapterra(&replay);
-    assert!(succeeded, "{said}");
+    let (succeeded, printed) = folder.hapterra(&replay);
+    assert!(succeeded, "{printed}");
     assert!(
-        said.contains("permanent water bodies") && !said.contains("warn"),
-        "{said}"
+        printed.contains("permanent water bodies") && !printed.contains("warn"),
+        "{printed}"
     );
 }
 
@@ -430,6 +442,6 @@ fn a_replay_with_materials_gives_the_same_bits_on_the_emulated_board() {
     for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
         assert_eq!(expected, got, "row {i} at {:?}", path[i]);
     }
-    board.say_goodbye().expect("said");
+    board.say_goodbye().expect("sent");
     emulator.finish().expect("the board ended well");
 }

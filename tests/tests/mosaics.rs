@@ -70,7 +70,7 @@ fn info(path: &Path) -> Output {
     output.expect("it runs")
 }
 
-fn told(output: &Output) -> String {
+fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -362,7 +362,7 @@ fn a_file_that_cannot_be_read_is_a_hole_with_one_warning() {
     assert!(many.height(4, 1).is_nan());
     let output = info(at);
     assert!(output.status.success(), "{output:?}");
-    let warnings = told(&output);
+    let warnings = output_text(&output);
     assert_eq!(warnings.matches("b.asc").count(), 1, "{warnings}");
     assert!(warnings.contains("counts as no data"), "{warnings}");
     // Gone while it is rendered: nothing but the header had been read.
@@ -398,7 +398,7 @@ fn what_does_not_fit_is_refused_with_the_file_and_the_reason() {
         let found = refused(at);
         assert!(found.contains("b.asc") && found.contains(why), "{found}");
         let output = info(at);
-        assert!(told(&output).contains("hint: "), "{output:?}");
+        assert!(output_text(&output).contains("hint: "), "{output:?}");
     }
     // 2³² columns away, but on the grid.
     two_tiles(at, 0);
@@ -475,14 +475,14 @@ fn malformed_vrts_end_in_bounded_memory() {
     }
     for path in files {
         let output = memory_limit::info(&path, &[]);
-        let told = told(&output);
+        let printed = output_text(&output);
         match output.status.code() {
             Some(0) => {}
             Some(1) => assert!(
-                told.contains("error: ") && told.contains("hint: "),
-                "{told}"
+                printed.contains("error: ") && printed.contains("hint: "),
+                "{printed}"
             ),
-            code => panic!("{}: {code:?} {told}", path.display()),
+            code => panic!("{}: {code:?} {printed}", path.display()),
         }
     }
 }
@@ -504,9 +504,9 @@ fn the_hint_for_files_that_do_not_fit_makes_one_of_them() {
             range.display()
         ),
     );
-    let told = told(&info(&at.join("my tiles")));
-    assert!(told.contains("b.tif its cells are"), "{told}");
-    let (_, command) = told.split_once("onto one grid: ").expect("a command");
+    let printed = output_text(&info(&at.join("my tiles")));
+    assert!(printed.contains("b.tif its cells are"), "{printed}");
+    let (_, command) = printed.split_once("onto one grid: ").expect("a command");
     shell(at, command.trim());
     let one = open(at.join("one.tif"));
     assert!(one.columns() > 500 && one.summary().holes < 200_000);
@@ -542,9 +542,9 @@ fn a_damaged_block_of_one_file_is_a_hole_that_is_named() {
     assert!(
         (0..512).all(|row| many.height(590, row).to_bits() == whole.height(590, row).to_bits())
     );
-    let told = told(&info(&at.join("tiles")));
+    let printed = output_text(&info(&at.join("tiles")));
     assert!(
-        told.contains("b.tif cannot be read and count as no data"),
-        "{told}"
+        printed.contains("b.tif cannot be read and count as no data"),
+        "{printed}"
     );
 }

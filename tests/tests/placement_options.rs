@@ -23,7 +23,7 @@ fn grid(folder: &Path, corner: [f64; 2], cell: f64) -> PathBuf {
     path
 }
 
-fn said(output: &Output) -> String {
+fn output_text(output: &Output) -> String {
     let both = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
     String::from_utf8_lossy(&both).into_owned()
 }
@@ -44,7 +44,7 @@ fn nothing_said_lays_all_of_it_into_the_reach_and_says_the_scale() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = grid(folder.path(), [5000.0, 7000.0], 10.0);
     for command in ["run", "demo"] {
-        let plain = said(&hapterra(command, &file, &[]));
+        let plain = output_text(&hapterra(command, &file, &[]));
         let place = |text: &str| {
             let lines = text
                 .lines()
@@ -102,13 +102,13 @@ fn place_scale_and_level_are_taken_and_said() {
         ),
     ] {
         let run = hapterra("run", &file, more);
-        let told = said(&run);
+        let told = output_text(&run);
         assert!(run.status.success(), "{more:?}: {told}");
         for part in parts {
             assert!(told.contains(part), "{more:?}: {part} in {told}");
         }
     }
-    let flat = said(&hapterra(
+    let flat = output_text(&hapterra(
         "run",
         &file,
         &["--at", "5100,7150", "--scale", "0.5mm/cell"],
@@ -169,7 +169,7 @@ fn what_cannot_be_placed_is_an_error_that_says_the_bounds_and_what_to_do() {
     ] {
         for command in ["run", "demo"] {
             let run = hapterra(command, &file, more);
-            let told = said(&run);
+            let told = output_text(&run);
             assert_eq!(run.status.code(), Some(1), "{command} {more:?}: {told}");
             for part in parts {
                 assert!(told.contains(part), "{command} {more:?}: {part} in {told}");
@@ -193,11 +193,16 @@ fn options_that_contradict_each_other_are_refused() {
         &["--crs", "file", "--crs", "lonlat"],
     ] {
         let run = hapterra("run", &file, more);
-        assert_eq!(run.status.code(), Some(2), "{more:?}: {}", said(&run));
-        assert!(
-            said(&run).contains("cannot be used"),
+        assert_eq!(
+            run.status.code(),
+            Some(2),
             "{more:?}: {}",
-            said(&run)
+            output_text(&run)
+        );
+        assert!(
+            output_text(&run).contains("cannot be used"),
+            "{more:?}: {}",
+            output_text(&run)
         );
     }
     for more in [
@@ -207,11 +212,16 @@ fn options_that_contradict_each_other_are_refused() {
         &["--at", "nan,0"],
     ] {
         let run = hapterra("run", &file, more);
-        assert_eq!(run.status.code(), Some(2), "{more:?}: {}", said(&run));
-        assert!(
-            said(&run).contains("numbers between commas"),
+        assert_eq!(
+            run.status.code(),
+            Some(2),
             "{more:?}: {}",
-            said(&run)
+            output_text(&run)
+        );
+        assert!(
+            output_text(&run).contains("numbers between commas"),
+            "{more:?}: {}",
+            output_text(&run)
         );
     }
 }
@@ -244,7 +254,7 @@ fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
     let wanted = |from: f64, to: f64| 100.0 * (narrower(from, to) - 1.0).abs();
     for command in ["run", "demo"] {
         // All of it is in reach: cells of the middle are too wide in the north.
-        let all = said(&hapterra(command, &file, &["--exaggeration", "9"]));
+        let all = output_text(&hapterra(command, &file, &["--exaggeration", "9"]));
         let [percent, latitude] = shape(&all).expect("a line");
         // The last row of haptic cells.
         assert!((54.0..54.5).contains(&latitude), "{all}");
@@ -252,11 +262,11 @@ fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
         assert!(off.abs() < 0.2, "{percent} for {}", wanted(47.25, latitude));
         // At a scale at which the arm reaches 20 km to each side cells are as they are rendered.
         let near = ["--at", "15,47", "--scale", "5m/mm"];
-        let near = said(&hapterra(command, &file, &near));
+        let near = output_text(&hapterra(command, &file, &near));
         assert!(near.contains("place ") && shape(&near).is_none(), "{near}");
         // What is stored is not square anywhere.
         let stored = ["--input", "cells=stored", "--exaggeration", "9"];
-        let stored = said(&hapterra(command, &file, &stored));
+        let stored = output_text(&hapterra(command, &file, &stored));
         assert!(
             shape(&stored).is_some_and(|[percent, _]| percent > 20.0),
             "{stored}"
@@ -283,7 +293,7 @@ fn how_far_cells_are_off_within_reach_is_said_at_the_start() {
     // A field that is small needs no word.
     let file = grid(folder.path(), [10.0, 40.0], 0.0005);
     std::fs::write(folder.path().join("terrain.prj"), degrees).expect("written");
-    let small = said(&hapterra("run", &file, &["--exaggeration", "9"]));
+    let small = output_text(&hapterra("run", &file, &["--exaggeration", "9"]));
     assert!(
         small.contains("place ") && shape(&small).is_none(),
         "{small}"

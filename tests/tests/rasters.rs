@@ -434,10 +434,10 @@ fn a_large_file_that_is_read_as_a_whole_says_so() {
         raster.remarks().join("; ")
     };
     assert_eq!(remarks(1 << 20), "");
-    let told = remarks(1 << 10);
+    let text = remarks(1 << 10);
     assert!(
-        told.contains("as a whole") && told.contains("-co TILED=YES"),
-        "{told}"
+        text.contains("as a whole") && text.contains("-co TILED=YES"),
+        "{text}"
     );
 }
 

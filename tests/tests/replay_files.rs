@@ -45,7 +45,7 @@ impl Folder {
     /// Rows of a replay that succeeds, as text.
     fn replayed(&self, more: &[&str]) -> Vec<Vec<String>> {
         let run = self.replay(more);
-        assert!(run.status.success(), "{}", said(&run));
+        assert!(run.status.success(), "{}", output_text(&run));
         let text = std::fs::read_to_string(self.path("out.csv")).expect("there");
         let mut lines = text.lines().skip_while(|line| line.starts_with('#'));
         let header = lines.next().expect("a header");
@@ -58,23 +58,23 @@ impl Folder {
     /// Fails with exit code 1 and leaves nothing behind; returns what it says.
     fn fails(&self, more: &[&str]) -> String {
         let run = self.replay(more);
-        assert_eq!(run.status.code(), Some(1), "{}", said(&run));
+        assert_eq!(run.status.code(), Some(1), "{}", output_text(&run));
         let left: Vec<_> = std::fs::read_dir(self.0.path())
             .expect("listed")
             .map(|entry| entry.expect("entry").file_name())
             .filter(|name| name != "terrain.asc" && name != "in.csv")
             .collect();
         assert!(left.is_empty(), "left behind: {left:?}");
-        let said = said(&run);
+        let printed = output_text(&run);
         assert!(
-            said.contains("error: ") && said.contains("hint: "),
-            "{said}"
+            printed.contains("error: ") && printed.contains("hint: "),
+            "{printed}"
         );
-        said
+        printed
     }
 }
 
-fn said(run: &Output) -> String {
+fn output_text(run: &Output) -> String {
     String::from_utf8_lossy(&run.stderr).into_owned()
 }
 
@@ -159,12 +159,12 @@ fn a_wrong_trajectory_is_named_with_line_and_column() {
         ("0,1e12,2,3\n", "line 2, column x_mm"),
     ] {
         let folder = Folder::new(&format!("t_s,x_mm,y_mm,z_mm\n{rows}"));
-        let said = folder.fails(&[]);
-        assert!(said.contains("in.csv: "), "{said}");
-        assert!(said.contains(expected), "{said}");
+        let printed = folder.fails(&[]);
+        assert!(printed.contains("in.csv: "), "{printed}");
+        assert!(printed.contains(expected), "{printed}");
     }
-    let said = Folder::new("time,x,y,z\n0,1,2,3\n").fails(&[]);
-    assert!(said.contains("line 1 is not the header"), "{said}");
+    let printed = Folder::new("time,x,y,z\n0,1,2,3\n").fails(&[]);
+    assert!(printed.contains("line 1 is not the header"), "{printed}");
 }
 
 #[test]
@@ -190,14 +190,14 @@ fn impossible_options_are_errors_before_anything_runs() {
             _ => unreachable!("a name and a value"),
         };
         let more: Vec<&str> = more.iter().map(String::as_str).collect();
-        let said = folder.fails(&more);
-        assert!(said.contains(expected), "{more:?}: {said}");
+        let printed = folder.fails(&more);
+        assert!(printed.contains(expected), "{more:?}: {printed}");
     }
     let missing = folder.path("no-such-image.elf");
     let device = format!("--device=emulated:{}", missing.display());
-    let said = folder.fails(&[&device]);
-    assert!(said.contains("no-such-image.elf"), "{said}");
-    assert!(said.contains("cargo xtask demo"), "{said}");
+    let printed = folder.fails(&[&device]);
+    assert!(printed.contains("no-such-image.elf"), "{printed}");
+    assert!(printed.contains("cargo xtask demo"), "{printed}");
 }
 
 #[test]
@@ -209,8 +209,8 @@ fn a_device_that_is_not_there_is_an_error_that_says_what_was_looked_for() {
             .args(["--device", device])
             .output()
             .expect("started");
-        assert_eq!(run.status.code(), Some(1), "{}", said(&run));
-        said(&run)
+        assert_eq!(run.status.code(), Some(1), "{}", output_text(&run));
+        output_text(&run)
     };
     // Port 9 (discard) has no server these days.
     let tcp = run("tcp:127.0.0.1:9");

@@ -76,26 +76,26 @@ impl Folder {
     fn replayed(&self, path: &str, more: &[&str]) -> (Vec<Row>, String) {
         self.write("in.csv", path);
         let run = self.replay("in.csv", "out.csv", more);
-        let said = said(&run);
-        assert!(run.status.success(), "{said}");
-        (rows(&self.read("out.csv")), said)
+        let printed = output_text(&run);
+        assert!(run.status.success(), "{printed}");
+        (rows(&self.read("out.csv")), printed)
     }
 
     /// Returns the messages of a replay of `in.csv` that fails.
     fn fails(&self, path: &str, more: &[&str]) -> String {
         self.write("in.csv", path);
         let run = self.replay("in.csv", "out.csv", more);
-        let said = said(&run);
-        assert_eq!(run.status.code(), Some(1), "{said}");
-        assert!(said.contains("hint: "), "{said}");
-        said
+        let printed = output_text(&run);
+        assert_eq!(run.status.code(), Some(1), "{printed}");
+        assert!(printed.contains("hint: "), "{printed}");
+        printed
     }
 
     /// A recording of these rows on the flat terrain at a tick rate.
     fn recording(&self, tick_hz: u32, rows: &str, more: &[&str]) -> String {
         self.write("one.csv", "t_s,x_mm,y_mm,z_mm\n0,40,20,1\n");
         let run = self.replay("one.csv", "one_felt.csv", more);
-        assert!(run.status.success(), "{}", said(&run));
+        assert!(run.status.success(), "{}", output_text(&run));
         let text = self.read("one_felt.csv");
         let settings: Vec<_> = text.lines().filter(|line| line.starts_with('#')).collect();
         let settings = settings.join("\n");
@@ -115,7 +115,7 @@ fn replay(terrain: &Path, from: &Path, to: &Path, more: &[&str]) -> Output {
     command.args(more).output().expect("started")
 }
 
-fn said(run: &Output) -> String {
+fn output_text(run: &Output) -> String {
     String::from_utf8_lossy(&run.stderr).into_owned()
 }
 
@@ -153,11 +153,11 @@ fn damping_is_the_same_however_often_a_path_has_rows() {
     let damped = [&PARAMS[..], &["--surface", DAMPED]].concat();
     for hz in [2, 10, 100, 250, 1_000, 1_600, 8_000, 100_000] {
         let rows = sampled(hz, 0.5, |t| [40.0, 20.0, 2.0 - 20.0 * t]);
-        let (replayed, said) = folder.replayed(&path(&rows), &damped);
+        let (replayed, printed) = folder.replayed(&path(&rows), &damped);
         assert_eq!(replayed.len(), 501, "{hz} Hz: a row a tick");
         assert!(pressed(&replayed) > 390, "{hz} Hz");
-        let resampled = said.contains("1000 ticks a second by t_s, on straight lines");
-        assert_eq!(resampled, hz != 1_000, "{hz} Hz: {said}");
+        let resampled = printed.contains("1000 ticks a second by t_s, on straight lines");
+        assert_eq!(resampled, hz != 1_000, "{hz} Hz: {printed}");
     }
 }
 
@@ -190,9 +190,9 @@ fn recording_is_replayed_at_its_own_tick_rate() {
     ] {
         let rows = sampled(tick_hz, 0.6, drag);
         let recording = folder.recording(tick_hz, &rows, &VISCOUS);
-        let (replayed, said) = folder.replayed(&recording, &[]);
+        let (replayed, printed) = folder.replayed(&recording, &[]);
         assert_eq!(replayed.len(), rows.lines().count(), "{tick_hz} Hz");
-        assert!(!said.contains("straight lines"), "{said}");
+        assert!(!printed.contains("straight lines"), "{printed}");
         trails(&replayed);
         // The output has the input's rows, and replays byte for byte.
         let output = folder.read("out.csv");
@@ -217,9 +217,9 @@ fn recording_is_replayed_at_its_own_tick_rate() {
 fn ticks_between_a_recordings_rows_are_filled_in() {
     let folder = Folder::new();
     let rows = sampled(1_000, 0.6, drag);
-    let (replayed, said) = folder.replayed(&folder.recording(4_000, &rows, &VISCOUS), &[]);
+    let (replayed, printed) = folder.replayed(&folder.recording(4_000, &rows, &VISCOUS), &[]);
     assert_eq!(replayed.len(), 2_401);
-    assert!(said.contains("4000 ticks a second by t_s"), "{said}");
+    assert!(printed.contains("4000 ticks a second by t_s"), "{printed}");
     trails(&replayed);
     let kept = |(n, row): (usize, &'_ str)| (n % 7 == 0).then(|| format!("{row}\n"));
     let lossy: String = rows.lines().enumerate().filter_map(kept).collect();
@@ -232,19 +232,19 @@ fn ticks_between_a_recordings_rows_are_filled_in() {
 fn times_that_contradict_a_recordings_rate_are_refused() {
     let folder = Folder::new();
     let recording = folder.recording(1_000, &sampled(4_000, 0.6, drag), &VISCOUS);
-    let said = folder.fails(&recording, &[]);
+    let printed = folder.fails(&recording, &[]);
     let expected =
         "0.00025 s is 0.25 ticks after the row before, where the settings say 1000 ticks";
     assert!(
-        said.contains(expected) && said.contains("--rows-are-ticks"),
-        "{said}"
+        printed.contains(expected) && printed.contains("--rows-are-ticks"),
+        "{printed}"
     );
     // Row by row it is rendered at the rate of its settings, as its path alone by its times.
-    let (replayed, said) = folder.replayed(&recording, &["--rows-are-ticks"]);
+    let (replayed, printed) = folder.replayed(&recording, &["--rows-are-ticks"]);
     assert_eq!((replayed.len(), replayed[2_400].t_s), (2_401, 2.4));
     assert!(
-        said.contains("one row of the path a tick, 1000 ticks a second"),
-        "{said}"
+        printed.contains("one row of the path a tick, 1000 ticks a second"),
+        "{printed}"
     );
     let (replayed, _) =
         folder.replayed(&recording, &[&["--ignore-settings"], &VISCOUS[..]].concat());
@@ -252,8 +252,11 @@ fn times_that_contradict_a_recordings_rate_are_refused() {
     trails(&replayed);
     for tick_hz in [0, 1_500, 44_100] {
         let recording = recording.replace("tick_hz = 1000", &format!("tick_hz = {tick_hz}"));
-        let said = folder.fails(&recording, &[]);
-        assert!(said.contains(&format!("tick_hz = {tick_hz}")), "{said}");
+        let printed = folder.fails(&recording, &[]);
+        assert!(
+            printed.contains(&format!("tick_hz = {tick_hz}")),
+            "{printed}"
+        );
     }
 }
 
@@ -268,17 +271,17 @@ fn rows_without_times_are_ticks_and_that_is_said() {
         .map(|row| row.split_once(',').expect("a time").1);
     let places: Vec<_> = places.collect();
     let untimed = format!("x_mm,y_mm,z_mm\n{}\n", places.join("\n"));
-    let (replayed, said) = folder.replayed(&untimed, &damped);
+    let (replayed, printed) = folder.replayed(&untimed, &damped);
     assert!(replayed == expected);
-    let line = said.lines().last().expect("a line");
+    let line = printed.lines().last().expect("a line");
     assert!(
         line.ends_with("out.csv; one row of the path a tick, 1000 ticks a second: it has no t_s"),
-        "{said}"
+        "{printed}"
     );
     let zero: String = places.iter().map(|place| format!("0,{place}\n")).collect();
-    let (replayed, said) = folder.replayed(&path(&zero), &damped);
+    let (replayed, printed) = folder.replayed(&path(&zero), &damped);
     assert!(replayed == expected);
-    assert!(said.contains("t_s is 0 in all of them"), "{said}");
+    assert!(printed.contains("t_s is 0 in all of them"), "{printed}");
     // Times that are not used are those of the ticks.
     let slower = (0..).zip(&places);
     let slower = slower.map(|(row, place)| format!("{},{place}\n", f64::from(row) * 1e-2));
@@ -313,20 +316,20 @@ fn wrong_times_are_refused_and_odd_ones_remarked_on() {
             "line 4, column t_s: the HIP moves during a gap of 10 s",
         ),
     ] {
-        let said = folder.fails(&path(rows), &PARAMS);
-        assert!(said.contains(expected), "{rows}: {said}");
+        let printed = folder.fails(&path(rows), &PARAMS);
+        assert!(printed.contains(expected), "{rows}: {printed}");
         assert!(!folder.path("out.csv").exists(), "{rows}");
     }
     // Perhaps milliseconds, perhaps places to go to.
-    let (replayed, said) = folder.replayed(&path("0,40,20,1\n1,40,20,0\n2,40,20,-1\n"), &PARAMS);
+    let (replayed, printed) = folder.replayed(&path("0,40,20,1\n1,40,20,0\n2,40,20,-1\n"), &PARAMS);
     assert_eq!(replayed.len(), 2_001);
     let remark = "in.csv: 2 times the HIP moves for more than 0.05 s between two rows, 1 s at most";
-    assert!(said.contains(remark), "{said}");
-    let (replayed, said) = folder.replayed(&path(&sampled(1_000, 0.1, drag)), &PARAMS);
+    assert!(printed.contains(remark), "{printed}");
+    let (replayed, printed) = folder.replayed(&path(&sampled(1_000, 0.1, drag)), &PARAMS);
     assert_eq!(
-        (replayed.len(), said.contains("note")),
+        (replayed.len(), printed.contains("note")),
         (101, false),
-        "{said}"
+        "{printed}"
     );
 }
 
@@ -338,10 +341,10 @@ fn a_board_of_another_rate_than_a_recording_is_refused() {
     let folder = Folder::new();
     let recording = folder.recording(4_000, &sampled(4_000, 0.1, drag), &VISCOUS);
     let device = format!("--device=emulated:{}", image.display());
-    let said = folder.fails(&recording, &[&device]);
+    let printed = folder.fails(&recording, &[&device]);
     assert!(
-        said.contains("the recording has 4000 ticks a second, and the device has 1000"),
-        "{said}"
+        printed.contains("the recording has 4000 ticks a second, and the device has 1000"),
+        "{printed}"
     );
     let (replayed, _) = folder.replayed(&recording, &[&device, "--ignore-settings"]);
     assert_eq!(replayed.len(), 101);
@@ -357,7 +360,7 @@ fn reviewed_paths_and_recordings_are_replayed_by_time() {
     let replayed = |terrain: &str, path: &str, more: &[&str]| {
         let [terrain, path] = [terrain, path].map(|name| cases.join(name));
         let run = replay(&terrain, &path, &folder.path("out.csv"), more);
-        assert!(run.status.success(), "{}", said(&run));
+        assert!(run.status.success(), "{}", output_text(&run));
         rows(&folder.read("out.csv"))
     };
     trails(&replayed(

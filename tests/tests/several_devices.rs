@@ -12,7 +12,7 @@ use hapterra::link::Native;
 use hapterra::synth::Kind;
 use hapterra_core::guard::GuardInputs;
 use hapterra_core::wire::session::SessionEnd;
-use hapterra_tests::socket_device::{SocketDevice, signal, terrain, told};
+use hapterra_tests::socket_device::{SocketDevice, output_text, signal, terrain};
 use hapterra_tests::timeouts::end_of;
 use hapterra_tests::{greedy_device, hapterra_binary, terrain_file};
 
@@ -130,27 +130,31 @@ fn two_arms_in_memory_feel_to_the_bit_what_each_feels_alone() {
     };
     for (name, lines) in [("plain.csv", ""), ("zoomed.csv", "at 5 zoom 1.2\n")] {
         let output = alone(name, lines).output().expect("it runs");
-        assert!(output.status.success(), "{}", told(&output));
-        assert!(!told(&output).contains("native]"), "{}", told(&output));
+        assert!(output.status.success(), "{}", output_text(&output));
+        assert!(
+            !output_text(&output).contains("native]"),
+            "{}",
+            output_text(&output)
+        );
     }
     let output = alone("felt.csv", "on 2 at 5 zoom 1.2\n")
         .args(["--device", "native"])
         .output();
     let output = output.expect("it runs");
-    let told = told(&output);
-    assert!(output.status.success(), "{told}");
+    let printed = output_text(&output);
+    assert!(output.status.success(), "{printed}");
     for number in [1, 2] {
         let name = format!("[{number} native] ");
         let recording = format!("{name}recording      ");
-        assert!(told.contains(&recording), "{told}");
+        assert!(printed.contains(&recording), "{printed}");
     }
     // What is read at the start is no device's.
     let at_start = ["reading hills.tif", "planning a path over hills.tif"];
     let is_named =
         |line: &str| line.starts_with('[') || at_start.iter().any(|begin| line.starts_with(begin));
-    assert!(told.lines().all(is_named), "{told}");
-    assert!(told.contains("[2 native] view 1: "), "{told}");
-    assert!(!told.contains("[1 native] view 1: "), "{told}");
+    assert!(printed.lines().all(is_named), "{printed}");
+    assert!(printed.contains("[2 native] view 1: "), "{printed}");
+    assert!(!printed.contains("[1 native] view 1: "), "{printed}");
     assert!(!folder.path().join("felt.csv").exists());
     for (alone, among_two) in [("plain.csv", "felt-1.csv"), ("zoomed.csv", "felt-2.csv")] {
         let (alone, among_two) = (
@@ -173,10 +177,10 @@ fn a_signal_ends_each_with_a_goodbye_that_its_board_confirms() {
         let child = pair.start();
         signal(&child, name);
         let output = end_of(child);
-        let told = told(&output);
-        assert!(output.status.success(), "{name}: {told}");
+        let printed = output_text(&output);
+        assert!(output.status.success(), "{name}: {printed}");
         for number in [1, 2] {
-            assert!(pair.recording(number).exists(), "{name}: {told}");
+            assert!(pair.recording(number).exists(), "{name}: {printed}");
             let served = &pair.served[number - 1];
             assert_eq!(served.last_end(), SessionEnd::Goodbye, "{name}");
         }
@@ -190,20 +194,23 @@ fn unconfirmed_board_is_named_beside_a_confirmed_one() {
     pair.served[1].deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let printed = output_text(&output);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
     let says = "did not confirm that it is disarmed: switch the amplifiers off";
     let of = |number| {
         let name = pair.name(number);
-        let lines = told.lines().filter(move |line| line.starts_with(&name));
+        let lines = printed.lines().filter(move |line| line.starts_with(&name));
         lines.filter(|line| line.contains(says)).count()
     };
     // When it happened, and at the end.
-    assert_eq!((of(1), of(2)), (0, 2), "{told}");
-    assert!(told.contains("error: 1 of 2 devices failed"), "{told}");
+    assert_eq!((of(1), of(2)), (0, 2), "{printed}");
+    assert!(
+        printed.contains("error: 1 of 2 devices failed"),
+        "{printed}"
+    );
     assert!(
         pair.recording(1).exists() && pair.recording(2).exists(),
-        "{told}"
+        "{printed}"
     );
     assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
     assert_eq!(pair.served[1].last_end(), SessionEnd::Replaced);
@@ -221,13 +228,13 @@ fn the_second_signal_names_the_boards_that_have_not_confirmed() {
     pair.served[1].wait_for_unheard_bye();
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(130), "{told}");
-    let line = told.lines().find(|line| line.contains("ended at once"));
-    let line = line.expect(&told);
+    let printed = output_text(&output);
+    assert_eq!(output.status.code(), Some(130), "{printed}");
+    let line = printed.lines().find(|line| line.contains("ended at once"));
+    let line = line.expect(&printed);
     assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
-    assert!(line.contains(&pair.name(2)), "{told}");
-    assert!(!line.contains(&pair.name(1)), "{told}");
+    assert!(line.contains(&pair.name(2)), "{printed}");
+    assert!(!line.contains(&pair.name(1)), "{printed}");
 }
 
 #[test]
@@ -258,18 +265,21 @@ fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
     child.stderr = Some(lines.into_inner());
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("error: 1 of 2 devices failed"), "{told}");
-    assert!(told.contains(&format!("{name} error: ")), "{told}");
+    let printed = output_text(&output);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
     assert!(
-        !told.contains(&format!("{} error: ", pair.name(1))),
-        "{told}"
+        printed.contains("error: 1 of 2 devices failed"),
+        "{printed}"
+    );
+    assert!(printed.contains(&format!("{name} error: ")), "{printed}");
+    assert!(
+        !printed.contains(&format!("{} error: ", pair.name(1))),
+        "{printed}"
     );
     assert_eq!(pair.served[0].last_end(), SessionEnd::Goodbye);
     assert!(
         pair.recording(1).exists() && pair.recording(2).exists(),
-        "{told}"
+        "{printed}"
     );
 }
 
@@ -294,15 +304,15 @@ fn a_device_that_is_not_there_fails_alone_and_is_told_at_once() {
     child.stdout = Some(hear(child.stdout.take().expect("piped"), &[serves]));
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let printed = output_text(&output);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
     assert!(
-        told.contains("1 of 2 devices failed, the others did not"),
-        "{told}"
+        printed.contains("1 of 2 devices failed, the others did not"),
+        "{printed}"
     );
-    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
-    assert!(folder.path().join("felt-2.csv").exists(), "{told}");
-    assert!(!folder.path().join("felt-1.csv").exists(), "{told}");
+    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{printed}");
+    assert!(folder.path().join("felt-2.csv").exists(), "{printed}");
+    assert!(!folder.path().join("felt-1.csv").exists(), "{printed}");
 }
 
 #[test]
@@ -321,9 +331,12 @@ fn a_fault_of_one_arm_is_told_of_it_and_the_other_knows_nothing_of_it() {
     child.stderr = Some(hear(child.stderr.take().expect("piped"), &[fault]));
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert!(output.status.success(), "{told}");
-    assert!(!told.contains(&format!("{} FAULT", pair.name(1))), "{told}");
+    let printed = output_text(&output);
+    assert!(output.status.success(), "{printed}");
+    assert!(
+        !printed.contains(&format!("{} FAULT", pair.name(1))),
+        "{printed}"
+    );
     for served in &pair.served {
         assert_eq!(served.last_end(), SessionEnd::Goodbye);
     }
@@ -356,11 +369,17 @@ fn a_hostile_device_costs_the_other_nothing() {
     child.stderr = Some(hear(child.stderr.take().expect("piped"), &[goes]));
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains(&format!("[1 {greedy}] error: ")), "{told}");
-    assert!(!told.contains(&format!("[2 {there}] error: ")), "{told}");
-    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
+    let printed = output_text(&output);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
+    assert!(
+        printed.contains(&format!("[1 {greedy}] error: ")),
+        "{printed}"
+    );
+    assert!(
+        !printed.contains(&format!("[2 {there}] error: ")),
+        "{printed}"
+    );
+    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{printed}");
 }
 
 /// Bytes that a command reads from files in all, as the system counts them.
@@ -372,7 +391,7 @@ fn bytes_read(command: &Command) -> u64 {
         .args(command.get_args())
         .output()
         .expect("it runs");
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", output_text(&output));
     let counts = String::from_utf8_lossy(&output.stdout).into_owned();
     let read = counts.lines().find_map(|line| line.strip_prefix("rchar: "));
     read.and_then(|read| read.parse().ok()).expect(&counts)
@@ -420,10 +439,10 @@ fn options_for_one_device_are_refused_for_several() {
     ] {
         let mut command = command(folder.path(), &devices, &texts(&record));
         let output = command.args(more).output().expect("it runs");
-        let told = told(&output);
-        assert_eq!(output.status.code(), Some(1), "{told}");
-        assert!(told.contains(says), "{told}");
-        assert!(told.contains("hint: "), "{told}");
+        let printed = output_text(&output);
+        assert_eq!(output.status.code(), Some(1), "{printed}");
+        assert!(printed.contains(says), "{printed}");
+        assert!(printed.contains("hint: "), "{printed}");
     }
     let there = std::fs::read_dir(folder.path()).expect("a folder");
     let names: Vec<_> = there

@@ -103,15 +103,15 @@ fn info(path: &Path, more: &[&str]) -> Output {
     output.expect("it runs")
 }
 
-fn told(output: &Output) -> String {
+fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Runs the command that a refusal names, and opens what it makes.
 fn built(folder: &Path, refusal: &Output) -> Raster {
-    let told = told(refusal);
-    assert_eq!(refusal.status.code(), Some(1), "{told}");
-    let (_, command) = told.split_once("gdalbuildvrt ").expect("a command");
+    let printed = output_text(refusal);
+    assert_eq!(refusal.status.code(), Some(1), "{printed}");
+    let (_, command) = printed.split_once("gdalbuildvrt ").expect("a command");
     let (command, _) = command.split_once(';').expect("an end");
     let made = Command::new("sh")
         .args(["-c", &format!("gdalbuildvrt {command}")])
@@ -158,7 +158,11 @@ fn an_item_that_lies_elsewhere_than_its_file_is_named() {
     items[1]["properties"]["proj:transform"][2] = json!(corner(1, 0)[0] + 4.0 * CELL);
     let document = write(place.path(), "all.json", &collection(&items));
     let output = info(&document, &[]);
-    assert!(told(&output).contains("item tile-1"), "{}", told(&output));
+    assert!(
+        output_text(&output).contains("item tile-1"),
+        "{}",
+        output_text(&output)
+    );
     assert_is_both(&built(place.path(), &output));
 }
 
@@ -198,7 +202,7 @@ fn assets_whose_names_differ_are_chosen_by_a_pattern() {
     }
     let document = write(place.path(), "all.json", &collection(&items));
     let output = info(&document, &[]);
-    let words = told(&output);
+    let words = output_text(&output);
     assert!(
         words.contains("--input variable=dem_0_0.5|dem_0_2"),
         "{words}"
@@ -207,7 +211,7 @@ fn assets_whose_names_differ_are_chosen_by_a_pattern() {
         place.path(),
         &info(&document, &["--input", "variable=dem_*_2"]),
     ));
-    let words = told(&info(&document, &["--input", "variable=dsm_*"]));
+    let words = output_text(&info(&document, &["--input", "variable=dsm_*"]));
     assert!(words.contains("no asset of that name"), "{words}");
 }
 
@@ -234,11 +238,11 @@ fn documents_that_are_too_large_or_too_deep_end_in_bounded_memory() {
     let many = write("many.json", &format!("{{\"features\":[{many}]}}"));
     for path in [&huge, &deep, &many] {
         let output = memory_limit::info(path, &[]);
-        let told = told(&output);
-        assert_eq!(output.status.code(), Some(1), "{told}");
+        let printed = output_text(&output);
+        assert_eq!(output.status.code(), Some(1), "{printed}");
         assert!(
-            told.starts_with("error: ") && told.contains("hint: "),
-            "{told}"
+            printed.starts_with("error: ") && printed.contains("hint: "),
+            "{printed}"
         );
     }
 }

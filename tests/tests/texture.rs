@@ -136,8 +136,8 @@ fn a_recording_keeps_its_texture() {
             .current_dir(folder.path())
             .output()
             .expect("started");
-        let said = String::from_utf8_lossy(&run.stderr).into_owned();
-        (run.status.success(), said)
+        let printed = String::from_utf8_lossy(&run.stderr).into_owned();
+        (run.status.success(), printed)
     };
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("there");
     terrain_file(&folder.path().join("hills.tif"), Kind::Fractal, 129, 4);
@@ -149,12 +149,12 @@ fn a_recording_keeps_its_texture() {
         "--surface",
         concat!(env!("CARGO_MANIFEST_DIR"), "/data/surfaces/grating.toml"),
     ];
-    let (rendered, said) = hapterra(&demo);
-    assert!(rendered, "{said}");
+    let (rendered, printed) = hapterra(&demo);
+    assert!(rendered, "{printed}");
     let recording = read("demo/hills.csv");
     assert!(
         recording.contains("# [force.texture]\n# pattern = \"grating\"\n"),
-        "{said}"
+        "{printed}"
     );
     for (more, output) in [
         (&[][..], "a.csv"),
@@ -162,8 +162,8 @@ fn a_recording_keeps_its_texture() {
         (&["--surface", "ice"], "c.csv"),
     ] {
         let replay = ["replay", "hills.tif", "demo/hills.csv", "--out", output];
-        let (replayed, said) = hapterra(&[&replay[..], more].concat());
-        assert!(replayed, "{said}");
+        let (replayed, printed) = hapterra(&[&replay[..], more].concat());
+        assert!(replayed, "{printed}");
     }
     let [a, b, c] = ["a.csv", "b.csv", "c.csv"].map(read);
     assert_eq!(a, b);
@@ -176,7 +176,7 @@ fn a_recording_keeps_its_texture() {
     assert!(rows(&a).len() > 3_000 && rows(&a) != rows(&c));
     let high = "[default]\ntexture = \"grain\"\ntexture_amplitude = 0.5\n";
     std::fs::write(folder.path().join("high.toml"), high).expect("written");
-    let (replayed, said) = hapterra(
+    let (replayed, printed) = hapterra(
         &[
             &["replay", "hills.tif", "demo/hills.csv", "--out", "d.csv"][..],
             &["--surface", "high.toml"],
@@ -184,7 +184,7 @@ fn a_recording_keeps_its_texture() {
         .concat(),
     );
     assert!(
-        !replayed && said.contains("hint: texture_amplitude"),
-        "{said}"
+        !replayed && printed.contains("hint: texture_amplitude"),
+        "{printed}"
     );
 }

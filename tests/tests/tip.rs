@@ -319,9 +319,9 @@ fn runs(folder: &std::path::Path, words: &[&str]) -> String {
         .args(words)
         .env_remove("HAPTERRA_MPS2_ELF");
     let run = run.output().expect("started");
-    let [out, said] = [&run.stdout, &run.stderr].map(|text| String::from_utf8_lossy(text));
-    assert!(run.status.success(), "{words:?}: {out}{said}");
-    format!("{out}{said}")
+    let [out, printed] = [&run.stdout, &run.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(run.status.success(), "{words:?}: {out}{printed}");
+    format!("{out}{printed}")
 }
 
 /// Rows without the columns that the guard has its part in.
@@ -347,11 +347,14 @@ fn recordings_of_a_ball_are_replayed_with_it() {
         "--tip",
         "6mm",
     ];
-    let said = runs(
+    let printed = runs(
         folder,
         &[&["run", "hills.tif", "--out", "run.csv"][..], &native].concat(),
     );
-    assert!(said.contains("rendered with a ball of 6 mm"), "{said}");
+    assert!(
+        printed.contains("rendered with a ball of 6 mm"),
+        "{printed}"
+    );
     runs(
         folder,
         &[&["demo", "hills.tif", "--out", "demo"][..], &native].concat(),
@@ -371,7 +374,7 @@ fn recordings_of_a_ball_are_replayed_with_it() {
             "{recording}"
         );
         assert!(live == again, "{recording} has other forces");
-        let said = runs(
+        let printed = runs(
             folder,
             &[
                 "replay",
@@ -384,8 +387,8 @@ fn recordings_of_a_ball_are_replayed_with_it() {
             ],
         );
         assert!(
-            said.contains("--tip 0mm, where the recording has 6mm"),
-            "{said}"
+            printed.contains("--tip 0mm, where the recording has 6mm"),
+            "{printed}"
         );
         assert!(!read("point.csv").contains("tip_mm") && rendered(&read("point.csv")) != live);
     }
@@ -428,8 +431,11 @@ fn a_tip_of_too_many_cells_takes_a_coarser_level() {
                 .current_dir(folder)
                 .args(["replay", "hills.tif", "in.csv", "-o", "o.csv"]);
         let run = command.args(words).output().expect("started");
-        let said = String::from_utf8_lossy(&run.stderr);
-        assert!(!run.status.success() && said.contains(expected), "{said}");
+        let printed = String::from_utf8_lossy(&run.stderr);
+        assert!(
+            !run.status.success() && printed.contains(expected),
+            "{printed}"
+        );
     }
 }
 
@@ -459,8 +465,12 @@ fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
         (&demo[..], &[][..], true),
         (&replay[..], &[][..], false),
     ] {
-        let said = runs(folder, &[words, more].concat());
-        assert_eq!(said.contains(line), is_ball, "{words:?} {more:?}: {said}");
+        let printed = runs(folder, &[words, more].concat());
+        assert_eq!(
+            printed.contains(line),
+            is_ball,
+            "{words:?} {more:?}: {printed}"
+        );
     }
 }
 

@@ -76,8 +76,8 @@ fn run(folder: &Path, words: &[String]) -> Result<(), String> {
     command.stdin(Stdio::null()).stdout(Stdio::piped());
     let child = command.stderr(Stdio::piped()).spawn();
     let output = end_of(child.expect("it starts"));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    output.status.success().then_some(()).ok_or(said)
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    output.status.success().then_some(()).ok_or(printed)
 }
 
 /// The words to run a line with; none where it needs what a test does not have.
@@ -126,8 +126,8 @@ fn command_lines_without_a_board_run() {
         for words in lines {
             println!("{}", words.join(" "));
             count += 1;
-            if let Err(said) = run(folder.path(), &words) {
-                let _ = writeln!(wrong, "{}: {}\n{said}", page.display(), words.join(" "));
+            if let Err(printed) = run(folder.path(), &words) {
+                let _ = writeln!(wrong, "{}: {}\n{printed}", page.display(), words.join(" "));
             }
         }
     }

@@ -12,7 +12,7 @@ use hapterra::replay::{COLUMNS, TICK_COLUMNS};
 use hapterra::synth::Kind;
 use hapterra_tests::{UNCONTROLLED, hapterra_binary, terrain_file};
 
-use test_folder::{Folder, rows, said};
+use test_folder::{Folder, output_text, rows};
 
 const SETTINGS: [&str; 6] = [
     "--scale=0.7mm/cell",
@@ -242,8 +242,8 @@ fn place_far_from_the_middle_is_replayed_with_its_own_cells() {
         let words = ["hills.asc", "other.csv", "again.csv"].map(|name| folder.text(name));
         folder.run(&["replay", &words[0], &words[1], "-o", &words[2]])
     };
-    assert!(with(1e-7).status.success(), "{}", said(&with(1e-7)));
-    let told = said(&with(1e-5));
+    assert!(with(1e-7).status.success(), "{}", output_text(&with(1e-7)));
+    let told = output_text(&with(1e-5));
     assert!(told.contains("cells of another size"), "{told}");
 }
 
@@ -304,7 +304,7 @@ fn a_parquet_recording_is_opened_by_polars_or_pandas() {
         .args([folder.path("replayed.csv"), folder.path("replayed.parquet")])
         .output()
         .expect("started");
-    assert!(run.status.success(), "{}", said(&run));
+    assert!(run.status.success(), "{}", output_text(&run));
     assert_eq!(String::from_utf8_lossy(&run.stdout).trim(), "400");
 }
 
@@ -495,7 +495,7 @@ fn a_reader_who_goes_away_is_no_crash() {
             }
             let run = command.stdout(writer).spawn().expect("started");
             let run = run.wait_with_output().expect("it ends");
-            let told = said(&run);
+            let told = output_text(&run);
             assert!(!told.contains("panicked"), "{words:?}, {closed}: {told}");
             // A crash is 101; no hardware to be listed is 1.
             assert!(
@@ -575,7 +575,7 @@ fn an_output_that_cannot_be_written_is_no_crash() {
             .stdout(full.try_clone().expect("cloned"))
             .output()
             .expect("it runs");
-        let told = said(&run);
+        let told = output_text(&run);
         assert!(!told.contains("panicked"), "{words:?}: {told}");
         assert!(
             matches!(run.status.code(), Some(0 | 1)),
@@ -597,7 +597,7 @@ fn odd_outputs_and_options_are_told() {
     // `-` is standard output, and no file.
     folder.replays("in.csv", "replayed.csv", &[]);
     let run = folder.run(&["replay", &hills, &input, "-o", "-"]);
-    assert!(run.status.success(), "{}", said(&run));
+    assert!(run.status.success(), "{}", output_text(&run));
     assert_eq!(
         String::from_utf8_lossy(&run.stdout),
         folder.read("replayed.csv")
@@ -615,7 +615,11 @@ fn odd_outputs_and_options_are_told() {
         "-o",
         "new.toml",
     ]);
-    assert!(said(&run).contains("cannot be used with"), "{}", said(&run));
+    assert!(
+        output_text(&run).contains("cannot be used with"),
+        "{}",
+        output_text(&run)
+    );
     // Nothing is left of a demo that fails.
     let demo = folder.text("demo");
     let words = ["demo", &hills, "--device", "emulated:none.elf"];
@@ -666,7 +670,7 @@ fn every_command_takes_one_exaggeration_and_feels_true_to_scale_without() {
             assert!(
                 run.status.success() && told.contains(expected),
                 "{told}{}",
-                said(&run)
+                output_text(&run)
             );
         }
     }
@@ -677,5 +681,5 @@ fn every_command_takes_one_exaggeration_and_feels_true_to_scale_without() {
     let both = ["--exaggeration=2", "--exaggeration=1mm/unit"];
     let out = folder.text("o.csv");
     let run = folder.run(&[&["replay", &hills, &input, "-o", &out][..], &both].concat());
-    assert_eq!(run.status.code(), Some(2), "{}", said(&run));
+    assert_eq!(run.status.code(), Some(2), "{}", output_text(&run));
 }

@@ -30,15 +30,15 @@ fn marks_of(folder: &Folder, name: &str) -> Vec<Mark> {
 #[test]
 fn a_mark_has_its_tick_its_time_and_the_hosts_clock() {
     let folder = Folder::new();
-    let told = run(&folder, "felt.csv");
+    let printed = run(&folder, "felt.csv");
     let [began, ended] = ["commands", "felt.csv"].map(|name| changed_at_unix_s(&folder.path(name)));
     assert!(
-        told.contains(r"line 4 of the commands: `at 4 mark \u{1b}[31m`"),
-        "{told}"
+        printed.contains(r"line 4 of the commands: `at 4 mark \u{1b}[31m`"),
+        "{printed}"
     );
     assert!(
-        told.contains("the text of a mark has no control characters"),
-        "{told}"
+        printed.contains("the text of a mark has no control characters"),
+        "{printed}"
     );
     let text = folder.read("felt.csv");
     let marks = marks_of(&folder, "felt.csv");
@@ -54,8 +54,8 @@ fn a_mark_has_its_tick_its_time_and_the_hosts_clock() {
         assert!((before..=ended).contains(&mark.host_unix_s), "{mark:?}");
         before = mark.host_unix_s;
         assert!(
-            told.contains(&format!("`{}` at tick {tick}", mark.text)),
-            "{told}"
+            printed.contains(&format!("`{}` at tick {tick}", mark.text)),
+            "{printed}"
         );
     }
     // It was asked for at its time, and marked at once; the one without a time after the zoom.

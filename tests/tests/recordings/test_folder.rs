@@ -39,15 +39,20 @@ impl Folder {
     /// Runs a command that succeeds; what it says on standard error.
     pub(super) fn runs(&self, words: &[&str]) -> String {
         let run = self.run(words);
-        assert!(run.status.success(), "{words:?}: {}", said(&run));
-        said(&run)
+        assert!(run.status.success(), "{words:?}: {}", output_text(&run));
+        output_text(&run)
     }
 
     /// Runs a command that fails; what it says.
     pub(super) fn fails(&self, words: &[&str]) -> String {
         let run = self.run(words);
-        assert_eq!(run.status.code(), Some(1), "{words:?}: {}", said(&run));
-        said(&run)
+        assert_eq!(
+            run.status.code(),
+            Some(1),
+            "{words:?}: {}",
+            output_text(&run)
+        );
+        output_text(&run)
     }
 
     /// Replays `from` into `to`.
@@ -59,8 +64,12 @@ impl Folder {
     /// The same where it succeeds; what it says.
     pub(super) fn replays(&self, from: &str, to: &str, more: &[&str]) -> String {
         let run = self.replay(from, to, more);
-        assert!(run.status.success(), "{from} {more:?}: {}", said(&run));
-        said(&run)
+        assert!(
+            run.status.success(),
+            "{from} {more:?}: {}",
+            output_text(&run)
+        );
+        output_text(&run)
     }
 
     pub(super) fn read(&self, name: &str) -> String {
@@ -85,7 +94,7 @@ impl Folder {
 }
 
 /// Returns the standard error of a command.
-pub(super) fn said(run: &Output) -> String {
+pub(super) fn output_text(run: &Output) -> String {
     String::from_utf8_lossy(&run.stderr).into_owned()
 }
 

@@ -8,7 +8,7 @@ use hapterra::replay::{Settings, Trajectory};
 use hapterra_core::contact::{MAX_PIECE, WORK_PER_TICK};
 use hapterra_tests::{UNCONTROLLED, hapterra_binary};
 
-use super::test_folder::{Folder, rows, said};
+use super::test_folder::{Folder, output_text, rows};
 use super::write_degrees;
 
 /// Wide enough to be zoomed and panned.
@@ -41,8 +41,8 @@ fn demo(folder: &Folder) -> String {
         UNCONTROLLED,
     ];
     let run = folder.run(&[&words[..], &["--commands", &commands]].concat());
-    assert!(run.status.success(), "{}", said(&run));
-    said(&run)
+    assert!(run.status.success(), "{}", output_text(&run));
+    output_text(&run)
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn recording_has_each_change_of_placement_and_is_replayed() {
     );
 
     let replayed = folder.replay("demo/hills.csv", "again.csv", &[]);
-    assert!(replayed.status.success(), "{}", said(&replayed));
+    assert!(replayed.status.success(), "{}", output_text(&replayed));
     let again_text = folder.read("again.csv");
     let again = rows(&again_text);
     assert_eq!(live.len(), again.len());
@@ -146,9 +146,9 @@ fn what_cannot_be_replayed_is_refused_and_named() {
     demo(&folder);
     let refused = |from: &str, more: &[&str]| {
         let run = folder.replay(from, "again.csv", more);
-        assert_eq!(run.status.code(), Some(1), "{}", said(&run));
+        assert_eq!(run.status.code(), Some(1), "{}", output_text(&run));
         assert!(!folder.path("again.csv").exists());
-        said(&run)
+        output_text(&run)
     };
     let told = refused("demo/hills.csv", &["--scale", "3mm/cell"]);
     assert!(
@@ -171,7 +171,7 @@ fn what_cannot_be_replayed_is_refused_and_named() {
     );
     // The path alone is what it says.
     let run = folder.replay("demo/hills.csv", "again.csv", &["--ignore-settings"]);
-    assert!(run.status.success(), "{}", said(&run));
+    assert!(run.status.success(), "{}", output_text(&run));
 }
 
 #[test]
@@ -183,14 +183,18 @@ fn parquet_recording_of_placements_is_replayed() {
     let words = ["run", terrain, "--device", "native", "--out", record];
     let more = ["--commands", commands, "--duration", "6s"];
     let run = folder.run(&[&words[..], &more].concat());
-    assert!(run.status.success(), "{}", said(&run));
-    assert!(said(&run).contains("view 2: "), "{}", said(&run));
+    assert!(run.status.success(), "{}", output_text(&run));
+    assert!(
+        output_text(&run).contains("view 2: "),
+        "{}",
+        output_text(&run)
+    );
     let trajectory = Trajectory::open(&folder.path("replayed.parquet")).expect("opened");
     let settings = trajectory.settings().expect("settings");
     assert_eq!(settings.views.len(), 2);
     assert_eq!(settings.views[1].cell_mm, settings.rendered.cell_mm);
     let run = folder.replay("replayed.parquet", "again.csv", &[]);
-    assert!(run.status.success(), "{}", said(&run));
+    assert!(run.status.success(), "{}", output_text(&run));
     let again = folder.read("again.csv");
     assert_eq!(rows(&again).last().expect("rows")["view"], "2");
 }
@@ -216,13 +220,17 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     // It goes on when the writer is gone.
     drop(stdin);
     let run = child.wait_with_output().expect("it ends");
-    assert!(run.status.success(), "{}", said(&run));
+    assert!(run.status.success(), "{}", output_text(&run));
     for part in [
         "line 2 of the commands: `nonsense`",
         "no more detail",
         "view 1: ",
     ] {
-        assert!(said(&run).contains(part), "{part} in {}", said(&run));
+        assert!(
+            output_text(&run).contains(part),
+            "{part} in {}",
+            output_text(&run)
+        );
     }
     let text = folder.read("replayed.csv");
     assert_eq!(rows(&text).last().expect("rows")["view"], "1");
@@ -230,9 +238,9 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     let run = folder.run(&[&words[..], &more, &[&none]].concat());
     assert_eq!(run.status.code(), Some(1));
     assert!(
-        said(&run).contains("none") && said(&run).contains("--commands"),
+        output_text(&run).contains("none") && output_text(&run).contains("--commands"),
         "{}",
-        said(&run)
+        output_text(&run)
     );
 }
 

@@ -13,7 +13,7 @@ use hapterra_core::guard::Mode;
 use hapterra_core::phantom::Calibration;
 use hapterra_tests::hapterra_binary;
 
-use hapterra_tests::socket_device::{SocketDevice, signal, told};
+use hapterra_tests::socket_device::{SocketDevice, output_text, signal};
 use hapterra_tests::timeouts::{HANG, end_of};
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
@@ -96,10 +96,10 @@ fn one_signal_disarms_and_ends_a_bring_up() {
     let child = armed(&served, &bench, folder.path());
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert!(told.contains("stopped"), "{told}");
-    assert!(!told.contains("did not confirm"), "{told}");
-    assert_eq!(served.status().health.report.mode, Mode::Disarmed, "{told}");
+    let text = output_text(&output);
+    assert!(text.contains("stopped"), "{text}");
+    assert!(!text.contains("did not confirm"), "{text}");
+    assert_eq!(served.status().health.report.mode, Mode::Disarmed, "{text}");
 }
 
 #[test]
@@ -110,8 +110,8 @@ fn where_a_board_does_not_confirm_the_end_of_a_bring_up_the_user_is_told() {
     served.deaf.store(true, Ordering::Relaxed);
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert!(told.contains("switch the amplifiers off"), "{told}");
+    let text = output_text(&output);
+    assert!(text.contains("switch the amplifiers off"), "{text}");
 }
 
 #[test]
@@ -124,10 +124,10 @@ fn second_signal_ends_bringup_and_warns_of_an_armed_arm() {
     served.wait_for_unheard_end();
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
+    let text = output_text(&output);
     // Not by itself, as where the board does not confirm in time.
-    assert_eq!(output.status.code(), Some(130), "{told}");
-    assert!(told.contains("switch the amplifiers off"), "{told}");
+    assert_eq!(output.status.code(), Some(130), "{text}");
+    assert!(text.contains("switch the amplifiers off"), "{text}");
 }
 
 #[test]

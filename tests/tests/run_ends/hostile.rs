@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use hapterra_tests::greedy_device;
-use hapterra_tests::socket_device::{command, has_begun, signal, told};
+use hapterra_tests::socket_device::{command, has_begun, output_text, signal};
 use hapterra_tests::timeouts::{end_of, pass};
 
 #[test]
@@ -16,6 +16,6 @@ fn a_device_that_asks_for_much_and_reads_little_holds_no_end_up() {
     pass(Duration::from_secs(2));
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert!(told.contains("switch the amplifiers off"), "{told}");
+    let text = output_text(&output);
+    assert!(text.contains("switch the amplifiers off"), "{text}");
 }

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use hapterra_core::wire::session::SessionEnd;
 use hapterra_tests::hapterra_binary;
-use hapterra_tests::socket_device::{SocketDevice, command, signal, start, told};
+use hapterra_tests::socket_device::{SocketDevice, command, output_text, signal, start};
 use hapterra_tests::timeouts::{end_of, pass};
 
 #[test]
@@ -25,10 +25,10 @@ fn a_signal_ends_it_with_a_goodbye_that_the_board_confirms() {
         let child = start(&served, folder.path(), &[]);
         signal(&child, name);
         let output = end_of(child);
-        let told = told(&output);
-        assert!(output.status.success(), "{name}: {told}");
-        assert!(!told.contains("did not confirm"), "{name}: {told}");
-        assert!(folder.path().join("felt.csv").exists(), "{name}: {told}");
+        let text = output_text(&output);
+        assert!(output.status.success(), "{name}: {text}");
+        assert!(!text.contains("did not confirm"), "{name}: {text}");
+        assert!(folder.path().join("felt.csv").exists(), "{name}: {text}");
         assert_eq!(served.last_end(), SessionEnd::Goodbye, "{name}");
     }
 }
@@ -39,7 +39,7 @@ fn the_end_of_the_time_is_a_goodbye_too() {
     let served = SocketDevice::start();
     let child = start(&served, folder.path(), &["--duration", "0.5s"]);
     let output = end_of(child);
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", output_text(&output));
     // Who looks does not hide it from who looks next.
     for _ in 0..2 {
         assert_eq!(served.last_end(), SessionEnd::Goodbye);
@@ -56,11 +56,11 @@ fn where_the_board_does_not_confirm_the_user_is_told_and_it_fails() {
         served.deaf.store(true, Ordering::Relaxed);
         signal(&child, name);
         let output = end_of(child);
-        let told = told(&output);
-        assert_eq!(output.status.code(), Some(1), "{name}: {told}");
+        let text = output_text(&output);
+        assert_eq!(output.status.code(), Some(1), "{name}: {text}");
         let says = "did not confirm that it is disarmed: switch the amplifiers off";
-        assert!(told.contains(says), "{name}: {told}");
-        assert!(folder.path().join("felt.csv").exists(), "{name}: {told}");
+        assert!(text.contains(says), "{name}: {text}");
+        assert!(folder.path().join("felt.csv").exists(), "{name}: {text}");
         assert_eq!(served.last_end(), SessionEnd::Replaced, "{name}");
     }
 }
@@ -75,9 +75,9 @@ fn the_second_signal_ends_it_at_once_with_the_same_word() {
     served.wait_for_unheard_bye();
     signal(&child, "INT");
     let output = end_of(child);
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(130), "{told}");
-    assert!(told.contains("switch the amplifiers off"), "{told}");
+    let text = output_text(&output);
+    assert_eq!(output.status.code(), Some(130), "{text}");
+    assert!(text.contains("switch the amplifiers off"), "{text}");
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn a_silence_that_no_device_keeps_to_is_refused() {
             .args(["run", "x.tif", "--silence", seconds])
             .output()
             .expect("it runs");
-        assert_eq!(output.status.code(), Some(2), "{}", told(&output));
+        assert_eq!(output.status.code(), Some(2), "{}", output_text(&output));
     }
 }
 
@@ -99,9 +99,9 @@ fn stiffness_that_no_arm_feels_is_refused() {
         .args(["--stiffness", "1e30"])
         .output()
         .expect("it runs");
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("no arm renders more than 20 N/mm"), "{told}");
+    let text = output_text(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("no arm renders more than 20 N/mm"), "{text}");
 }
 
 /// A bound of the system on the size of files stands for a disk that is full.
@@ -116,9 +116,9 @@ fn recording_that_fills_the_disk_is_kept_and_named() {
         .args(usual.get_args())
         .output()
         .expect("it ends by itself");
-    let told = told(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("cannot write"), "{told}");
+    let text = output_text(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("cannot write"), "{text}");
     let partial = guardian::partial(folder.path()).expect("what was written");
     let bytes = folder
         .path()
@@ -128,10 +128,10 @@ fn recording_that_fills_the_disk_is_kept_and_named() {
         .len();
     assert!(bytes >= 1 << 15, "{bytes}");
     assert!(
-        told.contains(&format!("{partial} ({bytes} bytes)")),
-        "{told}"
+        text.contains(&format!("{partial} ({bytes} bytes)")),
+        "{text}"
     );
-    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
+    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{text}");
 }
 
 #[test]
@@ -144,8 +144,8 @@ fn one_that_cannot_begin_tells_that_the_arm_may_be_armed() {
     // What the one before has left armed cannot be disarmed by the next one.
     served.deaf.store(true, Ordering::Relaxed);
     let next = command(served.address, folder.path()).output();
-    let told = told(&next.expect("it ends"));
-    assert!(told.contains("switch the amplifiers off"), "{told}");
+    let text = output_text(&next.expect("it ends"));
+    assert!(text.contains("switch the amplifiers off"), "{text}");
 }
 
 #[test]
@@ -163,11 +163,11 @@ fn a_signal_before_it_has_begun_is_heeded() {
     pass(Duration::from_millis(500));
     served.deaf.store(false, Ordering::Relaxed);
     let output = end_of(child);
-    let told = told(&output);
+    let text = output_text(&output);
     // Or it had begun before it heard the signal.
     assert!(
-        told.contains("interrupted") || output.status.success(),
-        "{told}"
+        text.contains("interrupted") || output.status.success(),
+        "{text}"
     );
-    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{told}");
+    assert_eq!(served.last_end(), SessionEnd::Goodbye, "{text}");
 }

@@ -13,7 +13,7 @@ use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
 
-use hapterra_tests::socket_device::{SocketDevice, command, has_begun, signal, start, told};
+use hapterra_tests::socket_device::{SocketDevice, command, has_begun, output_text, signal, start};
 use hapterra_tests::timeouts::{end_of, pass, wait_for, wait_until};
 
 /// Longer than it takes until a line is written to what is no terminal any more.
@@ -115,7 +115,7 @@ fn unread_output_does_not_stop_the_first_and_second_signal() {
     signal(&child, "INT");
     let output = end_of(child);
     // Not by itself, as where the board does not confirm in time.
-    assert_eq!(output.status.code(), Some(130), "{}", told(&output));
+    assert_eq!(output.status.code(), Some(130), "{}", output_text(&output));
 }
 
 /// Reads what is shown in a window until it holds a text.
