@@ -391,7 +391,7 @@ impl<'t> World<'t> {
             Step::Arming if self.ramp_samples > 0 => self.step = Step::Feeling,
             Step::Feeling if self.ramp_samples >= RAMP_SAMPLES && self.abrupt => self.leave(),
             Step::Feeling if self.ramp_samples >= RAMP_SAMPLES && self.has_errands(0) => {
-                self.run_errands(0)
+                self.run_errands(0);
             }
             Step::Feeling if self.ramp_samples >= RAMP_SAMPLES => {
                 self.client.ask(HostRequest::Request(Request::Disarm));
@@ -432,7 +432,7 @@ impl<'t> World<'t> {
                     HostRequest::Request(Request::Jog(_)) => self.judge.wished(),
                     // Two deadlines for a request that has to be repeated.
                     HostRequest::Request(Request::Disarm) => {
-                        self.judge.unwished_from(self.now + 9_000)
+                        self.judge.unwished_from(self.now + 9_000);
                     }
                     _ => {}
                 }
