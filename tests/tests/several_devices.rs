@@ -382,7 +382,8 @@ fn a_hostile_device_costs_the_other_nothing() {
     assert_eq!(served.last_end(), SessionEnd::Goodbye, "{printed}");
 }
 
-/// Bytes that a command reads from files in all, as the system counts them.
+/// Bytes that a command reads from files in all, as the system counts them: the system's own
+/// files too, whose numbers have more digits at one time than at another.
 #[cfg(target_os = "linux")]
 fn bytes_read(command: &Command) -> u64 {
     let output = Command::new("sh")
@@ -397,13 +398,20 @@ fn bytes_read(command: &Command) -> u64 {
     read.and_then(|read| read.parse().ok()).expect(&counts)
 }
 
-/// Of a terrain that stays in its file.
+/// Samples in a row of the terrain that stays in its file.
+#[cfg(target_os = "linux")]
+const SIDE: u32 = 2048;
+
+/// Bytes of a row, the least that is read of the file at once.
+#[cfg(target_os = "linux")]
+const ROW_BYTES: u64 = 4 * SIDE as u64;
+
 #[cfg(target_os = "linux")]
 #[test]
 fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("large.tif");
-    terrain_file(&path, Kind::Fractal, 2048, 1);
+    terrain_file(&path, Kind::Fractal, SIDE, 1);
     let path = path.to_str().expect("a plain path");
     let read_by = |devices: usize| {
         let mut command = Command::new(hapterra_binary());
@@ -417,7 +425,8 @@ fn two_devices_read_no_byte_of_the_terrain_that_one_does_not_read() {
     };
     let (one, two) = (read_by(1), read_by(2));
     assert!(one > 1 << 20, "{one} bytes: the terrain is read");
-    assert_eq!(one, two);
+    // Less than one row of the terrain.
+    assert!(one.abs_diff(two) < ROW_BYTES / 2, "{one} and {two} bytes");
 }
 
 #[test]

@@ -1,15 +1,15 @@
 //! `cargo xtask test`: everything that must hold, from set-up to verdict.
 
 use std::ffi::OsString;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
 use crate::board::{BOARDS, Board};
 use crate::deny::Advisories;
-use crate::run::{OF_TESTS, cargo, say, shown, timed};
+use crate::run::{OF_TESTS, cargo, run, say, shown, timed};
 use crate::setup::{emulator, gdal, qemu, toolchain};
 use crate::{counts, deny, image, page, panics, python, size};
 
@@ -66,18 +66,25 @@ pub(crate) fn test(request: &Request) -> Result<()> {
             step("cargo xtask deny", checked.map(|not| notes.extend(not)));
         }
     }
-    let mut command = cargo();
-    command
-        .args(["test", "--no-fail-fast"])
-        .args(if request.quick { &QUICK[..] } else { &OF_TESTS })
-        .args(&request.only)
-        .env("HAPTERRA_QEMU", qemu)
-        .env(image::COUNTS_VARIABLE, &counts);
-    for (board, path) in &images {
-        command.env(board.elf_variable, path);
-    }
+    let tests = || {
+        let mut command = cargo();
+        command
+            .args(["test", "--no-fail-fast"])
+            .args(if request.quick { &QUICK[..] } else { &OF_TESTS })
+            .env("HAPTERRA_QEMU", &qemu)
+            .env(image::COUNTS_VARIABLE, &counts);
+        for (board, path) in &images {
+            command.env(board.elf_variable, path);
+        }
+        command
+    };
     let failed = timed("running the workspace's tests", || {
-        failed_targets(&mut command)
+        if request.only.is_empty() {
+            return failed_of_all(&tests);
+        }
+        let mut only = tests();
+        only.args(&request.only);
+        failed_targets(only, |line| println!("{line}"))
     })?;
     failures.extend(failed.iter().map(|target| repeat(target, request.quick)));
     if request.only.is_empty() && !request.quick {
@@ -110,17 +117,64 @@ fn dependencies() -> Result<Option<String>> {
     deny::check("fuzz/Cargo.toml").map(Advisories::not_checked)
 }
 
-/// Runs `cargo test`. Returns the targets that failed, as cargo selects them: `-p PACKAGE --lib`.
-fn failed_targets(command: &mut Command) -> Result<Vec<String>> {
-    let line = shown(command);
-    let mut child = command
-        .stderr(Stdio::piped())
-        .spawn()
-        .with_context(|| format!("cannot start `{line}`"))?;
+/// The targets of the workspace in two halves, which run side by side: many a test waits for a
+/// program in real time, or is the last of its program, and leaves a core idle.
+const HALVES: [&[&str]; 2] = [
+    &["--lib", "--bins", "--test", "[a-f]*"],
+    &["--test", "[g-z]*"],
+];
+
+/// Builds all tests, runs both halves at once, and then the examples in the documentation. Returns
+/// the targets that failed.
+fn failed_of_all(tests: &(dyn Fn() -> Command + Sync)) -> Result<Vec<String>> {
+    let with = |words: &[&str]| {
+        let mut command = tests();
+        command.args(words);
+        command
+    };
+    run(&mut with(&["--no-run"]))?;
+    let halves: Vec<_> = std::thread::scope(|scope| {
+        let run_half = |words| scope.spawn(move || by_program(with(words)));
+        let running = HALVES.map(run_half).into_iter();
+        running.map(|half| half.join().expect("no panic")).collect()
+    });
     let mut failed = vec![];
-    for said in BufReader::new(child.stderr.take().context("piped")?).lines() {
+    for half in halves {
+        failed.extend(half?);
+    }
+    failed.extend(by_program(with(&["--doc"]))?);
+    Ok(failed)
+}
+
+/// Like [`failed_targets`]; prints the lines of each program together, when it has ended.
+fn by_program(command: Command) -> Result<Vec<String>> {
+    let mut lines = String::new();
+    let failed = failed_targets(command, |line| {
+        if begins_program(line) {
+            print!("{}", std::mem::take(&mut lines));
+        }
+        lines += line;
+        lines.push('\n');
+    });
+    print!("{lines}");
+    failed
+}
+
+/// Runs `cargo test`, and shows each line of its output. Returns the targets that failed, as cargo
+/// selects them: `-p PACKAGE --lib`.
+fn failed_targets(mut command: Command, mut show: impl FnMut(&str)) -> Result<Vec<String>> {
+    let line = shown(&command);
+    let (from, to) = io::pipe()?;
+    command.stdout(to.try_clone()?).stderr(to);
+    let child = command.spawn();
+    // The pipe ends with the programs that write into it.
+    drop(command);
+    let mut child = child.with_context(|| format!("cannot start `{line}`"))?;
+    let mut failed = vec![];
+    for said in BufReader::new(from).split(b'\n') {
         let said = said?;
-        eprintln!("{said}");
+        let said = String::from_utf8_lossy(&said);
+        show(&said);
         failed.extend(listed_target(&said).map(str::to_owned));
     }
     let status = child.wait()?;
@@ -128,6 +182,12 @@ fn failed_targets(command: &mut Command) -> Result<Vec<String>> {
         bail!("`{line}` failed ({status})");
     }
     Ok(failed)
+}
+
+/// Returns true if cargo says in this line that it runs the next program.
+fn begins_program(line: &str) -> bool {
+    let line = line.trim_start();
+    line.starts_with("Running ") || line.starts_with("Doc-tests ")
 }
 
 /// The target in a line of the list with which `cargo test --no-fail-fast` ends.

@@ -180,7 +180,8 @@ class Device:
         options
             Options of ``hapterra run`` with underscores: ``at=(x, y)``, ``scale="5m/mm"``,
             ``exaggeration="auto"``, ``tip="2mm"``, ``duration="60s"``. A Terrain has its scale
-            itself.
+            itself. If neither ``tip=`` nor ``Terrain.with_tip`` gives a radius, the tip is the ball
+            that ``hapterra run`` chooses, while ``Contact`` has a point.
         """
         if self._session is not None:
             raise DeviceError("a terrain is touched: disarm() before another is loaded")
