@@ -46,7 +46,7 @@ impl Arm {
         pose.tip_mm().z - self.mechanism.home_mm().z
     }
 
-    /// Goes on for a tick, with these motor currents and a hand that is drawn to a
+    /// Continues for a tick, with these motor currents and a hand that is drawn to a
     /// height over the tip's home, mm.
     fn go_on(&mut self, drive: &GuardOutputs, wanted_mm: f32) {
         let pose = self.mechanism.pose(self.counts(), [0; 3]);

@@ -8,7 +8,7 @@
 //!                      └──────────────────── held ────────────────────┘
 //! ```
 //!
-//! While it opens and closes the contact goes on as ever, and a share of its force is let
+//! While it opens and closes the contact continues as ever, and a share of its force is let
 //! through: from all to nothing in 0.1 s, from nothing to all in 0.5 s. The rest of the path,
 //! the guard and all its bounds, is as it always is.
 //!
@@ -23,7 +23,7 @@
 //! A hand that presses gives way when the force goes out: it moves on, towards where it wants to
 //! be. Where the terrain goes with it the ground sinks by that. So a clutch that is held for another
 //! view only ([`ClutchHold::InPlace`]) leaves the terrain in its place before the arm: the point that was
-//! under the tip when the clutch opened is there when it closes, and the press comes back.
+//! under the tip when the clutch opened is there when it closes, and the press returns.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -199,7 +199,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
 
     /// Takes a command between ticks. Returns a tile buffer that is free again, if there is
     /// one: most tiles bring one in the place of another, those of a fallback stay besides, and
-    /// their buffers come back one by one under a scene that has none.
+    /// their buffers return one by one under a scene that has none.
     ///
     /// # Errors
     /// [`RefusedScene`]: a scene or view was not taken, and there is no scene any more.

@@ -193,7 +193,7 @@ fn hills(x: i32, y: i32) -> f32 {
     (8.0 * (x * 0.11).sin() * (y * 0.07).cos() + (x * 1.3).sin()) as f32
 }
 
-/// Rises above the plane and comes back into it. Home is half a millimetre
+/// Rises above the plane and returns into it. Home is half a millimetre
 /// below; 64 counts of the second axis are 1.8 mm.
 fn dip() -> impl Iterator<Item = [i32; 3]> {
     let rise = (0..=64).map(|n| [0, n, 0]);

@@ -21,7 +21,7 @@ pub trait Amplifiers: Sized {
 
     /// Commands zero current, then switches the power stages on. Outputs that can be
     /// asked and do not read back as they were set leave the power stages off, and
-    /// [`GuardInputs::outputs_not_as_set`] says so in the next tick.
+    /// [`GuardInputs::outputs_not_as_set`] reports it in the next tick.
     fn enable(self) -> Self::Enabled;
 
     /// A tick with the power stages off: puts these shares of full scale, each cut to

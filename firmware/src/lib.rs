@@ -57,7 +57,7 @@
 //! time; in a replay, no time passes between two points.
 //! [`link::Link::may_stand_still`] says when that is so. The emulated board then
 //! stops its two timers, its only clocks; the native device is not
-//! ticked; a real board cannot stop time and goes on. So the host's speed changes
+//! ticked; a real board cannot stop time and continues. So the host's speed changes
 //! nothing that is rendered, and a run repeats to the last bit.
 //!
 //! While time stands still, no time-out comes. The device requests a tile again at

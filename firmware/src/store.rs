@@ -18,7 +18,7 @@
 //! Erasing is slow (a sector of a large chip: seconds), so only
 //! [`CalibrationStore::prepare`] does it, at start-up, before there is a tick or a
 //! watchdog. Saving only writes, which takes some milliseconds; where no place is left,
-//! it says so.
+//! it reports it.
 
 use embedded_storage::nor_flash::NorFlash;
 use hapterra_core::phantom::{Calibration, CalibrationError, RECORD_BYTES, RecordError};

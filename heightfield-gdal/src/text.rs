@@ -39,7 +39,7 @@ pub(crate) unsafe fn list_from_c(list: *const *const c_char) -> Vec<String> {
         return texts;
     }
     for at in 0.. {
-        // SAFETY: the list goes on until the null pointer, which was not reached yet.
+        // SAFETY: the list continues until the null pointer, which was not reached yet.
         let text = unsafe { *list.add(at) };
         if text.is_null() {
             break;

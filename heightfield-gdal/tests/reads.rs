@@ -1,4 +1,4 @@
-//! A libgdal of this machine reads a file that the test writes; without one it says so.
+//! A libgdal of this machine reads a file that the test writes; without one it reports it.
 
 use std::path::Path;
 

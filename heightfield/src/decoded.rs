@@ -45,7 +45,7 @@ pub(super) struct Decoded {
     pub(super) cell: Option<CellSize>,
     /// Its stored values are depths, which were turned into heights.
     pub(super) are_depths: bool,
-    /// Metres per vertical unit, where the file says so.
+    /// Metres per vertical unit, if the file states it.
     pub(super) metres_per_vertical_unit: Option<f64>,
     /// Source of that.
     pub(super) vertical_unit_from: Certainty,
@@ -177,7 +177,7 @@ impl Decoded {
         }
     }
 
-    /// Turns numbers that grow downwards into heights, and says so.
+    /// Turns numbers that grow downwards into heights, and reports it.
     pub(super) fn turn_depths_into_heights(&mut self, why: &str) {
         // Several facts of a file may say that it has depths.
         if std::mem::replace(&mut self.are_depths, true) {

@@ -244,7 +244,7 @@ fn files_that_are_filled_have_another_print() {
     assert_eq!(prints[1], print(1));
 }
 
-/// Two blocks of 64 samples, the second of which is not here until the test says so.
+/// Two blocks of 64 samples, the second of which is not here until the test allows it.
 struct Late {
     images: Vec<BlockImage>,
     is_here: Arc<AtomicBool>,

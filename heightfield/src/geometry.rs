@@ -23,9 +23,9 @@ pub enum Certainty {
     Stated,
     /// It follows from a code of a reference system in the file.
     FromCode,
-    /// Nothing says so: it is taken to be the usual one.
+    /// Nothing states it: it is taken to be the usual one.
     Assumed,
-    /// The user says so.
+    /// The user states it.
     Given,
 }
 

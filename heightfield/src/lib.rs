@@ -640,7 +640,7 @@ impl Raster {
         self.source.cell
     }
 
-    /// Metres per vertical unit, where the file says so; most say nothing and
+    /// Metres per vertical unit, if the file states it; most say nothing and
     /// mean metres.
     pub fn stated_metres_per_vertical_unit(&self) -> Option<f64> {
         self.source.metres_per_vertical_unit

@@ -1,7 +1,7 @@
 //! `print!`, `println!`, `eprint!` and `eprintln!` of this crate, under the names of the
 //! standard library's. Those panic if the reader is gone: `hapterra list | head
 //! -1` would end in a crash, and `hapterra run FILE | head -1` without letting go of the
-//! arm. These go on in silence.
+//! arm. These continue in silence.
 //!
 //! For commands that hold no device. Where an arm may be armed, `cli::terminal::writer`
 //! writes, and callers do not wait for it.

@@ -15,7 +15,7 @@ pub enum Reader {
 }
 
 impl Reader {
-    /// All that this machine has; says so where there is no GDAL.
+    /// All that this machine has; reports it where there is no GDAL.
     pub fn all() -> Vec<Self> {
         match gdal() {
             Ok(_) => vec![Self::Own, Self::Gdal],

@@ -65,7 +65,7 @@ impl SlowLine {
     }
 }
 
-/// A device whose time passes tick by tick, when its host says so.
+/// A device whose time passes tick by tick, on command of its host.
 pub trait Stepped {
     /// Sends frames in no time of the device. Returns its messages since.
     fn exchange(&mut self, frames: &[u8]) -> Vec<u8>;

@@ -95,7 +95,7 @@ fn found_from(from: Step, bench: VirtualBench, record: Calibration) -> (Step, Fi
     let Err(BringupError::Found { step, finding }) = ended else {
         panic!("{ended:?}");
     };
-    // It says so in the log, and goes on nowhere else.
+    // It notes this in the log, and continues nowhere else.
     assert_eq!(log.next(), Some(step));
     let last = log.entries.last().expect("an entry");
     assert_eq!((last.step, last.passed), (step, false));

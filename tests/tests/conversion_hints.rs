@@ -1,6 +1,6 @@
 //! The commands that hints name for files that are refused, run as they stand: what
 //! they write opens. Where a command's program, or a package of Python's that it names, is not
-//! installed, this says so and is skipped.
+//! installed, this reports it and is skipped.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

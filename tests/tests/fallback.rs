@@ -79,7 +79,7 @@ impl<'t> Slide<'t> {
         let scene = self
             .terrain
             .scene(SurfaceParams::PREMIUM, Source::Encoders, home);
-        // Its time goes on, as a board's does.
+        // Its time continues, as a board's does.
         let scene = Scene {
             hold_clock: false,
             materials: None,

@@ -326,7 +326,7 @@ fn a_device_of_another_version_is_told_and_never_driven() {
     });
     let report = report.expect("nothing wrong");
     assert!(report.end == End::Told && !report.driven && report.ticks < 100);
-    // One that was given other firmware meanwhile says so after its reset.
+    // One that was given other firmware meanwhile reports it after its reset.
     for at in (0..ticks).step_by(MOMENTS) {
         let other = Interruption::OtherDevice;
         let interruptions = vec![(at, Interruption::DeviceReset), (at, other)];

@@ -24,7 +24,7 @@ const FILES: [&str; 11] = [
     "turned_contiguous.nc",
 ];
 
-/// Returns true if there is a libgdal; says so where not.
+/// Returns true if there is a libgdal; reports it where not.
 fn has_gdal() -> bool {
     gdal()
         .inspect_err(|why| eprintln!("skipped: {why}"))

@@ -215,7 +215,7 @@ fn a_sheared_grid_is_true_in_shape_and_said_to_be() {
 }
 
 /// A map in feet whose heights have no unit is rendered 3.28 times too steep where they are in
-/// feet, too: every command says so until the unit is stated.
+/// feet, too: every command reports it until the unit is stated.
 #[test]
 fn an_assumed_unit_of_height_is_told_until_it_is_stated() {
     let told = |file: &str, more: &[&str]| {

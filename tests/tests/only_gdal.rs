@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use hapterra_tests::{gdal_stand_in, hapterra_binary, memory_limit};
 use heightfield::{OpenOptions, Raster, RasterError, files_read_with, gdal};
 
-/// Returns true if there is a libgdal; says so where not.
+/// Returns true if there is a libgdal; reports it where not.
 fn has_gdal() -> bool {
     gdal()
         .inspect_err(|why| eprintln!("skipped: {why}"))

@@ -167,7 +167,7 @@ fn a_proxy_that_friction_would_hold_otherwise_is_found() {
     let broken = at(10.7, 11.2);
     assert_eq!(found(&[first, broken]), [], "it slid until just now");
     assert_eq!(found(&[&rest[..], &[broken]].concat()), [Stuck]);
-    // In the air it forgets, also where it comes back to where it was.
+    // In the air it forgets, also where it returns to where it was.
     let over = with(free([10.5, 10.5, 2.5]), |rendered| {
         (rendered.proxy, rendered.converged) = (first.output.proxy, false);
     });

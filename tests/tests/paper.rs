@@ -216,7 +216,7 @@ fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
         proxy[0] > 19.0 && proxy[0] < 20.0,
         "stopped by the first wall: {proxy:?}"
     );
-    // And stays there until the HIP comes back.
+    // And stays there until the HIP returns.
     let rendered = contact.step([40.0, 31.0, 3.0]);
     assert!(position(&rendered.proxy)[0] < 20.0);
     let rendered = contact.step([15.0, 31.0, 3.0]);

@@ -180,7 +180,7 @@ fn a_way_in_over_the_border_is_no_crossing_wherever_its_pieces_end() {
 }
 
 /// A HIP beside the field goes deep under it, in over its very corner. The look
-/// along that way ended where the field begins, and the way that went on from there
+/// along that way ended where the field begins, and the way that continued from there
 /// had come from nowhere: it touched from below.
 #[test]
 fn a_way_in_over_the_corner_of_the_field_touches_nothing() {

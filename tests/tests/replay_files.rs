@@ -92,7 +92,7 @@ fn one_row_a_row_with_the_columns_that_were_promised() {
     assert_eq!(rows.len(), 4);
     let contacts: Vec<_> = rows.iter().map(|row| row[4].as_str()).collect();
     assert_eq!(contacts, ["0", "1", "1", "0"]);
-    // What went in comes back as the same number, and out of contact the proxy
+    // What went in returns as the same number, and out of contact the proxy
     // is the HIP.
     let went_in: f64 = "10.123456789012345".parse().expect("a number");
     assert_eq!(number(&rows[3][1]).to_bits(), went_in.to_bits());

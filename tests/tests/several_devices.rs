@@ -253,7 +253,7 @@ fn a_device_that_is_lost_is_waited_for_and_the_other_goes_on() {
     let pair = Pair::of(mortal);
     let mut child = pair.start();
     gone.store(true, Ordering::Relaxed);
-    // The line that says so is that of the second device.
+    // The line that reports it is that of the second device.
     let (err, name) = (child.stderr.take().expect("piped"), pair.name(2));
     let mut lines = BufReader::with_capacity(1, err);
     let mut line = String::new();

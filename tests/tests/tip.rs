@@ -478,7 +478,7 @@ fn an_arm_feels_by_a_ball_unless_a_point_is_stated() {
 struct Touched {
     /// Distances from HIP to proxy in contact, sorted, mm.
     penetration_mm: Vec<f64>,
-    /// The longest that the proxy stayed within 0.25 mm while the HIP went on by 3 mm or more, s.
+    /// The longest that the proxy stayed within 0.25 mm while the HIP continued by 3 mm or more, s.
     held_s: f64,
 }
 

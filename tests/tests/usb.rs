@@ -245,7 +245,7 @@ fn visit(then: impl FnOnce(&mut Session<'_>, &Rc<RefCell<Board>>)) {
     then(&mut session, &board);
 }
 
-/// Goes on over a new line.
+/// Continues over a new line.
 fn resume(session: &mut Session<'_>, link: Box<Bulk<ScriptedPipes<Board>>>) -> DeviceHello {
     session
         .resume(link, &|| true, &mut |_| {})

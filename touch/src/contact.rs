@@ -62,7 +62,7 @@ pub enum State {
     /// The surface that the proxy was on has come to an end, and the last force fades away.
     Releasing,
     /// The HIP is below the surface and has not been above it, so that the side it came from is
-    /// unknown: no force until it has been above `surface_mm`. A path may begin here, or go on here
+    /// unknown: no force until it has been above `surface_mm`. A path may begin here, or continue here
     /// from a hole or from outside.
     BelowGround {
         /// The height of the surface over the HIP, mm.

@@ -85,7 +85,7 @@ impl Scale {
     /// [`MAX_CELL`] cells from the origin.
     ///
     /// Worked out in `f64`; the fraction is rounded once, to `f32`. A place that [`Self::to_mm`]
-    /// gives for a whole number of cells comes back as that number.
+    /// gives for a whole number of cells returns as that number.
     #[must_use]
     pub fn to_grid(&self, mm: [f64; 3]) -> Option<GridPoint> {
         let cells = mm.map(|mm| {

@@ -157,7 +157,7 @@ impl<'t> Running<'t> {
             self.spare = Some(tile);
             return Err(error);
         }
-        // A tile is never refused: the buffer that it replaces comes back.
+        // A tile is never refused: the buffer that it replaces returns.
         let _ = self.accept(Command::Tile(tile));
         Ok(())
     }

@@ -46,7 +46,7 @@ impl RrdFile {
 pub struct Ended {
     /// The writer ended the stream; without that it was killed.
     pub is_told: bool,
-    /// Error of the file for rerun's own viewer. The page goes on without it.
+    /// Error of the file for rerun's own viewer. The page continues without it.
     pub rrd: Result<()>,
 }
 

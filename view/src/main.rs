@@ -136,7 +136,7 @@ fn open(url: &str) {
     drop(started);
 }
 
-/// Says a line, and goes on without a reader.
+/// Says a line, and continues without a reader.
 fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

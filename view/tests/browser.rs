@@ -31,7 +31,7 @@ const SHORTER: usize = 80;
 /// Software draws the pages: one test at a time.
 static ONE: Mutex<()> = Mutex::new(());
 
-/// A live session that goes on while the page is looked at.
+/// A live session that continues while the page is looked at.
 struct Session {
     viewer: Viewer,
     tick: u64,
@@ -95,7 +95,7 @@ fn is_whole(terrain: &Colours, plots: &Colours) -> bool {
     terrain.count > 400 && { marks }.all(|marks| *marks > 10) && plots.count > 20
 }
 
-/// The browser; none, and a line that says so, where there is none.
+/// The browser; none, and a line that reports it, where there is none.
 fn browser_in(folder: &Path) -> Option<Browser> {
     let program = program();
     if program.is_none() {
@@ -338,7 +338,7 @@ fn commands_of_a_session_zoom_its_page_and_reset_it() {
     let mut demo = Running::shown(&mut demo, "");
     let page = browser.open(&demo.address());
     shown(&mut browser, &page, &mut || {}, is_whole);
-    // White on the map until it is as it should be, twice: what passes over lines goes on.
+    // White on the map until it is as it should be, twice: what passes over lines continues.
     let mut white = |is_right: &dyn Fn(usize) -> bool| {
         let (until, mut before) = (Instant::now() + HANG, false);
         loop {

@@ -44,7 +44,7 @@ fn of_page(browser: &mut Browser, page: &Page) -> OfPage {
     }
 }
 
-/// A demo that goes on for longer than it is looked at.
+/// A demo that continues for longer than it is looked at.
 fn touching(into: &Path) -> Option<Command> {
     let mut demo = hapterra()?;
     demo.args(["demo", "--rounds", "300", "--view"]);

@@ -23,7 +23,7 @@ const TRACE: usize = 400;
 /// Commands for the zoomed picture.
 const ZOOM: &str = "zoom 1.6\nzoom 1.6\n";
 
-/// A page of a demo that goes on.
+/// A page of a demo that continues.
 struct Shown {
     browser: Browser,
     page: Page,

@@ -1,7 +1,7 @@
 //! The project's own commands, as `cargo xtask COMMAND`.
 //!
 //! Each finds what it needs, installs it where it may, says what it is doing,
-//! and where it cannot go on says exactly what to type.
+//! and where it cannot continue says exactly what to type.
 
 mod board;
 mod campaign;

@@ -49,7 +49,7 @@ const FALLBACK: Fallback = Fallback {
     near: None,
 };
 
-/// The fallback's tile; beyond the field it goes on as it ends there.
+/// The fallback's tile; beyond the field it continues as it ends there.
 fn coarse(grid: &Grid, fallback: &Fallback) -> Tile {
     let mut tile = Tile::VACANT;
     let side = fallback.wide.spacing() as usize;

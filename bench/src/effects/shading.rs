@@ -56,7 +56,7 @@ fn off(grid: &Grid, rendered: &[EffectTick]) -> Vec<f64> {
     off.collect()
 }
 
-/// Degrees between forces that follow each other while the proxy goes on evenly: shading does not
+/// Degrees between forces that follow each other while the proxy continues evenly: shading does not
 /// move a proxy that leaves a ridge.
 fn turns(rendered: &[EffectTick]) -> Vec<f64> {
     let goes = |pair: &[EffectTick]| length(minus(pair[1].proxy, pair[0].proxy));

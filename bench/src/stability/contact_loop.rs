@@ -53,7 +53,7 @@ pub(super) struct LoopSettings {
 }
 
 /// Runs an arm in an arming hand until its script ends, and shows every tick with the time since
-/// the script began, s. Ends early where `look` says so.
+/// the script began, s. Ends early when `look` asks for it.
 pub(super) fn run(
     settings: &LoopSettings,
     mut arm: HeldPhantom,

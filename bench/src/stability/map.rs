@@ -73,7 +73,7 @@ impl Plan {
     }
 
     /// Tries all of it on all processors. `on_trial` hears of every one that is done, of how
-    /// many, and says whether to go on; none where it did not.
+    /// many, and says whether to continue; none where it did not.
     ///
     /// # Errors
     /// [`OutOfReach`] as a trial.

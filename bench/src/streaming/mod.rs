@@ -54,6 +54,6 @@ pub struct Plan {
     /// Halvings in the search for the fastest speed: six tell it to 9 %, four to 40 %.
     pub halvings: u32,
     /// True if virtual time stands still while a block of a file is read, so that what is counted
-    /// does not depend on the machine. A web server's latency goes on.
+    /// does not depend on the machine. A web server's latency continues.
     pub stands_while_reading: bool,
 }

@@ -204,7 +204,7 @@ mod tests {
         assert!((beside(&field, at(40.25, 5.0)).fade - 0.5).abs() < 1e-6);
     }
 
-    /// Milliseconds that a HIP which is moved into the hole goes on feeling
+    /// Milliseconds that a HIP which is moved into the hole keeps feeling
     /// its edge, and the largest change of the boundary fade in a tick.
     fn faded_after(khz: u32) -> (f32, f32) {
         let mut tiles = buffers::<2>();

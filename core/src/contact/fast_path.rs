@@ -67,7 +67,7 @@ impl Follow {
         })
     }
 
-    /// Moves the proxy to where it rests now, if it goes on resting well inside its
+    /// Moves the proxy to where it rests now, if it keeps resting well inside its
     /// patch.
     #[inline]
     pub(super) fn to(&mut self, view: &HipView) -> Followed {

@@ -51,12 +51,12 @@ impl Phase {
         match self {
             // The HIP is above the surface.
             Self::Unseeded => ("unseeded", &["free"]),
-            // The path goes on in the next tick; it has hit the surface; it leads under it from
+            // The path continues in the next tick; it has hit the surface; it leads under it from
             // the side, or the HIP has leapt.
             Self::Free => ("free", &["sweeping", "on surface", "unseeded"]),
             // The same, and the path is at its end.
             Self::Sweeping(_) => ("sweeping", &["free", "on surface", "unseeded"]),
-            // The HIP is free; the path to it goes on; the surface is lost; it has ended under the
+            // The HIP is free; the path to it continues; the surface is lost; it has ended under the
             // HIP, or the HIP has leapt.
             Self::OnSurface(_) => ("on surface", &["free", "sweeping", "releasing", "unseeded"]),
             // The force has faded, and the HIP is above the surface or not.
@@ -329,7 +329,7 @@ impl Contact {
             self.redirect(window, hip, known, &mut budget);
         }
         // Bounded by the budget: of the turns that follow one another without work,
-        // none comes back to the one before.
+        // none returns to the one before.
         while self.turn(window, hip, &mut budget) == Turn::GoesOn {}
         self.hip = hip;
         self.ends(&budget);
@@ -373,7 +373,7 @@ impl Contact {
         budget: &mut Budget,
     ) {
         match &mut self.phase {
-            // Its departures count on: it may come back to where it left.
+            // Its departures count on: it may return to where it left.
             Phase::Sweeping(sweeping) => {
                 sweeping.path.redirect(hip);
                 sweeping.was_late = true;

@@ -457,7 +457,7 @@ fn holds_when_the_hip_jumps() {
 }
 
 /// On a path that hardly moves sideways, the sweep resolves poorly which part of
-/// it the field begins; going on from beyond that, it would come from nowhere.
+/// it the field begins; continuing from beyond that, it would come from nowhere.
 #[test]
 fn steep_ways_in_over_the_border_cross_nothing() {
     let mut tiles = buffers::<8>();

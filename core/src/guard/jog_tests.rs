@@ -37,7 +37,7 @@ impl<'t> Bench<'t> {
         self.haptics.report()
     }
 
-    /// One tick; once a millisecond the encoders go on as `moves` says of the currents.
+    /// One tick; once a millisecond the encoders continue as `moves` says of the currents.
     fn tick(&mut self, moves: impl Fn(Vec3) -> [i32; 3]) -> GuardOutputs {
         let drive = self.haptics.tick(&self.sense, true).drive;
         self.drives.push(drive);

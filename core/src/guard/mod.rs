@@ -320,7 +320,7 @@ impl Guard {
     }
 
     /// The host asks to arm. A jog that was asked for before, and has driven nothing, is
-    /// forgotten; one under way goes on.
+    /// forgotten; one under way continues.
     pub fn arm(&mut self) {
         self.hold.end();
         if !self.mode().drives() {

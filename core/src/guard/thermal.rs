@@ -106,7 +106,7 @@ pub struct Motors {
     ticks: u32,
     /// The most that each axis may be given now, A.
     pub(super) allowed_a: Vec3,
-    /// True if a winding is too hot to go on.
+    /// True if a winding is too hot to continue.
     pub(super) too_hot: bool,
 }
 
@@ -162,7 +162,7 @@ impl Motors {
     }
 
     /// Lets `currents_a` flow for a tick.
-    // A few instructions, but for the tick in ten that goes on to the temperatures.
+    // A few instructions, but for the tick in ten that continues to the temperatures.
     #[inline(always)]
     pub fn heat(&mut self, currents_a: Vec3) {
         self.squares += currents_a * currents_a;

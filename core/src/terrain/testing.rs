@@ -102,7 +102,7 @@ impl<'t, const D: usize> Field<'t, D> {
         }
     }
 
-    /// Installs a tile; the buffer that comes back goes round.
+    /// Installs a tile; the buffer that returns goes round.
     pub(crate) fn give_back(&mut self, key: TileKey) {
         let spent = self.install(key);
         self.spare.push(spent);

@@ -41,7 +41,7 @@ pub struct RequestHint {
 }
 
 impl RequestHint {
-    /// The tile around which others are wanted: without it nothing goes on.
+    /// The tile around which others are wanted: without it nothing continues.
     fn centre(&self) -> TileIndex {
         self.missing_tile.unwrap_or(TileIndex::holding(self.proxy))
     }
@@ -194,7 +194,7 @@ impl<const D: usize> TileRequester<D> {
         let is_overdue = |at: &u32| now.wrapping_sub(*at) >= RETRY_TICKS;
         let (level, centre) = (self.level, demand.centre());
         let is_near = |key: &TileKey| key.level != level || Self::reaches(centre, key.index);
-        // The proxy went on meanwhile: an answer now would push out a nearer tile.
+        // The proxy continued meanwhile: an answer now would push out a nearer tile.
         self.asked
             .retain(|(key, at)| !is_overdue(at) || is_near(key));
         let (key, at) = self.asked.iter_mut().find(|(_, at)| is_overdue(at))?;

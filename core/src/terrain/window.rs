@@ -141,7 +141,7 @@ impl<'t, const D: usize> Window<'t, D> {
     ///
     /// It is the surface at once ([`Self::take`] has the tiles over a fallback).
     ///
-    /// A buffer that comes back with a key is that of a tile that is not held. The same
+    /// A buffer that returns with a key is that of a tile that is not held. The same
     /// tile once more therefore gives back a vacant buffer.
     #[must_use]
     pub fn install(&mut self, tile: &'t mut Tile) -> &'t mut Tile {

@@ -9,7 +9,7 @@ use crate::crc::{self, CRC};
 /// Longest frame in bytes, its zero included: a tile with materials and what is around it.
 pub const MAX_FRAME: usize = 5120;
 
-/// Reason for which a frame was not understood. It is dropped; the link goes on.
+/// Reason for which a frame was not understood. It is dropped; the link continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FrameError {

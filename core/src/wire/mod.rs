@@ -53,7 +53,7 @@
 //! restart of the device, says nothing about the present one. Where another session was
 //! opened since, another host has taken the device: an error at once, in each state but
 //! detaching, which is closed. Where the device has let go the arm of a host that was
-//! silent, the host goes on in a new session; one that leaves waits for its goodbye.
+//! silent, the host continues in a new session; one that leaves waits for its goodbye.
 //!
 //! An answer is a frame of this session that answers a message of the host:
 //! hello, scene taken, point answer, answer, marked, status, calibration, alive, goodbye,
@@ -74,7 +74,7 @@
 //! of their own, which their answers repeat: a host takes the answer to its present
 //! question only. One that comes late, to a question before, tells what was.
 //!
-//! A host that goes on over a new line draws a new number, unless the last one was
+//! A host that continues over a new line draws a new number, unless the last one was
 //! never answered. The device's hello tells what became of the session before, and
 //! how many samples that had: loss at its end is counted, too.
 //!
@@ -83,7 +83,7 @@
 //! | state | hears | leaves it when |
 //! | --- | --- | --- |
 //! | closed | hello | hello comes: open |
-//! | open | everything | bye: leaving. Detach: detached, and it says so. `silence_s` without a frame of this session while armed, or being armed: ended, after a command to disarm. Hello of another session: open, replaced |
+//! | open | everything | bye: leaving. Detach: detached, which is answered. `silence_s` without a frame of this session while armed, or being armed: ended, after a command to disarm. Hello of another session: open, replaced |
 //! | leaving | alive, status, calibration, bye | the amplifiers are off and the telemetry has left: it says goodbye and is ended. Hello of another session: open |
 //! | detached | detach: answered by detached; bye | bye: leaving. `silence_s` while armed, as when open: ended, after a command to disarm. Hello of another session: open |
 //! | ended | bye: answered by goodbye; detach: answered by detached; close: the emulated board ends its program | hello of another session: open |

@@ -52,7 +52,7 @@ pub enum SessionEnd {
     None,
     /// The host closed the session: the arm was disarmed.
     Goodbye,
-    /// Another session was opened. The device went on with what it held.
+    /// Another session was opened. The device continued with what it held.
     Replaced,
     /// The host was silent for too long: the force was let out and the arm disarmed.
     HostSilent,

@@ -76,7 +76,7 @@ pub struct BootReport {
     /// End of the program before, if it crashed.
     pub crash: Option<Crash>,
     /// Supply below which the chip holds itself in reset, as its option bytes have it,
-    /// millivolts; zero where no chip says so.
+    /// millivolts; zero where no chip reports it.
     pub resets_below_mv: u16,
 }
 
@@ -91,7 +91,7 @@ impl BootReport {
         (1..RESETS_BELOW_MV).contains(&self.resets_below_mv)
     }
 
-    /// The fault to begin with: a board that crashed says so before it drives
+    /// The fault to begin with: a board that crashed reports it before it drives
     /// anything again.
     #[must_use]
     pub fn fault(&self) -> Option<Fault> {

@@ -37,7 +37,7 @@ impl Frames {
     /// The next message; `None` at the end of the file.
     pub(crate) fn next<'a, T: Deserialize<'a>>(&'a mut self) -> Option<T> {
         // The frame is found by its length first: what `push` gives back cannot
-        // be kept while the loop goes on.
+        // be kept while the loop continues.
         loop {
             if self.from == self.to {
                 self.to = self.file.read(&mut self.chunk).expect("readable");

@@ -43,7 +43,7 @@ pub(crate) fn hold(reason: Reason) {
     clock_timer().control.set(0);
 }
 
-/// Takes the reason back; time goes on when none is left.
+/// Takes the reason back; time continues when none is left.
 pub(crate) fn release(reason: Reason) {
     let before = REASONS.fetch_and(!(reason as u8), Ordering::AcqRel);
     // Only if this reason, and no other, stopped the timers. While they are

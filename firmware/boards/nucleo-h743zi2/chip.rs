@@ -265,7 +265,7 @@ pub(crate) fn resets_below_mv() -> u16 {
 
 /// Lets the watchdog and the clock of embassy's time run on while a debugger halts the core,
 /// whatever that asked for: the one resets the chip, the other tells the next tick of the
-/// halt, and so does TIM15, which lets the duty cycles go on. Lets the halt stop TIM1. Its outputs
+/// halt, and so does TIM15, which lets the duty cycles continue. Lets the halt stop TIM1. Its outputs
 /// are then off as by a break (RM0433, 38.3.28).
 pub(crate) fn let_a_halt_stop_the_arm() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(false));

@@ -2,7 +2,7 @@
 //! went.
 //!
 //! Loading such a word raises a bus fault. One load may do so: after its fault the
-//! program goes on behind it. Any other bus fault becomes a hard fault.
+//! program continues behind it. Any other bus fault becomes a hard fault.
 
 use core::arch::global_asm;
 

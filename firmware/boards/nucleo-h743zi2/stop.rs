@@ -66,7 +66,7 @@ pub(crate) fn new(pin: Peri<'static, PE15>) -> EmergencyStop {
 }
 
 impl Stop for EmergencyStop {
-    /// Tells a stop that was too short for the tick to see, too. The outputs come back
+    /// Tells a stop that was too short for the tick to see, too. The outputs return
     /// when the stop is released and the amplifiers are off, which is a tick after it was
     /// reported at the earliest: the compare registers still hold the last command until then.
     fn is_pressed(&mut self) -> bool {

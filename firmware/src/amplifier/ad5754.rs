@@ -39,7 +39,7 @@ const POWER_UP_US: u32 = 20;
 /// The way to a converter: it sends frames.
 pub trait FrameBus {
     /// Sends a frame of three bytes with SYNC low, lets SYNC rise whatever happened (the
-    /// part ignores a frame that was cut short) and returns what came back meanwhile. SYNC
+    /// part ignores a frame that was cut short) and returns what returned meanwhile. SYNC
     /// is high for at least 200 ns between two frames: the part asks for 100 ns after a
     /// write and for 200 ns after a read. The part clocks data in on the falling edge
     /// (mode 1), at 30 MHz at most; what it sends is valid 40 ns after the rising edge,

@@ -19,7 +19,7 @@ struct Part {
     data: [u16; 4],
     /// Register that the last frame requested.
     asked: u16,
-    /// Nothing comes back.
+    /// Nothing returns.
     is_silent: bool,
     /// Last reported state.
     as_set: bool,

@@ -281,7 +281,7 @@ where
 }
 
 /// Hands the loop the table of a scene with materials, if it comes with one: a later scene's may
-/// wait behind a scene that goes on with the table before.
+/// wait behind a scene that continues with the table before.
 fn take_materials<const D: usize>(
     haptics: &mut Haptics<'_, D>,
     ends: &mut LoopEnds<'_>,

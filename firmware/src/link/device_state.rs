@@ -109,7 +109,7 @@ impl DeviceState {
         self.forget_press();
     }
 
-    /// Answers the hello of this number, of a host that may come back to `scene`.
+    /// Answers the hello of this number, of a host that may return to `scene`.
     pub(super) fn hello(&self, number: u8, scene: Option<Scene>, session: &Session) -> DeviceHello {
         DeviceHello {
             number,
@@ -177,7 +177,7 @@ impl DeviceState {
     }
 
     /// The host that wanted a calibration stored says nothing any more. It is answered, should
-    /// it come back.
+    /// it return.
     pub(super) fn give_up_press(&mut self) {
         if self.waits_for_press() {
             self.storing = Storing::No;

@@ -19,7 +19,7 @@ pub(super) enum LoaderEntry {
 }
 
 impl<const D: usize> Link<'_, D> {
-    /// Says that the board enters a loader when [`Self::enters_loader`] says so.
+    /// Says that the board enters a loader when [`Self::enters_loader`] reports it.
     pub fn offer_loader(&mut self) {
         self.loader = LoaderEntry::Offered;
     }

@@ -188,7 +188,7 @@ impl<const D: usize> Link<'_, D> {
         }
     }
 
-    /// The host has looked and goes: what drives goes on, and what only waits to drive, or
+    /// The host has looked and goes: what drives continues, and what only waits to drive, or
     /// to be stored, does not.
     fn on_detach(&mut self, state: SessionState, room: CommandRoom) {
         match state {
@@ -266,7 +266,7 @@ impl<const D: usize> Link<'_, D> {
 
     pub(super) fn take_scene(&mut self, scene: Scene, room: CommandRoom) {
         let accepted = scene.is_valid() && self.has_materials_of(&scene);
-        // The very scene in force goes on: its host came back.
+        // The very scene in force continues: its host returned.
         if accepted && self.scene != Some(scene) {
             self.drop_scene_samples();
             self.requester.reset(scene.level, scene.size);

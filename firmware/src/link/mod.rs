@@ -15,7 +15,7 @@
 //!   change nothing.
 //! - A hello at any time (after a zero, which ends what an earlier host may
 //!   have left unfinished) opens a new session and keeps the scene and every
-//!   tile that is held, so a host that comes back goes on where it was.
+//!   tile that is held, so a host that returns continues where it was.
 //! - A host that vanishes leaves the arm rendering what is held, but not for ever:
 //!   after the time that the host named the arm is disarmed.
 //! - Another view of a scene is put in only while no force is rendered; the arm stays armed.
@@ -211,7 +211,7 @@ impl<'t, const D: usize> Link<'t, D> {
     /// True without a scene, between the points of a replay, and, in a scene
     /// that asks for it ([`Scene::hold_clock`]), while the host owes a tile. An
     /// emulated board then stops its clock, and a caller that runs the device in lock-step
-    /// does not tick; a real board goes on ticking.
+    /// does not tick; a real board keeps ticking.
     #[must_use]
     pub fn may_stand_still(&self) -> bool {
         let waits = match &self.scene {

@@ -23,7 +23,7 @@ pub trait LinkBoard {
     /// Called after every poll, with the link as it then stands.
     fn after_poll<const D: usize>(&self, link: &Link<'_, D>);
 
-    /// Stores a calibration in the board's memory. The watchdog goes on watching, so
+    /// Stores a calibration in the board's memory. The watchdog keeps watching, so
     /// what takes long has to wait, not to block.
     fn store(&self, _calibration: &Calibration) -> impl Future<Output = Result<(), Refusal>> {
         core::future::ready(Err(Refusal::NoMemory))
@@ -32,7 +32,7 @@ pub trait LinkBoard {
 
 /// Serves the link for ever.
 ///
-/// Reading and writing go on side by side, so that a host that does not read
+/// Reading and writing continue side by side, so that a host that does not read
 /// cannot keep the device from reading, nor the link from being polled. A reader
 /// that gives no bytes says that the transport was interrupted, and so does a writer
 /// that fails.
@@ -82,7 +82,7 @@ pub async fn run<const D: usize>(
                 }
                 let bytes = chunk.get(..n).unwrap_or(&[]);
                 // A host that does not read, or is gone, holds the writer up
-                // for as long as it likes. The link goes on with the loop.
+                // for as long as it likes. The link continues with the loop.
                 let polling = async {
                     loop {
                         board.tick_done().await;

@@ -15,7 +15,7 @@ impl<'t, const D: usize> Link<'t, D> {
     pub(super) fn reclaim_buffers(&mut self) {
         while let Some(tile) = self.ends.spent.dequeue() {
             self.nothing_to_request_at = None;
-            // A tile that the window refused comes back under its own key, a tile
+            // A tile that the window refused returns under its own key, a tile
             // that it replaced under the replaced one's: neither is held.
             if let Some(key) = tile.key() {
                 self.requester.lost(key);

@@ -2,7 +2,7 @@
 //! system and place, as GDAL, QGIS and ArcGIS keep them where the format has no place for them.
 //!
 //! Which of two sources counts is as in GDAL: the notes for no-data, reference system and place,
-//! the file for scale, offset and unit. Where both differ, a remark says so.
+//! the file for scale, offset and unit. Where both differ, a remark reports it.
 
 use crate::RasterError;
 use crate::crs::ReferenceSystem;

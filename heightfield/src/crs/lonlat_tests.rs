@@ -4,7 +4,7 @@ use super::*;
 
 const DEGREE_M: f64 = 111_000.0;
 
-/// Returns true if there is a libgdal, which describes texts without a code; says so where there is none.
+/// Returns true if there is a libgdal, which describes texts without a code; reports it where there is none.
 pub(super) fn has_libgdal() -> bool {
     let library = heightfield_gdal::Library::load(heightfield_gdal::Settings::default());
     if let Err(why) = &library {

@@ -61,7 +61,7 @@ pub(super) fn followed(from: &Url, location: &str, has_key: bool) -> Result<Url,
     Ok(to)
 }
 
-/// Returns true if both are at one server, also where it goes on from http to https.
+/// Returns true if both are at one server, also where it continues from http to https.
 fn is_same_host(from: &Url, to: &Url) -> bool {
     let port = |url: &Url| url.port_or_known_default();
     let goes_on_encrypted = (port(from), port(to)) == (Some(80), Some(443));

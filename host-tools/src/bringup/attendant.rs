@@ -43,7 +43,7 @@ pub trait Attendant {
     fn may_be_armed(&mut self, _may: bool) {}
 }
 
-/// The attendant does not want to go on.
+/// The attendant does not want to continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped: the steps that are passed are kept in the log")]
 pub struct Stopped;

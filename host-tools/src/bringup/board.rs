@@ -36,7 +36,7 @@ pub(super) struct Board<'d, 't> {
 
 impl<'d, 't> Board<'d, 't> {
     /// The board at the other end of a dialogue, for an attendant who wants to stop when
-    /// `stops` says so.
+    /// `stops` returns true.
     pub(super) fn new(control: &'d mut ControlSession<'t>, stops: fn() -> bool) -> Self {
         Self {
             control,

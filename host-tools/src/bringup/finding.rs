@@ -65,7 +65,7 @@ pub enum Finding {
         /// The encoder that counted.
         encoder: usize,
     },
-    /// An encoder did not come back to where it was.
+    /// An encoder did not return to where it was.
     #[error("the encoder of joint {joint} loses counts: {there} there, {back} back")]
     CountsLost {
         /// The joint.

@@ -14,7 +14,7 @@ use crate::link::ControlSession;
 pub enum Walked {
     /// To the end: the log is complete.
     ToTheEnd,
-    /// The board was without power meanwhile: greet it again, and go on.
+    /// The board was without power meanwhile: greet it again, and continue.
     BoardWasOff,
 }
 

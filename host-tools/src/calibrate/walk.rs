@@ -48,7 +48,7 @@ pub trait Attendant {
     fn agrees(&mut self, review: &Review) -> Result<bool, Stopped>;
 }
 
-/// The attendant does not want to go on.
+/// The attendant does not want to continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped: nothing was changed on the device")]
 pub struct Stopped;

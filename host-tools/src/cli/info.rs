@@ -107,7 +107,7 @@ struct FileReport {
     #[serde(skip)]
     projection_known: bool,
     cell: Option<Cell>,
-    /// Metres per vertical unit, where the file says so.
+    /// Metres per vertical unit, if the file states it.
     metres_per_vertical_unit: Option<f64>,
     vertical: Vertical,
     /// In the file's vertical unit.

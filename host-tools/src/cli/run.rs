@@ -145,7 +145,7 @@ fn silence(text: &str) -> Result<u16, String> {
 ///
 /// # Errors
 /// A fault of the file, or a missing device at the beginning. A device that disappears later is
-/// waited for. Of several devices a failure is reported at once, the others go on, and the error
+/// waited for. Of several devices a failure is reported at once, the others continue, and the error
 /// at the end names each that failed.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let devices = devices::of(args)?;

@@ -104,7 +104,7 @@ pub trait Pipes {
     fn send(&mut self, transfer: &[u8]) -> io::Result<()>;
 
     /// Receives what has come, after waiting for at most `wait` for the first
-    /// byte. A time-out may be zero or an error that says so.
+    /// byte. A time-out may be zero or an error that reports it.
     ///
     /// # Errors
     /// When the device is gone.

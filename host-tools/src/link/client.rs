@@ -29,11 +29,11 @@ use crate::terrain::{Terrain, TileBuffer};
 #[derive(Debug)]
 pub enum Event<'e> {
     /// The scene is in force. `resumed` tells whether the device held it
-    /// already and goes on where it was.
+    /// already and continues where it was.
     Opened {
         /// Returns the device's introduction.
         device: &'e DeviceHello,
-        /// True if it goes on with the scene it held.
+        /// True if it continues with the scene it held.
         resumed: bool,
     },
     /// The sample of one tick of a scene whose HIP comes from the encoders.
@@ -279,7 +279,7 @@ impl<'t> Client<'t> {
         self.talk.put_view(view, now, out);
     }
 
-    /// The view that was put in is in force, where the conversation says so; or it is not and
+    /// The view that was put in is in force, if the protocol says so; or it is not and
     /// will not be. Tells which.
     fn settle_view(&mut self, over: bool, on: &mut dyn FnMut(Event<'_>)) {
         let epoch = self.talk.scene().map(|scene| scene.epoch);
@@ -425,7 +425,7 @@ impl<'t> Client<'t> {
             return;
         }
         let again = std::mem::replace(&mut self.has_armed, true);
-        // A real arm that has come back is as it is: armed, or its user says when it is
+        // A real arm that has returned is as it is: armed, or its user says when it is
         // to be.
         if let Some(Arming { zero }) = self.arming.filter(|a| !again || a.zero.is_some()) {
             if let Some(counts) = zero {

@@ -13,7 +13,7 @@ pub struct LinkStats {
     /// Tiles sent.
     pub tiles: u64,
     /// Of those, tiles that had been sent before: lost on the way, or asked
-    /// for again because the window had moved on and come back.
+    /// for again because the window had moved on and returned.
     pub again: u64,
     /// Bytes of the tiles sent, framing included.
     pub tile_bytes: u64,

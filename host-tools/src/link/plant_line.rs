@@ -11,7 +11,7 @@ use super::messages::{Inbox, send};
 use super::transport::Transport;
 use crate::phantom::HeldPhantom;
 
-/// Moves the arm with the board's ticks until `stop` says so or the board is
+/// Moves the arm with the board's ticks until `stop` returns true or the board is
 /// gone. The board's time stands still until each tick's counts are there.
 ///
 /// # Errors
@@ -34,7 +34,7 @@ pub fn serve_plant(
                 return Ok(());
             }
         };
-        // A board that failed says so with a number of its own.
+        // A board that failed reports it with a number of its own.
         if currents.tick != tick && !currents.enabled {
             return Err(io::Error::other("the board has failed"));
         }

@@ -20,7 +20,7 @@ use crate::terrain::Terrain;
 pub struct Session<'t> {
     client: Client<'t>,
     line: Line<'t>,
-    /// True if it is to go on; what a device does not read is not waited for else.
+    /// True if it is to continue; what a device does not read is not waited for else.
     goes_on: &'t dyn Fn() -> bool,
     /// Until then the close has to be sent and answered.
     leaves_by: Option<Duration>,
@@ -78,8 +78,8 @@ impl<'t> Session<'t> {
         self.shake_hands(self.goes_on, on)
     }
 
-    /// Goes on over a new transport after the old one was lost, for as long as `go_on`
-    /// says so. Returns the device, whose hello tells in `epoch` what it still held.
+    /// Continues over a new transport after the old one was lost, for as long as `go_on`
+    /// returns true. Returns the device, whose hello tells in `epoch` what it still held.
     ///
     /// # Errors
     /// As [`Session::open`]; [`LinkError::Interrupted`].

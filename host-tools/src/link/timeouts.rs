@@ -29,7 +29,7 @@ pub struct Timeouts {
 
 impl Timeouts {
     /// Time for which an armed real board tolerates a silent host, unless the user says
-    /// otherwise, seconds: longer than a host that goes on takes to come back.
+    /// otherwise, seconds: longer than a host that continues takes to return.
     pub const REAL_SILENCE_S: u16 = 30;
 
     /// For a device that runs in real time.

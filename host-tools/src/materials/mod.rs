@@ -161,7 +161,7 @@ impl Materials {
     }
 
     /// The materials of a tile over a grid, whose samples are `step` of the grid's cells apart, as they
-    /// go on the link. Beyond the field they go on as it ends there. And whether they are complete.
+    /// are sent. Beyond the field they continue as it ends there. And whether they are complete.
     pub(crate) fn tile<'b>(
         &self,
         (grid, last, step): (&HapticGrid<'_>, [i32; 2], f64),

@@ -86,7 +86,7 @@ impl Plant {
     }
 
     /// Sets the hand's target, m and m/s in the device frame. Within a
-    /// step the target goes on at that speed. Without a hand, nothing.
+    /// step the target continues at that speed. Without a hand, nothing.
     pub fn aim(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
         if let Some(hand) = &mut self.hand {
             hand.aim(target_m, speed_m_s);

@@ -241,7 +241,7 @@ impl Bounds {
             }
             PlacementChange::Stiffness(factor) => {
                 let stiffness = params.stiffness_n_per_mm * factor_of(factor)? as f32;
-                // A stiffness of the user's own may go down, and come back.
+                // A stiffness of the user's own may go down, and return.
                 let most = STIFFEST_N_PER_MM.max(self.first.params.stiffness_n_per_mm);
                 if !(SOFTEST_N_PER_MM..=most).contains(&stiffness) {
                     return Err(ChangeError::Stiffness(stiffness));

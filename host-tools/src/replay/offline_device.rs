@@ -42,7 +42,7 @@ impl<'t> OfflineDevice<'t> {
         patience: Timeouts,
     ) -> Result<Self, LinkError> {
         let mut scene = terrain.scene(params, Source::Points, GridPoint::default());
-        // A device that holds the scene of an earlier replay would go on from
+        // A device that holds the scene of an earlier replay would continue from
         // where that ended.
         let nonce = nonce();
         scene.epoch ^= nonce;
@@ -76,7 +76,7 @@ impl<'t> OfflineDevice<'t> {
     /// that touches begins there on the surface, as it does on an arm.
     ///
     /// # Errors
-    /// [`LinkError`]; the replay cannot go on after one.
+    /// [`LinkError`]; the replay cannot continue after one.
     pub fn put_view(
         &mut self,
         terrain: Terrain<'t>,
@@ -141,7 +141,7 @@ impl<'t> OfflineDevice<'t> {
     /// Steps the loop with the HIP at `hip` and returns its record.
     ///
     /// # Errors
-    /// [`LinkError`]; the replay cannot go on after one.
+    /// [`LinkError`]; the replay cannot continue after one.
     pub fn step(&mut self, hip: GridPoint) -> Result<TickRecord, LinkError> {
         self.last = Some(hip);
         let seq = self.seq;

@@ -1,4 +1,4 @@
-//! Opens a session, serves, goes on over another line where one is lost, and ends.
+//! Opens a session, serves, continues over another line where one is lost, and ends.
 
 use std::time::{Duration, Instant};
 
@@ -36,7 +36,7 @@ pub struct Service<'s, 't> {
     pub device: String,
     /// Between two tries to find a device that is gone.
     pub retry: Duration,
-    /// True if the user wants it to go on.
+    /// True if the user wants it to continue.
     pub goes_on: &'t dyn Fn() -> bool,
     /// Prints the messages that must reach the user in every case.
     pub tell: &'s dyn Fn(&str),
@@ -142,7 +142,7 @@ impl<'t> Served<'_, 't> {
         Ok(())
     }
 
-    /// The device is gone: says so, waits for it and resumes.
+    /// The device is gone: reports it, waits for it and resumes.
     fn wait_for_device(
         &mut self,
         handler: &mut dyn SessionHandler<'t>,
@@ -189,7 +189,7 @@ impl<'t> Served<'_, 't> {
     ) -> Result<(), LinkError> {
         self.is_left = true;
         match why {
-            // Another host has the arm; it is not this one's to disarm, and says so itself.
+            // Another host has the arm; it is not this one's to disarm, and reports it itself.
             Some(LinkError::Taken) => return Ok(()),
             // Nothing that this host says is understood.
             Some(LinkError::Version { .. }) => return Err(LinkError::NotConfirmed),

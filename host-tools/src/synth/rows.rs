@@ -15,7 +15,7 @@ pub struct Grid {
     pub cell_m: f64,
 }
 
-/// The caller did not want to go on.
+/// The caller did not want to continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]
 pub struct Interrupted;

@@ -32,7 +32,7 @@ pub enum WriteFault {
     /// It would not fit.
     #[error(transparent)]
     NoRoom(#[from] NoRoom),
-    /// The caller did not want to go on.
+    /// The caller did not want to continue.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
     /// The extension names no format that is written.

@@ -70,7 +70,7 @@ impl Terrain<'_> {
         })
     }
 
-    /// The heights of a tile that a device with this scene asks for, as they go on the link: of the
+    /// The heights of a tile that a device with this scene asks for, as they are sent: of the
     /// scene's level, or of its fallback. `None` if there is no such tile. And whether they are
     /// complete.
     #[must_use]
@@ -109,7 +109,7 @@ impl Terrain<'_> {
         }
     }
 
-    /// The height of a coarse tile's sample, in cells. Beyond the field it goes on as it ends
+    /// The height of a coarse tile's sample, in cells. Beyond the field it continues as it ends
     /// there.
     fn coarse_sample(&self, tile: &CoarseTile, place: [usize; 2], reads: &ReadTracker) -> f64 {
         let size = self.size();
@@ -126,7 +126,7 @@ impl Terrain<'_> {
     }
 
     /// A sample of the near tile: on its border the height that the wide one has there, so that the
-    /// surface goes on evenly. Where that has none, its own.
+    /// surface continues evenly. Where that has none, its own.
     fn near_sample(
         &self,
         wide: &CoarseTile,

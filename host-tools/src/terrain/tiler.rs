@@ -491,7 +491,7 @@ impl<'r> Terrain<'r> {
         );
     }
 
-    /// The materials of a tile of a terrain that has some, as they go on the link; `None` where
+    /// The materials of a tile of a terrain that has some, as they are sent; `None` where
     /// there is no such tile, or it has none. And whether they are complete.
     #[must_use]
     pub fn materials_of<'b>(

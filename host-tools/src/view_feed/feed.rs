@@ -261,7 +261,7 @@ impl<'t> ViewFeed<'t> {
         self.queue.wait_for_room(Duration::from_secs(60))
     }
 
-    /// Ends the stream. The viewer goes on showing what it has; the child is handed over,
+    /// Ends the stream. The viewer keeps showing what it has; the child is handed over,
     /// so that a caller can wait for it.
     #[must_use]
     pub fn finish(mut self) -> (Dropped, Option<Child>) {

@@ -445,7 +445,7 @@ impl Bus {
         matches!(self.chip.commands, Commands::Serial { sent, .. } if sent.0 == address)
     }
 
-    /// Returns true if this is the register with what came back from the SPI.
+    /// Returns true if this is the register with what returned from the SPI.
     fn is_back(&self, address: u32) -> bool {
         matches!(self.chip.commands, Commands::Serial { back, .. } if back == address)
     }

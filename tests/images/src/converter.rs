@@ -4,7 +4,7 @@
 //! Its timing is the data sheet's (rev. G, table 4): SYNC has to be high for 100 ns after a
 //! frame that writes and for 200 ns after one that reads; a frame that comes sooner is
 //! lost. The outputs take 10 µs to power up, and a code that is written meanwhile is lost,
-//! too. What a frame asks to read comes back during the frame after it.
+//! too. What a frame asks to read returns during the frame after it.
 //!
 //! The emulated core's time moves on every 200 instructions (1.6 µs), unless a test asks for
 //! less: two frames with less between them have nothing between them here, so a test of
@@ -46,7 +46,7 @@ pub struct Converter {
     frame: Vec<u8>,
     /// Request of the last frame.
     asked: u16,
-    /// Bytes that came back and were not read yet.
+    /// Bytes that returned and were not read yet.
     back: Vec<u8>,
     /// True if the SPI's clock has failed: frames do not go out.
     pub is_cut: bool,
@@ -71,7 +71,7 @@ impl Converter {
         if on { [a, b, c] } else { [0; 3] }
     }
 
-    /// The supply goes and comes back: all registers are as after power-up.
+    /// The supply goes and returns: all registers are as after power-up.
     pub fn forget(&mut self) {
         self.codes = [0; 4];
         self.ranges = [0; 4];
@@ -97,7 +97,7 @@ impl Converter {
         others | if sent { EOT } else { 0 }
     }
 
-    /// A byte is clocked out, and one comes back.
+    /// A byte is clocked out, and one returns.
     pub fn take(&mut self, byte: u8) {
         let [high, low] = self.asked.to_be_bytes();
         let back = [0, high, low].get(self.frame.len()).copied();
@@ -106,7 +106,7 @@ impl Converter {
         self.frame.push(byte);
     }
 
-    /// A byte that came back, the first first.
+    /// A byte that returned, the first first.
     pub fn give(&mut self) -> u8 {
         match self.back.is_empty() {
             true => 0,
@@ -191,7 +191,7 @@ impl Converter {
 mod tests {
     use super::*;
 
-    /// Sends a frame that begins at a time and returns what came back.
+    /// Sends a frame that begins at a time and returns what returned.
     fn send(converter: &mut Converter, frame: [u8; 3], at_ns: u64) -> u16 {
         converter.select(true, at_ns);
         frame.iter().for_each(|byte| converter.take(*byte));

@@ -75,7 +75,7 @@ struct Run {
 }
 
 /// Runs the counting image in a folder to its end, and returns what each tick took: from the entry
-/// of the function that is one, until another function of the image goes on.
+/// of the function that is one, until another function of the image continues.
 ///
 /// # Panics
 /// If the image fails.

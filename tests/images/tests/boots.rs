@@ -178,7 +178,7 @@ fn full_memory_is_erased_at_the_next_start() {
                 .borrow_mut()
                 .patch(area, &record.repeat(places));
         }
-        // The link going on shows that the watchdog is fed.
+        // The link continuing shows that the watchdog is fed.
         assert_eq!(store(&mut device), Err(Refusal::MemoryFull), "{board}");
         device.run_ms(300);
         let full = device.machine.borrow().bytes(areas[0], PLACE);

@@ -1,4 +1,4 @@
-//! Motor temperatures of a board after a start: those that it kept in its RAM go on
+//! Motor temperatures of a board after a start: those that it kept in its RAM continue
 //! after a reset, and everything else is hot.
 
 use hapterra::terrain::Terrain;

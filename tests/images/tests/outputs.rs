@@ -64,7 +64,7 @@ fn no_frame_to_the_converter_comes_too_soon() {
             device.move_to(plane().counts_at([100.0, 100.0], 3.0));
             device.run_ms(40);
             assert!(device.commands().iter().any(|code| *code != 0));
-            // Time goes on with each instruction: what lies between two frames counts.
+            // Time continues with each instruction: what lies between two frames counts.
             let mut machine = device.machine.borrow_mut();
             machine.slice = 1;
             // To the end of a tick, so that the three that follow are whole.

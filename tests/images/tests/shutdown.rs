@@ -271,7 +271,7 @@ fn a_stop_too_short_for_a_tick_to_see_is_a_stop() {
         let pin = machine.chip.emergency_stop;
         machine.set_input(pin, true);
         machine.set_input(pin, false);
-        // The pulses that come back would be the last command's.
+        // The pulses that return would be the last command's.
         machine.slice = 1;
         machine.run_until(3, |m| {
             let pulses = m.bus().drives_duty_cycles() == Some(true);

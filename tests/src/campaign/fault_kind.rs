@@ -41,7 +41,7 @@ pub enum Kind {
     LinkDuplicates,
     /// Bits are flipped, both ways.
     LinkCorruption,
-    /// The link is unplugged or silent for seconds, then the host comes back.
+    /// The link is unplugged or silent for seconds, then the host returns.
     LinkSilence,
     /// The host is restarted and brings another scene.
     HostRestarted,
@@ -64,7 +64,7 @@ pub enum Kind {
     HotMotors,
     /// The hand is yanked away.
     Yank,
-    /// The supply breaks down under load and comes back; the RAM may be damaged.
+    /// The supply breaks down under load and returns; the RAM may be damaged.
     BrownOut,
     /// The chip is reset under load.
     ResetUnderLoad,
@@ -183,7 +183,7 @@ impl Kind {
             }
             Self::EncoderBeyondLimits => latch(&[Fault::JointLimit, Fault::Linkage], 3_000),
             // Where nothing moves or pushes it cannot be seen, and does no harm;
-            // what it missed comes back as a jump.
+            // what it missed returns as a jump.
             Self::EncoderStuck => Expectation {
                 may_latch: &[Fault::NoMotion, Fault::EncoderJump, Fault::TooFast],
                 ..RIDE

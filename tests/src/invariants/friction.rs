@@ -97,7 +97,7 @@ impl TickOracle<'_> {
     }
 
     /// Returns the position of the proxy when its motion for this HIP began: ticks that were cut
-    /// short go on with it.
+    /// short continue with it.
     pub(super) fn begun_at(&self, before: &ObservedTick, seen: &ObservedTick) -> [f64; 3] {
         match before.output.converged || before.hip != seen.hip {
             true => before.proxy,
@@ -148,7 +148,7 @@ impl TickOracle<'_> {
     }
 
     /// A proxy inside the cone does not move. One that was in the air slides at first, also where
-    /// it comes back to where it was.
+    /// it returns to where it was.
     pub(super) fn sticks(&mut self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
         let touches = |seen: &ObservedTick| {
             seen.output.state == ContactState::Touching && seen.output.converged

@@ -74,7 +74,7 @@ impl TickOracle<'_> {
     }
 
     pub(super) fn descends(&self, before: &ObservedTick, seen: &ObservedTick) -> Verdict {
-        // A proxy that waits for a tile goes on from where it entered its patch.
+        // A proxy that waits for a tile continues from where it entered its patch.
         let waited = before.output.missing_tile.is_some();
         if !(before.is_touching() && seen.is_touching()) || waited {
             return Ok(());

@@ -49,7 +49,7 @@ pub struct Segment<'t> {
     pub now: u64,
     /// When the line or one of its ends was last not as it should be.
     troubled: u64,
-    /// Until when the amplifiers may go on.
+    /// Until when the amplifiers may be switched on.
     wished: u64,
     was_on: bool,
     /// When the direction to the host had no room last.
@@ -138,7 +138,7 @@ impl<'t> Segment<'t> {
         self.fault = Some(fault);
     }
 
-    /// Lets the honest host do something; what it says goes on its way.
+    /// Lets the honest host do something; its frames enter the line.
     pub fn with_host(&mut self, act: impl FnOnce(&mut Host<'t>, u64, &mut Vec<u8>)) {
         let mut out = Vec::new();
         if let Some(host) = &mut self.host {
@@ -259,7 +259,7 @@ impl<'t> Segment<'t> {
         Ok(())
     }
 
-    /// Amplifiers go on only where a host that lives has asked for it.
+    /// Amplifiers are switched on only if a live host has requested it.
     fn judge_wish(&mut self) -> Result<(), String> {
         let wishes = |host: &Host<'_>| host.asked && host.end.is_none();
         if self.host.as_ref().is_some_and(wishes) {

@@ -73,7 +73,7 @@ impl LossyLine {
         self.begun.clear();
     }
 
-    /// Puts bytes in; whole frames go on their way.
+    /// Puts bytes in; whole frames enter the line.
     pub(super) fn send(&mut self, bytes: &[u8], now: u64) {
         for byte in bytes {
             self.begun.push(*byte);

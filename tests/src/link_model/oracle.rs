@@ -19,7 +19,7 @@ pub enum Wrong {
     Hangs,
     /// The amplifiers were on at this tick, and no host wished it.
     Driven(u64),
-    /// The amplifiers went on at this tick in a session whose host had not asked for it.
+    /// The amplifiers were switched on at this tick in a session without a request of its host.
     Unasked(u64),
     /// The amplifiers were on at this tick, and nothing had come for longer than the host
     /// had sent.

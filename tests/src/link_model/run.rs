@@ -27,7 +27,7 @@ use super::status_queries::StatusQueries;
 const LONGEST: u64 = 60_000;
 /// Ticks after the end, in which what was delayed still arrives.
 const AFTER: u64 = 6_500;
-/// Samples with the amplifiers on after which the host goes on.
+/// Samples with the amplifiers on after which the host continues.
 const RAMP_SAMPLES: u32 = 60;
 /// Times that the host takes up a session that went silent.
 const RESUMPTIONS: u32 = 4;

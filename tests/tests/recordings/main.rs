@@ -187,7 +187,7 @@ fn run_recording_replays_bit_by_bit() {
 fn demo_recording_replays_bit_by_bit() {
     let folder = Folder::new();
     let (terrain, out) = (folder.text("hills.tif"), folder.text("demo"));
-    // No image is named, and no device: it runs in the program itself, and says so.
+    // No image is named, and no device: it runs in the program itself, and reports it.
     let told = folder.runs(&[
         "demo",
         &terrain,

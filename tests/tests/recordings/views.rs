@@ -94,7 +94,7 @@ fn recording_has_each_change_of_placement_and_is_replayed() {
     let (before, _) = before.expect("rows of view 1");
     assert!(before.starts_with("# "), "{before}");
     assert!(folder.path("demo/hills.png").exists());
-    // Time goes on, tick by tick.
+    // Time continues, tick by tick.
     let times: Vec<f64> = live
         .iter()
         .map(|row| row["t_s"].parse().expect("s"))
@@ -217,7 +217,7 @@ fn commands_come_by_standard_input_and_a_file_that_is_not_there_is_told() {
     stdin
         .write_all(b"zoom 2\nnonsense\nzoom 1e9\n")
         .expect("written");
-    // It goes on when the writer is gone.
+    // It continues when the writer is gone.
     drop(stdin);
     let run = child.wait_with_output().expect("it ends");
     assert!(run.status.success(), "{}", output_text(&run));
@@ -281,7 +281,7 @@ fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
     let first_m = settings.rendered.cell_m.expect("known");
     let latitude = |view: PlacementSettings| view.measured_at.expect("a place")[1];
     let [up, down] = [latitude(north) - 56.0, latitude(softer) - latitude(south)];
-    // The hand goes on meanwhile.
+    // The hand continues meanwhile.
     assert!(
         (2.0..6.0).contains(&up) && (0.5..3.0).contains(&down),
         "{up} {down}"

@@ -161,7 +161,7 @@ pub(super) fn partial(folder: &Path) -> Option<String> {
 /// The abort stands for a stack that overflows and for memory that ends: Rust's runtime ends both
 /// by one. Neither can be had truly. No input is known any more that overflows a stack, and a
 /// thread that runs has the pages of its stack already. A worker whose address space is limited to
-/// what it has goes on for minutes, and serves: it asks for no more.
+/// what it has continues for minutes, and serves: it asks for no more.
 #[test]
 fn worker_killed_while_armed_is_disarmed_by_guardian() {
     for (name, number) in [("ABRT", 6), ("KILL", 9)] {
@@ -271,7 +271,7 @@ fn worker_that_does_not_react_to_ctrl_c_is_killed() {
     assert!(ended.shown.contains("did not react"), "{}", ended.shown);
 }
 
-/// Ctrl-C in a terminal reaches both processes, and is pressed once: the worker goes on saying
+/// Ctrl-C in a terminal reaches both processes, and is pressed once: the worker keeps saying
 /// goodbye, and is not ended at once.
 #[test]
 fn signal_to_both_processes_is_pressed_once() {

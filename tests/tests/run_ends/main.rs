@@ -52,7 +52,7 @@ fn where_the_board_does_not_confirm_the_user_is_told_and_it_fails() {
         let folder = tempfile::tempdir().expect("a folder");
         let served = SocketDevice::start();
         let child = start(&served, folder.path(), &[]);
-        // Telemetry goes on coming, and nothing gets to the board any more.
+        // Telemetry keeps coming, and nothing gets to the board any more.
         served.deaf.store(true, Ordering::Relaxed);
         signal(&child, name);
         let output = end_of(child);

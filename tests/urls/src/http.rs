@@ -38,7 +38,7 @@ pub enum Fault {
     Forbidden,
     /// The line ends in the middle.
     Cut,
-    /// Other bytes come than were asked for, and it says so.
+    /// Other bytes come than were asked for, and it reports it.
     OtherRange,
     /// Fewer bytes come than the answer's head promises.
     Short,

@@ -29,7 +29,7 @@ pub(crate) fn listening<S: Future<Output = ()> + Send + 'static>(
     (port, runtime)
 }
 
-/// Returns true if there is a libgdal; without one, a test that wants it says so.
+/// Returns true if there is a libgdal; without one, a test that wants it reports it.
 #[must_use]
 pub fn has_gdal() -> bool {
     let found = heightfield::gdal();

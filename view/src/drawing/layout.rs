@@ -231,7 +231,7 @@ impl Layout {
     fn part(&mut self, kind: &str, share: f32) -> Part {
         self.count += 1;
         // Any will do that differs from the others'; the same each time, so that a page
-        // that comes back finds its own.
+        // that returns finds its own.
         let mut bytes = *b"hapterra-view\0\0\0";
         if let Some(last) = bytes.last_mut() {
             *last = self.count;

@@ -13,7 +13,7 @@
 //! | `/words` | place, scale and coordinates | four a second |
 //!
 //! Another view of the terrain while it is touched comes as another scene: the terrain stays
-//! where it is on the ground, the eye comes nearer or goes away, and plots and time go on.
+//! where it is on the ground, the eye comes nearer or goes away, and plots and time continue.
 //!
 //! Entries without a time are logged as static, and the latest replaces the one before, in the history
 //! as in the page: a session of hours grows by its samples alone.

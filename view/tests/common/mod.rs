@@ -90,7 +90,7 @@ impl Running {
         format!("http://127.0.0.1:{}/", self.port())
     }
 
-    /// Returns true if it goes on.
+    /// Returns true if it continues.
     pub fn goes_on(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
     }

@@ -7,7 +7,7 @@
 /// Effect of an instruction on the flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Flow {
-    /// Goes on, returns, or stops.
+    /// Continues, returns, or stops.
     Next,
     /// May go to this address: branch or call.
     To(u32),

@@ -5,7 +5,7 @@
 //! every exception and every interrupt, whether it is enabled or not. Every direct branch of
 //! every function that one of them can reach is followed. A call through a
 //! register cannot be followed, so it is an error unless the board's table says
-//! what it is; the walk goes on where the table says that it leads. So the walk is complete
+//! what it is; the walk continues where the table says that it leads. So the walk is complete
 //! without guesses about pointers.
 
 mod calls;

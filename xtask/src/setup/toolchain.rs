@@ -59,7 +59,7 @@ impl Toolchain {
     /// Sees to it that `cargo clippy` is there.
     pub(crate) fn with_clippy(self) -> Result<()> {
         match self {
-            // A part of every usual toolchain; cargo itself says so if it is not.
+            // A part of every usual toolchain; cargo itself reports it if it is not.
             Self::Own => Ok(()),
             Self::Distribution => distribution::with_clippy(),
         }

@@ -1,7 +1,7 @@
 //! Continuation of the descent from a point of a patch's border.
 //!
 //! The distance to the HIP has a slope into each patch that meets there, and its
-//! way goes on in the one into which the slope is steepest: in a mirrored scene
+//! way continues in the one into which the slope is steepest: in a mirrored scene
 //! that is the mirrored patch. The offer of a neighbour is searched for
 //! before the way goes there.
 
@@ -19,7 +19,7 @@ use crate::terrain::{CellContent, Window};
 pub(super) enum Onward {
     /// Into a neighbouring patch, as [`Asking::best`] has it.
     Into,
-    /// It may go on in a tile that is not here.
+    /// It may continue in a tile that is not here.
     Missing,
     /// The budget is spent.
     Suspended,
@@ -100,7 +100,7 @@ impl Asking {
         self.best = None;
     }
 
-    /// Goes on until it is known where downhill goes on. `patch` becomes that of the best offer, if that is made
+    /// Searches until the downhill direction is known. `patch` becomes that of the best offer, if that is made
     /// now.
     #[inline]
     pub(super) fn advance<const D: usize>(

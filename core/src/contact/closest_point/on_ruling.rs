@@ -33,7 +33,7 @@ pub(super) struct Ruling {
     pub(super) along: f32,
     /// Slope of the patch across the ruling at the point.
     pub(super) across: f32,
-    /// True if the point is an end of the ruling, beyond which it would go on.
+    /// True if the point is an end of the ruling, beyond which it would continue.
     pub(super) at_end: bool,
 }
 

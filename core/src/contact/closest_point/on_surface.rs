@@ -155,7 +155,7 @@ impl Descent {
         Some((self.at, patch.height(self.at.u, self.at.v)))
     }
 
-    /// Goes on until the proxy rests, leaves, or may not go on.
+    /// Continues until the proxy rests, leaves, or has to wait.
     pub(in crate::contact) fn advance<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -249,7 +249,7 @@ impl Descent {
         self.stage = Stage::Asking;
     }
 
-    /// The way goes on in a neighbouring patch, whose closest point is known.
+    /// The way continues in a neighbouring patch, whose closest point is known.
     fn enter<const D: usize>(
         &mut self,
         window: &Window<'_, D>,

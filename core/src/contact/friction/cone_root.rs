@@ -36,7 +36,7 @@ impl ConeRoot {
     }
 
     /// Returns the end of a path whose evaluations are used up: the farthest place at which the
-    /// proxy is still pulled, from which the next way goes on; only where that is the start, the
+    /// proxy is still pulled, from which the next way continues; only where that is the start, the
     /// nearest place at which the cone holds.
     pub(super) fn so_far(&self) -> Option<f32> {
         let (low, _) = self.low;

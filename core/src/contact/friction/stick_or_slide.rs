@@ -97,7 +97,7 @@ pub(in crate::contact) struct Walk {
 }
 
 impl Walk {
-    /// Goes on to where friction holds.
+    /// Continues to where friction holds.
     pub(in crate::contact) fn advance<const D: usize>(
         &mut self,
         window: &Window<'_, D>,

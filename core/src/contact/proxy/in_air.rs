@@ -87,7 +87,7 @@ impl Contact {
         self.arrives(window, hip, swept, (Departures::None, 1.0), budget)
     }
 
-    /// Goes on with a path from an earlier tick, or off the surface.
+    /// Continues with a path from an earlier tick, or off the surface.
     #[inline(never)]
     pub(super) fn sweeps<const D: usize>(
         &mut self,

@@ -273,7 +273,7 @@ impl Contact {
                 rough.motion = Motion::Sticks;
             }
         }
-        // The viscous part of a motion ends with it: the proxy goes on though the HIP rests.
+        // The viscous part of a motion ends with it: the proxy continues though the HIP rests.
         let creeps = rough.friction.viscous_s > 0.0 && way != Some(0.0);
         self.at_rest &= rough.motion == Motion::Sticks && !creeps;
     }

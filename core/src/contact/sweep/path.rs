@@ -5,7 +5,7 @@
 //! distance, so a sweep of thousands of cells is as accurate as one of a tenth.
 //! Pieces are always the
 //! same halves of halves, so a sweep that runs out of budget or meets a missing tile
-//! goes on later to the same bits.
+//! continues later to the same bits.
 
 use heapless::Vec;
 
@@ -16,7 +16,7 @@ use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::{Altitude, GridPoint};
 use crate::terrain::{CellBox, CellContent, Window};
 
-/// Most columns, or rows, that a piece which is intersected cell by cell goes on
+/// Most columns, or rows, that a piece which is intersected cell by cell continues
 /// from its first: it is over nine cells at most, which a tick's budget is enough
 /// for.
 const WALK_CELLS: u32 = 4;

@@ -113,7 +113,7 @@ impl<'t, const D: usize> Window<'t, D> {
     }
 
     /// A tile has come into the slot of `index`: it settles if it is to, and the fallback was rendered
-    /// there. One that was there before goes on as it was.
+    /// there. One that was there before continues as it was.
     pub(super) fn has_come(&mut self, index: TileIndex, settles: bool, was_here: bool) {
         let (row, col) = TileBlend::<D>::slot(index);
         self.tile_blend.has_changed = self.fallback.is_wanted();

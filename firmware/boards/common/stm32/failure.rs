@@ -41,7 +41,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 
 /// Switches off without a stack, because the fault may be that there is none left. ARM's
 /// manual (DDI 0337, 5.12.1) has the handler run even where its frame could not be
-/// written. Then it goes on on a fresh stack, which is the old one's memory: what the
+/// written. Then it continues on a fresh stack, which is the old one's memory: what the
 /// frame says is read before. The floating-point unit discards the registers
 /// that it still owes that frame.
 #[unsafe(naked)]
@@ -83,7 +83,7 @@ unsafe extern "C" fn HardFault() -> ! {
     )
 }
 
-/// Goes on after a hard fault at `pc`, called from about `lr` (both zero where no frame
+/// Continues after a hard fault at `pc`, called from about `lr` (both zero where no frame
 /// was left), with the stack pointer at `sp`.
 extern "C" fn after_hard_fault(pc: u32, lr: u32, sp: u32) -> ! {
     // SAFETY: reads of status registers, which have no side effect.

@@ -1,7 +1,7 @@
 //! The way into the USB loader in the chip's ROM: an update without a debug probe.
 //!
 //! The loader wants the chip as a reset leaves it. So the program leaves a mark in RAM
-//! and resets the chip, and the next start goes on to the loader before anything is set
+//! and resets the chip, and the next start continues to the loader before anything is set
 //! up. From the reset to the new program's own start no instruction of ours drives the
 //! enable pin: the pull-down outside holds the amplifiers off, as at every reset.
 //!

@@ -23,7 +23,7 @@ use crate::usb::EndpointHalts;
 /// Time for which the host has to fetch the answer before the board enters its loader.
 const FAREWELL: Duration = Duration::from_millis(50);
 
-/// Board for the link's task. A real board goes on ticking whatever
+/// Board for the link's task. A real board keeps ticking whatever
 /// the link does.
 struct Board {
     memory: CalibrationMemory,

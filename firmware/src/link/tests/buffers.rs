@@ -96,7 +96,7 @@ fn at(column: i32) -> QueuedTick {
 fn no_more_tiles_are_asked_for_than_there_are_buffers() {
     let (mut link, mut loop_ends) = link();
     let mut total = 0;
-    // The loop sleeps: no buffer comes back, wherever the HIP goes.
+    // The loop sleeps: no buffer returns, wherever the HIP goes.
     for column in 0..12 {
         assert!(loop_ends.records.enqueue(at(column)).is_ok());
         for key in asked(&mut link) {
@@ -107,7 +107,7 @@ fn no_more_tiles_are_asked_for_than_there_are_buffers() {
     assert_eq!(total, SPARES);
     let tiles = tiles_handed_over(&mut loop_ends);
     assert_eq!(tiles.len(), SPARES, "every answer found its buffer");
-    // It wakes: they come back, and asking goes on.
+    // It wakes: they return, and asking continues.
     for tile in tiles {
         tile.vacate();
         assert!(loop_ends.spent.enqueue(tile).is_ok());

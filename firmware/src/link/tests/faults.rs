@@ -27,7 +27,7 @@ fn undisturbed() -> Vec<(u32, hapterra_core::Vec3)> {
 #[test]
 fn another_protocol_is_refused_in_words_that_every_version_knows() {
     let mut rig = Rig::new();
-    // A host of protocol 3 says its hello and goes on in its own tongue.
+    // A host of protocol 3 says its hello and continues in its own tongue.
     rig.send(&asked(3));
     rig.send(&[1, 7, 0, 0]);
     rig.run(3);

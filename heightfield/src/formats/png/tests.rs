@@ -48,7 +48,7 @@ fn an_opaque_colour_picture_is_not_a_height_field() {
         open(&opaque, None),
         Err(RasterError::AmbiguousChannels(_))
     ));
-    // Unless the user says so.
+    // Unless the user states it.
     assert_eq!(
         open(&opaque, Some(PngChannel::Alpha)).expect("heights"),
         [255.0; 4]

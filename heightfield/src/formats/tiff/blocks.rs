@@ -392,7 +392,7 @@ impl Image {
             .map(|tag| &tag.value)
     }
 
-    /// Returns true if it lies where another image lies, as far as it says so: most overviews do not.
+    /// Returns true if it lies where another image lies, as far as it states it: most overviews do not.
     fn has_place_of(&self, full: &Self, times: [f64; 2]) -> bool {
         const PIXEL_SCALE: u16 = 33550;
         const TIE_POINTS: u16 = 33922;

@@ -16,7 +16,7 @@ pub const LOADER_VENDOR_ID: u16 = 0x0483;
 /// See [`LOADER_VENDOR_ID`].
 pub const LOADER_PRODUCT_ID: u16 = 0xDF11;
 
-/// Time that a control transfer may take. An erase goes on behind its transfer.
+/// Time that a control transfer may take. An erase continues behind its transfer.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Beginning of the description of its flash.
 const FLASH: &str = "@Internal Flash";

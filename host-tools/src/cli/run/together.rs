@@ -10,7 +10,7 @@ use crate::cli::failure::Failure;
 ///
 /// # Errors
 /// That of the one device. Of several, each that failed, by its name; it was reported when it
-/// failed, too, because others may go on for long after it.
+/// failed, too, because others may continue for long after it.
 pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failure> {
     if servings.len() == 1
         && let Some(only) = servings.pop()

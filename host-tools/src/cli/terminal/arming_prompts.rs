@@ -1,5 +1,5 @@
 //! Arming while a terrain is served: says what keeps the arm from it, and takes
-//! Enter for "go on": clear the fault, zero the arm, ask to arm.
+//! Enter for "continue": clear the fault, zero the arm, ask to arm.
 //!
 //! Enter answers the question that was shown last, and nothing else: what was typed before
 //! it is forgotten, and a fault that came after it is shown first. A program that answers for its
@@ -91,7 +91,7 @@ pub(in crate::cli) struct ArmingPrompts {
     /// Number of the question that was asked last.
     number: u32,
     report: Option<Report>,
-    /// The device has come back: its first report tells whether the arm is armed.
+    /// The device has returned: its first report tells whether the arm is armed.
     is_back: bool,
     /// Enter was pressed with the arm in its zero pose: its counts are asked for.
     zeroing: bool,

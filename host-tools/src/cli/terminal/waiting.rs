@@ -70,7 +70,7 @@ fn at_bottom(line: impl Fn() -> String, goes_on: impl Fn(Duration) -> bool) {
     bar.finish_and_clear();
 }
 
-/// `goes_on` waits for so long, and tells whether the work goes on.
+/// `goes_on` waits for so long, and tells whether the work continues.
 fn in_lines(
     line: impl Fn() -> String,
     goes_on: impl Fn(Duration) -> bool,

@@ -6,7 +6,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 /// A line of more bytes is none; rows take some hundred.
 const LONGEST: usize = 1 << 20;
 
-/// A stream that fails where a line goes on and on.
+/// A stream that fails where a line has no end.
 pub(super) struct Bounded<R> {
     stream: R,
     /// Bytes since the last line ended.

@@ -76,7 +76,7 @@ impl RecordingRows {
         })
     }
 
-    /// With which settings it was recorded, where it says so.
+    /// The settings with which it was recorded, if it has them.
     #[must_use]
     pub const fn settings(&self) -> Option<&Settings> {
         self.trajectory.settings()
