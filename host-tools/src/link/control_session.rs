@@ -13,9 +13,9 @@ use hapterra_core::wire::status::Status;
 
 use super::error::LinkError;
 use super::host_protocol::{HostProtocol, ProtocolEvent, State};
+use super::host_request::HostRequest;
 use super::line::{LOOK, Line};
 use super::messages::{FromDevice, from_device, next_frame};
-use super::request_queue::HostRequest;
 use super::timeouts::Timeouts;
 use super::transport::Transport;
 

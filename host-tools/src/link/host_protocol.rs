@@ -13,8 +13,9 @@ use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
 use super::error::LinkError;
+use super::host_request::HostRequest;
 use super::messages::append;
-use super::request_queue::{HostRequest, RequestQueue};
+use super::request_queue::RequestQueue;
 use super::timeouts::Timeouts;
 
 /// State of the session.

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! - `host_protocol`: the host's states of [`hapterra_core::wire`], without I/O and without a clock;
-//!   `request_queue`: the host's requests, repeated until they are answered.
+//!   `host_request` and `request_queue`: the host's requests, repeated until they are answered.
 //! - [`Client`] serves a terrain by that protocol, and [`Session`] runs it over a [`Transport`]. The
 //!   device requests tiles and the host answers, so a new session needs nothing from the one before:
 //!   either end may fail and reconnect.
@@ -26,6 +26,7 @@ mod device_address;
 mod emulator;
 mod error;
 mod host_protocol;
+mod host_request;
 mod line;
 mod link_stats;
 mod messages;
@@ -51,10 +52,10 @@ pub use emulator::{
 };
 pub use error::LinkError;
 pub use host_protocol::State;
+pub use host_request::HostRequest;
 pub use link_stats::LinkStats;
 pub use native::{FaultInjector, HostClock, Native};
 pub use plant_line::{move_arm_while, serve_plant};
-pub use request_queue::HostRequest;
 pub use session::Session;
 pub use tcp::Tcp;
 pub use timeouts::Timeouts;

@@ -2,35 +2,13 @@
 //! ends.
 
 use std::collections::VecDeque;
-use std::mem::discriminant;
 use std::time::Duration;
 
 use hapterra_core::wire::message::ToDevice;
 use hapterra_core::wire::request::Request;
 
+use super::host_request::HostRequest;
 use super::timeouts::Timeouts;
-
-/// A host's request, repeated until it is answered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum HostRequest {
-    /// An action, executed once.
-    Request(Request),
-    /// The device's status.
-    Status,
-    /// The calibration in force.
-    Calibration,
-}
-
-impl HostRequest {
-    /// Returns true if both are of the same kind. Equality would not do: a NaN in a request equals
-    /// nothing.
-    pub(super) fn is_like(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Request(one), Self::Request(two)) => discriminant(one) == discriminant(two),
-            _ => discriminant(self) == discriminant(other),
-        }
-    }
-}
 
 /// Pending request.
 #[derive(Clone, Copy, Debug)]

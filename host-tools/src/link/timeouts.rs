@@ -6,7 +6,7 @@ use hapterra_core::wire::request::Request;
 use hapterra_core::wire::session::{DEFAULT_SILENCE_S, ONLY_LOOKS};
 use hapterra_core::wire::status::PRESS_MS;
 
-use super::request_queue::HostRequest;
+use super::host_request::HostRequest;
 
 /// The times of the table in [`hapterra_core::wire`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
