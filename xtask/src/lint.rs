@@ -51,7 +51,7 @@ pub(crate) fn lint() -> Result<()> {
     timed("documentation", || {
         let mut command = cargo();
         command
-            .args(["doc", "--workspace", "--no-deps"])
+            .args(["doc", "--workspace", "--no-deps", "--features=hapterra/probe"])
             .env("RUSTDOCFLAGS", "-D warnings");
         run(&mut command)
     })

@@ -18,7 +18,7 @@ pub const COLUMNS: [(&[&str], &str); 12] = [
     (&["contact"], "1 in contact, else 0"),
     (
         &["proxy_x_mm", "proxy_y_mm", "proxy_z_mm"],
-        "the proxy; the HIP without contact",
+        "the proxy; without contact, the HIP",
     ),
     (
         &["force_x_n", "force_y_n", "force_z_n"],
