@@ -51,7 +51,12 @@ pub(crate) fn lint() -> Result<()> {
     timed("documentation", || {
         let mut command = cargo();
         command
-            .args(["doc", "--workspace", "--no-deps", "--features=hapterra/probe"])
+            .args([
+                "doc",
+                "--workspace",
+                "--no-deps",
+                "--features=hapterra/probe",
+            ])
             .env("RUSTDOCFLAGS", "-D warnings");
         run(&mut command)
     })
