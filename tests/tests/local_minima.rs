@@ -1,5 +1,5 @@
 //! Random walks judged a second time: by a list of all places a proxy may rest
-//! (`hapterra_tests::minima`), and by looking densely at the HIP paths.
+//! (`hapterra_tests::local_minima`), and by looking densely at the HIP paths.
 
 use hapterra::terrain::{HapticCells, HapticGrid};
 use hapterra_core::contact::ContactState;

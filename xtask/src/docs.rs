@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::run::{OF_TESTS, cargo, on_path, root, run, say, timed};
 
 /// Programs that test the pages.
-const TESTS: [&str; 4] = ["--test", "reference", "--test", "docs"];
+const TESTS: [&str; 4] = ["--test", "reference_pages", "--test", "docs"];
 
 /// Compares the generated pages with the code, or writes them; checks figures, links and tables of
 /// all pages; builds the book where mdBook is installed. Command lines are run by `cargo xtask test`.

@@ -15,12 +15,12 @@ use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_core::wire::session::{LastSession, SessionNumber};
 use hapterra_core::wire::status::Status;
 
-use super::ahead::{self, Ahead};
 use super::error::LinkError;
 use super::host_protocol::{HostProtocol, ProtocolEvent, State};
 use super::host_request::HostRequest;
 use super::link_stats::LinkStats;
 use super::messages::{FromDevice, from_device, next_frame};
+use super::prefetch::{self, Prefetch};
 use super::timeouts::Timeouts;
 use crate::materials::{MaterialBuffer, Materials};
 use crate::terrain::{Terrain, TileBuffer};
@@ -136,8 +136,8 @@ pub struct Client<'t> {
     sent: Vec<TileKey>,
     /// Tiles whose heights have not come yet from elsewhere, and when they were asked for.
     awaited: Vec<(TileKey, Duration)>,
-    /// Ground ahead of the HIP.
-    ahead: Ahead,
+    /// Tiles ahead of the HIP.
+    prefetch: Prefetch,
     zeroing: bool,
     /// The pending point of a replay, and the time at which it was sent.
     point: Option<(HipCommand, Duration)>,
@@ -201,7 +201,7 @@ impl<'t> Client<'t> {
             withheld: vec![],
             sent: vec![],
             awaited: vec![],
-            ahead: Ahead::default(),
+            prefetch: Prefetch::default(),
             zeroing: false,
             point: None,
             tally: LinkStats::default(),
@@ -246,7 +246,7 @@ impl<'t> Client<'t> {
         self.is_new = true;
         self.withheld.clear();
         self.awaited.clear();
-        self.ahead.forget();
+        self.prefetch.forget();
         self.zeroing = false;
         if self.talk.greet(now, out) {
             self.tally.drawn();
@@ -274,7 +274,7 @@ impl<'t> Client<'t> {
         terrain: Terrain<'t>,
         out: &mut Vec<u8>,
     ) {
-        ahead::read_around(&terrain, &view.hip);
+        prefetch::read_around(&terrain, &view.hip);
         self.next = Some((view, terrain));
         self.talk.put_view(view, now, out);
     }
@@ -290,7 +290,7 @@ impl<'t> Client<'t> {
             if taken {
                 self.scene = view.scene;
                 self.awaited.clear();
-                self.ahead.forget();
+                self.prefetch.forget();
                 self.terrain = Lent::SceneChange(Box::new(terrain));
             }
             on(Event::Viewed { view: &view, taken });
@@ -499,7 +499,7 @@ impl<'t> Client<'t> {
                 if self.tally.received(&telemetry) && !self.is_new {
                     if let (Some(device), Some(last)) = (&self.device, telemetry.samples.last()) {
                         let tick_hz = f64::from(device.tick_hz);
-                        self.ahead
+                        self.prefetch
                             .follow(&self.terrain, last.tick, &last.hip, tick_hz);
                     }
                     telemetry.samples.iter().for_each(|s| on(Event::Sample(s)));

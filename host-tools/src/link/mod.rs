@@ -11,6 +11,7 @@
 //! - [`Client`] serves a terrain by that protocol, and [`Session`] runs it over a [`Transport`]. The
 //!   device requests tiles and the host answers, so a new session needs nothing from the one before:
 //!   either end may fail and reconnect.
+//! - `prefetch` reads the tiles ahead of the HIP before the device requests them.
 //! - [`ControlSession`] sends queries and requests without a terrain: status, calibration, arming.
 //! - Transports are [`Tcp`], [`Usb`], and [`Native`], a device in this
 //!   program's memory; [`DeviceAddress`] is how a user names one.
@@ -18,7 +19,6 @@
 //! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual
 //!   Phantom at its second line.
 
-mod ahead;
 mod bulk;
 mod client;
 mod control_session;
@@ -32,6 +32,7 @@ mod link_stats;
 mod messages;
 mod native;
 mod plant_line;
+mod prefetch;
 mod request_queue;
 mod session;
 mod tcp;

@@ -1,5 +1,6 @@
 //! Invariants of every tick, on any terrain, for any path of the HIP. They are checked
-//! in f64, by methods that are none of the product's.
+//! in f64, by methods that are none of the product's: in `tests/tests/properties.rs`, `quick_soak.rs`
+//! and `cargo xtask soak`. `tests/tests/oracles.rs` shows that each can fail.
 //!
 //! [`oracle`] lists the invariants in the order in which they are checked; [`material`] checks the
 //! forces of a scene with materials. [`observed_tick`] is one tick as the oracle sees it. `single_tick`,

@@ -1,34 +1,34 @@
-//! The HIP's extrapolated path, and the tiles that it needs.
+//! Prefetch of the tiles that the HIP's extrapolated path needs.
 
 use hapterra_core::grid::GridPoint;
 use hapterra_core::terrain::TILE_CELLS;
 
 use crate::terrain::Terrain;
 
-/// So far ahead is looked, seconds: longer than a server at a distance takes to answer.
+/// Time ahead of the HIP, seconds: longer than the answer of a distant server takes.
 const AHEAD_S: f64 = 0.5;
-/// Between two looks, seconds: of what moves, positions of one tick tell little of the speed.
+/// Time between two positions, seconds: positions of adjacent ticks give no useful speed.
 const BETWEEN_S: f64 = 0.05;
-/// Tiles each way beyond the one under the HIP, at most. A HIP that is faster is not
-/// caught up with: what it has passed when it comes is not asked for.
+/// Max distance from the HIP's tile, tiles. For a faster HIP nothing is prefetched: the tiles would
+/// arrive after it has passed them.
 const MAX_TILES: i32 = 8;
 
-/// Follows the HIP, and has what lies before it read.
+/// Follows the HIP, and prefetches the tiles ahead of it.
 #[derive(Debug, Default)]
-pub(super) struct Ahead {
-    /// A tick, and where the HIP was.
+pub(super) struct Prefetch {
+    /// A tick, and the HIP's position in it.
     was: Option<(u32, GridPoint)>,
-    /// First and last tile of what was asked for, east and north.
-    asked: Option<[[i32; 2]; 2]>,
+    /// First and last prefetched tile, east and north.
+    prefetched: Option<[[i32; 2]; 2]>,
 }
 
-impl Ahead {
-    /// The scene is another, or the device is.
+impl Prefetch {
+    /// Begins anew, for another scene or another device.
     pub(super) fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// Takes where the HIP is at a tick, of which there are so many a second.
+    /// Takes the HIP's position in a tick, at `tick_hz` ticks a second.
     pub(super) fn follow(
         &mut self,
         terrain: &Terrain<'_>,
@@ -48,7 +48,7 @@ impl Ahead {
         let Some(tiles) = tiles(&was, hip, AHEAD_S / since) else {
             return;
         };
-        if self.asked.replace(tiles) != Some(tiles) {
+        if self.prefetched.replace(tiles) != Some(tiles) {
             let cells = |tile: i32| tile.saturating_mul(TILE_CELLS as i32);
             let [from, to] = tiles;
             let to = to.map(|tile| cells(tile.saturating_add(1)));
@@ -57,7 +57,7 @@ impl Ahead {
     }
 }
 
-/// Has the tiles around a HIP read that is about to be there.
+/// Prefetches the tiles around a HIP's next position.
 pub(super) fn read_around(terrain: &Terrain<'_>, hip: &GridPoint) {
     let [east, north, _] = hip.cell();
     let tile = TILE_CELLS as i32;
@@ -68,8 +68,8 @@ pub(super) fn read_around(terrain: &Terrain<'_>, hip: &GridPoint) {
     terrain.prefetch(from, to);
 }
 
-/// First and last tile, east and north, from the one under the HIP to where it will be after
-/// `times` as long as it took from `was`; `None` where it is too fast.
+/// Returns the first and last tile, east and north, between the HIP and its position after `times`
+/// the time since `was`; `None` if it is too fast.
 fn tiles(was: &GridPoint, is: &GridPoint, times: f64) -> Option<[[i32; 2]; 2]> {
     let along = |axis: usize| {
         let at = |point: &GridPoint| f64::from(point.cell()[axis]) + f64::from(point.frac()[axis]);
