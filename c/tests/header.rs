@@ -8,7 +8,7 @@ fn header_is_that_of_the_sources() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(folder.join("cbindgen.toml")).expect("settings");
     let mut builder = cbindgen::Builder::new().with_config(config);
-    for file in ["status", "surface", "terrain", "contact", "memory"] {
+    for file in ["status", "surface_params", "terrain", "contact", "memory"] {
         builder = builder.with_src(folder.join(format!("src/{file}.rs")));
     }
     let mut made = vec![];
