@@ -15,7 +15,7 @@ use super::finding::Finding;
 use super::halt::Halt;
 use crate::link::{ControlSession, LinkError};
 
-/// Time between two status requests, ms of the board's time.
+/// Duration of a look, the interval of status requests, ms of the board's time.
 const LOOK_MS: u32 = 100;
 /// Time limit for the board to detect a user's action, in looks.
 const LOOKS: usize = 600;
@@ -57,11 +57,11 @@ impl<'d, 't> Board<'d, 't> {
         Ok(self.control.calibration()?)
     }
 
-    /// Returns the status after a look, or as soon as `on` returns true for a sample. Sends the
-    /// flat tiles that the board requests.
+    /// Returns the status after `LOOK_MS` (one look), or as soon as `on` returns true for a sample.
+    /// Sends the flat tiles that the board requests.
     ///
     /// # Errors
-    /// [`Halt::Link`].
+    /// [`Halt::Stopped`], [`Halt::Link`].
     pub(super) fn look_until(
         &mut self,
         on: &mut dyn FnMut(&TickRecord) -> bool,
@@ -93,7 +93,7 @@ impl<'d, 't> Board<'d, 't> {
         Ok(passed?)
     }
 
-    /// Returns the status after a look; calls `on` for each sample.
+    /// Returns the status after one look; calls `on` for each sample.
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].
@@ -104,10 +104,10 @@ impl<'d, 't> Board<'d, 't> {
         })
     }
 
-    /// Returns the status after a look.
+    /// Returns the status after one look.
     ///
     /// # Errors
-    /// [`Halt::Link`].
+    /// [`Halt::Stopped`], [`Halt::Link`].
     pub(super) fn look(&mut self) -> Result<Status, Halt> {
         self.look_with(&mut |_| {})
     }

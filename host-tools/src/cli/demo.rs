@@ -48,7 +48,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: Option<PathBuf>,
 
-    /// Statements about the file that it does not make itself.
+    /// Properties that the file does not state.
     #[command(flatten)]
     pub reading: ReadingOptions,
 
@@ -72,7 +72,7 @@ pub struct Args {
           value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub rounds: u32,
 
-    /// Which part of it.
+    /// Place and scale of the terrain.
     #[command(flatten)]
     pub placing: Placing,
 
@@ -84,7 +84,7 @@ pub struct Args {
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// Commands that change the placement meanwhile.
+    /// Commands that change the placement during the session.
     #[command(flatten)]
     pub commands: Commands,
 

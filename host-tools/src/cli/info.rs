@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath, required_unless_present = "formats")]
     pub file: Option<PathBuf>,
 
-    /// Statements about the file that it does not make itself.
+    /// Properties that the file does not state.
     #[command(flatten)]
     pub reading: ReadingOptions,
 

@@ -88,7 +88,7 @@ pub struct Args {
     #[arg(long)]
     pub unchecked: bool,
 
-    /// Which part of the terrain.
+    /// Place and scale of the terrain.
     #[command(flatten)]
     pub placing: Placing,
 
@@ -100,7 +100,7 @@ pub struct Args {
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// Commands that change the placement meanwhile.
+    /// Commands that change the placement during the session.
     #[command(flatten)]
     pub commands: Commands,
 

@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub terrain: Option<PathBuf>,
 
-    /// Statements about the terrain file that it does not make itself.
+    /// Properties that the terrain file does not state.
     #[command(flatten)]
     pub reading: ReadingOptions,
 
@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "OUT.rrd", value_hint = ValueHint::FilePath)]
     pub rrd: Option<PathBuf>,
 
-    /// Rendering of the terrain, where the recording does not state it.
+    /// Rendering of the terrain, if the recording does not state it.
     #[command(flatten)]
     pub rendering: Rendering,
 }

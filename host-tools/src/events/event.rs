@@ -46,7 +46,7 @@ pub enum Event<'e> {
     },
     /// The placement changed.
     View {
-        /// The view, counted from 0.
+        /// Number of the placement, from 0.
         view: usize,
         /// Level of detail: every 2^level-th sample.
         level: u8,
@@ -78,7 +78,7 @@ pub enum Event<'e> {
         state: &'static str,
         /// Mode, as in the column `mode`.
         mode: &'static str,
-        /// The view, counted from 0.
+        /// Number of the placement, from 0.
         view: usize,
     },
     /// Instructions for arming.

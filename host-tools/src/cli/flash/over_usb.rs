@@ -102,7 +102,7 @@ fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
         .or_hint("disarm it (`hapterra status --disarm`) and try again; firmware without this request is flashed through the debug probe once")
 }
 
-/// Calls `look` until it finds something, at most for [`REAPPEARS`].
+/// Calls `look` until it finds something, at most for `REAPPEARS`.
 fn wait_for<T>(
     mut look: impl FnMut() -> Result<Option<T>, UpdateError>,
 ) -> Result<Option<T>, UpdateError> {

@@ -133,7 +133,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         RasterError::AllNoData { .. } => {
             "check that the file covers your area, or name another no-data value with --input no-data=VALUE"
         }
-        // Only GDAL's formats have a checksum command.
+        // `gdalinfo -checksum` works only for formats that GDAL reads.
         RasterError::AbsurdSize(_) | RasterError::Damaged(_) | RasterError::Truncated(_)
             if !is_known_to_gdal(path) =>
         {

@@ -61,7 +61,7 @@ impl LinkFigures {
         for at in (0..columns * rows).step_by(stride) {
             let key = TileKey::new(0, (at % columns) as i32, (at / columns) as i32);
             match terrain.tile(key, &mut buffer) {
-                // A tile that a server did not send is no sample of the others.
+                // A tile that a server did not send has no size to include.
                 Some((_, ReadStatus::Pending)) => unread += 1,
                 None | Some((Heights::Hole | Heights::Flat { .. }, _)) => others += 1,
                 Some((heights, _)) => {

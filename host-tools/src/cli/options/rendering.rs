@@ -46,7 +46,7 @@ pub struct Rendering {
           value_parser = |text: &str| LENGTH.read_within(text, TIPS_MM))]
     pub tip: Option<f64>,
 
-    /// Its surface.
+    /// Surface of the terrain.
     #[command(flatten)]
     pub surface: SurfaceOptions,
 }

@@ -32,7 +32,7 @@ pub struct TerrainFile {
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
-    /// Statements about the file that it does not make itself.
+    /// Properties that the file does not state.
     #[command(flatten)]
     pub reading: ReadingOptions,
 }

@@ -97,8 +97,7 @@ impl Keyboard {
         while self.is_typed && self.lines.try_recv().is_ok() {}
     }
 
-    /// Returns true if a line was typed, or Enter pressed, since the last call; false without
-    /// input.
+    /// Returns true if a line was typed, or Enter pressed, since the last call; false for a pipe.
     pub(in crate::cli) fn was_pressed(&mut self) -> bool {
         self.sort();
         let pressed = mem::take(&mut self.enters) > 0;
