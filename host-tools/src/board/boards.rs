@@ -1,15 +1,15 @@
-//! The boards that there is firmware for.
+//! The boards that have firmware.
 
 use super::memories::Memories;
 
-/// A board that there is firmware for.
+/// A board that has firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Board {
-    /// Its name, which is also its image's.
+    /// The board's name and the name of its image.
     pub name: &'static str,
-    /// Name of its chip in probe-rs; none for a board that is only emulated.
+    /// Name of the chip in probe-rs; `None` for a board that is only emulated.
     pub chip: Option<&'static str>,
-    /// The memories of that chip.
+    /// The chip's memories.
     pub memories: Option<Memories>,
     /// Chip, role and connection, for lists of boards.
     pub what: &'static str,
@@ -58,7 +58,7 @@ impl Board {
         }
     }
 
-    /// The board called `name`.
+    /// Returns the board called `name`.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         BOARDS.iter().find(|board| board.name == name)

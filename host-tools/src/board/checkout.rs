@@ -1,4 +1,4 @@
-//! The source of the firmware, where this program was built from it.
+//! The firmware's source, if this program was built from it.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ pub struct Checkout {
     root: PathBuf,
 }
 
-/// An image could not be built.
+/// Error of an image's build.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// Cargo cannot be started.
@@ -24,19 +24,19 @@ pub enum BuildError {
         #[source]
         source: io::Error,
     },
-    /// It ended without an image; it has printed the reason.
+    /// Cargo ended without an image; it has printed the reason.
     #[error("`cargo xtask image {board}` in {} failed", root.display())]
     Failed {
-        /// The board.
+        /// The board to build for.
         board: &'static str,
-        /// Place where it was built.
+        /// Folder of the build.
         root: PathBuf,
     },
 }
 
 impl Checkout {
-    /// The checkout that this program was built from, where it is still there. Another one, as
-    /// around the working folder, may be a stranger's: what is built there is run there, too.
+    /// Returns the checkout that this program was built from, if it still exists. Other checkouts,
+    /// such as one around the working folder, are not trusted, because a build runs their code.
     #[must_use]
     pub fn own() -> Option<Self> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?;
@@ -47,16 +47,16 @@ impl Checkout {
         })
     }
 
-    /// Its folder.
+    /// Returns the checkout's folder.
     #[must_use]
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Builds the image of a board and gives the ELF's path.
+    /// Builds the image of a board and returns the ELF's path.
     ///
     /// # Errors
-    /// [`BuildError`]; what went wrong is on standard error.
+    /// [`BuildError`]; Cargo prints the details to standard error.
     pub fn build(&self, board: &Board) -> Result<PathBuf, BuildError> {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let output = Command::new(&cargo)

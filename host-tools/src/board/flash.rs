@@ -1,4 +1,4 @@
-//! An image onto a chip, through a debug probe.
+//! Writes an image to a chip through a debug probe.
 
 use probe_rs::Permissions;
 use probe_rs::config::{Registry, RegistryError};
@@ -9,16 +9,16 @@ use probe_rs::probe::{DebugProbeError, DebugProbeInfo, DebugProbeSelector};
 use super::boards::Board;
 use super::image::Image;
 
-/// An image was written.
+/// Result of a successful write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Flashed {
     /// The probe that was used.
     pub probe: String,
-    /// Bytes written, and read back to compare.
+    /// Bytes written and verified.
     pub bytes: usize,
 }
 
-/// Progress of writing, bytes over all phases.
+/// Progress of writing: bytes, summed over all phases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Bytes done.
@@ -27,36 +27,36 @@ pub struct Progress {
     pub of: u64,
 }
 
-/// Reason for which an image was not written.
+/// Error of writing an image.
 #[derive(Debug, thiserror::Error)]
 pub enum FlashError {
-    /// probe-rs does not know the chip.
+    /// probe-rs has no entry for the chip.
     #[error("the chip {0} is not known")]
     UnknownChip(&'static str, #[source] RegistryError),
     /// The board has no chip.
     #[error("{0} is emulated: there is no chip to write to")]
     Emulated(&'static str),
-    /// No probe at all.
+    /// No probe is connected.
     #[error("no debug probe: looked for ST-LINK, CMSIS-DAP, J-Link and other probes on USB")]
     NoProbe,
-    /// No probe has the name that was asked for.
+    /// No probe matches the requested name.
     #[error("no debug probe is {wanted}: there is {}", there.join(", "))]
     NoSuchProbe {
-        /// The name that was asked for.
+        /// The requested name.
         wanted: String,
-        /// The names of the probes that are there.
+        /// The names of the connected probes.
         there: Vec<String>,
     },
-    /// Several probes are there, and none was named.
+    /// Several probes are connected, and none was named.
     #[error("several debug probes: {}", .0.join(", "))]
     ManyProbes(Vec<String>),
-    /// The probe is there, but this user may not open it.
+    /// The probe is connected, but this user may not open it.
     #[error("the debug probe {0} is there, but this user may not open it")]
     Forbidden(String),
-    /// The name of a probe is not one.
+    /// The requested name is not a valid probe selector.
     #[error("{0} does not name a probe")]
     Selector(String),
-    /// The probe does not open.
+    /// The probe cannot be opened.
     #[error("the debug probe {name} does not open")]
     Probe {
         /// The probe.
@@ -65,7 +65,7 @@ pub enum FlashError {
         #[source]
         source: DebugProbeError,
     },
-    /// The chip does not answer.
+    /// The chip does not respond.
     #[error("{chip} does not answer at the debug probe {name}")]
     Chip {
         /// The probe.
@@ -76,7 +76,7 @@ pub enum FlashError {
         #[source]
         source: Box<probe_rs::Error>,
     },
-    /// The chip would not take the image.
+    /// The chip refused the image.
     #[error("{chip} did not take the image")]
     Write {
         /// The chip.
@@ -87,8 +87,8 @@ pub enum FlashError {
     },
 }
 
-/// Writes an image, compares what is in the chip then, and starts it. The chip is
-/// held in reset first, so that its pins let go of the amplifiers.
+/// Writes an image, verifies it and starts it. The chip is connected in reset, so that its pins
+/// release the amplifiers.
 ///
 /// # Errors
 /// [`FlashError`].
@@ -170,7 +170,7 @@ fn name(info: &DebugProbeInfo) -> String {
     format!("{vendor:04x}:{product:04x}{serial} ({})", info.identifier)
 }
 
-/// Adds up what probe-rs tells of each phase.
+/// Sums probe-rs' progress over the phases.
 fn phases<'p>(progress: &'p mut dyn FnMut(Progress)) -> impl FnMut(ProgressEvent) + 'p {
     let mut at = Progress { done: 0, of: 0 };
     move |event| {

@@ -1,5 +1,4 @@
-//! An image as what has to be where in the chip, held against the memories that
-//! the chip has, before anything is touched.
+//! Parts of an image with their addresses, checked against the chip's memories before any write.
 
 use std::io;
 use std::ops::Range;
@@ -13,7 +12,7 @@ use super::boards::Board;
 use super::memories::Memories;
 use heightfield::regular_file;
 
-/// No ELF of a board is larger, also with all that a debugger wants.
+/// Size limit of an ELF; one with debug information is smaller.
 const MAX_BYTES: u64 = 256 << 20;
 
 /// An image that fits its chip.
@@ -22,11 +21,11 @@ pub struct Image {
     pub(super) memories: Memories,
     /// Parts for the chip's flash.
     pub(super) parts: Vec<Part>,
-    /// Its memories, for people.
+    /// The memories used, for the user's information.
     pub placed: Vec<Placed>,
 }
 
-/// Bytes for an address.
+/// Bytes and their address.
 #[derive(Debug)]
 pub(super) struct Part {
     pub(super) address: u64,
@@ -36,15 +35,15 @@ pub(super) struct Part {
 /// Part of an image in one of its chip's memories.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Placed {
-    /// First address and the one past the last of the memory.
+    /// The memory's first address and the one past its last.
     pub memory: Range<u64>,
-    /// True if it keeps its content without power.
+    /// True if the memory keeps its content without power.
     pub is_flash: bool,
-    /// Bytes taken.
+    /// Bytes used.
     pub bytes: u64,
 }
 
-/// Reason for which a file is no image for a board.
+/// Error of reading an image for a board.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The board has no chip.
@@ -59,15 +58,15 @@ pub enum ImageError {
         #[source]
         source: io::Error,
     },
-    /// It is not a program for a Cortex-M.
+    /// The file is not a program for a Cortex-M.
     #[error("{} is no image for a board: {why}", path.display())]
     NoImage {
         /// The file.
         path: PathBuf,
-        /// Fault of the file.
+        /// Defect of the file.
         why: String,
     },
-    /// Part of it would lie where the chip has no memory of that kind.
+    /// Part of the image lies where the chip has no memory of that kind.
     #[error(
         "{} is not for {chip}: {bytes} bytes of it belong at {address:#010x}, where that chip has no {memory}",
         path.display()
@@ -77,14 +76,14 @@ pub enum ImageError {
         path: PathBuf,
         /// The chip.
         chip: String,
-        /// Place where the part begins.
+        /// First address of the part.
         address: u64,
         /// Length of the part, bytes.
         bytes: u64,
         /// Flash or RAM.
         memory: &'static str,
     },
-    /// It was built for another board, or bears no board's mark.
+    /// The image was built for another board, or names no board.
     #[error(
         "{} is not for {board}: {}",
         path.display(),
@@ -93,24 +92,24 @@ pub enum ImageError {
     OtherBoard {
         /// The file.
         path: PathBuf,
-        /// The board it should be for.
+        /// The expected board.
         board: &'static str,
-        /// The board it names.
+        /// The board that the image names.
         found: Option<String>,
     },
 }
 
 impl Image {
-    /// The memories of the chip that it is for.
+    /// Returns the memories of the image's chip.
     #[must_use]
     pub const fn memories(&self) -> &Memories {
         &self.memories
     }
 
-    /// Reads an ELF and holds it against the memories of the board's chip.
+    /// Reads an ELF and checks it against the memories of the board's chip.
     ///
     /// # Errors
-    /// [`ImageError`]: what does not fit.
+    /// [`ImageError`].
     pub fn read(board: &Board, path: &Path) -> Result<Self, ImageError> {
         let (Some(chip), Some(memories)) = (board.chip, board.memories) else {
             return Err(ImageError::Emulated(board.name));
@@ -130,7 +129,7 @@ impl Image {
             bytes: stray.bytes,
             memory: if stray.in_flash { "flash" } else { "RAM" },
         })?;
-        // Of two chips that hold it both, the wiring still differs.
+        // The wiring can differ even if the image fits both chips.
         match mark.as_deref() == Some(board.name) {
             true => Ok(image),
             false => Err(ImageError::OtherBoard {
@@ -142,14 +141,14 @@ impl Image {
     }
 }
 
-/// Beginning of the symbol's name that `firmware/build.rs` gives an image, and goes
-/// on with the board's name, its dashes as underscores.
+/// Prefix of the symbol that `firmware/build.rs` adds to an image. The board's name follows, with
+/// underscores for dashes.
 const MARK: &str = "hapterra.board.";
 
 /// Contents of an ELF.
 struct Contents {
     segments: Vec<Segment>,
-    /// The board that it says it is for.
+    /// The board that the ELF names.
     mark: Option<String>,
 }
 
@@ -174,7 +173,7 @@ fn mark(header: &FileHeader32<LittleEndian>, elf: &[u8]) -> Option<String> {
     })
 }
 
-/// A loaded segment: where it runs, where it is loaded from, what is in it.
+/// A loaded segment: its address at run time, its load address and its bytes.
 struct Segment {
     runs: u64,
     in_memory: u64,
@@ -241,7 +240,7 @@ fn place(memories: Memories, segments: Vec<Segment>) -> Result<Image, Stray> {
     };
     for segment in &segments {
         take(segment.loaded, segment.bytes.len() as u64, true)?;
-        // What runs where it is loaded is in flash already.
+        // A segment that runs at its load address is already in flash.
         if segment.runs != segment.loaded || segment.bytes.is_empty() {
             take(segment.runs, segment.in_memory, false)?;
         }

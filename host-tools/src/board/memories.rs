@@ -1,6 +1,6 @@
-//! The chips' memories, as far as an image is held against them.
+//! The chips' memories, to check images.
 //!
-//! From ST's reference manuals RM0440 and RM0433; a test compares these numbers with
+//! The numbers are from ST's reference manuals RM0440 and RM0433; a test compares them with
 //! probe-rs' registry.
 
 use std::ops::Range;
@@ -14,26 +14,25 @@ pub struct Memories {
     pub flash: u64,
     /// Bytes of flash.
     pub flash_bytes: u64,
-    /// Bytes that are erased at once.
+    /// Bytes of the smallest erasable unit.
     pub page_bytes: u64,
-    /// Bytes that are written at once, with a check of their own.
+    /// Bytes of the smallest writable unit, which has its own check bits.
     pub word_bytes: u64,
-    /// Bytes at the beginning of flash that an image may use; behind them are the
-    /// calibrations.
+    /// Bytes at the beginning of flash that an image may use; the calibrations follow.
     pub image_bytes: u64,
-    /// RAM: first address and bytes of each block; neighbours are one block.
+    /// RAM: first address and bytes of each block; adjacent memories are one block.
     pub ram: &'static [(u64, u64)],
 }
 
 impl Memories {
-    /// STM32G474RE, with two banks, as it is sold.
+    /// STM32G474RE with two banks, as delivered.
     pub const G474: Self = Self {
         flash: 0x0800_0000,
         flash_bytes: 512 * KIB,
         page_bytes: 2 * KIB,
         word_bytes: 8,
         image_bytes: 508 * KIB,
-        // CCM RAM, and SRAM1, SRAM2 and CCM again behind them.
+        // CCM RAM; then SRAM1, SRAM2 and CCM again as one block.
         ram: &[(0x1000_0000, 32 * KIB), (0x2000_0000, 128 * KIB)],
     };
 
@@ -54,19 +53,19 @@ impl Memories {
         ],
     };
 
-    /// All addresses of flash.
+    /// Returns all addresses of flash.
     #[must_use]
     pub const fn all_flash(&self) -> Range<u64> {
         self.flash..self.flash + self.flash_bytes
     }
 
-    /// The addresses of flash that an image may use.
+    /// Returns the addresses of flash that an image may use.
     #[must_use]
     pub const fn for_image(&self) -> Range<u64> {
         self.flash..self.flash + self.image_bytes
     }
 
-    /// The memory that holds all of a range, if one does.
+    /// Returns the memory that contains a whole range, if one does.
     #[must_use]
     pub fn holding(&self, address: u64, bytes: u64, in_flash: bool) -> Option<Range<u64>> {
         let end = address.checked_add(bytes)?;

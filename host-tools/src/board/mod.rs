@@ -1,6 +1,5 @@
-//! The boards the firmware is built for, and what of them is here: their USB
-//! links, debug probes, their images, and the ways of an image onto a chip: through
-//! the loader in the chip's ROM and, with the feature `probe`, through a debug probe.
+//! The firmware's boards: their USB links, debug probes and images. An image is written through the
+//! loader in the chip's ROM or, with the feature `probe`, through a debug probe.
 
 mod boards;
 mod checkout;

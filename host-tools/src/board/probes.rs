@@ -1,18 +1,18 @@
-//! Debug probes that are plugged in, known by their USB numbers: that needs no
-//! driver and no rights, and tells a probe that cannot be opened from none.
+//! Connected debug probes, found by their USB numbers. This needs no driver and no rights, so that
+//! a probe that cannot be opened is distinguished from none.
 
 /// A debug probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Probe {
-    /// Which kind of probe.
+    /// Kind of the probe.
     pub kind: &'static str,
-    /// Its own name, if it has one.
+    /// The probe's own name, if it has one.
     pub name: Option<String>,
-    /// As probe-rs and `hapterra flash --probe` take it: `VID:PID[:SERIAL]`.
+    /// Selector for probe-rs and `hapterra flash --probe`: `VID:PID[:SERIAL]`.
     pub selector: String,
 }
 
-/// ST's vendor number and the products that are ST-LINKs; every Nucleo has one.
+/// ST's vendor number and the product numbers of ST-LINKs; every Nucleo has one.
 const ST: u16 = 0x0483;
 const ST_LINKS: [u16; 10] = [
     0x3744, 0x3748, 0x374a, 0x374b, 0x374d, 0x374e, 0x374f, 0x3752, 0x3753, 0x3754,
@@ -20,7 +20,7 @@ const ST_LINKS: [u16; 10] = [
 /// SEGGER's vendor number.
 const SEGGER: u16 = 0x1366;
 
-/// Probes among the USB devices here, and how many USB devices there are.
+/// Returns the connected probes and the number of USB devices.
 #[must_use]
 pub fn probes() -> (Vec<Probe>, usize) {
     let devices = crate::link::usb_devices();
@@ -42,7 +42,7 @@ fn kind(vendor: u16, product: u16, name: Option<&str>) -> Option<&'static str> {
     match (vendor, name) {
         (ST, _) if ST_LINKS.contains(&product) => Some("ST-LINK"),
         (SEGGER, _) => Some("J-Link"),
-        // The standard asks for these words in the product string.
+        // CMSIS-DAP requires these words in the product string.
         (_, Some(name)) if name.contains("CMSIS-DAP") => Some("CMSIS-DAP"),
         _ => None,
     }
@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn probes_are_told_from_other_devices() {
         assert_eq!(kind(0x0483, 0x374e, None), Some("ST-LINK"));
-        // ST's virtual serial port of a user's own firmware.
+        // A user's own firmware with ST's virtual serial port.
         assert_eq!(kind(0x0483, 0x5740, Some("STM32 Virtual ComPort")), None);
         let pico = Some("Debug Probe (CMSIS-DAP)");
         assert_eq!(kind(0x2e8a, 0x000c, pico), Some("CMSIS-DAP"));

@@ -4,89 +4,89 @@ use std::fmt;
 
 use crate::calibrate::Direction;
 
-/// Who connects, turns, presses, measures and looks.
+/// The user's side of a bring-up: acts, measures and answers.
 pub trait Attendant {
     /// Receives a message.
     fn hear(&mut self, line: &str);
 
-    /// Is asked to do something that the board sees by itself.
+    /// Requests an action that the board detects by itself.
     fn begin(&mut self, task: Task);
 
-    /// Does something and says when it is done.
+    /// Requests an action and returns when it is done.
     ///
     /// # Errors
     /// [`Stopped`].
     fn finish(&mut self, task: Task) -> Result<(), Stopped>;
 
-    /// Reads something off a meter, a ruler or a scale.
+    /// Returns the reading of a meter, ruler or scale.
     ///
     /// # Errors
     /// [`Stopped`].
     fn read(&mut self, reading: Reading) -> Result<f64, Stopped>;
 
-    /// Says whether something is so.
+    /// Returns the answer to a yes-or-no question.
     ///
     /// # Errors
     /// [`Stopped`].
     fn confirms(&mut self, question: Question) -> Result<bool, Stopped>;
 
-    /// Tells whether the attendant wants to stop; asked before each look at the board.
+    /// Returns a function that is true if the attendant wants to stop; it is called before each
+    /// status request.
     fn stops(&self) -> fn() -> bool {
         || false
     }
 
-    /// The time that has passed on a clock beside the board since some moment; that of the
-    /// board itself is `board_ms`.
+    /// Returns the time since a fixed moment on a clock independent of the board, s. The board's
+    /// own time is `board_ms`.
     fn time_s(&self, board_ms: f64) -> f64;
 
-    /// Receives a change: the arm may be armed from now on, or is known to be disarmed.
+    /// Receives a change: the arm may be armed from now on, or is disarmed for certain.
     fn may_be_armed(&mut self, _may: bool) {}
 }
 
-/// The attendant does not want to continue.
+/// The attendant stopped the bring-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped: the steps that are passed are kept in the log")]
 pub struct Stopped;
 
-/// Something to do.
+/// An action for the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
-    /// Wire the board as a step wants it.
+    /// Wire the board for a step.
     Wire(&'static str),
     /// Press the emergency stop.
     PressStop,
-    /// Release it.
+    /// Release the emergency stop.
     ReleaseStop,
-    /// Pull one of its wires, the switch released.
+    /// Disconnect one wire of the released emergency stop.
     PullStopWire,
     /// Connect the wire again.
     ConnectStopWire,
-    /// Pull the ready wire of an amplifier (0 to 2) off the board.
+    /// Disconnect the ready wire of an amplifier (0 to 2) from the board.
     PullReadyWire(usize),
-    /// Connect it again.
+    /// Connect the ready wire again.
     ConnectReadyWire(usize),
     /// Press the dead-man switch and hold it.
     PressDeadMan,
-    /// Let it go.
+    /// Release the dead-man switch.
     ReleaseDeadMan,
     /// Put the arm into its zero pose and hold it.
     ZeroPose,
-    /// Move the tip along a ruler from where it is, by this many millimetres.
+    /// Move the tip along a ruler from its position, by this many millimetres.
     MoveAlong(Direction, u16),
     /// Hold the tip loosely in the zero pose.
     HoldLoosely,
-    /// Hold the tip in the zero pose with a spring scale that pulls against the push
-    /// of an axis (0 to 2).
+    /// Hold the tip in the zero pose with a spring scale, against the push of an axis (0 to 2).
     HoldWithScale(usize),
-    /// Read the scale now, for a question that comes after.
+    /// Read the scale now; the question follows later.
     LookAtScale,
-    /// Let the tip go, a hand near it.
+    /// Release the tip, with a hand near it.
     LetGoOfTip,
     /// Hold the tip again.
     HoldTip,
     /// Lower the tip slowly through the plane.
     LowerTip,
-    /// Lift the tip off it.
+    /// Lift the tip off the plane.
     LiftTip,
 }
 
@@ -140,23 +140,23 @@ const fn against(axis: usize) -> &'static str {
     }
 }
 
-/// Something to read.
+/// A measurement by the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reading {
-    /// The enable line at the amplifiers' end, V.
+    /// The enable line at the amplifiers, V.
     EnableVolts(BoardIs),
-    /// A command output (0 to 2) while the board holds it at a fraction of full scale.
+    /// A command output (0 to 2) that the board holds at a fraction of full scale.
     Output {
-        /// Which.
+        /// The output.
         axis: usize,
         /// The fraction, −1 to 1.
         fraction: f64,
-        /// In which unit it is read.
+        /// Unit of the reading.
         unit: &'static str,
     },
-    /// Path of the tip along the ruler, mm.
+    /// Distance that the tip moved along the ruler, mm.
     MovedMm(Direction, u16),
-    /// Reading of the scale, grams; at rest, or at the moment that was called out.
+    /// The scale, grams: at rest, or at the requested moment.
     ScaleGrams {
         /// True if the motor pushed.
         pushed: bool,
@@ -166,11 +166,11 @@ pub enum Reading {
 /// State of the board while the enable line is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardIs {
-    /// It runs, disarmed.
+    /// The board runs, disarmed.
     Running,
-    /// Its reset button is held down.
+    /// The reset button is held down.
     InReset,
-    /// It is without power.
+    /// The board has no power.
     Unplugged,
 }
 
@@ -206,14 +206,14 @@ impl fmt::Display for Reading {
     }
 }
 
-/// Something to say yes or no to.
+/// A yes-or-no question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Question {
-    /// Question whether the amplifiers' ready outputs are wired to the board.
+    /// Are the amplifiers' ready outputs wired to the board?
     ReadyIsWired,
-    /// Question whether the pressed stop takes the power from the amplifiers.
+    /// Does the pressed stop cut the amplifiers' power?
     StopTakesPower,
-    /// Question whether the floor pushed the tip back up.
+    /// Did the floor push the tip back up?
     PushedBack,
 }
 

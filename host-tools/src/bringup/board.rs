@@ -1,4 +1,4 @@
-//! The board as the steps use it: looked at, asked for things, given a plane.
+//! The steps' interface to the board: status, requests and scenes.
 
 use std::cell::Cell;
 
@@ -15,13 +15,13 @@ use super::finding::Finding;
 use super::halt::Halt;
 use crate::link::{ControlSession, LinkError};
 
-/// Between two looks, ms of the board's time.
+/// Duration of a look, the interval of status requests, ms of the board's time.
 const LOOK_MS: u32 = 100;
-/// Time for which the board looks out for what the user was asked to do, in looks.
+/// Time limit for the board to detect a user's action, in looks.
 const LOOKS: usize = 600;
-/// Checks within which a board that received a disarm command has let the force out.
+/// Looks within which a board must remove the force after a disarm command.
 const LOOKS_TO_DISARM: usize = 20;
-/// Encoders that move by more than this between two looks are not still.
+/// Largest change between two looks of an encoder at rest.
 const STILL_COUNTS: u32 = 3;
 
 /// A board on the link.
@@ -29,14 +29,12 @@ pub(super) struct Board<'d, 't> {
     control: &'d mut ControlSession<'t>,
     /// True if the attendant wants to stop.
     stops: fn() -> bool,
-    /// It was asked for something that drives, and has not confirmed that it is disarmed
-    /// since.
+    /// True from a request that drives the arm until the board confirms that it is disarmed.
     may_be_armed: bool,
 }
 
 impl<'d, 't> Board<'d, 't> {
-    /// The board at the other end of a dialogue, for an attendant who wants to stop when
-    /// `stops` returns true.
+    /// Wraps the session of a board. `stops` returns true if the attendant wants to stop.
     pub(super) fn new(control: &'d mut ControlSession<'t>, stops: fn() -> bool) -> Self {
         Self {
             control,
@@ -45,13 +43,13 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
-    /// Returns its introduction.
+    /// Returns the board's introduction.
     #[must_use]
     pub(super) fn device(&self) -> &DeviceHello {
         self.control.device()
     }
 
-    /// The record in force.
+    /// Returns the calibration record in force.
     ///
     /// # Errors
     /// [`Halt::Link`].
@@ -59,11 +57,11 @@ impl<'d, 't> Board<'d, 't> {
         Ok(self.control.calibration()?)
     }
 
-    /// Looks at it after a moment, or as soon as `on` says of a sample that it is enough;
-    /// sends the flat tiles that it asks for.
+    /// Returns the status after `LOOK_MS` (one look), or as soon as `on` returns true for a sample.
+    /// Sends the flat tiles that the board requests.
     ///
     /// # Errors
-    /// [`Halt::Link`].
+    /// [`Halt::Stopped`], [`Halt::Link`].
     pub(super) fn look_until(
         &mut self,
         on: &mut dyn FnMut(&TickRecord) -> bool,
@@ -95,7 +93,7 @@ impl<'d, 't> Board<'d, 't> {
         Ok(passed?)
     }
 
-    /// Looks at it after a moment; tells `on` of each sample.
+    /// Returns the status after one look; calls `on` for each sample.
     ///
     /// # Errors
     /// [`Halt::Stopped`], [`Halt::Link`].
@@ -106,15 +104,15 @@ impl<'d, 't> Board<'d, 't> {
         })
     }
 
-    /// Looks at it after a moment.
+    /// Returns the status after one look.
     ///
     /// # Errors
-    /// [`Halt::Link`].
+    /// [`Halt::Stopped`], [`Halt::Link`].
     pub(super) fn look(&mut self) -> Result<Status, Halt> {
         self.look_with(&mut |_| {})
     }
 
-    /// Asks the attendant to do something and looks until the board sees it.
+    /// Requests an action of the attendant and waits until the board detects it.
     ///
     /// # Errors
     /// [`Finding::NotSeen`], [`Halt::Link`].
@@ -134,7 +132,7 @@ impl<'d, 't> Board<'d, 't> {
         Err(Finding::NotSeen(task).into())
     }
 
-    /// Looks until the encoders stand still; returns their counts.
+    /// Waits until the encoders are at rest; returns their counts.
     ///
     /// # Errors
     /// [`Halt::Link`].
@@ -153,7 +151,7 @@ impl<'d, 't> Board<'d, 't> {
         Ok(before)
     }
 
-    /// Asks for something to be done.
+    /// Sends a request.
     ///
     /// # Errors
     /// [`Finding::NotReady`], [`Finding::Refused`], [`Halt::Link`].
@@ -165,7 +163,7 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
-    /// Asks for something that drives the arm, once the user presses the switch.
+    /// Sends a request that drives the arm, once the user presses the switch.
     ///
     /// # Errors
     /// As [`Board::ask`].
@@ -179,7 +177,7 @@ impl<'d, 't> Board<'d, 't> {
         self.ask(request)
     }
 
-    /// Puts a scene in force.
+    /// Activates a scene.
     ///
     /// # Errors
     /// [`Halt::Link`].
@@ -187,10 +185,10 @@ impl<'d, 't> Board<'d, 't> {
         Ok(self.control.put_scene(scene)?)
     }
 
-    /// Arms for the scene in force, with the attendant's press.
+    /// Arms for the active scene at the attendant's dead-man press.
     ///
     /// # Errors
-    /// A blocker, or a fault.
+    /// A blocker or a fault.
     pub(super) fn arm(&mut self, attendant: &mut dyn Attendant) -> Result<(), Halt> {
         self.drive(attendant, &Request::Arm)?;
         let ends = |status: &Status| {
@@ -204,7 +202,7 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
-    /// Has the attendant do something that is to end in a fault, and clears the fault.
+    /// Requests an action of the attendant that must cause a fault, and clears the fault.
     ///
     /// # Errors
     /// [`Finding::NotSeen`]; another fault.
@@ -221,28 +219,28 @@ impl<'d, 't> Board<'d, 't> {
         }
     }
 
-    /// Disarms, clears what the step has latched and drops its scene.
+    /// Disarms, clears the step's latched faults and removes its scene.
     ///
     /// # Errors
-    /// [`LinkError::NotConfirmed`] where the board was asked to drive the arm and does not
-    /// say that it is disarmed.
+    /// [`LinkError::NotConfirmed`] if the board received a request to drive the arm and does not
+    /// confirm that it is disarmed.
     pub(super) fn leave(&mut self) -> Result<(), LinkError> {
         match self.disarm() {
             Ok(true) => self.may_be_armed = false,
             _ if self.may_be_armed => return Err(LinkError::NotConfirmed),
-            // The board may be gone; then nothing is left to be done.
+            // The board may be disconnected; then nothing is left to do.
             _ => return Ok(()),
         }
         let latched = self.control.fresh_status().ok();
         let seen = latched.and_then(|status| status.health.report.fault);
         for request in [Request::DropScene, Request::ClearFault { seen }] {
-            // Whether it does depends on what it still sees.
+            // A refusal is no error here: the cause may still be present.
             let _ = self.control.request(&request);
         }
         Ok(())
     }
 
-    /// Checks that the board says that it is disarmed, after the command.
+    /// Sends the disarm command and returns true if the board confirms it.
     fn disarm(&mut self) -> Result<bool, LinkError> {
         let answer = self.control.request(&Request::Disarm)?;
         for _ in 0..LOOKS_TO_DISARM {

@@ -6,29 +6,29 @@ use hapterra_core::wire::request::Refusal;
 use super::attendant::Task;
 use crate::calibrate::FitError;
 
-/// Reason for which a step is not passed. Axes and joints are counted from 1.
+/// Reason why a step fails. Axes and joints are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Finding {
     /// The board has a fault.
     #[error("the board has fault {} {:?}: {}", .0.number(), .0, .0.meaning())]
     Fault(Fault),
-    /// The board finds something wrong with itself.
+    /// The board reports a blocker.
     #[error("the board is not ready: {}", .0.meaning())]
     NotReady(Blockers),
-    /// The board's ticks are not those of another clock.
+    /// The board's tick rate differs by another clock.
     #[error(
         "the board ticks {hz:.0} times a second by this computer's clock where it says {stated_hz:.0}"
     )]
     WrongTickRate {
-        /// Counted.
+        /// The counted rate.
         hz: f64,
-        /// Statement of the board.
+        /// The rate that the board reports.
         stated_hz: f64,
     },
-    /// The oscillator of USB does not follow the host's.
+    /// The board's USB oscillator is not locked to the host's.
     #[error("the board's USB clock does not follow this computer's")]
     UsbClockUnlocked,
-    /// The board does not do what it is asked for.
+    /// The board refuses a request.
     #[error("the board refuses: {0}")]
     Refused(Refusal),
     /// The user's action was not detected.
@@ -37,19 +37,19 @@ pub enum Finding {
     /// The enable line is not low.
     #[error("the enable line is at {0:.2} V where it has to be low")]
     EnableHigh(f64),
-    /// An output is not where it is held.
+    /// An output has a wrong value.
     #[error("output {axis} is at {found} {unit} where {expected} {unit} is expected")]
     Output {
-        /// Which.
+        /// The output.
         axis: usize,
         /// Measured value.
         found: f64,
         /// Expected value.
         expected: f64,
-        /// In which unit.
+        /// Unit of both values.
         unit: &'static str,
     },
-    /// No encoder counted where a joint was turned.
+    /// An encoder did not count while its joint turned.
     #[error("the encoder of joint {joint} is dead: it went {counts} counts while the joint turned")]
     DeadEncoder {
         /// The joint.
@@ -57,7 +57,7 @@ pub enum Finding {
         /// Counts.
         counts: i32,
     },
-    /// Another encoder counted.
+    /// Another joint's encoder counted.
     #[error("encoders are swapped: joint {joint} turned and encoder {encoder} counted")]
     SwappedEncoders {
         /// The joint that was turned.
@@ -65,23 +65,23 @@ pub enum Finding {
         /// The encoder that counted.
         encoder: usize,
     },
-    /// An encoder did not return to where it was.
+    /// An encoder did not return to its first count.
     #[error("the encoder of joint {joint} loses counts: {there} there, {back} back")]
     CountsLost {
         /// The joint.
         joint: usize,
-        /// Counts on the way there.
+        /// Counts in the outward motion.
         there: i32,
-        /// Counts on the way back.
+        /// Counts in the return motion.
         back: i32,
     },
-    /// There is no record on the board.
+    /// The board has no calibration record.
     #[error("the board holds no stored calibration")]
     NoCalibration,
-    /// The ruler's moves fit no record.
+    /// The distances by the ruler fit no record.
     #[error(transparent)]
     Ruler(#[from] FitError),
-    /// An encoder's direction is not the record's.
+    /// An encoder's direction differs from the record's.
     #[error(
         "the encoder sign of joint {joint} is inverted: the record says {record:+}, the ruler the opposite"
     )]
@@ -91,19 +91,19 @@ pub enum Finding {
         /// The record's sign.
         record: i8,
     },
-    /// A cable ratio is not the record's.
+    /// A cable ratio differs from the record's.
     #[error(
         "the ratio of joint {joint} is wrong: {record:.2} in the record, {found:.2} by the ruler"
     )]
     WrongRatio {
         /// The joint.
         joint: usize,
-        /// The record's.
+        /// The record's ratio.
         record: f64,
-        /// Distance by the ruler.
+        /// The ratio by the ruler.
         found: f64,
     },
-    /// A motor turned another joint than its own.
+    /// A motor turned another motor's joint.
     #[error("motors are swapped: command {motor} turns joint {joint}")]
     SwappedMotors {
         /// The command.
@@ -111,14 +111,14 @@ pub enum Finding {
         /// The joint that moved.
         joint: usize,
     },
-    /// A motor turned its joint the other way.
+    /// A motor turned its joint in the wrong direction.
     #[error(
         "the sign of motor {motor} is inverted: it turns its joint the other way than the record says"
     )]
     InvertedMotor {
         /// The motor.
         motor: usize,
-        /// The sign that is right.
+        /// The correct sign.
         right: i8,
     },
     /// A motor does not push.
@@ -129,7 +129,7 @@ pub enum Finding {
         /// The current, A.
         current_a: f32,
     },
-    /// The hand's own motion hides the direction of a motor.
+    /// The hand's motion hides the direction of a motor.
     #[error(
         "the direction of motor {motor} cannot be determined: the hand moved more than the motor"
     )]
@@ -142,29 +142,29 @@ pub enum Finding {
     WrongTorque {
         /// The motor.
         motor: usize,
-        /// By the scale, Nm/A of the motor.
+        /// Torque constant by the scale, Nm/A of the motor.
         found: f64,
-        /// The record's.
+        /// The record's torque constant.
         record: f64,
     },
-    /// The arm does not stay where it is left.
+    /// The arm drifts after its release.
     #[error("the arm drifts: {mm:.0} mm within {seconds:.1} s after it was let go")]
     Drifts {
         /// Distance, mm.
         mm: f64,
-        /// In which time, s.
+        /// Time, s.
         seconds: f64,
     },
-    /// The arm moves when it is left to itself.
+    /// The arm moves fast after its release.
     #[error("the arm moves by itself: its tip had {mm_s:.0} mm/s when it was let go")]
     MovesByItself {
         /// Speed, mm/s.
         mm_s: f64,
     },
-    /// The pressed stop leaves the amplifiers their power.
+    /// The pressed stop does not cut the amplifiers' power.
     #[error("the pressed stop does not cut the power of the amplifiers' power stages")]
     StopLeavesPower,
-    /// The floor does not push, or not up.
+    /// The floor does not push the tip up.
     #[error("the floor does not push the tip back")]
     NoFloor,
 }

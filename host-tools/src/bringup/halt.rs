@@ -1,19 +1,19 @@
-//! Reason for which a step ends before it is passed.
+//! Reason why a step ends early.
 
 use super::attendant::Stopped;
 use super::finding::Finding;
 use crate::link::LinkError;
 
-/// Reason for which a step ends before it is passed.
+/// Reason why a step ends early.
 #[derive(Debug, thiserror::Error)]
 pub enum Halt {
     /// The attendant stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// The device is gone or silent.
+    /// The device is disconnected or does not respond.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// Something is wrong.
+    /// The step failed.
     #[error("{0}")]
     Found(#[from] Finding),
 }

@@ -1,6 +1,5 @@
-//! The log of a first power-up: what was passed on which board, with which record.
-//! It is kept as TOML, and what is in it no longer counts where the board, its firmware
-//! or its calibration is another one.
+//! The log of a bring-up, stored as TOML: the passed steps, with the board and its calibration
+//! record. Its entries become invalid if the board, its firmware or its calibration changes.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -16,28 +15,27 @@ use super::utc::utc;
 use crate::output::{Output, OutputError};
 use heightfield::regular_file;
 
-/// No log is larger: a step has some hundred bytes.
+/// Size limit of a log; a step has a few hundred bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Which board, and which record in it.
+/// Identity of the board and of its calibration record.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// The board's name.
     pub board: String,
-    /// The board's serial number; empty where it has none.
+    /// The board's serial number; empty if it has none.
     #[serde(default)]
     pub serial: String,
-    /// Its firmware's version.
+    /// The firmware's version.
     pub firmware: String,
-    /// Ticks a second of its image.
+    /// Ticks a second of the firmware.
     pub tick_hz: u32,
-    /// CRC-32 of the calibration record in force, in hexadecimal digits; empty where
-    /// there is none.
+    /// CRC-32 of the calibration record in force, in hexadecimal digits; empty if there is none.
     pub calibration: String,
 }
 
 impl Identity {
-    /// Of a device and the record in force on it.
+    /// Returns the identity of a device with the record in force.
     #[must_use]
     pub fn of(device: &DeviceHello, record: Option<&Calibration>) -> Self {
         Self {
@@ -50,7 +48,7 @@ impl Identity {
     }
 }
 
-/// The board's serial number; empty where it has none.
+/// Returns the board's serial number; empty if it has none.
 fn serial(device: &DeviceHello) -> String {
     match device.serial.is_none() {
         true => String::new(),
@@ -58,7 +56,7 @@ fn serial(device: &DeviceHello) -> String {
     }
 }
 
-/// The check sum that a record ends with.
+/// Returns the checksum at the end of a record.
 fn fingerprint(record: &Calibration) -> String {
     let mut buffer = [0; RECORD_BYTES];
     let sum = record.encode(&mut buffer).last_chunk::<4>();
@@ -69,20 +67,20 @@ fn fingerprint(record: &Calibration) -> String {
 /// Outcome of a step.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
-    /// The step that was done.
+    /// The step.
     pub step: Step,
-    /// True if it was passed.
+    /// True if the step was passed.
     pub passed: bool,
-    /// When, UTC.
+    /// Time of the entry, UTC.
     pub at: String,
-    /// Measurement, or fault.
+    /// Measurement or finding.
     pub result: String,
 }
 
 /// The log of one board.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Log {
-    /// The board and record that it is about.
+    /// The board and the record of the log.
     #[serde(flatten)]
     pub identity: Identity,
     /// The completed steps, in order, each once.
@@ -90,32 +88,32 @@ pub struct Log {
     pub entries: Vec<Entry>,
 }
 
-/// Reason for which a log cannot be kept.
+/// Error of reading or writing a log.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
-    /// There is no home folder to keep it in.
+    /// There is no home folder to store the log in.
     #[error("there is no folder to keep the log in: {0}")]
     NoHome(#[from] etcetera::HomeDirError),
-    /// It cannot be read.
+    /// The log cannot be read.
     #[error("cannot read the log {path}: {source}")]
     Unreadable {
-        /// The place.
+        /// The path.
         path: PathBuf,
         /// The reason.
         source: io::Error,
     },
-    /// It is no log.
+    /// The file is not a log.
     #[error("{path} is no log of a first power-up: {source}")]
     NoLog {
-        /// The place.
+        /// The path.
         path: PathBuf,
         /// The reason.
         source: Box<toml::de::Error>,
     },
-    /// It cannot be put into words.
+    /// The log cannot be serialised.
     #[error("the log cannot be written: {0}")]
     Unwritable(#[from] toml::ser::Error),
-    /// It cannot be written.
+    /// The log cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
 }
@@ -131,7 +129,7 @@ impl Log {
             app_name: "hapterra".into(),
             ..AppStrategyArgs::default()
         })?;
-        // A board's name comes over the link: it names no other folder.
+        // The board's name is from the link, so it must not be able to select another folder.
         let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
         let mut name: String = device.board.chars().map(plain).collect();
         let serial = serial(device);
@@ -141,7 +139,7 @@ impl Log {
         Ok(strategy.in_data_dir(format!("bringup/{name}.toml")))
     }
 
-    /// Reads a log; an empty one where there is none yet.
+    /// Reads a log; it is empty if the file does not exist.
     ///
     /// # Errors
     /// [`LogError::Unreadable`], [`LogError::NoLog`].
@@ -160,7 +158,7 @@ impl Log {
         })
     }
 
-    /// Writes the log as a whole: it is the old one or the new one.
+    /// Replaces the log atomically.
     ///
     /// # Errors
     /// [`LogError::Unwritable`], [`LogError::Output`].
@@ -182,9 +180,9 @@ impl Log {
         Ok(toml::to_string(self)?)
     }
 
-    /// Takes the board and record as they are now, and forgets what was found of others:
-    /// everything of another board or firmware, and what depends on the calibration of
-    /// another record. Returns why something was forgotten.
+    /// Sets the current board and record, and removes entries that are no longer valid: all of them
+    /// if the board or firmware changed, those that depend on the calibration if the record
+    /// changed. Returns the reason if any was removed.
     pub fn meet(&mut self, now: Identity) -> Option<&'static str> {
         let was = std::mem::replace(&mut self.identity, now);
         let before = self.entries.len();
@@ -203,15 +201,14 @@ impl Log {
         (self.entries.len() < before).then_some(why)
     }
 
-    /// The first step that is not passed; none where the log is complete.
+    /// Returns the first step that is not passed; `None` if the log is complete.
     #[must_use]
     pub fn next(&self) -> Option<Step> {
         let passed = |step: &Step| self.entries.iter().any(|e| e.step == *step && e.passed);
         Step::ALL.into_iter().find(|step| !passed(step))
     }
 
-    /// Takes what became of a step. What comes after it is forgotten: it was not found
-    /// on what this step found.
+    /// Adds the outcome of a step. Later steps are removed, because they depend on this one.
     pub fn take(&mut self, step: Step, passed: bool, result: String) {
         self.entries.retain(|entry| entry.step < step);
         self.entries.push(Entry {
@@ -311,7 +308,7 @@ mod tests {
         let mut other = device.clone();
         other.serial = SerialNumber::new([0x2B; 12]);
         assert_ne!(one, place(&other));
-        // One's log under the other's name tells nothing of the other.
+        // A log under the other board's name is not valid for it.
         let mut log = complete();
         log.identity = Identity::of(&device, None);
         assert_eq!(log.meet(Identity::of(&device, None)), None);

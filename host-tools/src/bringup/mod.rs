@@ -1,4 +1,4 @@
-//! The first power-up of a board and its arm, step by step, none of them skipped.
+//! The bring-up of a board and its arm, step by step; no step is skipped.
 //!
 //! ```text
 //! Step (in order) ─▶ steps/ ─ asks ─▶ Attendant (a terminal, or a VirtualUser)
@@ -7,10 +7,9 @@
 //!           result, or a Finding that names what is wrong ─▶ Log (TOML)
 //! ```
 //!
-//! The motors are first driven by a *jog*: one at a time, with a quarter of the current
-//! that it can bear for ever, while no joint may move faster than
-//! [`JOG_FAST_RAD_S`](hapterra_core::guard::JOG_FAST_RAD_S) or farther than
-//! [`JOG_FAR_RAD`](hapterra_core::guard::JOG_FAR_RAD). There is nothing to feel before
+//! The motors are first driven by a *jog*: one at a time, with a quarter of the continuous current,
+//! while no joint may move faster than [`JOG_FAST_RAD_S`](hapterra_core::guard::JOG_FAST_RAD_S) or
+//! farther than [`JOG_FAR_RAD`](hapterra_core::guard::JOG_FAR_RAD). No surface is rendered before
 //! each motor's joint, sign and torque are known.
 
 mod attendant;

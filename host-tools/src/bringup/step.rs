@@ -1,4 +1,4 @@
-//! The steps of a first power-up, in their order.
+//! The steps of a bring-up, in order.
 
 use serde::{Deserialize, Serialize};
 
@@ -39,7 +39,7 @@ pub enum Step {
 }
 
 impl Step {
-    /// All of them, in order.
+    /// All steps, in order.
     pub const ALL: [Self; 11] = [
         Self::Board,
         Self::Switches,
@@ -54,13 +54,13 @@ impl Step {
         Self::FirstTouch,
     ];
 
-    /// Returns true if what it finds depends on the calibration record.
+    /// Returns true if the step's result depends on the calibration record.
     #[must_use]
     pub fn depends_on_calibration(self) -> bool {
         self >= Self::Calibration
     }
 
-    /// Returns its heading.
+    /// Returns the step's heading.
     #[must_use]
     pub const fn title(self) -> &'static str {
         match self {
@@ -78,7 +78,7 @@ impl Step {
         }
     }
 
-    /// Returns the required wiring before it begins, where that changes.
+    /// Returns the required wiring, if it changes at this step.
     #[must_use]
     pub const fn wiring(self) -> Option<&'static str> {
         match self {
@@ -100,7 +100,7 @@ impl Step {
         }
     }
 
-    /// The axis of a motor's step, 0 to 2.
+    /// Returns the axis of a motor's step, 0 to 2.
     #[must_use]
     pub const fn motor(self) -> Option<usize> {
         match self {
@@ -111,7 +111,7 @@ impl Step {
         }
     }
 
-    /// Its number, from 1.
+    /// Returns the step's number, from 1.
     #[must_use]
     pub fn number(self) -> usize {
         1 + Self::ALL.iter().filter(|step| **step < self).count()

@@ -1,14 +1,14 @@
-//! The date and time of day of a log's entry.
+//! Date and time of a log's entry.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// A time as `2026-11-27T18:25:34Z`; what is before 1970 is 1970.
+/// Returns a time as `2026-11-27T18:25:34Z`; times before 1970 become 1970.
 pub(super) fn utc(time: SystemTime) -> String {
     let seconds = time
         .duration_since(UNIX_EPOCH)
         .map_or(0, |since| since.as_secs());
     let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Years that begin in March, in eras of 400 years, which all have as many days.
+    // Years begin in March. All eras of 400 years have the same number of days.
     let days = days + 719_468;
     let (era, day) = (days / 146_097, days % 146_097);
     let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;

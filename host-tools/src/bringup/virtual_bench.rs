@@ -1,4 +1,4 @@
-//! A virtual Phantom on a virtual bench: wired, held and measured as its user does it.
+//! A virtual Phantom on a virtual bench, with the user's wiring, grip and measurements.
 
 use glam::DVec3;
 use hapterra_core::guard::{GuardInputs, GuardOutputs};
@@ -7,15 +7,15 @@ use hapterra_core::wire::status::UsbClock;
 use crate::calibrate::N_PER_GRAM;
 use crate::phantom::{HandModel, PhantomModel, Plant, Wiring, kinematics};
 
-/// Speed at which a hand leads the tip, m/s; and of a hand that searches for the surface.
+/// Speed of a hand that leads the tip, and of one that searches for the surface, m/s.
 const LEAD_M_S: f64 = 0.1;
 const SLOW_M_S: f64 = 0.02;
 /// Length of a tick, s.
 const TICK_S: f64 = 1e-3;
-/// The output at full scale, V.
+/// Voltage of an output at full scale, V.
 const FULL_V: f64 = 10.0;
 
-/// Fingers that lead the tip and hold it firmly.
+/// Fingers that hold the tip firmly and lead it.
 const FIRM: HandModel = HandModel {
     mass_kg: 0.15,
     arm_n_per_m: 20_000.0,
@@ -24,42 +24,43 @@ const FIRM: HandModel = HandModel {
     grip_ns_per_m: 60.0,
 };
 
-/// A hand that holds the tip by a spring scale.
+/// A hand that holds the tip with a spring scale.
 const SCALE: HandModel = HandModel {
     arm_n_per_m: 1_000.0,
     arm_ns_per_m: 10.0,
     ..FIRM
 };
 
-/// Grip of the tip.
+/// Grip on the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Grip {
-    /// By fingers that lead it.
+    /// Fingers that lead the tip.
     Firm,
-    /// Between two fingers.
+    /// Two loose fingers.
     Loose,
-    /// By a spring scale.
+    /// A spring scale.
     Scale,
 }
 
-/// Mistakes between the board and its amplifiers and switches.
+/// Wiring mistakes between the board and its amplifiers and switches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BenchMistakes {
-    /// A command at its amplifier's input is off by so many volts.
+    /// Error of a command at its amplifier's input, V.
     pub output_off_v: [f64; 3],
-    /// The enable line has no pull-down: it is high if it is not driven.
+    /// The enable line has no pull-down: it is high unless it is driven low.
     pub enable_floats: bool,
-    /// The stop is a normally open one: pressed it closes its contact, and so does no wire.
+    /// The stop is normally open: its contact closes if it is pressed, and a disconnected wire
+    /// looks released.
     pub stop_normally_open: bool,
-    /// The stop's second contact is not in the supply of the power stages.
+    /// The stop's second contact does not switch the power stages' supply.
     pub stop_leaves_power: bool,
-    /// The amplifier is not there, or has no power: it pushes nothing, and says nothing.
+    /// The amplifier is missing or has no power: no push, no ready signal.
     pub amplifier_missing: [bool; 3],
-    /// The ready input is tied to ground instead of to its amplifier.
+    /// The ready input is connected to ground instead of its amplifier.
     pub ready_grounded: [bool; 3],
-    /// The part by which the board's clock is slow.
+    /// Relative error by which the board's clock is slow.
     pub clock_slow_by: f64,
-    /// The oscillator of the board's USB does not follow the host's.
+    /// The board's USB oscillator is not locked to the host's.
     pub usb_clock_unlocked: bool,
 }
 
@@ -67,26 +68,25 @@ pub struct BenchMistakes {
 pub struct VirtualBench {
     plant: Plant,
     wiring: Wiring,
-    /// Goal of the hand, and its present target, m.
+    /// Goal of the hand and its present target, m.
     goal_m: DVec3,
     at_m: DVec3,
     speed_m_s: f64,
     pub(super) dead_man: bool,
     pub(super) stop: bool,
-    /// True if the stop's wire is off the board.
+    /// True if the stop's wire is disconnected.
     pub(super) stop_wire_off: bool,
-    /// True if each ready wire is off the board.
+    /// True for each disconnected ready wire.
     pub(super) ready_wire_off: [bool; 3],
     mistakes: BenchMistakes,
     drive: GuardOutputs,
-    /// Fastest that each joint has turned since the amplifiers first came on, while they
-    /// were on or had been within a tenth of a second, rad/s.
+    /// Maximum speed of each joint, rad/s, while the amplifiers are on and for 0.1 s after.
     fastest_rad_s: [f64; 3],
     since_on_ticks: u32,
 }
 
 impl VirtualBench {
-    /// An arm that was switched on in some other pose than zero, held firmly.
+    /// Returns a bench whose arm was switched on outside its zero pose and is held firmly.
     #[must_use]
     pub fn new(model: PhantomModel, wiring: Wiring) -> Self {
         let mut plant = Plant::new(model, [0.2, -0.1, 0.3]);
@@ -109,14 +109,15 @@ impl VirtualBench {
         }
     }
 
-    /// The same bench with these mistakes.
+    /// Returns the same bench with these mistakes.
     #[must_use]
     pub const fn with_mistakes(mut self, mistakes: BenchMistakes) -> Self {
         self.mistakes = mistakes;
         self
     }
 
-    /// One tick: the amplifiers got `drive`; what encoders and switches say after it.
+    /// Simulates a tick with the amplifiers' commands `drive`; returns the encoders and switches
+    /// after it.
     pub fn tick(&mut self, drive: &GuardOutputs) -> GuardInputs {
         self.drive = *drive;
         let left = self.goal_m - self.at_m;
@@ -142,13 +143,13 @@ impl VirtualBench {
         }
     }
 
-    /// Returns true if the board reads the stop as pressed: an open contact.
+    /// Returns true if the board reads the stop as pressed: an open circuit.
     fn stop_reads_pressed(&self) -> bool {
         let closed = self.stop == self.mistakes.stop_normally_open;
         self.stop_wire_off || !closed
     }
 
-    /// Returns true if a ready input is high: pulled up, and not pulled down from outside.
+    /// Returns true if a ready input is high: only its pull-up acts.
     fn not_ready(&self) -> bool {
         (0..3).any(|axis| {
             let silent = self.mistakes.amplifier_missing[axis] || self.ready_wire_off[axis];
@@ -169,19 +170,19 @@ impl VirtualBench {
         }
     }
 
-    /// Fastest that each joint has turned while the amplifiers were on or had been within
-    /// a tenth of a second, rad/s.
+    /// Returns the maximum speed of each joint, rad/s, while the amplifiers are on and for 0.1 s
+    /// after.
     #[must_use]
     pub fn fastest_rad_s(&self) -> [f64; 3] {
         self.fastest_rad_s
     }
 
-    /// The time that passes on a right clock while so much passes on the board's, s.
+    /// Returns the true time, s, for a time on the board's clock.
     pub(super) fn time_s(&self, board_ms: f64) -> f64 {
         1e-3 * board_ms / (1.0 - self.mistakes.clock_slow_by)
     }
 
-    /// The state of USB's clock recovery that the board reports.
+    /// Returns the state of USB's clock recovery that the board reports.
     pub(super) const fn usb_clock(&self) -> UsbClock {
         match self.mistakes.usb_clock_unlocked {
             true => UsbClock::Unlocked,
@@ -199,7 +200,7 @@ impl VirtualBench {
         DVec3::from(kinematics::tip(self.plant.model(), [0.0; 3]))
     }
 
-    /// Takes the tip in a hand.
+    /// Holds the tip with a grip.
     pub(super) fn hold(&mut self, grip: Grip) {
         let hand = match grip {
             Grip::Firm => FIRM,
@@ -211,17 +212,17 @@ impl VirtualBench {
         self.plant = self.plant.held_by(hand);
     }
 
-    /// Leads the tip to a point, from now on.
+    /// Starts to lead the tip to a point.
     pub(super) fn lead(&mut self, to_m: DVec3) {
         (self.goal_m, self.speed_m_s) = (to_m, LEAD_M_S);
     }
 
-    /// Feels the way to a point, from now on.
+    /// Starts to move slowly to a point, in search of the surface.
     pub(super) fn step(&mut self, to_m: DVec3) {
         (self.goal_m, self.speed_m_s) = (to_m, SLOW_M_S);
     }
 
-    /// Takes the hand away.
+    /// Releases the tip.
     pub(super) fn let_go(&mut self) {
         self.plant = self.plant.let_go();
     }
@@ -236,7 +237,7 @@ impl VirtualBench {
         FULL_V * f64::from(self.drive.held[axis]) + self.mistakes.output_off_v[axis]
     }
 
-    /// Returns the voltage of the enable line, V, driven by the board or not.
+    /// Returns the voltage of the enable line, V. `driven` is true if the board drives it.
     pub(super) fn enable_v(&self, driven: bool) -> f64 {
         let high = if driven {
             self.drive.enabled

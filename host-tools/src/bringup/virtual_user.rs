@@ -1,4 +1,4 @@
-//! A user made of formulas, at a virtual bench.
+//! A simulated user at a virtual bench.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -15,34 +15,34 @@ use hapterra_core::wire::status::BootReport;
 use hapterra_firmware::native::StoppedClock;
 use hapterra_firmware::store::Stored;
 
-/// Distance below the tip at which a hand aims to push into the soft plane, m.
+/// Depth below the tip to which the hand pushes into the soft plane, m.
 const PUSH_M: f64 = 0.035;
-/// The virtual user feels an upward push from this force on, N.
+/// Upward force from which the user notices a push, N.
 const FELT_N: f64 = 0.1;
-/// So often the virtual device lets its host look around, ms.
+/// Interval at which the virtual device returns to its host, ms.
 const LOOK_MS: u32 = 25;
 
-/// Follows the instructions at a virtual bench, and reads off the truth.
+/// Follows the instructions at a virtual bench, and reads the exact values.
 pub struct VirtualUser {
     bench: Rc<RefCell<VirtualBench>>,
     /// Position of the tip before its last move along the ruler, m.
     before_m: DVec3,
-    /// The direction of the scale, and what it read when it was called out, grams.
+    /// The scale's direction, and its reading at the requested moment, grams.
     scale: (DVec3, f64),
-    /// The largest push up while the tip was lowered, N.
+    /// Maximum upward force while the tip was lowered, N.
     force_n: f64,
-    /// Takes the output, a line at a time.
+    /// Receives the output, a line at a time.
     pub says: fn(&str),
 }
 
 impl VirtualUser {
-    /// A user of a Premium 1.5, wired like this.
+    /// Returns a user of a Premium 1.5 with this wiring.
     #[must_use]
     pub fn new(wiring: Wiring) -> Self {
         Self::at(VirtualBench::new(PhantomModel::premium_1_5(), wiring))
     }
 
-    /// A user at this bench.
+    /// Returns a user at this bench.
     #[must_use]
     pub fn at(bench: VirtualBench) -> Self {
         Self {
@@ -54,14 +54,14 @@ impl VirtualUser {
         }
     }
 
-    /// The bench.
+    /// Returns the bench.
     #[must_use]
     pub fn bench(&self) -> Rc<RefCell<VirtualBench>> {
         Rc::clone(&self.bench)
     }
 
-    /// A device in memory, just switched on, that is wired to the bench and holds this
-    /// record.
+    /// Returns an in-memory device that was just switched on, with this record and the bench's
+    /// wiring.
     #[must_use]
     pub fn device(&self, record: Calibration) -> Native<StoppedClock> {
         let bench = self.bench();
@@ -109,7 +109,7 @@ impl VirtualUser {
                 bench.step(tip_m - PUSH_M * DVec3::Z);
             }
             Task::LiftTip => {
-                // Against the push of the hand, the floor's is what is left over.
+                // The hand balances the floor's push, so the floor's force is its reaction.
                 self.force_n = bench.scale_grams(DVec3::Z) * crate::calibrate::N_PER_GRAM;
                 bench.step(self.before_m);
             }
@@ -152,7 +152,7 @@ impl Attendant for VirtualUser {
     }
 
     fn read(&mut self, reading: Reading) -> Result<f64, Stopped> {
-        // No meter shows more, and none shows a negative zero.
+        // Round to the meter's digit; `+ 0.0` removes a negative zero.
         let value = (self.reads(reading) * 10.0).round() / 10.0 + 0.0;
         (self.says)(&format!("  ? {reading} {value:.1}"));
         Ok(value)

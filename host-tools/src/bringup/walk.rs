@@ -1,4 +1,4 @@
-//! The steps in their order, from where the log ends.
+//! The sequence of steps, from the log's end.
 
 use super::attendant::Attendant;
 use super::board::Board;
@@ -9,36 +9,35 @@ use super::step::Step;
 use super::steps;
 use crate::link::ControlSession;
 
-/// Progress of a walk.
+/// Progress of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Walked {
-    /// To the end: the log is complete.
+    /// The log is complete.
     ToTheEnd,
-    /// The board was without power meanwhile: greet it again, and continue.
+    /// The board was without power: open a new session, then continue.
     BoardWasOff,
 }
 
-/// Reason for which a walk ended early.
+/// Reason why the sequence ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum BringupError {
-    /// A step found something wrong.
+    /// A step failed.
     #[error("step {} ({}): {finding}", .step.number(), .step.title())]
     Found {
         /// The step.
         step: Step,
-        /// The fault.
+        /// The finding.
         finding: Finding,
     },
-    /// The attendant stopped, or the device is gone.
+    /// The attendant stopped, or the device was disconnected.
     #[error(transparent)]
     Halt(Halt),
-    /// The log cannot be kept.
+    /// The log cannot be stored.
     #[error(transparent)]
     Log(#[from] LogError),
 }
 
-/// Walks through the steps that the log does not have yet, and has `keep` keep the log
-/// after each.
+/// Runs the steps that are not in the log, and calls `keep` with the log after each.
 ///
 /// # Errors
 /// [`BringupError`].
@@ -80,8 +79,7 @@ pub fn walk(
     Ok(Walked::ToTheEnd)
 }
 
-/// Has the board disarm after a step that was not passed; tells the attendant where it
-/// does not confirm that.
+/// Disarms the board after a failed step; informs the attendant unless the board confirms it.
 fn leave(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) {
     match board.leave() {
         Ok(()) => attendant.may_be_armed(false),

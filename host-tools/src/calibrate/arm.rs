@@ -1,4 +1,4 @@
-//! The arm's geometry in `f64`, with the lengths of a record.
+//! The arm's geometry in `f64`, with the lengths of a calibration record.
 
 use glam::{DMat3, DVec3};
 use hapterra_core::phantom::Calibration;
@@ -14,7 +14,7 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// An arm with a record's lengths and zero pose.
+    /// Returns an arm with a record's lengths and zero pose.
     #[must_use]
     pub fn of(record: &Calibration) -> Self {
         Self {
@@ -27,23 +27,23 @@ impl Arm {
         }
     }
 
-    /// Joint angles after the encoders turned by `counts` from the zero pose, rad.
+    /// Returns the joint angles after the encoders turned by `counts` from the zero pose, rad.
     #[must_use]
     pub fn angles(&self, rad_per_count: DVec3, counts: [i32; 3]) -> DVec3 {
         self.zero_rad + DVec3::from(counts.map(f64::from)) * rad_per_count
     }
 
-    /// The tip, device frame, mm: x towards the user, y to the right, z up.
+    /// Returns the tip's position, device frame, mm: x towards the user, y to the right, z up.
     #[must_use]
     pub fn tip_mm(&self, q_rad: DVec3) -> DVec3 {
         1e3 * DVec3::from(kinematics::tip(&self.model, q_rad.to_array()))
     }
 
-    /// Joint torques that a force at the tip (N, device frame) makes, Nm.
+    /// Returns the joint torques of a force at the tip (N, device frame), Nm.
     #[must_use]
     pub fn torques_nm(&self, q_rad: DVec3, force_n: DVec3) -> DVec3 {
         let rows = kinematics::jacobian(&self.model, q_rad.to_array());
-        // The array's rows are glam's columns, so this is the transpose already.
+        // The array's rows are glam's columns, so this is already the transpose.
         DMat3::from_cols_array_2d(&rows) * force_n
     }
 }

@@ -1,5 +1,5 @@
-//! Calibration records in files: TOML, to be read, compared and changed by hand. A
-//! device keeps the same numbers as a checked binary record in its flash
+//! Calibration records in TOML files, to read, compare and change by hand. A device stores the same
+//! numbers in its flash as a binary record with a checksum
 //! ([`hapterra_core::phantom::Calibration::encode`]).
 
 use std::io::{self, Write as _};
@@ -14,7 +14,7 @@ use serde::Deserialize;
 use crate::output::{Output, OutputError};
 use heightfield::regular_file;
 
-/// No calibration is larger.
+/// Size limit of a calibration file.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Version of the file's format.
@@ -22,7 +22,7 @@ const FORMAT: u32 = 1;
 /// First bytes of the binary files of earlier versions.
 const BINARY: &[u8] = b"HAPC";
 
-/// Models by the names that files and the command line give them.
+/// Models by their names in files and on the command line.
 pub const MODELS: [(&str, Model); 5] = [
     ("premium-1.0", Model::Premium10),
     ("premium-1.5", Model::Premium15),
@@ -31,7 +31,7 @@ pub const MODELS: [(&str, Model); 5] = [
     ("other", Model::Other),
 ];
 
-/// Reason for which a file is no usable calibration.
+/// Error of reading a calibration file.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {fault}", path.display())]
 pub struct FileError {
@@ -55,11 +55,11 @@ enum Fault {
     Binary(RecordError),
 }
 
-/// The file as it is read.
+/// Content of a calibration file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    /// Known before all else is read.
+    /// Read before all other fields.
     #[serde(rename = "hapterra-calibration")]
     _format: u32,
     model: String,
@@ -120,11 +120,10 @@ struct Limits {
     max_speed_mm_s: f32,
 }
 
-/// Reads a calibration file and checks it as a whole; also a binary one of an earlier
-/// version.
+/// Reads and checks a calibration file; also a binary one of an earlier version.
 ///
 /// # Errors
-/// [`FileError`] says what is wrong with which file.
+/// [`FileError`] names the file and its fault.
 pub fn read(path: &Path) -> Result<Calibration, FileError> {
     let record = regular_file::read(path, MAX_BYTES)
         .map_err(Fault::Unreadable)
@@ -144,7 +143,7 @@ pub fn read(path: &Path) -> Result<Calibration, FileError> {
 /// Writes a calibration file.
 ///
 /// # Errors
-/// When it cannot be written.
+/// The file cannot be written.
 pub fn write(path: &Path, record: &Calibration) -> Result<(), OutputError> {
     let mut output = Output::create(path)?;
     let written = output.write_all(to_toml(record).as_bytes());
@@ -156,7 +155,7 @@ pub fn write(path: &Path, record: &Calibration) -> Result<(), OutputError> {
 }
 
 fn from_toml(text: &str) -> Result<Calibration, Fault> {
-    /// The format alone: all else may be another way in another one.
+    /// The format alone, because the other fields depend on it.
     #[derive(Deserialize)]
     struct Format {
         #[serde(rename = "hapterra-calibration")]
@@ -217,8 +216,8 @@ impl File {
     }
 }
 
-/// A record as the text of a file. Numbers have the digits that read back to the same
-/// bits; angles are in radians for that reason, with degrees beside them.
+/// Returns a record as the text of a file. Numbers have enough digits to read back the same bits.
+/// Angles are in radians for that reason, with degrees beside them.
 #[must_use]
 pub fn to_toml(record: &Calibration) -> String {
     let known = MODELS.iter().find(|(_, model)| *model == record.model);

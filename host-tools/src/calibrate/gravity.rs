@@ -1,5 +1,5 @@
-//! The weight on joints 2 and 3, from poses in which something that reads its
-//! force holds the arm still.
+//! The weight on joints 2 and 3, from poses in which an instrument holds the arm still and measures
+//! the force.
 
 use glam::DVec3;
 use hapterra_core::phantom::Calibration;
@@ -15,37 +15,37 @@ pub const N_PER_GRAM: f64 = 9.806_65e-3;
 pub struct Still {
     /// Joint angles, rad.
     pub q_rad: [f64; 3],
-    /// The force that holds it at the tip, N, device frame.
+    /// The holding force at the tip, N, device frame.
     pub force_n: [f64; 3],
 }
 
-/// The weights on joints 2 and 3 that explain the poses best, Nm.
+/// The weights on joints 2 and 3 that fit the poses best, Nm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GravityFit {
     /// As [`Calibration::gravity_2_nm`].
     pub gravity_2_nm: f64,
     /// As [`Calibration::gravity_3_nm`].
     pub gravity_3_nm: f64,
-    /// Root mean square of what is left over, Nm: the joints' friction.
+    /// Root mean square of the residuals, Nm: the joints' friction.
     pub off_nm: f64,
 }
 
 impl GravityFit {
-    /// Puts the weights into a record.
+    /// Sets the weights in a record.
     pub fn apply(&self, record: &mut Calibration) {
         record.gravity_2_nm = self.gravity_2_nm as f32;
         record.gravity_3_nm = self.gravity_3_nm as f32;
     }
 }
 
-/// The weights that explain the poses best, in the sense of least squares. The
-/// joints' friction, 0.01 Nm, is how far off each pose may be.
+/// Fits the weights to the poses by least squares. The joints' friction, 0.01 Nm, limits the
+/// accuracy of each pose.
 ///
 /// # Errors
 /// [`FitError::NoWeight`]: all poses have joint 2 upright, or joint 3 hanging.
 pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, FitError> {
     let arm = Arm::of(record);
-    // (how much of the weight is rendered, torque) of each pose.
+    // For each pose: the factor of the weight, and the torque.
     let torque_of = |still: &Still| {
         let (q_rad, force_n) = (DVec3::from(still.q_rad), DVec3::from(still.force_n));
         let torque = arm.torques_nm(q_rad, force_n);
@@ -83,8 +83,7 @@ pub fn fit_gravity(record: &Calibration, poses: &[Still]) -> Result<GravityFit, 
 mod tests {
     use super::*;
 
-    /// The force at the tip that makes the torques which hold the weights, in a
-    /// pose with q1 = 0.
+    /// Returns the force at the tip that holds the weights in a pose with q1 = 0.
     fn holding(q: [f64; 3], weights: [f64; 2]) -> Still {
         let record = Calibration::PREMIUM_1_5;
         let (l1, l2) = (

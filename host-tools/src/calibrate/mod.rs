@@ -1,5 +1,5 @@
-//! Calibrating an arm: from what a user reads off a ruler and a spring scale
-//! to a calibration record.
+//! Calibration of an arm: from a user's readings of a ruler and a spring scale to a calibration
+//! record.
 //!
 //! ```text
 //! zero pose ─▶ counts ──┐
@@ -8,9 +8,9 @@
 //! scale     ─▶ newtons ───▶ gravity (gravity.rs) ──────┘
 //! ```
 //!
-//! The motors stay off throughout, so nothing that is wrong in a record can hurt
-//! anybody while it is measured. [`walk`] leads through it; who answers is an
-//! [`Attendant`]: a terminal, or a [`VirtualUser`].
+//! The motors stay off throughout, so that an error in a record cannot hurt the user during the
+//! measurement. [`walk`] runs the steps; the [`Attendant`] that answers is a terminal or a
+//! [`VirtualUser`].
 
 mod arm;
 pub mod file;

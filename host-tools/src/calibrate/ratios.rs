@@ -11,17 +11,17 @@ use super::fit_error::FitError;
 /// A move of the tip along a ruler.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Check {
-    /// Counts since the zero pose where the move began.
+    /// Counts from the zero pose to the move's start.
     pub from: [i32; 3],
-    /// Counts since the zero pose where it ended.
+    /// Counts from the zero pose to the move's end.
     pub to: [i32; 3],
-    /// Along which direction.
+    /// Direction of the move.
     pub direction: Direction,
-    /// The length of the move as read off the ruler, mm; negative the other way.
+    /// Length of the move by the ruler, mm; negative in the opposite direction.
     pub mm: f64,
 }
 
-/// The direction in which the tip was moved along a ruler.
+/// Direction of a move along a ruler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// To the user's right: joint 1.
@@ -33,10 +33,10 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// All of them.
+    /// All directions.
     pub const ALL: [Self; 3] = [Self::Right, Self::Up, Self::TowardsUser];
 
-    /// The unit vector, device frame.
+    /// Returns the unit vector, device frame.
     #[must_use]
     pub const fn unit(self) -> DVec3 {
         match self {
@@ -46,7 +46,7 @@ impl Direction {
         }
     }
 
-    /// In words.
+    /// Returns the direction in words.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -57,41 +57,39 @@ impl Direction {
     }
 }
 
-/// The ratios and signs that explain the checks best.
+/// The ratios and signs that fit the checks best.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RatioFit {
-    /// Motor turns a joint turn.
+    /// Motor turns per joint turn.
     pub ratio: DVec3,
-    /// +1 where counts rise with the joint's angle, −1 where they fall.
+    /// +1 if counts increase with the joint's angle, −1 if they decrease.
     pub sign: DVec3,
-    /// Root mean square of what is left over, mm.
+    /// Root mean square of the residuals, mm.
     pub off_mm: f64,
 }
 
 impl RatioFit {
-    /// Puts ratios and signs into a record. A motor turns with its encoder, so
-    /// where an encoder's sign turns over, the motor's does not follow: that is
-    /// its wiring's.
+    /// Sets ratios and signs in a record. A change of an encoder's sign leaves the motor's sign
+    /// unchanged, because that depends on the motor's wiring.
     pub fn apply(&self, record: &mut Calibration) {
         record.ratio = self.ratio.as_vec3();
         record.encoder_sign = self.sign.as_vec3();
     }
 }
 
-/// A joint has to move by this much in one of the checks.
+/// Counts that each joint must move in one of the checks.
 const ENOUGH_COUNTS: u32 = 400;
-/// More than this left over is no fit, mm: a ruler is read to one.
+/// Largest residual of a fit, mm; a ruler is read to 1 mm.
 const ENOUGH_MM: f64 = 4.0;
-/// Weight of the part of a move across its direction: a hand leads it.
+/// Weight of a move's component across its direction, because a hand leads it.
 const ACROSS: f64 = 0.25;
-/// Gauss-Newton steps; it takes three or four.
+/// Maximum Gauss-Newton steps; usually three or four are enough.
 const STEPS: usize = 20;
 
-/// Finds the ratios that explain the checks best, in the sense of least squares,
-/// beginning at those of a record and trying all signs.
+/// Fits the ratios to the checks by least squares. Starts at a record's ratios and tries all signs.
 ///
-/// Recovers ratios within 0.1 % from exact readings, within 1 % from readings
-/// 0.5 mm off over 80 mm (`tests/tests/calibrate.rs`).
+/// Recovers ratios within 0.1 % from exact readings, within 1 % from readings 0.5 mm off over 80 mm
+/// (`tests/tests/calibrate.rs`).
 ///
 /// # Errors
 /// [`FitError::NotMoved`], [`FitError::NoRatios`].
@@ -126,7 +124,7 @@ pub fn fit_ratios(record: &Calibration, checks: &[Check]) -> Result<RatioFit, Fi
     })
 }
 
-/// Gauss-Newton from a starting point; where it ends, and the squares left.
+/// Runs Gauss-Newton from a starting point; returns the result and its sum of squares.
 fn descend(arm: &Arm, checks: &[Check], start: DVec3) -> (DVec3, f64) {
     let mut at = start;
     for _ in 0..STEPS {
@@ -146,7 +144,7 @@ fn descend(arm: &Arm, checks: &[Check], start: DVec3) -> (DVec3, f64) {
         if !step.is_finite() {
             break;
         }
-        // Never more than half of what a count is worth, and never through zero.
+        // A step changes no value by more than half, so that none reaches zero.
         let longest = (step / at).abs().max_element();
         at -= step * f64::min(1.0, 0.5 / longest.max(1e-300));
         if longest < 1e-12 {
@@ -159,8 +157,8 @@ fn descend(arm: &Arm, checks: &[Check], start: DVec3) -> (DVec3, f64) {
     (at, squares.sum())
 }
 
-/// Returns the difference of the move by the encoders and the move by the ruler, mm; what
-/// lies across the ruler counts less.
+/// Returns the difference of the move by the encoders and by the ruler, mm. Components across the
+/// ruler have less weight.
 fn left_over(arm: &Arm, check: &Check, rad_per_count: DVec3) -> DVec3 {
     let tip = |counts| arm.tip_mm(arm.angles(rad_per_count, counts));
     let (moved, unit) = (tip(check.to) - tip(check.from), check.direction.unit());
@@ -172,8 +170,8 @@ fn left_over(arm: &Arm, check: &Check, rad_per_count: DVec3) -> DVec3 {
 mod tests {
     use super::*;
 
-    /// Counts since the zero pose at a tip position, for an arm with other ratios
-    /// than the preset's.
+    /// Returns the counts from the zero pose to a tip position, for an arm with ratios other than
+    /// the preset's.
     fn counts(arm: &Arm, rad_per_count: DVec3, wanted_mm: DVec3) -> [i32; 3] {
         let mut q = arm.zero_rad;
         for _ in 0..100 {

@@ -7,15 +7,14 @@ use hapterra_core::phantom::Calibration;
 use super::gravity::GravityFit;
 use super::ratios::RatioFit;
 
-/// Findings before they are accepted; displayed, old and new
-/// numbers side by side.
+/// Results before they are accepted. Displays old and new numbers side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Review {
-    /// The record that the walk began with.
+    /// The record before the calibration.
     pub before: Calibration,
-    /// The record that it came to.
+    /// The new record.
     pub after: Calibration,
-    /// The counts of the zero pose.
+    /// Encoder counts of the zero pose.
     pub zero: [i32; 3],
     /// The ratios, if they were measured.
     pub ratios: Option<RatioFit>,

@@ -1,4 +1,4 @@
-//! A user made of formulas, with a Phantom whose true numbers are its own.
+//! A simulated user with a Phantom whose true numbers are known.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -12,9 +12,9 @@ use super::walk::{Attendant, Stopped};
 use crate::link::FaultInjector;
 use crate::phantom::{HandModel, PhantomModel, Plant, kinematics};
 
-/// Time for which a pose is held until everything is still, s.
+/// Time to hold a pose until the arm is at rest, s.
 const SETTLE_S: f64 = 4.0;
-/// Places at which the weight is measured: from the zero pose, mm, device frame.
+/// Positions for the measurement of the weight, from the zero pose, mm, device frame.
 const POSES_MM: [[f64; 3]; 4] = [
     [30.0, 0.0, 40.0],
     [60.0, 0.0, 0.0],
@@ -22,19 +22,19 @@ const POSES_MM: [[f64; 3]; 4] = [
     [70.0, 0.0, 60.0],
 ];
 
-/// Moves a virtual Phantom, and reads ruler and scale off the truth.
+/// Moves a virtual Phantom, and reads the exact values of ruler and scale.
 pub struct VirtualUser {
     plant: Plant,
     /// Encoder counts, shared with the device's driver.
     counts: Rc<Cell<[i32; 3]>>,
-    /// Error of every reading of the ruler, mm.
+    /// Error of each ruler reading, mm.
     pub ruler_off_mm: f64,
-    /// Takes what the user says, a line at a time.
+    /// Receives the user's output, a line at a time.
     pub says: fn(&str),
 }
 
 impl VirtualUser {
-    /// A user of an arm that was switched on in some other pose than zero.
+    /// Returns the user of an arm that was switched on outside its zero pose.
     #[must_use]
     pub fn new(model: PhantomModel) -> Self {
         let mut plant = Plant::new(model, [0.2, -0.1, 0.3]);
@@ -48,8 +48,8 @@ impl VirtualUser {
         }
     }
 
-    /// A Premium 1.5 that is not quite as its preset says: two ratios some per
-    /// cent off, one encoder the other way round, a stylus of 40 g.
+    /// Returns the user of a Premium 1.5 that differs from its preset: two ratios by a few per
+    /// cent, one encoder's direction, a stylus of 40 g.
     #[must_use]
     pub fn with_a_stylus() -> Self {
         let mut model = PhantomModel::premium_1_5();
@@ -61,15 +61,14 @@ impl VirtualUser {
         Self::new(model)
     }
 
-    /// The cell that holds what the encoders read, counts; it follows the arm.
+    /// Returns the cell with the encoder counts, which follow the arm.
     #[must_use]
     pub fn counts(&self) -> Rc<Cell<[i32; 3]>> {
         Rc::clone(&self.counts)
     }
 
-    /// Returns the hands' effect on the encoders and switches of a device: the encoders
-    /// follow the arm, and the dead-man switch is pressed for half of every second, so
-    /// that whatever waits for a press gets one.
+    /// Returns the hands' effect on a device's encoders and switches. The encoders follow the arm.
+    /// The dead-man switch is pressed for half of every second, so that each wait for a press ends.
     #[must_use]
     pub fn hands(&self) -> FaultInjector {
         let counts = self.counts();
@@ -79,7 +78,7 @@ impl VirtualUser {
         })
     }
 
-    /// The arm with its true ratios, signs and weights.
+    /// Returns the arm with its true ratios, signs and weights.
     #[must_use]
     pub fn model(&self) -> &PhantomModel {
         self.plant.model()
@@ -90,7 +89,7 @@ impl VirtualUser {
         let from = DVec3::from(self.plant.tip_m());
         let ticks = (SETTLE_S * 1e3) as u32;
         for tick in 0..ticks {
-            // There in the first quarter of the time, then only held.
+            // The motion ends after a quarter of the time; then the tip is held.
             let share = f64::min(1.0, 4.0 * f64::from(tick) / f64::from(ticks));
             let at = from.lerp(DVec3::from(to_m), share);
             self.plant.aim(at.to_array(), [0.0; 3]);
@@ -107,7 +106,7 @@ impl Attendant for VirtualUser {
 
     fn zero_pose(&mut self) -> Result<(), Stopped> {
         (self.says)("into the zero pose");
-        // In its rest, exactly: no hand is as precise.
+        // Exactly the zero pose; no hand is as precise.
         self.plant.put([0.0; 3]);
         self.counts.set(self.plant.counts());
         Ok(())

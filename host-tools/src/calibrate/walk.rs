@@ -1,4 +1,4 @@
-//! The steps of a calibration in their order, for a user or a simulated one.
+//! The steps of a calibration in order, for a real or simulated user.
 
 use hapterra_core::phantom::Calibration;
 
@@ -10,67 +10,66 @@ use super::review::Review;
 
 /// Distance of the move along the ruler, mm.
 const ABOUT_MM: f64 = 80.0;
-/// Encoders that move by more than this between two looks are not still.
+/// Largest change between two looks of an encoder at rest.
 const STILL_COUNTS: u32 = 3;
-/// Poses in which the weight is measured.
+/// Number of poses for the weight.
 const POSES: usize = 4;
 
-/// Who moves the arm and reads ruler and scale.
+/// The user's side of a calibration: moves the arm, and reads ruler and scale.
 pub trait Attendant {
     /// Receives a message.
     fn hear(&mut self, line: &str);
 
-    /// Puts the arm into its zero pose and holds it there.
+    /// Moves the arm into its zero pose and holds it there.
     ///
     /// # Errors
     /// [`Stopped`].
     fn zero_pose(&mut self) -> Result<(), Stopped>;
 
-    /// Moves the tip from where it is along a ruler, `about_mm` or so, and tells
-    /// how far it went, mm; negative where it went the other way.
+    /// Moves the tip along a ruler by approximately `about_mm`. Returns the distance by the ruler,
+    /// mm; negative in the opposite direction.
     ///
     /// # Errors
     /// [`Stopped`].
     fn move_along(&mut self, direction: Direction, about_mm: f64) -> Result<f64, Stopped>;
 
-    /// Holds the tip still with something that reads its force, in another pose
-    /// each time. Tells the force with which it is held, N, upwards and towards
-    /// the user; none where gravity is not to be measured any further.
+    /// Holds the tip still with a scale, in a different pose each time. Returns the holding force,
+    /// N, upwards and towards the user; `None` ends the measurement of gravity.
     ///
     /// # Errors
     /// [`Stopped`].
     fn hold_still(&mut self, number: usize) -> Result<Option<[f64; 2]>, Stopped>;
 
-    /// Checks that the record is right.
+    /// Returns true if the user accepts the record.
     ///
     /// # Errors
     /// [`Stopped`].
     fn agrees(&mut self, review: &Review) -> Result<bool, Stopped>;
 }
 
-/// The attendant does not want to continue.
+/// The attendant stopped the calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped: nothing was changed on the device")]
 pub struct Stopped;
 
-/// Reason for which a walk made no record.
+/// Reason why a calibration gives no record.
 #[derive(Debug, thiserror::Error)]
 pub enum WalkError<E: std::error::Error + 'static> {
     /// The attendant stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// The measurements do not fit together.
+    /// The measurements are inconsistent.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// The device does not tell its counts.
+    /// The device does not report its counts.
     #[error(transparent)]
     Counts(E),
-    /// The attendant does not like the record.
+    /// The attendant did not accept the record.
     #[error("the record was not agreed to: nothing was changed on the device")]
     Refused,
 }
 
-/// Which parts of the record are measured; the zero pose always is.
+/// The measured parts of the record; the zero pose is always measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// True if the cable ratios and encoder signs are measured.
@@ -79,7 +78,7 @@ pub struct Plan {
     pub gravity: bool,
 }
 
-/// Walks through a calibration from a record. `counts` reads the encoders.
+/// Runs a calibration from a record. `counts` reads the encoders.
 ///
 /// # Errors
 /// [`WalkError`].
@@ -176,7 +175,7 @@ impl<E: std::error::Error + 'static> Walk<'_, E> {
         }))
     }
 
-    /// The counts, once the arm is held still.
+    /// Returns the counts once the arm is at rest.
     fn still_counts(&mut self) -> Result<[i32; 3], WalkError<E>> {
         let mut told = false;
         loop {

@@ -1,4 +1,4 @@
-//! `hapterra completions`: what a shell completes.
+//! `hapterra completions`: a shell's completion script.
 
 use clap::CommandFactory as _;
 use clap_complete::{Shell, generate};
@@ -13,7 +13,7 @@ pub struct Args {
     pub shell: Shell,
 }
 
-/// Prints the completions.
+/// Prints the completion script.
 ///
 /// # Errors
 /// Standard output cannot be written.

@@ -1,4 +1,4 @@
-//! `hapterra cut`: a terrain's heights for a page in a browser, few enough for it.
+//! `hapterra cut`: a terrain's heights for a web page, reduced to a limited number of samples.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -11,11 +11,11 @@ use super::options::terrain_file::TerrainFile;
 use crate::output::{Output, OutputError, OutputFolder, keep_apart};
 use crate::terrain::HapticGrid;
 
-/// The heights, beside their description.
+/// The file of heights and its description.
 const HEIGHTS: &str = "terrain.npy";
 const ABOUT: &str = "terrain.json";
 
-/// Hint for a folder that cannot be written to.
+/// Hint for a folder that cannot be written.
 const HINT: &str = "name another folder with -o";
 
 /// Arguments of `hapterra cut`.
@@ -34,26 +34,26 @@ pub struct Args {
     pub most_samples: u64,
 }
 
-/// Description of the heights; the fields' names are those of the JSON.
+/// Description of the heights; its fields have the names of the JSON.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 struct About {
-    /// The file with the heights, beside this one.
+    /// The file of heights, in the same folder.
     file: &'static str,
-    /// Name of the terrain.
+    /// The terrain's name.
     name: String,
-    /// Rendered samples before some were left out, west to east and south to north.
+    /// Rendered samples before the reduction, west to east and south to north.
     of: [u32; 2],
     /// Side of a cell on the ground, m.
     cell_m: Option<f64>,
-    /// Metres in a unit of height.
+    /// Metres per unit of height.
     unit_m: f64,
 }
 
-/// Writes the heights, of the cells that are rendered, and what is known of them.
+/// Writes the rendered cells' heights and their description.
 ///
 /// # Errors
-/// When the terrain cannot be opened, or the folder not be written to.
+/// The terrain cannot be opened, or the folder cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let heights = args.out.join(HEIGHTS);
     keep_apart(&[&heights], &args.terrain.inputs()).or_hint(HINT)?;
@@ -100,7 +100,7 @@ fn written(
     output.finish()
 }
 
-/// NumPy's format, 32-bit floats, north row first.
+/// Writes NumPy's format, 32-bit floats, north row first.
 fn write_npy(
     out: &mut impl Write,
     grid: &HapticGrid<'_>,
@@ -113,7 +113,7 @@ fn write_npy(
     writeln!(out, "{shape:117}")?;
     let mut row = vec![0.0; columns as usize];
     for south in (0..rows).rev() {
-        // `check_complete` reports what could not be read.
+        // `check_complete` reports unreadable samples.
         let _ = grid.read_row(level, south, 0, &mut row);
         let bytes: Vec<u8> = row.iter().flat_map(|h| (*h as f32).to_le_bytes()).collect();
         out.write_all(&bytes)?;

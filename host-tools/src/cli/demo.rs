@@ -1,5 +1,4 @@
-//! `hapterra demo`: the whole thing, from a file to a picture of what a hand
-//! felt.
+//! `hapterra demo`: a whole session, from a terrain file to a picture of the rendered forces.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -36,9 +35,9 @@ use crate::telemetry::{Placements, SampleLog};
 use heightfield::without_key;
 use heightfield::{Raster, files_read_with};
 
-/// Samples along the side of the terrain that the demo makes itself.
+/// Samples along the side of the demo's own terrain.
 const OWN_SIZE: u32 = 1024;
-/// Name of that terrain in a recording: how to make it as a file.
+/// Name of the demo's own terrain in a recording: the command that makes it as a file.
 pub(super) const OWN_TERRAIN: &str = "hapterra synth fractal --size 1024 --seed 1";
 
 /// Arguments of `hapterra demo`.
@@ -49,7 +48,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: Option<PathBuf>,
 
-    /// Statements about the file that it does not make itself.
+    /// Properties that the file does not state.
     #[command(flatten)]
     pub reading: ReadingOptions,
 
@@ -73,7 +72,7 @@ pub struct Args {
           value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub rounds: u32,
 
-    /// Which part of it.
+    /// Place and scale of the terrain.
     #[command(flatten)]
     pub placing: Placing,
 
@@ -85,7 +84,7 @@ pub struct Args {
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// Commands that change the placement meanwhile.
+    /// Commands that change the placement during the session.
     #[command(flatten)]
     pub commands: Commands,
 
@@ -101,7 +100,7 @@ pub struct Args {
 /// Runs the demonstration.
 ///
 /// # Errors
-/// A fault of the file, the device or the output folder.
+/// The file, the device or the output folder fails.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (raster, name) = terrain_of(args)?;
     let outputs = Outputs::new(&args.out, &name);
@@ -114,7 +113,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
     asked.grid = asked.grid.with_materials(materials.as_ref());
     asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
-    // The virtual Phantom is one.
+    // The virtual arm is a Premium 1.5.
     let view = asked.view(&Calibration::PREMIUM_1_5)?;
     let terrain = view.terrain(asked.grid)?;
     let placed = shown_planning(&name, &raster, || {
@@ -135,14 +134,14 @@ fn terrain_of(args: &Args) -> Result<(Raster, String), Failure> {
     Ok((own_terrain()?, "fractal".into()))
 }
 
-/// The terrain that the demo makes itself: [`OWN_TERRAIN`].
+/// Returns the demo's own terrain: [`OWN_TERRAIN`].
 pub(super) fn own_terrain() -> Result<Raster, Failure> {
     let amplitude = Kind::Fractal.usual_amplitude_cells();
     let raster = Synth::new(Kind::Fractal, 1, amplitude).raster(OWN_SIZE, OWN_SIZE);
     raster.map_err(Failure::new)
 }
 
-/// Hint for a file of the demo that cannot be written.
+/// Hint for an output of the demo that cannot be written.
 const OTHER_FOLDER: &str = "name another folder with --out";
 
 /// The files that the demo writes.
@@ -153,7 +152,7 @@ struct Outputs {
 }
 
 impl Outputs {
-    /// In a folder, with the name of the terrain.
+    /// Returns the outputs in a folder, named after the terrain.
     fn new(folder: &Path, name: &str) -> Self {
         let stem = Path::new(name).file_stem();
         let stem = stem.map_or(name.into(), |stem| stem.to_string_lossy());
@@ -180,7 +179,7 @@ fn show(
     name: &str,
     outputs: &Outputs,
 ) -> Result<(), Failure> {
-    // Gone again where nothing comes to lie in it.
+    // The folder is removed again if it stays empty.
     let _folder = OutputFolder::create(&outputs.folder).or_hint(OTHER_FOLDER)?;
     let terrain = placed.terrain();
     println!(
@@ -221,7 +220,7 @@ fn show(
         VirtualDevice::Emulated(board) => tour_emulated(&board, tour, arm)?,
     };
     server.into_iter().for_each(events::end);
-    // The terminal is as it was.
+    // Restores the terminal.
     drop(control);
     let file = args.file.as_ref();
     let file = file.map_or(OWN_TERRAIN.into(), |file| without_key(file));
@@ -247,7 +246,7 @@ fn show(
     }
 }
 
-/// Returns the device of the loop: as stated, otherwise the emulated board if there is one.
+/// Returns the requested device; by default the emulated board if there is one.
 fn device(args: &Args) -> VirtualDevice {
     match &args.device {
         Some(device) => device.clone(),
@@ -273,17 +272,17 @@ fn control<'t>(
     Ok(PlacementControl::new(served, arm, args.commands.open()?))
 }
 
-/// The samples of a tour.
+/// Result of a tour.
 struct Toured<'t> {
-    /// The rows of the recording, with what the loop did.
+    /// The rows of the recording, with the loop's columns.
     rows: Vec<(Record, LoopColumns)>,
     marks: Vec<Mark>,
     views: Placements<'t>,
     summary: SessionSummary,
 }
 
-/// Draws the samples of the last placement: places and heights of another are other places of
-/// the hand.
+/// Draws only the last placement's samples, because another placement's coordinates are other
+/// positions of the hand.
 fn draw(toured: &Toured<'_>, first: &Placement, name: &str, path: &Path) -> Result<(), Failure> {
     let last = toured.rows.last().map_or(0, |(_, of_loop)| of_loop.view());
     let in_last = toured
@@ -301,7 +300,7 @@ fn draw(toured: &Toured<'_>, first: &Placement, name: &str, path: &Path) -> Resu
     summary.draw(path, (&placement.terrain, &view), &title, &records)
 }
 
-/// Tours on the board in an emulator, the arm in a thread of its own.
+/// Runs the tour on an emulated board, with the arm in its own thread.
 fn tour_emulated<'t>(
     board: &EmulatedBoard,
     tour: Tour<'_, 't>,
@@ -312,15 +311,15 @@ fn tour_emulated<'t>(
     move_arm_while(&mut lines.plant, &mut arm, || {
         match tour.go(Box::new(lines.link), Timeouts::EMULATED) {
             Ok(toured) => {
-                // The arm is still there while the board lets its force go out.
+                // The arm must run until the board has reduced its force to zero.
                 let ended = emulator.finish().map(|()| toured);
                 ended
                     .map_err(|why| format!("the emulated board did not end well: {why}"))
                     .or_hint(report)
             }
-            // The user ended it, and the board may not have been able to answer.
+            // The user ended the tour, and the board may not have been able to reply.
             Err(_) if interrupt::requested() => Err("interrupted").or_hint("nothing was written"),
-            // A link that broke because the board ended is the board's failure.
+            // If the link broke because the board ended, the board's failure is reported.
             Err(error) => match emulator.failure() {
                 Some(said) => Err(format!("the emulated board failed: {said}")).or_hint(report),
                 None => Err(error.into()),
@@ -329,7 +328,7 @@ fn tour_emulated<'t>(
     })
 }
 
-/// A tour that is to be made.
+/// A tour to run.
 struct Tour<'p, 't> {
     placed: &'p PlacedTerrain<'t>,
     stop_s: f64,
@@ -340,7 +339,7 @@ struct Tour<'p, 't> {
 }
 
 impl<'t> Tour<'_, 't> {
-    /// Serves the terrain until the tour has come to its end.
+    /// Serves the terrain until the tour ends.
     fn go(
         self,
         transport: Box<dyn Transport + 't>,
@@ -414,8 +413,7 @@ impl<'t> Tour<'_, 't> {
         marks.extend(control.marks(&log, true));
         let figures = log.figures();
         let ticks = log.ticks();
-        // However the tour ended, the board is notified; its samples after the tour's end
-        // is not shown.
+        // The device is always notified of the end; its samples after the tour are not shown.
         let left = session.say_goodbye(&mut |_| {});
         if let Some(events) = &events {
             let disarmed = left.is_ok();

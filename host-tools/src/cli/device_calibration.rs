@@ -1,4 +1,4 @@
-//! Calibration of a device before it has a terrain.
+//! A device's calibration before it has a terrain.
 
 use hapterra_core::phantom::{Calibration, Model};
 
@@ -6,11 +6,11 @@ use super::bringup::PATIENCE;
 use super::failure::{Failure, OrHint};
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 
-/// Asks a device for its calibration, and leaves its host in place; the preset
-/// of its model if it has none, with a message.
+/// Reads a device's calibration without taking it from its host. If it has none, returns its
+/// model's preset, with a message.
 ///
 /// # Errors
-/// No device, one that does not answer, or a calibration that cannot be used.
+/// No device, no reply, or an unusable calibration.
 pub(super) fn calibration_of(
     address: &DeviceAddress,
     tell: &dyn Fn(String),

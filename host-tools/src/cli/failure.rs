@@ -1,4 +1,4 @@
-//! Failures of subcommands: what went wrong, and the one thing to do next.
+//! Failures of subcommands: the error and the next step for the user.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -8,7 +8,7 @@ use super::terminal::writer;
 /// Any error, as the standard library boxes it.
 type AnyError = Box<dyn Error + Send + Sync>;
 
-/// An error as the user sees it: `error: …` and, where there is one, `hint: …`.
+/// An error as shown to the user: `error: …` and, if there is one, `hint: …`.
 #[derive(Debug)]
 pub struct Failure {
     error: AnyError,
@@ -17,7 +17,7 @@ pub struct Failure {
     about: Option<String>,
 }
 
-/// An error that tells by itself what to do next; `?` makes a [`Failure`] of it.
+/// An error that has its own hint; `?` converts it to a [`Failure`].
 pub trait Hint {
     /// Returns the next step, in the imperative.
     fn hint(&self) -> String;
@@ -30,13 +30,12 @@ impl<E: Hint + Error + Send + Sync + 'static> From<E> for Failure {
     }
 }
 
-/// A result whose error becomes a [`Failure`] where the hint depends on the
-/// command, not on the error.
+/// A result whose hint depends on the command, not on the error.
 pub trait OrHint<T> {
-    /// The value, or the failure with what to do next, in the imperative.
+    /// Returns the value, or the failure with the next step, in the imperative.
     ///
     /// # Errors
-    /// That of the result.
+    /// The result's error.
     fn or_hint(self, next_step: impl Into<String>) -> Result<T, Failure>;
 }
 
@@ -47,7 +46,7 @@ impl<T, E: Into<AnyError>> OrHint<T> for Result<T, E> {
 }
 
 impl Failure {
-    /// A failure with no hint yet. The error's message says what failed and on what.
+    /// Creates a failure without a hint. The error's message states what failed and on what.
     pub fn new(error: impl Into<AnyError>) -> Self {
         Self {
             error: error.into(),
@@ -56,21 +55,21 @@ impl Failure {
         }
     }
 
-    /// Adds what to do next, in the imperative.
+    /// Adds the next step, in the imperative.
     #[must_use]
     pub fn hint(mut self, next_step: impl Into<String>) -> Self {
         self.hint = Some(next_step.into());
         self
     }
 
-    /// Names what the error is about, where that has a name.
+    /// Adds the name of the error's subject, if it has one.
     #[must_use]
     pub(super) fn about(mut self, name: Option<&str>) -> Self {
         self.about = name.map(str::to_owned);
         self
     }
 
-    /// The lines shown to the user: the error with its causes, then the hint.
+    /// Returns the text for the user: the error with its causes, then the hint.
     pub fn text(&self) -> String {
         let about = self.about.as_ref().map(|name| format!("{name} "));
         let mut text = format!("error: {}{}", about.unwrap_or_default(), self.error);

@@ -1,5 +1,5 @@
-//! `hapterra flash`: an image onto a board, through its debug probe or, with `--dfu`,
-//! through the USB loader in its chip's ROM.
+//! `hapterra flash`: writes an image to a board, through its debug probe or, with `--dfu`, through
+//! the USB loader in its chip's ROM.
 
 use std::path::PathBuf;
 
@@ -66,8 +66,8 @@ fn parse_board(text: &str) -> Result<&'static Board, String> {
 /// Writes the image.
 ///
 /// # Errors
-/// No image, one for another chip or board, no way to the board, or a chip that does not
-/// take it.
+/// No image, an image for another chip or board, no connection to the board, or a chip that refuses
+/// the image.
 pub fn run(args: &Args) -> Result<(), Failure> {
     #[cfg(not(feature = "probe"))]
     if !args.dfu && !args.check {
@@ -107,7 +107,7 @@ fn image(args: &Args) -> Result<PathBuf, Failure> {
     built.or_hint("the messages of cargo above say why")
 }
 
-/// This command was built without the part that talks to probes.
+/// Returns the failure of a build without support for probes.
 #[cfg(not(feature = "probe"))]
 fn without_probes(args: &Args) -> Failure {
     Failure::new(format!(

@@ -1,4 +1,4 @@
-//! Size of the command line's help.
+//! Tests of the size of the command line's help.
 
 use std::collections::BTreeSet;
 
@@ -29,7 +29,7 @@ fn options_are_few() {
     let mut options = BTreeSet::new();
     for subcommand in command.get_subcommands() {
         let own = subcommand.get_opts();
-        // Those that several commands share are defined once.
+        // Count options that several commands share only once.
         let own = own.map(|it| (it.get_long(), it.get_help().map(ToString::to_string)));
         options.extend(own);
     }

@@ -1,6 +1,6 @@
-//! Hints for each error of the library: one table an error type.
+//! Hints for each error of the library: one table per error type.
 //!
-//! A hint that depends on the command's own options stands in that command.
+//! A hint that depends on a command's options is in that command.
 
 mod terrain_files;
 
@@ -19,7 +19,7 @@ use crate::replay::settings::OtherTerrain;
 use crate::synth::{WriteError, WriteFault};
 use crate::terrain::TerrainError;
 
-/// For what no user can have caused.
+/// Hint for errors that a user cannot cause.
 const REPORT: &str = "this should not happen: please report it with the file and the options";
 
 impl Hint for TerrainError {

@@ -1,4 +1,4 @@
-//! `hapterra info`: what a terrain file holds and how it would be streamed.
+//! `hapterra info`: the content of a terrain file and its tiles.
 
 mod formats;
 mod link;
@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath, required_unless_present = "formats")]
     pub file: Option<PathBuf>,
 
-    /// Statements about the file that it does not make itself.
+    /// Properties that the file does not state.
     #[command(flatten)]
     pub reading: ReadingOptions,
 
@@ -50,7 +50,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// A rate of the link.
+/// Parses a rate of the link.
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
@@ -58,12 +58,12 @@ fn rate(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Shows what the file holds.
+/// Shows the file's content.
 ///
 /// # Errors
-/// When the file cannot be opened as a height field, or the output cannot be written.
+/// The file cannot be opened as a height field, or the output cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    // Clap wants a file where the list is not asked for.
+    // Clap requires a file unless the list is requested.
     let (false, Some(file)) = (args.formats, &args.file) else {
         return put(&formats::text());
     };
@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// Output of the command; the fields' names are those of the JSON.
+/// Output of the command; its fields have the names of the JSON.
 #[derive(Serialize)]
 struct FileReport {
     file: String,
@@ -95,14 +95,14 @@ struct FileReport {
     columns: u32,
     /// Samples from south to north.
     rows: u32,
-    /// The horizontal reference system, as `EPSG:26911`, where the file states it.
+    /// The horizontal reference system, such as `EPSG:26911`, if the file states it.
     crs: Option<String>,
     crs_name: Option<String>,
     /// Source of the reference system.
     crs_from: Option<&'static str>,
-    /// Outer edges of the cells around all samples, in the file's units.
+    /// Outer edges of the samples' cells, in the file's units.
     bounds: Option<Rectangle>,
-    /// The same in degrees of longitude and latitude: of WGS 84, where the way there is known.
+    /// The same in degrees of longitude and latitude; in WGS 84 if the conversion is known.
     bounds_lonlat: Option<Rectangle>,
     #[serde(skip)]
     projection_known: bool,
@@ -110,19 +110,19 @@ struct FileReport {
     /// Metres per vertical unit, if the file states it.
     metres_per_vertical_unit: Option<f64>,
     vertical: Vertical,
-    /// In the file's vertical unit.
+    /// Height range in the file's vertical unit.
     lowest: f64,
     highest: f64,
     /// Height = stored value × scale + offset.
     scale: f64,
     offset: f64,
-    /// Among the samples that were looked at.
+    /// Number of no-data samples among those examined.
     no_data: u64,
-    /// Distance in samples within which these are filled from data, where they are.
+    /// Distance in samples within which no-data is filled, if it is.
     filled_within: Option<u32>,
     /// The stored value that means no data.
     no_data_value: Option<f64>,
-    /// Bands, of which one holds the heights.
+    /// Number of bands; one of them contains the heights.
     bands: u32,
     /// Columns and rows of a strip, tile or block.
     block: Option<[u32; 2]>,
@@ -130,12 +130,12 @@ struct FileReport {
     overviews: Vec<[u32; 2]>,
     /// `area` or `point`: the meaning of a sample, if the file states it.
     samples_are: Option<&'static str>,
-    /// Samples that range and number of holes are from: all, or fewer where the raster
-    /// stays in its file.
+    /// Number of samples examined for range and no-data: all, or fewer if the raster stays in its
+    /// file.
     looked_at: u64,
-    /// True if that is all of them.
+    /// True if all samples were examined.
     known_whole: bool,
-    /// Bytes the samples take on the host, at most.
+    /// Maximum memory of the samples on the host, bytes.
     bytes: usize,
     levels: Vec<Level>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -150,35 +150,34 @@ struct Cell {
     unit: &'static str,
     /// True if the file states the unit; metres or degrees are assumed if not.
     unit_stated: bool,
-    /// Source of the unit: the `file`, the `code` of its reference system, an
-    /// `option` of this command, or it is `assumed`.
+    /// Source of the unit: the `file`, the `code` of its reference system, an `option` of this
+    /// command, or `assumed`.
     unit_from: &'static str,
     /// Ground length of both sides in metres.
     east_m: f64,
     north_m: f64,
-    /// Side of the square cell that is rendered, m on the ground.
+    /// Side of the square haptic cell, m on the ground.
     haptic_cell_m: f64,
-    /// True if heights are interpolated for that, as the stored cells are not square.
+    /// True if heights are interpolated because the stored cells are not square.
     resampled: bool,
     /// True if stored cells that are not square are rendered as squares.
     distorted: bool,
-    /// Worst error of slopes and lengths in the field, as a share, if all cells are rendered like
-    /// the middle one.
+    /// Maximum relative error of slopes and lengths, if all cells are rendered like the middle one.
     worst_share: Option<f64>,
-    /// Its place, in the file's coordinates.
+    /// Position of the maximum error, in the file's coordinates.
     worst_at: Option<[f64; 2]>,
     #[serde(skip)]
     worst: Option<String>,
 }
 
-/// One level of detail: the field with every 2^level-th sample.
+/// One level of detail: every 2^level-th sample.
 #[derive(Serialize)]
 struct Level {
     level: u8,
     tile_columns: u32,
     tile_rows: u32,
     tiles: u64,
-    /// Bytes of all its tiles as single floats.
+    /// Bytes of all tiles of the level in single floats.
     bytes: u64,
 }
 
@@ -294,7 +293,7 @@ impl FileReport {
         text
     }
 
-    /// Returns the storage of the samples in the file.
+    /// Returns the format of the stored samples.
     fn stored(&self) -> [(&'static str, String); 4] {
         let sides = |[columns, rows]: [u32; 2]| format!("{columns} × {rows}");
         let no_data = self
@@ -333,7 +332,7 @@ impl FileReport {
         ]
     }
 
-    /// As `EPSG:26911 NAD83 / UTM zone 11N (stated)`.
+    /// Returns text such as `EPSG:26911 NAD83 / UTM zone 11N (stated)`.
     fn reference_system(&self) -> String {
         let from = self.crs_from.map(told).unwrap_or_default();
         match (&self.crs, &self.crs_name) {
@@ -408,8 +407,8 @@ impl Level {
     }
 }
 
-/// Levels of detail until one tile holds the field, or no whole cell is left of it
-/// one way.
+/// Returns the levels of detail, until one tile covers the field, or no whole cell is left in one
+/// direction.
 fn levels(columns: u32, rows: u32) -> Vec<Level> {
     let tile_bytes = (TILE_SAMPLES * TILE_SAMPLES * size_of::<f32>()) as u64;
     let mut levels = Vec::new();

@@ -2,20 +2,20 @@
 
 use std::time::{Duration, Instant};
 
-/// Time for which lines are counted together.
+/// Interval for which lines are counted.
 const WINDOW: Duration = Duration::from_secs(1);
 
-/// Lets so many lines through in a second, and counts the others.
+/// Allows a number of lines a second and counts the omitted ones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LineLimit {
     most: u32,
-    /// When the present second began, and the lines let through in it.
+    /// Start of the current interval, and the lines allowed in it.
     window: Option<(Instant, u32)>,
     left_out: u64,
 }
 
 impl LineLimit {
-    /// Lets `most` lines a second through.
+    /// Creates a limit of `most` lines a second.
     pub(super) const fn new(most: u32) -> Self {
         Self {
             most,
@@ -24,7 +24,7 @@ impl LineLimit {
         }
     }
 
-    /// Returns the number of lines that were left out since the last one, if a line at `now` is
+    /// Returns the number of lines omitted since the last allowed one, if a line at `now` is
     /// allowed.
     pub(super) fn admit(&mut self, now: Instant) -> Option<u64> {
         let open = self
@@ -39,7 +39,7 @@ impl LineLimit {
         Some(std::mem::take(&mut self.left_out))
     }
 
-    /// Returns the number of lines that were left out since the last one.
+    /// Returns the number of lines omitted since the last allowed one.
     pub(super) const fn left_out(&self) -> u64 {
         self.left_out
     }

@@ -1,4 +1,4 @@
-//! `hapterra list`: boards, debug probes and ports that can be seen from here.
+//! `hapterra list`: boards, debug probes and ports that this computer can reach.
 
 use std::time::Duration;
 
@@ -17,16 +17,15 @@ pub struct Args {
     pub addresses: Vec<String>,
 }
 
-/// Place where the link of an emulated board is looked for by default.
+/// Default address of an emulated board's link.
 const USUAL_ADDRESS: &str = "localhost:4000";
-/// Time that a board may take to say who it is.
+/// Time limit for a board's introduction.
 const PATIENCE: Duration = Duration::from_millis(1500);
 
-/// Lists what there is; where there is nothing, what was looked for and what to
-/// check.
+/// Lists the devices; if there are none, what was searched for and what to check.
 ///
 /// # Errors
-/// None: finding nothing is an answer.
+/// None: an empty list is a valid result.
 pub fn run(args: &Args) -> Result<(), Failure> {
     println!("boards with firmware");
     for board in &BOARDS {
@@ -106,7 +105,7 @@ fn list_emulated(args: &Args) {
     }
 }
 
-/// The device behind a link, in words.
+/// Returns a description of the device behind a link.
 fn who(link: Box<dyn Transport>) -> Result<String, LinkError> {
     let control = ControlSession::look(link, PATIENCE)?;
     Ok(session_summary::device(control.device()))

@@ -1,7 +1,7 @@
-//! Diagnostics on standard error. A device can cause some of them, as often as it
-//! likes and with words of its own: every line goes through [`printable`], and of each kind
-//! of line about the link one a second is written, with the count of those left out. Each
-//! device is served by a thread of its own, and the lines of one device leave none of another's out.
+//! Diagnostics on standard error. A device can cause some of them, at any rate and with any text.
+//! Therefore every line passes through [`printable`], and each kind of line about the link is
+//! limited to one a second, with the number of omitted lines. Each device is served by its own
+//! thread, and the limit is separate for each.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -18,14 +18,14 @@ use super::line_limit::LineLimit;
 use super::terminal::writer;
 use heightfield::printable_text::printable;
 
-/// Place where the lines come from that a device can cause.
+/// Log target of lines that a device can cause.
 const BY_DEVICE: &str = "hapterra::link";
 
 /// Starts the log. `RUST_LOG` overrides the `-v` count.
 pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
     let level = match verbose {
-        // A probe library warns of each kind of probe that it cannot look for;
-        // the error reports the outcome.
+        // A probe library warns of each kind of probe that it cannot search for; the error reports
+        // the result.
         0 => "warn,probe_rs=error",
         1 => "info",
         2 => "debug",
@@ -36,17 +36,17 @@ pub(super) fn to_stderr(verbose: u8) -> Log<Spoken> {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(log.clone())
-        // A colour is a control sequence, and of those no line has any.
+        // Colours are control sequences, which no line may contain.
         .with_ansi(false)
         .without_time()
-        // If standard error is closed there is no reader.
+        // If standard error is closed, there is no reader.
         .log_internal_errors(false)
         .init();
     log
 }
 
-/// Has lines written to standard error by the thread that writes there: the logging thread,
-/// perhaps with an armed arm at the other end of the link, does not wait for a terminal.
+/// Sends lines to the thread that writes to standard error. The logging thread, perhaps with an
+/// armed arm on its link, never waits for a terminal.
 pub(super) struct Spoken;
 
 impl Write for Spoken {
@@ -61,10 +61,10 @@ impl Write for Spoken {
     }
 }
 
-/// The log, over what `open` gives.
+/// A log that writes to the value of `open`.
 pub(super) struct Log<W> {
     open: Arc<dyn Fn() -> W + Send + Sync>,
-    /// Of each kind of line that a device can cause, and each thread that serves one.
+    /// The limit for each kind of line that a device can cause, and each serving thread.
     kinds: Arc<Mutex<HashMap<(Identifier, ThreadId), LineLimit>>>,
 }
 
@@ -85,8 +85,8 @@ impl<W: Write> Log<W> {
         }
     }
 
-    /// Returns the number of lines of this kind that were left out before the one at `now`; none if
-    /// this one is left out, too.
+    /// Returns the number of lines of this kind omitted before the one at `now`; `None` if this one
+    /// is omitted too.
     fn admit(&self, about: &Metadata<'_>, now: Instant) -> Option<u64> {
         if !about.target().starts_with(BY_DEVICE) {
             return Some(0);
@@ -97,7 +97,7 @@ impl<W: Write> Log<W> {
         kind.admit(now)
     }
 
-    /// Says how many lines were left out since the last of their kind.
+    /// Reports the number of lines omitted at the end.
     pub(super) fn end(&self) {
         let kinds = self.kinds.lock().unwrap_or_else(PoisonError::into_inner);
         let left_out: u64 = kinds.values().map(LineLimit::left_out).sum();
@@ -127,7 +127,7 @@ impl<W: Write> MakeWriter<'_> for Log<W> {
     }
 }
 
-/// Takes one line; none where it is left out. With the count of lines left out before.
+/// Writes one line, unless it is omitted, with the number of lines omitted before it.
 pub(super) struct Line<W>(Option<W>, u64);
 
 impl<W: Write> Write for Line<W> {
@@ -141,8 +141,7 @@ impl<W: Write> Write for Line<W> {
                 line += &left_out_text(left_out);
             }
             line.push('\n');
-            // A line that cannot be written ends nothing: an error here would be written to
-            // standard error, and a program panics that cannot.
+            // A write error is ignored: its report would go to standard error too, and would panic.
             let _ = out.write_all(line.as_bytes());
         }
         Ok(bytes.len())
@@ -158,7 +157,7 @@ impl<W: Write> Write for Line<W> {
 mod tests {
     use super::*;
 
-    /// A log that its copies share.
+    /// A log shared by its copies.
     #[derive(Clone, Default)]
     struct Page(Arc<Mutex<Vec<u8>>>);
 
@@ -178,7 +177,7 @@ mod tests {
         }
     }
 
-    /// Returns the log during `say` and at the end.
+    /// Returns the log of `say` and of its end.
     fn written(say: impl FnOnce()) -> String {
         let page = Page::default();
         let copy = page.clone();
@@ -201,7 +200,7 @@ mod tests {
             }
         });
         let said = text.lines().filter(|line| line.contains("no such tile"));
-        // One for each second that this took, and the last count.
+        // One line for each second of the test, and the final number.
         let (said, lines) = (said.count(), text.lines().count());
         assert!((1..60).contains(&said) && lines == said + 1, "{text}");
         let left_out = text.lines().filter_map(|line| {

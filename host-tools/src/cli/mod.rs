@@ -93,7 +93,7 @@ pub enum Command {
     Man(man::Args),
 }
 
-/// Runs the command with the arguments of this process: 0 on success, 1 on failure, 2 on wrong usage.
+/// Runs the command with this process's arguments: 0 on success, 1 on failure, 2 on wrong usage.
 pub fn main() -> ExitCode {
     let mut words = std::env::args_os();
     let name = words.next().unwrap_or_default();
@@ -101,10 +101,10 @@ pub fn main() -> ExitCode {
     ExitCode::from(command_line(&[own], words))
 }
 
-/// Runs the command with these arguments and returns its exit code, as [`main`] does. `program` is
-/// what starts it again, with the same arguments: a program and the words before the arguments.
+/// Runs the command with these arguments and returns its exit code, as [`main`] does. `program`
+/// restarts it: a program and the words before the arguments.
 ///
-/// It listens to signals and starts the log of this process: one call a process.
+/// It handles signals and starts the log of this process, so call it only once.
 pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let cli: Cli = match parse(arguments.clone()) {
@@ -132,8 +132,8 @@ pub fn command_line(program: &[OsString], arguments: impl IntoIterator<Item = Os
     })
 }
 
-/// Parses the words behind a program's name. Where they are wrong, or ask for help, it prints that and
-/// returns the exit code.
+/// Parses the arguments after a program's name. If they are wrong or request help, prints the text
+/// and returns the exit code.
 ///
 /// # Errors
 /// The exit code.
@@ -145,40 +145,40 @@ pub fn parse<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result
         failure.report();
         1
     })?;
-    // Its guardian has printed it already.
+    // The guardian has already printed it.
     if let Some(line) = line.filter(|_| !guardian::is_worker()) {
         eprintln!("{line}");
     }
     P::try_parse_from(&words).map_err(|mut error| {
         match error.use_stderr() {
-            // It repeats what was typed, which need not be of the user's making.
+            // The message repeats the arguments, which may contain text from elsewhere.
             true => {
                 let option = || old_options::hint(&words, &error);
                 let moved = old_subcommands::hint(&error)
                     .or_else(option)
                     .unwrap_or_default();
                 if !moved.is_empty() {
-                    // The parser's guess would contradict it.
+                    // The parser's suggestion would contradict the hint.
                     error.remove(ContextKind::Suggested);
                     error.remove(ContextKind::SuggestedArg);
                 }
                 writer::put(std::io::stderr(), &format!("{}{moved}", error.render()));
             }
-            // A reader who goes away has seen enough of the help.
+            // A closed pipe while help is printed is no error.
             false => _ = error.print(),
         }
         u8::try_from(error.exit_code()).unwrap_or(2)
     })
 }
 
-/// Runs a command with the log of this process and returns its exit code. It listens to signals: one
-/// call a process.
+/// Runs a command with this process's log and returns its exit code. It handles signals, so call it
+/// only once.
 pub fn finish(verbose: u8, command: impl FnOnce() -> Result<(), Failure>) -> u8 {
     let log = log::to_stderr(verbose);
     let outcome = command();
     log.end();
     writer::finish();
-    // A process that is not this crate's own program does not do so at its end.
+    // Another program's process does not flush at its end.
     let _ = std::io::stdout().flush();
     let code = match outcome {
         Ok(()) => 0,

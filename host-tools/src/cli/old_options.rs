@@ -1,31 +1,31 @@
-//! Options of earlier versions, and what to type now.
+//! Options of earlier versions, and their replacements.
 
 use std::ffi::OsString;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// An option that is gone.
+/// A removed option.
 struct Old {
-    /// The commands that had it.
+    /// The commands that had the option.
     commands: &'static [&'static str],
-    /// Its name.
+    /// The option's name.
     name: &'static str,
-    /// Present spelling.
+    /// The replacement.
     now: &'static str,
-    /// Rest of the spelling, as a key of a file.
+    /// Second part of the replacement, for a key of a file.
     within: &'static str,
 }
 
-/// Commands that rendered a terrain.
+/// Commands that render a terrain.
 const RENDERING: &[&str] = &["run", "demo", "replay", "view"];
-/// Commands that placed one before an arm.
+/// Commands that place a terrain for an arm.
 const PLACING: &[&str] = &["run", "demo"];
-/// Commands that opened one.
+/// Commands that open a terrain.
 const OPENING: &[&str] = &["run", "demo", "replay", "view", "info", "cut"];
-/// Commands that could emulate a board.
+/// Commands that emulate a board.
 const EMULATING: &[&str] = &["demo", "replay", "status", "calibrate"];
 
-/// A table's words for a key of a surface file.
+/// The table's text for a key of a surface file.
 const IN_SURFACE: &str = "--surface FILE.toml";
 
 const fn old(
@@ -42,7 +42,7 @@ const fn old(
     }
 }
 
-/// Those of `hapterra`.
+/// Options of `hapterra`.
 const OLD: &[Old] = &[
     old(&["run"], "--record", "-o FILE", ""),
     old(PLACING, "--seconds", "--duration 60s", ""),
@@ -178,14 +178,14 @@ const OLD: &[Old] = &[
     ),
 ];
 
-/// Those of `hapterra-lab`.
+/// Options of `hapterra-lab`.
 const OLD_IN_LAB: &[Old] = &[
     old(&["stability"], "--delay-us", "--delay 200us", ""),
     old(&["streaming"], "--latencies", "--latency 20ms,50ms", ""),
     old(&["synth"], "--cell-m", "--cell 10m", ""),
 ];
 
-/// Returns a line on what to type now where an option that earlier versions had is the error.
+/// Returns a hint with the replacement if the error is an option of earlier versions.
 pub(super) fn hint(words: &[OsString], error: &clap::Error) -> Option<String> {
     if error.kind() != ErrorKind::UnknownArgument {
         return None;
@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use crate::cli::Cli;
 
-    /// A command with what it always needs.
+    /// Returns a command with its required arguments.
     fn words(command: &str) -> Vec<&str> {
         let rest: &[&str] = match command {
             "replay" => &["t.tif", "path.csv"],

@@ -1,15 +1,15 @@
-//! Subcommands of earlier versions, and what to type now.
+//! Subcommands of earlier versions, and their replacements.
 
 use clap::error::{ContextKind, ContextValue};
 
-/// Subcommands that `hapterra-lab` has now, and their names there.
+/// Subcommands moved to `hapterra-lab`, and their names there.
 const IN_LAB: [(&str, &str); 3] = [
     ("bench", "contact"),
     ("stability", "stability"),
     ("synth", "synth"),
 ];
 
-/// Returns a line on what to type now where a word that earlier versions had is the error.
+/// Returns a hint with the replacement if the error is a subcommand of earlier versions.
 pub(super) fn hint(error: &clap::Error) -> Option<String> {
     let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else {
         return None;

@@ -1,4 +1,4 @@
-//! `hapterra replay`: what a trajectory feels, tick by tick.
+//! `hapterra replay`: renders a trajectory, tick by tick.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -81,12 +81,12 @@ pub struct Args {
 /// Replays the trajectory.
 ///
 /// # Errors
-/// A fault of the terrain, the trajectory, the device or the output.
+/// The terrain, the trajectory, the device or the output fails.
 pub fn run(args: &Args) -> Result<(), Failure> {
     run_by(args, None)
 }
 
-/// Replays the trajectory by a contact rule; without one by the recording's, else as devices do.
+/// Replays the trajectory with a contact rule; by default the recording's, else that of devices.
 ///
 /// # Errors
 /// As [`run`].
@@ -191,19 +191,19 @@ pub fn run_by(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
 struct Inputs<'t> {
     terrain: &'t Terrain<'t>,
     params: (SurfaceParams, Rule),
-    /// The rate of the recording.
+    /// The recording's tick rate.
     recorded_at: Option<TickRate>,
-    /// The other views of the recording.
+    /// The recording's further placements.
     views: Vec<PlacementSettings>,
-    /// Its marks.
+    /// The recording's marks.
     marks: Vec<Mark>,
-    /// The terrain file, as it was named.
+    /// The terrain file, as named by the user.
     file: String,
-    /// Its title in the viewer.
+    /// The title in the viewer.
     title: String,
     /// Home position of the arm, if a recording states it.
     home_mm: Option<[f64; 3]>,
-    /// Its viewer.
+    /// The viewer.
     viewer: Option<Program>,
 }
 
@@ -233,17 +233,17 @@ impl<'t> Inputs<'t> {
             facts: vec![],
             home_mm,
             laid_mm: None,
-            // A replay runs as fast as it can: its time is not the viewer's.
+            // A replay runs as fast as it can, so the viewer does not follow its time.
             is_live: false,
         }
     }
 }
 
-/// Notes the options that differ from the recording.
+/// Reports options that differ from the recording.
 ///
 /// # Errors
-/// Options for a recording of several placements, each of which has its own; a recording that could
-/// not be read twice.
+/// Options for a recording of several placements, each with its own; a recording that cannot be
+/// read twice.
 fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
     if !args.trajectory.is_file() {
         return Err("the recording must be a regular file, because it is read twice")
@@ -264,7 +264,8 @@ fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Checks that surface parameters have no effects under the published rule, which has none.
+/// Checks that the surface parameters have no effects under the published rule, which supports
+/// none.
 fn check_rule(rule: Rule, params: &SurfaceParams) -> Result<(), Failure> {
     let plain = SurfaceParams {
         stiffness_n_per_mm: params.stiffness_n_per_mm,
@@ -282,7 +283,7 @@ fn check_rule(rule: Rule, params: &SurfaceParams) -> Result<(), Failure> {
     }
 }
 
-/// The tick rate of a recording.
+/// Returns the tick rate of a recording.
 fn rate_of(recorded: &Settings) -> Result<TickRate, Failure> {
     let tick_hz = recorded.device.tick_hz;
     let why = format!("the recording has tick_hz = {tick_hz}, and no device has that rate");
@@ -317,7 +318,7 @@ fn emulated(
             .or_hint("leave --device out: the host renders it");
     }
     let (emulator, lines) = board.start()?;
-    // The other line stays open and silent: points take the arm's place.
+    // The arm's line stays open without data, because the trajectory replaces the arm.
     let _plant = lines.plant;
     let link: Box<dyn Transport> = Box::new(lines.link);
     let mut replayer = OfflineDevice::open(replayed.terrain, params, link, Timeouts::EMULATED)?;
@@ -329,7 +330,7 @@ fn emulated(
     Ok(replayed)
 }
 
-/// The trajectory at the ticks of a device.
+/// Returns the trajectory at the ticks of a device.
 fn ticks(
     args: &Args,
     replayed: &Inputs<'_>,

@@ -1,15 +1,13 @@
-//! Reports that a command exists to print: losing one is a failure of the command.
+//! Reports that are a command's result: if one cannot be written, the command fails.
 //!
-//! For commands that hold no device at that moment: the writing waits for a terminal that
-//! was stopped.
+//! Only for commands without an open device, because the write waits for a stopped terminal.
 
 use std::io::{ErrorKind, Write, stdout};
 
 use super::failure::Failure;
 use heightfield::printable_text::printable_lines;
 
-/// Prints the report. A reader who goes away wants no more of it; a disk without room has
-/// lost it.
+/// Prints the report. A closed pipe is no error, a full disk is one.
 ///
 /// # Errors
 /// Standard output cannot be written.

@@ -1,5 +1,4 @@
-//! `hapterra run`: serves a terrain to one device, or to several at once, for as long as it is
-//! touched.
+//! `hapterra run`: serves a terrain to one or several devices during a session.
 //!
 //! ```text
 //! Args ─ devices ─┐
@@ -8,10 +7,10 @@
 //!                      watch ◀───┘
 //! ```
 //!
-//! There is one [`Raster`](heightfield::Raster), with one reader and one bounded cache, and it
-//! is lent to all devices. Everything else is a device's own: its calibration, the view of the
-//! terrain in its reach, its session and thread, its arming, its recording. The terrain is laid for all
-//! devices before any is armed, because from then on no read waits.
+//! There is one [`Raster`](heightfield::Raster), with one reader and one bounded cache, which all
+//! devices share. Each device has its own calibration, placement, session, thread, arming and
+//! recording. All placements are made before any device is armed, because after that no read may
+//! wait.
 
 pub mod devices;
 mod placed;
@@ -47,7 +46,7 @@ use placed::{InReach, Placed};
 use session::{Serving, recording};
 use together::serve_each;
 
-/// The stiffest surface that `hapterra-lab stability` tries by itself.
+/// Maximum stiffness that `hapterra-lab stability` tests by default, N/mm.
 const STIFFEST_TRIED_N_PER_MM: f32 = 20.0;
 
 /// Hint for a recording that cannot be written.
@@ -89,7 +88,7 @@ pub struct Args {
     #[arg(long)]
     pub unchecked: bool,
 
-    /// Which part of the terrain.
+    /// Place and scale of the terrain.
     #[command(flatten)]
     pub placing: Placing,
 
@@ -101,7 +100,7 @@ pub struct Args {
     #[command(flatten)]
     pub settings: SettingsOption,
 
-    /// Commands that change the placement meanwhile.
+    /// Commands that change the placement during the session.
     #[command(flatten)]
     pub commands: Commands,
 
@@ -115,8 +114,8 @@ pub struct Args {
 }
 
 impl Args {
-    /// The same, and the board that is the only one now for good: one that is plugged in
-    /// later is not taken for it.
+    /// Returns the arguments with the only connected board selected by its serial number, so that
+    /// no other board is used later.
     #[must_use]
     pub fn pinned(mut self) -> Self {
         let devices = self.device.into_iter();
@@ -125,12 +124,12 @@ impl Args {
     }
 }
 
-/// A duration in seconds.
+/// Parses a duration in seconds.
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     TIME.read_within(text, [0.0, 1e9])
 }
 
-/// A time without a message that a device waits before it disarms, whole seconds.
+/// Parses the time without a message after which a device disarms, whole seconds.
 fn silence(text: &str) -> Result<u16, String> {
     let [least, most] = [SILENCE_S.0, SILENCE_S.1].map(f64::from);
     let seconds = TIME.read_within(text, [least, most])?;
@@ -140,13 +139,13 @@ fn silence(text: &str) -> Result<u16, String> {
     }
 }
 
-/// Serves the terrain until Ctrl-C, the end of the time or of the script; of several devices,
+/// Serves the terrain until Ctrl-C, the end of the time or of the script; with several devices,
 /// until each has ended.
 ///
 /// # Errors
-/// A fault of the file, or a missing device at the beginning. A device that disappears later is
-/// waited for. Of several devices a failure is reported at once, the others continue, and the error
-/// at the end names each that failed.
+/// A fault of the file, or a missing device at the start. If a device disappears later, the program
+/// waits for it. With several devices, a failure is reported at once, the others continue, and the
+/// final error names each that failed.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let devices = devices::of(args)?;
     let outputs: Vec<_> = devices.iter().filter_map(|d| d.record.clone()).collect();
@@ -169,7 +168,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut asked = args.placing.of((&args.rendering, cells), &raster)?;
     asked.grid = asked.grid.with_materials(materials.as_ref());
     asked.grid = asked.grid.with_tip(args.rendering.tip_of_hand_mm());
-    // What cannot be recorded is known before anything is armed.
+    // Errors of recordings are found before any device is armed.
     let recordings = of_each(&devices, recording)?;
     let commands = args.commands.open_for(devices.len())?;
     interrupt::listen();
@@ -181,7 +180,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Placed::new(device, (&name, laid), params)
             .map_err(|failure| failure.about(device.device_console.name()))
     })?;
-    // The coarse levels are read before anything is armed. A viewer shows one device.
+    // The coarse levels are read before any device is armed. A viewer shows one device.
     let shown = viewer
         .zip(placed.first())
         .map(|(program, of)| ToBeShown::new(program, of.terrain, &of.view, &name));
@@ -189,7 +188,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     materials
         .as_ref()
         .map_or(Ok(()), |it| it.classes().check_complete())?;
-    // While an arm may be armed no read of terrain waits.
+    // No read of terrain may wait while an arm may be armed.
     let mut shown = shown.map(ToBeShown::non_blocking);
     let terrains: Vec<_> = placed.iter().map(|of| of.terrain.non_blocking()).collect();
     let placed: Vec<_> = (placed.into_iter().zip(&terrains))
@@ -221,7 +220,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     ended
 }
 
-/// Checks that an arm can be meant by a stiffness.
+/// Checks that a stiffness is plausible for an arm.
 fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
     if n_per_mm <= STIFFEST_TRIED_N_PER_MM {
         return Ok(());
@@ -232,7 +231,7 @@ fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
     .hint("people hold 0.4 to 0.8 N/mm: hapterra-lab stability tries what an arm holds still"))
 }
 
-/// Makes something of each, or says what is wrong with the first for which that fails.
+/// Converts each item, or returns the error of the first that fails.
 fn of_each<T, U>(
     each: impl IntoIterator<Item = T>,
     make: impl FnMut(T) -> Result<U, Failure>,
@@ -240,8 +239,7 @@ fn of_each<T, U>(
     each.into_iter().map(make).collect()
 }
 
-/// The places of several devices at the keyboard; none if there is one device, or no
-/// keyboard.
+/// Returns the devices' shares of the keyboard; none for one device or without a keyboard.
 fn share_keyboard(args: &Args, devices: &[OneDevice]) -> Vec<Arc<DeviceKeys>> {
     if devices.len() == 1 || args.commands.are_typed() || !io::stdin().is_terminal() {
         return vec![];

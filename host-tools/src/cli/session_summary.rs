@@ -14,10 +14,10 @@ use crate::telemetry::Figures;
 use crate::terrain::Terrain;
 use heightfield::printable_text::printable;
 
-/// Figures of a session and of its link.
+/// Figures of a session and its link.
 #[derive(Clone, Debug)]
 pub(super) struct SessionSummary {
-    /// Ticks run since the scene was taken.
+    /// Number of ticks since the scene was received.
     pub(super) ticks: u64,
     pub(super) device: DeviceHello,
     pub(super) figures: Figures,
@@ -25,7 +25,7 @@ pub(super) struct SessionSummary {
 }
 
 impl SessionSummary {
-    /// The table that is printed, one figure a line.
+    /// Returns the table, one figure a line.
     pub(super) fn text(&self) -> String {
         let (figures, tally, ticks) = (&self.figures, &self.tally, self.ticks);
         let (force, depth, off) = (
@@ -78,7 +78,7 @@ impl SessionSummary {
         text
     }
 
-    /// Mean and worst cost of a tick, and what they are counted in.
+    /// Returns the mean and maximum cost of a tick, and their unit.
     fn cost(&self) -> (f64, f64, &'static str) {
         let (a_count, unit) = match self.device.board.as_str() {
             EMULATED => (INSTRUCTIONS_PER_COUNT, "instructions of the Cortex-M4F"),
@@ -91,7 +91,7 @@ impl SessionSummary {
         (a_count * cost.mean(), a_count * cost.max(), unit)
     }
 
-    /// The figures that go beside the picture.
+    /// Returns the figures beside the picture.
     fn facts(&self) -> Vec<(String, String)> {
         let (mean_cost, _, unit) = self.cost();
         let unit = unit.split(' ').next().unwrap_or_default();
@@ -105,7 +105,7 @@ impl SessionSummary {
         facts.map(|(name, value)| (name.to_owned(), value)).to_vec()
     }
 
-    /// Draws the picture of the session into a file.
+    /// Draws the picture of the session to a file.
     pub(super) fn draw(
         &self,
         path: &Path,
@@ -147,7 +147,7 @@ impl SessionSummary {
     }
 }
 
-/// The ball that feels a terrain and the level in which it does, in words; none of a point.
+/// Describes the ball at the tip and the level of the terrain; returns `None` for a point.
 pub(super) fn tip(terrain: &Terrain<'_>) -> Option<String> {
     let (mm, level) = (terrain.grid().tip_mm(), terrain.level());
     let cell_size = placing::short(terrain.scale().cell_mm());
@@ -156,7 +156,7 @@ pub(super) fn tip(terrain: &Terrain<'_>) -> Option<String> {
     })
 }
 
-/// A terrain and its scale, in words.
+/// Describes a terrain and its scale.
 pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     let (raster, grid, scale) = (terrain.raster(), terrain.grid(), terrain.scale());
     let proportions = match grid.exaggeration(&terrain.scale_of_level_0()) {
@@ -186,7 +186,7 @@ pub(super) fn in_words(terrain: &Terrain<'_>) -> String {
     format!("{columns} × {rows} samples,{cell_size} {cell_mm} mm a cell, {proportions}{tip}")
 }
 
-/// A device in words.
+/// Describes a device.
 pub(super) fn device(hello: &DeviceHello) -> String {
     match hello.serial.is_none() {
         true => kind_of_device(hello),
@@ -194,14 +194,14 @@ pub(super) fn device(hello: &DeviceHello) -> String {
     }
 }
 
-/// A device in words that are also those of others of its kind.
+/// Describes a kind of device, without its serial number.
 fn kind_of_device(hello: &DeviceHello) -> String {
     let [board, version] = [&hello.board, &hello.version].map(|text| printable(text));
     let (w, hz) = (hello.window, hello.tick_hz);
     format!("{board} {version}, window of {w} × {w} tiles, {hz} ticks a second")
 }
 
-/// Returns the materials of the ground, if there are several.
+/// Describes the materials of the ground, if there are several.
 pub(super) fn materials(terrain: &Terrain<'_>) -> Option<String> {
     let grid = terrain.grid();
     let materials = grid.materials()?;
@@ -214,7 +214,7 @@ mod tests {
     use crate::terrain::{HapticCells, HapticGrid};
     use heightfield::Raster;
 
-    /// A cell of level 3 is eight cells of the file, and as much higher.
+    /// A cell of level 3 is eight cells of the file wide, and its height is scaled equally.
     #[test]
     fn a_level_changes_no_proportion() {
         let raster = Raster::from_fn(65, 65, |column, row| (column + row) as f32);

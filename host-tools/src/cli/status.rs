@@ -1,4 +1,4 @@
-//! `hapterra status`: how a device is, and what to do about it.
+//! `hapterra status`: the state of a device, and remedies.
 
 use hapterra_core::wire::hello::PROTOCOL;
 use hapterra_core::wire::request::Request;
@@ -30,10 +30,10 @@ pub struct Args {
     pub device: Device,
 }
 
-/// Shows how the device is.
+/// Shows the state of the device.
 ///
 /// # Errors
-/// No device, one that does not answer, or a status that cannot be written.
+/// No device, no reply, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !args.disarm && !args.clear {
         let status = args.device.look(|control| Ok(control.fresh_status()?))?;
@@ -59,10 +59,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
-/// Status of an emulated board without a host.
+/// Line for an emulated board without a host.
 const NO_TICK: &str = "arm            no tick has run yet: the time of an emulated board stands still until it has a scene\n";
 
-/// The status as it is printed: a name and what there is to say, a line each.
+/// Returns the printed status: a name and a text on each line.
 fn text(status: &Status) -> String {
     let device = session_summary::device(&status.device);
     let arm = match status.ticks.run {
@@ -122,7 +122,7 @@ fn boot(boot: &BootReport) -> String {
     format!("started        {cause}\n{crash}{brown_out}")
 }
 
-/// A line about the oscillator of USB, if the board has one.
+/// Returns a line about the USB oscillator, if the board has one.
 const fn usb_clock(clock: UsbClock) -> &'static str {
     match clock {
         UsbClock::Unknown => "",
@@ -153,7 +153,7 @@ fn crashed(crash: &Crash) -> String {
     format!("crashed before {what}; pc {pc:#010x}, lr {lr:#010x}, tick {tick}: please report it\n")
 }
 
-/// Returns the state of the guard, its blockers, fault and limits.
+/// Describes the guard: its state, blockers, fault and limits.
 fn guard(status: &Status) -> String {
     let report = &status.health.report;
     let on = if report.mode.drives() { "on" } else { "off" };
@@ -176,7 +176,7 @@ fn guard(status: &Status) -> String {
     text
 }
 
-/// Returns the readings of encoders, switches, motors and the loop's own clock.
+/// Describes the readings of encoders, switches and motors, and the loop's clock.
 fn measured(status: &Status) -> String {
     let (health, ticks) = (&status.health, &status.ticks);
     let [a, b, c] = health.sense.counts;
@@ -265,7 +265,7 @@ mod tests {
         }
     }
 
-    /// The emulated board cannot store one, as `hapterra calibrate` says too.
+    /// The emulated board cannot store a record, which `hapterra calibrate` also reports.
     #[test]
     fn where_the_calibration_is_from_is_true_of_the_emulated_board() {
         let mut status = status();

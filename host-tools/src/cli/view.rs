@@ -1,4 +1,4 @@
-//! `hapterra view`: a recording in the viewer, to be looked at again.
+//! `hapterra view`: shows a recording in the viewer again.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Program, ViewFeed};
 use heightfield::{Raster, files_read_with};
 
-/// Rows between two looks at whether the viewer still reads.
+/// Rows between two checks that the viewer still reads.
 const LOOK_EVERY: u64 = 10_000;
 
 /// Arguments of `hapterra view`.
@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(value_hint = ValueHint::FilePath)]
     pub terrain: Option<PathBuf>,
 
-    /// Statements about the terrain file that it does not make itself.
+    /// Properties that the terrain file does not state.
     #[command(flatten)]
     pub reading: ReadingOptions,
 
@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "OUT.rrd", value_hint = ValueHint::FilePath)]
     pub rrd: Option<PathBuf>,
 
-    /// Rendering of the terrain, where the recording does not state it.
+    /// Rendering of the terrain, if the recording does not state it.
     #[command(flatten)]
     pub rendering: Rendering,
 }
@@ -51,7 +51,7 @@ pub struct Args {
 /// Shows a recording until the viewer is closed.
 ///
 /// # Errors
-/// A fault of the recording or the terrain; no viewer.
+/// The recording or the terrain fails, or there is no viewer.
 pub fn run(args: &Args) -> Result<(), Failure> {
     check_file(&args.recording)?;
     let rows = RecordingRows::open(&args.recording).map_err(ReplayError::from)?;
@@ -94,7 +94,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The terrain's file: as named, else as the recording names it.
+/// Returns the terrain's file: from the command line, else from the recording.
 fn path_of(args: &Args, recorded: Option<&Settings>) -> Result<PathBuf, Failure> {
     let named = |it: &Settings| PathBuf::from(&it.terrain.file);
     let path = args.terrain.clone().or_else(|| recorded.map(named));
@@ -102,7 +102,8 @@ fn path_of(args: &Args, recorded: Option<&Settings>) -> Result<PathBuf, Failure>
         .or_hint("name it: hapterra view RECORDING TERRAIN")
 }
 
-/// Checks that the recording was cut.
+/// Shows the rows until their end, an interrupt, or the end of the viewer. Returns true if the
+/// recording was cut.
 fn show<'t>(
     mut feed: ViewFeed<'t>,
     mut rows: RecordingRows,

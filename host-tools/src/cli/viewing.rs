@@ -1,4 +1,4 @@
-//! The viewer, as several commands start it.
+//! The viewer, for several commands.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use crate::telemetry::SessionPlacement;
 use crate::terrain::Terrain;
 use crate::view_feed::{Picture, Prepared, Program, ProgramError, VARIABLE, ViewFeed};
 
-/// Between two looks at whether the viewer has ended.
+/// Interval of checks whether the viewer has ended.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// The viewer.
@@ -31,10 +31,10 @@ pub struct Viewing {
 }
 
 impl Viewing {
-    /// The viewer, where one is asked for: it is looked for before anything is armed.
+    /// Returns the viewer, if requested. It is searched for before any device is armed.
     ///
     /// # Errors
-    /// There is none.
+    /// The viewer is missing.
     pub(in crate::cli) fn program(&self) -> Result<Option<Program>, Failure> {
         Ok(self.view.then(Program::find).transpose()?)
     }
@@ -66,7 +66,7 @@ fn picture<'p, 't>(terrain: &'p Terrain<'t>, view: &Placement, title: &'p str) -
     }
 }
 
-/// A viewer that is to be started when there is something to be shown.
+/// A viewer that starts once there is something to show.
 pub(in crate::cli) struct ToBeShown<'t> {
     program: Program,
     prepared: Prepared<'t>,
@@ -88,7 +88,7 @@ impl<'t> ToBeShown<'t> {
         }
     }
 
-    /// The same, whose further reads of the terrain do not wait.
+    /// Returns the same, with further reads of the terrain that do not wait.
     pub(in crate::cli) fn non_blocking(self) -> Self {
         Self {
             prepared: self.prepared.non_blocking(),
@@ -96,7 +96,7 @@ impl<'t> ToBeShown<'t> {
         }
     }
 
-    /// Starts it. A viewer that does not start is reported, and ends nothing.
+    /// Starts the viewer. If it does not start, this is reported and the session continues.
     pub(in crate::cli) fn start(
         self,
         device: &DeviceHello,
@@ -116,21 +116,21 @@ impl<'t> ToBeShown<'t> {
     }
 }
 
-/// Messages of a session to a viewer.
+/// Sends a session to a viewer.
 pub(in crate::cli) struct Shown<'t> {
     feed: ViewFeed<'t>,
     title: String,
-    /// The view of the latest sample.
+    /// Placement of the latest sample.
     view: usize,
 }
 
 impl<'t> Shown<'t> {
-    /// Takes what a session tells.
+    /// Processes an event of the session.
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         self.feed.on_event(event);
     }
 
-    /// Takes a sample with its row, and the view that it was rendered in.
+    /// Processes a sample with its row and its placement.
     pub(in crate::cli) fn take(
         &mut self,
         sample: &TickRecord,
@@ -158,8 +158,8 @@ impl<'t> Shown<'t> {
     }
 }
 
-/// Ends the stream, reports what was not sent to the viewer, and waits until no page is open any
-/// more or the user has had enough.
+/// Ends the stream, reports what was not sent to the viewer, and waits until no page is open or the
+/// user interrupts.
 pub(in crate::cli) fn end(feed: ViewFeed<'_>, say: impl Fn(String)) {
     let (dropped, viewer) = feed.finish();
     if dropped.messages > 0 {

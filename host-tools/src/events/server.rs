@@ -10,15 +10,15 @@ use std::time::{Duration, Instant};
 
 use super::event::{Event, FORMAT, Line};
 
-/// Lines that wait for the thread, at most.
+/// Maximum lines in the queue to the thread.
 const WAITING: usize = 4096;
-/// Bytes that wait for a reader, at most, beside what the system keeps for it.
+/// Maximum bytes buffered for a reader, in addition to the system's buffer.
 const FOR_A_READER: usize = 256 << 10;
-/// Readers at a time; more are closed.
+/// Maximum number of readers; further connections are closed.
 const READERS: usize = 16;
-/// Between two looks at new readers and at those that were slow.
+/// Interval of checks for new readers and of retries to slow ones.
 const LOOK: Duration = Duration::from_millis(20);
-/// For how long readers may take what is left at the end.
+/// Time for readers to receive the last lines.
 const AT_THE_END: Duration = Duration::from_secs(1);
 
 /// State that the senders and the thread share.
@@ -31,7 +31,7 @@ struct Shared {
     dropped: AtomicU64,
 }
 
-/// Offers lines. It never waits.
+/// Queues lines without waiting.
 #[derive(Clone, Debug)]
 pub struct Sender {
     lines: SyncSender<String>,
@@ -39,13 +39,13 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// Returns the number of readers that have connected; none if there is no reader now.
+    /// Returns the number of readers that have ever connected; `None` if none is connected now.
     pub(super) fn readers_so_far(&self) -> Option<u64> {
         let reads = self.shared.readers.load(Ordering::Acquire) > 0;
         reads.then(|| self.shared.joined.load(Ordering::Acquire))
     }
 
-    /// Offers a line; without room it is dropped, and counted.
+    /// Queues a line; it is dropped and counted if the queue is full.
     pub(super) fn offer(&self, line: String) {
         if self.lines.try_send(line).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
@@ -58,15 +58,15 @@ impl Sender {
 pub struct Server {
     sender: Sender,
     address: SocketAddr,
-    /// Returns how many lines readers were too slow for.
+    /// Returns the number of lines lost to slow readers.
     thread: JoinHandle<u64>,
 }
 
 impl Server {
-    /// Listens on a port of this machine alone, 127.0.0.1; 0 takes any that is free.
+    /// Listens on a port of 127.0.0.1, for this machine only; port 0 selects a free one.
     ///
     /// # Errors
-    /// A port that is taken.
+    /// The port is in use.
     pub fn listen(port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         listener.set_nonblocking(true)?;
@@ -89,20 +89,20 @@ impl Server {
         })
     }
 
-    /// Returns its address.
+    /// Returns the server's address.
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Another way for lines to come in.
+    /// Returns another sender of lines.
     #[must_use]
     pub fn sender(&self) -> Sender {
         self.sender.clone()
     }
 
-    /// Ends it when all other senders are gone. Readers have a second for what is left. Returns
-    /// how many lines were dropped.
+    /// Ends the server when all other senders are dropped. Readers have one second to receive the
+    /// remaining lines. Returns the number of dropped lines.
     #[must_use]
     pub fn end(self) -> u64 {
         let Sender { lines, shared } = self.sender;
@@ -112,7 +112,7 @@ impl Server {
     }
 }
 
-/// A reader, and its pending lines.
+/// A reader and its unsent lines.
 struct Reader {
     stream: TcpStream,
     waiting: Vec<u8>,
@@ -120,7 +120,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Adds a line where there is room, after the number of those that there was none for.
+    /// Adds a line if there is room, after the number of lines dropped before it.
     fn take(&mut self, line: &[u8]) {
         let said = match self.dropped {
             0 => String::new(),
@@ -135,7 +135,7 @@ impl Reader {
         self.waiting.extend(line);
     }
 
-    /// Writes what the reader takes now. Returns false if it is gone.
+    /// Writes as much as the reader accepts now. Returns false if it is disconnected.
     fn write(&mut self) -> bool {
         while !self.waiting.is_empty() {
             match self.stream.write(&self.waiting) {
@@ -150,17 +150,17 @@ impl Reader {
     }
 }
 
-/// A line that is no device's.
+/// Returns a line that belongs to no device.
 fn of_reader(event: &Event<'_>) -> String {
     Line { event, at: None }.text()
 }
 
-/// The thread's part.
+/// State of the server's thread.
 struct Readers {
     listener: TcpListener,
     readers: Vec<Reader>,
     shared: Arc<Shared>,
-    /// Lines that readers were too slow for.
+    /// Number of lines lost to slow readers.
     dropped: u64,
 }
 
@@ -201,7 +201,7 @@ impl Readers {
         self.shared.readers.store(count, Ordering::Release);
     }
 
-    /// Takes readers that have come. What is wrong with one is its own.
+    /// Accepts new readers. An error affects only its own reader.
     fn accept(&mut self) {
         while let Ok((stream, _)) = self.listener.accept() {
             if self.readers.len() >= READERS || stream.set_nonblocking(true).is_err() {
@@ -267,7 +267,7 @@ mod tests {
         }
     }
 
-    /// The lines of a reader, in a thread.
+    /// Reads a reader's lines in a thread.
     fn read(stream: TcpStream, mut take: impl FnMut(&str) + Send + 'static) {
         std::thread::spawn(move || {
             let lines = BufReader::new(stream).lines();
@@ -286,7 +286,7 @@ mod tests {
             assert!(!line.contains("dropped"), "{line}");
             sees.fetch_max(number(line).unwrap_or(0), Ordering::AcqRel);
         });
-        // More than the system and the buffer keep for a reader.
+        // More than the buffers of system and reader can store.
         let spaces = " ".repeat(1000);
         for n in 1..=20_000 {
             sender.offer(format!("{{\"n\":{n}}}{spaces}\n"));

@@ -1,4 +1,4 @@
-//! From samples to events: what has changed.
+//! Conversion of samples to events: detects changes.
 
 use std::num::NonZeroU32;
 
@@ -11,11 +11,11 @@ use crate::replay::{Mark, Record, mode_name, state_name};
 use crate::terrain::Terrain;
 use heightfield::ReadStatus;
 
-/// Interval of reported places, s of the device's time.
+/// Interval of reported positions, s of the device's time.
 const PLACE_EVERY_S: f64 = 0.1;
-/// Between two looks at the material, s of the device's time.
+/// Interval of material checks, s of the device's time.
 const MATERIAL_EVERY_S: f64 = 0.01;
-/// The HIP's speed is known from samples no farther apart than this, s.
+/// Maximum interval between samples for an estimate of the HIP's speed, s.
 const SPEED_WITHIN_S: f64 = 0.005;
 
 /// Last reported state.
@@ -24,25 +24,25 @@ struct Told {
     view: Option<usize>,
     contact: Option<bool>,
     limits: Option<(Limits, Mode, Option<Fault>)>,
-    /// The class of the material; none outside before one was touched.
+    /// The class of the material; the outer `None` means no contact yet.
     class: Option<Option<i64>>,
     proxy_mm: Option<[f64; 3]>,
     place_due_s: f64,
     material_due_s: f64,
 }
 
-/// Watches what a device feels.
+/// Converts a device's samples to events.
 #[derive(Debug)]
 pub struct Watcher {
     sender: Sender,
     device: usize,
     at: At,
     told: Told,
-    /// Readers that were connected at the last event.
+    /// Number of readers connected before the last event.
     readers: u64,
-    /// The HIP of the sample before, with its view.
+    /// The previous sample's record, with its placement.
     before: Option<(usize, Record)>,
-    /// The last lines about arming, and the readers that were connected then.
+    /// The last lines about arming, and the number of readers at that time.
     arming: (Vec<String>, u64),
     /// Interval of reported samples.
     every: Option<NonZeroU32>,
@@ -51,7 +51,7 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    /// Watches a device, counted from 1.
+    /// Creates the watcher of a device, counted from 1.
     #[must_use]
     pub fn new(sender: Sender, device: usize) -> Self {
         let at = At {
@@ -72,13 +72,13 @@ impl Watcher {
         }
     }
 
-    /// The same, which tells every so many samples one.
+    /// Returns the same watcher, which also reports every `every`-th sample.
     #[must_use]
     pub fn with_samples(self, every: Option<NonZeroU32>) -> Self {
         Self { every, ..self }
     }
 
-    /// Takes a sample, its row and the view in which it was rendered.
+    /// Processes a sample, its row and its placement.
     pub fn take(
         &mut self,
         sample: &TickRecord,
@@ -89,7 +89,7 @@ impl Watcher {
             self.before = None;
             return;
         };
-        // A new reader gets the whole state.
+        // A new reader receives the whole state.
         if readers != self.readers {
             (self.readers, self.told) = (readers, Told::default());
         }
@@ -108,7 +108,7 @@ impl Watcher {
         let touching = record.contact;
         let changes = self.told.contact.replace(touching) != Some(touching);
         if touching {
-            // The material of a contact comes before it.
+            // The material of a contact is reported before the contact.
             self.tell_material(record, terrain, changes);
         }
         if changes {
@@ -122,7 +122,7 @@ impl Watcher {
         }
     }
 
-    /// Takes a mark.
+    /// Reports a mark.
     pub fn mark(&self, mark: &Mark) {
         self.say(&Event::Mark {
             marked_tick: mark.tick,
@@ -132,8 +132,8 @@ impl Watcher {
         });
     }
 
-    /// Takes new lines about arming, where there are any, and the question that is open now, of
-    /// which later readers get, too.
+    /// Reports new lines about arming, if any, and the open question. Later readers receive them
+    /// too.
     pub fn arming(&mut self, new: Vec<String>, asks: Option<u32>) {
         let Some(readers) = self.sender.readers_so_far() else {
             if !new.is_empty() {
@@ -152,7 +152,7 @@ impl Watcher {
         self.tell(&Event::Arming { lines, asks });
     }
 
-    /// Takes what no sample shows, as of the latest tick.
+    /// Reports an event that no sample shows, at the latest tick.
     pub fn say(&self, event: &Event<'_>) {
         if self.sender.readers_so_far().is_some() {
             self.tell(event);
@@ -220,7 +220,7 @@ impl Watcher {
         }
         let ground = ground_of(record, terrain);
         let (index, ReadStatus::Complete) = materials.index_at(terrain.grid(), ground) else {
-            // It is reported when it is known.
+            // The material is reported once it is known.
             return;
         };
         self.told.material_due_s = record.t_s + MATERIAL_EVERY_S;
@@ -255,7 +255,7 @@ fn limits_of((limits, mode, fault): (Limits, Mode, Option<Fault>)) -> Event<'sta
     }
 }
 
-/// The proxy in the file's coordinates.
+/// Returns the proxy's position in the file's coordinates.
 fn ground_of(record: &Record, terrain: &Terrain<'_>) -> [f64; 2] {
     let cell_mm = terrain.scale_of_level_0().cell_mm();
     let [east, north, _] = record.proxy_mm;
@@ -273,8 +273,8 @@ fn place_of(record: &Record, terrain: &Terrain<'_>) -> Place {
     }
 }
 
-/// Speed of the HIP into the surface, mm/s: along the way from the proxy to it. None where the
-/// samples are too far apart to tell.
+/// Returns the speed of the HIP into the surface, mm/s, along the direction from proxy to HIP;
+/// `None` if the samples are too far apart.
 fn speed_into(before: &Record, now: &Record) -> Option<f64> {
     let dt_s = now.t_s - before.t_s;
     if !(dt_s > 0.0 && dt_s <= SPEED_WITHIN_S) {

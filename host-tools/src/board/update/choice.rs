@@ -1,16 +1,15 @@
-//! Which of the devices on USB is updated.
+//! Choice of the USB device to update.
 
 use super::error::UpdateError;
 
 /// A device that could be updated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plugged {
-    /// Its USB port: the same before and after it changes into its
-    /// loader.
+    /// The USB port: the same before and after the device changes into its loader.
     pub place: String,
-    /// Its serial number. A loader's is another than that of the board's firmware.
+    /// Serial number. The loader's differs from the firmware's.
     pub serial: Option<String>,
-    /// True if it is a loader already, and not a board that runs its firmware.
+    /// True for a loader, false for a board that runs its firmware.
     pub is_loader: bool,
 }
 
@@ -19,15 +18,15 @@ pub struct Plugged {
 pub enum Choice<'p> {
     /// A board that runs its firmware and has to enter its loader first.
     Board(&'p Plugged),
-    /// The loader that was named.
+    /// The loader that the user named.
     Loader(&'p Plugged),
-    /// A loader that the user did not name. Any STM32 may be one: a board after an update that
-    /// failed, or another machine of the user's. Its user has to say that it is meant.
+    /// A loader that the user did not name. It may be any STM32: a board after a failed update, or
+    /// another machine. The user must confirm it.
     UnnamedLoader(&'p Plugged),
 }
 
-/// Picks the device with a serial number, or the only one that there is. A choice is
-/// never made between two: the image might go onto the wrong board.
+/// Returns the device with a serial number, or the only device. If several match, none is chosen,
+/// because the image might be written to the wrong board.
 ///
 /// # Errors
 /// [`UpdateError::Nothing`] and [`UpdateError::Several`], which names them.

@@ -1,21 +1,21 @@
-//! Failures of updates, and whether the board still has its program.
+//! Errors of updates, and whether the board still has its program.
 
 use std::error::Error;
 use std::{fmt, io};
 
-/// Reason for which the loader did not write an image.
+/// Error of writing an image through the loader.
 #[derive(Debug, thiserror::Error)]
 pub enum UpdateError {
-    /// Nothing to update is plugged in.
+    /// No board or loader is connected.
     #[error("no board to update: looked for {looked_for} on USB")]
     Nothing {
-        /// Device that was sought.
+        /// The device sought.
         looked_for: String,
     },
-    /// Several could be meant.
+    /// Several devices match.
     #[error("several boards could be updated: {}", .0.join(", "))]
     Several(Vec<String>),
-    /// The image is for another board than the one that is plugged in.
+    /// The image is for another board than the connected one.
     #[error("the image is for {image}, and the board on USB runs {running}")]
     OtherBoard {
         /// The board that the image is for.
@@ -23,33 +23,33 @@ pub enum UpdateError {
         /// The board that the running firmware names.
         running: String,
     },
-    /// The loader did not show up.
+    /// The loader did not appear on USB.
     #[error("the board has left its program, and no loader has appeared on USB")]
     NoLoader,
-    /// The loader's description of its flash is unknown.
+    /// The loader describes its flash in an unsupported way.
     #[error("the loader describes its flash in a way that is not understood: {0:?}")]
     Layout(String),
-    /// The loader's flash is not that of the board's chip.
+    /// The loader's flash differs from the board's chip.
     #[error("the loader is not that of {board}: it reports the flash {said:?}")]
     OtherChip {
         /// The board that the image is for.
         board: &'static str,
-        /// Description by the loader.
+        /// The loader's description.
         said: String,
     },
-    /// The loader cannot write, or not read back.
+    /// The loader cannot write or cannot read back.
     #[error("the loader cannot {0}")]
     Cannot(&'static str),
-    /// The image would take the place of the calibrations.
+    /// The image would overwrite the calibrations.
     #[error("the image reaches to {end:#010x}, into the flash that keeps the calibrations")]
     Calibrations {
-        /// The address past its last byte.
+        /// The address past the image's last byte.
         end: u64,
     },
-    /// The image has nothing where the chip looks for its vectors.
+    /// The image has no vectors where the chip reads them.
     #[error("the image has no vectors at {0:#010x}")]
     NoVectors(u64),
-    /// The loader went away or does not answer.
+    /// The loader was disconnected or does not respond.
     #[error("the loader is gone, while it was to {doing}")]
     Gone {
         /// Step that failed.
@@ -58,19 +58,19 @@ pub enum UpdateError {
         #[source]
         source: io::Error,
     },
-    /// The loader refused something.
+    /// The loader refused a request.
     #[error("the loader refused to {doing}: {why} (status {status}, state {state})")]
     Refused {
         /// Step that failed.
         doing: &'static str,
-        /// Meaning of its status.
+        /// Meaning of the loader's status.
         why: &'static str,
-        /// The status it gave.
+        /// The loader's status.
         status: u8,
-        /// The state it is in.
+        /// The loader's state.
         state: u8,
     },
-    /// The loader never comes to an end.
+    /// The loader does not finish an operation.
     #[error("the loader did not finish: {0}")]
     Endless(&'static str),
     /// The read-back differs from the image.
@@ -81,9 +81,9 @@ pub enum UpdateError {
 /// A failed update.
 #[derive(Debug)]
 pub struct UpdateFailure {
-    /// Its reason.
+    /// Reason of the failure.
     pub error: UpdateError,
-    /// True if anything was erased: the board has then no whole program.
+    /// True if anything was erased: then the board has no complete program.
     pub erased: bool,
 }
 

@@ -1,15 +1,15 @@
-//! A loader's description of its flash: `@Internal Flash  /0x08000000/256*02Kg`, which is a
-//! name, the first address, and runs of pages (UM0424, 4.3.2).
+//! A loader's description of its flash: `@Internal Flash  /0x08000000/256*02Kg`. It has a name, the
+//! first address, and runs of pages (UM0424, 4.3.2).
 
 use super::error::UpdateError;
 
-/// Most pages that are believed: the largest STM32 has fewer.
+/// Maximum number of pages; the largest STM32 has fewer.
 const MAX_PAGES: u64 = 4096;
 
-/// The flash of a loader: pages of one size, one after the other.
+/// The flash of a loader: consecutive pages of one size.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// The loader's own words, for people; other than printable ASCII is left out.
+    /// The loader's text, to display: only its printable ASCII.
     pub said: String,
     /// First address.
     pub start: u64,
@@ -20,11 +20,11 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Reads a loader's words.
+    /// Parses a loader's description.
     ///
     /// # Errors
-    /// [`UpdateError::Layout`] where they are anything else than one block of pages of one
-    /// size that can be read, erased and written.
+    /// [`UpdateError::Layout`] unless it is one block of pages of one size that can be read, erased
+    /// and written.
     pub fn read(words: &str) -> Result<Self, UpdateError> {
         let printable = |c: &char| c.is_ascii_graphic() || *c == ' ';
         let said: String = words.chars().filter(printable).take(100).collect();
@@ -53,12 +53,12 @@ impl Layout {
     }
 }
 
-/// A run of pages, as `256*02Kg`: how many, and bytes of each.
+/// Parses a run of pages such as `256*02Kg`: their number, and the bytes of each.
 fn run(text: &str) -> Option<(u64, u64)> {
     let (pages, size) = text.trim().split_once('*')?;
     let digits = size.len() - size.trim_start_matches(|c: char| c.is_ascii_digit()).len();
     let (number, unit) = size.split_at_checked(digits)?;
-    // The last letter counts what may be done: bit 0 to read, 1 to erase, 2 to write.
+    // The low bits of the last letter are the permissions: bit 0 read, 1 erase, 2 write.
     let scale = match unit {
         "Kg" => 1024,
         "Mg" => 1024 * 1024,

@@ -1,9 +1,9 @@
 //! The USB loader in the chip's ROM: DFU 1.1 with ST's extensions (AN3156, UM0424).
 //!
-//! A download is a control transfer whose block number says what it is: 0 is a command,
-//! from 2 on it is data, `(block − 2) × transfer size` bytes behind the address pointer.
-//! The loader does it when its status is asked for, says for how long it wants to be left
-//! alone, and has done it when the state is `dfuDNLOAD-IDLE` afterwards.
+//! The block number of a download gives its meaning: block 0 is a command; blocks from 2 on are
+//! data for the address pointer plus `(block − 2) × transfer size` bytes. The loader starts the
+//! operation at a status request and replies with a wait time. The operation is complete if the
+//! state is then `dfuDNLOAD-IDLE`.
 
 use std::io;
 use std::time::Duration;
@@ -11,21 +11,21 @@ use std::time::Duration;
 use super::error::UpdateError;
 use super::layout::Layout;
 
-/// Requests of the class.
+/// Requests of the DFU class.
 pub mod request {
-    /// Gives the loader a block.
+    /// Sends a block to the loader.
     pub const DNLOAD: u8 = 1;
-    /// Takes a block from it.
+    /// Reads a block from the loader.
     pub const UPLOAD: u8 = 2;
-    /// Asks for status and state.
+    /// Requests status and state.
     pub const GETSTATUS: u8 = 3;
-    /// Ends an error.
+    /// Clears an error.
     pub const CLRSTATUS: u8 = 4;
-    /// Back to idle.
+    /// Returns to idle.
     pub const ABORT: u8 = 6;
 }
 
-/// States.
+/// States of the loader.
 const IDLE: u8 = 2;
 const DNLOAD_SYNC: u8 = 3;
 const DNBUSY: u8 = 4;
@@ -37,7 +37,7 @@ const ERROR: u8 = 10;
 /// Commands of block 0.
 const SET_ADDRESS: u8 = 0x21;
 const ERASE: u8 = 0x41;
-/// The block with a page's first bytes.
+/// Number of the block at the address pointer.
 const FIRST_BLOCK: u16 = 2;
 
 /// Bits of the functional descriptor's attributes.
@@ -45,29 +45,29 @@ const CAN_DOWNLOAD: u8 = 1 << 0;
 const CAN_UPLOAD: u8 = 1 << 1;
 /// The descriptor's type.
 const FUNCTIONAL: u8 = 0x21;
-/// Longest transfer that is used; an STM32's loaders say 1,024 or 2,048.
+/// Longest transfer used; STM32 loaders report 1,024 or 2,048.
 const MAX_TRANSFERRED: u16 = 4096;
 
-/// Longest that one thing may take: an H743's sector takes 4 s at most (its data sheet).
+/// Time limit of one operation; an H743's sector takes at most 4 s (its data sheet).
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Tries to bring a loader to rest.
+/// Attempts to make a loader idle.
 const TRIES: usize = 8;
 
 /// Control transfers to the loader's interface.
 pub trait ControlPipe {
-    /// A request of the class that reads at most `length` bytes.
+    /// Sends a class request that reads at most `length` bytes.
     ///
     /// # Errors
-    /// The device is gone, refuses or does not answer.
+    /// The device is disconnected, refuses or does not respond.
     fn read(&mut self, request: u8, value: u16, length: u16) -> io::Result<Vec<u8>>;
 
-    /// A request of the class that writes.
+    /// Sends a class request that writes.
     ///
     /// # Errors
     /// As for [`Self::read`].
     fn write(&mut self, request: u8, value: u16, bytes: &[u8]) -> io::Result<()>;
 
-    /// Leaves the device alone for a while.
+    /// Waits without any request to the device.
     fn wait(&mut self, time: Duration);
 }
 
@@ -82,18 +82,17 @@ struct Status {
 /// A loader at the end of a pipe.
 pub struct Loader<P> {
     pipe: P,
-    /// Its description of its flash.
+    /// The loader's description of its flash.
     layout: Layout,
     /// Bytes of a transfer.
     transfer: u16,
 }
 
 impl<P: ControlPipe> Loader<P> {
-    /// Takes a loader that says these words of its flash and has this functional
-    /// descriptor, and brings it to rest.
+    /// Checks a loader's description of its flash and its functional descriptor, and makes it idle.
     ///
     /// # Errors
-    /// [`UpdateError`]: it is no such loader, or does not answer.
+    /// [`UpdateError`]: the loader is unsuitable or does not respond.
     pub fn open(pipe: P, words: &str, functional: &[u8]) -> Result<Self, UpdateError> {
         let layout = Layout::read(words)?;
         let (attributes, transfer) = match functional {
@@ -108,7 +107,7 @@ impl<P: ControlPipe> Loader<P> {
         if attributes & CAN_UPLOAD == 0 {
             return Err(UpdateError::Cannot("read back what was written"));
         }
-        // Whole words of flash.
+        // A transfer contains only whole words of flash.
         let transfer = transfer.min(MAX_TRANSFERRED) / 32 * 32;
         if transfer == 0 {
             return Err(UpdateError::Cannot("take whole words of flash"));
@@ -128,7 +127,7 @@ impl<P: ControlPipe> Loader<P> {
         &self.layout
     }
 
-    /// Gives the pipe back.
+    /// Returns the pipe.
     pub fn into_pipe(self) -> P {
         self.pipe
     }
@@ -141,7 +140,7 @@ impl<P: ControlPipe> Loader<P> {
         self.command(ERASE, address, "erase a page")
     }
 
-    /// Writes erased flash from an address on.
+    /// Writes `bytes` to erased flash at an address.
     ///
     /// # Errors
     /// [`UpdateError`].
@@ -154,14 +153,14 @@ impl<P: ControlPipe> Loader<P> {
         Ok(())
     }
 
-    /// Reads flash from an address on.
+    /// Reads `bytes` bytes of flash from an address.
     ///
     /// # Errors
     /// [`UpdateError`].
     pub fn read(&mut self, address: u64, bytes: usize) -> Result<Vec<u8>, UpdateError> {
         const DOING: &str = "read back";
         self.command(SET_ADDRESS, address, DOING)?;
-        // Only an idle loader, or one that reads already, gives blocks.
+        // A loader returns blocks only if it is idle or already reading.
         self.rest(DOING)?;
         let mut all = Vec::with_capacity(bytes);
         let mut block = FIRST_BLOCK;
@@ -179,7 +178,7 @@ impl<P: ControlPipe> Loader<P> {
         Ok(all)
     }
 
-    /// Leaves the loader for the program at an address.
+    /// Ends the loader and starts the program at an address.
     ///
     /// # Errors
     /// [`UpdateError`].
@@ -191,7 +190,7 @@ impl<P: ControlPipe> Loader<P> {
             doing: DOING,
             source,
         })?;
-        // It leaves when its status is asked for, and may be gone before it answers.
+        // The loader ends at the status request, possibly before it replies.
         match self.status(DOING) {
             Ok(status) if matches!(status.state, MANIFEST | MANIFEST_SYNC) => Ok(()),
             Ok(status) => Err(refused(DOING, status)),
@@ -209,7 +208,7 @@ impl<P: ControlPipe> Loader<P> {
         self.give(0, &[command, a, b, c, d], doing)
     }
 
-    /// Gives the loader a block and waits until it is done with it.
+    /// Sends a block to the loader and waits until it is processed.
     fn give(&mut self, block: u16, bytes: &[u8], doing: &'static str) -> Result<(), UpdateError> {
         let given = self.pipe.write(request::DNLOAD, block, bytes);
         given.map_err(|source| self.failed(doing, source))?;
@@ -219,7 +218,7 @@ impl<P: ControlPipe> Loader<P> {
             match status.state {
                 DNLOAD_IDLE if status.status == 0 => return Ok(()),
                 DNBUSY | DNLOAD_SYNC if status.status == 0 => {
-                    // No loader may hold its host up for ever, or spin it.
+                    // A loader must not block the host for ever or make it spin.
                     let wait = status.wait.clamp(Duration::from_millis(1), PATIENCE);
                     self.pipe.wait(wait);
                     waited += wait;
@@ -230,7 +229,7 @@ impl<P: ControlPipe> Loader<P> {
         Err(UpdateError::Endless(doing))
     }
 
-    /// A transfer failed: what the loader says of it, if it still answers.
+    /// Returns the error of a failed transfer: the loader's status, if it still responds.
     fn failed(&mut self, doing: &'static str, source: io::Error) -> UpdateError {
         match self.status(doing) {
             Ok(status) if status.state == ERROR => refused(doing, status),
@@ -238,7 +237,7 @@ impl<P: ControlPipe> Loader<P> {
         }
     }
 
-    /// Brings the loader to `dfuIDLE`, whatever was before.
+    /// Makes the loader `dfuIDLE` from any state.
     fn rest(&mut self, doing: &'static str) -> Result<(), UpdateError> {
         for _ in 0..TRIES {
             let status = self.status(doing)?;
@@ -281,7 +280,7 @@ fn refused(doing: &'static str, Status { status, state, .. }: Status) -> UpdateE
     }
 }
 
-/// Returns the meaning of a status (DFU 1.1, 6.1.2; ST gives some of them a meaning of its own).
+/// Returns the meaning of a status (DFU 1.1, 6.1.2; ST redefines some).
 const fn meaning(status: u8) -> &'static str {
     match status {
         0x00 => "it is in another state than it should be",

@@ -1,18 +1,16 @@
-//! An image onto a board without a debug probe: through the USB loader in the chip's
-//! ROM.
+//! Writes an image to a board without a debug probe, through the USB loader in the chip's ROM.
 //!
 //! ```text
 //! Image ── Plan ── update() ── Loader ── ControlPipe ══ the chip's ROM
 //! ```
 //!
-//! - [`Plan`] is which pages of flash are erased and what they hold then, held against
-//!   what the loader says of its flash, before anything is erased.
-//! - [`Loader`] speaks DFU 1.1 with ST's extensions (AN3156, UM0424).
-//! - [`update`] erases, writes, reads back and compares, and starts the program. The
-//!   page with the vectors is erased first and their word written last, so that no half
-//!   of a program is ever started.
-//! - [`choose`] picks the device; [`SystemPipe`] is a loader on the system's USB, and a
-//!   test puts a scripted one in its place.
+//! - [`Plan`] lists the pages of flash to erase and their new content. It is checked against the
+//!   loader's description of its flash before anything is erased.
+//! - [`Loader`] implements DFU 1.1 with ST's extensions (AN3156, UM0424).
+//! - [`update`] erases, writes, verifies and starts the program. The page with the vectors is
+//!   erased first and their word is written last, so that an incomplete program never starts.
+//! - [`choose`] selects the device. [`SystemPipe`] is a loader on the system's USB; tests replace
+//!   it with a scripted one.
 
 mod choice;
 mod error;

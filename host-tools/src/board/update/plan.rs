@@ -1,4 +1,4 @@
-//! Which pages of flash an update erases, and what they hold afterwards.
+//! The pages of flash that an update erases, and their new content.
 
 use std::collections::BTreeMap;
 
@@ -10,23 +10,23 @@ use crate::board::memories::Memories;
 
 /// Value of an erased byte.
 const ERASED: u8 = 0xFF;
-/// Whole words of flash, and what they will hold.
+/// Whole words of flash and their new content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlashRange {
     /// The first address.
     pub address: u64,
-    /// Its new content.
+    /// The new content.
     pub bytes: Vec<u8>,
 }
 
-/// Erasures and writes of an update.
+/// The pages to erase and the words to write in an update.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// First addresses of the pages to erase; first that with the vectors.
+    /// First addresses of the pages to erase; the page with the vectors is first.
     pub erased: Vec<u64>,
-    /// The word with the first two vectors, stack and start: written last.
+    /// The word with the first two vectors, stack and start, which is written last.
     pub vectors: FlashRange,
-    /// Everything else, in order. What is not written of an erased page stays erased.
+    /// All other words, in order. The rest of an erased page stays erased.
     pub others: Vec<FlashRange>,
 }
 
@@ -34,7 +34,7 @@ impl Plan {
     /// Plans an update of `board` with `image` through a loader with the flash `layout`.
     ///
     /// # Errors
-    /// [`UpdateError`]: the flash is another chip's, or the image reaches into the
+    /// [`UpdateError`]: the flash belongs to another chip, or the image reaches into the
     /// calibrations or has no vectors.
     pub fn new(board: &Board, image: &Image, layout: &Layout) -> Result<Self, UpdateError> {
         let memories = image.memories;
@@ -73,7 +73,7 @@ impl Plan {
         })
     }
 
-    /// Bytes that are written.
+    /// Returns the number of bytes to write.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let others: usize = self.others.iter().map(|range| range.bytes.len()).sum();
@@ -81,7 +81,7 @@ impl Plan {
     }
 }
 
-/// The image's bytes, page by page.
+/// Divides the image's bytes into pages.
 fn pages(image: &Image, memories: &Memories) -> Result<BTreeMap<u64, Vec<u8>>, UpdateError> {
     let allowed = memories.for_image();
     let mut pages: BTreeMap<u64, Vec<u8>> = BTreeMap::new();

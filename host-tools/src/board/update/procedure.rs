@@ -9,23 +9,22 @@ use crate::board::image::Image;
 /// Progress of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// So many pages of so many are erased.
+    /// Pages erased, of a total.
     Erased(usize, usize),
-    /// So many bytes of so many are written.
+    /// Bytes written, of a total.
     Written(usize, usize),
-    /// So many bytes of so many were read back and are as they should be.
+    /// Bytes read back and equal, of a total.
     Compared(usize, usize),
 }
 
-/// Brings an image onto the board behind a loader, compares what is in flash then, and
-/// starts it. Returns how many bytes it wrote.
+/// Writes an image through a loader, verifies it and starts it. Returns the number of bytes
+/// written.
 ///
-/// The page with the vectors is erased before any other, and its first word is written
-/// when everything else was read back: until then a chip that is reset finds no program
-/// at all, and none that is half old and half new.
+/// The page with the vectors is erased first, and its first word is written after everything else
+/// is verified. Before that, a chip that is reset finds no program, never a mixture of two.
 ///
 /// # Errors
-/// [`UpdateFailure`], which says whether anything was erased.
+/// [`UpdateFailure`], which reports whether anything was erased.
 pub fn update<P: ControlPipe>(
     loader: &mut Loader<P>,
     board: &Board,

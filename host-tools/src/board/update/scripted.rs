@@ -1,6 +1,5 @@
-//! A chip's ROM loader that follows AN3156 and UM0424 to the letter, and what can go
-//! wrong with it. It forgives nothing: a request in a state that does not take it, or
-//! before the time that it asked to be left alone for, is an error.
+//! A simulated ROM loader that follows AN3156 and UM0424 strictly, with injected faults. A request
+//! in a state that does not allow it, or before the requested wait has ended, is an error.
 
 use std::io;
 use std::time::Duration;
@@ -9,22 +8,22 @@ use super::loader::{ControlPipe, request};
 
 const FLASH: u64 = 0x0800_0000;
 pub(super) const TRANSFER: usize = 1024;
-/// Time that it asks for to write, ms.
+/// Wait that the loader requests to write, ms.
 const WRITE_MS: u64 = 5;
 
-/// A chip's ROM as far as it concerns the flash.
+/// The parts of a chip's ROM loader that concern its flash.
 #[derive(Debug)]
 pub(super) struct Rom {
     /// The board with this chip.
     pub(super) board: &'static str,
-    /// Its description of its flash.
+    /// The loader's description of its flash.
     pub(super) words: &'static str,
     pub(super) flash_bytes: usize,
-    /// Bytes that are erased at once.
+    /// Bytes of the smallest erasable unit.
     pub(super) page: usize,
-    /// Bytes that are written at once: it refuses a part of them.
+    /// Bytes of the smallest writable unit; the loader refuses a part of one.
     pub(super) word: usize,
-    /// Time that it asks for to erase, ms: a page of a G474, a sector of an H743.
+    /// Wait that the loader requests to erase, ms: a page of a G474, a sector of an H743.
     pub(super) erase_ms: u64,
 }
 
@@ -61,7 +60,7 @@ pub(super) enum State {
     Error = 10,
 }
 
-/// Operation on its flash.
+/// Operation on the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Deed {
     Erased(u64),
@@ -69,18 +68,18 @@ pub(super) enum Deed {
     Started(u64),
 }
 
-/// Its injected faults.
+/// Injected faults of the loader.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Faults {
-    /// It is gone after so many requests.
+    /// Requests after which the loader is disconnected.
     pub(super) gone_after: Option<usize>,
-    /// A cell of its flash that reads a bit that was not written.
+    /// A cell of the flash that reads back a wrong bit.
     pub(super) bad_cell: Option<u64>,
     /// A page that cannot be erased.
     pub(super) stuck_page: Option<u64>,
-    /// It is protected against reading.
+    /// True if the flash is protected against reading.
     pub(super) protected: bool,
-    /// It never carries out a command.
+    /// True if no command ever completes.
     pub(super) never_done: bool,
 }
 
@@ -91,7 +90,7 @@ pub(super) struct Scripted {
     pub(super) state: State,
     status: u8,
     pointer: u64,
-    /// The block that was given last.
+    /// The last block received.
     block: (u16, Vec<u8>),
     now: Duration,
     busy_until: Duration,
@@ -101,7 +100,7 @@ pub(super) struct Scripted {
 }
 
 impl Scripted {
-    /// A chip whose flash is full of another program.
+    /// Returns a chip whose flash is full of another program.
     pub(super) fn new(rom: &'static Rom, faults: Faults) -> Self {
         Self {
             rom,
@@ -118,7 +117,7 @@ impl Scripted {
         }
     }
 
-    /// The same chip, reset into its loader again, with nothing wrong.
+    /// Returns the same chip, reset into its loader again, without faults.
     pub(super) fn again(self) -> Self {
         Self {
             flash: self.flash,

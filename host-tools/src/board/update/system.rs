@@ -11,14 +11,14 @@ use super::error::UpdateError;
 use super::loader::{ControlPipe, Loader};
 use crate::link::{is_board, place_on_usb, printable, usb_devices};
 
-/// The numbers of the USB loader in every STM32's ROM: ST's own.
+/// The USB numbers of the loader in every STM32's ROM, assigned by ST.
 pub const LOADER_VENDOR_ID: u16 = 0x0483;
 /// See [`LOADER_VENDOR_ID`].
 pub const LOADER_PRODUCT_ID: u16 = 0xDF11;
 
-/// Time that a control transfer may take. An erase continues behind its transfer.
+/// Time limit of a control transfer. An erase continues after its transfer.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Beginning of the description of its flash.
+/// Prefix of the description of internal flash.
 const FLASH: &str = "@Internal Flash";
 /// The type of a DFU functional descriptor.
 const FUNCTIONAL: u8 = 0x21;
@@ -62,7 +62,7 @@ fn is_loader(info: &nusb::DeviceInfo) -> bool {
     (info.vendor_id(), info.product_id()) == (LOADER_VENDOR_ID, LOADER_PRODUCT_ID)
 }
 
-/// Boards and loaders that are plugged in.
+/// Returns the connected boards and loaders.
 #[must_use]
 pub fn plugged() -> Vec<Plugged> {
     let devices = usb_devices();
@@ -77,10 +77,10 @@ pub fn plugged() -> Vec<Plugged> {
     described.collect()
 }
 
-/// Opens the loader that is plugged in at a place, if there is one.
+/// Opens the loader at a USB port, if there is one.
 ///
 /// # Errors
-/// [`UpdateError`]: it is there and cannot be used.
+/// [`UpdateError`]: the loader is present but cannot be used.
 pub fn open_loader(place: &str) -> Result<Option<Loader<SystemPipe>>, UpdateError> {
     let here = |info: &nusb::DeviceInfo| is_loader(info) && place_on_usb(info) == place;
     let Some(info) = usb_devices().into_iter().find(here) else {

@@ -1,4 +1,4 @@
-//! Whole updates of a scripted loader, honest and with each fault.
+//! Whole updates with a scripted loader, without faults and with each fault.
 
 use super::scripted::{Deed, Faults, G474, H743, Rom, Scripted, State, TRANSFER};
 use super::{ControlPipe, Loader, Plan, Step, UpdateError, UpdateFailure, request, update};
@@ -6,14 +6,14 @@ use crate::board::image::Part;
 use crate::board::{Board, Image, Memories};
 
 const FLASH: u64 = 0x0800_0000;
-/// The chips whose loaders are played.
+/// The chips whose loaders are simulated.
 static ROMS: [&Rom; 2] = [&G474, &H743];
-/// Length, type, what it can, time-out, bytes of a transfer, version 1.1a.
+/// Length, type, attributes, time-out, bytes of a transfer, version 1.1a.
 const FUNCTIONAL: [u8; 9] = [9, 0x21, 0x0B, 0xFF, 0, 0, (TRANSFER / 256) as u8, 0x1A, 1];
 /// Bytes of a program.
 const PROGRAM: usize = 11_000;
-/// Starts of its pieces: of an H743's, behind the first sector and in the second bank,
-/// because a program that fills these is long to write.
+/// Offsets of the program's parts. An H743's are behind the first sector and in the second bank,
+/// because a program that fills these takes long to write.
 const G474_PIECES: [u64; 3] = [0, 472, 4_000];
 const H743_PIECES: [u64; 3] = [0, 128 * 1024 + 480, 1024 * 1024];
 
@@ -28,8 +28,8 @@ fn memories(rom: &Rom) -> Memories {
     }
 }
 
-/// A program: on a G474 five pages and a bit in one, on an H743 three sectors with a
-/// beginning in each.
+/// A program: on a G474 it fills five pages and part of a sixth, on an H743 it has a part in each
+/// of three sectors.
 fn image(rom: &Rom) -> Image {
     let bytes: Vec<u8> = (0..PROGRAM as u32).map(|i| (i * 7 % 251) as u8).collect();
     let starts = match rom.page {
@@ -46,13 +46,13 @@ fn image(rom: &Rom) -> Image {
         });
     Image {
         memories: memories(rom),
-        // In an order that is never written.
+        // The parts are in reverse, not in the order in which they are written.
         parts: parts.rev().collect(),
         placed: vec![],
     }
 }
 
-/// First addresses of the pages that it lies in.
+/// First addresses of the pages that the image uses.
 fn touched(rom: &Rom) -> Vec<u64> {
     let page = rom.page as u64;
     let ends = image(rom).parts.into_iter().flat_map(|part| {
@@ -110,7 +110,7 @@ fn an_image_is_written_read_back_and_started_and_nothing_else_is_touched() {
     for rom in ROMS {
         let image = image(rom);
         let (device, done) = try_update(Scripted::new(rom, Faults::default()), &image);
-        // Whole words of flash.
+        // The number of bytes is rounded up to whole words of flash.
         let written = done.expect("done");
         assert!(written.is_multiple_of(rom.word), "{}: {written}", rom.board);
         assert!(is_whole(&device, &image), "{}", rom.board);
@@ -178,7 +178,7 @@ fn lost_loader_leaves_no_half_program_and_can_be_retried() {
     }
 }
 
-/// An update whose loader is gone after so many requests of all that it takes, and another.
+/// Runs an update whose loader disconnects after `gone_after` of `all` requests, and then another.
 fn goes_away(rom: &'static Rom, image: &Image, gone_after: usize, all: usize) {
     let faults = Faults {
         gone_after: Some(gone_after),
@@ -187,7 +187,7 @@ fn goes_away(rom: &'static Rom, image: &Image, gone_after: usize, all: usize) {
     let at = format!("{}: {gone_after} of {all}", rom.board);
     let (device, done) = try_update(Scripted::new(rom, faults), image);
     let Err(failure) = done else {
-        // Its last answer is the one that it need not give.
+        // Only the loader's last reply is optional.
         assert!(gone_after + 1 == all, "{at}");
         return;
     };
@@ -263,7 +263,7 @@ fn what_the_loader_refuses_is_told_in_words_and_ends() {
     assert!(said.contains("did not finish"), "{said}");
 }
 
-/// Nothing was erased or written.
+/// Asserts that nothing was erased or written.
 fn assert_untouched(device: &Scripted) {
     assert_eq!(device.deeds, []);
     assert!(device.flash.iter().all(|byte| *byte == 0xA5));
@@ -352,13 +352,13 @@ fn progress_ends_where_it_said_it_would() {
 #[test]
 fn the_scripted_loader_forgives_nothing() {
     let mut device = Scripted::new(&G474, Faults::default());
-    // Too early.
+    // The second status request is too early.
     device
         .write(request::DNLOAD, 0, &[0x41, 0, 0, 0, 8])
         .expect("taken");
     device.read(request::GETSTATUS, 0, 6).expect("busy");
     assert!(device.read(request::GETSTATUS, 0, 6).is_err());
-    // A page that is not erased, and a block while it reads.
+    // A page that is not erased, and a write while the loader reads.
     let mut device = Scripted::new(&G474, Faults::default());
     device
         .read(request::UPLOAD, 2, TRANSFER as u16)

@@ -1,5 +1,5 @@
-//! Checks of the board's clocks: its ticks against another clock, and
-//! the oscillator of its USB against the host's.
+//! Checks of the board's clocks: the tick rate by another clock, and the USB oscillator by the
+//! host's.
 
 use hapterra_core::wire::status::UsbClock;
 
@@ -8,15 +8,14 @@ use super::super::board::Board;
 use super::super::finding::Finding;
 use super::super::halt::Halt;
 
-/// For how long the ticks are counted, s: an answer that is late by a tenth of a second is off by
-/// a hundredth.
+/// Duration of the count, s: a reply that is 0.1 s late causes an error of 1 %.
 const COUNTED_S: f64 = 10.0;
-/// By how much the ticks may be off: twice the error of the chips' own oscillators.
+/// Largest relative error of the tick rate: twice that of the chips' own oscillators.
 const MAX_OFF: f64 = 0.02;
-/// Looks within which the oscillator of USB has to follow: the board measures it each second.
+/// Looks within which the USB oscillator must lock; the board measures it once a second.
 const LOOKS: usize = 30;
 
-/// Counts the ticks by the attendant's clock, and asks whether USB's oscillator follows. Returns
+/// Counts the ticks by the attendant's clock, and checks that the USB oscillator is locked. Returns
 /// the ticks in a second.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! The encoders: each joint is moved by hand, there and back.
+//! Check of the encoders: each joint is moved by hand, forth and back.
 
 use super::{Board, Halt};
 use crate::bringup::attendant::{Attendant, Task};
@@ -7,13 +7,12 @@ use crate::calibrate::Direction;
 
 /// Distance of the move, mm.
 const ABOUT_MM: u16 = 80;
-/// An encoder whose joint was moved that far has counted more than this.
+/// Counts that a working encoder exceeds in this move.
 const ALIVE_COUNTS: u32 = 400;
-/// There and back may differ by this share: a hand does not find the zero pose again
-/// any better.
+/// Largest relative difference of forth and back: a hand returns to the zero pose no better.
 const LOST_SHARE: f64 = 0.1;
 
-/// Has the tip moved right, up and towards the user, and back.
+/// Checks the encoders while the tip is moved right, up and towards the user, and back.
 pub(super) fn by_hand(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -38,7 +37,7 @@ fn moved(from: [i32; 3], to: [i32; 3]) -> [i32; 3] {
     std::array::from_fn(|i| to[i].wrapping_sub(from[i]))
 }
 
-/// Checks the encoder of the joint (0 to 2) that was moved.
+/// Checks the encoder of the moved joint (0 to 2).
 fn judge(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Finding> {
     let most = (0..3).max_by_key(|i| there[*i].unsigned_abs());
     let most = most.unwrap_or(joint);
@@ -50,7 +49,7 @@ fn judge(joint: usize, there: [i32; 3], back: [i32; 3]) -> Result<(), Finding> {
             encoder: most + 1,
         });
     }
-    // One that stands still is dead, whatever else moves along.
+    // A joint's encoder that does not count is dead, even if others count.
     if counts.unsigned_abs() <= ALIVE_COUNTS {
         return Err(Finding::DeadEncoder {
             joint: joint + 1,
@@ -86,7 +85,7 @@ mod tests {
             encoder: 3,
         };
         assert_eq!(judge_one([40, 700, 2_800]), Err(swapped));
-        // A board may say anything.
+        // The counts are from the link and may have any value.
         let most = judge(1, [0, i32::MAX, 0], [0, i32::MAX, 0]);
         assert!(matches!(most, Err(Finding::CountsLost { joint: 2, .. })));
         let lost = judge(1, [40, 2_800, 700], [-40, -2_000, -700]);

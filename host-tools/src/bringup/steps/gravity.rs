@@ -1,4 +1,4 @@
-//! The motors carry the arm's weight, with nothing to touch in its reach.
+//! Check that the motors carry the arm's weight, with no surface within its workspace.
 
 use std::collections::VecDeque;
 
@@ -11,23 +11,22 @@ use super::{Board, Halt, plane};
 use crate::bringup::attendant::{Attendant, Task};
 use crate::bringup::finding::Finding;
 
-/// The plane that a scene has to have lies so far below the tip, mm.
+/// Distance of the scene's plane below the tip, mm: out of reach.
 const OUT_OF_REACH_MM: f32 = 1_000.0;
-/// For so many looks (a tenth of a second each) the tip is left to itself.
+/// Looks, of 0.1 s each, for which the tip is released.
 const LOOKS: usize = 30;
-/// So far the tip may drift meanwhile, mm.
+/// Largest drift of the tip in that time, mm.
 const DRIFT_MM: f64 = 20.0;
 
-/// Speed limit of a tip that is left to itself, mm/s: half of what a jog may move
-/// it.
+/// Speed limit of the released tip, mm/s: half of a jog's.
 const FAST_MM_S: f64 = 100.0;
-/// Over so many milliseconds its speed is taken.
+/// Interval of the speed estimate, ms.
 const OVER_MS: u32 = 10;
 
-/// The motion of the tip, sample by sample.
+/// Motion of the tip, from samples.
 struct TipMotion {
     ticks_per_ms: u32,
-    /// The latest samples: their ticks, and where the tip was, mm.
+    /// The latest samples: tick, and position of the tip, mm.
     latest: VecDeque<(u32, DVec3)>,
     /// Maximum speed, mm/s.
     fastest_mm_s: f64,
@@ -42,11 +41,11 @@ impl TipMotion {
         }
     }
 
-    /// Takes the next sample. Returns whether the tip is too fast.
+    /// Adds a sample. Returns true if the tip is too fast.
     fn take(&mut self, sample: &TickRecord) -> bool {
         let now = (sample.tick, plane::hip_mm(sample));
         let since = |then: &(u32, DVec3)| now.0.wrapping_sub(then.0) / self.ticks_per_ms;
-        // The oldest that is old enough; what comes before it is not needed any more.
+        // Keep one sample that is old enough; older ones are not needed.
         while self
             .latest
             .get(1)
@@ -64,7 +63,7 @@ impl TipMotion {
     }
 }
 
-/// Has the tip let go and watches that it stays; then has the switch let go.
+/// Checks that the released tip stays in place, and then that releasing the switch ends the force.
 pub(super) fn carried(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,

@@ -1,4 +1,4 @@
-//! The amplifiers' ready lines, and the enable line with a meter.
+//! Check of the amplifiers' ready lines, and of the enable line with a meter.
 
 use hapterra_core::guard::Blockers;
 use hapterra_core::wire::status::Status;
@@ -10,8 +10,7 @@ use crate::bringup::finding::Finding;
 /// Voltage below which every amplifier's enable input reads low, V.
 const LOW_V: f64 = 0.8;
 
-/// Has each ready wire pulled, and the enable line measured. The board is without power at
-/// its end.
+/// Checks each ready wire and measures the enable line. The board has no power at the end.
 pub(super) fn ready_and_enable(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -23,7 +22,8 @@ pub(super) fn ready_and_enable(
     Ok(format!("{ready}; {}", enable_line(attendant)?))
 }
 
-/// Has each ready wire pulled: an input that reads as ready without one tells nothing.
+/// Checks each ready line with its wire disconnected, because an input that reads ready without a
+/// wire is useless.
 fn ready_lines(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,

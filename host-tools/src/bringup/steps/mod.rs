@@ -1,4 +1,4 @@
-//! The steps, one file for what is done alike.
+//! The steps of a bring-up; similar ones share a file.
 
 mod clocks;
 mod encoders;
@@ -23,7 +23,7 @@ use super::halt::Halt;
 use super::step::Step;
 use heightfield::printable_text::printable;
 
-/// Goes through one step. Returns what the log keeps of it.
+/// Runs a step. Returns the result for the log.
 ///
 /// # Errors
 /// [`Halt`].
@@ -50,7 +50,7 @@ pub(super) fn go(
     }
 }
 
-/// The board answers, is disarmed, and finds nothing wrong with itself; its clocks are right.
+/// Checks that the board responds, is disarmed and has no blocker, and that its clocks are right.
 fn answers(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<String, Halt> {
     let status = board.look()?;
     let report = status.health.report;
@@ -72,7 +72,7 @@ fn answers(board: &mut Board<'_, '_>, attendant: &dyn Attendant) -> Result<Strin
     ))
 }
 
-/// The record that the board holds in its memory.
+/// Returns the record stored in the board's memory.
 fn stored_record(board: &mut Board<'_, '_>) -> Result<Calibration, Halt> {
     let source = board.look()?.calibration;
     match board.calibration()? {
@@ -81,8 +81,7 @@ fn stored_record(board: &mut Board<'_, '_>) -> Result<Calibration, Halt> {
     }
 }
 
-/// The record, with the arm zeroed; where it is not, the attendant puts it into its zero
-/// pose.
+/// Returns the record of the zeroed arm; zeroes it with the attendant if necessary.
 fn zeroed(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<Calibration, Halt> {
     let record = stored_record(board)?;
     if board.look()?.health.zero.is_none() {
@@ -91,7 +90,7 @@ fn zeroed(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<Ca
     Ok(record)
 }
 
-/// Has the arm put into its zero pose and tells the board. Returns the counts there.
+/// Zeroes the arm in the zero pose, with the attendant's help. Returns the counts there.
 fn zero(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<[i32; 3], Halt> {
     attendant.finish(Task::ZeroPose)?;
     let counts = board.still(attendant)?;
@@ -99,8 +98,8 @@ fn zero(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<[i32
     Ok(counts)
 }
 
-/// The arm zeroed, held loosely and still: puts a plane so far below the tip, mm, in
-/// force, and has the attendant arm for it. Returns the record.
+/// Zeroes the arm, which the attendant holds loosely and still, activates a plane that many
+/// millimetres below the tip, and arms. Returns the record.
 fn armed_over_plane(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,

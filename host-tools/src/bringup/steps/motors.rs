@@ -1,4 +1,4 @@
-//! One motor at a time, jogged: which joint it turns, which way, and how strongly.
+//! Jogs of one motor at a time, to find its joint, direction and torque.
 
 use glam::{DVec3, Vec3};
 use hapterra_core::guard::{Fault, JOG_SHARE, Jog};
@@ -11,21 +11,21 @@ use crate::bringup::attendant::{Attendant, Reading, Task};
 use crate::bringup::finding::Finding;
 use crate::calibrate::N_PER_GRAM;
 
-/// Time for which the current stays, ms, to see which way the joint gives.
+/// Duration of a jog to find the direction, ms.
 const GIVE_MS: u16 = 500;
-/// Time for which it stays to be read off a scale, ms.
+/// Duration of a jog to read the scale, ms.
 const SCALE_MS: u16 = 3_000;
-/// A joint has moved by this much under a jog, rad: 0.3 mm at the tip of a Premium 1.5,
-/// a third of what a relaxed hand gives under it.
+/// Angle from which a joint counts as moved by a jog, rad: 0.3 mm at the tip of a Premium 1.5, a
+/// third of the motion in a relaxed hand.
 const MOVED_RAD: f64 = 0.001_5;
-/// So often it is tried to tell the motor's motion from the hand's.
+/// Attempts to distinguish the motor's motion from the hand's.
 const TRIES: usize = 3;
-/// By this factor the torque may differ from the record's either way. The scale is read
-/// against the joint's friction, about an eighth of a jog's torque on a Premium 1.5, and
-/// no scale is hooked on quite straight: this is the order of magnitude and no more.
+/// Largest factor between measured torque and the record's, in both directions. The reading
+/// includes the joint's friction, about an eighth of a jog's torque on a Premium 1.5, and the scale
+/// is never quite straight: it shows only the order of magnitude.
 const TORQUE_FACTOR: f64 = 1.6;
 
-/// Finds joint, sign and torque constant of a motor (0 to 2).
+/// Finds the joint, sign and torque constant of a motor (0 to 2).
 pub(super) fn jogged(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -41,12 +41,12 @@ pub(super) fn jogged(
     ))
 }
 
-/// The current of a jog, A.
+/// Returns the current of a jog, A.
 fn current_a(record: &Calibration, axis: usize) -> f32 {
     JOG_SHARE * record.continuous_current_a[axis]
 }
 
-/// Jogs both ways while the tip is held loosely.
+/// Finds the sign by jogs in both directions while the tip is held loosely.
 fn find_sign(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -58,7 +58,7 @@ fn find_sign(
     for _ in 0..TRIES {
         attendant.finish(Task::HoldLoosely)?;
         board.still(attendant)?;
-        // The positions of the joints show what a fault would report here.
+        // The joints' positions also show the cause that a fault would report.
         let mut gave = |current_a| jog(board, attendant, (axis, current_a, GIVE_MS), false);
         let (plus, minus) = (gave(current_a)?.0, gave(-current_a)?.0);
         judged = judge_sign(record, axis, plus, minus);
@@ -69,8 +69,8 @@ fn find_sign(
     Ok(judged?)
 }
 
-/// Has the attendant press the switch for a jog, and follows it to its end. Returns how
-/// far the joints gave, rad, and the jog's own fault that ended it.
+/// Runs a jog at the attendant's dead-man press. Returns the joints' motion, rad, and the jog fault
+/// that ended it, if any.
 fn jog(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -108,8 +108,7 @@ fn jog(
         let (number, meaning) = (fault.number(), fault.meaning());
         attendant.hear(&format!("  the jog ended with fault {number}: {meaning}"));
     }
-    // A joint that was held springs back when the current is gone; one that ran away
-    // does not.
+    // A held joint springs back when the current ends; one that ran away does not.
     let at = match fault {
         None | Some(Fault::NoMotion) => driven,
         Some(Fault::JogRanAway) => now,
@@ -121,8 +120,7 @@ fn jog(
     Ok((angles(&at) - from, fault))
 }
 
-/// Which way the motor turns, given how far the joints gave under a positive and a
-/// negative current, rad.
+/// Returns the motor's sign, from the joints' motion under a positive and a negative current, rad.
 fn judge_sign(record: &Calibration, axis: usize, plus: DVec3, minus: DVec3) -> Result<i8, Finding> {
     let (by_motor, by_hand) = (0.5 * (plus - minus), 0.5 * (plus + minus));
     let joint = by_motor.abs().max_position();
@@ -155,8 +153,8 @@ fn judge_sign(record: &Calibration, axis: usize, plus: DVec3, minus: DVec3) -> R
     }
 }
 
-/// Jogs towards larger angles while a spring scale holds the tip. Returns the motor's
-/// torque constant by the scale, Nm/A.
+/// Jogs towards larger angles while a spring scale holds the tip. Returns the motor's torque
+/// constant by the scale, Nm/A.
 fn find_torque(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,

@@ -1,4 +1,4 @@
-//! The command outputs, with a meter and the power stages off.
+//! Check of the command outputs with a meter, the power stages off.
 
 use hapterra_core::wire::request::Request;
 
@@ -6,13 +6,12 @@ use super::{Board, Halt};
 use crate::bringup::attendant::{Attendant, Reading};
 use crate::bringup::finding::Finding;
 
-/// Shares of full scale at which each output is measured.
+/// Fractions of full scale at which each output is measured.
 const FRACTIONS: [f32; 3] = [0.0, 0.5, -0.5];
-/// So far a reading may be from what is expected, as a share of full scale: an offset
-/// stage has resistors of a per cent, and so has the meter.
+/// Largest error of a reading, as a share of full scale: resistors and meter have about 1 % each.
 const OFF_SHARE: f64 = 0.04;
 
-/// Reading of a meter for a share of full scale, and the measured pins.
+/// The meter's reading for a fraction of full scale, and its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct OutputScale {
     middle: f64,
@@ -21,18 +20,19 @@ struct OutputScale {
 }
 
 impl OutputScale {
-    /// Of a board by its name.
+    /// Returns the scale of a board by its name.
     fn of(board: &str) -> Self {
         let (middle, full, unit) = match board {
             "nucleo-h743zi2" => (50.0, 35.0, "% duty cycle"),
-            // Behind the G474's offset stage, too: its own flaws drive a motor as well.
+            // The G474 is also measured behind its offset stage, because errors of that stage drive
+            // a motor too.
             _ => (0.0, 10.0, "V at the amplifier's input"),
         };
         Self { middle, full, unit }
     }
 }
 
-/// Has each output measured while the board holds it.
+/// Measures each output while the board holds it.
 pub(super) fn held(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
     use hapterra_firmware::amplifier::{duty_code, offset_code};
 
-    /// Returns the output of the offset stage of the wiring page for the converter's volts.
+    /// Returns the offset stage's output for the converter's voltage (see the wiring page).
     fn behind_the_stage(volts: f64) -> f64 {
         (volts - 1.65) * 10.0 / 1.444
     }

@@ -1,4 +1,4 @@
-//! A flat plane under the arm, without a terrain file.
+//! A flat plane for the arm, without a terrain file.
 
 use glam::{DVec3, Vec3};
 use hapterra_core::force::SurfaceParams;
@@ -12,23 +12,23 @@ use crate::calibrate::Arm;
 
 /// Size of a cell, mm.
 const CELL_MM: f32 = 8.0;
-/// Cells along a side: half a metre, with the arm's zero pose over its middle.
+/// Cells along a side: half a metre, centred below the arm's zero pose.
 const CELLS: i32 = 64;
 
-/// Softest stiffness that can be rendered, N/mm, and the most that the plane may push, N.
+/// Lowest stiffness that can be rendered, N/mm, and maximum force of the plane, N.
 pub(super) const SOFT: SurfaceParams = SurfaceParams {
     stiffness_n_per_mm: 0.05,
     max_force_n: 0.5,
     ..SurfaceParams::PREMIUM
 };
 
-/// A plane that lies `below_mm` under the tip as it is now.
+/// Returns a plane `below_mm` under the tip's present position.
 pub(super) fn below_tip(record: &Calibration, status: &Status, below_mm: f32) -> Scene {
     let tip_mm = tip_mm(record, status) - Arm::of(record).tip_mm(DVec3::ZERO);
     let up_mm = to_terrain_frame(tip_mm.as_vec3()).z;
     let middle = CELLS / 2;
     Scene {
-        // Another one than the last, whatever that was.
+        // The epoch must differ from the last scene's.
         epoch: status.ticks.run | 1,
         level: 0,
         size: FieldSize::new(CELLS, CELLS),
@@ -46,7 +46,7 @@ pub(super) fn below_tip(record: &Calibration, status: &Status, below_mm: f32) ->
     }
 }
 
-/// The tip by the encoders, mm, device frame.
+/// Returns the tip's position by the encoders, mm, device frame.
 pub(super) fn tip_mm(record: &Calibration, status: &Status) -> DVec3 {
     Arm::of(record).tip_mm(status.health.angles_rad.as_dvec3())
 }

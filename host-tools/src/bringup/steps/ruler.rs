@@ -1,4 +1,4 @@
-//! The record against a ruler: zero pose, ratios and signs.
+//! Check of the record with a ruler: zero pose, ratios and signs.
 
 use hapterra_core::phantom::Calibration;
 
@@ -9,11 +9,10 @@ use crate::calibrate::{Check, Direction, RatioFit, fit_ratios};
 
 /// Distance of the move, mm.
 const ABOUT_MM: u16 = 80;
-/// By this share a ratio may differ from the ruler's: one read to a millimetre gives it
-/// to two per cent.
+/// Largest relative difference of a ratio from the ruler's: a reading to 1 mm has an error of 2 %.
 const RATIO_SHARE: f64 = 0.05;
 
-/// Zeroes the arm and holds the record against a ruler.
+/// Zeroes the arm and compares the record with a ruler.
 pub(super) fn check(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -45,7 +44,7 @@ pub(super) fn check(
     ))
 }
 
-/// Compares the record with the ruler.
+/// Compares the record with the fit.
 fn judge(record: &Calibration, fit: &RatioFit) -> Result<(), Finding> {
     for joint in 0..3 {
         let sign = record.encoder_sign[joint];

@@ -1,11 +1,11 @@
-//! The stop and dead-man inputs, each in both positions.
+//! Check of the stop and dead-man inputs, in both positions.
 
 use hapterra_core::wire::status::Status;
 
 use super::{Board, Halt};
 use crate::bringup::attendant::{Attendant, Task};
 
-/// Has each switch moved, and its wire pulled where that has to read as pressed.
+/// Checks each switch, and that a disconnected stop wire reads as pressed.
 pub(super) fn both_positions(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,

@@ -1,4 +1,4 @@
-//! The first touch: a soft plane that pushes with half a newton at most.
+//! The first touch: a soft plane with a force of at most 0.5 N.
 
 use hapterra_core::guard::Fault;
 use hapterra_core::scene::TickRecord;
@@ -8,25 +8,25 @@ use super::{Board, Halt, plane};
 use crate::bringup::attendant::{Attendant, Question, Task};
 use crate::bringup::finding::Finding;
 
-/// So far below the tip the plane lies, mm.
+/// Distance of the plane below the tip, mm.
 const BELOW_MM: f32 = 20.0;
-/// So deep the tip is to be pushed into it, mm.
+/// Depth to which the tip must be pushed, mm.
 const DEEP_MM: f32 = 5.0;
-/// The tip rests while it comes less than this deeper in a look, mm.
+/// Largest increase of depth in a look while the tip is at rest, mm.
 const STILL_MM: f32 = 0.1;
-/// So many looks (a tenth of a second each) that may take.
+/// Maximum looks, of 0.1 s each.
 const LOOKS: usize = 600;
 
 /// Contact with the plane.
 #[derive(Default)]
 struct PlaneContact {
-    /// Deepest HIP below the proxy, mm, and the force up there, N.
+    /// Maximum depth of the HIP below the proxy, mm, and the upward force there, N.
     deepest: (f32, f32),
-    /// The largest force, N.
+    /// Maximum force, N.
     most_n: f32,
-    /// The latest force, N.
+    /// Present force, N.
     now_n: f32,
-    /// Maximum depth at the last sample, mm.
+    /// Maximum depth until the last look, mm.
     looked_mm: f32,
 }
 
@@ -41,7 +41,7 @@ impl PlaneContact {
     }
 }
 
-/// Has the tip lowered into the plane and lifted again; then has the stop pressed.
+/// Lets the user lower the tip into the plane, lift it and press the stop.
 pub(super) fn soft_plane(
     board: &mut Board<'_, '_>,
     attendant: &mut dyn Attendant,
@@ -59,7 +59,8 @@ pub(super) fn soft_plane(
     let released = |s: &hapterra_core::wire::status::Status| !s.health.sense.dead_man;
     board.see(attendant, Task::ReleaseDeadMan, released)?;
     board.leave()?;
-    // Asked with the arm disarmed: a board whose host waits for an answer is on its own.
+    // The arm is disarmed during the question, because the host does not supervise the board while
+    // it waits.
     if !attendant.confirms(Question::StopTakesPower)? {
         return Err(Finding::StopLeavesPower.into());
     }
@@ -78,10 +79,10 @@ pub(super) fn soft_plane(
 /// Condition for the end of a move.
 type IsDone = fn(&PlaneContact) -> bool;
 
-/// Lets the tip be lowered until it is deep enough, and lifted until there is no force.
+/// Waits until the tip is deep enough, and then until it has no force.
 fn touched(board: &mut Board<'_, '_>, attendant: &mut dyn Attendant) -> Result<PlaneContact, Halt> {
     let mut contact = PlaneContact::default();
-    // Deep enough, and not on its way any more.
+    // Deep enough and at rest.
     let deep = |contact: &PlaneContact| {
         contact.deepest.0 >= DEEP_MM && contact.deepest.0 - contact.looked_mm < STILL_MM
     };

@@ -1,4 +1,4 @@
-//! `hapterra bringup`: the first power-up, step by step, with a log.
+//! `hapterra bringup`: the bring-up of a board and its arm, step by step, with a log.
 
 pub(super) mod required;
 mod terminal;
@@ -19,9 +19,9 @@ use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native, T
 use crate::phantom::Wiring;
 use terminal::UserAtTerminal;
 
-/// Time that a device may take to answer.
+/// Time limit for a device's reply.
 pub(super) const PATIENCE: Duration = Duration::from_secs(4);
-/// Time that a device in this program may take to answer.
+/// Time limit for a reply of a device in this program.
 const VIRTUAL_PATIENCE: Duration = Duration::from_secs(20);
 
 /// Arguments of `hapterra bringup`.
@@ -42,10 +42,10 @@ pub struct Args {
     pub again_from: Option<Step>,
 }
 
-/// Walks through the steps that the log does not have yet.
+/// Runs the steps that are not yet in the log.
 ///
 /// # Errors
-/// No device; what a step finds; a log that cannot be kept.
+/// No device; a failed step; a log that cannot be stored.
 pub fn run(args: &Args) -> Result<(), Failure> {
     interrupt::listen();
     if args.device == DeviceAddress::Native {
@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             Ok(Box::new(user.device(Calibration::PREMIUM_1_5)))
         });
     }
-    // There is none in memory.
+    // The native device needs no address.
     let native = || Native::new(HostClock::default(), None);
     let mut user = UserAtTerminal {
         since: Instant::now(),
@@ -67,7 +67,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
-/// Walks until the log is complete, and greets the board again where it was off.
+/// Runs steps until the log is complete; reconnects to a board that was switched off.
 fn bring_up<A: Attendant>(
     args: &Args,
     user: &mut A,
@@ -93,7 +93,7 @@ fn bring_up<A: Attendant>(
             say(format!("log            {}", path.display()));
         }
         match (walked, control) {
-            // The session went with the board's power: there is no session to close.
+            // The session ended with the board's power, so there is none to close.
             (Ok(Walked::BoardWasOff), _) => kept = Some(log),
             (Ok(Walked::ToTheEnd), control) => {
                 control.end()?;
@@ -112,7 +112,7 @@ fn bring_up<A: Attendant>(
     Ok(())
 }
 
-/// Returns the place where the log is kept.
+/// Returns the path of the log.
 fn place(args: &Args, control: &ControlSession<'_>) -> Result<Option<PathBuf>, Failure> {
     Ok(match (&args.log, &args.device) {
         (Some(path), _) => Some(path.clone()),

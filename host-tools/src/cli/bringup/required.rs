@@ -12,11 +12,11 @@ use crate::cli::options::device::EMULATED_PATIENCE;
 use crate::link::{ControlSession, Transport};
 use heightfield::printable_text::printable;
 
-/// Asks the device who it is, and refuses a real board whose log is not complete. The
-/// device keeps what it holds.
+/// Queries the device, and refuses a real board whose log is incomplete. The device's scene
+/// remains.
 ///
 /// # Errors
-/// The board was not brought up; no answer.
+/// The board was not brought up; no reply.
 pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Failure> {
     let mut control = ControlSession::look(Box::new(transport), PATIENCE)?;
     if is_real(&control.device().board) {
@@ -35,11 +35,10 @@ pub(in crate::cli) fn brought_up(transport: &mut dyn Transport) -> Result<(), Fa
     Ok(control.end()?)
 }
 
-/// Asks the device who it is, and refuses one that may drive a real arm. The device keeps
-/// what it holds.
+/// Queries the device, and refuses one that may drive a real arm. The device's scene remains.
 ///
 /// # Errors
-/// It may; no answer.
+/// It may drive an arm; no reply.
 pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(), Failure> {
     let control = ControlSession::look(Box::new(transport), EMULATED_PATIENCE)?;
     let board = &control.device().board;
@@ -53,8 +52,7 @@ pub(in crate::cli) fn drives_no_arm(transport: &mut dyn Transport) -> Result<(),
     Ok(control.end()?)
 }
 
-/// Returns true if a board of this name may drive a real arm: all but those that are known to
-/// drive none.
+/// Returns true if a board of this name may drive a real arm: all except those known not to.
 fn is_real(board: &str) -> bool {
     let is_emulated = BOARDS
         .iter()
@@ -62,7 +60,7 @@ fn is_real(board: &str) -> bool {
     board != native::BOARD && !is_emulated
 }
 
-/// The first step that its log does not have, for the device and record as they are now.
+/// Returns the first step missing in the log, for the device's current identity and record.
 fn missing(device: &DeviceHello, record: Option<&Calibration>, mut log: Log) -> Option<Step> {
     log.meet(Identity::of(device, record));
     log.next()

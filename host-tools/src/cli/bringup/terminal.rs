@@ -1,4 +1,4 @@
-//! The first power-up's tasks and questions at a terminal.
+//! Tasks and questions of a bring-up at a terminal.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use crate::link::DeviceAddress;
 
 /// A user at a terminal.
 pub(super) struct UserAtTerminal {
-    /// From when on this computer's clock is counted.
+    /// Start of the time measurement on this computer's clock.
     pub(super) since: Instant,
     /// The board.
     pub(super) address: DeviceAddress,

@@ -5,13 +5,13 @@ use std::str::FromStr;
 /// Measurements of an arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Measure {
-    /// The zero pose: the first step of all measuring.
+    /// The zero pose, the first step of every measurement.
     pub(super) zero: bool,
     /// The cable ratios and encoder signs.
     pub(super) ratios: bool,
     /// The weights on joints 2 and 3.
     pub(super) gravity: bool,
-    /// Ratios that are a guess are taken as they are.
+    /// True if guessed ratios are accepted without a measurement.
     pub(super) takes_guessed_ratios: bool,
 }
 

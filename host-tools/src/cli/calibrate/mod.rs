@@ -1,4 +1,4 @@
-//! `hapterra calibrate`: the walk through a calibration, and records in files.
+//! `hapterra calibrate`: the steps of a calibration, and records in files.
 
 mod measure;
 mod questions;
@@ -27,7 +27,7 @@ use set::Setting;
 
 /// Hint for a record that cannot be written.
 const OTHER_FILE: &str = "name another file with -o";
-/// Time that a device in this program may take to answer.
+/// Time limit for a reply of a device in this program.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Arguments of `hapterra calibrate`.
@@ -75,7 +75,7 @@ pub struct Args {
     pub yes: bool,
 }
 
-/// Models with a preset: the name on the command line, what it is, the model.
+/// Models with a preset: name on the command line, description, model.
 const MODELS: [(&str, &str, Model); 4] = [
     ("premium-1.0", "Phantom Premium 1.0", Model::Premium10),
     ("premium-1.5", "Phantom Premium 1.5", Model::Premium15),
@@ -91,11 +91,10 @@ fn models() -> impl TypedValueParser<Value = Model> {
     })
 }
 
-/// Calibrates.
+/// Runs a calibration.
 ///
 /// # Errors
-/// No device, measurements that do not fit together, a record that the device
-/// refuses.
+/// No device, inconsistent measurements, or a record that the device refuses.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (outputs, inputs) = (
         Vec::from_iter(args.out.as_deref()),
@@ -104,7 +103,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     keep_apart(&outputs, &inputs).or_hint(OTHER_FILE)?;
     match &args.show {
         Some(Some(path)) => return put(&file::to_toml(&file::read(path)?)),
-        // Who only looks takes no arm from its host.
+        // A read-only query does not take the arm from its host.
         Some(None) => return put(&file::to_toml(&args.device.look(held)?)),
         None => {}
     }
@@ -115,7 +114,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .device
             .talk(|control| calibrate(args, control, &mut user));
     }
-    // In memory: a virtual user shows how it goes.
+    // A virtual user demonstrates the steps on an in-memory device.
     let mut user = VirtualUser::with_a_stylus();
     user.says = |line| say(line);
     let device = Native::new(HostClock::default(), None)
@@ -128,7 +127,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     calibrate(args, &mut control, &mut user)
 }
 
-/// The record that the device holds.
+/// Returns the device's record.
 fn held(control: &mut ControlSession<'_>) -> Result<Calibration, Failure> {
     let held = control
         .calibration()?
@@ -175,7 +174,7 @@ fn calibrate(
     Ok(())
 }
 
-/// The record to begin with, and where it is from.
+/// Returns the initial record and its source.
 fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, String), Failure> {
     let held = control.calibration()?;
     let (mut record, whence) = match (&args.from, args.model, held) {
@@ -197,8 +196,7 @@ fn begin(args: &Args, control: &mut ControlSession<'_>) -> Result<(Calibration, 
     Ok((record, whence))
 }
 
-/// Puts the record in force on the device, and has it stored there unless
-/// `--no-store` says otherwise.
+/// Activates the record on the device, and stores it there unless `--no-store` is given.
 fn hand_over(
     args: &Args,
     control: &mut ControlSession<'_>,

@@ -1,5 +1,4 @@
-//! The questions of a calibration at a terminal, or at a pipe, whose lines are
-//! the answers.
+//! The questions of a calibration, at a terminal or from a pipe whose lines are the answers.
 
 use crate::calibrate::{Attendant, Direction, N_PER_GRAM, Review, Stopped};
 use crate::cli::terminal::questions::{ask, number};
@@ -11,7 +10,7 @@ pub(super) struct UserAtTerminal {
 }
 
 impl UserAtTerminal {
-    /// A user who may have agreed beforehand.
+    /// Creates a user; `yes` accepts every question in advance.
     pub(super) fn new(yes: bool) -> Self {
         Self { yes }
     }

@@ -9,24 +9,24 @@ use hapterra_core::phantom::Calibration;
 #[derive(Clone, Copy, Debug)]
 pub struct Setting {
     number: Number,
-    /// The joint of a number that each joint has, 0 to 2.
+    /// The joint, 0 to 2, of a number that each joint has.
     axis: usize,
     value: f32,
 }
 
-/// Place of a number in the record.
+/// Position of a number in the record.
 #[derive(Clone, Copy, Debug)]
 enum Number {
-    /// One for the whole arm.
+    /// One number for the whole arm.
     One(fn(&mut Calibration) -> &mut f32),
-    /// One a joint.
+    /// One number per joint.
     Joint(fn(&mut Calibration) -> &mut Vec3),
-    /// One a joint, set in degrees and kept in radians.
+    /// One number per joint, set in degrees and stored in radians.
     JointDegrees(fn(&mut Calibration) -> &mut Vec3),
 }
 use Number::{Joint, JointDegrees, One};
 
-/// Every number that can be set, by name; `ratio` is `ratio-1` to `ratio-3`.
+/// Names of all numbers that can be set; `ratio` is `ratio-1` to `ratio-3`.
 const NUMBERS: [(&str, Number); 15] = [
     ("counts-per-turn", One(|r| &mut r.counts_per_turn)),
     ("ratio", Joint(|r| &mut r.ratio)),
@@ -79,7 +79,7 @@ impl FromStr for Setting {
 }
 
 impl Setting {
-    /// Changes the record; whether it makes sense is looked at as a whole.
+    /// Changes the record; the record is checked later as a whole.
     pub(super) fn apply(&self, record: &mut Calibration) {
         match self.number {
             One(number) => *number(record) = self.value,

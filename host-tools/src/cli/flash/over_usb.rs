@@ -1,4 +1,4 @@
-//! Over USB, by the loader in the chip's ROM.
+//! Update over USB, by the loader in the chip's ROM.
 
 use std::time::{Duration, Instant};
 
@@ -17,12 +17,12 @@ use crate::cli::terminal::questions::ask;
 use crate::cli::terminal::writer::{self, say};
 use crate::link::{ControlSession, DeviceAddress, Usb};
 
-/// Time that the board may take to answer.
+/// Time limit for the board's reply.
 const PATIENCE: Duration = Duration::from_secs(4);
-/// Time that a device may take to show up again as another: on Windows, a driver's first
-/// start takes seconds.
+/// Time limit for a device to reappear as another; on Windows, a driver's first start takes
+/// seconds.
 const REAPPEARS: Duration = Duration::from_secs(15);
-/// Between two looks at what is plugged in.
+/// Interval of checks for connected devices.
 const LOOK: Duration = Duration::from_millis(200);
 
 pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
@@ -46,8 +46,8 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
         }
     };
     let mut loader = wait_for(|| open_loader(place))?.ok_or(UpdateError::NoLoader)?;
-    // The same is done again before the first erase; here, a refusal can still let the
-    // board go.
+    // The update repeats this check before the first erase; a failure here can still restart the
+    // program.
     if let Err(error) = Plan::new(args.board, image, loader.layout()) {
         let _ = loader.leave(image.memories().flash);
         return Err(error.into());
@@ -61,8 +61,8 @@ pub(super) fn run(args: &Args, image: &Image) -> Result<(), Failure> {
     greet(place)
 }
 
-/// Asks whether a loader that the user did not name is the board that is meant: a loader does not
-/// tell what it is wired to.
+/// Asks the user to confirm a loader that was not named, because a loader cannot report which board
+/// it is on.
 fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
     let serial = device.serial.as_deref().unwrap_or("without a number");
     let (place, board) = (&device.place, args.board.name);
@@ -81,7 +81,7 @@ fn agree(args: &Args, device: &Plugged) -> Result<(), Failure> {
     }
 }
 
-/// Has a board that runs its firmware enter its loader, if it is the right one.
+/// Makes a board enter its loader if it is the right board.
 fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);
     let mut control = ControlSession::open(transport, PATIENCE)?;
@@ -102,7 +102,7 @@ fn enter_loader(args: &Args, device: &Plugged) -> Result<(), Failure> {
         .or_hint("disarm it (`hapterra status --disarm`) and try again; firmware without this request is flashed through the debug probe once")
 }
 
-/// Looks until something is there, for as long as a device may take to reappear.
+/// Calls `look` until it finds something, at most for `REAPPEARS`.
 fn wait_for<T>(
     mut look: impl FnMut() -> Result<Option<T>, UpdateError>,
 ) -> Result<Option<T>, UpdateError> {
@@ -134,7 +134,7 @@ fn write(args: &Args, image: &Image, loader: &mut Loader<SystemPipe>) -> Result<
     Ok(written?)
 }
 
-/// Waits for the new firmware to introduce itself.
+/// Waits for the new firmware's introduction.
 fn greet(place: &str) -> Result<(), Failure> {
     let back = wait_for(|| {
         let mut devices = plugged().into_iter();

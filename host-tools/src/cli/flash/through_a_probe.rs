@@ -1,4 +1,4 @@
-//! Through a debug probe.
+//! Update through a debug probe.
 
 use super::Args;
 use crate::board::{Image, flash};

@@ -1,4 +1,4 @@
-//! Closes devices that a worker has left, until they confirm.
+//! Closes the devices of an ended worker, until they confirm.
 
 use std::sync::mpsc::Sender;
 use std::thread;
@@ -6,14 +6,14 @@ use std::time::{Duration, Instant};
 
 use crate::link::{ControlSession, DeviceAddress, HostClock, LinkError, Native};
 
-/// For so long a device is tried.
+/// Time limit for all attempts on a device.
 const TRIED_FOR: Duration = Duration::from_secs(10);
-/// For so long a device may take to answer.
+/// Time limit for a device's reply.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Between two tries.
+/// Interval between attempts.
 const RETRY: Duration = Duration::from_millis(200);
 
-/// Closes the device in a thread of its own, and sends the address with what came of it.
+/// Closes the device in a separate thread, which sends the address and the result.
 pub(super) fn begin(address: String, done: Sender<(String, Result<(), LinkError>)>) {
     thread::spawn(move || {
         let closed = until_confirmed(&address);

@@ -1,4 +1,4 @@
-//! The process that waits.
+//! The guardian process.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -22,34 +22,34 @@ use super::{WorkerMessage, close, worker};
 use crate::cli::failure::Failure;
 use crate::cli::terminal::interrupt::{self, ASK_FOR_AN_END, INTERRUPTED};
 
-/// Between two looks.
+/// Interval of checks.
 const LOOK: Duration = Duration::from_millis(20);
-/// A serving thread that does not react to a press for so long never will. With the time
-/// that a board takes to confirm this stays below three seconds.
+/// Time after which a serving thread that does not react to a press counts as blocked. Together
+/// with the board's time to confirm, it stays below 3 s.
 pub(super) const DEAF: Duration = Duration::from_secs(2);
-/// So long a worker may take to end at once.
+/// Time limit for a worker to end at once.
 const AT_ONCE: Duration = Duration::from_secs(1);
 
-/// The worker, and what is known of it.
+/// The worker and its reported state.
 struct Watch {
     child: Child,
     signals: Signals,
     presses: PipeWriter,
     message: PipeReader,
-    /// The beginning of a line.
+    /// An incomplete line.
     rest: Vec<u8>,
     terminal: Option<Termios>,
     is_listening: bool,
     may_be_armed: BTreeSet<String>,
     leaving: BTreeSet<String>,
     recordings: Vec<PathBuf>,
-    /// When an end was asked for by a press, each time.
+    /// Times of the presses, each of which requests an end.
     pressed: Vec<Instant>,
-    /// When the input ended, which asks for an end.
+    /// Time when the input ended, which requests an end.
     input_ended: Option<Instant>,
 }
 
-/// Starts the worker and waits for its end; gives its exit code.
+/// Starts the worker and waits for its end; returns its exit code.
 pub(super) fn watch(program: &[OsString], arguments: &[OsString]) -> u8 {
     match Watch::begin(program, arguments) {
         Ok(mut watch) => watch.until_end(),
@@ -67,12 +67,12 @@ impl Watch {
         let (its_presses, presses) = pipe()?;
         let (message, its_messages) = pipe()?;
         ioctl_fionbio(&message, true)?;
-        // These two ends are the worker's.
+        // The worker inherits these two ends.
         fcntl_setfd(&its_presses, FdFlags::empty())?;
         fcntl_setfd(&its_messages, FdFlags::empty())?;
         let descriptors = (its_presses.as_raw_fd(), its_messages.as_raw_fd());
         let (me, (presses_fd, news_fd)) = (std::process::id(), descriptors);
-        // Before the worker changes them.
+        // Saved before the worker changes the modes.
         let terminal = tcgetattr(io::stdin()).ok();
         let (program, words) = program.split_first().ok_or(ErrorKind::NotFound)?;
         let child = Command::new(program)
@@ -99,13 +99,14 @@ impl Watch {
     fn until_end(&mut self) -> u8 {
         let mut was_killed = false;
         let status = loop {
-            // Before the messages are read: all that the worker wrote is then there.
+            // Check for the end before the messages are read, so that none of an ended worker is
+            // missed.
             let ended = self.child.try_wait();
             self.read_news();
             match ended {
                 Ok(None) => {}
                 Ok(Some(status)) => break status,
-                // Nothing more can be known of it.
+                // The worker's state cannot be read any more.
                 Err(_) => break ExitStatus::from_raw(1 << 8),
             }
             self.pass_signals();
@@ -126,12 +127,12 @@ impl Watch {
         u8::try_from(code).unwrap_or(1)
     }
 
-    /// Passes each signal on.
+    /// Sends each signal on to the worker.
     fn pass_signals(&mut self) {
         for signal in self.signals.pending() {
             self.pressed.push(Instant::now());
             let _ = self.presses.write_all(b"!");
-            // It does not read the pipe yet. A signal twice is one to it.
+            // The worker does not read the pipe yet. It counts the same signal twice as one.
             let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
             if let (false, Some(pid), Some(signal)) =
                 (self.is_listening, pid, Signal::from_named_raw(signal))
@@ -178,7 +179,7 @@ impl Watch {
         }
     }
 
-    /// Does what the worker has left undone.
+    /// Closes devices, restores the terminal and names recordings, if the worker did not.
     fn clean_up(&mut self, status: ExitStatus, was_killed: bool) {
         let (done, closed) = channel();
         for address in &self.may_be_armed {
@@ -212,7 +213,7 @@ impl Watch {
         }
     }
 
-    /// Names what is left of recordings.
+    /// Names the incomplete recordings.
     fn name_recordings(&self) {
         for path in &self.recordings {
             if let Ok(file) = fs::metadata(path) {
@@ -224,7 +225,7 @@ impl Watch {
         }
     }
 
-    /// Gives the terminal its modes of before. The cursor may be anywhere in a line.
+    /// Restores the terminal's modes. The cursor may be anywhere in a line.
     fn put_terminal_back(&self) {
         if let Some(before) = &self.terminal {
             let _ = tcsetattr(io::stdin(), OptionalActions::Now, before);

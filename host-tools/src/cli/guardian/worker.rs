@@ -9,14 +9,14 @@ use std::thread::Builder;
 use super::WorkerMessage;
 use crate::cli::terminal::interrupt;
 
-/// The variable with the guardian's process number and the descriptors of the two pipes.
-/// Programs that the worker starts have other parents, so it is nothing to them.
+/// The variable with the guardian's process number and the descriptors of the two pipes. The
+/// worker's child processes ignore it, because their parent is another process.
 pub(super) const VARIABLE: &str = "HAPTERRA_GUARDIAN";
 
-/// Destination of messages; none if this is no worker.
+/// Destination of messages; empty if this process is no worker.
 static MESSAGES: OnceLock<Mutex<File>> = OnceLock::new();
 
-/// Connects to the guardian. Returns false if no guardian has started this process.
+/// Connects to the guardian. Returns false if no guardian started this process.
 pub(super) fn begin() -> bool {
     let Some([presses, message]) = descriptors() else {
         return false;
@@ -27,7 +27,7 @@ pub(super) fn begin() -> bool {
         Builder::new().name("guardian".into()).spawn(listen)
     });
     if let Err(error) = connected {
-        // The guardian still sees the end of this process, and passes signals on.
+        // The guardian still detects the end of this process, and sends signals on.
         eprintln!("warning: the guardian does not know which arm may be armed: {error}");
     }
     true
@@ -37,7 +37,7 @@ pub(super) fn has_guardian() -> bool {
     descriptors().is_some()
 }
 
-/// The numbers of the two descriptors, if this process is the child that they are for.
+/// Returns the two descriptors if this process is the guardian's child.
 fn descriptors() -> Option<[u32; 2]> {
     let variable = std::env::var(VARIABLE).ok()?;
     let numbers: Vec<u32> = variable.split(':').map_while(|n| n.parse().ok()).collect();
@@ -62,12 +62,12 @@ pub(super) fn report(message: &WorkerMessage) {
     if let Some(to) = MESSAGES.get() {
         let line = [message.line(), b"\n".to_vec()].concat();
         let mut to = to.lock().unwrap_or_else(PoisonError::into_inner);
-        // The reader notices a guardian that is gone.
+        // The reader detects the end of the guardian.
         let _ = to.write_all(&line);
     }
 }
 
-/// A byte is a press of Ctrl-C. The end of the pipe is the end of the guardian.
+/// Reads presses: each byte is one of Ctrl-C; the end of the pipe is the guardian's end.
 fn listen(mut presses: File) {
     while let Ok(1) = presses.read(&mut [0]) {
         interrupt::press_if_listening();

@@ -7,17 +7,17 @@ use std::path::PathBuf;
 pub(in crate::cli) enum WorkerMessage {
     /// The worker handles signals itself from now on.
     Listening,
-    /// A key asked for an end.
+    /// A key requested an end.
     Pressed,
-    /// The program that gives commands is gone, which asks for an end, too.
+    /// The program that sends commands ended, which also requests an end.
     InputEnded,
     /// The device at this address may be armed.
     MayBeArmed(String),
-    /// The thread that serves this device has seen that an end is asked for.
+    /// The thread that serves this device has detected the request to end.
     Leaving(String),
-    /// The device has confirmed that it is disarmed, or its absence was reported to the user.
+    /// The device confirmed that it is disarmed, or the user was informed that it is missing.
     Settled(String),
-    /// This file grows.
+    /// This file is being written.
     Recording(PathBuf),
 }
 
@@ -29,7 +29,7 @@ mod lines {
     use super::WorkerMessage;
 
     impl WorkerMessage {
-        /// As a line, without its end.
+        /// Returns the line, without its line end.
         pub(in crate::cli::guardian) fn line(&self) -> Vec<u8> {
             let (word, rest): (&str, &[u8]) = match self {
                 Self::Listening => ("listening", b""),
@@ -43,7 +43,7 @@ mod lines {
             [word.as_bytes(), b" ", rest].concat()
         }
 
-        /// Reads a line; none if it is no message.
+        /// Parses a line; returns `None` if it is no message.
         pub(in crate::cli::guardian) fn read(line: &[u8]) -> Option<Self> {
             let space = line.iter().position(|byte| *byte == b' ')?;
             let (word, rest) = (line.get(..space)?, line.get(space + 1..)?);

@@ -1,7 +1,6 @@
 //! Hints for a terrain file that does not open.
 //!
-//! Commands of other programs are tried by `tests/tests/conversion_hints.rs` where these
-//! programs are installed.
+//! `tests/tests/conversion_hints.rs` runs the commands of other programs if these are installed.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -72,7 +71,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
                 names.join("|")
             );
         }
-        // Palettes and single bits do not outlive another type of samples.
+        // Palettes and single bits are lost in a conversion of the sample type.
         RasterError::NotAHeightField(_) => {
             let one_band = format!("-b 1 {PLAIN}");
             return format!(
@@ -134,7 +133,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         RasterError::AllNoData { .. } => {
             "check that the file covers your area, or name another no-data value with --input no-data=VALUE"
         }
-        // What is not an image of GDAL's has no checksum there.
+        // `gdalinfo -checksum` works only for formats that GDAL reads.
         RasterError::AbsurdSize(_) | RasterError::Damaged(_) | RasterError::Truncated(_)
             if !is_known_to_gdal(path) =>
         {
@@ -182,13 +181,13 @@ fn elsewhere(path: &Path, error: &std::io::Error) -> &'static str {
     }
 }
 
-/// The extension in lower case.
+/// Returns the extension in lower case.
 fn extension(path: &Path) -> String {
     let extension = path.extension().unwrap_or_default();
     extension.to_string_lossy().to_lowercase()
 }
 
-/// Returns the hint for GDAL, if it is missing and may read the file as it is.
+/// Returns the hint for GDAL, if GDAL is missing and may read the file unchanged.
 fn with_gdal(path: &Path) -> String {
     match is_known_to_gdal(path) && gdal().is_err() {
         true => format!(
@@ -206,22 +205,22 @@ fn is_known_to_gdal(path: &Path) -> bool {
     !others.contains(&extension(path).as_str())
 }
 
-/// GDAL's options for a type and a packing that are read.
+/// GDAL's options for a sample type and compression that can be read.
 const PLAIN: &str = "-ot Float32 -co COMPRESS=DEFLATE";
 
-/// Stores the last two dimensions of an array's first layer as numbers of a kind that is read.
+/// Stores the last two dimensions of an array's first layer in a readable sample type.
 const FROM_NPY: &str = "import sys, numpy as n; a = n.squeeze(n.load(sys.argv[1])); \
     n.save('heights.npy', a.reshape(-1, *a.shape[-2:])[0].astype('f4'))";
-/// The same of the first array of several.
+/// The same for the first of several arrays.
 const FROM_NPZ: &str = "import sys, numpy as n; f = n.load(sys.argv[1]); a = n.squeeze(f[f.files[0]]); \
     n.save('heights.npy', a.reshape(-1, *a.shape[-2:])[0].astype('f4'))";
-/// Lays a grid over points: each cell has the mean height of the ground points in it, or of
-/// all points where none are marked as ground. Cells without points are holes. The points'
-/// reference system is kept in a `.prj`.
+/// Makes a grid of points: each cell has the mean height of its ground points, or of all its points
+/// if none are marked as ground. Cells without points are no-data. The points' reference system is
+/// written to a `.prj`.
 const FROM_POINTS: &str = r"import sys, laspy, numpy as n; f, t, d = sys.argv[1:]; d = float(d); p = laspy.read(f); g = p.classification == 2; p = p[g] if g.any() else p; x, y, z = (n.array(v) for v in (p.x, p.y, p.z)); e = [d * n.arange(n.floor(v.min() / d), n.floor(v.max() / d) + 2) for v in (y, x)]; s, c = n.histogram2d(y, x, e, weights=z)[0], n.histogram2d(y, x, e)[0]; n.savetxt(t + '.asc', n.where(c > 0, s / n.maximum(c, 1), -9999)[::-1], '%.3f', comments='', header='ncols %d\nnrows %d\nxllcorner %.10g\nyllcorner %.10g\ncellsize %.10g\nnodata_value -9999' % (*c.shape[::-1], e[1][0], e[0][0], d)); r = p.header.parse_crs(); r and open(t + '.prj', 'w').write(r.to_wkt())";
 
-/// The command that makes a file that is read of one that is not, with GDAL's `options`
-/// if GDAL reads such files.
+/// Returns the command that converts a file to a readable one, with GDAL's `options` if GDAL reads
+/// such files.
 fn converted(path: &Path, options: &str) -> String {
     let (from, to) = names(path);
     let space = if options.is_empty() { "" } else { " " };
@@ -241,9 +240,9 @@ fn converted(path: &Path, options: &str) -> String {
     }
 }
 
-/// The command that makes a VRT of files.
+/// Returns the command that makes a VRT of files.
 fn built(path: &Path, files: &[String]) -> String {
-    /// More names make an unreadable command.
+    /// More names would make the command unreadable.
     const SHOWN: usize = 20;
     let each: Vec<_> = files.iter().take(SHOWN).map(|file| quoted(file)).collect();
     let more = match files.len() {
@@ -257,7 +256,7 @@ fn built(path: &Path, files: &[String]) -> String {
     )
 }
 
-/// The command that cuts a part of so many samples out of a file.
+/// Returns the command that cuts a part of this size, in samples, out of a file.
 fn cut(path: &Path, (width, height): (u64, u64)) -> String {
     let (from, to) = names(path);
     format!(
@@ -267,7 +266,7 @@ fn cut(path: &Path, (width, height): (u64, u64)) -> String {
     )
 }
 
-/// The command that lays files of different grids onto one.
+/// Returns the command that resamples files of different grids to one grid.
 fn brought_together(path: &Path, file: &Path, other: &Path) -> String {
     const ONTO_ONE: &str = "gdalwarp -r bilinear -ot Float32 -dstnodata -9999 -co TILED=YES \
                             -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER";
@@ -289,11 +288,11 @@ fn brought_together(path: &Path, file: &Path, other: &Path) -> String {
     )
 }
 
-/// The file, and what a converted copy of it in this folder is called, as a shell takes them.
+/// Returns the file and its converted copy in this folder, as shell words.
 fn names(path: &Path) -> (String, String) {
     let to = format!("{}.tif", stem(path));
     let from = path.display().to_string();
-    // As GDAL calls what is elsewhere.
+    // GDAL's name for a file at a URL.
     let from = match from.starts_with("http") && is_url(&from) {
         true => format!("/vsicurl/{from}"),
         false => from,
@@ -301,13 +300,13 @@ fn names(path: &Path) -> (String, String) {
     (quoted(&from), quoted(&to))
 }
 
-/// Returns the name of a converted copy, without its ending.
+/// Returns the name of a converted copy, without its extension.
 fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     format!("{}-converted", stem.to_string_lossy())
 }
 
-/// A name as one word of a shell, whatever is in it.
+/// Quotes any name as one shell word.
 fn quoted(name: &str) -> String {
     match name.contains(['"', '$', '`', '\\', '!']) && cfg!(unix) {
         false => format!("\"{name}\""),

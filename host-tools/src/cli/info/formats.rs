@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use heightfield::{gdal, own_formats};
 use heightfield_gdal::Error;
 
-/// The formats, and the libgdal that was found or what to do about it.
+/// Returns the formats, and the libgdal found or how to install it.
 pub(super) fn text() -> String {
     let own: Vec<_> = own_formats().collect();
     let mut text = format!("read by hapterra:\n  {}\n", own.join(", "));

@@ -1,4 +1,4 @@
-//! Size of a file's tiles on the link, and the HIP's speed that they allow.
+//! Size of a file's tiles on the link, and the speed of the HIP that they allow.
 
 use serde::Serialize;
 
@@ -10,42 +10,44 @@ use heightfield::ReadStatus;
 
 use crate::terrain::{HapticGrid, Terrain, TerrainError, TileBuffer};
 
-/// Tiles that are looked at, at most: of more, evenly spread ones.
+/// Maximum tiles examined; of more, an evenly spread selection.
 const MAX_TILES: u64 = 8192;
 
-/// Figures of the tiles of level 0, true to scale with cells of 1 mm. Tiles without a
-/// surface and level ones, of a few bytes, do not count.
+/// Figures of the level-0 tiles, true to scale with cells of 1 mm. No-data tiles and flat tiles, of
+/// a few bytes, are not included.
 #[derive(Serialize)]
 pub(super) struct LinkFigures {
-    /// Megabytes (10⁶ bytes) a second that the link takes.
+    /// Rate of the link, megabytes (10⁶ bytes) a second.
     mb_per_s: f64,
-    /// Tiles that count.
+    /// Number of tiles included.
     tiles: u64,
-    /// Level tiles and tiles without a surface, among those looked at.
+    /// Number of flat and no-data tiles examined.
     others: u64,
-    /// Tiles that could not be read at present, among those looked at.
+    /// Number of tiles examined that cannot be read at present.
     unread: u64,
-    /// As they travel.
+    /// The format on the link.
     sent: Form,
-    /// With each sample as a single float.
+    /// Each sample as a single float.
     floats: Form,
 }
 
-/// One way to send tiles.
+/// A format of tiles.
 #[derive(Serialize)]
 struct Form {
-    /// Bytes of a tile's frame: mean, and the most.
+    /// Bytes of a tile's frame: mean and maximum.
     mean_bytes: f64,
     worst_bytes: u64,
     /// Mean rate of the link.
     tiles_per_s: f64,
-    /// Speed along an axis at which they come in time, by the mean.
+    /// Maximum speed along an axis at which tiles arrive in time, by the mean.
     cells_per_s: f64,
 }
 
 impl LinkFigures {
+    /// Returns the figures of a grid's tiles on a link.
+    ///
     /// # Errors
-    /// If the file cannot be rendered true to scale.
+    /// The file cannot be rendered true to scale.
     pub(super) fn of(grid: &HapticGrid<'_>, mb_per_s: f64) -> Result<Self, TerrainError> {
         let scale = grid.true_scale(1.0)?;
         let terrain = Terrain::over(*grid, scale, 0)?;
@@ -59,7 +61,7 @@ impl LinkFigures {
         for at in (0..columns * rows).step_by(stride) {
             let key = TileKey::new(0, (at % columns) as i32, (at / columns) as i32);
             match terrain.tile(key, &mut buffer) {
-                // A tile that a server did not send says nothing of the others.
+                // A tile that a server did not send has no size to include.
                 Some((_, ReadStatus::Pending)) => unread += 1,
                 None | Some((Heights::Hole | Heights::Flat { .. }, _)) => others += 1,
                 Some((heights, _)) => {
@@ -129,13 +131,13 @@ impl Form {
     }
 }
 
-/// Tiles of a new column that a HIP requests on its way along a row of tiles, at most: what
-/// is within the margin on both sides of it.
+/// Returns the maximum tiles of a new column that the HIP requests in motion along a row: those
+/// within the margin on both sides.
 const fn tiles_across() -> i32 {
     (2 * MARGIN_CELLS + TILE_CELLS as i32 - 1) / TILE_CELLS as i32 + 1
 }
 
-/// Bytes of the frame in which a tile travels.
+/// Returns the bytes of a tile's frame.
 fn frame_bytes(key: TileKey, heights: Heights<'_>) -> u64 {
     let message = InSession {
         session: SessionNumber::new(u32::MAX),
@@ -185,7 +187,7 @@ mod tests {
         let hills = in_file(folder.path(), [600, 600], |x, y| (x * y % 50) as f32);
         let grid = HapticGrid::new(&hills, HapticCells::Square).with_wait(Wait::Never);
         let figures = LinkFigures::of(&grid, 1.0).expect("figures");
-        // Some may be read in the background meanwhile; the first cannot.
+        // A background read may finish early, but the first is always unread.
         assert!(figures.unread > 0);
         assert_eq!((figures.tiles + figures.unread, figures.others), (361, 0));
         let [line, _] = figures.lines();

@@ -1,4 +1,4 @@
-//! Place and vertical datum of a terrain, and the source of each.
+//! Position and vertical datum of a terrain, and their sources.
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ pub(super) const fn from(certainty: Certainty) -> &'static str {
     }
 }
 
-/// The same for people.
+/// Returns the source as text for the user.
 pub(super) fn told(from: &str) -> &'static str {
     match from {
         "file" => "stated",
@@ -31,11 +31,11 @@ pub(super) struct Rectangle {
     south: f64,
     east: f64,
     north: f64,
-    /// Of the sides: `metre`, `degree`, `grad` or `unit of 0.3048 m`.
+    /// Unit of the sides: `metre`, `degree`, `grad` or `unit of 0.3048 m`.
     unit: String,
-    /// Source of the unit; of longitudes and latitudes, that of their conversion.
+    /// Source of the unit; for longitudes and latitudes, source of their conversion.
     from: &'static str,
-    /// Of longitudes and latitudes: what they belong to.
+    /// Datum of longitudes and latitudes.
     #[serde(flatten)]
     globe: Option<Globe>,
 }
@@ -43,11 +43,11 @@ pub(super) struct Rectangle {
 /// Datum of longitudes and latitudes.
 #[derive(Serialize)]
 struct Globe {
-    /// `WGS 84`, the name of a datum or of a body's; nothing where the file states none.
+    /// `WGS 84`, the name of a datum or of its body; `None` if the file states none.
     datum: Option<String>,
-    /// Of WGS 84 by way of another datum: usually not farther off than this, m.
+    /// Usual maximum error of a conversion to WGS 84 from another datum, m.
     within_m: Option<f64>,
-    /// Of another body than the Earth: its semi-major axis, m.
+    /// Semi-major axis of a body other than the Earth, m.
     body_radius_m: Option<f64>,
     #[serde(skip)]
     text: String,
@@ -93,7 +93,7 @@ impl Globe {
 }
 
 impl Rectangle {
-    /// The outer edges of a raster's cells in its own units.
+    /// Returns the outer edges of a raster's cells in its own units.
     pub(super) fn of(raster: &Raster) -> Option<Self> {
         let cell = raster.cell()?;
         let unit = match cell.unit {
@@ -110,7 +110,7 @@ impl Rectangle {
         Some(Self::new(raster.bounds()?, unit, cell.certainty, None))
     }
 
-    /// The same in longitude and latitude.
+    /// Returns the edges in longitude and latitude.
     pub(super) fn lonlat(raster: &Raster) -> Option<Self> {
         let way = match (raster.cell()?.unit, raster.reference_system()) {
             _ if raster.reference_system_from() == Certainty::Assumed => Certainty::Assumed,
@@ -156,16 +156,16 @@ impl Rectangle {
     }
 }
 
-/// Unit and zero of the heights.
+/// Unit and datum of the heights.
 #[derive(Serialize)]
 pub(super) struct Vertical {
     metres_per_unit: f64,
     unit_from: &'static str,
-    /// Name of the vertical reference system, where the file states it.
+    /// Name of the vertical reference system, if the file states it.
     datum: Option<String>,
-    /// As `EPSG:5703`.
+    /// Code such as `EPSG:5703`.
     datum_code: Option<String>,
-    /// `file`, where there is a datum: none is ever assumed.
+    /// `file` if there is a datum, because none is assumed.
     datum_from: Option<&'static str>,
 }
 
@@ -182,7 +182,7 @@ impl Vertical {
         }
     }
 
-    /// As `metres (assumed), above EPSG:5703 NAVD88 height (stated)`.
+    /// Returns text such as `metres (assumed), above EPSG:5703 NAVD88 height (stated)`.
     pub(super) fn text(&self) -> String {
         let unit = match self.metres_per_unit {
             1.0 => "metres".to_owned(),

@@ -1,5 +1,5 @@
-//! Which device a command talks to: on USB, behind a socket, in this program's
-//! memory, or a board that is emulated for the occasion.
+//! The device of a command: on USB, at a socket, in this program's memory, or on a board emulated
+//! for this command.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -12,15 +12,15 @@ use crate::link::{
 };
 use crate::phantom::{ArmFrame, HandModel, HeldPhantom, PhantomModel, Script};
 
-/// Time that a real device may take to answer.
+/// Time limit for a real device's reply.
 const PATIENCE: Duration = Duration::from_secs(4);
-/// Time that an emulated board may take to answer, on a busy machine.
+/// Time limit for an emulated board's reply, on a busy machine.
 pub(in crate::cli) const EMULATED_PATIENCE: Duration = Duration::from_secs(60);
 
-/// A device by the name that the command line gives it.
+/// A device named on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceChoice {
-    /// A device that is there already.
+    /// A device that already runs.
     There(DeviceAddress),
     /// A board emulated by QEMU, with a virtual Phantom at rest.
     Emulated(EmulatedBoard),
@@ -41,12 +41,12 @@ impl FromStr for DeviceChoice {
     }
 }
 
-/// Device without a real arm: in this program, or on an emulated board.
+/// A device without a real arm: in this program, or on an emulated board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum VirtualDevice {
-    /// In this program: the application compiled for this machine.
+    /// The application compiled for this machine, in this program.
     Native,
-    /// On the emulated Cortex-M4F board.
+    /// The emulated Cortex-M4F board.
     Emulated(EmulatedBoard),
 }
 
@@ -62,15 +62,15 @@ impl FromStr for VirtualDevice {
     }
 }
 
-/// A board that QEMU emulates, by its image; `HAPTERRA_QEMU` may name QEMU.
+/// A board that QEMU emulates, with its image; `HAPTERRA_QEMU` may name QEMU.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EmulatedBoard {
-    /// The image; where none is named, that of `HAPTERRA_MPS2_ELF`.
+    /// The image; if `None`, that of `HAPTERRA_MPS2_ELF`.
     image: Option<PathBuf>,
 }
 
 impl EmulatedBoard {
-    /// The board that a device's name means, if any.
+    /// Parses the name of an emulated board, if it is one.
     fn named(text: &str) -> Option<Self> {
         match text.strip_prefix("emulated")? {
             "" => Some(Self::default()),
@@ -90,7 +90,7 @@ impl EmulatedBoard {
     /// Starts the board and connects its two lines.
     ///
     /// # Errors
-    /// The missing part, and what to type.
+    /// A missing part, with the remedy.
     pub(in crate::cli) fn start(&self) -> Result<(Emulator, Lines), Failure> {
         let image = self.image.clone().or_else(|| path_in(IMAGE_VARIABLE));
         let image = image.ok_or(EmulatorError::NoImage)?;
@@ -99,7 +99,7 @@ impl EmulatedBoard {
     }
 }
 
-/// The path in an environment variable; none where the variable is empty.
+/// Returns the path in an environment variable; `None` if it is empty.
 fn path_in(variable: &str) -> Option<PathBuf> {
     let value = std::env::var_os(variable).filter(|value| !value.is_empty());
     value.map(PathBuf::from)
@@ -117,10 +117,10 @@ pub struct Device {
 }
 
 impl Device {
-    /// Talks to the device, which has no scene to feel.
+    /// Opens a session without a scene and calls `talk`.
     ///
     /// # Errors
-    /// No device, or what `talk` fails with.
+    /// No device, or the error of `talk`.
     pub fn talk<T>(
         &self,
         talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
@@ -128,7 +128,7 @@ impl Device {
         self.speak(opened, talk)
     }
 
-    /// Looks at the device, and leaves it to the host that it has.
+    /// Queries the device without taking it from its host.
     ///
     /// # Errors
     /// As [`Device::talk`].
@@ -163,7 +163,7 @@ impl Device {
     }
 }
 
-/// Talks, and ends the conversation.
+/// Calls `talk` and ends the session.
 fn converse<T>(
     mut control: ControlSession<'_>,
     talk: impl FnOnce(&mut ControlSession<'_>) -> Result<T, Failure>,
@@ -187,7 +187,7 @@ fn looked_at<'t>(
     ControlSession::look(line, patience)
 }
 
-/// A virtual Phantom at rest in its zero pose.
+/// Returns a virtual Phantom at rest in its zero pose.
 fn resting() -> Result<HeldPhantom, Failure> {
     let home_mm = [0.0; 3];
     let script = Script::start(home_mm);

@@ -1,4 +1,4 @@
-//! Options of [events](crate::events), and the end of their server; shared by `run` and `demo`.
+//! Options of [events](crate::events), and the end of their server, shared by `run` and `demo`.
 
 use std::num::NonZeroU32;
 
@@ -17,12 +17,12 @@ pub struct EventOptions {
     pub events: Option<Events>,
 }
 
-/// Destination of events, and their samples.
+/// Destination of events, and interval of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Events {
-    /// The port of 127.0.0.1; 0 takes a free one.
+    /// The port of 127.0.0.1; 0 selects a free one.
     port: u16,
-    /// Every N-th sample is sent, too.
+    /// N, if every N-th sample is sent too.
     samples: Option<NonZeroU32>,
 }
 
@@ -38,10 +38,10 @@ fn events(text: &str) -> Result<Events, String> {
 }
 
 impl EventOptions {
-    /// Listens for readers, if events are asked for.
+    /// Listens for readers, if events are requested.
     ///
     /// # Errors
-    /// A port that is taken.
+    /// The port is in use.
     pub(in crate::cli) fn listen(&self) -> Result<Option<Server>, Failure> {
         let Some(Events { port, .. }) = self.events else {
             return Ok(None);
@@ -53,13 +53,13 @@ impl EventOptions {
         Ok(Some(server))
     }
 
-    /// Watches a device, counted from 1.
+    /// Creates the watcher of a device, counted from 1.
     pub(in crate::cli) fn watcher(&self, server: &Server, device: usize) -> Watcher {
         Watcher::new(server.sender(), device).with_samples(self.events.and_then(|it| it.samples))
     }
 }
 
-/// Ends the server, and tells how many lines were dropped.
+/// Ends the server and reports the number of dropped lines.
 pub(in crate::cli) fn end(server: Server) {
     let dropped = server.end();
     if dropped > 0 {

@@ -5,18 +5,18 @@ use std::str::FromStr;
 
 use crate::place::Heights;
 
-/// The unit of a height in the hand for each vertical unit of the file.
+/// Unit of a height: device millimetres per vertical unit of the file.
 const MM_PER_UNIT: &str = "mm/unit";
 
 /// Height of a rendered terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exaggeration {
-    /// This many times higher than true to scale; upside down below zero. One is every command's
-    /// default.
+    /// Factor to the height that is true to scale; negative is upside down. Every command's default
+    /// is 1.
     Times(f64),
-    /// As many times as make the relief large enough: [`crate::place::suited_height`].
+    /// The factor that makes the relief high enough: [`crate::place::suited_height`].
     Auto,
-    /// Device millimetres a vertical unit of the file.
+    /// Device millimetres per vertical unit of the file.
     MmPerUnit(f64),
 }
 

@@ -1,4 +1,4 @@
-//! `--input`: what a terrain file does not say itself, one `KEY=VALUE` each.
+//! `--input`: properties that a terrain file does not state, one `KEY=VALUE` each.
 
 use std::str::FromStr;
 
@@ -26,7 +26,7 @@ const KEYS: [(&str, &str); 13] = [
     ("asset", "dem"),
 ];
 
-/// Something about the input.
+/// A property of the input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InputSetting {
     key: String,
@@ -35,27 +35,27 @@ pub struct InputSetting {
 
 #[derive(Clone, Debug, PartialEq)]
 enum InputValue {
-    /// The file is raw samples, north row first.
+    /// The file contains raw samples, north row first.
     Raw(u32, u32, SampleType, Endian),
     /// The stored value that means no data.
     NoData(f64),
-    /// Distance within which samples without data are filled.
+    /// Distance within which no-data is filled.
     Fill(Fill),
-    /// The band that holds the height, the first being 1.
+    /// The band with the heights; the first is 1.
     Band(u32),
-    /// Which raster of several holds the height.
+    /// The raster with the heights, if the file has several.
     Variable(String),
     /// Side of a cell on the ground, m.
     CellM(f64),
-    /// Metres in a unit of height.
+    /// Metres per unit of height.
     HeightUnitM(f64),
     /// Encoding of heights as colours.
     Encoding(Encoding),
-    /// The channel of a PNG that holds the height.
+    /// The channel of a PNG with the heights.
     Channel(PngChannel),
-    /// Which cells are rendered.
+    /// The rendered cells.
     Cells(HapticCells),
-    /// Megabytes of samples that are kept in memory.
+    /// Maximum megabytes of samples in memory.
     InMemoryMb(u32),
     /// An option of the GDAL driver.
     Gdal(String),
@@ -71,7 +71,7 @@ impl FromStr for InputSetting {
         };
         let (key, value) = text.split_once('=').ok_or_else(unknown)?;
         let key = match key {
-            // A STAC's raster is an asset.
+            // The raster of a STAC item is an asset.
             "asset" => "variable",
             key => key,
         };
@@ -108,7 +108,7 @@ impl FromStr for InputSetting {
 }
 
 impl InputSetting {
-    /// The cells that are asked for, if this setting is about them.
+    /// Returns the requested cells, if this setting is about them.
     pub(in crate::cli) const fn cells(&self) -> Option<HapticCells> {
         match self.value {
             InputValue::Cells(cells) => Some(cells),
@@ -117,7 +117,7 @@ impl InputSetting {
     }
 }
 
-/// Converts the options of an input to those of the library.
+/// Converts the options of an input to the library's.
 pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Failure> {
     let twice = settings.iter().enumerate().find(|(index, setting)| {
         let mut before = settings.iter().take(*index);
@@ -160,7 +160,7 @@ pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Fai
     Ok(options)
 }
 
-/// As `512x400:i16:le`; type and byte order may be left out.
+/// Parses `512x400:i16:le`; type and byte order are optional.
 fn raw(text: &str) -> Result<InputValue, String> {
     let mut parts = text.split(':');
     let (columns, rows) = parse_size(parts.next().unwrap_or_default())?;
@@ -183,7 +183,7 @@ fn raw(text: &str) -> Result<InputValue, String> {
     ))
 }
 
-/// One of some values by its name.
+/// Parses the name of one of `all` values.
 fn one_of<T: Copy>(all: &[T], name: fn(T) -> &'static str, text: &str) -> Result<T, String> {
     let named = all.iter().find(|value| name(**value) == text);
     named.copied().ok_or_else(|| {
@@ -196,14 +196,14 @@ fn number(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "a number is wanted".into())
 }
 
-/// A distance within which samples without data are filled.
+/// Parses the distance within which no-data is filled.
 fn fill(text: &str) -> Result<Fill, String> {
     let samples = text.trim().parse().ok();
     let wanted = || format!("a whole number of samples from 1 to {}", Fill::MAX);
     samples.and_then(Fill::within).ok_or_else(wanted)
 }
 
-/// A unit of height in metres.
+/// Parses a unit of height, in metres.
 fn height_unit(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let metres = metres_in(text).or_else(|| text.parse().ok());
@@ -212,10 +212,10 @@ fn height_unit(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "m, ft, us-ft, or metres in a unit, as 0.01".into())
 }
 
-/// A size in samples, as `512x400`, or `512` for a square.
+/// Parses a size in samples: `512x400`, or `512` for a square.
 ///
 /// # Errors
-/// The format of a size.
+/// The text is no size.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let parts = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
     match (parts.0.trim().parse(), parts.1.trim().parse()) {

@@ -1,5 +1,5 @@
-//! Options that several subcommands share: which terrain, where and how large, what it feels like, on
-//! which device.
+//! Options that several subcommands share: the terrain, its place and scale, its surface, the
+//! device.
 
 pub mod device;
 pub mod events;

@@ -1,5 +1,4 @@
-//! Options that say which part of a terrain lies in front of the arm, and how large;
-//! shared by `run` and `demo`.
+//! Options for the part of a terrain in front of the arm and its scale, shared by `run` and `demo`.
 
 use hapterra_core::phantom::Calibration;
 
@@ -13,7 +12,7 @@ use crate::place::{
 use crate::terrain::{Distortion, HapticCells, HapticGrid, Terrain};
 use heightfield::{Georeference, Raster};
 
-/// Relief in the hand below which an exaggeration is suggested, mm.
+/// Height of the relief at the device below which an exaggeration is suggested, mm.
 const FLAT_MM: f64 = 4.0;
 
 /// Which part of the terrain. Without these options all of it is fitted to the workspace.
@@ -41,17 +40,17 @@ pub struct Placing {
     pub crs: Option<Coordinates>,
 }
 
-/// A grid, and what is asked for of it.
+/// A grid and its requested placement.
 pub(in crate::cli) struct Asked<'r> {
     pub(in crate::cli) grid: HapticGrid<'r>,
     options: PlacementOptions,
 }
 
 impl Placing {
-    /// Checks the placement on a raster, before any device is contacted.
+    /// Checks the placement on a raster, before any device is opened.
     ///
     /// # Errors
-    /// No such place.
+    /// The place does not exist.
     pub(in crate::cli) fn of<'r>(
         &self,
         (rendering, cells): (&Rendering, HapticCells),
@@ -59,7 +58,7 @@ impl Placing {
     ) -> Result<Asked<'r>, Failure> {
         let options = self.options(rendering);
         let grid = options.target.grid(raster, cells)?;
-        // Whichever arm it will be: of one, all but the reach shows already.
+        // Any arm will do here: only the workspace depends on it.
         placement(&grid, &Calibration::PREMIUM_3_0, &options)?;
         Ok(Asked { grid, options })
     }
@@ -84,13 +83,13 @@ impl Asked<'_> {
     /// Returns the placement in front of an arm with a calibration.
     ///
     /// # Errors
-    /// Heights that the arm does not reach.
+    /// The arm cannot reach the heights.
     pub(in crate::cli) fn view(&self, arm: &Calibration) -> Result<Placement, Failure> {
         placement(&self.grid, arm, &self.options)
     }
 }
 
-/// Lays a terrain in front of an arm. The error of heights that cannot be read is that of the file.
+/// Places a terrain in front of an arm. If heights cannot be read, returns the file's error.
 fn placement(
     grid: &HapticGrid<'_>,
     arm: &Calibration,
@@ -104,7 +103,7 @@ fn placement(
     Err(fault.into())
 }
 
-/// Returns the place and size of a terrain, in lines as `run` and `demo` print them.
+/// Returns the place and scale of a terrain, in lines that `run` and `demo` print.
 pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     let mut text = format!(
@@ -134,13 +133,13 @@ pub(in crate::cli) fn told(view: &Placement, terrain: &Terrain<'_>) -> String {
     text
 }
 
-/// Largest error of the shape of haptic cells.
+/// Describes the largest error of the haptic cells' shape.
 pub(in crate::cli) fn off_in_words(worst: &Distortion) -> String {
     let percent = 100.0 * worst.share;
     format!("slopes and lengths are off by up to {percent:.2} %")
 }
 
-/// A view's scale, and what a haptic cell of its level is.
+/// Describes the scale of a placement, and a haptic cell of its level.
 pub(in crate::cli) fn scale_in_words(view: &Placement) -> String {
     let (level, cell_mm) = (view.level, short(view.haptic_cell_mm()));
     match (view.ground_m_per_mm(), view.haptic_cell_m()) {
@@ -153,7 +152,7 @@ pub(in crate::cli) fn scale_in_words(view: &Placement) -> String {
     }
 }
 
-/// Scale and place, in short lines for a picture: a name and what there is to say.
+/// Returns scale and place in short lines for a picture: name and text.
 pub(in crate::cli) fn picture_lines(
     view: &Placement,
     file: &Georeference<'_>,
@@ -189,7 +188,7 @@ pub(in crate::cli) fn picture_lines(
     lines
 }
 
-/// Five digits of a number at most.
+/// Formats a number with at most five digits.
 pub(in crate::cli) fn short(value: f64) -> String {
     let decimals = (4.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0);
     let text = format!("{value:.*}", decimals as usize);
@@ -199,7 +198,7 @@ pub(in crate::cli) fn short(value: f64) -> String {
     }
 }
 
-/// The coordinates of a place by name.
+/// Parses the name of a coordinate system.
 fn coordinates(text: &str) -> Result<Coordinates, String> {
     let code = || {
         let prefix = text
@@ -214,7 +213,7 @@ fn coordinates(text: &str) -> Result<Coordinates, String> {
     }
 }
 
-/// So many finite numbers between commas.
+/// Parses `COUNT` finite numbers, separated by commas.
 fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
     let parsed: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     let numbers = parsed.ok().and_then(|numbers| numbers.try_into().ok());

@@ -1,33 +1,33 @@
-//! Quantities as they are typed: a number, and a unit where it is not the usual one.
+//! Quantities on the command line: a number, and its unit if it is not the default.
 
 use std::fmt::Display;
 use std::str::FromStr;
 
-/// The units that a kind of quantity may carry.
+/// The units of a kind of quantity.
 #[derive(Debug)]
 pub struct Units {
-    /// The name of the quantity, for messages.
+    /// Name of the quantity, for messages.
     name: &'static str,
-    /// Each unit and its size in the first, which is that of a number alone.
+    /// Each unit and its size in the first one, which is the default.
     units: &'static [(&'static str, f64)],
 }
 
-/// A force between tip and surface for each millimetre between HIP and proxy.
+/// Stiffness: force per millimetre between HIP and proxy.
 pub const STIFFNESS: Units = Units {
     name: "a stiffness",
     units: &[("N/mm", 1.0), ("N/m", 1e-3)],
 };
-/// A force.
+/// Force.
 pub const FORCE: Units = Units {
     name: "a force",
     units: &[("N", 1.0), ("mN", 1e-3)],
 };
-/// A length at the device.
+/// Length at the device.
 pub const LENGTH: Units = Units {
     name: "a length at the device",
     units: &[("mm", 1.0), ("cm", 10.0), ("um", 1e-3), ("µm", 1e-3)],
 };
-/// A length on the ground.
+/// Length on the ground.
 pub const GROUND: Units = Units {
     name: "a length on the ground",
     units: &[
@@ -38,7 +38,7 @@ pub const GROUND: Units = Units {
         ("ft", 0.3048),
     ],
 };
-/// A time.
+/// Time.
 pub const TIME: Units = Units {
     name: "a time",
     units: &[
@@ -50,37 +50,37 @@ pub const TIME: Units = Units {
         ("µs", 1e-6),
     ],
 };
-/// A rate of the loop.
+/// Rate of the loop.
 pub const FREQUENCY: Units = Units {
     name: "a rate",
     units: &[("Hz", 1.0), ("kHz", 1e3)],
 };
-/// A force for each unit of speed.
+/// Damping: force per unit of speed.
 pub const DAMPING: Units = Units {
     name: "a damping",
     units: &[("Ns/m", 1.0), ("N·s/m", 1.0), ("Ns/mm", 1e3)],
 };
-/// An angle.
+/// Angle.
 pub const ANGLE: Units = Units {
     name: "an angle",
     units: &[("deg", 1.0), ("°", 1.0)],
 };
-/// A size in memory.
+/// Size in memory.
 pub const MEMORY: Units = Units {
     name: "a size",
     units: &[("MB", 1.0), ("GB", 1024.0)],
 };
-/// Ground under a millimetre of the device.
+/// Scale: ground length per device millimetre.
 pub const GROUND_SCALE: Units = Units {
     name: "a scale",
     units: &[("m/mm", 1.0), ("km/mm", 1e3), ("cm/mm", 0.01)],
 };
 
 impl Units {
-    /// Reads a quantity in the first of the units.
+    /// Parses a quantity and returns it in the default unit.
     ///
     /// # Errors
-    /// A number that is not finite, or an unknown unit; the message lists the units.
+    /// The number is not finite, or the unit is unknown; the message lists the units.
     pub fn read(&self, text: &str) -> Result<f64, String> {
         let (number, unit) = split(text);
         let size = self.size_of(unit);
@@ -95,7 +95,7 @@ impl Units {
         }
     }
 
-    /// The same in single precision: a number in the first unit is rounded once.
+    /// The same in single precision, so that a number in the default unit is rounded once.
     ///
     /// # Errors
     /// As [`Units::read`].
@@ -107,10 +107,10 @@ impl Units {
         }
     }
 
-    /// Reads a quantity within a range.
+    /// Parses a quantity within a range.
     ///
     /// # Errors
-    /// As [`Units::read`]; a quantity out of range.
+    /// As [`Units::read`]; the quantity is out of range.
     pub fn read_within(&self, text: &str, range: [f64; 2]) -> Result<f64, String> {
         let value = self.read(text)?;
         let [least, most] = range;
@@ -121,7 +121,7 @@ impl Units {
             .ok_or_else(|| format!("{} from {least} to {most} {unit}", self.name))
     }
 
-    /// A quantity as it is typed.
+    /// Formats a quantity as on the command line.
     #[must_use]
     pub fn say(&self, value: impl Display) -> String {
         format!("{value}{}", self.usual())
@@ -151,7 +151,7 @@ impl Units {
     }
 }
 
-/// A number and what stands behind it.
+/// Splits a text into a number and the rest.
 fn split(text: &str) -> (&str, &str) {
     let text = text.trim();
     let ends = (0..=text.len())

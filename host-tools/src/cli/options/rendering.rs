@@ -1,4 +1,4 @@
-//! Options that say how a terrain is rendered, shared by `replay`, `run`, `demo` and `view`.
+//! Options for the rendering of a terrain, shared by `replay`, `run`, `demo` and `view`.
 
 use super::exaggeration::Exaggeration;
 use super::quantity::LENGTH;
@@ -9,8 +9,8 @@ use crate::place::{TIPS_MM, suited_height};
 use crate::terrain::{HapticCells, HapticGrid, MAX_TIP_CELLS, Scale, Terrain};
 use heightfield::Raster;
 
-/// Radius of the ball at the tip of an arm unless another is stated, mm: with a friction of 0.4 no
-/// ground that was tried stops it (docs/explanation/tip.md).
+/// Default radius of the ball at an arm's tip, mm: with a friction of 0.4 it does not get stuck on
+/// any tested ground (docs/explanation/tip.md).
 const HAND_MM: f64 = 7.0;
 
 /// Rendering of the terrain.
@@ -46,16 +46,16 @@ pub struct Rendering {
           value_parser = |text: &str| LENGTH.read_within(text, TIPS_MM))]
     pub tip: Option<f64>,
 
-    /// Its surface.
+    /// Surface of the terrain.
     #[command(flatten)]
     pub surface: SurfaceOptions,
 }
 
 impl Rendering {
-    /// The scale: as stated, the rest by default.
+    /// Returns the scale of the options, with defaults.
     ///
     /// # Errors
-    /// Numbers that no terrain can be scaled with.
+    /// A terrain cannot be scaled with these numbers.
     pub fn scale(&self, grid: &HapticGrid<'_>) -> Result<Scale, Failure> {
         let cell_mm = match self.scale {
             None => 1.0,
@@ -79,7 +79,8 @@ impl Rendering {
         scale.or_hint("choose another --scale or --exaggeration")
     }
 
-    /// The grid of a raster, of cells as they are at a place in its coordinates, else in its middle.
+    /// Returns the grid of a raster. Its cells are those at a place in its coordinates, by default
+    /// in its middle.
     #[must_use]
     pub fn grid<'r>(
         &self,
@@ -93,7 +94,7 @@ impl Rendering {
         grid.with_tip(self.tip.unwrap_or(0.0))
     }
 
-    /// Radius of the ball at the tip of an arm that a hand holds, mm: a stated level is rendered for a
+    /// Returns the radius of the ball at an arm's tip, mm. With a stated level the default is a
     /// point.
     #[must_use]
     pub fn tip_of_hand_mm(&self) -> f64 {
@@ -101,11 +102,11 @@ impl Rendering {
         self.tip.unwrap_or(usual)
     }
 
-    /// The terrain at a scale; without a stated level the finest in which the tip is not too many
-    /// cells large.
+    /// Returns the terrain at a scale. The default level is the finest in which the tip is at most
+    /// `MAX_TIP_CELLS` large.
     ///
     /// # Errors
-    /// Heights or a size that positions cannot say, or a level too high.
+    /// Positions cannot represent its heights or size, or the level is too high.
     pub fn terrain<'r>(&self, grid: HapticGrid<'r>, scale: Scale) -> Result<Terrain<'r>, Failure> {
         let holds = |level: &u8| grid.tip_mm() / scale.at_level(*level).cell_mm() <= MAX_TIP_CELLS;
         let level = self.level.or_else(|| (0..31).find(holds));

@@ -6,20 +6,20 @@ use std::str::FromStr;
 use super::quantity::GROUND_SCALE;
 use crate::place::Sizing;
 
-/// The unit of the size of a cell in the hand.
+/// Unit of the cell size at the device.
 const MM_PER_CELL: &str = "mm/cell";
 
 /// Scale of a rendered terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MapScale {
-    /// Ground metres a device millimetre.
+    /// Ground metres per device millimetre.
     GroundMPerMm(f64),
-    /// Device millimetres a haptic cell of level 0.
+    /// Device millimetres per haptic cell of level 0.
     CellMm(f64),
 }
 
 impl MapScale {
-    /// Returns the size of a terrain in front of an arm.
+    /// Returns the sizing of a terrain in front of an arm.
     #[must_use]
     pub const fn sizing(scale: Option<Self>) -> Sizing {
         match scale {
@@ -29,8 +29,8 @@ impl MapScale {
         }
     }
 
-    /// Device millimetres a cell with a side of `side_m` on the ground; none where that is not known
-    /// and matters.
+    /// Returns the device millimetres per cell with a side of `side_m` on the ground; `None` if the
+    /// side is required but unknown.
     #[must_use]
     pub fn cell_mm(self, side_m: Option<f64>) -> Option<f64> {
         match self {

@@ -1,4 +1,4 @@
-//! Options and input of views that change while they are touched; shared by `run` and `demo`.
+//! Options and input for placements that change during a session, shared by `run` and `demo`.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ pub struct Commands {
 }
 
 impl Commands {
-    /// The file that commands come from, if any.
+    /// Returns the file of commands, if any.
     pub(in crate::cli) fn file(&self) -> Option<PathBuf> {
         match &self.commands {
             Some(Origin::File(path)) => Some(path.clone()),
@@ -47,10 +47,10 @@ impl Commands {
         }
     }
 
-    /// Reads them from now on.
+    /// Starts to read commands.
     ///
     /// # Errors
-    /// A file that cannot be opened.
+    /// The file cannot be opened.
     pub(in crate::cli) fn open(&self) -> Result<CommandQueue, Failure> {
         if self.end_with_input {
             return self
@@ -62,10 +62,10 @@ impl Commands {
             .map(Option::unwrap_or_default)
     }
 
-    /// The same for so many devices, a queue for each.
+    /// The same for several devices, with a queue for each.
     ///
     /// # Errors
-    /// A file that cannot be opened.
+    /// The file cannot be opened.
     pub(in crate::cli) fn open_for(&self, devices: usize) -> Result<Vec<CommandQueue>, Failure> {
         if devices == 1 && !self.end_with_input {
             return self.open().map(|queue| vec![queue]);
@@ -97,13 +97,13 @@ impl Commands {
             .or_hint("name another file with --commands, or `-` for standard input")
     }
 
-    /// Returns true if they come from standard input.
+    /// Returns true if commands come from standard input.
     pub(in crate::cli) fn are_typed(&self) -> bool {
         self.commands == Some(Origin::StandardInput)
     }
 }
 
-/// Keys and commands on one side, a session on the other.
+/// Connects keys and commands with a session.
 pub(in crate::cli) struct PlacementControl<'t> {
     steering: Steering<'t>,
     marks: Marks,
@@ -111,22 +111,22 @@ pub(in crate::cli) struct PlacementControl<'t> {
     keys: Keys,
     typing: Typing,
     began: Instant,
-    /// The question that was answered since the last look.
+    /// The question answered since the last call.
     entered: Option<u32>,
 }
 
 /// Source of keys.
 enum Typing {
-    /// No keyboard, or input by lines.
+    /// No keyboard, or standard input is read by lines.
     Nobody,
-    /// The terminal, in raw mode until this is dropped.
+    /// The terminal, in raw mode until the value is dropped.
     Terminal(RawMode),
-    /// The terminal of several devices.
+    /// The shared terminal of several devices.
     DeviceKeys(Arc<DeviceKeys>),
 }
 
 impl Typing {
-    /// The keys that were pressed since the last look; none where there are no keys.
+    /// Returns the keys pressed since the last call; `None` without a keyboard.
     fn keys(&self) -> Option<Vec<Key>> {
         match self {
             Self::Nobody => None,
@@ -137,7 +137,7 @@ impl Typing {
 }
 
 impl<'t> PlacementControl<'t> {
-    /// Begins with what is served first.
+    /// Starts with the first placement served.
     pub(in crate::cli) fn new(
         (terrain, laid): (&Terrain<'t>, Laid),
         (arm, level): (&Calibration, Option<u8>),
@@ -160,13 +160,13 @@ impl<'t> PlacementControl<'t> {
         }
     }
 
-    /// The number of the question that a command has answered since the last look.
+    /// Returns the number of the question that a command answered since the last call.
     pub(in crate::cli) fn entered(&mut self) -> Option<u32> {
         self.entered.take()
     }
 
-    /// Takes keys from the terminal from now on, until this is dropped, where there is one
-    /// whose lines are no commands. Returns a line that names them.
+    /// Reads keys from the terminal until the value is dropped, unless commands are read there.
+    /// Returns a line with the keys.
     pub(in crate::cli) fn listen(&mut self, options: &Commands) -> Option<String> {
         if options.are_typed() {
             return None;
@@ -175,19 +175,18 @@ impl<'t> PlacementControl<'t> {
         Some(format!("keys           {KEYS}"))
     }
 
-    /// Takes the keys that are pressed for one of several devices from now on.
+    /// Reads the keys for one of several devices.
     pub(in crate::cli) fn use_keys(&mut self, device_keys: &Arc<DeviceKeys>) {
         self.typing = Typing::DeviceKeys(Arc::clone(device_keys));
     }
 
-    /// Takes what the device tells.
+    /// Processes an event of the device.
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         self.steering.on_event(event);
         self.marks.on_event(event);
     }
 
-    /// Looks at keys and commands at a time of the device, s. What is wrong with them is
-    /// told.
+    /// Processes keys and commands at a time of the device, s. Reports their errors with `tell`.
     pub(in crate::cli) fn look(&mut self, t_s: f64, tell: &mut dyn FnMut(String)) {
         let now = self.began.elapsed();
         if let Some(keys) = self.typing.keys() {
@@ -214,15 +213,15 @@ impl<'t> PlacementControl<'t> {
         }
     }
 
-    /// Returns the requests to the device now.
+    /// Returns the present requests to the device.
     pub(in crate::cli) fn asks(&mut self) -> Vec<HostRequest> {
         let mut asks = self.steering.asks();
         asks.extend(self.marks.asks());
         asks
     }
 
-    /// The marks that were made since the last look, as a recording has them; `is_over` at the
-    /// end, when the device answers no more.
+    /// Returns the marks made since the last call, for a recording. `is_over` is true at the end,
+    /// when the device no longer replies.
     pub(in crate::cli) fn marks(&mut self, log: &SampleLog<'_>, is_over: bool) -> Vec<Mark> {
         let made = match is_over {
             true => self.marks.take_all(),
@@ -235,14 +234,14 @@ impl<'t> PlacementControl<'t> {
         made.into_iter().map(mark).collect()
     }
 
-    /// The view that is to be put in now, which samples may be rendered in from now on.
+    /// Returns the placement to activate now; samples may use it from now on.
     pub(in crate::cli) fn put(&mut self, views: &mut Placements<'t>) -> Option<Put<'t>> {
         let put = self.steering.take_put()?;
         views.put(put.view.number, put.terrain.clone(), put.laid);
         Some(put)
     }
 
-    /// The view in force in a few words, and the keys.
+    /// Describes the active placement briefly, with the keys.
     pub(in crate::cli) fn in_words(&self) -> String {
         let Laid { view, params } = self.steering.now();
         let scale = match view.ground_m_per_mm() {
@@ -259,7 +258,7 @@ impl<'t> PlacementControl<'t> {
     }
 }
 
-/// Describes a surface by the effects that it has.
+/// Describes a surface by its effects.
 fn surface_in_words(params: &SurfaceParams) -> String {
     let number = |number: f32| placing::short(f64::from(number));
     let (friction, texture) = (&params.friction, &params.texture);
@@ -284,7 +283,7 @@ fn surface_in_words(params: &SurfaceParams) -> String {
     words.join(", ")
 }
 
-/// Describes a mark in a line.
+/// Describes a mark in one line.
 pub(in crate::cli) fn marked(mark: &Mark) -> String {
     let Mark { text, t_s, .. } = mark;
     match mark.tick {
@@ -295,7 +294,7 @@ pub(in crate::cli) fn marked(mark: &Mark) -> String {
     }
 }
 
-/// Describes a placement that took effect, in a line.
+/// Describes a new placement in one line.
 pub(in crate::cli) fn told(number: usize, laid: &Laid, terrain: &Terrain<'_>) -> String {
     let file = terrain.raster().georeference();
     format!(

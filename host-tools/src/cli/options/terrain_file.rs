@@ -16,9 +16,9 @@ use heightfield::{file_name, is_url};
 
 /// Heading of these options in `--help`.
 const INPUT: &str = "Input";
-/// Environment variable with the folder of the disk cache.
+/// Environment variable for the folder of the disk cache.
 const FOLDER_VARIABLE: &str = "HAPTERRA_CACHE_DIR";
-/// Environment variable with the size of the disk cache, megabytes.
+/// Environment variable for the size of the disk cache, megabytes.
 const LIMIT_VARIABLE: &str = "HAPTERRA_CACHE_MB";
 
 /// A terrain file, and what the user says about it that it does not say itself.
@@ -32,7 +32,7 @@ pub struct TerrainFile {
     #[arg(value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
 
-    /// Statements about the file that it does not make itself.
+    /// Properties that the file does not state.
     #[command(flatten)]
     pub reading: ReadingOptions,
 }
@@ -65,10 +65,10 @@ pub struct ReadingOptions {
 }
 
 impl TerrainFile {
-    /// Opens the terrain, and notes what the user should know of it.
+    /// Opens the terrain and prints remarks about it.
     ///
     /// # Errors
-    /// The fault of the file, and what to do next.
+    /// The fault of the file, and its remedy.
     pub fn open(&self) -> Result<Raster, Failure> {
         let raster = self.open_without_remarks()?;
         for remark in raster.remarks() {
@@ -77,10 +77,10 @@ impl TerrainFile {
         Ok(raster)
     }
 
-    /// Opens the terrain, and shows that it takes a while. The caller shows its remarks.
+    /// Opens the terrain with a progress message. Callers print its remarks.
     ///
     /// # Errors
-    /// The fault of the file, and what to do next.
+    /// The fault of the file, and its remedy.
     pub(in crate::cli) fn open_without_remarks(&self) -> Result<Raster, Failure> {
         let options = self.reading.options()?;
         let line = || format!("reading {}", self.name());
@@ -92,12 +92,12 @@ impl TerrainFile {
         Ok(raster)
     }
 
-    /// The file and those beside it that are read with it: no output may be one of them.
+    /// Returns the file and those read with it, none of which may be an output.
     pub fn inputs(&self) -> Vec<PathBuf> {
         files_read_with(&self.file)
     }
 
-    /// The file's name without folders, as it is shown: on a page and in a picture, too.
+    /// Returns the file's name without folders, as displayed, also on a page and in a picture.
     pub fn name(&self) -> String {
         if let Some(url) = self.file.to_str().filter(|file| is_url(file)) {
             return printable(file_name(url));
@@ -108,14 +108,14 @@ impl TerrainFile {
 }
 
 impl ReadingOptions {
-    /// The cells of the file that are rendered.
+    /// Returns the kind of cells to render.
     #[must_use]
     pub fn cells(&self) -> HapticCells {
         let mut stated = self.input.iter().filter_map(InputSetting::cells);
         stated.next().unwrap_or_default()
     }
 
-    /// Nothing is kept where there is no home folder, or none is wanted.
+    /// The cache is off if there is no home folder or the user disabled it.
     fn disk_cache(&self) -> Result<DiskCache, Failure> {
         let folder = self.cache.clone().or_else(DiskCache::usual_folder);
         let folder = folder.filter(|folder| folder.as_os_str() != "off");
@@ -137,8 +137,8 @@ impl ReadingOptions {
         }))
     }
 
-    /// The options for a raster of classes over the terrain: it states all by itself, and shares the
-    /// limits of memory and disk.
+    /// Returns the options for a raster of classes over the terrain. The file states everything
+    /// itself; the limits of memory and disk are shared.
     pub(in crate::cli) fn of_classes(&self) -> Result<OpenOptions, Failure> {
         let terrain = self.options()?;
         Ok(OpenOptions {
@@ -149,10 +149,10 @@ impl ReadingOptions {
         })
     }
 
-    /// The options of the library.
+    /// Returns the library's options.
     ///
     /// # Errors
-    /// Two settings that disagree.
+    /// Two settings contradict each other.
     pub fn options(&self) -> Result<OpenOptions, Failure> {
         Ok(OpenOptions {
             disk_cache: self.disk_cache()?,
@@ -161,8 +161,8 @@ impl ReadingOptions {
     }
 }
 
-/// A note where heights are only assumed to be metres, and the ground is not in metres: feet would be
-/// rendered 3.28 times too steep.
+/// Returns a note if heights are assumed to be in metres and the ground is not in metres: heights
+/// in feet would be rendered 3.28 times too steep.
 #[must_use]
 pub fn assumed_unit(raster: &Raster) -> Option<String> {
     let assumed = "the file does not state the unit of its heights: they are taken to be metres";

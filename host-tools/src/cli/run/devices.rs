@@ -1,4 +1,4 @@
-//! Which devices are served: what each is given, and what cannot be given to several.
+//! The devices of a session, and the options that several devices cannot have.
 
 use std::net::ToSocketAddrs;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::cli::terminal::device_console::DeviceConsole;
 use crate::cli::terminal::shared_keyboard;
 use crate::link::{DeviceAddress, tcp_address};
 
-/// A device as the command line names it.
+/// A device named on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServedDevice {
     address: DeviceAddress,
@@ -22,7 +22,7 @@ pub struct ServedDevice {
 }
 
 impl ServedDevice {
-    /// The same, and the board that is the only one now for good.
+    /// Returns the device, with the only connected board selected by its serial number.
     pub(super) fn pinned(self) -> Self {
         Self {
             address: self.address.pinned(),
@@ -48,25 +48,26 @@ impl FromStr for ServedDevice {
     }
 }
 
-/// One of the devices, with what belongs to it alone.
+/// One of the devices, with its own console and files.
 #[derive(Clone)]
 pub(super) struct OneDevice {
     pub(super) address: DeviceAddress,
     /// The plant line of an emulated board.
     pub(super) plant: Option<String>,
-    /// File of its recording.
+    /// File of the device's recording.
     pub(super) record: Option<PathBuf>,
     pub(super) device_console: DeviceConsole,
 }
 
 impl OneDevice {
-    /// Returns true if the arm is virtual, held by a hand that follows a script.
+    /// Returns true if the arm is virtual, in a hand that follows a script.
     pub(super) fn is_scripted(&self) -> bool {
         self.plant.is_some() || self.address == DeviceAddress::Native
     }
 
-    /// The calibration of its arm, as it tells it. Where it does not, why, and that of a
-    /// Premium 1.5: the session is closed later, because the arm may be armed from before.
+    /// Returns the calibration that the device reports. If it reports none, returns that of a
+    /// Premium 1.5 and the error. The session is closed later, because the arm may already be
+    /// armed.
     pub(super) fn meet(&self) -> (Calibration, Result<(), Failure>) {
         // The virtual Phantom is a Premium 1.5.
         let preset = Calibration::PREMIUM_1_5;
@@ -80,10 +81,10 @@ impl OneDevice {
     }
 }
 
-/// The devices that are asked for.
+/// Returns the requested devices.
 ///
 /// # Errors
-/// One device that is named twice, and what several devices cannot be given.
+/// A device is named twice, or an option is invalid for several devices.
 pub(super) fn of(args: &Args) -> Result<Vec<OneDevice>, Failure> {
     let are_several = args.device.len() > 1;
     if are_several {
@@ -108,7 +109,7 @@ fn addresses_of(args: &Args) -> Vec<DeviceAddress> {
     devices.map(|device| device.address.clone()).collect()
 }
 
-/// Refuses options that several devices cannot have.
+/// Refuses options that are invalid for several devices.
 fn check(args: &Args) -> Result<(), Failure> {
     let count = args.device.len();
     if count > shared_keyboard::MOST {
@@ -159,7 +160,7 @@ fn apart(addresses: &[DeviceAddress]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns true if both name a board on USB, and one does not say which.
+/// Returns true if both are boards on USB and one has no serial number.
 fn may_be_same_board(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     match (first, second) {
         (DeviceAddress::Usb(first), DeviceAddress::Usb(second)) => {
@@ -169,8 +170,7 @@ fn may_be_same_board(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     }
 }
 
-/// Returns true if both are known to be the same device. Each device in this program's memory is
-/// another one.
+/// Returns true if both are certainly the same device. Native devices are always different.
 fn is_same(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     match (first, second) {
         (DeviceAddress::Native, _) => false,
@@ -179,7 +179,7 @@ fn is_same(first: &DeviceAddress, second: &DeviceAddress) -> bool {
     }
 }
 
-/// Returns true if two `HOST:PORT` are the same socket, also by two names of a host.
+/// Returns true if two `HOST:PORT` are the same socket, even by different names of a host.
 fn is_same_socket(first: &str, second: &str) -> bool {
     if first == second {
         return true;
@@ -188,7 +188,7 @@ fn is_same_socket(first: &str, second: &str) -> bool {
     if port(first) != port(second) {
         return false;
     }
-    // An unknown name is reported when a line is made.
+    // An unknown name is reported when the line is opened.
     let of = |text: &str| text.to_socket_addrs().map(Vec::from_iter);
     match (of(first), of(second)) {
         (Ok(first), Ok(second)) => first.iter().any(|address| second.contains(address)),
@@ -196,7 +196,8 @@ fn is_same_socket(first: &str, second: &str) -> bool {
     }
 }
 
-/// Checks that each device that is not native has a plant line of its own, or none has one.
+/// Checks that all devices except native ones have plant lines, each a different one, or that none
+/// has.
 fn plants_apart(args: &Args) -> Result<(), Failure> {
     let plants: Vec<_> = { args.device.iter() }
         .filter_map(|device| device.plant.as_ref())
@@ -224,9 +225,9 @@ fn same_plant(plant: &str) -> Failure {
     Failure::new(error).hint("give each emulated board a plant line of its own")
 }
 
-/// Returns the file of the recording of a device, as `felt-2.csv` for `felt.csv`.
+/// Returns the file of a device's recording, such as `felt-2.csv` for `felt.csv`.
 fn of_device(path: &Path, number: usize) -> PathBuf {
-    // What stands for standard output, or is a folder, is reported as that.
+    // Standard output and folders are reported elsewhere.
     let Some(stem) = path.file_stem().filter(|stem| *stem != "-") else {
         return path.to_owned();
     };

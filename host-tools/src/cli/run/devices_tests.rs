@@ -1,4 +1,4 @@
-//! Messages about several devices.
+//! Tests of messages about several devices.
 
 use clap::Parser;
 
@@ -54,7 +54,7 @@ fn each_of_several_devices_has_its_number_its_name_and_its_recording() {
         assert_eq!(device.record, Some(file));
     }
     assert_eq!(of_device(Path::new("felt"), 2), Path::new("felt-2"));
-    // A file that cannot be written is reported by its own name.
+    // Paths that cannot be written are unchanged, so that messages name them.
     assert_eq!(of_device(Path::new("-"), 2), Path::new("-"));
     assert_eq!(of_device(Path::new(".."), 2), Path::new(".."));
 }

@@ -1,4 +1,4 @@
-//! A terrain as it lies in the reach of a device's arm.
+//! A terrain placed in the workspace of a device's arm.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::phantom::Calibration;
@@ -21,10 +21,10 @@ pub(super) struct InReach<'r> {
 }
 
 impl<'r> InReach<'r> {
-    /// Lays what is asked for into the reach of an arm.
+    /// Places a requested terrain in the workspace of an arm.
     ///
     /// # Errors
-    /// Heights that the arm does not reach.
+    /// The arm cannot reach the heights.
     pub(super) fn of(asked: &Asked<'r>, arm: Calibration) -> Result<Self, Failure> {
         let view = asked.view(&arm)?;
         let terrain = view.terrain(asked.grid)?;
@@ -32,21 +32,21 @@ impl<'r> InReach<'r> {
     }
 }
 
-/// The same, how it feels, and how an arm that is virtual moves over it.
+/// A placed terrain, with the arm and the tour of a virtual arm.
 pub(super) struct Placed<'t> {
     pub(super) terrain: &'t Terrain<'t>,
     pub(super) view: Placement,
     pub(super) scene: Scene,
-    /// Of the arm that feels it.
+    /// Calibration of the arm that touches the terrain.
     pub(super) arm: Calibration,
     pub(super) tour: Option<PlacedTerrain<'t>>,
 }
 
 impl<'t> Placed<'t> {
-    /// With the tour of a virtual arm, where the device has one; `name` is the terrain's.
+    /// Creates the value, with a tour if the device's arm is virtual; `name` is the terrain's.
     ///
     /// # Errors
-    /// No place that a virtual arm could tour.
+    /// No place is suitable for a tour.
     pub(super) fn new(
         device: &OneDevice,
         (name, laid): (&str, &'t InReach<'t>),

@@ -1,4 +1,4 @@
-//! The session with one device, from its opening to its last word.
+//! The session with one device, from open to close.
 
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -34,39 +34,39 @@ use crate::stability;
 use crate::steering::CommandQueue;
 use heightfield::without_key;
 
-/// Between two tries to find a device that is gone.
+/// Interval between attempts to find a missing device.
 const RETRY: Duration = Duration::from_millis(500);
-/// For how long the virtual arm stays after the session has ended.
+/// Time for which the virtual arm remains after the session.
 const LINGER: Duration = Duration::from_secs(2);
 
 /// Remark at the end of a virtual arm's session without contact.
 const UNTOUCHED: &str = "the virtual hand never touched the ground: choose another place with --at, or a longer --duration";
 
-/// Bytes that a recording may have on any disk: a day of CSV at 1 kHz.
+/// Size limit of a recording on any disk: a day of CSV at 1 kHz.
 const MAX_RECORDED: u64 = 16 << 30;
 
-/// A device that is to be served, and all that it is given.
+/// A device to serve, with its inputs and outputs.
 pub(super) struct Serving<'p, 't> {
     pub(super) args: &'p Args,
     pub(super) device: &'p OneDevice,
     pub(super) placed: &'p Placed<'t>,
-    /// Success of the query for the calibration. After a failure the session is closed: the
-    /// arm may be armed from before.
+    /// Result of the query for the calibration. After a failure the session is closed, because the
+    /// arm may already be armed.
     pub(super) met: Result<(), Failure>,
     pub(super) recording: Option<Recording>,
     pub(super) commands: CommandQueue,
-    /// Its place at a keyboard that several devices share.
+    /// The device's share of a common keyboard.
     pub(super) device_keys: Option<Arc<DeviceKeys>>,
     pub(super) shown: Option<ToBeShown<'t>>,
     pub(super) events: Option<Watcher>,
 }
 
 impl<'t> Serving<'_, 't> {
-    /// Serves the device until its end, and moves its arm where that is virtual and at the
-    /// plant line of an emulated board.
+    /// Serves the device until its end. Also moves a virtual arm at the plant line of an emulated
+    /// board.
     ///
     /// # Errors
-    /// The cause of its end, or a device that did not confirm that it is disarmed.
+    /// The cause of the end, or a device that did not confirm that it is disarmed.
     pub(super) fn serve(self) -> Result<(), Failure> {
         let (Some(address), Some(tour)) = (&self.device.plant, &self.placed.tour) else {
             return self.session();
@@ -75,11 +75,11 @@ impl<'t> Serving<'_, 't> {
         let done = OnceLock::new();
         std::thread::scope(|scope| {
             scope.spawn(|| move_arm(address, arm, &done));
-            // Also where the session panics: the line is not served for ever.
+            // Also if the session panics; otherwise the line would be served for ever.
             let _ended = AtEnd(|| {
                 let _ = done.set(Instant::now() + LINGER);
             });
-            // The arm is still there while the board lets its force go out.
+            // The arm must run until the board has reduced its force to zero.
             self.session()
         })
     }
@@ -94,7 +94,7 @@ impl<'t> Serving<'_, 't> {
         may_be_armed(true);
         let met = self.met;
         let opened = service.open(|line| met.and_then(|()| fit_to_serve(args, device, line)));
-        // After a failure to open, pending messages are shown.
+        // Pending messages are shown even if the session cannot be opened.
         let (served, hello) = opened.inspect_err(|_| may_be_armed(false))?;
         let how = session_summary::in_words(placed.terrain);
         device_console.say(format!("terrain        {}: {how}", args.terrain.name()));
@@ -122,7 +122,7 @@ impl<'t> Serving<'_, 't> {
             (&placed.arm, args.rendering.level),
             self.commands,
         );
-        // Before any other reader uses the keyboard.
+        // Before anything else reads the keyboard.
         match &self.device_keys {
             Some(device_keys) => control.use_keys(device_keys),
             None if device_console.name().is_some() => {}
@@ -132,7 +132,7 @@ impl<'t> Serving<'_, 't> {
                 }
             }
         }
-        // A viewer that does not start ends nothing.
+        // If the viewer does not start, the session continues.
         let shown =
             (self.shown).and_then(|shown| shown.start(&hello, |line| device_console.tell(line)));
         let control = (control, self.device_keys.as_ref());
@@ -141,7 +141,7 @@ impl<'t> Serving<'_, 't> {
         let end = served.serve(&mut watch);
         let is_others = matches!(end.why, Err(LinkError::Taken));
         watch.ended(end.disarmed.is_ok() && !is_others);
-        // What was recorded is kept, however it ended, and before anything else is done.
+        // The recording is saved first, regardless of the cause of the end.
         let log = watch.finish();
         let kept = log.kept.or_hint(OTHER_FILE);
         let ended = told(end.why, end.disarmed, &tell).and(came(log.stood_still));
@@ -166,7 +166,8 @@ impl<'t> Serving<'_, 't> {
     }
 }
 
-/// Terrain that does not come ends a virtual arm's session; a real arm feels what is held.
+/// Returns an error if missing terrain ended a virtual arm's session. A real arm uses the stored
+/// tiles.
 fn came(stood_still: bool) -> Result<(), Failure> {
     match stood_still {
         false => Ok(()),
@@ -176,7 +177,7 @@ fn came(stood_still: bool) -> Result<(), Failure> {
     }
 }
 
-/// Does something when it is dropped.
+/// Calls a function when it is dropped.
 struct AtEnd<F: FnMut()>(F);
 
 impl<F: FnMut()> Drop for AtEnd<F> {
@@ -185,8 +186,8 @@ impl<F: FnMut()> Drop for AtEnd<F> {
     }
 }
 
-/// Moves the virtual Phantom at a board's plant line, which may come and go;
-/// until the line ends after the session has, or the time that `done` names.
+/// Moves the virtual Phantom at a board's plant line, which may be reconnected. Ends when the line
+/// closes after the session, or at the time in `done`.
 fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
     let stop = || done.get().is_some_and(|by| Instant::now() >= *by);
     while done.get().is_none() {
@@ -199,20 +200,20 @@ fn move_arm(address: &str, mut arm: HeldPhantom, done: &OnceLock<Instant>) {
     }
 }
 
-/// Checks that a device may be served: a real board was brought up, and one that is given a
-/// virtual arm drives no real one.
+/// Checks that a device may be served: a real board must be brought up, and a board with a virtual
+/// arm must not drive a real one.
 fn fit_to_serve(args: &Args, device: &OneDevice, line: &mut dyn Transport) -> Result<(), Failure> {
     match (&device.plant, &device.address) {
         (_, DeviceAddress::Native) => Ok(()),
-        // Regardless of other messages: its zero pose would be taken for known, and its lines for
-        // a harmless virtual arm.
+        // Even with `--unchecked`: a virtual arm's zero pose and lines would be assumed for a real
+        // arm.
         (Some(_), _) => drives_no_arm(line),
         (None, _) if args.unchecked => Ok(()),
         (None, _) => brought_up(line),
     }
 }
 
-/// Returns the service of a terrain to a device.
+/// Returns the service that sends a terrain to a device.
 fn service<'s, 't: 's>(
     args: &'s Args,
     (device, placed): (&'s OneDevice, &'s Placed<'t>),
@@ -221,8 +222,8 @@ fn service<'s, 't: 's>(
     Service {
         terrain: placed.terrain,
         scene: placed.scene,
-        // A virtual arm was switched on in its zero pose; where a real one was,
-        // its user has to say.
+        // A virtual arm starts in its zero pose; the pose of a real one must be confirmed by the
+        // user.
         arming: match device.is_scripted() {
             true => Arming::VIRTUAL,
             false => Arming::default(),
@@ -239,7 +240,7 @@ fn service<'s, 't: 's>(
     }
 }
 
-/// Returns the failure of the session; of two, the first is reported here.
+/// Returns the failure of the session; if there are two, prints the first.
 fn told(
     why: Result<(), LinkError>,
     disarmed: Result<(), LinkError>,
@@ -254,10 +255,10 @@ fn told(
     }
 }
 
-/// The recording of a device, where one is asked for.
+/// Returns the recording of a device, if requested.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// The file cannot be written.
 pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure> {
     let [state, mode, limits, view] = LoopColumns::COLUMNS;
     let [tick, work, cost, late] = TICK_COLUMNS.map(Column::Count);
@@ -272,14 +273,14 @@ pub(super) fn recording(device: &OneDevice) -> Result<Option<Recording>, Failure
     recording.transpose().or_hint(OTHER_FILE)
 }
 
-/// Bytes that a recording may have: half of what is free at its beginning, so that no device
-/// fills the disk, however fast its samples come.
+/// Returns the size limit of a recording: half of the free space at its start, so that no device
+/// can fill the disk at any rate of samples.
 fn most_recorded(path: &Path) -> u64 {
     let free = fs4::available_space(folder_of(path));
     free.map_or(MAX_RECORDED, |free| MAX_RECORDED.min(free / 2))
 }
 
-/// The recording, with the settings in which the device feels the terrain.
+/// Adds the settings of the terrain and surface to the recording.
 fn described(
     mut recording: Option<Recording>,
     args: &Args,

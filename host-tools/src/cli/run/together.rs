@@ -1,16 +1,15 @@
-//! Several devices at once: each is served in a thread of its own, and none ends another's
-//! session.
+//! Several devices at once: each is served by its own thread, and none ends another's session.
 
 use std::thread::{self, ScopedJoinHandle};
 
 use super::session::Serving;
 use crate::cli::failure::Failure;
 
-/// Serves each device until its own end; one device in this thread.
+/// Serves each device until its end; a single device in this thread.
 ///
 /// # Errors
-/// That of the one device. Of several, each that failed, by its name; it was reported when it
-/// failed, too, because others may continue for long after it.
+/// The error of the one device. With several, each failure with the device's name; it is also
+/// printed when it occurs, because other devices may continue for long.
 pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failure> {
     if servings.len() == 1
         && let Some(only) = servings.pop()
@@ -25,7 +24,7 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
                 let device_console = serving.device.device_console.clone();
                 let name = device_console.name().unwrap_or_default().to_owned();
                 let thread = scope.spawn(move || {
-                    // Names the device in what the link logs of it.
+                    // Adds the device's name to the log lines of its link.
                     let _named =
                         tracing::error_span!("device", name = device_console.name()).entered();
                     let ended = serving.serve();
@@ -39,11 +38,11 @@ pub(super) fn serve_each(mut servings: Vec<Serving<'_, '_>>) -> Result<(), Failu
     all_failures(count, failures)
 }
 
-/// Returns the failure of a thread, with the device's name; none if it has succeeded.
+/// Returns the failure of a thread, with the device's name; `None` after success.
 fn failed(
     (name, thread): (String, ScopedJoinHandle<'_, Result<(), Failure>>),
 ) -> Option<(String, Failure)> {
-    // A session that panics has closed, and has reported a close without confirmation.
+    // A session that panics closes the device, and reports a missing confirmation.
     let panicked = |_| {
         Err(Failure::new(
             "the program failed while it served this device",
@@ -53,7 +52,7 @@ fn failed(
     ended.err().map(|failure| (name, failure))
 }
 
-/// The failures of several devices as one.
+/// Combines the failures of several devices.
 fn all_failures(count: usize, failures: Vec<(String, Failure)>) -> Result<(), Failure> {
     if failures.is_empty() {
         return Ok(());

@@ -23,17 +23,17 @@ use crate::serving::SessionHandler;
 use crate::telemetry::{Figures, SampleLog};
 use crate::terrain::Terrain;
 
-/// The clock of a virtual arm waits for terrain that the host owes. After so long without a tick
-/// that terrain does not come any more.
+/// Time without a tick after which missing terrain is an error. The clock of a virtual arm stops
+/// while terrain is missing.
 const STANDS_STILL: Duration = Duration::from_secs(60);
-/// Between two lines where there is no terminal.
+/// Interval of status lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(2);
 
-/// Observation and recording of a running session.
+/// Displays and records a running session.
 pub(super) struct Watch<'t> {
     log: SampleLog<'t>,
     stop_s: f64,
-    /// Time of the last reported tick of a virtual arm.
+    /// Time of a virtual arm's last reported tick.
     ticked: Option<Instant>,
     /// The latest sample and its row.
     latest: Option<(TickRecord, Record)>,
@@ -49,16 +49,16 @@ pub(super) struct Watch<'t> {
     device_console: DeviceConsole,
 }
 
-/// Result of the observation.
+/// Result of a session's display and recording.
 pub(super) struct Seen<'t> {
-    /// Ticks run since the scene was taken.
+    /// Number of ticks since the scene was received.
     pub(super) ticks: u64,
     pub(super) figures: Figures,
-    /// The clock of the virtual arm stood still at the end.
+    /// True if the virtual arm's clock was stopped at the end.
     pub(super) stood_still: bool,
-    /// The way to the viewer, where there is one.
+    /// Connection to the viewer, if there is one.
     pub(super) shown: Option<Shown<'t>>,
-    /// Success of the recording, if there is one: complete and in its place.
+    /// Result of the recording, if there is one: complete and saved.
     pub(super) kept: Result<(), OutputError>,
 }
 
@@ -92,24 +92,24 @@ impl<'t> Watch<'t> {
         }
     }
 
-    /// The same, with samples to a viewer.
+    /// Returns the same watch, which also sends samples to a viewer.
     pub(super) fn shown(self, shown: Option<Shown<'t>>) -> Self {
         Self { shown, ..self }
     }
 
-    /// The same, with events to their readers.
+    /// Returns the same watch, which also sends events.
     pub(super) fn with_events(self, events: Option<Watcher>) -> Self {
         Self { events, ..self }
     }
 
-    /// Tells readers of events that the session is over.
+    /// Reports the end of the session to readers of events.
     pub(super) fn ended(&self, disarmed: bool) {
         if let Some(events) = &self.events {
             events.say(&Told::End { disarmed });
         }
     }
 
-    /// Ends the recording, and takes the line at the bottom of the terminal away.
+    /// Ends the recording, and removes the status line of the terminal.
     pub(super) fn finish(mut self) -> Seen<'t> {
         self.device_console.status(None);
         self.take_marks(true);
@@ -134,7 +134,7 @@ impl<'t> Watch<'t> {
             .is_some_and(|ticked| ticked.elapsed() >= STANDS_STILL)
     }
 
-    /// Takes the marks that were made, at the end also those that were only asked for.
+    /// Records new marks; at the end also those without a reply.
     fn take_marks(&mut self, is_over: bool) {
         for mark in self.control.marks(&self.log, is_over) {
             self.device_console.tell(steering::marked(&mark));
@@ -190,7 +190,7 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
             shown.on_event(&event);
         }
         if let Event::Sample(sample) = event {
-            // The last ticks, in which the arm is disarmed, are not what it waited for.
+            // Ticks during the final disarm must not reset the time of a stopped clock.
             if !self.stands_still() {
                 self.ticked = self.ticked.map(|_| Instant::now());
             }
@@ -234,7 +234,7 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
         Some((put.view, put.terrain))
     }
 
-    /// One line that is written over, or a line now and then.
+    /// Updates the status line, or prints one at intervals.
     fn show(&mut self, tally: &LinkStats) {
         if let Some(shown) = &mut self.shown {
             shown.look(tally);

@@ -10,10 +10,10 @@ use super::Setting;
 use crate::cli::failure::{Failure, OrHint};
 use heightfield::regular_file;
 
-/// A longer file has no settings, bytes.
+/// Size limit of a settings file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Reads a settings file; `is_known` says which keys it may have.
+/// Reads a settings file. `is_known` returns true for a valid key.
 pub(super) fn read(path: &Path, is_known: impl Fn(&str) -> bool) -> Result<Vec<Setting>, Failure> {
     let name = path.display();
     let other = "correct the file, or leave it out with --settings none";
@@ -30,7 +30,7 @@ pub(super) fn read(path: &Path, is_known: impl Fn(&str) -> bool) -> Result<Vec<S
             return Err(format!("{place}: no command has an option --{key}")).or_hint(other);
         }
         let values = match value.into_inner() {
-            // The surface stands in this file itself.
+            // The surface is in this file.
             Value::Table(_) if key == "surface" => Some(vec![path.into()]),
             Value::Array(values) => values.iter().map(word).collect(),
             value => word(&value).map(|word| vec![word]),
@@ -47,7 +47,7 @@ pub(super) fn read(path: &Path, is_known: impl Fn(&str) -> bool) -> Result<Vec<S
     settings.collect()
 }
 
-/// A value as it is typed.
+/// Converts a value to its form on the command line.
 fn word(value: &Value) -> Option<OsString> {
     match value {
         Value::String(text) => Some(text.into()),

@@ -1,8 +1,8 @@
-//! Settings that stand for options: those of a settings file and of a recording.
+//! Settings from a settings file or a recording, used as options.
 //!
-//! Each becomes words of the command line, `--name=value`, in front of the user's own. An option that
-//! the user gives, or that the environment has, takes the place of all words for it. So a setting is
-//! read, checked and explained as the option is.
+//! Each setting becomes an argument, `--name=value`, before the user's own. An option on the
+//! command line or in the environment replaces all arguments for it. Therefore a setting is parsed,
+//! checked and explained like its option.
 
 mod file;
 mod recorded;
@@ -22,11 +22,11 @@ use super::options::scale::MapScale;
 use crate::terrain::HapticCells;
 pub(super) use recorded::differences;
 
-/// The settings file that is read if it exists.
+/// The default settings file, read if it exists.
 const USUAL_FILE: &str = "hapterra.toml";
-/// The commands that a settings file is for.
+/// The commands that read a settings file.
 const COMMANDS: [&str; 3] = ["run", "demo", "replay"];
-/// Options that no settings file can contain.
+/// Options that a settings file must not contain.
 const NOT_IN_FILE: [&str; 4] = ["settings", "help", "version", "verbose"];
 
 /// Which settings file is read.
@@ -42,7 +42,7 @@ pub struct SettingsOption {
 }
 
 impl SettingsOption {
-    /// The file that is read, if any: no output may be it.
+    /// Returns the settings file to read, if any; it must not be an output.
     pub(in crate::cli) fn file(&self) -> Option<PathBuf> {
         match &self.settings {
             Some(path) => Some(path.clone()).filter(|path| path.as_os_str() != "none"),
@@ -51,33 +51,32 @@ impl SettingsOption {
     }
 }
 
-/// One setting.
+/// A setting.
 struct Setting {
-    /// The name of its option.
+    /// Name of the option.
     name: String,
-    /// Its values, as on the command line; none for a flag.
+    /// Values, as on the command line; empty for a flag.
     values: Vec<OsString>,
-    /// Its source, for messages.
+    /// Source of the setting, for messages.
     place: String,
 }
 
-/// The words of a command with its settings.
+/// The arguments of a command with its settings.
 pub(super) struct Completed {
-    /// The words.
+    /// The arguments.
     pub(super) words: Vec<OsString>,
-    /// A line on the settings file that was read.
+    /// A line that names the settings file that was read.
     pub(super) line: Option<String>,
 }
 
-/// Puts settings into the words of a command, the name of the program first.
+/// Adds settings to the arguments of a command; the first argument is the program's name.
 ///
 /// # Errors
-/// A settings file or a recording that cannot be read; a setting that is no option, or has a value
-/// that is none.
+/// A settings file or a recording cannot be read; a setting is no option, or its value is invalid.
 pub(super) fn complete(command: &Command, words: Vec<OsString>) -> Result<Completed, Failure> {
     let as_typed = |words| Completed { words, line: None };
     let command = relaxed(command);
-    // What the user has typed wrongly is explained when it is parsed in earnest.
+    // The final parse explains errors in the user's arguments.
     let Ok(matches) = command.clone().try_get_matches_from(&words) else {
         return Ok(as_typed(words));
     };
@@ -119,7 +118,7 @@ pub(super) fn complete(command: &Command, words: Vec<OsString>) -> Result<Comple
     Ok(Completed { words, line })
 }
 
-/// The command line, without any option that has to be given.
+/// Returns the command line with all options optional.
 fn relaxed(command: &Command) -> Command {
     let mut command = command.clone();
     for subcommand in command.get_subcommands_mut() {
@@ -129,7 +128,7 @@ fn relaxed(command: &Command) -> Command {
     command
 }
 
-/// Returns true if the user or the environment gives an option.
+/// Returns true if an option is on the command line or in the environment.
 fn is_given(matches: &ArgMatches, option: &Arg) -> bool {
     let from = matches.value_source(option.get_id().as_str());
     matches!(
@@ -138,21 +137,21 @@ fn is_given(matches: &ArgMatches, option: &Arg) -> bool {
     )
 }
 
-/// The keys of the user's `--input`: a setting adds others.
+/// Returns the keys of the user's `--input`, which settings do not replace.
 fn input_keys(matches: &ArgMatches) -> BTreeSet<String> {
     let given = matches.try_get_raw("input").ok().flatten();
     let given = given.into_iter().flatten();
     given.map(key_of).collect()
 }
 
-/// The key of `KEY=VALUE`.
+/// Returns the key of `KEY=VALUE`.
 fn key_of(value: &OsStr) -> String {
     let text = value.to_string_lossy();
     let key = text.split('=').next().unwrap_or_default();
     key.to_owned()
 }
 
-/// The settings of the recording that is replayed or shown.
+/// Returns the settings of the recording to replay or show.
 fn of_recording(name: &str, matches: &ArgMatches) -> Result<Option<Vec<Setting>>, Failure> {
     let argument = match name {
         "replay" => "trajectory",
@@ -170,7 +169,7 @@ fn of_recording(name: &str, matches: &ArgMatches) -> Result<Option<Vec<Setting>>
     }
 }
 
-/// The scale and the kind of cells that the user states.
+/// Returns the scale and the kind of cells that the user states.
 fn stated_in(matches: &ArgMatches) -> (Option<MapScale>, Option<HapticCells>) {
     let scale = matches.try_get_one::<MapScale>("scale");
     let input = matches.try_get_many::<InputSetting>("input").ok().flatten();
@@ -178,7 +177,7 @@ fn stated_in(matches: &ArgMatches) -> (Option<MapScale>, Option<HapticCells>) {
     (scale.ok().flatten().copied(), cells)
 }
 
-/// The settings file of a command, and what it says.
+/// Returns the settings file of a command and its settings.
 fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Setting>)>, Failure> {
     if !COMMANDS.contains(&name) {
         return Ok(None);
@@ -207,7 +206,7 @@ fn of_file(name: &str, matches: &ArgMatches) -> Result<Option<(PathBuf, Vec<Sett
     Ok(Some((path, settings)))
 }
 
-/// Returns true if one of the commands has an option of a name.
+/// Returns true if one of the commands has this option.
 fn is_known(command: &Command, name: &str) -> bool {
     let mut commands = COMMANDS
         .iter()
@@ -220,8 +219,8 @@ fn option<'c>(command: &'c Command, name: &str) -> Option<&'c Arg> {
     options.find(|option| option.get_long() == Some(name))
 }
 
-/// The words of a setting; none where a given option stands for it or against it, or the command
-/// has no such option.
+/// Returns the arguments of a setting; none if a given option replaces or excludes it, or the
+/// command has no such option.
 fn words_of(
     command: &Command,
     of: &Command,
@@ -269,7 +268,7 @@ fn words_of(
     Ok(words)
 }
 
-/// Checks that a word of a setting is one that the command takes.
+/// Checks that the command accepts an argument of a setting.
 fn check(command: &Command, name: &str, word: &OsStr, setting: &Setting) -> Result<(), Failure> {
     let program = OsStr::new("hapterra");
     let words = [program, OsStr::new(name), word];

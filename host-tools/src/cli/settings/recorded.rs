@@ -13,8 +13,8 @@ use crate::replay::Settings;
 use crate::replay::settings::RenderedTerrain;
 use crate::terrain::HapticCells;
 
-/// The options that a recording was made with. The user may state a scale and cells of another kind:
-/// the recorded proportions stay.
+/// Returns the options of a recording. If the user states a scale or another kind of cells, the
+/// recorded proportions are kept.
 pub(super) fn settings(
     path: &Path,
     recorded: &Settings,
@@ -53,8 +53,8 @@ pub(super) fn settings(
     options.into_iter().map(setting).collect()
 }
 
-/// The recorded height, at the scale that the user states. Cells of another kind have another size on
-/// the ground: there the factor keeps the proportions.
+/// Returns the recorded height at the user's scale. For another kind of cells, whose size on the
+/// ground differs, returns the factor that keeps the proportions.
 fn height(rendered: &RenderedTerrain, scale: Option<MapScale>, cells: HapticCells) -> Exaggeration {
     let cell_mm = match scale {
         None => Some(rendered.cell_mm),
@@ -67,7 +67,7 @@ fn height(rendered: &RenderedTerrain, scale: Option<MapScale>, cells: HapticCell
     }
 }
 
-/// The recording as a file with a surface: a name alone might be a surface's.
+/// Returns the path of the recording in a form that cannot be the name of a surface.
 fn surface_file(path: &Path) -> PathBuf {
     match path.extension() {
         Some(_) => path.to_owned(),
@@ -75,7 +75,7 @@ fn surface_file(path: &Path) -> PathBuf {
     }
 }
 
-/// Lines on the options that differ from a recording, whose settings stand for all the others.
+/// Returns lines about the options that differ from a recording.
 pub(in crate::cli) fn differences(
     rendering: &Rendering,
     cells: HapticCells,
@@ -170,7 +170,7 @@ fn in_words(cells: HapticCells) -> &'static str {
     }
 }
 
-/// The surface that is asked for; that of the recording is its own.
+/// Describes the requested surface; the recording itself means its own surface.
 fn surface_in_words(surface: Option<&SurfaceChoice>, recording: &Path) -> String {
     match surface {
         Some(SurfaceChoice::Named(named)) => named.name.to_owned(),

@@ -13,7 +13,7 @@ use crate::replay::{Rule, Settings};
 use crate::terrain::{Scale, Terrain};
 use heightfield::Raster;
 
-/// The words of a command with a settings file.
+/// Returns the arguments of a command with a settings file.
 fn completed(text: &str, line: &str) -> Result<Vec<String>, String> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("s.toml");
@@ -66,7 +66,7 @@ fn command_line_wins() {
             "--settings"
         ]
     );
-    // A box is fitted: it goes with neither a place nor a scale.
+    // A box is fitted, so it excludes a place and a scale.
     let words = completed(text, "run t.tif --bbox 1,2,3,4").expect("settings");
     assert_eq!(
         words,
@@ -139,7 +139,7 @@ fn no_settings_are_read_where_none_are_wanted() {
     assert!(missing.is_err());
 }
 
-/// A recording of cells of 2 mm under a soft spring with friction, as a file in a folder.
+/// Writes a recording to a folder: cells of 2 mm, a soft spring with friction.
 fn recording(folder: &Path) -> (PathBuf, Settings) {
     let raster = Raster::from_fn(9, 9, |x, _| x as f32).expect("raster");
     let scale = Scale::new(2.0, 6.0).expect("valid");
@@ -164,7 +164,7 @@ fn recording(folder: &Path) -> (PathBuf, Settings) {
     (path, settings)
 }
 
-/// A replay with the settings of a recording, and the lines on what differs.
+/// Parses a replay with a recording's settings; returns the lines about differences.
 fn replayed(more: &str) -> (crate::cli::replay::Args, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let (path, settings) = recording(folder.path());
@@ -194,7 +194,7 @@ fn options_of_a_recording_are_those_of_its_making() {
 
 #[test]
 fn options_win_over_a_recording_and_are_named() {
-    // Half as large, and half as high.
+    // Half the size and half the height.
     let (args, lines) = replayed("--scale 1mm/cell --stiffness 0.5");
     assert_eq!(
         args.rendering.exaggeration,
@@ -207,7 +207,7 @@ fn options_win_over_a_recording_and_are_named() {
             "--stiffness 0.5N/mm, where the recording has 0.3N/mm"
         ]
     );
-    // Other cells keep the factor.
+    // Another kind of cells keeps the factor.
     let (args, lines) = replayed("--input cells=stored");
     assert_eq!(args.rendering.exaggeration, Some(Exaggeration::Times(3.0)));
     assert_eq!(lines.len(), 1, "{lines:?}");
@@ -236,7 +236,7 @@ fn recorded_surface_has_all_bits_of_its_law() {
         .map(|surface| surface.params)
         .map_err(|it| it.text());
     assert_eq!(params, Ok(settings.params()));
-    // A friction of one's own brings its static part, and leaves shading as it is.
+    // A stated friction also sets the static part, and leaves the shading unchanged.
     let rough = SurfaceOptions {
         friction: Some(0.7),
         ..options
@@ -253,7 +253,7 @@ fn recorded_surface_has_all_bits_of_its_law() {
             ..settings.params()
         })
     );
-    // So may `run` take it.
+    // `run` also accepts the recording.
     let line = format!("hapterra run t.tif --settings {}", path.display());
     let words = line.split_whitespace().map(OsString::from).collect();
     let completed = complete(&Cli::command(), words).map_err(|failure| failure.text());

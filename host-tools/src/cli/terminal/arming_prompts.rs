@@ -1,9 +1,9 @@
-//! Arming while a terrain is served: says what keeps the arm from it, and takes
-//! Enter for "continue": clear the fault, zero the arm, ask to arm.
+//! Arming while a terrain is served. Prints the blockers, and reads Enter as "continue": clear the
+//! fault, zero the arm, request to arm.
 //!
-//! Enter answers the question that was shown last, and nothing else: what was typed before
-//! it is forgotten, and a fault that came after it is shown first. A program that answers for its
-//! user names the question by a number, which begins at random: what was not asked has no answer.
+//! Enter answers only the last question shown. Earlier input is discarded, and a fault after the
+//! question is shown first. A program that answers for its user states the question's number.
+//! Numbers start at a random value, so that only a question that was asked can be answered.
 
 use std::io::{self, IsTerminal};
 use std::sync::Arc;
@@ -17,36 +17,36 @@ use super::shared_keyboard::DeviceKeys;
 use crate::cli::line_limit::LineLimit;
 use crate::link::{Event, HostRequest};
 
-/// More than an arm that is armed, faulted and armed again in a second needs.
+/// More lines than an arm needs that is armed, faulted and armed again within a second.
 const LINES_A_SECOND: u32 = 24;
 
-/// Meaning of Enter.
+/// The action of Enter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Question {
-    /// The fault that was shown and is cleared.
+    /// The fault that was shown and will be cleared.
     fault: Option<Fault>,
-    /// The arm is in its zero pose.
+    /// True if the user confirms that the arm is in its zero pose.
     zeroes: bool,
 }
 
-/// Something to tell the user.
+/// A line for the user.
 #[derive(Debug)]
 struct Line {
     text: String,
-    /// Meaning of Enter from now on.
+    /// The action of Enter after this line.
     asks: Option<Question>,
 }
 
 /// Source of Enter.
 trait Enter {
-    /// Forgets the keys pressed before.
+    /// Discards earlier keys.
     fn forget(&mut self);
 
-    /// Returns true if Enter was pressed since the last look.
+    /// Returns true if Enter was pressed since the last call.
     fn was_pressed(&mut self) -> bool;
 }
 
-/// The user at the terminal.
+/// A user at the terminal.
 struct AtTheTerminal;
 
 impl Enter for AtTheTerminal {
@@ -59,7 +59,7 @@ impl Enter for AtTheTerminal {
     }
 }
 
-/// The user at a terminal of several devices.
+/// A user at a terminal that several devices share.
 impl Enter for Arc<DeviceKeys> {
     fn forget(&mut self) {
         DeviceKeys::forget(self);
@@ -81,22 +81,22 @@ impl Enter for Nobody {
     }
 }
 
-/// Leads the user from disarmed to armed.
+/// Prompts the user through arming.
 pub(in crate::cli) struct ArmingPrompts {
     enter: Box<dyn Enter>,
-    /// The user's action to answer, in the imperative.
+    /// The user's action to answer a question, in the imperative.
     press_enter: String,
     /// The open question.
     question: Option<Question>,
-    /// Number of the question that was asked last.
+    /// Number of the last question.
     number: u32,
     report: Option<Report>,
-    /// The device has returned: its first report tells whether the arm is armed.
+    /// True after a reconnection, until the first report shows whether the arm is armed.
     is_back: bool,
-    /// Enter was pressed with the arm in its zero pose: its counts are asked for.
+    /// True while the counts of a zero pose that the user confirmed are requested.
     zeroing: bool,
     say: Vec<HostRequest>,
-    /// True if there is a user who arms; a virtual hand follows its script.
+    /// True if a user arms; false for a virtual hand, which follows its script.
     leads: bool,
     /// Lines for the user, in order.
     lines: Vec<Line>,
@@ -104,7 +104,7 @@ pub(in crate::cli) struct ArmingPrompts {
 }
 
 impl ArmingPrompts {
-    /// For a virtual hand: only errors are shown.
+    /// Creates prompts for a virtual hand: only errors are shown.
     pub(in crate::cli) fn for_a_script() -> Self {
         Self {
             leads: false,
@@ -112,7 +112,7 @@ impl ArmingPrompts {
         }
     }
 
-    /// Listens to the terminal, if there is one.
+    /// Creates prompts at the terminal, if there is one.
     pub(in crate::cli) fn at_the_terminal() -> Self {
         match io::stdin().is_terminal() {
             true => Self::listening(AtTheTerminal),
@@ -120,7 +120,7 @@ impl ArmingPrompts {
         }
     }
 
-    /// Listens to what is pressed for one of several devices.
+    /// Creates prompts with the keys for one of several devices.
     pub(in crate::cli) fn at(device_keys: &Arc<DeviceKeys>) -> Self {
         Self {
             press_enter: device_keys.press_enter(),
@@ -144,7 +144,7 @@ impl ArmingPrompts {
         }
     }
 
-    /// Takes what the device tells.
+    /// Processes an event of the device.
     pub(in crate::cli) fn on_event(&mut self, event: &Event<'_>) {
         match event {
             Event::Guard(report) => self.on_guard_report(report),
@@ -155,7 +155,7 @@ impl ArmingPrompts {
                     self.name(*why);
                     self.ask_for_enter(*why);
                 }
-                // It is armed already, in the pose that it has.
+                // The arm is already armed in its present pose.
                 (Request::Zero { .. }, Err(Refusal::NotWhileArmed)) => {}
                 (request, Err(refused)) => self.tell(format!("{request:?}: {refused}")),
                 (_, Ok(())) => {}
@@ -176,7 +176,7 @@ impl ArmingPrompts {
         }
     }
 
-    /// Says how the guard stands, where that is news.
+    /// Reports the state of the guard if it changed.
     fn on_guard_report(&mut self, report: &Report) {
         let before = self.report.replace(*report);
         let is_settled = report.mode == Mode::Disarmed || report.mode.drives();
@@ -200,7 +200,7 @@ impl ArmingPrompts {
         }
         match report.mode {
             _ if !self.leads => {}
-            // What is in the way besides is refused, or gone, in a moment.
+            // Other blockers are refused or end in a moment.
             Mode::Requested if Blockers::BY_HAND.contains(report.blockers) => {
                 self.tell("ready to arm; waits for your hand:");
                 self.name(report.blockers);
@@ -223,7 +223,7 @@ impl ArmingPrompts {
         self.lines.push(Line { text, asks: None });
     }
 
-    /// Names what is in the way of arming, with what to do, a line each.
+    /// Prints each blocker with its remedy.
     fn name(&mut self, blockers: Blockers) {
         for (name, meaning) in blockers.meanings() {
             self.tell(format!("  {name}: {meaning}"));
@@ -248,7 +248,7 @@ impl ArmingPrompts {
         });
     }
 
-    /// Returns the messages for the device now.
+    /// Returns the present messages to the device.
     pub(in crate::cli) fn messages(&mut self) -> Vec<HostRequest> {
         if self.enter.was_pressed()
             && let Some(question) = self.question.take()
@@ -258,12 +258,12 @@ impl ArmingPrompts {
         std::mem::take(&mut self.say)
     }
 
-    /// Number of the question that is open now.
+    /// Returns the number of the open question.
     pub(in crate::cli) fn asks(&self) -> Option<u32> {
         self.question.map(|_| self.number)
     }
 
-    /// Enter as an answer to the question of a number. Returns false if that one is not open.
+    /// Answers the question with this number. Returns false if it is not open.
     pub(in crate::cli) fn answer(&mut self, number: u32) -> bool {
         let is_open = self.asks() == Some(number);
         if is_open && let Some(question) = self.question.take() {
@@ -274,7 +274,7 @@ impl ArmingPrompts {
 
     fn on_enter(&mut self, question: Question) {
         let fault = self.report.and_then(|report| report.fault);
-        // The user has not read of a fault after the question.
+        // The user has not read about a fault after the question.
         if fault.is_some() && fault != question.fault {
             let blockers = self.report.unwrap_or_default().blockers;
             return self.ask_for_enter(blockers);
@@ -290,8 +290,8 @@ impl ArmingPrompts {
         });
     }
 
-    /// Returns the lines for the user now: a device whose state flickers gets a limited number of
-    /// lines a second, and the others are counted. A question that is left out was not asked.
+    /// Returns the present lines for the user. Lines a second are limited, because a device's state
+    /// may flicker; omitted lines are counted. An omitted question counts as not asked.
     pub(in crate::cli) fn lines(&mut self) -> Vec<String> {
         let now = Instant::now();
         let mut said = vec![];
@@ -352,13 +352,13 @@ mod tests {
         prompts.on_event(&Event::Guard(&not_zeroed()));
         prompts.on_event(&REFUSED);
         assert_eq!(prompts.messages(), []);
-        // Nor is one that comes while the question is on its way to the terminal.
+        // An Enter before the question is on the terminal is no answer either.
         press.send(()).expect("listening");
         assert!(prompts.lines().join("\n").contains("press Enter"));
         assert_eq!(prompts.messages(), []);
         press.send(()).expect("listening");
         assert_eq!(prompts.messages(), [HostRequest::Status]);
-        // It is answered once.
+        // A question is answered only once.
         press.send(()).expect("listening");
         assert_eq!(prompts.messages(), []);
     }
@@ -436,7 +436,7 @@ mod tests {
             prompts.on_event(&Event::Guard(&report));
             said += prompts.lines().len();
         }
-        // However long this took, it was not ten thousand seconds.
+        // Far fewer than all lines, even if the test ran slowly.
         assert!((24..5_000).contains(&said), "{said} lines");
     }
 
@@ -466,7 +466,7 @@ mod tests {
             prompts.on_event(&Event::Guard(&report));
         }
         assert!(prompts.lines().is_empty());
-        // A fault that was latched before this session.
+        // A fault latched before this session.
         let report = Report {
             fault: Some(Fault::EncoderJump),
             ..Report::default()

@@ -1,31 +1,31 @@
-//! Who speaks: lines that concern one device name it where several are served.
+//! Lines about one device, which name it if several are served.
 
 use std::fmt::Display;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::writer;
 
-/// Says what concerns one device, as [`writer`] does.
+/// Writes lines about one device with [`writer`].
 #[derive(Clone, Default)]
 pub(in crate::cli) struct DeviceConsole {
-    /// None where there is one device.
+    /// `None` if there is only one device.
     several: Option<Several>,
 }
 
 #[derive(Clone)]
 struct Several {
-    /// Prefix of a line, as `[2 tcp:localhost:4000]`.
+    /// Prefix of a line, such as `[2 tcp:localhost:4000]`.
     name: String,
-    /// Its place among the lines at the bottom.
+    /// Index of the device's status line.
     index: usize,
     bottom: Arc<Mutex<Bottom>>,
 }
 
-/// The lines at the bottom of the terminal, one for each device.
+/// The status lines of the terminal, one for each device.
 struct Bottom(Vec<Option<String>>);
 
 impl Bottom {
-    /// The lines of those that have one.
+    /// Returns the status lines that are set.
     fn text(&self) -> Option<String> {
         let lines: Vec<&str> = self.0.iter().flatten().map(String::as_str).collect();
         (!lines.is_empty()).then(|| lines.join("\n"))
@@ -33,8 +33,8 @@ impl Bottom {
 }
 
 impl DeviceConsole {
-    /// One for each of these devices: where there are several, their lines begin with
-    /// their number, counted from one, and their name.
+    /// Returns a console for each device. If there are several, their lines start with their
+    /// number, from one, and their name.
     pub(in crate::cli) fn of_each(devices: &[impl Display]) -> Vec<Self> {
         if devices.len() == 1 {
             return vec![Self::default()];
@@ -52,7 +52,7 @@ impl DeviceConsole {
             .collect()
     }
 
-    /// Returns the prefix of its lines, if there are several devices.
+    /// Returns the prefix of the lines, if there are several devices.
     pub(in crate::cli) fn name(&self) -> Option<&str> {
         self.several.as_ref().map(|several| several.name.as_str())
     }
@@ -76,12 +76,12 @@ impl DeviceConsole {
         writer::tell(self.named(&line.to_string()));
     }
 
-    /// Replaces this device's line at the bottom of the terminal, or takes it away.
+    /// Replaces or removes this device's status line.
     pub(in crate::cli) fn status(&self, line: Option<String>) {
         let Some(several) = &self.several else {
             return writer::status(line);
         };
-        // Nothing that panics runs while this is held.
+        // No code that panics runs while the lock is held.
         let bottom = several.bottom.lock();
         let mut bottom = bottom.unwrap_or_else(PoisonError::into_inner);
         if let Some(own) = bottom.0.get_mut(several.index) {
@@ -90,7 +90,7 @@ impl DeviceConsole {
         writer::status(bottom.text());
     }
 
-    /// Each line of a text with the name before it.
+    /// Adds the device's name to each line of a text.
     fn named(&self, text: &str) -> String {
         match self.name() {
             None => text.to_owned(),

@@ -1,5 +1,5 @@
-//! Ctrl-C, and the signals that ask a program to end or tell that its terminal is
-//! gone: the first asks for a clean end, the second ends at once.
+//! Ctrl-C, and the signals that request an end or report a closed terminal: the first requests a
+//! clean end, the second ends the program at once.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -16,7 +16,7 @@ use super::writer::put;
 use crate::cli::guardian::{self, WorkerMessage};
 use crate::link::DeviceAddress;
 
-/// Signals that ask for an end.
+/// Signals that request an end.
 #[cfg(unix)]
 pub(in crate::cli) const ASK_FOR_AN_END: [i32; 7] = {
     use signal_hook::consts::signal::{
@@ -26,26 +26,26 @@ pub(in crate::cli) const ASK_FOR_AN_END: [i32; 7] = {
 };
 
 static IS_LISTENING: AtomicBool = AtomicBool::new(false);
-/// An end is asked for.
+/// True if an end was requested.
 static REQUESTED: AtomicBool = AtomicBool::new(false);
-/// The user has pressed Ctrl-C, or its equivalent.
+/// True if the user pressed Ctrl-C, or its equivalent.
 static PRESSED: AtomicBool = AtomicBool::new(false);
-/// The boards that may be armed by this program, by what lines about them begin with: nothing,
-/// where there is one.
+/// The boards that this program may have armed, by the prefix of their lines; the prefix is empty
+/// for a single board.
 static MAY_BE_ARMED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// Time-out of a write to a terminal without a reader.
 const WRITTEN: Duration = Duration::from_millis(200);
 
-/// Exit code of a program that was interrupted twice, as shells have it.
+/// Exit code of a program that was interrupted twice, by the convention of shells.
 pub(in crate::cli) const INTERRUPTED: i32 = 130;
 
 thread_local! {
-    /// The device that this thread serves, until it has seen that an end is asked for.
+    /// The device that this thread serves, until it detects the request to end.
     static SERVES: RefCell<Option<String>> = const { RefCell::new(None) };
 }
 
-/// Listens from now on.
+/// Starts to handle signals.
 pub fn listen() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| match handle(on_signal) {
@@ -53,7 +53,7 @@ pub fn listen() {
             IS_LISTENING.store(true, Ordering::Relaxed);
             guardian::report(&WorkerMessage::Listening);
         }
-        // Then it ends this program the hard way, as without a handler.
+        // Then Ctrl-C ends the program at once, as without a handler.
         Err(error) => tracing::debug!("cannot listen to Ctrl-C: {error}"),
     });
 }
@@ -70,8 +70,8 @@ fn handle(on_signal: fn()) -> io::Result<()> {
     ctrlc::set_handler(on_signal).map_err(io::Error::other)
 }
 
-/// In a terminal Ctrl-C reaches a worker and its guardian, which passes it on: the signal
-/// alone asks for an end, and what is passed on counts.
+/// Handles a signal. In a terminal Ctrl-C reaches the worker and its guardian, which sends it on.
+/// The signal alone only requests an end; presses from the guardian are counted.
 fn on_signal() {
     match guardian::counts_presses() {
         true => REQUESTED.store(true, Ordering::Relaxed),
@@ -79,8 +79,8 @@ fn on_signal() {
     }
 }
 
-/// A press that the guardian passes on. Before this program listens, the guardian sends it
-/// the signal, too.
+/// Handles a press from the guardian, which also sends the signal until this program handles
+/// presses.
 #[cfg(unix)]
 pub(in crate::cli) fn press_if_listening() {
     if IS_LISTENING.load(Ordering::Relaxed) {
@@ -88,7 +88,7 @@ pub(in crate::cli) fn press_if_listening() {
     }
 }
 
-/// Ends this program, whose guardian is gone, as after Ctrl-C.
+/// Ends this program as after Ctrl-C, because its guardian has ended.
 #[cfg(unix)]
 pub(in crate::cli) fn end_without_guardian() {
     if !IS_LISTENING.load(Ordering::Relaxed) {
@@ -98,20 +98,21 @@ pub(in crate::cli) fn end_without_guardian() {
     REQUESTED.store(true, Ordering::Relaxed);
 }
 
-/// Ctrl-C as a key.
+/// Handles Ctrl-C as a key.
 pub(super) fn press_key() {
     guardian::report(&WorkerMessage::Pressed);
     press();
 }
 
-/// Asks for an end because the program that gives commands is gone. A press beside it is the
-/// first: in a terminal Ctrl-C reaches both programs.
+/// Requests an end because the program that sends commands has ended. A press at the same time is
+/// the first, because in a terminal Ctrl-C reaches both programs.
 pub(in crate::cli) fn input_ended() {
     guardian::report(&WorkerMessage::InputEnded);
     REQUESTED.store(true, Ordering::Relaxed);
 }
 
-/// Ctrl-C, from wherever it is heard: the first asks for an end, the second ends at once.
+/// Handles a Ctrl-C from any source: the first requests an end, the second ends the program at
+/// once.
 fn press() {
     REQUESTED.store(true, Ordering::Relaxed);
     if PRESSED.swap(true, Ordering::Relaxed) {
@@ -123,7 +124,7 @@ fn press() {
     }
 }
 
-/// Returns the message at the end of a program that may leave these boards armed.
+/// Returns the final message of a program that may leave these boards armed.
 pub(in crate::cli) fn not_confirmed(boards: &BTreeSet<String>) -> Option<String> {
     let names: Vec<&str> = boards.iter().map(String::as_str).collect();
     let (who, is) = match &names[..] {
@@ -137,8 +138,7 @@ pub(in crate::cli) fn not_confirmed(boards: &BTreeSet<String>) -> Option<String>
     ))
 }
 
-/// Writes to a terminal; one without a reader does not hold the end
-/// up.
+/// Writes to a terminal; one without a reader does not delay the end.
 pub(in crate::cli) fn say(line: String) {
     let (done, is_done) = channel();
     let write = move || {
@@ -150,10 +150,10 @@ pub(in crate::cli) fn say(line: String) {
     }
 }
 
-/// Says whether a board may be armed by this program from now on: who ends it at once
-/// then gets the message to switch the amplifiers off. Called by the thread that serves the board,
-/// which then calls [`requested`] many times a second. `name` is what lines about the board
-/// begin with: nothing, where there is one.
+/// Sets whether this program may have armed a board. If so, a user who ends the program at once
+/// gets the message to switch the amplifiers off. The thread that serves the board calls this
+/// function, and then [`requested`] many times a second. `name` is the prefix of the board's lines,
+/// empty for a single board.
 pub(in crate::cli) fn device_may_be_armed(name: &str, address: &DeviceAddress, may: bool) {
     match may {
         true => may_be_armed().insert(name.to_owned()),
@@ -170,11 +170,11 @@ pub(in crate::cli) fn device_may_be_armed(name: &str, address: &DeviceAddress, m
 }
 
 fn may_be_armed() -> MutexGuard<'static, BTreeSet<String>> {
-    // Nothing that panics runs while this is held.
+    // No code that panics runs while the lock is held.
     MAY_BE_ARMED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns true if an end was asked for.
+/// Returns true if an end was requested.
 #[must_use]
 pub fn requested() -> bool {
     let requested = REQUESTED.load(Ordering::Relaxed);

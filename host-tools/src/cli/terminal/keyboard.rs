@@ -1,8 +1,8 @@
-//! Lines from standard input for any waiting thread, or its keys one by one.
+//! Lines or single keys from standard input, for any thread that waits.
 //!
-//! A thread reads, so that Ctrl-C is heeded while a line is waited for, and so that what
-//! was typed before a question is not taken for its answer. Where the terminal is in raw mode
-//! when that begins, it reads keys, and no lines.
+//! A separate thread reads, so that Ctrl-C works during a wait for a line, and input before a
+//! question is no answer. If the terminal is in raw mode at the start, it reads keys instead of
+//! lines.
 
 use std::io::{self, BufRead, IsTerminal};
 use std::mem;
@@ -15,25 +15,25 @@ use super::raw_keys::{self, Pressed};
 use super::raw_mode;
 use crate::steering::keys::Key;
 
-/// Lines that wait to be taken.
+/// Maximum pending lines.
 const WAITING: usize = 64;
-/// Between two looks for Ctrl-C.
+/// Interval of checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Standard input, line by line.
 pub(in crate::cli) struct Keyboard {
     lines: Receiver<String>,
     pressed: Receiver<Pressed>,
-    /// Keys that were taken while Enter was looked for.
+    /// Keys read while Enter was expected.
     keys: Vec<Key>,
-    /// Number of times that Enter was pressed and not taken.
+    /// Number of unused presses of Enter.
     enters: usize,
-    /// A keyboard: a line that was typed before a question is no answer. What a pipe
-    /// holds is there on purpose.
+    /// True for a keyboard, whose lines before a question are no answer. Lines from a pipe are
+    /// always answers.
     is_typed: bool,
 }
 
-/// The one keyboard, which is read from the first call on.
+/// Returns the one keyboard; the first call starts to read it.
 pub(in crate::cli) fn keyboard() -> MutexGuard<'static, Keyboard> {
     static KEYBOARD: OnceLock<Mutex<Keyboard>> = OnceLock::new();
     let keyboard = KEYBOARD.get_or_init(|| Mutex::new(Keyboard::listening()));
@@ -61,7 +61,7 @@ impl Keyboard {
         }
     }
 
-    /// Sorts the keys that were pressed.
+    /// Separates Enter from other keys.
     fn sort(&mut self) {
         for pressed in self.pressed.try_iter() {
             match pressed {
@@ -71,14 +71,14 @@ impl Keyboard {
         }
     }
 
-    /// The keys besides Enter that were pressed since the last look.
+    /// Returns the keys except Enter that were pressed since the last call.
     pub(in crate::cli) fn keys(&mut self) -> Vec<Key> {
         self.sort();
         mem::take(&mut self.keys)
     }
 
-    /// Returns the keys since the last call, in order; a line of a single digit is that key, and
-    /// each line ends in Enter. Nothing without a keyboard.
+    /// Returns the keys since the last call, in order. A line becomes an Enter, after its digit if
+    /// it is a single digit. Empty without a keyboard.
     pub(super) fn pressed(&mut self) -> Vec<Pressed> {
         let mut pressed: Vec<_> = self.pressed.try_iter().collect();
         if self.is_typed {
@@ -90,22 +90,21 @@ impl Keyboard {
         pressed
     }
 
-    /// Forgets what was typed so far. Keys that change a view are no answer anyway.
+    /// Discards earlier lines and presses of Enter. Other keys remain, because they are no answers.
     pub(in crate::cli) fn forget_typed(&mut self) {
         self.sort();
         self.enters = 0;
         while self.is_typed && self.lines.try_recv().is_ok() {}
     }
 
-    /// Returns true if a line was typed, or Enter was pressed, since the last look; never where
-    /// there is no input.
+    /// Returns true if a line was typed, or Enter pressed, since the last call; false for a pipe.
     pub(in crate::cli) fn was_pressed(&mut self) -> bool {
         self.sort();
         let pressed = mem::take(&mut self.enters) > 0;
         pressed || (self.is_typed && self.lines.try_iter().count() > 0)
     }
 
-    /// Waits for the next line; none where the input ends or an end is asked for.
+    /// Waits for the next line; returns `None` if the input ends or an end is requested.
     pub(in crate::cli) fn line(&self) -> Option<String> {
         while !interrupt::requested() {
             match self.lines.recv_timeout(LOOK) {
@@ -118,7 +117,7 @@ impl Keyboard {
     }
 }
 
-/// The digit that is all of a line.
+/// Returns the digit of a line that has only this digit.
 fn digit(line: &str) -> Option<char> {
     let mut chars = line.trim().chars();
     let digit = chars.next().filter(char::is_ascii_digit);
@@ -131,7 +130,7 @@ fn read(typed: &SyncSender<String>, is_typed: bool) {
             return;
         };
         let taken = match is_typed {
-            // Earlier input is no answer.
+            // Input beyond the limit is older than any question, so it is no answer.
             true => !matches!(typed.try_send(line), Err(TrySendError::Disconnected(_))),
             false => typed.send(line).is_ok(),
         };

@@ -1,6 +1,6 @@
-//! The terminal while a command runs: output and input,
-//! progress, Ctrl-C, what killed commands left, and the prompts that lead to an armed arm. Where several
-//! devices are served, `shared_keyboard` shares the keyboard out and `device_console` names who speaks.
+//! The terminal while a command runs: output and input, progress, Ctrl-C, partial files of killed
+//! commands, and the prompts for arming. If several devices are served, `shared_keyboard` assigns
+//! keys to devices and `device_console` names them in lines.
 
 pub(super) mod arming_prompts;
 pub(super) mod device_console;

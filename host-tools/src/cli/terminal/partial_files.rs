@@ -4,15 +4,15 @@ use std::path::Path;
 
 use crate::output::partial_files;
 
-/// Says on standard error what killed commands left of these files, and how to keep it.
-/// Nothing else in this program touches what is left.
+/// Reports on standard error the partial files of killed commands, and how to keep them. No other
+/// part of the program touches these.
 pub fn tell<'p>(files: impl IntoIterator<Item = &'p Path>) {
     for line in files.into_iter().flat_map(lines) {
         eprintln!("{line}");
     }
 }
 
-/// Two lines for each partial file of `file`.
+/// Returns two lines for each partial file of `file`.
 fn lines(file: &Path) -> Vec<String> {
     let found = partial_files(file).into_iter().flat_map(|left| {
         let (path, bytes) = (left.path.display(), left.bytes);

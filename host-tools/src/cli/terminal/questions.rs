@@ -1,10 +1,10 @@
-//! Questions at a terminal, or at a pipe, whose lines are the answers.
+//! Questions at a terminal, or from a pipe whose lines are the answers.
 
 use super::keyboard::keyboard;
 use super::writer::{say, show};
 
-/// Asks, and gives the answer without the space around it; none where the input ends, an
-/// end is asked for, or the answer is `q`. What was typed before is no answer.
+/// Prints a question and returns the trimmed answer; `None` if the input ends, an end is requested,
+/// or the answer is `q`. Earlier input is discarded.
 pub(in crate::cli) fn ask(question: &str) -> Option<String> {
     let mut keyboard = keyboard();
     keyboard.forget_typed();
@@ -19,7 +19,7 @@ pub(in crate::cli) fn ask(question: &str) -> Option<String> {
     }
 }
 
-/// Asks until the answer is a number, or nothing; none as [`ask`].
+/// Repeats a question until the answer is a number or empty; returns `None` as [`ask`].
 pub(in crate::cli) fn number(question: &str) -> Option<Option<f64>> {
     loop {
         let answer = ask(question)?.replace(',', ".");

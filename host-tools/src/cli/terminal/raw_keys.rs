@@ -1,5 +1,4 @@
-//! Keys one by one, without waiting for Enter. In raw mode Ctrl-C is a key like others, and means
-//! what it always does.
+//! Single keys, without Enter. In raw mode Ctrl-C is read as a key and keeps its usual meaning.
 
 use std::io::{self, Read};
 use std::sync::mpsc::SyncSender;
@@ -7,23 +6,23 @@ use std::sync::mpsc::SyncSender;
 use super::{interrupt, raw_mode};
 use crate::steering::keys::Key;
 
-/// Input that the thread at the keyboard has read.
+/// Input read by the keyboard's thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pressed {
     /// Enter.
     Enter,
-    /// A key that may change the view.
+    /// Any other key, which may change the placement.
     Key(Key),
 }
 
-/// Reads keys until the terminal is gone.
+/// Reads keys until the terminal is closed.
 pub(super) fn read(pressed: &SyncSender<Pressed>) {
     let (mut keys, mut chunk, mut stdin) = (Sequence::default(), [0; 64], io::stdin().lock());
     while let Ok(n @ 1..) = stdin.read(&mut chunk) {
         for byte in chunk.iter().take(n) {
             match keys.take(*byte) {
                 Some(Typed::Interrupt) => interrupt::press_key(),
-                // Earlier input is ignored.
+                // Keys beyond the limit are dropped.
                 Some(Typed::Pressed(key)) => drop(pressed.try_send(key)),
                 None => {}
             }
@@ -32,7 +31,7 @@ pub(super) fn read(pressed: &SyncSender<Pressed>) {
     raw_mode::put_back();
 }
 
-/// Meaning of a byte, or of the last of several.
+/// Meaning of a byte, or of the end of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Typed {
     /// Ctrl-C, or Ctrl-\.
@@ -40,8 +39,8 @@ enum Typed {
     Pressed(Pressed),
 }
 
-/// Bytes of a key so far. Arrows are `ESC [ A` to `D`, or `ESC O A` to `D`; others with as many
-/// bytes are passed over as a whole.
+/// State of a key's sequence. Arrows are `ESC [ A` to `D`, or `ESC O A` to `D`; other sequences are
+/// skipped as a whole.
 #[derive(Clone, Copy, Debug, Default)]
 enum Sequence {
     #[default]
@@ -63,7 +62,7 @@ impl Sequence {
                 *self = Self::Control;
                 None
             }
-            // What stands before the last byte: of an arrow, the keys that are held with it.
+            // Parameters before the last byte; for an arrow, the modifier keys.
             (Self::Control, 0x20..=0x3F) => {
                 *self = Self::Control;
                 None
@@ -107,7 +106,7 @@ mod tests {
                 b"\x1b[A\x1b[B\x1bOC\x1bOD",
                 vec![arrow(0, 1), arrow(0, -1), arrow(1, 0), arrow(-1, 0)],
             ),
-            // Held with Ctrl; a page key, whose digits are no keys.
+            // An arrow with Ctrl; a page key, whose digits are no keys.
             (b"\x1b[1;5C\x1b[5~0", vec![arrow(1, 0), key(Key::Char('0'))]),
             (b"\x1b[\x03", vec![Typed::Interrupt]),
             (b"\xc3\xa4\x07\x1b\x1b[A", vec![arrow(0, 1)]),

@@ -1,21 +1,20 @@
-//! The terminal in raw mode, in which it hands over keys one by one. It is put back on every way out:
-//! when the mode is dropped, also in a panic, and before a program that is interrupted twice exits
-//! ([`put_back`]).
+//! The terminal in raw mode, which sends single keys. It is always restored: when the mode is
+//! dropped, also in a panic, and before a program that is interrupted twice exits ([`put_back`]).
 
 use std::io::{self, IsTerminal};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crossterm::terminal::{disable_raw_mode, enable_raw_mode};
 
-/// True if the terminal is in raw mode: lines then end in CR LF.
+/// True if the terminal is in raw mode; lines must then end in CR LF.
 static IS_RAW: AtomicBool = AtomicBool::new(false);
 
-/// The terminal in raw mode, until this is dropped.
+/// Keeps the terminal in raw mode until it is dropped.
 pub(in crate::cli) struct RawMode(());
 
 impl RawMode {
-    /// Puts the terminal into raw mode; none where standard input is no terminal, or it
-    /// cannot be.
+    /// Sets the terminal to raw mode; returns `None` if standard input is no terminal, or an error
+    /// occurs.
     pub(in crate::cli) fn enter() -> Option<Self> {
         if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
             return None;
@@ -32,7 +31,7 @@ impl Drop for RawMode {
     }
 }
 
-/// Puts the terminal back as it was, where it is in raw mode.
+/// Restores the terminal if it is in raw mode.
 pub(in crate::cli) fn put_back() {
     if IS_RAW.swap(false, Ordering::Relaxed) {
         let _ = disable_raw_mode();

@@ -1,8 +1,8 @@
-//! One keyboard for several devices. A digit chooses a device, and keys go to the device that was
-//! chosen last. Enter goes to a device whose digit was pressed right before it, and else to none:
-//! an Enter for one arm never arms another user's arm.
+//! One keyboard for several devices. A digit selects a device, and keys go to the selected device.
+//! Enter goes only to a device whose digit was pressed directly before: an Enter for one arm must
+//! never arm another user's arm.
 //!
-//! If the terminal sends whole lines, the number of a device on a line of its own is that digit and
+//! If the terminal sends whole lines, a line with only the number of a device means that digit and
 //! Enter.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,9 +14,9 @@ use super::raw_mode::RawMode;
 use super::writer::tell;
 use crate::steering::keys::Key;
 
-/// Devices that can be chosen by one digit.
+/// Maximum number of devices, each selected by one digit.
 pub(in crate::cli) const MOST: usize = 9;
-/// Keys that wait for a device; beyond them, keys are not heeded.
+/// Maximum pending keys of a device; further keys are dropped.
 const WAITING: usize = 64;
 
 /// The keyboard of several devices.
@@ -24,35 +24,35 @@ struct SharedKeyboard {
     /// Prefix of each device's lines.
     names: Vec<String>,
     state: Mutex<State>,
-    /// While keys come one by one.
+    /// Raw mode, if the terminal sends single keys.
     raw: Option<RawMode>,
 }
 
 struct State {
-    /// The device chosen last, counted from zero.
+    /// The selected device, counted from zero.
     chosen: usize,
-    /// The device whose digit was pressed last of all.
+    /// The device whose digit was the last key.
     named: Option<usize>,
     inboxes: Vec<Inbox>,
 }
 
-/// Keys for a device that it has not taken.
+/// Pending keys of a device.
 #[derive(Default)]
 struct Inbox {
     keys: Vec<Key>,
     enters: usize,
-    /// The device is not served any more.
+    /// True if the device is no longer served.
     is_closed: bool,
 }
 
-/// A device's place at the desk.
+/// A device's share of the keyboard.
 pub(in crate::cli) struct DeviceKeys {
     shared_keyboard: Arc<SharedKeyboard>,
     index: usize,
 }
 
-/// Takes what is typed for these devices from now on, and keys one by one where the terminal
-/// gives them so. The first device is chosen.
+/// Starts to share the keyboard among these devices, with single keys if the terminal can send
+/// them. The first device is selected.
 pub(in crate::cli) fn share(consoles: &[DeviceConsole]) -> Vec<Arc<DeviceKeys>> {
     share_from(consoles, RawMode::enter())
 }
@@ -83,11 +83,11 @@ fn share_from(consoles: &[DeviceConsole], raw: Option<RawMode>) -> Vec<Arc<Devic
 
 impl SharedKeyboard {
     fn state(&self) -> MutexGuard<'_, State> {
-        // Nothing that panics runs while this is held.
+        // No code that panics runs while the lock is held.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Hands out what was pressed since the last look.
+    /// Distributes the keys pressed since the last call.
     fn sort(&self) -> MutexGuard<'_, State> {
         let mut state = self.state();
         for pressed in keyboard().pressed() {
@@ -98,7 +98,7 @@ impl SharedKeyboard {
         state
     }
 
-    /// Distributes a pressed key. Returns the message about it, if there is one.
+    /// Distributes a pressed key. Returns a message about it, if any.
     fn take(&self, state: &mut State, pressed: Pressed) -> Option<String> {
         let number = match pressed {
             Pressed::Key(Key::Char(digit)) => digit.to_digit(10).unwrap_or(0) as usize,
@@ -136,25 +136,24 @@ impl SharedKeyboard {
 }
 
 impl DeviceKeys {
-    /// Returns true if keys come one by one.
+    /// Returns true if the terminal sends single keys.
     pub(in crate::cli) fn has_keys(&self) -> bool {
         self.shared_keyboard.raw.is_some()
     }
 
-    /// Returns the key that answers a question of this device.
+    /// Returns the keys that answer a question of this device.
     pub(in crate::cli) fn press_enter(&self) -> String {
         format!("press {} and then Enter", self.index + 1)
     }
 
-    /// The keys besides Enter that were pressed for this device since the last look.
+    /// Returns the keys except Enter that were pressed for this device since the last call.
     pub(in crate::cli) fn keys(&self) -> Vec<Key> {
         let mut state = self.shared_keyboard.sort();
         let inbox = state.inboxes.get_mut(self.index);
         inbox.map_or(vec![], |inbox| std::mem::take(&mut inbox.keys))
     }
 
-    /// Forgets what was pressed so far to answer a question of this device, also its digit
-    /// without an Enter.
+    /// Discards earlier answers to a question of this device, also its digit without an Enter.
     pub(in crate::cli) fn forget(&self) {
         drop(self.shared_keyboard.sort());
         self.forget_answers();
@@ -170,7 +169,7 @@ impl DeviceKeys {
         }
     }
 
-    /// Returns the number of times that Enter was pressed for this device since the last look.
+    /// Returns the number of presses of Enter for this device since the last call.
     pub(in crate::cli) fn enters(&self) -> usize {
         let mut state = self.shared_keyboard.sort();
         let inbox = state.inboxes.get_mut(self.index);
@@ -229,12 +228,11 @@ mod tests {
         let told = press(&device_keys, &[key('2'), Pressed::Enter]);
         assert_eq!(told, ["keys go to [2 usb:7]"]);
         assert_eq!(got(&device_keys[1]), (vec![], 1));
-        // The second device is chosen still; this Enter may be the first one's user's.
+        // The second device is still selected, but this Enter may be from the first one's user.
         no_device(press(&device_keys, &[Pressed::Enter]));
         no_device(press(&device_keys, &[key('2'), key('+'), Pressed::Enter]));
         assert_eq!(got(&device_keys[1]), (vec![Key::Char('+')], 0));
-        // A digit from before a question is no answer to it either, and one for another
-        // device's is.
+        // A digit before a question is no answer either; one for another device is kept.
         press(&device_keys, &[key('2')]);
         device_keys[1].forget_answers();
         no_device(press(&device_keys, &[Pressed::Enter]));
@@ -249,7 +247,7 @@ mod tests {
     fn keys_go_to_the_device_that_was_chosen_last() {
         let device_keys = two();
         press(&device_keys, &[key('+'), key('2'), key('-')]);
-        // There is no third device, and 0 is a key like others.
+        // There is no third device, and 0 is an ordinary key.
         press(&device_keys, &[key('3'), key('0')]);
         assert_eq!(got(&device_keys[0]), (vec![Key::Char('+')], 0));
         let keys = ['-', '3', '0'].map(Key::Char).to_vec();
@@ -263,7 +261,7 @@ mod tests {
         let told = press(&device_keys, &[key('2'), Pressed::Enter]);
         assert_eq!(told, ["[2 usb:7] is not served any more"]);
         assert_eq!(got(&device_keys[0]), (vec![], 0));
-        // However long keys are held for it.
+        // Even if a key is held down.
         press(&device_keys, &[key('+'); 10 * WAITING]);
         assert!(device_keys[0].shared_keyboard.state().inboxes[1].keys.len() <= WAITING);
     }

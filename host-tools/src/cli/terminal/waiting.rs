@@ -1,5 +1,4 @@
-//! Signs of life of long work: on a terminal a line at the bottom, else a line every
-//! few seconds.
+//! Progress of long work: a status line on a terminal, otherwise a line every few seconds.
 
 use std::io::{IsTerminal, stderr};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -10,20 +9,19 @@ use indicatif::ProgressBar;
 use crate::cli::failure::Failure;
 use heightfield::Raster;
 
-/// Before the first line where there is no terminal, and between two of them.
+/// Time before the first line without a terminal, and between two lines.
 const FIRST: Duration = Duration::from_secs(1);
 const BETWEEN: Duration = Duration::from_secs(3);
-/// Between two changes of the line on a terminal.
+/// Interval of updates of the status line.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Does `work`, and shows meanwhile what `line` says of it. For what is done before a device is
-/// served.
+/// Runs `work` and shows `line` meanwhile. For work before a device is served.
 pub(in crate::cli) fn shown_meanwhile<T>(
     line: impl Fn() -> String + Sync,
     work: impl FnOnce() -> T,
 ) -> T {
     std::thread::scope(|scope| {
-        // It is closed also where the work panics.
+        // The channel also closes if the work panics.
         let (_working, ended) = channel::<()>();
         let line = &line;
         scope.spawn(move || {
@@ -37,10 +35,10 @@ pub(in crate::cli) fn shown_meanwhile<T>(
     })
 }
 
-/// The same of the plan of a path over an open terrain.
+/// The same for planning a path over an open terrain.
 ///
 /// # Errors
-/// The reason why heights could not be read, or else that of the work.
+/// The reason why heights could not be read, or else the error of the work.
 pub(in crate::cli) fn shown_planning<T, E>(
     name: &str,
     raster: &Raster,
@@ -70,7 +68,7 @@ fn at_bottom(line: impl Fn() -> String, goes_on: impl Fn(Duration) -> bool) {
     bar.finish_and_clear();
 }
 
-/// `goes_on` waits for so long, and tells whether the work continues.
+/// Prints lines until `goes_on` returns false; it waits for the given time first.
 fn in_lines(
     line: impl Fn() -> String,
     goes_on: impl Fn(Duration) -> bool,

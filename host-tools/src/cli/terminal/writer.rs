@@ -1,10 +1,9 @@
-//! Output to the terminal while a board may be armed, and the log. Commands that
-//! hold no device print (`print_macros.rs`).
+//! Output to the terminal while a board may be armed, and the log. Commands without an open device
+//! print directly (`print_macros.rs`).
 //!
-//! One thread writes, and callers do not wait for it. A window that was closed,
-//! a reader that is gone and a disk that is full therefore end nothing. A terminal that
-//! was stopped (Ctrl-S), or a reader that does not read, delays nothing: the lines that
-//! do not fit any more are left out.
+//! One thread writes, and callers do not wait for it. Therefore a closed window, a closed pipe or a
+//! full disk ends nothing, and a terminal stopped by Ctrl-S, or a reader that does not read, delays
+//! nothing: lines beyond the queue are omitted.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -17,22 +16,22 @@ use indicatif::ProgressBar;
 use super::raw_mode;
 use heightfield::printable_text::printable_lines;
 
-/// Lines that wait to be written; beyond them, lines are left out.
+/// Maximum pending lines; further lines are omitted.
 const WAITING: usize = 512;
 
 /// Text to write.
 enum Said {
-    /// To standard output, as it is.
+    /// Unchanged text for standard output.
     Out(String),
-    /// A line to standard error.
+    /// A line for standard error.
     Err(String),
-    /// The line at the bottom of the terminal.
+    /// The status line of the terminal.
     Status(Option<String>),
-    /// Nothing: everything before is written.
+    /// Confirms that all earlier text is written.
     Flush(SyncSender<()>),
 }
 
-/// The way to the thread that writes; none where there can be no such thread.
+/// Queue of the writing thread; `None` if the thread cannot be started.
 static WRITER: OnceLock<Option<SyncSender<Said>>> = OnceLock::new();
 
 /// Writes a line to standard output.
@@ -40,7 +39,7 @@ pub(in crate::cli) fn say(line: impl Display) {
     speak(Said::Out(format!("{line}\n")));
 }
 
-/// Writes to standard output, without an end of the line.
+/// Writes to standard output, without a line end.
 pub(in crate::cli) fn show(text: impl Display) {
     speak(Said::Out(text.to_string()));
 }
@@ -50,7 +49,7 @@ pub(in crate::cli) fn tell(line: impl Display) {
     speak(Said::Err(format!("{line}\n")));
 }
 
-/// Replaces the line at the bottom of the terminal, or takes it away.
+/// Replaces or removes the status line.
 pub(in crate::cli) fn status(line: Option<String>) {
     speak(Said::Status(line));
 }
@@ -59,7 +58,7 @@ pub(in crate::cli) fn status(line: Option<String>) {
 pub(in crate::cli) fn finish() {
     if let Some(Some(writer)) = WRITER.get() {
         let (done, is_done) = sync_channel(1);
-        // Where the thread is gone there is nothing to wait for.
+        // If the thread has ended, there is nothing to wait for.
         if writer.send(Said::Flush(done)).is_ok() {
             let _ = is_done.recv();
         }
@@ -73,7 +72,7 @@ fn speak(said: Said) {
         thread.spawn(move || write_all(said)).ok().map(|_| writer)
     });
     match writer {
-        // Without a reader this cannot be reported either.
+        // If the queue is full or closed, this cannot be reported either.
         Some(writer) => drop(writer.try_send(said)),
         None => write(said, &mut None),
     }
@@ -86,7 +85,7 @@ fn write_all(said: Receiver<Said>) {
     }
 }
 
-/// Writes around the line at the bottom.
+/// Writes above the status line.
 fn write(said: Said, bottom: &mut Option<ProgressBar>) {
     match said {
         Said::Out(text) => above(bottom, || put(io::stdout(), &text)),
@@ -114,8 +113,8 @@ fn above(bottom: &Option<ProgressBar>, put: impl FnOnce()) {
     }
 }
 
-/// Writes, where that can be written, what a terminal may show. In raw mode a terminal does not go
-/// back to the first column by itself.
+/// Writes text that is safe for a terminal, and ignores errors. In raw mode the terminal needs a CR
+/// for the first column.
 pub(in crate::cli) fn put(mut to: impl Write, text: &str) {
     let mut text = printable_lines(text);
     if raw_mode::is_raw() {

@@ -1,23 +1,23 @@
-//! A table's entry for one material, with its units.
+//! A table's entry for one material, with units.
 
 use serde::{Deserialize, Deserializer};
 
 use super::super::quantity::{ANGLE, DAMPING, LENGTH, STIFFNESS, TIME, Units};
 
-/// A table's entry for one material; empty where it states nothing.
+/// A table's entry for one material; fields not stated are `None`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaterialEntry {
-    /// Its name.
+    /// Name of the material.
     pub name: Option<String>,
     /// Stiffness, N/mm.
     #[serde(deserialize_with = "stiffness")]
     pub stiffness: Option<f32>,
-    /// Coefficient of friction while the tip slides.
+    /// Coefficient of sliding friction.
     pub friction: Option<f32>,
-    /// The same until it begins to slide.
+    /// Coefficient of static friction.
     pub static_friction: Option<f32>,
-    /// Friction that grows with the speed: the time by which the tip trails, s.
+    /// Viscous friction, proportional to the speed: the time by which the tip lags, s.
     #[serde(deserialize_with = "time")]
     pub viscous_friction: Option<f32>,
     /// Damping along the force, N·s/m.
@@ -28,36 +28,36 @@ pub struct MaterialEntry {
     /// Height of the micro-relief above and below the surface, mm.
     #[serde(deserialize_with = "length")]
     pub texture_amplitude: Option<f32>,
-    /// From ridge to ridge, mm.
+    /// Distance between ridges, mm.
     #[serde(deserialize_with = "length")]
     pub texture_wavelength: Option<f32>,
-    /// Direction in which the ridges of a grating follow each other, degrees from east to north.
+    /// Direction across the ridges of a grating, degrees from east to north.
     #[serde(deserialize_with = "angle")]
     pub texture_direction: Option<f32>,
-    /// Which of the textures that are alike.
+    /// Selects one of many similar textures.
     pub texture_seed: Option<u32>,
 }
 
-/// A texture by its name.
+/// Name of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TextureName {
-    /// The surface is even.
+    /// No texture.
     None,
-    /// Heights at random.
+    /// Random heights.
     Grain,
-    /// Ridges.
+    /// Parallel ridges.
     Grating,
 }
 
-/// Shading of the force over the edges between patches.
+/// Shading of the force across the edges of patches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ShadingName {
-    /// It follows the normals of the patches.
+    /// The force follows the patches' normals.
     #[default]
     None,
-    /// It turns evenly.
+    /// The force's direction changes gradually.
     Smooth,
 }
 
@@ -65,10 +65,10 @@ pub enum ShadingName {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PassivityName {
-    /// Wherever a current may flow.
+    /// On while a current may flow.
     #[default]
     On,
-    /// Never.
+    /// Always off.
     Off,
 }
 

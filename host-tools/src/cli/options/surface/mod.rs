@@ -1,4 +1,4 @@
-//! Options that say what a terrain feels like; shared by `replay`, `run`, `demo` and `view`.
+//! Options for the surface of a terrain, shared by `replay`, `run`, `demo` and `view`.
 
 mod material_entry;
 mod numbers;
@@ -58,16 +58,16 @@ pub struct SurfaceOptions {
     pub materials: Option<PathBuf>,
 }
 
-/// A surface by its name, or the file that has it.
+/// A named surface, or the file of one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SurfaceChoice {
-    /// One that has a name.
+    /// A named surface.
     Named(&'static NamedSurface),
     /// A table, a settings file with one, or a recording.
     File(PathBuf),
 }
 
-/// Reads a surface's name or file.
+/// Returns the parser of a surface's name or file.
 pub fn choice() -> impl TypedValueParser<Value = SurfaceChoice> {
     PathBufValueParser::new().try_map(|path| {
         let named = path.to_str().and_then(NamedSurface::find);
@@ -87,14 +87,14 @@ pub fn choice() -> impl TypedValueParser<Value = SurfaceChoice> {
 /// A surface with all its numbers.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// The surface parameters of the scene: those of the default if the ground has classes.
+    /// The scene's surface parameters; the default class if the ground has classes.
     pub params: SurfaceParams,
-    /// The classes of the ground, where the surface has some.
+    /// The classes of the ground, if any.
     looks: Option<Looks>,
 }
 
 impl SurfaceOptions {
-    /// The files that are read: no output may be one of them.
+    /// Returns the input files, none of which may be an output.
     pub(in crate::cli) fn inputs(&self) -> Vec<PathBuf> {
         let mut inputs = self.materials.as_deref().map_or(vec![], files_read_with);
         if let Some(SurfaceChoice::File(file)) = &self.surface {
@@ -103,10 +103,10 @@ impl SurfaceOptions {
         inputs
     }
 
-    /// Reads the surface. `--stiffness` and `--friction` take the place of its own numbers.
+    /// Reads the surface. `--stiffness` and `--friction` replace its own numbers.
     ///
     /// # Errors
-    /// A file that has no surface, and numbers that no surface has.
+    /// The file has no surface, or a number is invalid for a surface.
     pub fn load(&self) -> Result<Surface, Failure> {
         let mut surface = match &self.surface {
             None => Surface::of(&SurfaceParams::PREMIUM),
@@ -137,7 +137,7 @@ impl SurfaceOptions {
         Ok(surface)
     }
 
-    /// The surface of a recording, with its classes as they were.
+    /// Returns the surface of a recording, with its classes.
     fn of_recording(&self, file: &Path) -> Result<Surface, Failure> {
         let Some(settings) = settings_of(file)? else {
             return Err(format!("{} is no recording, and no .toml", file.display()))
@@ -152,7 +152,8 @@ impl SurfaceOptions {
         Ok(Surface { params, looks })
     }
 
-    /// The surface of a table: the options over its default, and the classes over that.
+    /// Returns the surface of a table: the options replace numbers of its default, and the classes
+    /// replace both.
     fn of_table(&self, file: &Path) -> Result<Surface, Failure> {
         let table = TableFile::open(file)?;
         let (line, look) = &table.default;
@@ -201,8 +202,8 @@ impl SurfaceOptions {
         })
     }
 
-    /// Checks that a table, which may be a stranger's, asks for no more stiffness than keys may, or
-    /// than the command line does.
+    /// Checks that a table, which may be from an untrusted source, has no more stiffness than keys
+    /// or the command line allow.
     fn check_stiffness(
         &self,
         look: &MaterialEntry,
@@ -224,7 +225,7 @@ impl SurfaceOptions {
 }
 
 impl Surface {
-    /// A surface that is the same everywhere.
+    /// Returns a uniform surface.
     const fn of(params: &SurfaceParams) -> Self {
         Self {
             params: *params,
@@ -232,11 +233,12 @@ impl Surface {
         }
     }
 
-    /// The materials of a terrain: its classes from the file of the options, as this surface has
-    /// them.
+    /// Returns a terrain's materials: the classes of the options' file, with this surface's
+    /// entries.
     ///
     /// # Errors
-    /// A fault of the file of classes or its place; a file without classes, or classes without a file.
+    /// The file of classes or its place is invalid; there are no classes for a file, or no file for
+    /// classes.
     pub(in crate::cli) fn materials(
         &self,
         options: &SurfaceOptions,
@@ -262,8 +264,8 @@ impl Surface {
     }
 }
 
-/// Returns the failure of a file of classes: hints for heights work out numbers between those of
-/// the file, and between classes there are none.
+/// Returns the failure of a file of classes. Hints for heights interpolate between values, which is
+/// invalid for classes.
 fn of_classes(error: heightfield::Error) -> Failure {
     let hint = error.hint().replace("-r bilinear", "-r near");
     let hint = hint.replace("-r average", "-r mode");

@@ -1,4 +1,4 @@
-//! The numbers of a surface: which it can have, and how a table changes them.
+//! The valid numbers of a surface, and their change by a table.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use super::table::MaterialEntry;
 use super::texture;
 use crate::cli::failure::Failure;
 
-/// A friction with another coefficient, which also holds until the tip slides.
+/// Returns a friction with another coefficient, also for static friction.
 pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
     Friction {
         viscous_s: friction.viscous_s,
@@ -17,8 +17,8 @@ pub(super) fn rubbed(friction: &Friction, mu: f32) -> Friction {
     }
 }
 
-/// A material with what a table states in place of its numbers. A friction brings its own static
-/// part.
+/// Returns a material with a table's numbers in place of its own. A stated friction also sets the
+/// static part.
 pub(super) fn over(
     material: &Material,
     look: &MaterialEntry,
@@ -48,7 +48,7 @@ pub(super) fn over(
     })
 }
 
-/// Checks that a surface can have these numbers; the message says which it can.
+/// Checks that the numbers are valid for a surface; the message states the valid range.
 pub(super) fn check(material: &Material) -> Result<(), String> {
     let Friction {
         static_mu,

@@ -1,4 +1,4 @@
-//! A surface as a user writes it: TOML, the default and further classes of the ground.
+//! A surface file of the user: TOML, with the default and further classes of the ground.
 //!
 //! ```toml
 //! shading = "smooth"
@@ -12,8 +12,8 @@
 //! texture = "grain"
 //! ```
 //!
-//! A quantity is a number in its usual unit, or a text with the unit. A class takes from the default
-//! what it does not state.
+//! A quantity is a number in its default unit, or a text with a unit. A class inherits fields that
+//! it does not state from the default.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,35 +26,34 @@ pub use super::material_entry::{MaterialEntry, PassivityName, ShadingName, Textu
 use heightfield::printable_text::printable;
 use heightfield::regular_file;
 
-/// Most classes that a table names: with the default, as many materials as a device has room
-/// for.
+/// Maximum classes of a table: with the default, the number of materials that a device can store.
 pub const MAX_CLASSES: usize = 15;
-/// A longer file is no table, bytes.
+/// Size limit of a table, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// The keys of earlier versions and their names now.
+/// Keys of earlier versions and their present names.
 const RENAMED: [(&str, &str); 2] = [
     ("stiffness_n_per_mm", "stiffness"),
     ("damping_ns_per_m", "damping"),
 ];
 
-/// A table that was read: the default, and the classes in their order, each with its line.
+/// A parsed table: the default, and the classes in order, each with its line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableFile {
-    /// Which normals the force follows.
+    /// Shading of the force.
     pub shading: ShadingName,
     /// The passivity controller, on or off.
     pub passivity: PassivityName,
-    /// Entry for samples without a class.
+    /// Line and entry for samples without a class.
     pub default: (usize, MaterialEntry),
-    /// By class.
+    /// Number, line and entry of each class.
     pub classes: Vec<(i64, usize, MaterialEntry)>,
 }
 
-/// Fault of a table.
+/// Error of reading a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{}: {why}", file.display())]
     Unreadable {
         /// The file.
@@ -62,27 +61,27 @@ pub enum TableError {
         /// The reason.
         why: std::io::Error,
     },
-    /// It is no such TOML.
+    /// The text is no valid table.
     #[error("{}: {why}", file.display())]
     NoTable {
         /// The file.
         file: PathBuf,
-        /// Found text, and its line.
+        /// The parser's message, with the line.
         why: String,
     },
-    /// One of its classes.
+    /// One of the classes is invalid.
     #[error("{}, line {line}: {why}", file.display())]
     Class {
         /// The file.
         file: PathBuf,
-        /// The line, from 1 on.
+        /// The line, from 1.
         line: usize,
         /// The fault.
         why: String,
     },
 }
 
-/// The file as TOML has it.
+/// The file's TOML structure.
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Written {
@@ -92,14 +91,14 @@ struct Written {
     class: BTreeMap<String, Spanned<MaterialEntry>>,
 }
 
-/// A settings file, whose table `surface` is one.
+/// A settings file, whose table `surface` is a surface.
 #[derive(Deserialize)]
 struct SettingsFile {
     surface: Written,
 }
 
 impl Written {
-    /// Reads a surface, in a file of its own or in a settings file.
+    /// Parses a surface, in its own file or in a settings file.
     fn read(text: &str) -> Result<Self, toml::de::Error> {
         let is_in_settings = toml::from_str::<toml::Table>(text)
             .is_ok_and(|file| file.get("surface").is_some_and(toml::Value::is_table));
@@ -110,7 +109,7 @@ impl Written {
     }
 }
 
-/// Describes the fault of a text, with the present name of a renamed key.
+/// Describes a parse error, with the present name of a renamed key.
 fn explained(why: &toml::de::Error) -> String {
     let text = why.to_string().trim_end().to_owned();
     let is_unknown = |(old, _): &&(&str, &str)| text.contains(&format!("unknown field `{old}`"));
@@ -241,7 +240,7 @@ mod tests {
     #[test]
     fn a_file_that_is_no_table_is_not_read_to_its_end() {
         let file = tempfile::NamedTempFile::new().expect("a file");
-        // All holes: it takes no room.
+        // A sparse file, which needs no disk space.
         file.as_file().set_len(1 << 40).expect("sparse");
         let why = TableFile::open(file.path()).expect_err("a terabyte");
         assert!(

@@ -1,19 +1,19 @@
-//! The micro-relief of a surface, from what a table says of it.
+//! The micro-relief of a surface, from a table's numbers.
 
 use hapterra_core::force::{Pattern, Texture};
 
 use super::table::{MaterialEntry, TextureName};
 
-/// From ridge to ridge where nothing is stated, mm.
+/// Default distance between ridges, mm.
 const USUAL_WAVELENGTH_MM: f32 = 1.0;
-/// Amplitude where nothing is stated: part of the wavelength, and most of it, mm.
+/// Default amplitude: a fraction of the wavelength, and its maximum, mm.
 const USUAL_PART: f32 = 0.1;
 const USUAL_MOST_MM: f32 = 0.2;
 
-/// The texture of a material over that of the default. A stated pattern brings its own numbers.
+/// Returns a material's texture, based on the default's. A stated pattern replaces all numbers.
 ///
 /// # Errors
-/// Numbers without a texture, or such that no hand could feel or no tick could make.
+/// Numbers without a texture, or numbers too small to feel or too large to render.
 pub(super) fn texture(look: &MaterialEntry, default: &Texture) -> Result<Texture, String> {
     let pattern = look
         .texture
@@ -54,7 +54,7 @@ pub(super) fn texture(look: &MaterialEntry, default: &Texture) -> Result<Texture
     })
 }
 
-/// The name of the first number that is stated.
+/// Returns the name of the first stated number.
 fn first_number(look: &MaterialEntry) -> Option<&'static str> {
     let stated = [
         (look.texture_amplitude.is_some(), "texture_amplitude"),
@@ -66,7 +66,7 @@ fn first_number(look: &MaterialEntry) -> Option<&'static str> {
     stated.next().map(|(_, name)| name)
 }
 
-/// A texture whose numbers a hand can feel and a tick can render.
+/// Returns a texture if its numbers can be felt and rendered.
 fn checked(texture: Texture) -> Result<Texture, String> {
     let Texture {
         amplitude_mm: amplitude,
