@@ -100,7 +100,7 @@ fn beside_patches<const D: usize>(
     }
 }
 
-/// Distance along one axis from a place in a cell to a neighbouring cell.
+/// Returns the distance along one axis from a place in a cell to a neighbouring cell.
 fn gap(place: f32, toward: i32) -> f32 {
     match toward {
         1 => 1.0 - place,

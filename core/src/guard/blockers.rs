@@ -3,7 +3,7 @@
 use super::{Blockers, Guard, GuardInputs, SceneKind, Surroundings};
 
 impl Guard {
-    /// Returns the blockers of arming, besides those of the user.
+    /// Returns the blockers of arming, except those that the user can clear.
     pub(super) fn find_blockers(&self, sense: &GuardInputs, around: &Surroundings<'_>) -> Blockers {
         let outside = around.arm.is_some_and(|(_, pose)| {
             let q = pose.angles();

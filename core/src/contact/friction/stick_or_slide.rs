@@ -24,8 +24,8 @@ pub(in crate::contact) const LOOKS: u32 = 8;
 /// Maximum number of straight paths for one HIP, some four for each cell of a window. It stops a
 /// proxy that rounding sends back and forth across a border.
 const WAYS: u32 = 1_024;
-/// Straight ways along the pull within a patch after which Newton's direction takes its place: in
-/// the bent valley of a twisted patch the pull leads across rather than along.
+/// Straight paths along the pull within a patch before Newton's direction replaces it: in the bent
+/// valley of a twisted patch the pull leads across rather than along.
 const ACROSS: u32 = 3;
 
 /// End of a walk.
