@@ -30,8 +30,8 @@ pub(super) struct StraightWay {
 }
 
 impl StraightWay {
-    /// Creates a path from a place of the patch, for a HIP at `hip`, in patch coordinates; at `t =
-    /// 1` it has covered all of `way`.
+    /// Creates a path from a place of the patch, for a HIP at `hip`, in patch coordinates; at
+    /// `t = 1` it has covered all of `way`.
     #[inline]
     pub(super) fn new(patch: &Patch, hip: (f32, f32), from: (f32, f32), way: (f32, f32)) -> Self {
         let (off_u, off_v) = (from.0 - hip.0, from.1 - hip.1);
