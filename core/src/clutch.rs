@@ -114,7 +114,7 @@ impl Clutch {
         matches!(self.state, State::Closed)
     }
 
-    /// Returns true if there is no force, and the HIP stays where it is over the terrain.
+    /// Returns true if there is no force, and the HIP stays at its place over the terrain.
     pub(crate) const fn is_open(&self) -> bool {
         matches!(self.state, State::Open { .. })
     }

@@ -220,7 +220,7 @@ fn pressed_on_a_plane_the_motors_push_back() {
     assert!(last.drive.enabled);
 }
 
-/// A device whose proxy is on the plane, in the tile 10, 10.
+/// A device whose proxy is on the plane, in the tile (10, 10).
 fn dipped(tiles: &mut [Tile]) -> Device<'_, 3> {
     let mut device = Device::<3>::armed(tiles, plane);
     for counts in dip() {

@@ -34,7 +34,7 @@ pub(super) struct Follow {
     pub(super) point: SurfacePoint,
     /// A cell that surely holds a patch: while the HIP is over it, nothing fades.
     over: Cell,
-    /// The patch, and the whole cells of height that its heights count from.
+    /// The patch, and the base of its heights in whole cells.
     patch: Patch,
     base: i32,
     convexity: Convexity,

@@ -46,7 +46,7 @@ fn hip_over(height: Height, [x, y]: [f64; 2], above: f64) -> GridPoint {
     GridPoint::new([cell[0], cell[1], z.floor() as i32], Vec3::new(u, v, w))
 }
 
-/// Returns the answers along a path, after contact onset at its first place.
+/// Returns the results along a path, after contact onset at its first place.
 fn forces_along<const D: usize>(
     field: &Field<'_, D>,
     height: Height,

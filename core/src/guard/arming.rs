@@ -43,7 +43,7 @@ pub(super) struct Arming {
     pub(super) decision: Decision,
     /// True if the switch was open at some time during the request.
     seen_open: bool,
-    /// Share of the force that is let through.
+    /// Rendered share of the force.
     pub(super) gain: f32,
     pub(super) rate: TickRate,
 }

@@ -10,9 +10,9 @@ use crate::rate::TickRate;
 const ENABLE_MS: u32 = 10;
 /// Time for which a ready amplifier may report that it is not ready, ms: a spike on the wire.
 const SPIKE_MS: u32 = 2;
-/// Time constant of the comparison of currents, ms. With twice this value the tolerance would
-/// hardly be reached by an amplifier that reads duty cycles at 1 kHz and follows the fastest change
-/// of force (5.5 A in 8 ms, each current 1 ms late).
+/// Time constant of the comparison of currents, ms. With half of this value, an amplifier that
+/// reads duty cycles at 1 kHz follows the fastest change of force (5.5 A in 8 ms, each current 1 ms
+/// late) without coming near the tolerance.
 const COMPARE_MS: u32 = 20;
 
 /// Maximum difference of a measured current from its command, A, averaged over the comparison's 20

@@ -63,7 +63,7 @@ pub(super) struct JogRun {
     full_a: Vec3,
     /// Ticks at full current that are left.
     left: u32,
-    /// Joint angles when the amplifiers came on.
+    /// Joint angles when the amplifiers were switched on.
     from_rad: Option<Vec3>,
     /// True if the axis' encoder has moved since.
     moved: bool,

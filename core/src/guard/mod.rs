@@ -1,4 +1,4 @@
-//! The gate to the amplifiers: every failure ends in zero.
+//! The guard, the only path to the amplifiers: every failure sets the currents to zero.
 //!
 //! A tick calls three functions in this order: [`Guard::watch`] checks the inputs and the measured
 //! values, and decides whether anything may be driven at all; [`Guard::limit_force`] limits the
@@ -329,7 +329,7 @@ impl Guard {
         self.jog = Some(JogRun::new(jog, self.arming.rate));
     }
 
-    /// Lowers the force to zero, then switches off.
+    /// Fades the force out, then switches off.
     pub fn disarm(&mut self) {
         self.hold.end();
         let gain = self.arming.gain;

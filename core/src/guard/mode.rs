@@ -1,4 +1,4 @@
-//! The steps between off and on.
+//! The modes between off and on.
 
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@
 //! - *All* encoders are stationary, to the count, for two seconds while a motor has more than its
 //!   continuous current. No hand is that steady under such a force.
 //! - *One* encoder is stationary, to within a count, while its motor pushes and the other joints
-//!   move. A hand trembles by more than a count, so if one joint turns alone, only the others count
-//!   as moving.
+//!   move. A hand trembles by more than a count, so in a motion that turns one joint only, the
+//!   other joints still move.
 
 use glam::Vec3;
 

@@ -50,9 +50,9 @@ pub struct Calibration {
     pub l2_mm: f32,
     /// Joint angles within the stops.
     pub limits: JointLimits,
-    /// Torque that holds joint 2 against the arm's weight where cos q2 is 1, Nm.
+    /// Torque that holds joint 2 against the arm's weight at cos q2 = 1, Nm.
     pub gravity_2_nm: f32,
-    /// Torque that holds joint 3 against the arm's weight where sin q3 is 1, Nm.
+    /// Torque that holds joint 3 against the arm's weight at sin q3 = 1, Nm.
     pub gravity_3_nm: f32,
     /// Motor torque constants, Nm/A.
     pub torque_constant: Vec3,

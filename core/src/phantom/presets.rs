@@ -146,7 +146,7 @@ impl Calibration {
 mod tests {
     use super::*;
 
-    /// The tables here and in docs/reference/hardware.md.
+    /// Checks the tables here and in docs/reference/hardware.md.
     #[test]
     fn a_premium_1_0_counts_as_the_tables_say_with_either_ratio() {
         let counts_a_mm = |ratio: Vec3| {

@@ -42,7 +42,7 @@ pub enum FieldError {
         /// Maximum cells per side.
         most: i32,
     },
-    /// The number of heights differs from that of a field of the size, which is this.
+    /// The number of heights is wrong: a field of the size has this many.
     #[error("a field of this size has {0} heights: one more than cells each way")]
     Count(i32),
     /// The heights are too steep.

@@ -13,9 +13,9 @@ pub const MAX_FRAME: usize = 5120;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FrameError {
-    /// Longer than the reader's buffer.
+    /// The frame is longer than the reader's buffer.
     TooLong,
-    /// Not COBS.
+    /// The bytes are not valid COBS.
     Encoding,
     /// The check sum or the content is wrong.
     Content,

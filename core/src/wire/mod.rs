@@ -107,8 +107,8 @@
 //!   ([`ToDevice::MaterialTile`](message::ToDevice::MaterialTile)), and its fallback has none; any
 //!   other tile is a bad frame. A new placement keeps the table, or has none.
 //! - A new session keeps the scene and every stored tile; the numbers of samples and requests start
-//!   again. If arming was in progress without a drive, it is cancelled: the new host must request
-//!   it again. The same happens when its host detaches.
+//!   again. If arming was in progress but nothing was driven yet, it is cancelled: the new host
+//!   must request it again. The same happens when its host detaches.
 //! - Each request is done once. A repeated number of the last request is answered again, unless the
 //!   request is still active. An older number (by less than 128, wrapping) is ignored. An arm
 //!   request is answered when the loop has decided, a store request when the calibration is stored.

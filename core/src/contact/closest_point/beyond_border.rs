@@ -287,7 +287,7 @@ fn fall_into(
 }
 
 /// Returns the neighbour's offer for its closest point `closest`, with the HIP at `hip` in its
-/// coordinates; `None` if that is not nearer.
+/// coordinates; `None` if that is no improvement.
 fn offer(next: &Neighbour, hip: (f32, f32), here: &Nearest, closest: Nearest) -> Option<Offer> {
     let Neighbour {
         side,

@@ -14,7 +14,7 @@ fn convex(heights: [f32; 4], hip: (f32, f32), from: (f32, f32)) -> Option<(f32, 
     Some((place.u, place.v))
 }
 
-/// The closest point by the search by rulings, from both starts.
+/// The closest point by the search by rulings: over v, or over u if that ends at a border.
 fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
     let search = |patch: &Patch, hip, start| {
         let (looked, most) = (0, u32::MAX);

@@ -60,7 +60,7 @@ impl Leave {
 /// depends only on this state, the terrain and the HIP.
 #[derive(Clone, Debug)]
 pub(in crate::contact) struct Descent {
-    /// Point of entry into the patch; its closest point, once that is known.
+    /// Point of entry into the patch; later its closest point.
     at: SurfacePoint,
     stage: Stage,
     /// The patch's closest point, in the stages after it is computed.

@@ -1,4 +1,4 @@
-//! A tick of a proxy on the surface, and of one that lost it.
+//! A tick of a proxy on the surface, and of one whose surface has ended.
 
 use glam::Vec3;
 

@@ -133,7 +133,7 @@ impl SurfacePoint {
         }
     }
 
-    /// Returns true if it is farther from its patch's border than any rounding.
+    /// Returns true if the point is farther from its patch's border than any rounding.
     #[inline]
     pub(in crate::contact) fn is_well_inside(&self) -> bool {
         is_well_inside(self.u) && is_well_inside(self.v)

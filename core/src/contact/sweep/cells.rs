@@ -64,7 +64,7 @@ impl Step {
         }
     }
 
-    /// Returns true if it is no more than a point.
+    /// Returns true if the part is a single point.
     pub(super) fn is_point(&self) -> bool {
         self.from == self.to && self.z_from == self.z_to
     }
@@ -80,7 +80,7 @@ impl Step {
     }
 }
 
-/// Returns the content beside a step over no data: a patch on whose border it is, or no data.
+/// Returns the content beside a step over no-data: a patch on whose border it is, or no-data.
 #[inline(never)]
 pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, CellContent) {
     for place in 0..3 {

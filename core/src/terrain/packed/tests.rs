@@ -222,7 +222,7 @@ fn random_bits_do_not_pay_or_are_whole() {
     assert!((90..180).contains(&packs), "{packs}");
 }
 
-/// Some packed tiles of every kind.
+/// Examples of packed tiles of every kind.
 fn some() -> Vec<Vec<u8>> {
     let mut hollow = hills(30.0, 50);
     for i in (0..SAMPLES).filter(|i| i % 37 < 9) {
