@@ -38,7 +38,7 @@ impl Sources {
         Self { code }
     }
 
-    /// A crate made of these modules.
+    /// A crate with these modules.
     #[cfg(test)]
     fn made_up(modules: &[(&str, &str)]) -> Self {
         let module = |name: &str| {

@@ -42,7 +42,7 @@ pub(super) struct Follow {
 
 impl Follow {
     /// Creates the fast path of a proxy that came to rest with the HIP over the patch of `over`;
-    /// returns `None` if there is none.
+    /// returns `None` if the proxy must use the full contact.
     pub(super) fn from<const D: usize>(
         window: &Window<'_, D>,
         point: SurfacePoint,

@@ -7,8 +7,8 @@ use super::passivity::{MAX_MJ, Moment, Motion, Passivity, Takes};
 use super::{EffectContext, SurfaceParams, clamp_length};
 use crate::scalar::{larger, smaller};
 
-/// Energy that a shaded force may give before an edge, and take beyond it, without a reduction of
-/// its turn, as a fraction of its size times the sum of a cell and the depth. An edge gives a
+/// Energy that a shaded force may give before an edge, and take beyond it, before its turn is
+/// reduced. It is a fraction of the force times the sum of a cell and the depth. An edge gives a
 /// quarter of its bend times the part of a cell on which the force turns ([`super::shading`]): this
 /// much at 23°, twice as much at 45°, the maximum.
 const EDGE_GIVES: f32 = 0.1;

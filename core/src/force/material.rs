@@ -83,8 +83,8 @@ impl MaterialTable {
         materials: Vec::new(),
     };
 
-    /// Creates a table of these materials, the default first; returns `None` if there are none, or
-    /// more than [`Self::MOST`].
+    /// Creates a table of these materials, the default first; returns `None` without materials, or
+    /// with more than [`Self::MOST`].
     #[must_use]
     pub fn new(materials: &[Material]) -> Option<Self> {
         let materials = Vec::from_slice(materials).ok()?;

@@ -2,11 +2,11 @@
 //! (Hannaford and Ryu 2002).
 //!
 //! An ideal spring returns no more energy than it received. A spring that is rendered in ticks
-//! does: its force belongs to the start of the tick and acts a latency L later, too small on the
-//! way in and too large on the way out, and gives K (T / 2 + L) v per metre. The observer adds up
-//! the work of the forces that acted, each at its time, and compares the sum with the energy of an
-//! ideal spring at this depth; the excess was created. So the leak is known while the tip moves in,
-//! and not only after it has left.
+//! does: its force belongs to the start of the tick and acts a latency L later, so it is too small
+//! on the way in and too large on the way out. This gives K (T / 2 + L) v per metre. The observer
+//! adds up the work of the forces that acted, each at its time, and compares the sum with the
+//! energy of an ideal spring at this depth; the excess was created. So the leak is known while the
+//! tip moves in, and not only after it has left.
 //!
 //! The damping of the controller also acts a latency later, so the controller predicts: the next
 //! forces are known, and the tip is assumed to keep its velocity. It adds the damping that

@@ -3,9 +3,9 @@
 //!
 //! The eastward slope of a patch interpolates between its two edges that lead east, so it is
 //! continuous northward and jumps from one edge of a row to the next. Each row of edges is
-//! therefore smoothed along itself: at a sample its direction is the mean of the two edges that
-//! meet there; away from the sample it approaches that of the edge, over the whole edge at a gentle
-//! bend, and over a fifth of it at a sharp bend, which is intended. Columns and the northward slope
+//! therefore smoothed along itself. At a sample its direction is the mean of the two edges that
+//! meet there; away from the sample it approaches that of the edge. A gentle bend uses the whole
+//! edge for this, a sharp bend, which is intended, a fifth of it. Columns and the northward slope
 //! are smoothed in the same way.
 
 use crate::contact::surface::HipView;

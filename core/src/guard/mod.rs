@@ -48,8 +48,8 @@ use stall::StallDetector;
 use thermal::{Motors, Temperatures};
 
 /// Share of the calibration's maximum force that the guard clamps to. An encoder error of twice the
-/// permitted jump per tick, some 7 mm at the tip, changes the levers, and so the force at the tip,
-/// by up to 9 %; this share keeps it below the calibration's maximum (tested by a sweep).
+/// permitted jump per tick is some 7 mm at the tip. It changes the levers, and so the force at the
+/// tip, by up to 9 %; this share keeps it below the calibration's maximum (tested by a sweep).
 pub const WORKING_SHARE: f32 = 0.9;
 /// Maximum counts of an encoder in a second: about 3 m/s at the tip of a Premium 1.5.
 pub const MAX_COUNTS_PER_S: u32 = 128_000;

@@ -12,10 +12,10 @@ use glam::Vec3;
 
 /// Readings (a millisecond each) for which all encoders may be stationary under load.
 const ALL_STILL: u32 = 2_000;
-/// Counts that the other joints may move together while one is stationary: about 200 mm. This is
-/// three times the motion of a hand that turns one joint only, at up to half a metre a second, with
-/// a tremor of 0.2 mm (measured on the virtual Phantom), and more than that of a hand that rubs
-/// along a straight line without any.
+/// Counts that the other joints may move together while one is stationary: about 200 mm. A hand
+/// that turns one joint only, at up to half a metre a second, with a tremor of 0.2 mm (measured on
+/// the virtual Phantom), moves them by a third of this. A hand that rubs along a straight line
+/// without a tremor also moves them by less.
 pub const TRAVEL: u32 = 8_000;
 /// Distance, in counts, within which a joint counts as stationary: an encoder with one dead channel
 /// still alternates by one count.

@@ -21,8 +21,8 @@ pub struct CoarseTile {
 }
 
 impl CoarseTile {
-    /// Minimum shift: a finer tile would have more samples under an arriving tile than a tick has
-    /// time for.
+    /// Minimum shift: with a finer tile, the check of an arriving tile would read more samples than
+    /// a tick has time for.
     pub const LEAST_SHIFT: u8 = 2;
     /// Maximum shift: a tile as large as the range of positions.
     pub const MAX_SHIFT: u8 = 24;

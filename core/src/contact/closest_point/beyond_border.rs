@@ -318,8 +318,8 @@ fn offer(next: &Neighbour, hip: (f32, f32), here: &Nearest, closest: Nearest) ->
 }
 
 /// Returns by how much the squared distance from a HIP at `(p, q)` is smaller at `there` than at
-/// `here`, which is in the patch across a border; the rounding error of that; and the share of it
-/// due to the rounding of both points.
+/// `here`, which is in the patch across a border; its rounding error; and the maximum error due to
+/// the rounding of both points.
 ///
 /// The difference of squares is computed from its factors: with a far HIP the squares themselves
 /// would lose it to rounding.

@@ -186,7 +186,7 @@ fn snapped(x: f32, hip: f32) -> f32 {
 }
 
 impl Nearest {
-    /// No point yet.
+    /// The state before a point is found.
     pub(super) const NONE: Self = Self {
         u: 0.0,
         v: 0.0,

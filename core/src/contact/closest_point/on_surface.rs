@@ -38,7 +38,7 @@ pub(in crate::contact) enum Leave {
     Anywhere,
     /// Anywhere else: a departure from here ended on the surface at once.
     ButAt(SurfacePoint),
-    /// Nowhere: there were too many departures. The proxy last rested here, above the HIP.
+    /// Nowhere: there were too many departures. The proxy last hit the surface here, above the HIP.
     NoMore(SurfacePoint),
 }
 
@@ -289,7 +289,8 @@ impl Descent {
     }
 
     /// Rests, but not below the HIP if the proxy must not leave any more: there the force would
-    /// pull. A patch's closest point may lie there; the place of the last departure does not.
+    /// pull. A patch's closest point may lie there; the place where the proxy last hit the surface
+    /// does not.
     #[inline(never)]
     fn rests(&mut self, leave: &Leave) -> Ended {
         if let Leave::NoMore(held) = leave

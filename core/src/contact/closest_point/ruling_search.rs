@@ -7,8 +7,8 @@
 //!
 //! Newton's method may pass a crest and end lower beyond it. So the rulings between the first and
 //! the last are checked at the end; if F exceeds its start at one of them, the search restarts with
-//! that ruling as the far one. The checks are at even angles: as a patch twists, the height of a
-//! ruling's line over the HIP along its normal is a sine of the angle, so a crest is about as wide
+//! that ruling as the far one. The checks are at even angles. As a patch twists, the height of a
+//! ruling's line over the HIP along its normal is a sine of the angle. So a crest is about as wide
 //! as an angle, even if it is narrow in v.
 
 use super::on_ruling::Ruling;

@@ -1,8 +1,8 @@
 //! The friction cone: pull along the surface, pressure, and the limit that friction holds.
 //!
-//! With `D` the vector from the proxy to the HIP, the pull is the component of `D` along the
-//! steepest direction in which the proxy can move, over all patches that meet at it; the rest of
-//! `D` presses. On an edge or a vertex, each patch offers only the directions that lead into it.
+//! `D` is the vector from the proxy to the HIP. The pull is the component of `D` along the steepest
+//! direction in which the proxy can move, over all patches that meet at it. The rest of `D`
+//! presses. On an edge or a vertex, each patch offers only the directions that lead into it.
 
 use glam::Vec3;
 

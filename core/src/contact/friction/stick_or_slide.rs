@@ -1,10 +1,10 @@
 //! Friction as a walk: the proxy follows the pull and stops where the cone holds (Moreau's
 //! catching-up).
 //!
-//! From the proxy's place the walk goes straight along the pull through one patch, to the first of:
+//! From the proxy's place the walk follows the pull straight through one patch, to the first of:
 //! the cone holds; the border; the minimum of the distance to the HIP. There the pull is computed
-//! again. Every straight path ends nearer to the HIP than it began and crosses no crest, so the
-//! proxy never gets farther from the HIP, and a suspended walk needs no state but a point of the
+//! again. Every straight path ends nearer to the HIP than it began and crosses no crest. So the
+//! proxy never gets farther from the HIP, and the only state of a suspended walk is a point of the
 //! surface.
 
 use glam::Vec3;
