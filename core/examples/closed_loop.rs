@@ -1,5 +1,5 @@
-//! The closed loop: the whole tick, from encoder counts to motor currents, with
-//! a simulated arm and a simulated person who presses it onto a plane.
+//! The closed loop: the whole tick, from encoder counts to motor currents, with a simulated arm
+//! that a simulated hand presses onto a plane.
 //!
 //! ```text
 //! cargo run -p hapterra-core --example closed_loop
@@ -16,11 +16,11 @@ use hapterra_core::terrain::{FieldSize, Tile, TileArena, TileKey};
 use hapterra_core::tick::{Command, Haptics};
 
 const TICK_S: f32 = TickRate::DEFAULT.tick_s();
-/// The plane is this far below the tip's home, mm.
+/// Distance of the plane below the tip's home, mm.
 const ABOVE_PLANE_MM: f32 = 10.0;
 const SIZE: FieldSize = FieldSize::new(64, 64);
 
-/// An arm with a person's hand on it: three joints with inertia and friction.
+/// An arm with a hand on it: three joints with inertia and friction.
 struct Arm {
     mechanism: Kinematics,
     angles: Vec3,
@@ -32,7 +32,7 @@ impl Arm {
     const INERTIA: Vec3 = Vec3::new(0.02, 0.02, 0.015);
     /// Friction and the hand's damping, Nm·s/rad.
     const DAMPING: f32 = 0.15;
-    /// Stiffness of the person's hold at the hand's target, N/mm.
+    /// Stiffness of the hand's grasp at its target, N/mm.
     const GRIP_N_PER_MM: f32 = 0.1;
 
     /// Returns the encoders' counts.
@@ -40,14 +40,14 @@ impl Arm {
         self.mechanism.counts(self.angles, [0; 3])
     }
 
-    /// The tip's height over its home, mm.
+    /// Returns the tip's height over its home, mm.
     fn height_mm(&self) -> f32 {
         let pose = self.mechanism.pose(self.counts(), [0; 3]);
         pose.tip_mm().z - self.mechanism.home_mm().z
     }
 
-    /// Continues for a tick, with these motor currents and a hand that is drawn to a
-    /// height over the tip's home, mm.
+    /// Advances by a tick, with these motor currents and a hand whose target is a height over the
+    /// tip's home, mm.
     fn go_on(&mut self, drive: &GuardOutputs, wanted_mm: f32) {
         let pose = self.mechanism.pose(self.counts(), [0; 3]);
         let wanted = self.mechanism.home_mm() + Vec3::Z * wanted_mm;
@@ -69,7 +69,7 @@ pub(crate) fn main() -> Result<(), CalibrationError> {
         rates: Vec3::ZERO,
     };
 
-    // The loop, in memory that is owned here.
+    // The loop, in memory of this function.
     let mut storage = TileArena::<2>::new();
     let mut spare = Tile::VACANT;
     let mut haptics = Haptics::new(storage.slots(), TickRate::DEFAULT, None);
@@ -88,7 +88,7 @@ pub(crate) fn main() -> Result<(), CalibrationError> {
         materials: None,
     };
     let _ = haptics.accept(Command::Scene(scene));
-    // The whole field fits the window, so its tiles are given once.
+    // The whole field fits into the window, so its tiles are delivered once.
     let mut free = &mut spare;
     for index in SIZE.tiles() {
         let filled = free.fill_from(TileKey { level: 0, index }, 0, SIZE, |_, _| 0.0);
@@ -103,7 +103,7 @@ pub(crate) fn main() -> Result<(), CalibrationError> {
     let mut last = 0.0;
     for tick in 0..6_000_u16 {
         let time_s = f32::from(tick) * TICK_S;
-        // Armed after the switch is pressed and force has come in; then down.
+        // Armed after the switch is pressed and the force has ramped up; then down.
         let wanted_mm = (-8.0 * (time_s - 2.5)).clamp(-20.0, 0.0);
         let sense = GuardInputs {
             counts: arm.counts(),
@@ -124,7 +124,7 @@ pub(crate) fn main() -> Result<(), CalibrationError> {
         }
     }
     assert_eq!(haptics.report().mode, Mode::Armed);
-    // At rest the hand's spring and the surface's hold each other.
+    // At rest the hand's spring and the surface's are in balance.
     let hand_n = Arm::GRIP_N_PER_MM * (arm.height_mm() + 20.0);
     println!("at rest: the surface pushes {last:.3} N up, the hand {hand_n:.3} N down");
     assert!(last > 0.5 && (last - hand_n).abs() < 0.05);

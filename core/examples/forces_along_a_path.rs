@@ -1,7 +1,7 @@
-//! Contact forces along a path over a field that is made of a function.
+//! Contact forces along a path over a field defined by a function.
 //!
-//! The haptic interface point (HIP) sinks into a hill and crosses it. The proxy
-//! stays on the surface, and a spring between the two makes the force.
+//! The haptic interface point (HIP) sinks into a hill and crosses it. The proxy stays on the
+//! surface, and a spring between the two generates the force.
 //!
 //! ```text
 //! cargo run -p hapterra-core --example forces_along_a_path
@@ -23,8 +23,8 @@ fn hill(x: i32, y: i32) -> f32 {
     8.0 * (-(x * x + y * y) / 100.0).exp()
 }
 
-/// Returns the HIP after part `t` of the path, in cells: down to one cell above
-/// the plain, and from west to east right through the hill.
+/// Returns the HIP after a share `t` of the path, in cells: down to one cell above the plain, and
+/// from west to east through the hill.
 fn path(t: f32) -> Vec3 {
     Vec3::new(5.0 + 50.0 * t, 20.3, (9.0 - 80.0 * t).max(1.0))
 }

@@ -1,5 +1,5 @@
-//! A host in memory that serves the tiles of a field far larger than the device's
-//! window, in the messages that travel on the link.
+//! A host in memory that serves the tiles of a field far larger than the device's window, in the
+//! link's messages.
 //!
 //! ```text
 //! cargo run -p hapterra-core --example serve_tiles
@@ -17,12 +17,12 @@ use hapterra_core::wire::frame::{FrameError, FrameReader, MAX_FRAME, decode, enc
 use hapterra_core::wire::message::{Heights, TileMessage, ToDevice, ToHost};
 use hapterra_core::wire::session::{InSession, SessionNumber};
 
-/// 8,000 × 8,000 cells, of which the window holds 128 × 128.
+/// 8,000 × 8,000 cells; the window stores 128 × 128.
 const SIZE: FieldSize = FieldSize::new(8_000, 8_000);
 const TOP: i32 = 4;
 const EPOCH: u32 = 1;
 const SESSION: SessionNumber = SessionNumber::new(1);
-/// Ticks from a request to the tile.
+/// Ticks between a request and the arrival of its tile.
 const LATENCY: u32 = 20;
 
 fn height(x: i32, y: i32) -> f32 {
@@ -30,14 +30,14 @@ fn height(x: i32, y: i32) -> f32 {
     2.0 + (0.11 * x).sin() + (0.07 * y).cos()
 }
 
-/// The bytes in a frame, as the reader at the other end of the link gets them.
+/// Returns the bytes of a frame, as received at the other end of the link.
 fn travel(frame: &[u8]) -> Result<Vec<u8>, FrameError> {
     let mut reader = FrameReader::<MAX_FRAME>::new();
     let (_, content) = reader.push(frame);
     content.unwrap_or(Err(FrameError::Encoding)).map(Vec::from)
 }
 
-/// The host: answers a request for a tile with its heights.
+/// Answers a request for a tile with its heights, as a host.
 fn host(request: &[u8]) -> Result<Vec<u8>, FrameError> {
     let content = travel(request)?;
     let InSession { session, message } = decode(&content)?;
@@ -69,7 +69,7 @@ fn host(request: &[u8]) -> Result<Vec<u8>, FrameError> {
     Ok(encode(&framed, &mut buffer).expect("a tile fits").to_vec())
 }
 
-/// The device: takes a tile into a free buffer, and gives its key.
+/// Loads a tile into a free buffer, as a device; returns its key.
 fn load(frame: &[u8], buffer: &mut Tile) -> Result<TileKey, FrameError> {
     let content = travel(frame)?;
     let InSession { message, .. } = decode(&content)?;
@@ -93,7 +93,7 @@ pub(crate) fn main() -> Result<(), FrameError> {
     requester.reset(0, SIZE);
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
 
-    // On the link: when each tile arrives, and its frame.
+    // The link: the arrival time of each tile, and its frame.
     let mut link: VecDeque<(u32, Vec<u8>)> = VecDeque::new();
     let (mut served, mut bytes, mut touching, mut waiting) = (0, 0, 0, 0);
     println!("  tick   HIP x   tiles served   state");

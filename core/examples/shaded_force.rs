@@ -1,5 +1,5 @@
-//! Draws how far the force leans east over a valley, a ridge and a cliff, without shading and
-//! with it: `cargo run -p hapterra-core --example shaded_force > docs/shading.svg`.
+//! Draws how far the force leans east over a valley, a ridge and a cliff, without and with shading:
+//! `cargo run -p hapterra-core --example shaded_force > docs/shading.svg`.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{Contact, ContactSettings};
@@ -9,7 +9,7 @@ use hapterra_core::terrain::{FieldSize, TileArena};
 
 /// Heights of a section, cells: the ground is the same from south to north.
 const SECTION: [f32; 11] = [1.5, 1.5, 1.0, 0.5, 1.0, 1.5, 1.0, 0.5, 0.5, 6.5, 6.5];
-/// HIPs in a cell, and how deep they are, cells.
+/// HIPs per cell, and their depth, cells.
 const A_CELL: i32 = 100;
 const DEPTH: f32 = 0.02;
 /// Pixels of a cell, of its height, and of a degree.
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The picture.
+/// Returns the picture.
 pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     let size = FieldSize::new(SECTION.len() as i32 - 1, 4);
     let mut field = TileArena::<1>::from_fn(size, |x, _| SECTION[x as usize])?;
@@ -59,7 +59,7 @@ pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     ))
 }
 
-/// A HIP so far above the section, a hundredth of a cell after the other.
+/// Returns a HIP at a height above the section; HIPs are a hundredth of a cell apart.
 fn hip(i: i32, above: f32) -> GridPoint {
     let (cell, u) = (i / A_CELL, (i % A_CELL) as f32 / A_CELL as f32);
     let [from, to] = [0, 1].map(|next| SECTION[(cell as usize + next).min(SECTION.len() - 1)]);

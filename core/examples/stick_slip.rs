@@ -1,5 +1,6 @@
-//! Draws how a tip sticks and slips: a compliant hand drags it slowly over a plane that holds more
-//! at rest than while it slides: `cargo run -p hapterra-core --example stick_slip > docs/stick-slip.svg`.
+//! Draws how a tip sticks and slips: a compliant hand drags it slowly over a plane with more
+//! friction at rest than during sliding:
+//! `cargo run -p hapterra-core --example stick_slip > docs/stick-slip.svg`.
 
 use std::error::Error;
 
@@ -14,14 +15,15 @@ const FRICTION: Friction = Friction {
     dynamic_mu: 0.3,
     viscous_s: 0.0,
 };
-/// The surface, N/mm, and how deep the HIP is, cells of a millimetre: it presses with 1 N.
+/// The stiffness of the surface, N/mm, and the depth of the HIP, cells of a millimetre: it presses
+/// with 1 N.
 const STIFFNESS: f32 = 0.5;
 const DEPTH: f32 = 2.0;
-/// The grasp, N/mm and N·s/mm, and what moves with the tip, N·s²/mm: 0.1 kg.
+/// The grasp, N/mm and N·s/mm, and the mass that moves with the tip, N·s²/mm: 0.1 kg.
 const GRASP: f32 = 0.05;
 const DAMPING: f32 = 1e-3;
 const MASS: f32 = 1e-4;
-/// The hand, mm/s, and for how long, ticks.
+/// The hand's speed, mm/s, and the duration, ticks.
 const SPEED: f32 = 12.0;
 const TICKS: u16 = 4000;
 /// Steps of the motion in a tick.
@@ -31,11 +33,11 @@ const SECOND: f32 = 155.0;
 const NEWTON: f32 = 170.0;
 const MM: f32 = 5.0;
 
-/// No force, and no way, in pixels from the top.
+/// Zero force, and zero distance, in pixels from the top.
 const ICE: f32 = 160.0;
 const START: f32 = 460.0;
 
-/// Observation of a tick: s, newtons along the surface, and mm from its start.
+/// Record of a tick: s, newtons along the surface, and mm from the start.
 struct Seen {
     time: f32,
     force: f32,
@@ -49,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The picture.
+/// Returns the picture.
 pub(crate) fn drawn() -> Result<String, Box<dyn Error>> {
     let seen = dragged()?;
     let line = |color: &str, height: fn(&Seen) -> f32| {
@@ -81,13 +83,13 @@ pub(crate) fn drawn() -> Result<String, Box<dyn Error>> {
     ))
 }
 
-/// A hand that goes east, and what it drags.
+/// Runs a hand that moves east, and the tip that it drags.
 fn dragged() -> Result<Vec<Seen>, Box<dyn Error>> {
     let size = FieldSize::new(64, 4);
     let mut field = TileArena::<2>::from_fn(size, |_, _| 0.0)?;
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ.with_friction(FRICTION));
-    // Counted from the place where the tip comes down.
+    // Counted from the place where the tip lands.
     let at = |x: f32, height: f32| GridPoint::new([5, 2, 0], Vec3::new(x, 0.5, height));
     contact.step(&window, &at(0.0, 1.0));
     let tick_s = TickRate::DEFAULT.tick_s();

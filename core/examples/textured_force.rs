@@ -1,5 +1,5 @@
-//! Draws the force over a grating and over grain in a level plane, and how a texture fades with the
-//! speed: `cargo run -p hapterra-core --example textured_force > docs/texture.svg`.
+//! Draws the force over a grating and over grain in a level plane, and the fade of a texture with
+//! increasing speed: `cargo run -p hapterra-core --example textured_force > docs/texture.svg`.
 
 use hapterra_core::Vec3;
 use hapterra_core::force::{Pattern, Texture, Texturer};
@@ -9,7 +9,7 @@ use hapterra_core::rate::TickRate;
 /// Stiffness, N/mm, and depth, mm: half a newton without texture.
 const STIFFNESS: f32 = 0.5;
 const DEPTH: f32 = 1.0;
-/// Way over the plane, mm, and from one HIP to the next.
+/// Path over the plane, mm, and distance between HIPs, mm.
 const WAY: f32 = 10.0;
 const STEP: f32 = 0.02;
 /// Pixels of a millimetre, and of a newton.
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The picture.
+/// Returns the picture.
 pub(crate) fn drawn() -> Result<String, Box<dyn std::error::Error>> {
     let grain = Texture {
         pattern: Pattern::Grain,
@@ -76,7 +76,7 @@ fn polyline(color: &str, points: &str) -> String {
     )
 }
 
-/// Forces on a way eastward, after a rest at its beginning.
+/// Returns the forces on a path eastward, after a rest at its start.
 fn rendered(texture: &Texture, step_mm: f32, ticks: usize) -> Result<Vec<Vec3>, &'static str> {
     let texturer = Texturer::of(texture, 1.0, TickRate::DEFAULT);
     let mut texturer = texturer.ok_or("no texture")?;
@@ -87,7 +87,7 @@ fn rendered(texture: &Texture, step_mm: f32, ticks: usize) -> Result<Vec<Vec3>, 
     }
     let before: Vec<Vec3> = (0..100).map(&mut step).collect();
     let after = (100..ticks + 100).map(&mut step);
-    // Slow ways are drawn from their beginning; at speed the share has to settle.
+    // Slow paths are drawn from their start; at speed the share must first become steady.
     match step_mm <= STEP {
         true => Ok(before.into_iter().chain(after).take(ticks).collect()),
         false => Ok(after.collect()),

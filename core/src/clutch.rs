@@ -1,5 +1,4 @@
-//! The clutch: while it is held the terrain goes with the hand, and another view of it may
-//! be put in.
+//! The clutch: while it is held, the terrain follows the hand, and its placement may change.
 //!
 //! ```text
 //!           held                force out               let go               force in
@@ -8,21 +7,21 @@
 //!                      └──────────────────── held ────────────────────┘
 //! ```
 //!
-//! While it opens and closes the contact continues as ever, and a share of its force is let
-//! through: from all to nothing in 0.1 s, from nothing to all in 0.5 s. The rest of the path,
-//! the guard and all its bounds, is as it always is.
+//! While the clutch opens and closes, the contact continues, and a share of its force is rendered:
+//! from full force to zero in 0.1 s, from zero to full force in 0.5 s. The rest of the tick, the
+//! guard and all its limits stay the same.
 //!
-//! The host holds it, or the board's clutch input, or both: it is open until both have let go.
+//! The host holds it, or the board's clutch input, or both: it is open until both release it.
 //!
-//! It opens to the end before it closes again, however often it is held and let go. A spring that
-//! gets softer takes energy from the hand and one that gets harder gives some, so one turn gives the
-//! hand at most what the spring holds then: ½ F² / K, 72 mJ at 8.5 N and 0.5 N/mm, and 0.5 s pass until it may
-//! be given again. Where the terrain stays in its place that is more by what the hand has moved meanwhile, 10 mm
-//! at most.
+//! It always opens fully before it closes again. A spring that gets softer takes energy from the
+//! hand and one that gets harder gives some, so one cycle gives the hand at most the energy of the
+//! spring: ½ F² / K, 72 mJ at 8.5 N and 0.5 N/mm, and the next cycle can give it 0.5 s later at the
+//! earliest. If the terrain stays in its place, the work over the hand's motion is added, 10 mm at
+//! most.
 //!
-//! A hand that presses gives way when the force goes out: it moves on, towards where it wants to
-//! be. Where the terrain goes with it the ground sinks by that. So a clutch that is held for another
-//! view only ([`ClutchHold::InPlace`]) leaves the terrain in its place before the arm: the point that was
+//! A pressing hand yields when the force fades out: it moves on towards its target. If the terrain
+//! follows it, the ground sinks by that distance. So a clutch that is held only for a new placement
+//! ([`ClutchHold::InPlace`]) keeps the terrain in its place relative to the arm: the point that was
 //! under the tip when the clutch opened is there when it closes, and the press returns.
 
 use glam::Vec3;
@@ -35,37 +34,37 @@ use crate::rate::TickRate;
 use crate::scene::Scene;
 use crate::terrain::Window;
 
-/// Time that all of it takes to come in again, ms.
+/// Duration of the ramp-up to full force, ms.
 const IN_MS: u32 = 500;
-/// Most that a hand may have moved while the terrain stayed in its place, mm. What it moved
-/// beyond that the terrain goes with it: a hand that gives way under 1.2 N moves some 5 mm.
+/// Maximum motion of the hand, mm, for which the terrain stays in its place; for any motion beyond
+/// that the terrain follows the hand. A hand that yields under 1.2 N moves some 5 mm.
 const GIVE_MM: f32 = 10.0;
 
-/// The host's use of the clutch. In either way the HIP stays where it is over the terrain,
-/// and no force is rendered.
+/// The host's use of the clutch. While it is held, the HIP stays at its place over the terrain, and
+/// no force is rendered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ClutchHold {
     /// Not held.
     #[default]
     LetGo,
-    /// The terrain goes with the hand: it is rendered again at the new position of the hand.
+    /// The terrain follows the hand: it is rendered again at the new position of the hand.
     WithHand,
-    /// For another view: the terrain is rendered again where it was before the arm, however the hand
-    /// gave way meanwhile, up to 10 mm.
+    /// For a new placement: the terrain is rendered again in its place relative to the arm, after
+    /// any motion of the hand up to 10 mm.
     InPlace,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// The terrain is where it is.
+    /// The clutch has no effect.
     Closed,
-    /// The force goes out.
+    /// The force fades out.
     Opening,
-    /// The HIP stays at its place over the terrain, wherever the tip goes. `tip_mm` is
-    /// where the tip was when it opened, from its home pose: device millimetres east,
-    /// north and up, which are the same in every view.
+    /// The HIP stays at its place over the terrain for any motion of the tip. `tip_mm` is the tip's
+    /// position when the clutch opened, from its home pose: device millimetres east, north and up,
+    /// which are the same in every placement.
     Open { hip: GridPoint, tip_mm: Vec3 },
-    /// The force comes in again.
+    /// The force ramps up.
     Closing,
 }
 
@@ -73,27 +72,27 @@ enum State {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clutch {
     state: State,
-    /// The host's use of it.
+    /// The host's use of the clutch.
     host: ClutchHold,
-    /// The board's clutch input is held: the terrain goes with the hand.
+    /// True if the board's clutch input is held: the terrain follows the hand.
     input: bool,
-    /// Since it was held the terrain was to go with the hand.
+    /// True if the terrain had to follow the hand at some time since the clutch was held.
     carries: bool,
-    /// Remaining return of the terrain, relative to the tip, mm.
+    /// Remaining shift of the terrain, relative to the tip, mm.
     owed_mm: Vec3,
-    /// Share of the force that is let through to a driven arm.
+    /// Share of the force for a driven arm.
     ramp: f32,
-    /// Share that was let through in the last tick.
+    /// Share of the force in the last tick.
     share: f32,
-    /// Its limits of the last tick.
+    /// The clutch's limits of the last tick.
     limits: Limits,
-    /// Most that it may change in a tick: out as when the arm is disarmed.
+    /// Decrease of the share in a tick: the same as for disarming.
     out: f32,
     back: f32,
 }
 
 impl Clutch {
-    /// Closed.
+    /// Creates a closed clutch.
     pub(crate) fn new(rate: TickRate) -> Self {
         Self {
             state: State::Closed,
@@ -109,19 +108,19 @@ impl Clutch {
         }
     }
 
-    /// Returns true if it takes no part in a tick.
+    /// Returns true if the clutch has no effect on a tick.
     #[inline]
     pub(crate) const fn is_closed(&self) -> bool {
         matches!(self.state, State::Closed)
     }
 
-    /// Returns true if there is no force, and the HIP stays where it is over the terrain.
+    /// Returns true if there is no force, and the HIP stays at its place over the terrain.
     pub(crate) const fn is_open(&self) -> bool {
         matches!(self.state, State::Open { .. })
     }
 
-    /// As at the beginning of a scene: closed. An input that is held opens the clutch of an
-    /// arm; a replay has no hand.
+    /// Restarts, closed, for a new scene. A held input opens the clutch of an arm; a replay has no
+    /// hand.
     pub(crate) fn begin(&mut self, rate: TickRate, of_arm: bool) {
         let input = self.input;
         *self = Self::new(rate);
@@ -131,19 +130,19 @@ impl Clutch {
         }
     }
 
-    /// The host holds it like this from now on, or no longer.
+    /// Sets the host's use of the clutch.
     pub(crate) fn hold(&mut self, host: ClutchHold) {
         self.host = host;
         self.open_if_held();
     }
 
-    /// The board's clutch input is held from now on, or no longer.
+    /// Sets the state of the board's clutch input.
     pub(crate) fn press(&mut self, held: bool) {
         self.input = held;
         self.open_if_held();
     }
 
-    /// Returns true if it is held.
+    /// Returns true if the host or the input holds the clutch.
     const fn is_held(&self) -> bool {
         self.input || !matches!(self.host, ClutchHold::LetGo)
     }
@@ -159,31 +158,31 @@ impl Clutch {
         self.carries |= self.input || self.host == ClutchHold::WithHand;
     }
 
-    /// Puts the HIP of an open clutch somewhere else.
+    /// Moves the HIP of an open clutch.
     pub(crate) fn put(&mut self, there: GridPoint) {
         if let State::Open { hip, .. } = &mut self.state {
             *hip = there;
         }
     }
 
-    /// Returns its limits of the tick: none where it is closed.
+    /// Returns the clutch's limits of the tick: none if it is closed.
     #[inline]
     pub(crate) const fn limits(&self) -> Limits {
         self.limits
     }
 
-    /// Share of the force that it lets through: all where it is closed.
+    /// Returns the rendered share of the force: 1 if the clutch is closed.
     #[inline]
     pub(crate) const fn share(&self) -> f32 {
         self.share
     }
 
-    /// One tick of a clutch that is not closed, with the tip at a place over the terrain.
-    /// Returns where the HIP is. When it closes it moves the scene's home, so that the
-    /// terrain is where it is to be.
+    /// Runs a tick of a clutch that is not closed, with the tip at a place over the terrain.
+    /// Returns the HIP. During closing it moves the scene's home, to bring the terrain to its
+    /// place.
     ///
-    /// An arm that is not driven has all of the force in its share: nothing is armed by
-    /// holding the clutch in the ground.
+    /// An arm that is not driven has the full force in its share, so that the clutch cannot hide a
+    /// large force from the check of arming.
     #[cold]
     #[inline(never)]
     pub(crate) fn tick<const D: usize>(
@@ -222,7 +221,8 @@ impl Clutch {
                 }
             }
             State::Closing => {
-                // With the force, and no faster than a hand: in a leap the proxy would lag.
+                // Together with the force, and no faster than a hand: after a jump the proxy would
+                // lag.
                 let share = (self.back / (1.0 - self.ramp)).min(1.0);
                 let step_mm = self.owed_mm * share;
                 move_home(scene, step_mm / scene.cell_mm);
@@ -252,7 +252,7 @@ impl Clutch {
     }
 }
 
-/// Moves the point that is at the tip in the home pose, cells.
+/// Moves the point that is at the tip in the home pose, by `shift` cells.
 fn move_home(scene: &mut Scene, shift: Vec3) {
     scene.home = GridPoint::new(scene.home.cell(), scene.home.frac() + shift);
 }

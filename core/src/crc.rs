@@ -1,8 +1,7 @@
-//! Check sums: values as postcard writes them, followed by their CRC-32.
+//! Check sums: values in postcard's format, followed by their CRC-32.
 //!
-//! The sum is made over bytes that are there as a whole. postcard's own flavour for it
-//! takes each number of a message into the sum where that number is read, which makes
-//! every such place in an image larger and the reading slower.
+//! The sum is computed over complete bytes. postcard's own flavour adds each number of a message to
+//! the sum where it is read, which makes every such place in an image larger and slower.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 use serde::{Deserialize, Serialize};
@@ -11,8 +10,8 @@ use serde::{Deserialize, Serialize};
 /// tile's frame is 4.4 kB.
 pub(crate) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Reads a `T` and the sum that follows it, little-endian. Returns it and the bytes after
-/// the sum; nothing where the sum does not fit or the bytes are no `T`.
+/// Reads a `T` and its check sum, little-endian. Returns it and the bytes after the sum; `None` if
+/// the sum is wrong or the bytes are not a `T`.
 #[must_use]
 pub fn take<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Option<(T, &'b [u8])> {
     let (value, rest) = postcard::take_from_bytes(bytes).ok()?;
@@ -21,8 +20,8 @@ pub fn take<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Option<(T, &'b [u8])> {
     (u32::from_le_bytes(*found) == sum(read)).then_some((value, rest))
 }
 
-/// Writes `value` and its sum into `buffer`; returns the bytes written, or nothing where
-/// they do not fit.
+/// Writes `value` and its check sum into `buffer`; returns the written bytes, or `None` if they do
+/// not fit.
 pub fn put<'b, T: Serialize + ?Sized>(value: &T, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
     let length = postcard::to_slice(value, buffer).ok()?.len();
     let (written, rest) = buffer.split_at_mut_checked(length)?;
@@ -30,14 +29,14 @@ pub fn put<'b, T: Serialize + ?Sized>(value: &T, buffer: &'b mut [u8]) -> Option
     buffer.get(..length + size_of::<u32>())
 }
 
-/// The check sum of `bytes`. Once in an image, for everything that is read or written.
+/// Returns the check sum of `bytes`. A single function in an image, for all reads and writes.
 #[inline(never)]
 #[must_use]
 pub fn sum(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }
 
-/// Takes more bytes into a check sum: a call, where `update` is unrolled for each length.
+/// Adds more bytes to a check sum. A function, because `update` is unrolled for each length.
 #[inline(never)]
 pub(crate) fn add(digest: &mut Digest<'_, u32>, bytes: &[u8]) {
     digest.update(bytes);

@@ -1,14 +1,13 @@
-//! The tick rate, and what follows from it.
+//! The tick rate, and constants that depend on it.
 
-/// Most that the force may change, newtons a second. A hand at 2 m/s against
-/// 0.5 N/mm makes 1 N/ms; what is faster is no hand.
+/// Maximum change of the force, newtons a second. A hand at 2 m/s against 0.5 N/mm makes 1 N/ms; no
+/// hand is faster.
 pub const MAX_SLEW_N_PER_S: f32 = 1_000.0;
 
-/// Ticks a second: a build choice, 1 kHz by default. The stiffness that a user
-/// can hold grows with it.
+/// Ticks a second: a build option, 1 kHz by default. A higher rate permits a higher stiffness.
 ///
-/// Whole kilohertz, so that a millisecond is a number of ticks: what has to
-/// happen once a millisecond, or for so many of them, does so at every rate.
+/// Whole kilohertz, so that a millisecond is a whole number of ticks: durations in milliseconds are
+/// exact at every rate.
 ///
 /// ```
 /// use hapterra_core::rate::TickRate;
@@ -26,7 +25,7 @@ impl TickRate {
     /// 1 kHz.
     pub const DEFAULT: Self = Self(1_000);
 
-    /// A rate in [`Self::RANGE_HZ`], in whole kilohertz.
+    /// Creates a rate in [`Self::RANGE_HZ`], in whole kilohertz; returns `None` for any other.
     #[must_use]
     pub const fn new(hz: u32) -> Option<Self> {
         if hz < Self::RANGE_HZ.0 || hz > Self::RANGE_HZ.1 || !hz.is_multiple_of(1_000) {
@@ -35,19 +34,19 @@ impl TickRate {
         Some(Self(hz))
     }
 
-    /// Ticks a second.
+    /// Returns the ticks a second.
     #[must_use]
     pub const fn hz(self) -> u32 {
         self.0
     }
 
-    /// Length of a tick, s.
+    /// Returns the length of a tick, s.
     #[must_use]
     pub const fn tick_s(self) -> f32 {
         1.0 / self.0 as f32
     }
 
-    /// Ticks in some time, at least one.
+    /// Returns the number of ticks in a time, at least one.
     #[must_use]
     pub const fn ticks(self, milliseconds: u32) -> u32 {
         let ticks = (self.0 / 1000).saturating_mul(milliseconds);

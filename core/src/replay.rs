@@ -1,4 +1,4 @@
-//! Replay: the host's point in place of the arm, amplifiers off.
+//! Replay: points from the host in place of the arm, amplifiers off.
 
 use glam::Vec3;
 
@@ -7,8 +7,8 @@ use crate::haptics::Haptics;
 use crate::tick::{Outcome, write_nothing, write_output};
 
 impl<const D: usize> Haptics<'_, D> {
-    /// One tick. It is repeated until the point was rendered with all of its terrain; only then is
-    /// the point answered.
+    /// Runs one tick. It is repeated until the point is rendered with all of its terrain; only then
+    /// is the point answered.
     pub(crate) fn tick_point(&mut self, outcome: &mut Outcome) {
         outcome.drive = GuardOutputs::default();
         outcome.answers = None;

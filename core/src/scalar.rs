@@ -1,22 +1,22 @@
-//! Arithmetic for which a Cortex-M4F has no instruction: what is called in its place takes many
-//! times as long.
+//! Arithmetic without an instruction on a Cortex-M4F: the functions in its place take many times as
+//! long.
 
 use glam::Vec3;
 
-/// The smaller one; `b` where one of them is not a number. `f32::min` is a call.
+/// Returns the smaller number; `b` if one is NaN. `f32::min` is a call.
 #[inline]
 pub(crate) fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The larger one; `b` where one of them is not a number. `f32::max` is a call.
+/// Returns the larger number; `b` if one is NaN. `f32::max` is a call.
 #[inline]
 pub(crate) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// 1/√x of a normal x above zero, to 3e-7 of it: by three of Newton's steps from the exponent
-/// halved. A root to the last bit takes 95 instructions, this one 20.
+/// Returns 1/√x of a normal x above zero, with a relative error of 3e-7: three Newton steps,
+/// starting from half of the exponent. An exact root takes 95 instructions, this one 20.
 pub(crate) fn one_over_root(x: f32) -> f32 {
     let mut y = f32::from_bits(0x5F37_5A86 - (x.to_bits() >> 1));
     for _ in 0..3 {
@@ -25,8 +25,8 @@ pub(crate) fn one_over_root(x: f32) -> f32 {
     y
 }
 
-/// √x, to 3e-7 of it where x is normal; as [`libm::sqrtf`] of all else.
-// A call: five copies of it would be a kilobyte.
+/// Returns √x, with a relative error of 3e-7 for normal x; otherwise the same as [`libm::sqrtf`].
+// Not inlined: five copies would take a kilobyte.
 #[inline(never)]
 pub(crate) fn root(x: f32) -> f32 {
     if x.is_normal() && x > 0.0 {
@@ -36,27 +36,27 @@ pub(crate) fn root(x: f32) -> f32 {
     }
 }
 
-/// `v`, shortened to `limit` where it is longer; zero if it is not finite.
+/// Returns `v`, shortened to `limit` if it is longer; zero if it is not finite.
 ///
-/// The result is never longer than `limit` (of normal size), and at most 8 ulp
-/// shorter than it where it was clamped.
+/// The result is never longer than `limit` (of normal size), and at most 8 ulp shorter than `limit`
+/// if it was clamped.
 #[must_use]
 #[inline]
 pub fn clamp_length(v: Vec3, limit: f32) -> Vec3 {
     let squared = v.length_squared();
-    // The usual case; not where the square is too small or too large to tell, or
-    // is that of what is not finite.
+    // The usual case. It excludes squares that are too small or too large to compare, or not
+    // finite.
     if squared.is_normal() && squared <= limit * limit {
         return v;
     }
-    // In the air no force is rendered.
+    // No force in the air.
     if v == Vec3::ZERO {
         return Vec3::ZERO;
     }
     shortened(v, limit)
 }
 
-/// `v`, shortened to `limit`, whatever its numbers are.
+/// Returns `v`, shortened to `limit`, for any numbers.
 #[inline(never)]
 fn shortened(v: Vec3, limit: f32) -> Vec3 {
     let largest = v.abs().max_element();
@@ -65,14 +65,14 @@ fn shortened(v: Vec3, limit: f32) -> Vec3 {
     }
     // Scaled first, so that squaring cannot overflow.
     let unit = v / largest;
-    // Four roundings below, and one in the caller's own look at the length.
+    // Margin for four roundings below, and for one in a caller's check of the length.
     let limit = limit * (1.0 - 4.0 * f32::EPSILON);
     let part = limit / libm::sqrtf(unit.length_squared());
     if largest <= part { v } else { unit * part }
 }
 
-/// Returns true if all of it is a number and finite: nothing else times zero is zero. A third of
-/// the instructions of `Vec3::is_finite`, in every tick.
+/// Returns true if all components are finite: only finite numbers times zero are zero. It takes a
+/// third of the instructions of `Vec3::is_finite`, in every tick.
 #[inline]
 pub(crate) fn is_finite(v: Vec3) -> bool {
     (v * 0.0).element_sum() == 0.0

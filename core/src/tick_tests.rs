@@ -1,4 +1,4 @@
-//! The tick as a whole: arm to currents, and replay through a pulled window.
+//! The tick as a whole: arm to currents, and replay through a moving window.
 
 use std::vec::Vec;
 
@@ -25,7 +25,8 @@ mod views;
 
 const SIZE: i32 = 640;
 
-/// The spring alone: these arms are put from place to place, which no controller takes for a hand.
+/// The spring alone: these arms jump from place to place, which the controller would not expect of
+/// a hand.
 const SPRING: SurfaceParams = SurfaceParams {
     damping: Damping {
         controller: Controller::Off,
@@ -50,13 +51,13 @@ fn scene(source: Source) -> Scene {
     }
 }
 
-/// A device in memory: the loop, its tile requester, and a host that always answers.
+/// A device in memory: the loop, its tile requests, and a host that always answers.
 struct Device<'t, const D: usize> {
     haptics: Haptics<'t, D>,
     requester: TileRequester<D>,
     spare: Vec<&'t mut Tile>,
     height: fn(i32, i32) -> f32,
-    /// The material of a sample, in a scene that has some; `None` for tiles that come without.
+    /// The material of a sample, in a scene with materials; `None` for tiles without.
     material: fn(TileKey, [i32; 2]) -> Option<u8>,
     size: FieldSize,
     demand: RequestHint,
@@ -89,7 +90,7 @@ impl<'t, const D: usize> Device<'t, D> {
         }
     }
 
-    /// The same, armed with the arm in its zero pose.
+    /// The same device, armed in the arm's zero pose.
     fn armed(tiles: &'t mut [Tile], height: fn(i32, i32) -> f32) -> Self {
         let mut device = Self::new(tiles, Source::Encoders, height);
         device.arm([0; 3]);
@@ -100,7 +101,7 @@ impl<'t, const D: usize> Device<'t, D> {
         assert!(matches!(self.haptics.accept(command), Ok(None)));
     }
 
-    /// Zeroes the arm in its home pose and arms it where it is.
+    /// Zeroes the arm in its home pose and arms it there.
     fn arm(&mut self, counts: [i32; 3]) {
         self.say(Command::Zero([0; 3]));
         self.say(Command::Arm);
@@ -113,7 +114,7 @@ impl<'t, const D: usize> Device<'t, D> {
         assert_eq!(self.haptics.report().mode, Mode::Armed);
     }
 
-    /// One tick, then every tile that is wanted.
+    /// Runs a tick, then delivers every requested tile.
     fn tick(&mut self, counts: [i32; 3]) -> Outcome {
         let sense = GuardInputs {
             counts,
@@ -162,7 +163,7 @@ impl<'t, const D: usize> Device<'t, D> {
         self.served += 1;
     }
 
-    /// Feels one point, however many ticks that takes.
+    /// Renders one point, in as many ticks as needed.
     fn step(&mut self, seq: u32, hip: GridPoint) -> TickRecord {
         assert!(
             self.haptics
@@ -193,8 +194,8 @@ fn hills(x: i32, y: i32) -> f32 {
     (8.0 * (x * 0.11).sin() * (y * 0.07).cos() + (x * 1.3).sin()) as f32
 }
 
-/// Rises above the plane and returns into it. Home is half a millimetre
-/// below; 64 counts of the second axis are 1.8 mm.
+/// Moves above the plane and back into it. Home is half a millimetre below the plane; 64 counts of
+/// the second axis are 1.8 mm.
 fn dip() -> impl Iterator<Item = [i32; 3]> {
     let rise = (0..=64).map(|n| [0, n, 0]);
     rise.chain((0..=64).map(|n| [0, 64 - n, 0]))
@@ -219,7 +220,7 @@ fn pressed_on_a_plane_the_motors_push_back() {
     assert!(last.drive.enabled);
 }
 
-/// A device whose proxy is on the plane, in the tile 10, 10.
+/// A device whose proxy is on the plane, in the tile (10, 10).
 fn dipped(tiles: &mut [Tile]) -> Device<'_, 3> {
     let mut device = Device::<3>::armed(tiles, plane);
     for counts in dip() {
@@ -236,7 +237,7 @@ fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
     let fill = |tile: &mut Tile, key| {
         tile.fill_from(key, 0, size, plane).expect("in range");
     };
-    // The tile to the west of the proxy's is here, too.
+    // The tile to the west of the proxy's is also stored.
     let beside = TileKey::new(0, 9, 10);
     assert_eq!(device.haptics.window.occupant(beside), Some(beside));
     let late = TileKey::new(0, 12, 10);
@@ -247,7 +248,7 @@ fn a_tile_that_comes_too_late_pushes_out_none_beside_the_proxy() {
     let back = back.expect("taken").expect("refused");
     assert_eq!(back.key(), Some(late));
     device.spare.push(back);
-    // The same tile again is taken, and so is one that pushes out what is far away.
+    // The same tile is accepted again, and so is one that replaces a distant one.
     for key in [beside, TileKey::new(0, 11, 10)] {
         let tile = device.spare.pop().expect("a spare one");
         fill(tile, key);
@@ -274,7 +275,7 @@ fn an_fallback_that_comes_last_is_kept_whatever_the_proxy_touches() {
         wide: of(4),
         near: Some(of(2)),
     };
-    // Its tiles are named as if they belonged where this one is, beside the proxy's.
+    // The indices of the fallback's tiles match the slot of this tile, beside the proxy's.
     let beside = TileKey::new(0, 9, 9);
     assert_eq!(
         device.haptics.window.occupant(TileKey::new(0, 0, 0)),
@@ -353,7 +354,7 @@ fn a_fault_is_latched_until_cleared_and_counts_lost_have_to_be_zeroed() {
     for _ in 0..3 {
         assert_eq!(device.tick([5000, 0, 0]).drive, GuardOutputs::default());
     }
-    // Only the one that was seen.
+    // Clears only the fault that was seen.
     device.say(Command::ClearFault(Some(Fault::Hardware)));
     assert_eq!(
         device.tick([5000, 0, 0]).sample.fault,
@@ -423,7 +424,7 @@ fn settings_a_new_zero_and_a_replay_switch_off_at_once() {
     assert_eq!(model, Some(crate::phantom::Model::Premium10));
 }
 
-/// In a replay, with an arm that was zeroed before and is at `counts`.
+/// A device in a replay, with an arm at `counts` that was zeroed before.
 fn replaying(tiles: &mut [Tile]) -> Device<'_, 4> {
     let mut device = Device::<4>::armed(tiles, plane);
     let points = Scene {
@@ -434,7 +435,7 @@ fn replaying(tiles: &mut [Tile]) -> Device<'_, 4> {
     device
 }
 
-/// Moves the arm by 100 counts a tick, with a point under way at every other tick.
+/// Moves the arm by 100 counts a tick, with an active point in every other tick.
 fn wave(device: &mut Device<'_, 4>, ticks: i32) -> [i32; 3] {
     let mut counts = [0; 3];
     for n in 0..ticks {
@@ -568,8 +569,8 @@ fn a_scene_that_is_not_valid_is_refused() {
     assert_eq!(device.haptics.report().mode, Mode::Fading);
 }
 
-/// The window's size, the order in which tiles arrive, and how often the work
-/// of a tick ran out must not show in the force.
+/// The window's size, the order of the tiles' arrival, and ticks that run out of work must not
+/// change the force.
 #[test]
 fn a_small_window_feels_what_a_whole_one_feels() {
     let mut tiles = buffers::<4>();
@@ -631,12 +632,12 @@ fn pushed_over_the_edge_of_the_data_the_force_fades_and_says_why() {
     assert_eq!(last, Vec3::ZERO);
 }
 
-/// A plane with nothing more than 20 cells east of the middle.
+/// A plane that ends 20 cells east of the middle.
 fn edge(x: i32, _: i32) -> f32 {
     if x > 340 { f32::NAN } else { 5.5 }
 }
 
-/// The wire checks sums, not sense: a damaged host may send any bits.
+/// The link checks sums, not meanings: a damaged host may send any bits.
 #[test]
 fn point_of_any_bits_is_made_valid_before_the_contact() {
     let mut tiles = buffers::<4>();

@@ -1,4 +1,4 @@
-//! The examples run to their ends, where they check what they show.
+//! The examples run to their ends; their own assertions check their results.
 
 #[path = "../examples/closed_loop.rs"]
 mod closed_loop;

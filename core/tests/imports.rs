@@ -1,20 +1,20 @@
-//! Imports of the modules of core and firmware: no circle of files or folders, and in core
-//! nothing against the order that `lib.rs` states.
+//! Imports of the modules of core and firmware: no cycle of files or folders, and in core no import
+//! against the order in `lib.rs`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A module: the names on its way from the crate's root.
+/// A module: the names on its path from the crate's root.
 type Module = Vec<String>;
 
-/// The product's modules of a crate: their code without comments and tests.
+/// The non-test modules of a crate: their code without comments and tests.
 struct Sources {
     code: BTreeMap<Module, String>,
 }
 
 impl Sources {
-    /// Reads a folder `src`.
+    /// Reads the sources of a folder `src`.
     fn of(folder: &str) -> Self {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("..")
@@ -38,7 +38,7 @@ impl Sources {
         Self { code }
     }
 
-    /// A crate of these modules.
+    /// A crate with these modules.
     #[cfg(test)]
     fn made_up(modules: &[(&str, &str)]) -> Self {
         let module = |name: &str| {
@@ -53,7 +53,7 @@ impl Sources {
         }
     }
 
-    /// The paths that a module's code names, from the root.
+    /// The paths in a module's code, from the root.
     fn paths(&self, from: &Module) -> Vec<Module> {
         let words = words(&self.code[from]);
         let mut paths = vec![];
@@ -66,7 +66,7 @@ impl Sources {
                 "self" => from.clone(),
                 "super" => from[..from.len().saturating_sub(1)].to_vec(),
                 "use" => {
-                    // A module of this one, or another crate.
+                    // A child module, or another crate.
                     let is_child = |name: &String| {
                         let child = [from.as_slice(), std::slice::from_ref(name)].concat();
                         self.code.contains_key(&child)
@@ -86,7 +86,7 @@ impl Sources {
         paths
     }
 
-    /// The module that a path leads to, through what modules on the way import themselves.
+    /// The module at the end of a path, resolved through the imports of modules on the path.
     fn target(&self, path: &[String], depth: usize) -> Module {
         let known = (0..=path.len())
             .rev()
@@ -103,15 +103,15 @@ impl Sources {
         }
     }
 
-    /// Returns the imports between files and folders beside each other: by the folder, the
-    /// name in it that imports and the name that is imported; with an import that does so.
+    /// Returns the imports between files and folders beside each other: the folder, the importing
+    /// name and the imported name in it; with an example of such an import.
     fn imports(&self) -> BTreeMap<(Module, String, String), String> {
         let mut imports = BTreeMap::new();
         for from in self.code.keys() {
             for path in self.paths(from) {
                 let to = self.target(&path, 0);
                 let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
-                // A module and those inside of it are one.
+                // A module and its child modules count as one.
                 if let (Some(a), Some(b)) = (from.get(same), to.get(same)) {
                     let place = (from[..same].to_vec(), a.clone(), b.clone());
                     let shown = format!("{} imports {}", from.join("::"), path.join("::"));
@@ -122,7 +122,7 @@ impl Sources {
         imports
     }
 
-    /// Circles of imports, each as the imports that make it up.
+    /// Cycles of imports, each as a list of its imports.
     fn circles(&self) -> Vec<String> {
         let imports = self.imports();
         let reaches = |folder: &Module, from: &String, to: &String| {
@@ -142,8 +142,8 @@ impl Sources {
         in_circle.map(|(_, shown)| shown.clone()).collect()
     }
 
-    /// Imports against an order of the crate's modules: each may import those before it and
-    /// those in its own place. Modules without a place are the ground.
+    /// Imports against an order of the crate's modules: a module may import those before it and
+    /// those at its own place. All modules may import those without a place.
     fn against(&self, order: &BTreeMap<String, usize>) -> Vec<String> {
         let place = |name: &String| order.get(name).copied().unwrap_or(0);
         let imports = self.imports();
@@ -154,8 +154,8 @@ impl Sources {
     }
 }
 
-/// Appends the paths of a tree of imports, `a::{b, c::d as e}`, which begins with these words.
-/// Returns how many words it took.
+/// Appends the paths of a tree of imports, `a::{b, c::d as e}`, which starts with these words.
+/// Returns the number of words used.
 fn tree(words: &[String], base: Module, paths: &mut Vec<Module>) -> usize {
     let (mut path, mut at) = (base, 0);
     loop {
@@ -188,7 +188,7 @@ fn is_name(word: &str) -> bool {
     word.starts_with(|c: char| c.is_alphabetic() || c == '_')
 }
 
-/// Names, `::`, and other signs one by one.
+/// Splits code into names, `::`, and other single signs.
 fn words(code: &str) -> Vec<String> {
     let mut words: Vec<String> = vec![];
     let is_part = |c: char| c.is_alphanumeric() || c == '_';
@@ -205,7 +205,7 @@ fn words(code: &str) -> Vec<String> {
     words
 }
 
-/// Returns true if a file or folder of this name has tests, or what they share.
+/// Returns true if a file or folder of this name contains tests or test helpers.
 fn is_of_tests(name: &str) -> bool {
     let shared = ["tests", "testing", "cases", "dice"];
     shared.contains(&name) || name.ends_with("_tests")
@@ -222,7 +222,7 @@ fn without_tests(text: &str) -> String {
             code += line.split("//").next().unwrap_or_default();
             code.push('\n');
         }
-        // An item of one line, or the end of a module.
+        // A one-line item, or the end of a module.
         is_test &= line != "}" && !(is_first && line.ends_with(';'));
         is_next = line == "#[cfg(test)]" || is_next && is_attribute;
     }
@@ -240,7 +240,7 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The order of modules that core's `lib.rs` states: by name, the number of its place.
+/// The order of modules in core's `lib.rs`: the place of each name.
 fn stated_order() -> BTreeMap<String, usize> {
     let mut order = BTreeMap::new();
     let mut place = 0;
@@ -256,7 +256,7 @@ fn stated_order() -> BTreeMap<String, usize> {
             .split("[`")
             .skip(1)
             .filter_map(|rest| rest.split_once("`]"));
-        // A private module stands there by its file.
+        // A private module is listed by its file name.
         let files = said.split('`').filter_map(|word| word.strip_suffix(".rs"));
         let names = linked.map(|(name, _)| name).chain(files);
         for name in names.filter(|name| place > 0 && !name.contains("::")) {

@@ -19,7 +19,7 @@ std::thread_local! {
     static SEARCHED: Cell<[u32; 2]> = const { Cell::new([0; 2]) };
 }
 
-/// A patch has been searched.
+/// Counts a searched patch.
 pub(super) fn searched(evaluations: u32) {
     SEARCHED.with(|tally| {
         let [patches, all] = tally.get();
@@ -30,14 +30,14 @@ pub(super) fn searched(evaluations: u32) {
 const SIZE: i32 = 60;
 const TICKS: u32 = cases(4_000, 60);
 
-/// Hills three cells high, with a twist of their own in every patch.
+/// Hills three cells high, each patch with its own twist.
 fn height(x: i32, y: i32) -> f32 {
     let rough = (x * 7 + y * 13) % 10;
     let hills = (0.2 * f64::from(x)).sin() + (0.3 * f64::from(y)).cos();
     (1.5 * hills) as f32 + 0.02 * rough as f32
 }
 
-/// A HIP so high over a place, or so deep under it.
+/// A HIP `above` cells over a place, or under it.
 fn hip([x, y]: [f64; 2], above: f64) -> GridPoint {
     let cell = [x, y].map(|c| c as i32);
     let [u, v] = [x - x.floor(), y - y.floor()];
@@ -50,13 +50,13 @@ fn hip([x, y]: [f64; 2], above: f64) -> GridPoint {
     )
 }
 
-/// Places one after the other, so many cells apart.
+/// Consecutive places `step` cells apart.
 fn places(step: f64) -> impl Iterator<Item = [f64; 2]> {
     wander(Random(71), TICKS, SIZE, step, 0.05)
 }
 
-/// Median and 99th percentile of the patches and of the evaluations, over the
-/// ticks of these HIPs that end in a state.
+/// Median and 99th percentile of the patches and of the evaluations, over the ticks that end in a
+/// state.
 fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u32; 2]; 2] {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
@@ -69,7 +69,7 @@ fn looked_at(hips: impl Iterator<Item = GridPoint>, state: ContactState) -> [[u3
         SEARCHED.set([0; 2]);
         let output = step(&hip);
         let searched = match SEARCHED.get() {
-            // The shortcut: one evaluation.
+            // The fast path: one evaluation.
             [0, _] if output.state == ContactState::Touching && output.work == FAST_PATH => [1, 1],
             searched => searched,
         };
@@ -91,7 +91,7 @@ fn a_tick_looks_at_no_more_than_it_needs() {
     let flies = |above: f64| places(0.5).map(move |at| hip(at, above));
     let slides = |step: f64| places(step).map(|at| hip(at, -0.1));
     let taps = places(0.03).flat_map(|at| [hip(at, 0.2), hip(at, -0.1)]);
-    // An encoder count of 0.03 cell, one way or the other.
+    // One encoder count, 0.03 cell, in either direction.
     let mut random = Random(72);
     let mut count = || 0.03 * random.between(-1.5, 1.5).round();
     let trembles = (0..TICKS).map(|_| hip([30.4 + count(), 30.5 + count()], count() - 0.1));

@@ -1,4 +1,4 @@
-//! A proxy does not pass a crest of its patch, however far its HIP moves in a tick.
+//! A proxy passes no crest of its patch, for any motion of the HIP in a tick.
 
 use std::vec;
 
@@ -11,7 +11,7 @@ use crate::grid::GridPoint;
 use crate::terrain::FieldSize;
 use crate::terrain::testing::{Field, buffers};
 
-/// A single patch, in the cell (1, 1) of a field of holes.
+/// A single patch, in the cell (1, 1) of a field of no-data.
 #[derive(Clone, Copy, Debug)]
 struct Single([f32; 4]);
 
@@ -21,8 +21,7 @@ impl Single {
         (sw * (1.0 - u) + se * u) * (1.0 - v) + (nw * (1.0 - u) + ne * u) * v
     }
 
-    /// The proxy for the last of these HIPs, and the one before, in the patch; `None` unless both
-    /// touch.
+    /// The proxies for the last two of these HIPs, in the patch; `None` unless both touch.
     fn proxies(&self, hips: &[[f64; 3]]) -> Option<[[f64; 3]; 2]> {
         let mut tiles = buffers::<1>();
         let corners = self.0;
@@ -49,8 +48,8 @@ impl Single {
         Some([last[0]?, last[1]?])
     }
 
-    /// Returns true if columns whose ground, or air over it, is no farther from the HIP than `reach` join
-    /// two places.
+    /// Returns true if two places are joined by columns whose ground, or air over it, is no farther
+    /// from the HIP than `reach`.
     fn joins(&self, hip: [f64; 3], [from, to]: [[f64; 3]; 2], reach: f64) -> bool {
         const SIDE: usize = 200;
         let column = |at: [f64; 3]| [at[0], at[1]].map(|c| (c * SIDE as f64).round() as usize);
@@ -89,7 +88,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// One in 150 of such moves used to end on the other side of the patch's crest.
+/// One in 150 such moves ended on the other side of the patch's crest.
 #[test]
 fn proxy_passes_no_crest_of_a_twisted_patch() {
     let mut random = Random(39);
@@ -124,7 +123,7 @@ fn proxy_passes_no_crest_of_a_twisted_patch() {
     assert_eq!(wrong, 0, "of {moves}");
 }
 
-/// Corners, the last two HIPs, and where the proxy belongs.
+/// Corners, the last two HIPs, and the right place of the proxy.
 #[test]
 fn proxy_ends_in_its_basin_after_a_move_of_0_8_cell() {
     let cases = [

@@ -1,13 +1,11 @@
-//! Share of the force at the edge of the surface.
+//! Fade of the force at the edge of the surface.
 //!
-//! In contact the proxy is held at the edge of a hole, at the border of the
-//! data, and before a tile that is not here. The force then fades with the
-//! distance of the *HIP* from the nearest patch, to nothing at [`REACH`], and
-//! there the contact ends. The HIP slides off an edge as off a
-//! table, without a kick and without being hooked back from underneath.
+//! In contact, the proxy stops at the edge of no-data, at the border of the data, and before a
+//! missing tile. The force then fades with the distance of the *HIP* from the nearest patch, to
+//! zero at [`REACH`], where the contact ends. The HIP slides off an edge as off a table, without a
+//! kick and without a pull from underneath.
 //!
-//! The boundary fade is a factor on the force: 1 where all of it is rendered, 0 where
-//! nothing is.
+//! The edge fade is a factor on the force: from 1 (full force) to 0 (no force).
 
 use super::budget::Budget;
 use crate::grid::{Cell, GridPoint};
@@ -15,16 +13,15 @@ use crate::terrain::{CellContent, TILE_CELLS, Window};
 
 /// Distance of the HIP from the nearest patch, in cells, at which no force is rendered.
 pub const REACH: f32 = 0.5;
-/// Most that the boundary fade may change in a second, either way: from all to
-/// nothing in 32 ms.
+/// Maximum change of the edge fade in a second, in either direction: from 1 to 0 in 32 ms.
 pub const RATE_PER_S: f32 = 31.25;
-/// Most that it may change in a tick at 1 kHz.
+/// Maximum change of the edge fade in a tick at 1 kHz.
 pub const RATE: f32 = RATE_PER_S / 1_000.0;
-/// Cells, along an axis, from the proxy at which a HIP is too far off for what
-/// lies under it to matter: all of the force is then rendered.
+/// Distance between HIP and proxy, in cells along an axis, from which the cell under the HIP no
+/// longer matters: the full force is then rendered.
 ///
-/// A tile's side less one: what is looked at, a neighbour of the HIP's patch
-/// included, never shares a slot of the window with the tile under the proxy.
+/// One less than a tile's side: the cells that are read, including a neighbour of the HIP's patch,
+/// never share a slot of the window with the tile under the proxy.
 pub const FAR: u32 = TILE_CELLS as u32 - 1;
 
 /// Returns true if the cell under the HIP is too far from the proxy's to matter.
@@ -33,14 +30,13 @@ fn is_far(proxy: Cell, hip: Cell) -> bool {
     proxy.x.abs_diff(hip.x).max(proxy.y.abs_diff(hip.y)) >= FAR
 }
 
-/// Target of the edge fade, and its uncertainty.
+/// Target of the edge fade.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Target {
-    /// 1 over a patch, less beside one, 0 farther than [`REACH`] from any: continuous
-    /// in the HIP within [`FAR`] of the proxy's cell, and 1 beyond. What is missing
-    /// counts as not there.
+    /// 1 over a patch, less beside one, 0 farther than [`REACH`] from any: continuous in the HIP
+    /// within [`FAR`] of the proxy's cell, and 1 beyond. Missing tiles count as no-data.
     pub(super) fade: f32,
-    /// True if nothing fades as long as the HIP stays over its cell: there is a patch.
+    /// True if the HIP is over a patch, so that nothing fades while it stays over its cell.
     pub(super) over_patch: bool,
 }
 
@@ -51,14 +47,14 @@ impl Target {
     };
 }
 
-/// The target for a HIP, whose proxy is on the patch in a cell.
+/// Returns the target for a HIP whose proxy is on the patch in a cell.
 pub(super) fn target<const D: usize>(
     window: &Window<'_, D>,
     hip: &GridPoint,
     proxy: Cell,
     budget: &mut Budget,
 ) -> Target {
-    // Nearly always the HIP is over the patch that the proxy is on.
+    // Usually the HIP is over the patch that the proxy is on.
     if proxy == hip.column() {
         return Target::ALL;
     }
@@ -104,7 +100,7 @@ fn beside_patches<const D: usize>(
     }
 }
 
-/// Distance along one axis from a place in a cell to a neighbouring cell.
+/// Returns the distance along one axis from a place in a cell to a neighbouring cell.
 fn gap(place: f32, toward: i32) -> f32 {
     match toward {
         1 => 1.0 - place,
@@ -113,7 +109,7 @@ fn gap(place: f32, toward: i32) -> f32 {
     }
 }
 
-/// A boundary fade moved toward its target, by at most `most`, which is positive.
+/// Returns the edge fade, moved toward its target by at most `most`, which is positive.
 pub(super) fn approach(fade: f32, target: f32, most: f32) -> f32 {
     // Not `f32::min`, which is a call where the processor has no instruction for it.
     let way = target - fade;
@@ -185,7 +181,7 @@ mod tests {
         assert_eq!(over_patch(at(8.5, 10.5), proxy), (true, 1.0), "its own");
         assert_eq!(over_patch(at(8.5, 9.5), proxy), (true, 1.0), "another");
         assert_eq!(over_patch(at(39.0, 9.5), proxy), (false, 1.0), "a far one");
-        // Exactly on the border of a hole all is rendered, but no step farther.
+        // Exactly on the border of no-data the full force is rendered, but not beyond.
         assert_eq!(over_patch(at(9.0, 10.5), proxy), (false, 1.0), "a border");
     }
 
@@ -204,8 +200,8 @@ mod tests {
         assert!((beside(&field, at(40.25, 5.0)).fade - 0.5).abs() < 1e-6);
     }
 
-    /// Milliseconds that a HIP which is moved into the hole keeps feeling
-    /// its edge, and the largest change of the boundary fade in a tick.
+    /// Milliseconds until the force ends for a HIP that moved over no-data, and the maximum change
+    /// of the edge fade in a tick.
     fn faded_after(khz: u32) -> (f32, f32) {
         let mut tiles = buffers::<2>();
         let field = hole_at_10_10(&mut tiles);

@@ -1,10 +1,9 @@
-//! Fast paths for nearly every tick: free as before, or
-//! sliding on within a gentle patch.
+//! Fast paths for nearly every tick: still free, or still sliding within a gentle patch.
 //!
-//! Each answers with the bits that the whole contact (`proxy`) would answer with,
-//! or not at all: a test (`the_shortcuts_change_no_bit`) and the soak run scenes with
-//! and without. What they save is in `bench/instructions-m4f.csv`: a sliding tick
-//! that takes one beside a first contact, which does not.
+//! Each returns the same bits as the full contact (`proxy`), or nothing: a test
+//! (`the_shortcuts_change_no_bit`) and the randomised stress test run scenes with and without them.
+//! `bench/instructions-m4f.csv` shows what they save: compare a sliding tick on the fast path with
+//! a first contact.
 
 use glam::Vec3;
 
@@ -16,8 +15,7 @@ use super::tolerance::BESIDE_OF_NEAR_HIP;
 use crate::grid::{Cell, GridPoint};
 use crate::terrain::{CellBox, CellContent, Window};
 
-/// Returns true if a free HIP's path is clear, by one comparison or by a look at the nine
-/// samples around it.
+/// Returns true if a free HIP's path is clear, by one comparison or by the nine samples around it.
 #[inline]
 pub(super) fn is_free<const D: usize>(
     window: &Window<'_, D>,
@@ -29,22 +27,22 @@ pub(super) fn is_free<const D: usize>(
         || window.is_clear_nearby(CellBox::around(from.column(), to.column()), low)
 }
 
-/// A proxy at rest well inside a convex patch, all of its force rendered.
+/// A proxy at rest well inside a convex patch, with full force.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Follow {
     /// Place where it rests.
     pub(super) point: SurfacePoint,
-    /// A cell known to hold a patch, for the HIP to be over: nothing fades.
+    /// A cell that surely holds a patch: while the HIP is over it, nothing fades.
     over: Cell,
-    /// The patch, and the whole height in cells that its heights count from.
+    /// The patch, and the base of its heights in whole cells.
     patch: Patch,
     base: i32,
     convexity: Convexity,
 }
 
 impl Follow {
-    /// Of a proxy that came to rest for a HIP over the patch of `over`; `None` where
-    /// there is no shortcut.
+    /// Creates the fast path of a proxy that came to rest with the HIP over the patch of `over`;
+    /// returns `None` if the proxy must use the full contact.
     pub(super) fn from<const D: usize>(
         window: &Window<'_, D>,
         point: SurfacePoint,
@@ -67,8 +65,7 @@ impl Follow {
         })
     }
 
-    /// Moves the proxy to where it rests now, if it keeps resting well inside its
-    /// patch.
+    /// Moves the proxy to its new place of rest, if that is still well inside its patch.
     #[inline]
     pub(super) fn to(&mut self, view: &HipView) -> Followed {
         let patch = self.patch.relative_to(view.altitude(), self.base);
@@ -94,12 +91,12 @@ impl Follow {
 
 /// Outcome of following a proxy within its patch.
 pub(super) enum Followed {
-    /// It rests: its position, and the displacement from the HIP to it, cells.
+    /// The proxy rests: its position, and the displacement from the HIP to it, cells.
     Rests(GridPoint, Vec3),
-    /// More has to be looked at, but the proxy does not leave the surface at once, and
-    /// the patch's closest point is this one.
+    /// The full contact is needed, but the proxy does not leave the surface at once, and this is
+    /// the patch's closest point.
     InPatch(Place),
-    /// More has to be looked at.
+    /// The full contact is needed.
     Not,
 }
 

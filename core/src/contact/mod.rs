@@ -1,11 +1,11 @@
 //! The contact: the proxy, where the haptic interface point (HIP) would be if it
 //! could not enter the terrain.
 //!
-//! [`Contact::step`] takes the HIP of one tick and answers with the proxy. Read in
-//! this order: `proxy` (what a tick does), [`sweep`] (from free space to the
-//! surface), [`closest_point`] (over the surface), `friction` (what holds it back there), [`edge_fade`] (at the border
-//! of the data); [`surface`] is what all of them speak of. `tolerance` says how exact
-//! each is and `budget` how much a tick may do; `fast_path` is what nearly every tick is.
+//! [`Contact::step`] receives the HIP of one tick and returns the proxy. Reading order: `proxy`
+//! (the phases of a tick), [`sweep`] (from free space to the surface), [`closest_point`] (over the
+//! surface), `friction` (what holds the proxy back), [`edge_fade`] (at the border of the data); all
+//! use [`surface`]. `tolerance` defines how exact each is, `budget` limits the work of a tick, and
+//! `fast_path` handles nearly every tick.
 
 pub mod closest_point;
 pub mod edge_fade;

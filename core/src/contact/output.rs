@@ -10,32 +10,31 @@ use crate::terrain::TileIndex;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ContactState {
-    /// The HIP has not been seen above the surface yet: no force.
+    /// The HIP has not been above the surface yet: no force.
     #[default]
     Unseeded,
-    /// The proxy is free: it is where the HIP is, or on its way there.
+    /// The proxy is free: it is at the HIP, or on its path there.
     Free,
     /// The proxy is on the surface and the HIP below it.
     Touching,
-    /// The surface that the proxy was on has come to an end: the last force fades
-    /// away.
+    /// The surface under the proxy has ended: the last force fades out.
     Releasing,
 }
 
-/// One tick's answer.
+/// The result of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactOutput {
     /// State of the proxy.
     pub state: ContactState,
     /// Position of the proxy.
     pub proxy: GridPoint,
-    /// From the HIP to the proxy in cells, times the boundary fade: what the spring
-    /// stretches by. Zero unless touching or fading.
+    /// Vector from the HIP to the proxy in cells, times the edge fade: the extension of the spring.
+    /// Zero unless touching or releasing.
     pub displacement: Vec3,
-    /// Returns true if the tick did all there was to do for this HIP, with the tiles that are here.
+    /// True if the tick completed the work for this HIP with the stored tiles.
     pub converged: bool,
-    /// A tile that the tick looked for and that is not here: with it the answer may be another.
+    /// A missing tile that the tick needed: with it the result may differ.
     pub missing_tile: Option<TileIndex>,
-    /// Units of work spent; more than [`super::WORK_PER_TICK`] would be a fault.
+    /// Work units spent; more than [`super::WORK_PER_TICK`] is a fault.
     pub work: u32,
 }

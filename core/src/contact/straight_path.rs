@@ -1,13 +1,13 @@
-//! A straight way through one patch, and where the distance from the HIP is first least on it.
+//! A straight path through one patch, and the first minimum of the distance from the HIP on it.
 //!
-//! In the coordinates of the patch the way is `(u, v) + t·(du, dv)`. The height over it is a
+//! In the coordinates of the patch the path is `(u, v) + t·(du, dv)`. The height over it is a
 //! quadratic in `t`, half the squared distance a quartic, and its slope the cubic
 //!
 //! ```text
 //! h(t) = (off + t·d)·d + (z + s·t + w·t²)·(s + 2w·t)        w = a·du·dv
 //! ```
 //!
-//! So the first minimum is exact: a way that ends there has passed no crest.
+//! So the first minimum is exact: a path that ends there has passed no crest.
 
 use glam::Vec3;
 
@@ -15,12 +15,12 @@ use super::surface::Side;
 use super::surface::patch::Patch;
 use crate::scalar::{larger, smaller};
 
-/// Steps of false position at most. Three or four are usual.
+/// Maximum number of false-position steps. Three or four are usual.
 const STEPS: u32 = 16;
-/// The way may end where the slope is less than this part of that at its start.
+/// Fraction of the start's slope below which a path may end.
 const FLAT: f32 = 4e-3;
 
-/// A straight way through one patch.
+/// A straight path through one patch.
 #[derive(Debug)]
 pub(super) struct StraightWay {
     from: (f32, f32),
@@ -30,8 +30,8 @@ pub(super) struct StraightWay {
 }
 
 impl StraightWay {
-    /// From a place of the patch, for a HIP at `hip`, in patch coordinates; at `t = 1` it has gone
-    /// all of `way`.
+    /// Creates a path from a place of the patch, for a HIP at `hip`, in patch coordinates; at
+    /// `t = 1` it has covered all of `way`.
     #[inline]
     pub(super) fn new(patch: &Patch, hip: (f32, f32), from: (f32, f32), way: (f32, f32)) -> Self {
         let (off_u, off_v) = (from.0 - hip.0, from.1 - hip.1);
@@ -47,7 +47,7 @@ impl StraightWay {
         Self { from, way, slope }
     }
 
-    /// Returns where it meets the borders eastward or westward, and northward or southward.
+    /// Returns `t` at the borders eastward or westward, and northward or southward.
     #[inline]
     pub(super) fn to_borders(&self) -> (f32, f32) {
         let along = |from: f32, way: f32| match way {
@@ -59,7 +59,7 @@ impl StraightWay {
         (along(u, du), along(v, dv))
     }
 
-    /// The place at `t`, in the patch.
+    /// Returns the place at `t`, in the patch.
     #[inline]
     pub(super) fn at(&self, t: f32) -> (f32, f32) {
         let place = |from: f32, way: f32| larger(smaller(from + t * way, 1.0), 0.0);
@@ -67,7 +67,7 @@ impl StraightWay {
         (place(u, du), place(v, dv))
     }
 
-    /// The place where it meets the nearer of its [`Self::to_borders`], exactly on it.
+    /// Returns the place at the nearer of its [`Self::to_borders`], exactly on the border.
     #[inline]
     pub(super) fn on_border(&self, (to_east, to_north): (f32, f32)) -> (f32, f32) {
         let end = smaller(to_east, to_north);
@@ -81,15 +81,15 @@ impl StraightWay {
         (u, v)
     }
 
-    /// Half the slope of the squared distance over `t`.
+    /// Returns half the slope of the squared distance over `t`.
     #[inline]
     fn slope_at(&self, t: f32) -> f32 {
         let [c0, c1, c2, c3] = self.slope;
         c0 + t * (c1 + t * (c2 + t * c3))
     }
 
-    /// The first minimum of the distance up to `end`, or short of it by next to nothing; `None`
-    /// where the distance falls all the way. It has to fall at the start.
+    /// Returns the first minimum of the distance up to `end`, within rounding; `None` if the
+    /// distance falls all the way. It must fall at the start.
     pub(super) fn first_minimum(&self, end: f32) -> Option<f32> {
         let [c0, c1, c2, c3] = self.slope;
         let mut end = end;
@@ -128,10 +128,10 @@ impl StraightWay {
         Some(low)
     }
 
-    /// Returns true if the distance is surely nowhere on the way up to `t = 1` more than at its start:
-    /// half the squares by no more than `noise`.
+    /// Returns true if half the squared distance on the path up to `t = 1` surely never exceeds its
+    /// start by more than `noise`.
     pub(super) fn never_rises_above_start(&self, noise: f32) -> bool {
-        // Of the mean slope from the start to `t`, which times `t` is the rise.
+        // Bernstein coefficients of the mean slope from the start to `t`; times `t` it is the rise.
         let [c0, c1, c2, c3] = self.slope;
         let [c1, c2, c3] = [c1 / 2.0, c2 / 3.0, c3 / 4.0];
         let bernstein = [
@@ -144,10 +144,10 @@ impl StraightWay {
     }
 }
 
-/// The part of a vector along the tangent plane of these slopes, or, of a point on a border,
-/// along that direction into the patch which has most of it.
+/// Returns the component of a vector along the tangent plane of these slopes; for a point on a
+/// border, along the direction into the patch with the largest component.
 pub(super) fn steepest(su: f32, sv: f32, border: Side, way: Vec3) -> Vec3 {
-    // The projection onto the plane; multiplied out, so that a wall costs no bits.
+    // The projection onto the plane, multiplied out so that a wall loses no bits.
     let (across, norm) = (su * sv, 1.0 + su * su + sv * sv);
     let free = Vec3::new(
         ((1.0 + sv * sv) * way.x - across * way.y + su * way.z) / norm,

@@ -1,10 +1,10 @@
 //! A small seeded generator for tests, the same everywhere (xorshift64*).
 
-/// Its state; any number but zero.
+/// State of the generator, not zero.
 pub(super) struct Random(pub(super) u64);
 
 impl Random {
-    /// In `[0, 1)`.
+    /// A number in `[0, 1)`.
     pub(super) fn unit(&mut self) -> f64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -12,14 +12,14 @@ impl Random {
         (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// In `[low, high)`.
+    /// A number in `[low, high)`.
     pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 }
 
-/// So many places `step` cells apart, each a turn of up to `turn` rad from the
-/// way before, within a square field of `size` cells and away from its border.
+/// Places `step` cells apart, each turned by up to `turn` rad from the last direction, within a
+/// square field of `size` cells and away from its border.
 pub(super) fn wander(
     random: Random,
     ticks: u32,

@@ -1,4 +1,4 @@
-//! Invariants of every tick, on terrain from flat to absurd.
+//! Invariants of every tick, on terrain from flat to extreme.
 
 use std::vec::Vec;
 
@@ -24,7 +24,7 @@ fn hash(x: i32, y: i32) -> f64 {
 }
 
 const SIZE: i32 = 60;
-/// Paths of the HIP over each kind of ground.
+/// Number of HIP paths over each kind of ground.
 const SEEDS: core::ops::RangeInclusive<u64> = 1..=cases(20, 1) as u64;
 
 /// A terrain and its surface in f64.
@@ -48,7 +48,7 @@ impl Ground64 {
 }
 
 impl Ground64 {
-    /// The surface at a point that may lie on the edge of a hole.
+    /// The surface at a point that may lie on the edge of no-data.
     fn beside(&self, [x, y, _]: [f64; 3]) -> f64 {
         let e = 1e-9;
         [(0.0, 0.0), (e, 0.0), (0.0, e), (e, e)]
@@ -97,7 +97,7 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
             ContactState::Unseeded | ContactState::Free => {
                 assert_eq!(output.displacement, Vec3::ZERO, "{at}");
             }
-            // What it was on is not there any more.
+            // The terrain under the proxy no longer exists.
             ContactState::Releasing => {}
             ContactState::Touching => {
                 let z = truth.beside(proxy);
@@ -114,11 +114,11 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
     seen
 }
 
-/// No point of the surface right around the proxy is nearer to the HIP.
+/// No point of the surface on a ring around the proxy is nearer to the HIP.
 fn assert_is_nearest(truth: &Ground64, slope: f64, proxy: [f64; 3], hip: [f64; 3], at: &str) {
     const RING: f64 = 1e-5;
     let d = distance(proxy, hip);
-    // Beside an edge, but not on it, the ring would look over a ridge.
+    // Beside an edge, but not on it, the ring would reach over a ridge.
     let beside_edge = |c: f64| c != c.round() && (c - c.round()).abs() < 10.0 * RING;
     if slope > 1e3 || beside_edge(proxy[0]) || beside_edge(proxy[1]) {
         return;
@@ -140,7 +140,7 @@ fn assert_is_nearest(truth: &Ground64, slope: f64, proxy: [f64; 3], hip: [f64; 3
     }
 }
 
-/// A HIP that wanders, at `step` cells a tick, around height `mid` ± `span`.
+/// A HIP that wanders, at `step` cells a tick, at a height of `mid` ± `span`.
 fn wander(seed: u64, ticks: u32, step: f64, mid: f64, span: f64) -> Vec<[f64; 3]> {
     let mut random = Random(seed);
     let mut p = [30.0, 30.0, mid + span];
@@ -162,7 +162,7 @@ fn wander(seed: u64, ticks: u32, step: f64, mid: f64, span: f64) -> Vec<[f64; 3]
         .collect()
 }
 
-/// Jumps anywhere.
+/// A HIP that jumps anywhere.
 fn teleport(seed: u64, ticks: u32, mid: f64, span: f64) -> Vec<[f64; 3]> {
     let mut random = Random(seed);
     let mut path = std::vec![[30.0, 30.0, mid + 3.0 * span]];
@@ -176,8 +176,8 @@ fn teleport(seed: u64, ticks: u32, mid: f64, span: f64) -> Vec<[f64; 3]> {
     path
 }
 
-/// Returns the first crossing of the segment with the surface, by looking at many points:
-/// none, or the point before and the point after.
+/// Returns the points before and after the first crossing of the segment with the surface, by dense
+/// sampling; `None` without a crossing.
 fn dense_crossing(truth: &Ground64, from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     const POINTS: u32 = cases(2000, 100);
     let part = |i: u32| f64::from(i) / f64::from(POINTS);
@@ -217,7 +217,7 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
                 seen[0] += 1;
                 let x = f64::from(point.cell.x) + f64::from(point.u);
                 let y = f64::from(point.cell.y) + f64::from(point.v);
-                // On the way, and not after the dense search has seen it.
+                // On the path, and not after the crossing of the dense search.
                 let way = ((to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2)).sqrt();
                 let gone = ((x - from[0]).powi(2) + (y - from[1]).powi(2)).sqrt();
                 let seen_at = ((after[0] - from[0]).powi(2) + (after[1] - from[1]).powi(2)).sqrt();
@@ -232,7 +232,7 @@ fn sweeps_agree(name: &str, height: fn(i32, i32) -> f32, slope: f64, low: f64, h
                 );
             }
             (Swept::Hit(point), None) => {
-                // Grazes between two points of the dense search, or touches.
+                // A graze between two points of the dense search, or a touch.
                 let x = f64::from(point.cell.x) + f64::from(point.u);
                 let y = f64::from(point.cell.y) + f64::from(point.v);
                 assert!(truth.at(x, y).is_some(), "{at}");
@@ -261,8 +261,8 @@ fn the_first_crossing_is_found_exactly() {
     sweeps_agree("board", checkerboard, 1.0, -0.5, 1.5);
 }
 
-/// Figure 8 of the paper, with walls for its peaks: a single raised sample is
-/// a pole that a proxy may slide around, a wall may not be passed.
+/// Figure 8 of the paper, with walls for its peaks: a proxy may slide around a single raised
+/// sample, but it must not pass a wall.
 fn two_walls(x: i32, _: i32) -> f32 {
     if x == 20 || x == 24 { 30.0 } else { 0.0 }
 }
@@ -456,8 +456,8 @@ fn holds_when_the_hip_jumps() {
     }
 }
 
-/// On a path that hardly moves sideways, the sweep resolves poorly which part of
-/// it the field begins; continuing from beyond that, it would come from nowhere.
+/// On a path that hardly moves sideways, the sweep resolves poorly where the field begins; a
+/// continuation from beyond would start outside of the terrain.
 #[test]
 fn steep_ways_in_over_the_border_cross_nothing() {
     let mut tiles = buffers::<8>();
@@ -479,7 +479,7 @@ fn steep_ways_in_over_the_border_cross_nothing() {
     }
 }
 
-/// A field of 16 × 16 cells with a hole in the middle, flat at height 1.
+/// A field of 16 × 16 cells with no-data in the middle, flat at height 1.
 fn with_a_hole(x: i32, y: i32) -> f32 {
     match (6..=10).contains(&x) && (6..=10).contains(&y) {
         true => f32::NAN,
@@ -487,8 +487,8 @@ fn with_a_hole(x: i32, y: i32) -> f32 {
     }
 }
 
-/// A patch has all four borders: straight down onto the last sample in the east or
-/// north, or onto one beside a hole, is onto the surface.
+/// A patch has all four borders: a path straight down to the last sample in the east or north, or
+/// to one beside no-data, meets the surface.
 #[test]
 fn straight_down_onto_any_sample_meets_the_surface() {
     let mut tiles = buffers::<2>();
@@ -509,8 +509,8 @@ fn straight_down_onto_any_sample_meets_the_surface() {
     }
 }
 
-/// Forces on a path that often lies on grid lines are those on the mirrored path over
-/// the mirrored field.
+/// A path that often lies on grid lines has the same forces as the mirrored path over the mirrored
+/// field.
 #[test]
 fn mirrored_path_along_grid_lines_has_mirrored_forces() {
     let mut tiles = [buffers::<2>(), buffers::<2>()];
@@ -549,7 +549,7 @@ fn mirrored_path_along_grid_lines_has_mirrored_forces() {
     assert!(touched > cases(4000, 20), "{touched}");
 }
 
-/// A ground, the height around which it is rendered, and how far up and down from there.
+/// A ground, the height around which it is rendered, and the distance up and down from there.
 type TestGround = (fn(i32, i32) -> f32, f64, f64);
 
 /// Ground of every kind.
@@ -563,8 +563,8 @@ const GROUNDS: [TestGround; 7] = [
     (holes, 1.0, 1.5),
 ];
 
-/// Returns the answers of two contacts with other settings to the same path, tick by tick, each
-/// as often as it takes.
+/// Returns the outputs of two contacts with different settings on the same path, tick by tick, each
+/// repeated until it converges.
 fn side_by_side(
     one: ContactSettings,
     other: ContactSettings,
@@ -574,7 +574,7 @@ fn side_by_side(
         let mut tiles = buffers::<2>();
         let field = Field::<2>::held(&mut tiles, FieldSize::new(SIZE, SIZE), height);
         let mut contacts = [one, other].map(Contact::new);
-        // Most of the time below the surface, once it was seen from above.
+        // Usually below the surface, after a start above it.
         let above = [[30.0, 30.0, 2e4]].into_iter();
         for step in [0.01, 0.3, 2.0] {
             let below = wander(5, cases(1500, 20), step, mid - 0.6 * span, 0.6 * span);
@@ -641,8 +641,7 @@ fn a_tick_cut_short_anywhere_ends_on_the_same_bits() {
     assert!(cut > cases(500, 5), "{cut} ticks were cut short");
 }
 
-/// Tents whose top is a vertex, an edge eastward or northward; one side of the edge
-/// is steeper.
+/// Tents whose top is a vertex, or an edge eastward or northward; one side of the edge is steeper.
 #[test]
 fn on_an_edge_or_vertex_the_steepest_way_down_decides() {
     let tent = |x: i32, y: i32, at: i32| -> f32 {
@@ -669,8 +668,8 @@ fn on_an_edge_or_vertex_the_steepest_way_down_decides() {
     }
 }
 
-/// No arm moves by a window in a tick: a HIP that does is a new one, without force until it has
-/// been above the surface.
+/// No arm moves by a window in a tick: such a HIP is a new one, without force until it has been
+/// above the surface.
 #[test]
 fn hip_that_leaps_beyond_the_window_begins_anew() {
     let mut tiles = buffers::<2>();

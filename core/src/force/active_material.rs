@@ -1,10 +1,10 @@
 //! The active material, and the transition from one material to the next.
 //!
-//! The material of the sample nearest to the proxy is wanted. What acts on the force moves there
-//! evenly within [`MATERIAL_CHANGE_S`]: stiffness, damping and friction by as much in each tick,
-//! and a texture by its share: the old one goes out in the first half, and the new one comes
-//! in from then on. A proxy that comes out of the air finds its material as it is, because
-//! no force was rendered before.
+//! The target is the material of the sample nearest to the proxy. The rendered parameters reach it
+//! within [`MATERIAL_CHANGE_S`]: stiffness, damping and friction change by the same amount in each
+//! tick, and a texture by its share: the old one fades out in the first half, the new one fades in
+//! during the second. A proxy that lands from the air starts with its material at once, because no
+//! force was rendered before.
 
 use super::material::{MATERIAL_CHANGE_S, Material, MaterialTable};
 use super::{SurfaceParams, Texture, Texturer};
@@ -15,27 +15,27 @@ use crate::terrain::Window;
 /// The rendered material.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActiveMaterial {
-    /// The one that is wanted.
+    /// Index of the target material.
     index: u8,
-    /// Material when the change began, and the share of the change that is done.
+    /// Material when the change began, and the completed share of the change.
     from: Material,
     done: f32,
-    /// The part of a change in a tick.
+    /// Share of a change in one tick.
     step: f32,
-    /// Factor of the stiffness.
+    /// Factor on the stiffness.
     scale: f32,
-    /// The surface parameters as rendered. Their texture is the one whose share is rendered.
+    /// The rendered surface parameters. Their texture is the one that `texture_share` refers to.
     params: SurfaceParams,
-    /// Share of that texture that is rendered.
+    /// Rendered share of that texture.
     texture_share: f32,
     cell_mm: f32,
     rate: TickRate,
-    /// The proxy touched in the tick before.
+    /// True if the proxy touched in the last tick.
     was_rendered: bool,
 }
 
 impl ActiveMaterial {
-    /// Before anything is rendered: the default.
+    /// Creates the default material, before anything is rendered.
     pub(crate) fn of(
         table: &MaterialTable,
         params: &SurfaceParams,
@@ -61,7 +61,7 @@ impl ActiveMaterial {
         Some(material)
     }
 
-    /// The rendered surface parameters.
+    /// Returns the rendered surface parameters.
     pub(crate) const fn params(&self) -> &SurfaceParams {
         &self.params
     }
@@ -71,20 +71,20 @@ impl ActiveMaterial {
         self.params.friction
     }
 
-    /// Returns the share of the texture that is rendered.
+    /// Returns the rendered share of the texture.
     pub(crate) const fn texture_share(&self) -> f32 {
         self.texture_share
     }
 
-    /// The texture that is rendered, as a scene of its own would have it.
+    /// Returns a texturer for the rendered texture.
     pub(crate) fn texturer(&self) -> Option<Texturer> {
         Texturer::of(&self.params.texture, self.cell_mm, self.rate)
     }
 
-    /// One more tick of a contact, which is done with its HIP. Returns whether another texture
-    /// is rendered from now on.
+    /// Advances by one completed tick of a contact. Returns true if another texture is rendered
+    /// from now on.
     ///
-    /// The material stays while the tile of the proxy is missing.
+    /// The material stays the same while the tile of the proxy is missing.
     pub(crate) fn advance<const D: usize>(
         &mut self,
         table: &MaterialTable,
@@ -93,7 +93,7 @@ impl ActiveMaterial {
     ) -> bool {
         match contact.output().state {
             ContactState::Touching => {}
-            // What fades out does so as it was.
+            // A contact that fades out keeps its material.
             ContactState::Releasing => return false,
             ContactState::Unseeded | ContactState::Free => {
                 self.was_rendered = false;
@@ -132,13 +132,13 @@ impl ActiveMaterial {
                 self.feels(wanted);
             }
         }
-        // Out in half of the time, and in in the other half.
+        // Fade-out takes half of the time, and fade-in the other half.
         let step = 2.0 * self.step;
         if self.params.texture == wanted.texture {
             self.texture_share = (self.texture_share + step).min(1.0);
             return false;
         }
-        // An even surface has nothing that could go out.
+        // A surface without texture has nothing to fade out.
         let share = self.texture_share - step;
         if share > 0.0 && !self.params.texture.is_none() {
             self.texture_share = share;
@@ -148,7 +148,7 @@ impl ActiveMaterial {
         self.takes_texture(&wanted.texture)
     }
 
-    /// Between the material before the change and the wanted one.
+    /// Returns the material between the start of the change and the target.
     fn on_the_way_to(&self, wanted: &Material) -> Material {
         let mix = |from: f32, to: f32| from + (to - from) * self.done;
         let (from, to) = (&self.from, wanted);
@@ -157,7 +157,7 @@ impl ActiveMaterial {
         Material {
             stiffness_n_per_mm: mix(from.stiffness_n_per_mm, to.stiffness_n_per_mm),
             friction: Friction {
-                // By the last places, it might be below.
+                // Because of rounding it might be smaller.
                 static_mu: static_mu.max(dynamic_mu),
                 dynamic_mu,
                 viscous_s: mix(from.friction.viscous_s, to.friction.viscous_s),
@@ -167,7 +167,7 @@ impl ActiveMaterial {
         }
     }
 
-    /// Puts all of a material in force but its texture.
+    /// Renders all of a material except its texture.
     fn feels(&mut self, material: &Material) {
         self.params = SurfaceParams {
             texture: self.params.texture,
@@ -182,7 +182,7 @@ impl ActiveMaterial {
     }
 }
 
-/// A material of the table as stiff as the scene has it.
+/// Returns a material of the table, scaled to the stiffness of the scene.
 fn scaled(material: &Material, scale: f32) -> Material {
     Material {
         stiffness_n_per_mm: material.stiffness_n_per_mm * scale,

@@ -1,4 +1,4 @@
-//! Damping of a scene's choice along the force, and of the passivity controller's.
+//! Damping along the force, by a scene's choice and by the passivity controller.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -7,35 +7,34 @@ use super::passivity::{MAX_MJ, Moment, Motion, Passivity, Takes};
 use super::{EffectContext, SurfaceParams, clamp_length};
 use crate::scalar::{larger, smaller};
 
-/// Energy that a shaded force may give towards an edge, and take beyond it, before it is turned
-/// less, as a part of its size times a cell and the depth. An edge gives a quarter of its bend
-/// times the part of a cell on which the force turns ([`super::shading`]): this much at 23°,
-/// twice as much at 45°, the most.
+/// Energy that a shaded force may give before an edge, and take beyond it, before its turn is
+/// reduced. It is a fraction of the force times the sum of a cell and the depth. An edge gives a
+/// quarter of its bend times the part of a cell on which the force turns ([`super::shading`]): this
+/// much at 23°, twice as much at 45°, the maximum.
 const EDGE_GIVES: f32 = 0.1;
-/// A motion across the force that is slower is not damped, mm/s: a hand that rests and an arm that
-/// hums are. They create little, and damping that comes late would shake them.
+/// Speed across the force up to which a motion is not damped, mm/s: a resting hand, or an arm in a
+/// limit cycle. They create little energy, and late damping would make them unstable.
 const SLOW_MM_S: f32 = 30.0;
-/// So much more may have been created before it is turned less, mJ.
+/// Additional created energy that causes no reduction of the turn, mJ.
 const LEAST_MJ: f32 = 0.1;
 
-/// Damping of a surface: dissipation of a motion against it.
+/// Damping of a surface: it dissipates energy of a motion against the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Damping {
-    /// Newtons for a metre a second along the force. What it adds or takes is never more
-    /// than the spring's force: it comes in with the depth, and never pulls.
+    /// Newtons per metre a second along the force. The damping force never exceeds the spring's
+    /// force: it starts from zero with the depth, and never pulls.
     pub ns_per_m: f32,
     /// Dissipation of the energy leak of the sampled wall.
     pub controller: Controller,
 }
 
-/// The passivity controller, on or off: it dissipates the energy that a spring which is sampled
-/// in ticks creates.
+/// The passivity controller, on or off: it dissipates the energy that a sampled spring creates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]
 pub enum Controller {
-    /// Wherever a current may flow. Settings of earlier versions say `auto`, too.
+    /// Active wherever a current can flow. Settings of earlier versions also use `auto`.
     #[default]
     #[serde(alias = "auto")]
     On,
@@ -44,9 +43,9 @@ pub enum Controller {
 }
 
 impl Damping {
-    /// Most that a scene may ask for, N·s/m.
+    /// Maximum damping of a scene, N·s/m.
     pub const MAX_NS_PER_M: f32 = 20.0;
-    /// None, and the controller.
+    /// No damping, with the controller on.
     pub const NONE: Self = Self {
         ns_per_m: 0.0,
         controller: Controller::On,
@@ -58,15 +57,14 @@ impl Damping {
         *self == Self::NONE
     }
 
-    /// Returns true if its number is one that a loop can work with.
+    /// Returns true if the number is in its valid range.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         (0.0..=Self::MAX_NS_PER_M).contains(&self.ns_per_m)
     }
 }
 
-/// The damping of one scene at one rate, and what else its controller has a say in; a scene without
-/// any has none.
+/// The damping of one scene at one rate, and the effects that its controller limits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Damper {
     params: SurfaceParams,
@@ -74,8 +72,9 @@ pub(crate) struct Damper {
 }
 
 impl Damper {
-    /// Of a scene. Points have no hand that energy could be given to.
-    // A call: it is made by two, once for a scene.
+    /// Creates the damper of a scene, or `None` without damping. A replay has no hand that could
+    /// receive energy.
+    // Not inlined: it has two callers, and runs once for a scene.
     #[inline(never)]
     pub(crate) fn of(params: &SurfaceParams, context: &EffectContext) -> Option<Self> {
         let is_controlled = context.arm && params.is_controlled();
@@ -86,27 +85,29 @@ impl Damper {
         })
     }
 
-    /// The surface is another one from this tick on, of the same controller.
+    /// Changes the surface from this tick on; the controller stays.
     pub(crate) const fn feels(&mut self, params: &SurfaceParams) {
         self.params = *params;
     }
 
-    /// The energy that was created and not taken back yet, mJ, where it is watched.
+    /// Returns the energy that was created and not dissipated yet, mJ; zero without a controller.
     pub(crate) fn created_mj(&self) -> f32 {
         self.controller.as_ref().map_or(0.0, Passivity::created_mj)
     }
 
-    /// The share that is left of the turn of a shaded force, so deep.
+    /// Returns the share of a shaded force's turn that is rendered at a depth.
     ///
-    /// Such a force is not that of a spring: round a closed way it gives energy, and no damping
-    /// along it takes back what comes across. Towards an edge it gives what it takes beyond, so
-    /// all of the turn is left while no more was created than an edge gives.
+    /// A turned force is not that of a spring: around a closed path it can give energy, and damping
+    /// along the force does not dissipate energy from motion across it. The force gives before an
+    /// edge what it takes beyond, so the full turn is rendered until more energy was created than
+    /// an edge gives.
     pub(crate) fn turn_left(&self, depth_mm: f32, cell_mm: f32) -> f32 {
         let spring_n = smaller(
             depth_mm * self.params.stiffness_n_per_mm,
             self.params.max_force_n,
         );
-        // None of the turn is left at twice as much, and more than the book holds is forgotten.
+        // At twice this energy nothing is left of the turn. The observer never records more than
+        // `MAX_MJ`.
         let gives_mj = smaller(
             EDGE_GIVES * spring_n * (cell_mm + depth_mm) + LEAST_MJ,
             0.5 * MAX_MJ,
@@ -115,30 +116,31 @@ impl Damper {
         smaller(larger(1.0 - over, 0.0), 1.0)
     }
 
-    /// No force is rendered, or less than the spring's force: what was created before is forgotten.
+    /// Resets the controller while no force, or less than the spring's force, is rendered: energy
+    /// created before is forgotten.
     pub(crate) fn rest(&mut self) {
         if let Some(controller) = &mut self.controller {
             controller.rest();
         }
     }
 
-    /// Books the energy since the tick before.
+    /// Records the energy since the last tick.
     pub(crate) fn observe(&mut self, now: &Moment) {
         if let Some(controller) = &mut self.controller {
             controller.observe(&self.params, now);
         }
     }
 
-    /// The force of a tick: the spring's, damped, and less where the surface yields.
+    /// Returns the force of a tick: the spring's force, softened and damped.
     #[cold]
     #[inline(never)]
     pub(crate) fn force_n(&self, spring_n: Vec3, velocity_mm_s: Vec3) -> Vec3 {
         let share = self.controller.as_ref().map_or(1.0, Passivity::share);
         let spring_n = spring_n * share;
-        // Along the force, times its size: positive where the tip gives way to it.
+        // Component along the force, times its size: positive if the tip moves with the force.
         let along = velocity_mm_s.dot(spring_n);
         let share = along / spring_n.length_squared();
-        // No number without a force.
+        // NaN or infinite without a force.
         if !share.is_finite() {
             return spring_n;
         }
@@ -151,7 +153,7 @@ impl Damper {
             })
         });
         if !(self.params.shading.is_none() && self.params.texture.is_none()) {
-            // Such a force is not on the way to the proxy: damping across it could pull.
+            // Such a force does not point to the proxy: damping across it could pull.
             takes.across = 0.0;
         }
         takes.along += 1e-3 * self.params.damping.ns_per_m;
@@ -161,7 +163,7 @@ impl Damper {
     }
 }
 
-/// Returns the part of a vector beyond a length; zero for one that is no number.
+/// Returns the part of a vector beyond a length; zero for NaN.
 fn beyond(v: Vec3, length: f32) -> Vec3 {
     let share = 1.0 - length / v.length();
     if share > 0.0 { v * share } else { Vec3::ZERO }

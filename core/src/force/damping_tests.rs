@@ -1,4 +1,4 @@
-//! Damping and the controller, judged by what they do to a tip that moves along a spring.
+//! Damping and the controller, tested by their effect on a tip that moves along a spring.
 
 use core::f64::consts::TAU;
 use std::vec::Vec;
@@ -10,12 +10,12 @@ use super::super::{Pattern, Shading, Texture};
 use super::*;
 use crate::rate::TickRate;
 
-/// A scene's damper with an arm.
+/// The damper of a scene with an arm.
 fn damper(params: &SurfaceParams, hz: u32) -> Option<Damper> {
     Damper::of(params, &context(hz, 0.1e-3))
 }
 
-/// With an arm.
+/// The context of a scene with an arm.
 fn context(hz: u32, latency_s: f32) -> EffectContext {
     EffectContext {
         cell_mm: 1.0,
@@ -68,7 +68,7 @@ fn the_controller_acts_on_every_arm_unless_it_is_off() {
         assert!(!acts(stiffness, hz, Controller::Off), "{hz} Hz");
     }
     assert_eq!(SurfaceParams::PREMIUM.damping.controller, Controller::On);
-    // Points have no hand.
+    // A replay has no hand.
     let points = EffectContext {
         arm: false,
         ..context(1000, 0.1e-3)
@@ -77,8 +77,8 @@ fn the_controller_acts_on_every_arm_unless_it_is_off() {
     assert!(points.is_none());
 }
 
-/// The energy that `ramps` books on a tip at rest, and on one that leaves with the force of the
-/// whole spring, mJ.
+/// The energy, mJ, that the observer records with `ramps`: with a tip at rest, and with one that
+/// leaves under the full spring force.
 fn created_by(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
     let params = params(1.0, 0.0, Controller::On);
     let mut damper = damper(&params, 1000).expect("controlled");
@@ -112,11 +112,11 @@ fn ramp_and_clutch_book_only_energy_of_the_motion() {
     ] {
         let [at_rest, leaving] = created_by(|tick| ramps(share(tick)));
         assert_eq!(at_rest, 0.0);
-        // 2 N acted on 0.5 mm, and 0.51 of the spring gave 0.51 · ½ (2² − 1.5²).
+        // 2 N acted over 0.5 mm, and 0.51 of the spring gave 0.51 · ½ (2² − 1.5²).
         let given = 2.0 * 0.5 - 0.51 * 0.5 * (4.0 - 2.25);
         assert!((leaving - given).abs() < 1e-5, "{leaving} mJ, not {given}");
     }
-    // The speed limit lets a force back in, too, and no hand has asked for that.
+    // The speed limit also lets a force return, without an action of the user.
     let [at_rest, _] = created_by(|tick| Shares {
         speed: share(tick),
         ..Shares::ALL
@@ -126,7 +126,7 @@ fn ramp_and_clutch_book_only_energy_of_the_motion() {
 
 #[test]
 fn damping_is_that_of_the_spring_which_is_let_through() {
-    // What half of a spring created takes as much damping a newton as all of one.
+    // Energy created by half of a spring takes as much damping per newton as by all of one.
     let damped = |shares: Shares| {
         let params = params(1.0, 0.0, Controller::On);
         let mut damper = damper(&params, 1000).expect("controlled");
@@ -171,14 +171,14 @@ fn damping_is_that_of_the_spring_which_is_let_through() {
     }
 }
 
-/// Taps of a tip on a level surface: along a sine, some 3 mm deep.
+/// Taps of a tip on a level surface, along a sine some 3 mm deep.
 #[derive(Clone, Copy)]
 struct Taps {
     hz: u32,
-    /// From the beginning of a tick until its force acts, s, and the latency that is given to the damper.
+    /// Time from the start of a tick until its force acts, s, and the damper's latency.
     late_s: f64,
     told_s: f64,
-    /// Taps a second; at 9 the tip is up to 170 mm/s fast.
+    /// Taps a second; at 9 the tip moves at up to 170 mm/s.
     tap_hz: f64,
 }
 
@@ -193,7 +193,7 @@ impl Taps {
     }
 
     /// Energy that the surface gives in each of a few taps, mJ, integrated a hundred times a tick.
-    /// The force changes by no more than the guard lets it.
+    /// The force obeys the guard's rate limit.
     fn given_mj(self, params: &SurfaceParams) -> Vec<f64> {
         const DEEP_MM: f64 = 3.0;
         let mut damper = Damper::of(params, &context(self.hz, self.told_s as f32));
@@ -231,7 +231,7 @@ impl Taps {
                 let moves_mm = height_mm(now_s + to * tick_s) - height_mm(now_s + from * tick_s);
                 given += acts_n.unwrap_or(0.0) * moves_mm;
             }
-            // Well above the surface: a tap is over.
+            // Well above the surface: the tap has ended.
             if height_mm(now_s) > 0.9 * DEEP_MM && given != 0.0 {
                 taps.push(given);
                 given = 0.0;
@@ -264,8 +264,8 @@ fn with_the_controller_no_tap_gives_energy_and_without_it_every_one_does() {
     }
 }
 
-/// Energy, mJ, that a point which holds the proxy gives to a tip on circles of 4 mm round it,
-/// 200 mm/s fast, in a second: no motion is along the force.
+/// Energy, mJ, that a point which holds the proxy gives in a second to a tip on circles of 4 mm
+/// around it at 200 mm/s: no motion is along the force.
 fn given_on_circles_mj(params: &SurfaceParams, hz: u32) -> f64 {
     const RADIUS_MM: f64 = 4.0;
     let tick_s = 1.0 / f64::from(hz);
@@ -335,7 +335,7 @@ fn across_a_shaded_or_textured_force_nothing_is_taken() {
 
 #[test]
 fn energy_of_unstated_latency_is_not_all_dissipated() {
-    // So it matters that a board states how long it and its amplifiers take.
+    // So a board must state the latency of itself and of its amplifiers.
     let on = params(1.0, 0.0, Controller::On);
     let known = Taps::new(1000, 1.1e-3);
     let unknown = Taps {
@@ -352,7 +352,7 @@ fn energy_of_unstated_latency_is_not_all_dissipated() {
 
 #[test]
 fn a_force_that_comes_earlier_than_it_is_said_to_gives_nothing_either() {
-    // A duty cycle is read 0.5 to 1 ms after it was set.
+    // A duty cycle is read 0.5 to 1 ms after it is set.
     for hz in [1000, 2000, 4000] {
         for late_s in [0.63e-3, 0.88e-3] {
             let taps = Taps {
@@ -367,7 +367,7 @@ fn a_force_that_comes_earlier_than_it_is_said_to_gives_nothing_either() {
 
 #[test]
 fn a_tip_too_fast_for_the_guards_force_gets_nothing_either() {
-    // Up to 565 mm/s: at 4 N/mm the force would have to change twice as fast as it may.
+    // Up to 565 mm/s: at 4 N/mm the force would exceed its rate limit by a factor of two.
     for hz in [1000, 4000, 10_000] {
         for stiffness in [1.0, 2.0, 4.0] {
             let taps = Taps {
@@ -385,7 +385,7 @@ fn a_tip_too_fast_for_the_guards_force_gets_nothing_either() {
 
 #[test]
 fn what_is_taken_back_is_not_much_more_than_was_created() {
-    // A controller that damped more would be felt as honey.
+    // With more damping the surface would be rendered as honey.
     for hz in [1000, 4000] {
         for late_s in LATE_S {
             let taps = Taps::new(hz, late_s);
@@ -419,13 +419,13 @@ fn a_surface_yields_to_a_fast_tip_and_recovers_under_one_that_rests() {
             .z
             / params.spring().force_n(Vec3::Z * -up_mm).z
     };
-    // 500 N/s are half of what the guard allows.
+    // 500 N/s is half of the guard's rate limit.
     assert_eq!(share(-1.0, 250.0, 1), 1.0);
     assert!((share(-1.0, -500.0, 1) - 0.5).abs() < 1e-6);
-    // No less than it was, whatever the tip does, while it does something.
+    // The share does not decrease while the tip moves, in any direction.
     assert!((share(-1.0, 11.0, 1000) - 0.5).abs() < 1e-6);
     assert!((share(-1.0, 0.0, 299) - 0.5).abs() < 1e-6);
-    // Of 1 mJ, half in 0.1 s.
+    // From 1 mJ, half in 0.1 s.
     let recovering = share(-1.0, 0.0, 50);
     assert!((recovering - 0.75).abs() < 0.01, "{recovering}");
     assert_eq!(share(-1.0, 0.0, 60), 1.0);
@@ -450,7 +450,7 @@ fn what_was_created_is_forgotten_at_rest_and_never_more_than_a_little() {
         damper.created_mj()
     };
     assert_eq!(at(0.0, 0.0), 0.0);
-    // Pressed in without a force against it: what the spring holds came from nowhere.
+    // The tip was pressed in without a counterforce: the spring's energy was created.
     let created = at(-0.2, 0.0);
     assert!(
         (created - (0.5 * 5.2 * 5.2 - 0.5 * 25.0)).abs() < 1e-5,

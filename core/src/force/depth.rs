@@ -8,12 +8,12 @@ use crate::scalar::larger;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Depth {
     pub(super) mm: f32,
-    /// Speed at which the depth decreases.
+    /// Speed at which the depth decreases, mm/s.
     pub(super) leaves_mm_s: f32,
 }
 
 impl Depth {
-    /// Of a tip that is displaced from its proxy, at a velocity.
+    /// Returns the depth of a tip with this displacement to its proxy, at a velocity.
     pub(super) fn of(displacement_mm: Vec3, velocity_mm_s: Vec3) -> Self {
         let mm = displacement_mm.length();
         let along = velocity_mm_s.dot(displacement_mm);
@@ -21,8 +21,7 @@ impl Depth {
         Self { mm, leaves_mm_s }
     }
 
-    /// Returns the rest of it after a time in which the tip moves on as it does. Beyond the surface
-    /// there is none.
+    /// Returns the depth after a time at constant velocity; zero if the tip leaves the surface.
     pub(super) fn after_mm(&self, seconds: f32) -> f32 {
         larger(self.mm - self.leaves_mm_s * seconds, 0.0)
     }

@@ -7,8 +7,8 @@ use crate::rate::TickRate;
 pub(crate) struct EffectContext {
     pub(crate) cell_mm: f32,
     pub(crate) rate: TickRate,
-    /// From the beginning of a tick until its force acts, s.
+    /// Time from the start of a tick until its force acts, s.
     pub(crate) latency_s: f32,
-    /// An arm follows it, not points.
+    /// True if the scene follows an arm, not points.
     pub(crate) arm: bool,
 }

@@ -1,4 +1,4 @@
-//! Shading beside the passivity controller.
+//! Shading together with the passivity controller.
 
 use super::*;
 use crate::contact::ContactSettings;
@@ -25,7 +25,7 @@ fn context() -> EffectContext {
     }
 }
 
-/// At one depth the force does so much work.
+/// Makes the force create this much energy at constant depth.
 fn created(effects: &mut Effects, created_mj: f32) {
     if let Some(damper) = &mut effects.damper {
         for moved_mm in [Vec3::ZERO, Vec3::Z] {
@@ -41,7 +41,7 @@ fn created(effects: &mut Effects, created_mj: f32) {
     }
 }
 
-/// The displacement beside a ridge, without shading and with it, where the book has so much in it.
+/// The displacement beside a ridge, without and with shading, after this much created energy.
 fn beside_a_ridge(params: &SurfaceParams, created_mj: f32) -> [Vec3; 2] {
     let size = FieldSize::new(40, 40);
     let ridge = |x: i32, _| -0.5 * (x - 20).abs() as f32;
@@ -66,7 +66,7 @@ fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
     let [plain, shaded] = beside_a_ridge(&PARAMS, 0.0);
     let angle = plain.angle_between(shaded);
     assert!(angle > 0.1, "{angle}");
-    // What an edge gives at this depth, and a tenth of a millijoule.
+    // The energy of an edge at this depth, plus a tenth of a millijoule.
     let deep_mm = plain.length();
     let gives_mj = 0.1 * 0.5 * deep_mm * (1.0 + deep_mm) + 0.1;
     for share in [0.3, 0.99] {
@@ -90,7 +90,7 @@ fn the_more_the_controller_has_to_take_back_the_less_the_force_is_turned() {
 
 #[test]
 fn what_the_book_holds_at_most_is_enough_to_turn_no_force() {
-    // A cell of a metre: an edge gives more than the book holds.
+    // A cell of a metre: an edge gives more than the observer records.
     let damper = |created_mj: f32| {
         let mut effects = Effects::of(&PARAMS, &context()).expect("shaded");
         created(&mut effects, created_mj);
@@ -100,8 +100,9 @@ fn what_the_book_holds_at_most_is_enough_to_turn_no_force() {
     assert_eq!(damper(9.0).turn_left(100.0, 1e3), 0.0);
 }
 
-/// Slides 20 mm over facets of two cells, so deep, and compares each tick with the same without the
-/// controller: the largest step of the force of both, N, and the share of the turn that was left.
+/// Slides 20 mm over facets of two cells at a depth, and compares each tick with the same without
+/// the controller: returns the maximum step of the force of both, N, and the rendered share of the
+/// turn.
 fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] {
     let params = SurfaceParams {
         stiffness_n_per_mm,
@@ -125,7 +126,7 @@ fn slid(stiffness_n_per_mm: f32, slope: f32, depth: f32, mm_s: f32) -> [f32; 3] 
     let step = mm_s * TickRate::DEFAULT.tick_s();
     let (mut last, mut asked_n) = (None, Vec3::ZERO);
     let (mut steps, mut turned) = ([0.0_f32; 2], [0.0_f32; 2]);
-    // Down to its depth, and on from there.
+    // First down to the depth, then along it.
     let (down, on) = (100, (20.0 / step) as usize);
     for tick in 0..down + on {
         let x = 20.3 + step * tick.saturating_sub(down) as f32;
@@ -186,7 +187,7 @@ fn a_slide_over_facets_is_as_smooth_with_the_controller_as_without() {
         );
         assert!(left > 0.99, "{what}: {left} of the turn");
     }
-    // Where an edge gives more than a millijoule, some of it is rendered.
+    // Where an edge gives more than a millijoule, part of the turn is rendered.
     let [_, _, left] = slid(2.0, 0.3, 3.0, 50.0);
     assert!((0.75..0.9).contains(&left), "{left} of the turn");
 }

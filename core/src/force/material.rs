@@ -1,8 +1,8 @@
-//! Materials: what a class of ground feels like, and the table of them that a scene has.
+//! Materials: the surface of one class of ground, and a scene's table of them.
 //!
-//! The host sorts the ground into classes, and tells the device which material of the table
-//! each sample has; so the device needs no classes of the file.
-//! `active_material.rs` beside this file has how one material follows another.
+//! The host sorts the ground into classes and sends the device each sample's index into the table,
+//! so the device does not need the classes of the file. `active_material.rs` implements the
+//! transition between materials.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -12,15 +12,15 @@ use crate::contact::Friction;
 use crate::crc::{CRC, add};
 use crate::force::Damping;
 
-/// Time from one material to the next, seconds. So a border of
-/// classes changes a force by at most ten times a second what the two materials differ by.
+/// Time of the transition from one material to the next, seconds. So at a border of classes, a
+/// force changes per second by at most ten times the difference of the two materials.
 pub const MATERIAL_CHANGE_S: f32 = 0.1;
 
 /// Surface of one class of ground.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Material {
-    /// Newtons for a millimetre between the HIP and the proxy.
+    /// Newtons per millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,
     /// Its friction.
     pub friction: Friction,
@@ -42,8 +42,8 @@ impl Material {
         }
     }
 
-    /// The same parameters with this material; the limit, the controller and the shading
-    /// stay.
+    /// Returns the same parameters with this material; the limit, the controller and the shading
+    /// stay the same.
     #[must_use]
     pub const fn params(&self, params: &SurfaceParams) -> SurfaceParams {
         SurfaceParams {
@@ -58,47 +58,47 @@ impl Material {
         }
     }
 
-    /// Returns true if its numbers are such that a loop can work with.
+    /// Returns true if all numbers are in their valid ranges.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.params(&SurfaceParams::PREMIUM).is_valid()
     }
 }
 
-/// Most materials, the default among them: an index is half a byte.
+/// Maximum number of materials, including the default: an index is half a byte.
 const MAX_MATERIALS: usize = 16;
 
-/// The materials of a scene. The first is the default: the material where the ground has no
-/// class, or one that the table does not name.
+/// The materials of a scene. The first is the default, for ground without a class or with a class
+/// that is not in the table.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MaterialTable {
     materials: Vec<Material, MAX_MATERIALS>,
 }
 
 impl MaterialTable {
-    /// Most materials, the default among them.
+    /// Maximum number of materials, including the default.
     pub const MOST: usize = MAX_MATERIALS;
-    /// A table without any, which no scene can have.
+    /// An empty table, which is not valid in a scene.
     pub const EMPTY: Self = Self {
         materials: Vec::new(),
     };
 
-    /// A table of these materials, the default first; `None` where there are none, or more
-    /// than [`Self::MOST`].
+    /// Creates a table of these materials, the default first; returns `None` without materials, or
+    /// with more than [`Self::MOST`].
     #[must_use]
     pub fn new(materials: &[Material]) -> Option<Self> {
         let materials = Vec::from_slice(materials).ok()?;
         (!materials.is_empty()).then_some(Self { materials })
     }
 
-    /// The materials, the default first.
+    /// Returns the materials, the default first.
     #[must_use]
     pub fn materials(&self) -> &[Material] {
         &self.materials
     }
 
-    /// Returns true if there is a default with a stiffness, and all numbers are such that a loop can
-    /// work with.
+    /// Returns true if there is a default with a stiffness, and all numbers are in their valid
+    /// ranges.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let is_stiff = |default: &Material| default.stiffness_n_per_mm > 0.0;
@@ -106,8 +106,8 @@ impl MaterialTable {
             && self.materials.iter().all(Material::is_valid)
     }
 
-    /// Tells tables apart ([`Scene::materials`](crate::scene::Scene::materials)): a check sum of
-    /// all numbers, CRC-32 over their little-endian bytes in the order of the fields.
+    /// Returns the identifier of a table ([`Scene::materials`](crate::scene::Scene::materials)):
+    /// CRC-32 of all numbers, as little-endian bytes in the order of the fields.
     #[must_use]
     pub fn check_sum(&self) -> u32 {
         let mut digest = CRC.digest();
@@ -137,15 +137,16 @@ impl MaterialTable {
         digest.finalize()
     }
 
-    /// The material of an index; the default's where there is no such one.
+    /// Returns the material of an index; the default for an unknown index.
     #[must_use]
     pub fn at(&self, index: u8) -> Option<&Material> {
         let named = self.materials.get(usize::from(index));
         named.or_else(|| self.materials.first())
     }
 
-    /// Factor of surface parameters on the stiffness of all materials: their own stiffness over
-    /// the default's. A placement that is twice as stiff is so on each material.
+    /// Returns the factor by which surface parameters scale the stiffness of all materials: their
+    /// stiffness divided by the default's. A placement that is twice as stiff is so on each
+    /// material.
     #[must_use]
     pub fn stiffness_scale(&self, params: &SurfaceParams) -> f32 {
         let default = self.at(0).map_or(0.0, |default| default.stiffness_n_per_mm);
@@ -155,8 +156,8 @@ impl MaterialTable {
         }
     }
 
-    /// Surface parameters as stiff as the stiffest material, and as damped as the most damped: a
-    /// stability rule has to hold for them.
+    /// Returns surface parameters with the maximum stiffness and the maximum damping of all
+    /// materials: a stability rule must hold for them.
     #[must_use]
     pub fn hardest(&self, params: &SurfaceParams) -> SurfaceParams {
         let most = |of: fn(&Material) -> f32| {
@@ -173,7 +174,7 @@ impl MaterialTable {
         }
     }
 
-    /// A friction that one of the materials has; none where all are like ice.
+    /// Returns the friction of one material that has friction, or none if all are frictionless.
     #[must_use]
     pub(crate) fn some_friction(&self) -> Friction {
         let mut all = self.materials.iter().map(|material| material.friction);

@@ -30,27 +30,28 @@ pub use shading::{Shader, Shading};
 pub use texture::{Pattern, Texture};
 pub use texturer::Texturer;
 
-/// The parameters of a surface: its spring, and every effect. Immutable while a tick runs. A force
-/// is made of all of it by the tick; of the spring alone by [`Self::spring`].
+/// The parameters of a surface: its spring, and every effect. Immutable during a tick. The tick
+/// computes a force from all of them; [`Self::spring`] covers the spring alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SurfaceParams {
-    /// Newtons for a millimetre between the HIP and the proxy.
+    /// Newtons per millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,
-    /// Largest force in newtons; the direction is kept.
+    /// Maximum force in newtons; the direction is kept.
     pub max_force_n: f32,
     /// Friction of the surface.
     pub friction: Friction,
-    /// Damping of a motion against it.
+    /// Damping of motion against the surface.
     pub damping: Damping,
-    /// Which normals the force follows.
+    /// Choice of the normals that the force follows.
     pub shading: Shading,
     /// The micro-relief of the surface.
     pub texture: Texture,
 }
 
 impl SurfaceParams {
-    /// 0.5 N/mm and 8.5 N on a surface like ice: what a Phantom Premium 1.5 can hold.
+    /// 0.5 N/mm and 8.5 N on a frictionless surface: the continuous ability of a Phantom Premium
+    /// 1.5.
     pub const PREMIUM: Self = Self {
         stiffness_n_per_mm: 0.5,
         max_force_n: 8.5,
@@ -60,8 +61,8 @@ impl SurfaceParams {
         texture: Texture::NONE,
     };
 
-    /// Returns true if stiffness and limit are finite and not negative, and friction, damping and texture
-    /// are such.
+    /// Returns true if stiffness and limit are finite and not negative, and friction, damping and
+    /// texture are valid.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let ok = |x: f32| x.is_finite() && x >= 0.0;
@@ -72,7 +73,7 @@ impl SurfaceParams {
             && self.texture.is_valid()
     }
 
-    /// The spring, without friction, damping, shading and texture.
+    /// Returns the spring, without friction, damping, shading and texture.
     #[must_use]
     pub const fn spring(&self) -> Spring {
         Spring {
@@ -88,8 +89,8 @@ impl SurfaceParams {
     }
 }
 
-/// The spring between the haptic interface point (HIP) and the proxy (paper
-/// §4.3.4), and the limit of what it may ask for.
+/// The spring between the haptic interface point (HIP) and the proxy (paper §4.3.4), and the limit
+/// of its force.
 ///
 /// ```
 /// use hapterra_core::{Vec3, force::Spring};
@@ -103,27 +104,27 @@ impl SurfaceParams {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spring {
-    /// Newtons for a millimetre between the HIP and the proxy.
+    /// Newtons per millimetre between the HIP and the proxy.
     pub stiffness_n_per_mm: f32,
-    /// Largest force in newtons; the direction is kept.
+    /// Maximum force in newtons; the direction is kept.
     pub max_force_n: f32,
 }
 
 impl Spring {
-    /// Force in newtons for a proxy `displacement_mm` away from the HIP.
+    /// Returns the force in newtons for a proxy `displacement_mm` away from the HIP.
     ///
-    /// Along `displacement_mm`, proportional to its length, clamped as a vector.
-    /// Always finite: a displacement that is not gives no force.
+    /// It points along `displacement_mm`, is proportional to its length, and is clamped as a
+    /// vector. Always finite: a displacement that is not finite gives no force.
     #[must_use]
     pub fn force_n(&self, displacement_mm: Vec3) -> Vec3 {
         clamp_length(displacement_mm * self.stiffness_n_per_mm, self.max_force_n)
     }
 
-    /// The energy that it holds at a depth, mJ.
+    /// Returns the energy stored at a depth, mJ.
     pub(crate) fn stored_mj(&self, depth_mm: f32) -> f32 {
         let stretched_n = depth_mm * self.stiffness_n_per_mm;
         let at_limit_n = smaller(stretched_n, self.max_force_n);
-        // Beyond the limit the force stays as it is: F (d - d_m) more than at the limit.
+        // Beyond the limit the force is constant: F (d - d_m) more than at the limit.
         at_limit_n * (stretched_n - 0.5 * at_limit_n) / self.stiffness_n_per_mm
     }
 }

@@ -1,15 +1,16 @@
 //! The energy leak of the sampled wall at the tip, and the damping that dissipates it
 //! (Hannaford and Ryu 2002).
 //!
-//! A spring gives no more than it was given. One that is rendered in ticks does: its force is that of
-//! the tick's beginning and acts a latency L later, too small on the way in and too large on the
-//! way out, and gives K (T / 2 + L) v a metre. The observer adds up the work of the forces that did
-//! act, each at the time when it acted, and compares it with what a spring would hold at this depth;
-//! what is more was created. So it is known while the tip goes in, and not only when it has left.
+//! An ideal spring returns no more energy than it received. A spring that is rendered in ticks
+//! does: its force belongs to the start of the tick and acts a latency L later, so it is too small
+//! on the way in and too large on the way out. This gives K (T / 2 + L) v per metre. The observer
+//! adds up the work of the forces that acted, each at its time, and compares the sum with the
+//! energy of an ideal spring at this depth; the excess was created. So the leak is known while the
+//! tip moves in, and not only after it has left.
 //!
-//! The damping of the controller acts a latency later, too. So the controller looks ahead by that
-//! time: the forces to come are known, and the tip is assumed to keep its velocity. It adds the damping
-//! that dissipates the energy created until then: K (T / 2 + L) in an even motion.
+//! The damping of the controller also acts a latency later, so the controller predicts: the next
+//! forces are known, and the tip is assumed to keep its velocity. It adds the damping that
+//! dissipates the energy created until then: K (T / 2 + L) in a uniform motion.
 
 use glam::Vec3;
 
@@ -18,39 +19,41 @@ use super::rate_limit_softening::RateLimitSoftening;
 use super::{EffectContext, Spring, SurfaceParams};
 use crate::scalar::{larger, smaller};
 
-/// More than this is forgotten, mJ.
+/// Maximum recorded energy, mJ; more is forgotten.
 pub(super) const MAX_MJ: f32 = 2.0;
-/// Most damping, as ticks of the stiffness, besides the latency. What the velocity is off by,
-/// some 0.1 of a count a tick, makes a force of so many times the spring's for 0.1 of a count.
+/// Maximum damping, as ticks of the stiffness, in addition to the latency. The velocity has an
+/// error of some 0.1 count a tick, which gives a force of this many times the spring's force for
+/// 0.1 count.
 const MAX_TICKS: f32 = 2.0;
-/// The same across the force: an even motion creates what half of it takes.
+/// The same across the force: a uniform motion creates half of the energy that this dissipates.
 const MAX_TICKS_ACROSS: f32 = 1.0;
-/// Below this share of the force hardly any leaves the guard, and damping is not scaled up to it.
+/// Share of the force below which hardly any passes the guard, so damping is not scaled up further.
 const LEAST_SHARE: f32 = 1e-4;
-/// Forces kept: those on their way, the one that acts and the one before it. A power of two.
+/// Number of stored forces: the delayed ones, the acting one and the one before it. A power of two.
 const KEPT: usize = 16;
-/// Most ticks that a force may come late: what is later is taken to come then.
+/// Maximum latency of a force in ticks; a longer latency counts as this one.
 const MAX_LATE: usize = KEPT - 2;
 
-/// The observer's book, and the controller.
+/// The observer's energy record, and the controller.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Passivity {
     tick_s: f32,
-    /// From the beginning of a tick until its force acts, s: so many ticks, and a part of one.
+    /// Time from the start of a tick until its force acts, s, and the same in whole ticks and a
+    /// fraction.
     latency_s: f32,
     late: (usize, f32),
     rate_limit_softening: RateLimitSoftening,
     created_mj: f32,
-    /// The same when this tick's force has acted for a tick, all but the work of that force, for
-    /// a force before the guard's share.
+    /// The created energy, predicted for the end of a tick in which this tick's force acts, without
+    /// the work of that force, for a force before the guard's share.
     coming_mj: f32,
-    /// The spring before the guard's share, N/mm; the clutch's share is in it.
+    /// The spring before the guard's share, N/mm; the clutch's share is included.
     stiffness_n_per_mm: f32,
     before: Option<Before>,
     asked: Asked,
 }
 
-/// The state of the tick before.
+/// The state of the last tick.
 #[derive(Clone, Copy, Debug)]
 struct Before {
     depth_mm: f32,
@@ -78,7 +81,7 @@ impl Asked {
         self.forces_n[self.newest % KEPT] = force_n;
     }
 
-    /// The one of so many ticks ago.
+    /// Returns the force of `ticks` ticks ago.
     const fn ago(&self, ticks: usize) -> Vec3 {
         self.forces_n[self.newest.wrapping_sub(ticks) % KEPT]
     }
@@ -87,33 +90,33 @@ impl Asked {
 /// The inputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moment {
-    /// From the HIP to the proxy.
+    /// Vector from the HIP to the proxy.
     pub(crate) displacement_mm: Vec3,
-    /// The tip's displacement over the terrain since the tick before.
+    /// The tip's displacement over the terrain since the last tick.
     pub(crate) moved_mm: Vec3,
     /// Velocity of the tip.
     pub(crate) velocity_mm_s: Vec3,
-    /// The force that the guard let through in the tick before.
+    /// The force that the guard let through in the last tick.
     pub(crate) asked_n: Vec3,
-    /// The largest force that the guard lets through.
+    /// The maximum force that the guard lets through.
     pub(crate) most_n: f32,
     /// Shares of the spring's force in this tick.
     pub(crate) shares: Shares,
 }
 
-/// Shares of a force that clutch and guard let through, each above 0 and at most 1.
+/// Shares of a force that clutch and guard let through, each above 0, at most 1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shares {
-    /// The clutch's, before the guard's clamp.
+    /// The clutch's share, before the guard's clamp.
     pub(crate) clutch: f32,
-    /// The guard's after arming, after its clamp.
+    /// The guard's share after arming, after its clamp.
     pub(crate) ramp: f32,
-    /// The guard's for a fast tip, after its clamp.
+    /// The guard's share for a fast tip, after its clamp.
     pub(crate) speed: f32,
 }
 
 impl Shares {
-    /// All of the force.
+    /// The full force.
     pub(crate) const ALL: Self = Self {
         clutch: 1.0,
         ramp: 1.0,
@@ -140,7 +143,7 @@ impl Passivity {
         }
     }
 
-    /// The share of the spring's force that is rendered.
+    /// Returns the rendered share of the spring's force.
     pub(super) const fn share(&self) -> f32 {
         self.rate_limit_softening.share()
     }
@@ -154,13 +157,12 @@ impl Passivity {
         (self.rate_limit_softening, self.asked) = (RateLimitSoftening::NONE, Asked::NONE);
     }
 
-    /// Books what happened since the tick before, and what is going to happen until this tick's
-    /// force has acted for a tick, all but the work of that force. Energy that was lost gives no
-    /// credit.
+    /// Records the energy since the last tick, and predicts the energy until this tick's force has
+    /// acted for a tick, without the work of that force. Lost energy gives no credit.
     ///
-    /// The spring is that of the force which leaves the guard: the scene's, times all shares. A
-    /// spring that becomes stiffer puts energy in. Ramp and clutch are meant to do so, each once,
-    /// and that energy is not booked; everything else is.
+    /// The spring is the one of the force after the guard: the scene's, times all shares. A spring
+    /// that becomes stiffer adds energy. For ramp and clutch this is intended, once each, and not
+    /// recorded; everything else is.
     pub(super) fn observe(&mut self, params: &SurfaceParams, now: &Moment) {
         let depth = Depth::of(now.displacement_mm, now.velocity_mm_s);
         let Shares {
@@ -212,11 +214,12 @@ impl Passivity {
         self.stiffness_n_per_mm = stiffness_n_per_mm;
     }
 
-    /// The damping, N·s/mm, that takes back what was created, and what a spring's force will have
-    /// created when it has acted for a tick: along that force, and across it where damping along it
-    /// cannot take all, as where the tip moves round a peak or a point that friction holds.
+    /// Returns the damping, N·s/mm, that dissipates the created energy and the energy that the
+    /// spring's force will have created after acting for a tick: along that force, and across it if
+    /// damping along it is not enough, as where the tip moves around a peak or a point that
+    /// friction holds.
     pub(super) fn damping_ns_per_mm(&self, motion: &Motion) -> Takes {
-        // No number where nothing moves: then there is nothing to take from.
+        // NaN or infinite at rest, where damping has no effect.
         let takes = |mj: f32, squared: f32, ticks: f32| {
             let most = (ticks * self.tick_s + self.latency_s) * self.stiffness_n_per_mm;
             match mj / (squared * self.tick_s) {
@@ -250,7 +253,7 @@ pub(super) struct Takes {
     pub(super) across: f32,
 }
 
-/// Returns an energy within its bounds, mJ: one that is no number counts as none.
+/// Limits an energy to its bounds, mJ; NaN counts as zero.
 fn within(mj: f32) -> f32 {
     smaller(larger(mj, 0.0), MAX_MJ)
 }

@@ -1,28 +1,28 @@
-//! The micro-relief of a texture: how high it is at a place of the terrain, and how it slopes.
+//! The micro-relief of a texture: its height and slope at a place of the terrain.
 //!
 //! A place is counted in waves or grains from the terrain's origin: 32 bits of whole ones, which
-//! wrap, and 32 bits of a fraction. How many there are to a cell is rounded once, to an `f32`; all
-//! that follows is exact. So the relief is as fine 10⁸ cells from the origin as it is there, and
-//! depends on no window or tile.
+//! wrap, and 32 bits of a fraction. The number per cell is rounded once, to an `f32`; everything
+//! after that is exact. So the relief is as fine 10⁸ cells from the origin as near it, and does not
+//! depend on windows or tiles.
 
 use super::texture::{Pattern, Texture};
 use crate::grid::GridPoint;
 use crate::phantom::sin_cos;
 
-/// Grains to a wavelength: a rise and a fall.
+/// Grains per wavelength: a rise and a fall.
 const GRAINS_PER_WAVE: f32 = 2.0;
 
-/// The relief of a texture, as high as 1, over cells of one size.
+/// The relief of a texture with heights up to 1, over cells of one size.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Relief {
-    /// Waves, or grains, for a cell eastward and northward.
+    /// Waves, or grains, per cell eastward and northward.
     per_cell: [f32; 2],
     /// The seed, mixed.
     seed: u32,
     is_grain: bool,
 }
 
-/// Height of a relief at a place, and its slopes eastward and northward a cell.
+/// Height of a relief at a place, and its slopes eastward and northward per cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rise {
     pub(super) height: f32,
@@ -65,7 +65,7 @@ impl Relief {
     }
 }
 
-/// A coordinate times `per_cell`, in 2⁻³²; the whole part wraps.
+/// Returns a coordinate times `per_cell`, in 2⁻³²; the whole part wraps.
 fn counted(per_cell: f32, cell: i32, frac: f32) -> u64 {
     const ONE: f32 = 4_294_967_296.0;
     let per_cell = (per_cell * ONE) as i64;
@@ -73,16 +73,16 @@ fn counted(per_cell: f32, cell: i32, frac: f32) -> u64 {
     let (whole, rest) = (per_cell >> 32, per_cell & 0xFFFF_FFFF);
     let of_cells = i64::from(cell).wrapping_mul(per_cell);
     let of_part = part.wrapping_mul(whole);
-    // Both below 2³².
+    // Both are below 2³².
     let of_rest = (part as u64 * rest as u64) >> 32;
     (of_cells.wrapping_add(of_part) as u64).wrapping_add(of_rest)
 }
 
-/// A sine of a phase, a full turn of which is 2³², within 5e-4: its height, and its slope for a turn.
-/// Height and slope are continuous, and the slope is that of the height.
+/// Returns the sine of a phase, where 2³² is a full turn, within 5e-4: its height, and its slope
+/// per turn. Height and slope are continuous, and the slope is the exact derivative of the height.
 fn wave(phase: u32) -> (f32, f32) {
     const A: f32 = core::f32::consts::FRAC_PI_2;
-    // A + B + C = 1 and A + 3 B + 5 C = 0: the slope at the crest is none.
+    // A + B + C = 1 and A + 3 B + 5 C = 0: the slope at the crest is zero.
     const B: f32 = 0.5 * (5.0 - 4.0 * A);
     const C: f32 = 1.0 - A - B;
     const QUARTER: u32 = 1 << 30;
@@ -98,10 +98,10 @@ fn wave(phase: u32) -> (f32, f32) {
     (height, sign * (A + s * (3.0 * B + s * (5.0 * C))))
 }
 
-/// Heights drawn at random at the corners of square grains, and evenly mixed between them: the
-/// height, and its slopes for a grain.
+/// Interpolates random heights at the corners of square grains: returns the height, and its slopes
+/// per grain.
 fn grain([x, y]: [u64; 2], seed: u32) -> (f32, [f32; 2]) {
-    // Odd, and far from each other's multiples.
+    // Odd, and far from multiples of each other.
     const EAST: u32 = 0x9E37_79B1;
     const NORTH: u32 = 0x85EB_CA77;
     let (col, row) = ((x >> 32) as u32, (y >> 32) as u32);
@@ -121,7 +121,7 @@ fn grain([x, y]: [u64; 2], seed: u32) -> (f32, [f32; 2]) {
     (mix(south, north, v), [along_x, (north - south) * steep_v])
 }
 
-/// From 0 to 1 with level ends, and its slope.
+/// Returns a smooth step from 0 to 1 with level ends, and its slope.
 fn eased(part: u32) -> (f32, f32) {
     let x = (part >> 8) as f32 / (1_u32 << 24) as f32;
     (x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x))
@@ -131,7 +131,7 @@ fn mix(x: f32, y: f32, share: f32) -> f32 {
     x + (y - x) * share
 }
 
-/// A number that tells nothing of the one it follows from (Wellons' `lowbias32`).
+/// Returns a hash that is not correlated with its input (Wellons' `lowbias32`).
 fn mixed(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7FEB_352D);

@@ -1,4 +1,4 @@
-//! The relief against one that is worked out in f64 and whole numbers.
+//! The relief against a computation in f64 and integers.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use super::*;
 use crate::cases::cases;
 use crate::force::texture::Texture;
 
-/// Cells near the origin and as far as can be addressed.
+/// Cells near the origin and at the ends of the address range.
 const CELLS: [i32; 7] = [0, 1, -7, 100_000_000, -100_000_001, 1 << 29, -(1 << 29)];
 
 fn texture(pattern: Pattern, direction_deg: f32, seed: u32) -> Texture {
@@ -19,7 +19,7 @@ fn texture(pattern: Pattern, direction_deg: f32, seed: u32) -> Texture {
     }
 }
 
-/// Numbers from 0 to 1.
+/// Random numbers from 0 to 1.
 fn dice() -> impl FnMut() -> f32 {
     let mut state = 1_u32;
     move || {
@@ -30,7 +30,7 @@ fn dice() -> impl FnMut() -> f32 {
     }
 }
 
-/// A coordinate counted in whole numbers of 2⁻⁵⁶: what is whole, and the rest.
+/// A coordinate in integer multiples of 2⁻⁵⁶: the whole part, and the rest.
 fn exactly(per_cell: f32, cell: i32, frac: f32) -> (i64, f64) {
     let per_cell = (f64::from(per_cell) * 2_f64.powi(32)) as i128;
     let place = i128::from(cell) * (1 << 24) + (f64::from(frac) * 2_f64.powi(24)) as i128;
@@ -52,7 +52,7 @@ fn wellons(x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
-/// The height at a place, by a grain's corners or the sine.
+/// The height at a place, from a grain's corners or the sine.
 fn wanted(relief: &Relief, seed: u32, at: &GridPoint) -> f64 {
     let (cell, frac) = (at.cell(), at.frac());
     let x = exactly(relief.per_cell[0], cell[0], frac.x);
@@ -94,7 +94,7 @@ fn the_height_is_the_one_of_f64_at_every_scale_near_and_far() {
 
 #[test]
 fn a_relief_is_as_fine_far_from_the_origin_to_the_bit() {
-    // 16 waves to 32 cells, so every 32 cells are alike in a grating.
+    // 16 waves per 32 cells, so a grating repeats every 32 cells.
     let relief = Relief::of(&texture(Pattern::Grating, 0.0, 5), 0.5);
     for i in 0..1_000 {
         let (cell, frac) = (i / 31, Vec3::X * ((i % 31) as f32 / 31.0));
@@ -106,8 +106,8 @@ fn a_relief_is_as_fine_far_from_the_origin_to_the_bit() {
     }
 }
 
-/// Heights one beside the other, over borders of cells and grains: the slope between them is
-/// that of the relief, and the slope itself changes by no more than it may bend.
+/// Neighbouring heights, over borders of cells and grains: the difference quotient is the slope of
+/// the relief, and the slope changes by no more than the maximum bend.
 #[test]
 fn height_and_slope_are_continuous_over_cells_and_grains() {
     const STEP: f32 = 1.0 / 4096.0;
@@ -133,7 +133,7 @@ fn height_and_slope_are_continuous_over_cells_and_grains() {
     }
 }
 
-/// The bounds that the force's part along the surface is made for.
+/// The bounds that the tangential part of the force relies on.
 #[test]
 fn heights_and_slopes_are_within_their_bounds_and_reach_them() {
     for (pattern, steepest) in [

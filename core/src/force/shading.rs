@@ -1,9 +1,9 @@
-//! Force shading: the force turns evenly from patch to patch, while the proxy stays where it
-//! is (Morgenbesser and Srinivasan 1996).
+//! Force shading: the force turns gradually from patch to patch, while the proxy stays where it is
+//! (Morgenbesser and Srinivasan 1996).
 //!
-//! The force is turned as a whole, from the normal that the contact has to the normal of the
-//! smoothed slopes (`slopes`), and keeps its size. Without friction it then
-//! points along the smoothed normal; what friction adds is turned with it.
+//! The whole force is turned, from the contact's normal to the normal of the smoothed slopes
+//! (`slopes`), and keeps its size. Without friction it then points along the smoothed normal; the
+//! friction part is turned with it.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -13,44 +13,44 @@ use crate::contact::{Contact, ContactState};
 use crate::scalar::one_over_root;
 use crate::terrain::{TileIndex, Window};
 
-/// Which normals the force follows.
+/// Choice of the normals that the force follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(rename_all = "lowercase")]
 pub enum Shading {
-    /// Those of the patches: an edge between patches is rendered as an edge.
+    /// Normals of the patches: an edge between patches is rendered as an edge.
     #[default]
     None,
-    /// Normals that turn evenly over the edges between patches.
+    /// Normals that turn gradually over the edges between patches.
     Smooth,
 }
 
 impl Shading {
-    /// Returns true if there is none.
+    /// Returns true if there is no shading.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::None
     }
 }
 
-/// The shading of a scene: the turn of the force, and what it waits for.
+/// The shading of a scene: the turn of the force, and a missing tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shader {
-    /// Of the last contact; the force that fades when the surface ends keeps it.
+    /// Turn of the last contact; a force that fades out where the surface ends keeps it.
     turn: Turn,
-    /// The tile without which the last tick's turn is not the one of the whole terrain.
+    /// The missing tile without which the last tick's turn may be wrong.
     missing: Option<TileIndex>,
 }
 
 impl Shader {
-    /// Of a scene; one without shading has none.
+    /// Creates the shader of a scene; `None` without shading.
     #[must_use]
     pub fn of(shading: Shading) -> Option<Self> {
         (shading == Shading::Smooth).then(Self::default)
     }
 
-    /// The displacement of the contact's last tick in cells, turned: as long as without
-    /// shading, but for the last places.
+    /// Returns the displacement of the contact's last tick in cells, turned; its length stays the
+    /// same within rounding.
     ///
     /// ```
     /// use hapterra_core::Vec3;
@@ -87,18 +87,18 @@ impl Shader {
         self.turn.of(output.displacement)
     }
 
-    /// A tile without which the last turn may not be that of the whole terrain.
+    /// Returns a missing tile without which the last turn may be wrong.
     #[must_use]
     pub const fn missing(&self) -> Option<TileIndex> {
         self.missing
     }
 }
 
-/// The slopes whose normal a force is along: those of the patch, or between those of the
-/// patches that meet.
+/// Returns the slopes whose normal a force points along: those of the patch, or between those of
+/// the patches that meet.
 fn met_by(slopes: &SlopesAt, force: Vec3) -> Slopes {
     let SlopesAt { east, north, .. } = slopes;
-    // Upward, or all but level.
+    // Upward, or nearly level.
     let up = if force.z > 0.0 {
         force.z
     } else {
@@ -113,7 +113,7 @@ fn met_by(slopes: &SlopesAt, force: Vec3) -> Slopes {
     [along(force.x, *east), along(force.y, *north)]
 }
 
-/// Cosine and sine of the most that a force is turned: 60°. A bend of 120° is rendered evenly.
+/// Cosine and sine of the maximum turn of a force: 60°. A bend of 120° is rendered smoothly.
 const MAX_COS: f32 = 0.5;
 const MAX_SIN: f32 = 0.866_025_4;
 
@@ -133,8 +133,8 @@ impl Default for Turn {
 }
 
 impl Turn {
-    /// From the normal of some slopes to that of others, 60° at most: beyond
-    /// a right angle the force would pull.
+    /// Creates the turn from the normal of some slopes to that of others, 60° at most: beyond a
+    /// right angle the force would pull.
     fn between(from: Slopes, to: Slopes) -> Self {
         if from == to {
             return Self::default();
@@ -145,7 +145,7 @@ impl Turn {
             return Self { cos, axis };
         }
         let squared = axis.length_squared();
-        // Next to spikes, where the one is all but the opposite of the other.
+        // Beside spikes, where the two normals are nearly opposite.
         if !squared.is_normal() {
             return Self::default();
         }
@@ -155,14 +155,14 @@ impl Turn {
         }
     }
 
-    /// A vector, turned.
+    /// Returns a vector, turned.
     fn of(&self, v: Vec3) -> Vec3 {
         let along = self.axis.dot(v) / (1.0 + self.cos);
         v * self.cos + self.axis.cross(v) + self.axis * along
     }
 }
 
-/// The upward normal, of length 1.
+/// Returns the upward normal, of length 1.
 fn normal([east, north]: Slopes) -> Vec3 {
     let up = one_over_root(1.0 + east * east + north * north);
     Vec3::new(-east * up, -north * up, up)

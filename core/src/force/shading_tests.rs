@@ -1,4 +1,4 @@
-//! Shading, judged in f64 by the samples themselves.
+//! Shading, compared in f64 with the samples themselves.
 
 use std::vec::Vec;
 
@@ -9,12 +9,12 @@ use crate::grid::{Cell, GridPoint};
 use crate::terrain::testing::{Field, buffers};
 use crate::terrain::{FieldSize, TileKey};
 
-/// Depth of the HIP below the surface, cells: the proxy is all but over it.
+/// Depth of the HIP below the surface, cells: the proxy is nearly above it.
 const DEPTH: f64 = 0.01;
-/// From one HIP to the next, cells.
+/// Distance from one HIP to the next, cells.
 const STEP: f64 = 0.01;
 
-/// Answer to a HIP: the proxy, and the force without shading and with it.
+/// Result for a HIP: the proxy, and the force without and with shading.
 struct ShadedTick {
     proxy: GridPoint,
     plain: Vec3,
@@ -35,7 +35,7 @@ fn height_at(height: Height, [x, y]: [f64; 2]) -> f64 {
     south * (1.0 - v) + north * v
 }
 
-/// A HIP so far above a height function.
+/// A HIP `above` cells over a height function.
 fn hip_over(height: Height, [x, y]: [f64; 2], above: f64) -> GridPoint {
     let (cell, z) = (
         [x.floor() as i32, y.floor() as i32],
@@ -46,7 +46,7 @@ fn hip_over(height: Height, [x, y]: [f64; 2], above: f64) -> GridPoint {
     GridPoint::new([cell[0], cell[1], z.floor() as i32], Vec3::new(u, v, w))
 }
 
-/// Returns the answers along a path, after contact onset at its first place.
+/// Returns the results along a path, after contact onset at its first place.
 fn forces_along<const D: usize>(
     field: &Field<'_, D>,
     height: Height,
@@ -79,7 +79,7 @@ fn degrees(a: Vec3, b: Vec3) -> f32 {
     a.cross(b).length().atan2(a.dot(b)).to_degrees()
 }
 
-/// Largest change of direction from one HIP to the next, degrees: without shading, and with it.
+/// Maximum change of direction from one HIP to the next, degrees: without and with shading.
 fn largest_turns(rendered: &[ShadedTick]) -> (f32, f32) {
     rendered
         .windows(2)
@@ -92,7 +92,7 @@ fn largest_turns(rendered: &[ShadedTick]) -> (f32, f32) {
         })
 }
 
-/// A straight way with a HIP every [`STEP`].
+/// A straight path with a HIP every [`STEP`].
 fn straight(from: [f64; 2], to: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
     let (x, y) = (to[0] - from[0], to[1] - from[1]);
     let steps = (x.hypot(y) / STEP) as u32;
@@ -159,7 +159,7 @@ fn at_every_sample_the_force_is_along_the_mean_of_the_edges_that_meet() {
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(60, 60), rough);
     for i in 0..cases(400, 20) as i32 {
-        // Samples on tiles' borders among them.
+        // Including samples on tiles' borders.
         let (x, y) = (
             1 + (7 * i) % 58,
             if i % 3 == 0 { 32 } else { 1 + (5 * i) % 58 },
@@ -220,7 +220,7 @@ fn a_cliff_stays_a_cliff() {
             "{to_foot} before it: {off}°"
         );
     }
-    // Its face: by far most of it is rendered as it is.
+    // On the cliff's face most of the force is rendered unchanged.
     for u in [0.21_f32, 0.5, 0.79] {
         let proxy = GridPoint::new([10, 9, 0], Vec3::new(u, 0.4, 8.0 * u));
         let slopes = SlopesAt::point(&field.window, &proxy).expect("a patch");
@@ -228,12 +228,12 @@ fn a_cliff_stays_a_cliff() {
     }
 }
 
-/// Distance from a cliff at which its bend may be rendered, cells.
+/// Maximum distance from a cliff within which its bend is rendered, cells.
 const NARROW_AT_MOST: f32 = 0.2;
 
 #[test]
 fn border_of_a_tile_is_rendered_as_its_inside() {
-    // The same ground twice, once moved so that a tile's corner is in it.
+    // The same ground twice, the second time moved so that it contains a tile's corner.
     fn moved(x: i32, y: i32) -> f32 {
         rough(x - 22, y - 22)
     }
@@ -272,7 +272,7 @@ fn next_to_a_hole_the_force_turns_evenly_and_the_pull_back_stays() {
     }
     let mut tiles = buffers::<2>();
     let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), holed);
-    // Along the hole's southern border, half a cell and a tenth of one beside it.
+    // Along the southern border of no-data, half a cell and a tenth of a cell away.
     for y in [8.5, 8.9] {
         let rendered = forces_along(
             &field,
@@ -286,7 +286,7 @@ fn next_to_a_hole_the_force_turns_evenly_and_the_pull_back_stays() {
             "{plain}° and {shaded}°"
         );
     }
-    // Over the hole: the border pulls the HIP back as without shading.
+    // Over no-data the border pulls the HIP back as without shading.
     fn level(x: i32, y: i32) -> f32 {
         if x > 15 && y < 30 { f32::NAN } else { 3.0 }
     }

@@ -1,12 +1,12 @@
-//! The slopes of the surface, and slopes that change evenly from patch to patch (after
+//! The slopes of the surface, and slopes that change gradually from patch to patch (after
 //! Morgenbesser and Srinivasan 1996).
 //!
-//! The slope eastward of a patch mixes those of its two edges that lead east, so it is
+//! The eastward slope of a patch interpolates between its two edges that lead east, so it is
 //! continuous northward and jumps from one edge of a row to the next. Each row of edges is
-//! therefore smoothed along itself: at a sample its direction is the mean of the two edges
-//! that meet there; away from the sample it becomes that of the edge. At a gentle bend this
-//! takes the whole edge, at a sharp one, which is meant, a fifth of it. Columns and the slope
-//! northward are smoothed likewise.
+//! therefore smoothed along itself. At a sample its direction is the mean of the two edges that
+//! meet there; away from the sample it approaches that of the edge. A gentle bend uses the whole
+//! edge for this, a sharp bend, which is intended, a fifth of it. Columns and the northward slope
+//! are smoothed in the same way.
 
 use crate::contact::surface::HipView;
 use crate::contact::surface::patch::mix;
@@ -14,9 +14,9 @@ use crate::grid::GridPoint;
 use crate::scalar::one_over_root;
 use crate::terrain::{CellContent, Corners, TileIndex, Window};
 
-/// Cosine of the bend up to which the direction changes along a whole edge: 45°.
+/// Cosine of the maximum bend at which the direction changes along a whole edge: 45°.
 const GENTLE: f32 = core::f32::consts::FRAC_1_SQRT_2;
-/// Cosine of the bend from which the direction changes along [`NARROW`] of an edge: 75°.
+/// Cosine of the minimum bend at which the direction changes along [`NARROW`] of an edge: 75°.
 const SHARP: f32 = 0.258_819_04;
 /// Part of an edge along which the direction changes at a sharp bend.
 const NARROW: f32 = 0.2;
@@ -27,20 +27,20 @@ pub(crate) type Slopes = [f32; 2];
 /// Slopes of the surface at one of its points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SlopesAt {
-    /// Least and largest slope eastward of the patches that meet there.
+    /// Minimum and maximum slope eastward of the patches that meet there.
     pub(crate) east: [f32; 2],
-    /// Least and largest slope northward of the patches that meet there.
+    /// Minimum and maximum slope northward of the patches that meet there.
     pub(crate) north: [f32; 2],
-    /// Slopes that change evenly from patch to patch.
+    /// Slopes that change gradually from patch to patch.
     pub(crate) smoothed: Slopes,
-    /// A tile that is not here and holds a sample beside the patch. The surface is taken to
-    /// end before it.
+    /// A missing tile that holds a sample beside the patch. The surface then counts as ending
+    /// before it.
     pub(crate) missing: Option<TileIndex>,
 }
 
 impl SlopesAt {
-    /// The slopes at a point of the surface, by the samples of a patch and of its four
-    /// neighbours; `None` where there is no patch.
+    /// Returns the slopes at a point of the surface, from the samples of a patch and of its four
+    /// neighbours; `None` if there is no patch.
     pub(crate) fn point<const D: usize>(window: &Window<'_, D>, at: &GridPoint) -> Option<Self> {
         let view = HipView::new(*at);
         let (cell, CellContent::Patch(own)) = view.ground(window) else {
@@ -77,7 +77,7 @@ impl SlopesAt {
     }
 }
 
-/// The slopes of three edges of a row or column one after the other; NaN where there is none.
+/// The slopes of three consecutive edges of a row or column; NaN if an edge is missing.
 struct Edges {
     before: f32,
     own: f32,
@@ -93,7 +93,7 @@ impl Edges {
         }
     }
 
-    /// The smoothed slope at a place of the middle edge, from 0 to 1.
+    /// Returns the smoothed slope at a place of the middle edge, from 0 to 1.
     fn smoothed(&self, place: f32) -> f32 {
         let own = direction(self.own);
         let at_start = bent(own, self.before, place);
@@ -102,8 +102,8 @@ impl Edges {
     }
 }
 
-/// By how much the direction of an edge changes at a place so far from the sample where it
-/// meets an edge of the slope `beside`.
+/// Returns the change of an edge's direction at a distance `place` from the sample where it meets
+/// an edge of the slope `beside`.
 fn bent(own: [f32; 2], beside: f32, place: f32) -> [f32; 2] {
     if beside.is_nan() {
         return [0.0; 2];
@@ -119,19 +119,19 @@ fn bent(own: [f32; 2], beside: f32, place: f32) -> [f32; 2] {
     }
 }
 
-/// The direction of a slope: along the ground and up, of length 1.
+/// Returns the direction of a slope: along the ground and up, of length 1.
 fn direction(slope: f32) -> [f32; 2] {
     let along = one_over_root(1.0 + slope * slope);
     [along, slope * along]
 }
 
-/// The smoothed slope across a patch between two rows or columns of edges.
+/// Returns the smoothed slope across a patch between two rows or columns of edges.
 fn smoothed([first, second]: &[Edges; 2], along: f32, across: f32) -> f32 {
     mix(first.smoothed(along), second.smoothed(along), across)
 }
 
-/// Least and largest slope at a place of a patch: those of the edges before and after it where
-/// it is on the border between them.
+/// Returns the minimum and maximum slope at a place of a patch; on the border between edges, those
+/// of both edges.
 fn met([first, second]: &[Edges; 2], along: f32, across: f32) -> [f32; 2] {
     let own = mix(first.own, second.own, across);
     if along != 0.0 {
@@ -142,6 +142,6 @@ fn met([first, second]: &[Edges; 2], along: f32, across: f32) -> [f32; 2] {
         1.0 => second.before,
         _ => mix(first.before, second.before, across),
     };
-    // Not a number where there is no patch; then its own slope is all there is.
+    // NaN if there is no patch; then only its own slope remains.
     [own.min(before), own.max(before)]
 }

@@ -1,9 +1,9 @@
 //! Texture: a micro-relief on the surface, rendered by the force while the proxy stays where it is
 //! (Minsky 1990; Ho, Basdogan and Srinivasan 1999).
 //!
-//! The force is scaled by as much as the relief adds to the depth, and the relief's slope adds
-//! a part along the surface. Where the surface is read less than four times a wave, that would
-//! be another wave than the one that is asked for: the texture fades before.
+//! The force is scaled by the relief's addition to the depth, and the relief's slope adds a
+//! component along the surface. With fewer than four samples per wave, the rendered wave would be a
+//! different one: the texture fades out before that.
 
 use glam::Vec3;
 
@@ -13,15 +13,15 @@ use crate::grid::GridPoint;
 use crate::rate::TickRate;
 use crate::scalar::{larger, one_over_root, smaller};
 
-/// Part of a wavelength in a tick from which on nothing of the texture is rendered.
+/// Share of a wavelength per tick from which the texture is not rendered.
 const GONE: f32 = 0.25;
-/// The depth, times the amplitude, in squares of the wavelength, beyond which the part along the
-/// surface grows no more. So its stiffness is at most that of the surface: heights bend by
-/// at most 48 amplitudes a wavelength squared.
+/// Limit of the depth times the amplitude, in squares of the wavelength, for the component along
+/// the surface: its stiffness is then at most that of the surface, since heights bend by at most 48
+/// amplitudes per squared wavelength.
 const DEEPEST: f32 = 1.0 / 48.0;
-/// Speed of a proxy that was elsewhere before, or nowhere, wavelengths a tick.
+/// Speed of a proxy that jumped, or that had no last position, wavelengths a tick.
 const JUMP: f32 = 1.0;
-/// Decay of the speed, 1/s: encoders report a slow hand's speed in jumps.
+/// Decay rate of the speed, 1/s: encoders report a slow hand's speed in jumps.
 const FORGETS_PER_S: f32 = 100.0;
 
 /// The texture of one scene at one rate.
@@ -33,7 +33,7 @@ pub struct Texturer {
     /// Cells.
     deepest: f32,
     waves_per_cell: f32,
-    /// Share of a higher speed that a tick keeps.
+    /// Share of a higher speed that remains after a tick.
     keeps: f32,
     /// The proxy's speed, wavelengths a tick.
     speed: f32,
@@ -41,8 +41,8 @@ pub struct Texturer {
 }
 
 impl Texturer {
-    /// Of a scene with cells of such a size; one without texture has none, and one with cells
-    /// that cannot carry it neither.
+    /// Creates the texturer of a scene with cells of this size; returns `None` without texture, or
+    /// if the cells cannot carry it.
     #[must_use]
     pub fn of(texture: &Texture, cell_mm: f32, rate: TickRate) -> Option<Self> {
         if texture.is_none() || !texture.fits(cell_mm) {
@@ -62,8 +62,8 @@ impl Texturer {
         })
     }
 
-    /// The displacement of a tick in cells, which is also what the spring stretches by, with the
-    /// texture at the proxy. Never pulls: along `displacement` the result is not negative.
+    /// Returns the displacement of a tick in cells, the extension of the spring, with the texture
+    /// at the proxy. Never pulls: along `displacement` the result is not negative.
     ///
     /// ```
     /// use hapterra_core::Vec3;
@@ -88,8 +88,8 @@ impl Texturer {
         self.with_share(displacement, proxy, share)
     }
 
-    /// The same with a part of the texture only, from 0 to 1.
-    // Apart, so that a texture that is rendered in full costs no more.
+    /// Does the same with only a part of the texture, from 0 to 1.
+    // Separate, so that a texture that is rendered in full costs no more.
     #[cold]
     #[inline(never)]
     pub(crate) fn add_part(&mut self, displacement: Vec3, proxy: &GridPoint, part: f32) -> Vec3 {
@@ -112,19 +112,20 @@ impl Texturer {
         let slopes = Vec3::new(east, north, 0.0) * amplitude;
         let along = slopes - normal * slopes.dot(normal);
         let times = 1.0 + amplitude * rise.height / larger(depth, self.amplitude);
-        // By the last places, it might be below.
+        // Because of rounding it might be negative.
         let times = larger(times, 0.0);
         displacement * times - along * smaller(depth, self.deepest)
     }
 
-    /// Takes the proxy's place in a tick; returns the share of the texture that is rendered there.
+    /// Updates the speed with the proxy's place in a tick; returns the rendered share of the
+    /// texture.
     fn share_at(&mut self, proxy: &GridPoint) -> f32 {
         let now = match &self.before {
             Some(before) => {
                 let way = before.to(proxy) * self.waves_per_cell;
                 let squared = way.x * way.x + way.y * way.y;
                 match squared.is_normal() {
-                    // A jump is no speed: it is forgotten as soon as any that is too fast.
+                    // A jump is not a speed: limited to a value that decays at once.
                     true => smaller(squared * one_over_root(squared), JUMP),
                     false => 0.0,
                 }
@@ -132,7 +133,7 @@ impl Texturer {
             None => JUMP,
         };
         self.before = Some(*proxy);
-        // At once where it rises; where it falls, by and by.
+        // The speed rises at once and falls gradually.
         self.speed = now + larger(0.0, self.speed - now) * self.keeps;
         let left = (GONE - self.speed) / (GONE - WHOLE);
         let left = left.clamp(0.0, 1.0);

@@ -1,4 +1,4 @@
-//! Texture on planes, by what a hand would feel.
+//! Texture on planes, tested by the rendered displacement.
 
 use std::vec::Vec;
 
@@ -30,7 +30,7 @@ fn texturer(texture: &Texture) -> Texturer {
     Texturer::of(texture, CELL_MM, RATE).expect("textured")
 }
 
-/// A place so many millimetres east and north of cell 30.
+/// A place `x_mm` east and `y_mm` north of cell 30.
 fn place(x_mm: f64, y_mm: f64) -> GridPoint {
     let split = |mm: f64| {
         let cells = mm / f64::from(CELL_MM);
@@ -40,8 +40,8 @@ fn place(x_mm: f64, y_mm: f64) -> GridPoint {
     GridPoint::new([x, y, 0], Vec3::new(u, v, 0.0))
 }
 
-/// The displacement in millimetres, tick by tick, of a hand `depth_mm` deep in a level plane
-/// that goes east at so many mm/s; the first 100 ms are left out.
+/// The displacement in millimetres, tick by tick, of a hand `depth_mm` deep in a level plane that
+/// moves east at `speed_mm_s`, without the first 100 ms.
 fn rendered(texture: &Texture, speed_mm_s: f64, depth_mm: f32, ticks: u32) -> Vec<Vec3> {
     let mut texturer = texturer(texture);
     let displacement = Vec3::Z * (depth_mm / CELL_MM);
@@ -52,7 +52,7 @@ fn rendered(texture: &Texture, speed_mm_s: f64, depth_mm: f32, ticks: u32) -> Ve
     all.skip(100).collect()
 }
 
-/// The amplitude of a frequency in Hz.
+/// The amplitude at a frequency in Hz.
 fn amplitude(rendered: &[Vec3], hz: f64, part: fn(&Vec3) -> f32) -> f64 {
     let turn = std::f64::consts::TAU * hz * TICK_S;
     let sums = rendered
@@ -75,7 +75,7 @@ fn a_slow_hand_feels_the_amplitude_that_was_asked_for() {
         if texture.pattern == Pattern::Grating {
             assert!(most > 0.099 && least < -0.099, "{most} {least}");
         } else if !cfg!(miri) {
-            // A straight way meets a highest and a lowest grain seldom in their middle.
+            // A straight path rarely meets the middle of a highest or lowest grain.
             assert!(most > 0.08 && least < -0.08, "{most} {least}");
         }
     }
@@ -84,7 +84,7 @@ fn a_slow_hand_feels_the_amplitude_that_was_asked_for() {
 #[test]
 fn a_hand_at_speed_feels_the_frequency_of_the_wavelength() {
     for hz in [10.0, 50.0, 100.0, 125.0] {
-        // A wave a millimetre.
+        // One wave per millimetre.
         let rendered = rendered(&GRATING, hz, 1.0, 4_000);
         let there = amplitude(&rendered, hz, |v| v.z);
         assert!((there - 0.1).abs() < 1e-3, "{hz} Hz: {there}");
@@ -102,7 +102,7 @@ fn a_hand_at_speed_feels_the_frequency_of_the_wavelength() {
     }
 }
 
-/// Grain has no waves shorter than its wavelength, but for what its even rises need.
+/// Grain has no waves shorter than its wavelength, except what its smooth rises need.
 #[test]
 fn grain_reaches_the_frequency_of_its_wavelength() {
     let rendered = rendered(&GRAIN, 50.0, 1.0, cases(20_000, 400));
@@ -126,7 +126,7 @@ fn texture_fades_before_it_would_alias() {
         up.fold(0.0, f32::max)
     };
     assert!(swing(120.0) > 0.099);
-    // Half of the way from an eighth of a wave a tick to a quarter.
+    // The middle between an eighth and a quarter of a wave a tick.
     let half = swing(187.5);
     assert!((half - 0.05).abs() < 1e-3, "{half}");
     assert!(swing(160.0) > half && half > swing(220.0) && swing(220.0) > 0.0);
@@ -151,8 +151,8 @@ fn a_place_feels_the_same_from_everywhere() {
     }
 }
 
-/// In steps of a millionth of a wave no force jumps: over cells, tiles and grains, and where the
-/// hand lands and lifts.
+/// In steps of a millionth of a wave no force jumps: over cells, tiles and grains, and at contact
+/// onset and lift-off.
 #[test]
 fn nothing_steps_on_the_way() {
     let textures = [
@@ -184,8 +184,8 @@ fn nothing_steps_on_the_way() {
     }
 }
 
-/// Along the force the texture never turns it round; it adds no more than is stated; and with the
-/// depth it is gone.
+/// Along the force, the texture never reverses it; it adds no more than is stated; and it vanishes
+/// with the depth.
 #[test]
 fn it_never_pulls_and_keeps_its_bounds() {
     let steep = Texture {
@@ -230,7 +230,7 @@ fn it_never_pulls_and_keeps_its_bounds() {
     }
 }
 
-/// So that a hand that presses hard does not shake on a wave.
+/// So a hand that presses hard is not unstable on a wave.
 #[test]
 fn along_the_surface_it_is_no_stiffer_than_the_surface() {
     for texture in [
@@ -251,8 +251,8 @@ fn along_the_surface_it_is_no_stiffer_than_the_surface() {
     }
 }
 
-/// Up to the depth at which the part along the surface stays as it is, the force is that of
-/// a spring of the surface with its relief: a round gives nothing.
+/// Up to the depth limit of the component along the surface, the force is that of a spring on the
+/// surface with its relief: a closed path gives no energy.
 #[test]
 fn a_round_gives_no_energy() {
     for texture in [GRATING, GRAIN] {
@@ -285,14 +285,14 @@ fn a_round_gives_no_energy() {
     }
 }
 
-/// A slow hand's proxy goes by an encoder count in one tick and stands in others, and after a jump
-/// a texture comes in evenly.
+/// A slow hand's proxy moves by an encoder count in one tick and rests in others; after a jump, a
+/// texture fades in evenly.
 #[test]
 fn the_share_of_a_texture_neither_flutters_nor_jumps() {
     let mut coarse = texturer(&GRATING);
     let mut fine = texturer(&GRATING);
     for tick in 0..cases(3_000, 300) {
-        // On one line of equal height: 180 mm/s on average, by turns 0.2 and 0.16 mm a tick.
+        // On one line of equal height: 180 mm/s on average, alternately 0.2 and 0.16 mm a tick.
         let y_mm = 0.18 * f64::from(tick) + if tick % 2 == 0 { 0.02 } else { 0.0 };
         let [by_counts, evenly] = [(&mut coarse, y_mm), (&mut fine, 0.2 * f64::from(tick))]
             .map(|(texturer, y_mm)| texturer.add(Vec3::Z, &place(0.25, y_mm)).z);
@@ -312,7 +312,7 @@ fn the_share_of_a_texture_neither_flutters_nor_jumps() {
     assert!(largest < 0.25, "{largest} in a tick");
 }
 
-/// With the contact itself: the proxy stays where it is without texture.
+/// With the contact itself: the proxy is the same as without texture.
 #[test]
 fn the_proxy_is_not_moved_and_texture_is_along_the_slopes_normal() {
     let size = FieldSize::new(60, 60);
@@ -361,7 +361,7 @@ fn what_no_number_is_gives_none() {
                 .force_n(rendered);
             assert!(force.is_finite(), "{bad}: {force}");
         }
-        // And is forgotten.
+        // And the speed is forgotten.
         let rendered: Vec<_> = (0..100)
             .map(|_| texturer.add(Vec3::Z, &place(0.3, 0.3)))
             .collect();
@@ -370,7 +370,7 @@ fn what_no_number_is_gives_none() {
             "{}",
             rendered[99]
         );
-        // Too deep for a texture: what there is stays.
+        // Too deep for a texture: the displacement stays unchanged.
         let deep = Vec3::new(-3e24, 4e30, 1e20);
         assert_eq!(texturer.add(deep, &place(0.3, 0.3)), deep);
     }

@@ -1,8 +1,8 @@
-//! Which cell: the column and row of a patch.
+//! The column and row of a cell.
 
 use serde::{Deserialize, Serialize};
 
-/// Largest cell index, in any direction, that a [`GridPoint`] may have.
+/// Maximum cell index, in any direction, of a [`GridPoint`].
 ///
 /// A quarter of the `i32` range, so that the difference and the sum of any two
 /// indices are still exact. [`GridPoint::new`] clamps to it.
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// [`GridPoint::new`]: super::GridPoint::new
 pub const MAX_CELL: i32 = 1 << 29;
 
-/// The column and row of a cell, and so of the patch over it.
+/// The column and row of a cell, and of the patch over it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Cell {
@@ -22,13 +22,13 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The cell in this column and row.
+    /// Creates the cell in this column and row.
     #[must_use]
     pub const fn new(x: i32, y: i32) -> Self {
         Self { x, y }
     }
 
-    /// The cell so many columns east and rows north, stopping at the ends of the
+    /// Returns the cell `east` columns east and `north` rows north, saturating at the ends of the
     /// `i32` range.
     #[must_use]
     #[inline]

@@ -1,4 +1,4 @@
-//! The steps from off to on and back, and how long each may take.
+//! The steps from off to on and back, and their time-outs.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,26 +7,26 @@ use super::mode::Mode;
 use crate::rate::TickRate;
 use crate::scalar::smaller;
 
-/// Time for which something may block an arm command before it is refused, ms.
+/// Time after which a blocked arm command is refused, ms.
 const BLOCKED_TIMEOUT_MS: u32 = 50;
-/// Time for which it may wait for the dead-man switch, ms.
+/// Time for which an arm command waits for the dead-man switch, ms.
 const SWITCH_TIMEOUT_MS: u32 = 30_000;
-/// For how long the force has to stay small, ms.
+/// Time for which the force must stay small, ms.
 const CONFIRM_MS: u32 = 100;
-/// Time that force takes to come in, ms.
+/// Duration of the force's ramp-up, ms.
 const RAMP_MS: u32 = 2_000;
-/// Time that it takes to go out, ms.
+/// Duration of the force's fade-out, ms.
 pub(crate) const FADE_MS: u32 = 100;
 
-/// The force that counts as small, N.
+/// Upper limit of a small force, N.
 pub const SMALL_FORCE_N: f32 = 0.2;
 
 /// Outcome of the arm commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Decision {
-    /// Arm commands decided, wrapping.
+    /// Number of decided arm commands, wrapping.
     pub count: u8,
-    /// Reasons for the refusal of the last one; empty if it was granted.
+    /// Reasons for the refusal of the last arm command; empty if it was granted.
     pub refused: Blockers,
 }
 
@@ -36,14 +36,14 @@ pub(super) struct Arming {
     pub(super) mode: Mode,
     /// Ticks since the mode began.
     since: u32,
-    /// Ticks that something has blocked a request.
+    /// Ticks for which a request has been blocked.
     blocked: u32,
-    /// True if the request in force has been decided.
+    /// True if the current request has been decided.
     decided: bool,
     pub(super) decision: Decision,
-    /// The switch was seen open during the request.
+    /// True if the switch was open at some time during the request.
     seen_open: bool,
-    /// Share of the force that is let through.
+    /// Rendered share of the force.
     pub(super) gain: f32,
     pub(super) rate: TickRate,
 }
@@ -63,13 +63,13 @@ impl Arming {
         self.since = 0;
     }
 
-    /// The host asks to arm. Asked again, it waits anew.
+    /// Requests arming. A repeated request restarts the time-out.
     pub(super) fn request(&mut self) {
         match self.mode {
             Mode::Disarmed => self.enter(Mode::Requested),
             Mode::Requested => self.since = 0,
             Mode::Fading => return self.decide(Blockers::HOST_DISARMED),
-            // It is on its way already.
+            // Arming is already in progress.
             _ => return self.decide(Blockers::empty()),
         }
         self.blocked = 0;
@@ -77,7 +77,7 @@ impl Arming {
         self.seen_open = false;
     }
 
-    /// Off at once; `why` answers a request that is still open.
+    /// Switches off at once; `why` is the decision of an open request.
     pub(super) fn stop(&mut self, why: Blockers) {
         if self.mode != Mode::Disarmed {
             self.enter(Mode::Disarmed);
@@ -88,7 +88,7 @@ impl Arming {
         }
     }
 
-    /// Off, after force has gone out where there is any.
+    /// Switches off, after fading out a force.
     pub(super) fn fade(&mut self) {
         match self.mode {
             Mode::Ramping | Mode::Armed => self.enter(Mode::Fading),
@@ -107,8 +107,8 @@ impl Arming {
         };
     }
 
-    /// Before the amplifiers are on: one tick, with what blocks arming besides what
-    /// the user has to do.
+    /// Advances by a tick with the amplifiers off, with the blockers other than those that the user
+    /// can clear.
     pub(super) fn wait(&mut self, blockers: Blockers, dead_man: bool) {
         self.since = self.since.saturating_add(1);
         match self.mode {
@@ -145,7 +145,7 @@ impl Arming {
         }
     }
 
-    /// While confirming: whether the force that would be made is small.
+    /// Advances the confirmation; `small` is true if the wanted force is small.
     pub(super) fn confirm(&mut self, small: bool) {
         if !small {
             self.since = 0;
@@ -155,8 +155,8 @@ impl Arming {
         }
     }
 
-    /// The gain of this tick before [`Arming::drive`] moves it there; none while no force
-    /// follows what is asked for.
+    /// Returns the gain of this tick before [`Arming::drive`] sets it; `None` while the force does
+    /// not follow the wanted force.
     pub(super) fn next_gain(&self) -> Option<f32> {
         match self.mode {
             Mode::Ramping => Some(smaller(
@@ -168,7 +168,7 @@ impl Arming {
         }
     }
 
-    /// With the amplifiers on: moves the gain by a tick.
+    /// Advances the gain by a tick with the amplifiers on.
     pub(super) fn drive(&mut self) {
         match self.mode {
             Mode::Ramping => {

@@ -3,7 +3,7 @@
 use super::{Blockers, Guard, GuardInputs, SceneKind, Surroundings};
 
 impl Guard {
-    /// Returns the blockers of arming, besides those of the user.
+    /// Returns the blockers of arming, without those of `Arming::user_blockers`.
     pub(super) fn find_blockers(&self, sense: &GuardInputs, around: &Surroundings<'_>) -> Blockers {
         let outside = around.arm.is_some_and(|(_, pose)| {
             let q = pose.angles();
@@ -12,7 +12,7 @@ impl Guard {
         let bits = [
             (around.arm.is_none(), Blockers::NO_CALIBRATION),
             (!around.zeroed, Blockers::NOT_ZEROED),
-            // A jog takes the place of a scene.
+            // A jog replaces a scene.
             (
                 around.scene == SceneKind::None && self.jog.is_none(),
                 Blockers::NO_SCENE,

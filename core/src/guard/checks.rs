@@ -3,11 +3,11 @@
 use super::{Fault, Guard, GuardInputs, Limits, Mode, Surroundings};
 
 impl Guard {
-    /// Checks every input of a tick before anything is driven. Returns whether the
-    /// encoders lost counts, so that the arm has to be zeroed again.
+    /// Checks every input of a tick before anything is driven. Returns true if the encoders lost
+    /// counts, so that the arm must be zeroed again.
     pub fn watch(&mut self, sense: &GuardInputs, around: &Surroundings<'_>) -> bool {
         self.limits = Limits::empty();
-        // Before the arm is zeroed its position means nothing, nor does a jump.
+        // Before the arm is zeroed, neither its position nor a jump has a meaning.
         let jumped = around.zeroed && self.has_jumped(sense.counts);
         if jumped {
             self.trip(Fault::EncoderJump);
@@ -19,7 +19,7 @@ impl Guard {
         if let Some(fault) = self.feedback.check(sense, self.currents_a, is_on) {
             self.trip(fault);
         }
-        // A jog does not outlive its arming.
+        // A jog ends when its arming ends.
         if self.mode() == Mode::Disarmed {
             self.jog = None;
         }
@@ -35,7 +35,7 @@ impl Guard {
         jumped
     }
 
-    /// Returns true if an encoder moved farther than it can.
+    /// Returns true if an encoder moved farther than the arm can.
     fn has_jumped(&mut self, counts: [i32; 3]) -> bool {
         let most = self.max_counts;
         let jumped = self.counts.is_some_and(|last| {
@@ -52,7 +52,7 @@ impl Guard {
         }
         if !sense.dead_man {
             match self.mode() {
-                // The host let go first.
+                // The host disarmed first.
                 Mode::Fading => self.stop(),
                 _ => self.trip(Fault::DeadManReleased),
             }
@@ -60,7 +60,7 @@ impl Guard {
     }
 
     fn watch_undriven(&mut self, sense: &GuardInputs, around: &Surroundings<'_>) {
-        // Nothing is commanded: what flows all the same is what was measured.
+        // Nothing is commanded: only a measured current can flow.
         self.motors.rest(self.feedback.measured_a());
         self.feedback.rest(sense);
         self.hold.pass();

@@ -1,10 +1,10 @@
-//! The faults that end driving: what may not be while the amplifiers are on.
+//! The faults that end driving: conditions that are forbidden while the amplifiers are on.
 
 use super::speed::SpeedCheck;
 use super::{Fault, Guard, GuardInputs, Surroundings};
 
 impl Guard {
-    /// The first fault that may not be while the amplifiers are on.
+    /// Returns the first fault that is present while the amplifiers are on.
     pub(super) fn find_fault(
         &mut self,
         sense: &GuardInputs,

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A latched fault. The numbers are stable; only an explicit reset clears one.
-/// While one is latched the amplifiers are off.
+/// A latched fault. The numbers are stable. Only an explicit reset clears a fault, and until then
+/// the amplifiers are off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -12,20 +12,20 @@ pub enum Fault {
     NotANumber = 1,
     /// A tick took longer than its period.
     TickOverrun = 2,
-    /// An encoder moved farther in a tick than the arm can. Counts were lost,
-    /// so the arm has to be zeroed again.
+    /// An encoder moved farther in a tick than the arm can. It lost counts, so the arm must be
+    /// zeroed again.
     EncoderJump = 3,
-    /// The encoder or amplifier hardware did not answer.
+    /// The encoder or amplifier hardware did not respond.
     Hardware = 4,
     /// The emergency stop was pressed, or its wire broke.
     EmergencyStop = 5,
-    /// The dead-man switch was let go while the amplifiers were on.
+    /// The dead-man switch was released while the amplifiers were on.
     DeadManReleased = 6,
     /// A motor winding is too hot, in spite of derating.
     MotorTooHot = 7,
-    /// A joint beyond its stops.
+    /// A joint is beyond its stops.
     JointLimit = 8,
-    /// Joints 2 and 3 in a relation that the linkage does not allow.
+    /// Joints 2 and 3 are in a relation that the linkage does not allow.
     Linkage = 9,
     /// A motor pushes and its encoder does not move.
     NoMotion = 10,
@@ -42,17 +42,17 @@ pub enum Fault {
     HardFault = 15,
     /// Found at boot: the stored calibration record is damaged.
     CalibrationCorrupt = 16,
-    /// An amplifier says that it is not ready while it is enabled.
+    /// An amplifier reports that it is not ready while it is enabled.
     AmplifierNotReady = 17,
-    /// A motor's measured current is not the one that was commanded.
+    /// A motor's measured current differs from the commanded one.
     CurrentMismatch = 18,
-    /// The board's supply fell too low, now or (found at boot) before the reset.
+    /// The board's supply voltage fell too low, now or (found at boot) before the reset.
     SupplyLow = 19,
-    /// A converter's settings do not read back as they were written.
+    /// A converter's settings read back differently from the written ones.
     OutputsNotAsSet = 20,
     /// Found at boot: the program had overrun its stack.
     StackOverflow = 21,
-    /// A joint moved faster or farther than a jog may move it.
+    /// A joint moved faster or farther than a jog permits.
     JogRanAway = 22,
     /// More than one and a half periods passed between two ticks: a debugger halted the
     /// core, or a bus stalled it.
@@ -87,13 +87,13 @@ impl Fault {
         Self::TickGap,
     ];
 
-    /// The fault's number.
+    /// Returns the fault's number.
     #[must_use]
     pub const fn number(self) -> u8 {
         self as u8
     }
 
-    /// Returns its meaning, in a sentence for the user.
+    /// Returns the fault's meaning, in a sentence for the user.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         match self {
@@ -125,7 +125,7 @@ impl Fault {
         }
     }
 
-    /// Returns the remedy, for the user. Clearing it comes after that.
+    /// Returns the remedy, for the user. The fault can be cleared after that.
     #[must_use]
     pub const fn what_to_do(self) -> &'static str {
         match self {
@@ -176,7 +176,7 @@ mod tests {
             assert_eq!(usize::from(fault.number()), i + 1, "{fault:?}");
             assert!(!fault.meaning().is_empty() && !fault.what_to_do().is_empty());
         }
-        // Kept here a second time: recordings and pages name them.
+        // Repeated here because recordings and pages use these names.
         let named = [
             (Fault::NotANumber, 1),
             (Fault::TickOverrun, 2),

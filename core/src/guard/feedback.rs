@@ -1,58 +1,56 @@
-//! Feedback of the amplifiers: whether they are ready, and which currents
-//! flow.
+//! Feedback of the amplifiers: their ready lines and their measured currents.
 
 use glam::Vec3;
 
 use super::{Fault, GuardInputs};
 use crate::rate::TickRate;
 
-/// Time for which after the enable an amplifier need not be ready yet, ms. An ESCON's digital
-/// inputs switch within 8 ms.
+/// Time after the enable within which an amplifier may be not ready, ms. An ESCON's digital inputs
+/// switch within 8 ms.
 const ENABLE_MS: u32 = 10;
-/// Time for which an amplifier that was ready may say that it is not, ms: a spike on the wire.
+/// Time for which a ready amplifier may report that it is not ready, ms: a spike on the wire.
 const SPIKE_MS: u32 = 2;
-/// Time constant of the comparison of currents, ms. Twice what it takes an amplifier that
-/// reads duty cycles at 1 kHz to follow the fastest change of force (5.5 A in 8 ms, each
-/// current 1 ms late) without coming near the tolerance.
+/// Time constant of the comparison of currents, ms. With half of this value, an amplifier that
+/// reads duty cycles at 1 kHz follows the fastest change of force (5.5 A in 8 ms, each current 1 ms
+/// late) without coming near the tolerance.
 const COMPARE_MS: u32 = 20;
 
-/// Largest difference of a measured current from its command, A, averaged over the comparison's
-/// 20 ms. A tenth of an amplifier's range: three times what an ESCON's reading of a duty
-/// cycle may be wrong. What is 2 A off is found within 15 ms, an amplifier that pushes at
-/// its peak by itself within 5 ms.
+/// Maximum difference of a measured current from its command, A, averaged over the comparison's 20
+/// ms. It is a tenth of an amplifier's range: three times the error of an ESCON's reading of a duty
+/// cycle. An error of 2 A is detected within 15 ms, an amplifier that drives its peak current by
+/// itself within 5 ms.
 pub const CURRENT_TOLERANCE_A: f32 = 0.55;
 
-/// Largest difference of a measured current from its command without its sign, A, averaged as
-/// above. An error that changes its sign, as that of an amplifier whose own loop
-/// oscillates, is nothing on the average with its sign. Twice the tolerance: the fastest
-/// change of force, to and fro in every tick, is 0.69 A away for an amplifier that is 1 ms
-/// late, and no more. A sine of 1.8 A is above it. Less than that warms the motor, and the
-/// thermal model sees that.
+/// Maximum absolute difference of a measured current from its command, A, averaged as above. An
+/// error of alternating sign, as from an amplifier whose own loop oscillates, averages to zero with
+/// its sign. The limit is twice the tolerance: the fastest change of force, back and forth in every
+/// tick, stays 0.69 A away with an amplifier that is 1 ms late. A sine of 1.8 A exceeds the limit.
+/// A smaller one warms the motor, which the thermal model covers.
 pub const CURRENT_ROUGHNESS_A: f32 = 1.1;
 
-/// Follows the amplifiers' ready lines and current monitors, tick by tick.
+/// Monitor of the amplifiers' ready lines and currents, tick by tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Feedback {
-    /// Ticks after the enable in which an amplifier need not be ready.
+    /// Ticks after the enable within which an amplifier may be not ready.
     enable_ticks: u32,
-    /// Ticks that one may say that it is not ready.
+    /// Ticks for which an amplifier may report that it is not ready.
     spike_ticks: u32,
-    /// Share of a difference that a tick adds to the average.
+    /// Weight of a tick's difference in the average.
     share: f32,
-    /// Ticks that the amplifiers have been on.
+    /// Ticks since the amplifiers were switched on.
     on: u32,
-    /// Ticks in a row that one of them was not ready.
+    /// Ticks in a row in which an amplifier was not ready.
     unready: u32,
-    /// The command of the tick before the last, A: a monitor is converted at the
-    /// beginning of a tick and read in the next.
+    /// The command of the tick before the last, A: a monitor is converted at the start of a tick
+    /// and read in the next.
     before_a: Vec3,
     /// True if currents were measured in the last tick with the amplifiers off, or since.
     is_measured: bool,
-    /// Currents measured in this tick, A, without their signs; zero where nothing was measured.
+    /// Absolute currents measured in this tick, A; zero without a measurement.
     measured_a: Vec3,
-    /// Measured less commanded, averaged, A.
+    /// Average of measured minus commanded, A.
     error_a: Vec3,
-    /// The same without its sign.
+    /// Average of its absolute value, A.
     roughness_a: Vec3,
 }
 
@@ -72,7 +70,7 @@ impl Feedback {
         }
     }
 
-    /// Returns true if an amplifier that is on says for too long that it is not ready.
+    /// Returns true if an enabled amplifier has reported for too long that it is not ready.
     pub(super) fn is_unready(&mut self, sense: &GuardInputs) -> bool {
         self.on = self.on.saturating_add(1);
         let counts = sense.amplifier_not_ready && self.on > self.enable_ticks;
@@ -85,23 +83,22 @@ impl Feedback {
         self.is_measured
     }
 
-    /// Currents that were measured in this tick, A, without their signs. Zero where there
-    /// are no monitors.
+    /// Returns the absolute currents measured in this tick, A; zero without monitors.
     pub(super) const fn measured_a(&self) -> Vec3 {
         self.measured_a
     }
 
-    /// The amplifiers are off.
+    /// Resets the times while the amplifiers are off.
     pub(super) const fn rest(&mut self, sense: &GuardInputs) {
         self.is_measured = sense.measured_ma.is_some();
         self.on = 0;
         self.unready = 0;
     }
 
-    /// Takes the commands of the last tick, A (zero while the amplifiers are off), and
-    /// returns the fault that a measured current is not what was commanded. Without monitors
-    /// there is nothing to compare; monitors that are there no more, while the amplifiers are
-    /// `on`, are a fault of the board's wiring.
+    /// Compares the measured currents with the commands of the last tick, A (zero while the
+    /// amplifiers are off), and returns the fault for a difference. Without monitors nothing is
+    /// compared; monitors that disappear while the amplifiers are `on` are a fault of the board's
+    /// wiring.
     pub(super) fn check(
         &mut self,
         sense: &GuardInputs,
@@ -120,7 +117,7 @@ impl Feedback {
         self.error_a += (error_a - self.error_a) * self.share;
         self.roughness_a += (error_a.abs() - self.roughness_a) * self.share;
         let within = |error_a: Vec3, most_a| error_a.cmple(Vec3::splat(most_a)).all();
-        // Written so that what is not a number disagrees.
+        // Written so that NaN does not agree.
         let agrees = within(self.error_a.abs(), CURRENT_TOLERANCE_A)
             && within(self.roughness_a, CURRENT_ROUGHNESS_A);
         (!agrees).then_some(Fault::CurrentMismatch)

@@ -1,12 +1,12 @@
-//! Outputs held at given values with the amplifiers off, so that a user with a meter
-//! can see what a board puts out before anything can move.
+//! Outputs held at given values with the amplifiers off, so that a user can measure a board's
+//! outputs before anything can move.
 
 use glam::Vec3;
 
 use super::{Guard, Mode};
 use crate::rate::TickRate;
 
-/// Longest time for which outputs are held, s.
+/// Maximum time for which outputs are held, s.
 pub const HOLD_S: u32 = 60;
 
 /// Held outputs.
@@ -15,7 +15,7 @@ pub(super) struct Hold {
     ticks_a_second: u32,
     /// Shares of full scale, -1 to 1.
     shares: Vec3,
-    /// Ticks that are left of it.
+    /// Ticks that are left.
     left: u32,
 }
 
@@ -28,13 +28,13 @@ impl Hold {
         }
     }
 
-    /// Nothing is held any more.
+    /// Ends the hold.
     pub(super) const fn end(&mut self) {
         self.shares = Vec3::ZERO;
         self.left = 0;
     }
 
-    /// A tick passes.
+    /// Counts a tick.
     pub(super) fn pass(&mut self) {
         self.left = self.left.saturating_sub(1);
         if self.left == 0 {
@@ -44,9 +44,9 @@ impl Hold {
 }
 
 impl Guard {
-    /// Holds the outputs at shares of full scale, each cut to -1..=1, or no longer. Only
-    /// while disarmed and without a fault: the enable line stays low, so no current flows.
-    /// It ends after [`HOLD_S`] and with whatever arms, disarms, faults or changes
+    /// Holds the outputs at shares of full scale, each clamped to -1..=1, or ends the hold. Works
+    /// only while disarmed and without a fault: the enable line stays low, so no current flows. The
+    /// hold ends after [`HOLD_S`], and when the guard arms, disarms, faults or changes its
     /// settings. A share that is not a number holds zero.
     pub fn hold(&mut self, shares: Option<[f32; 3]>) {
         self.hold.end();
@@ -59,7 +59,7 @@ impl Guard {
         }
     }
 
-    /// Shares of full scale that the outputs are held at, zero unless they are.
+    /// Returns the shares of full scale at which the outputs are held, or zero.
     #[must_use]
     pub const fn held(&self) -> Vec3 {
         self.hold.shares

@@ -7,7 +7,7 @@ use crate::tick::{Command, Haptics};
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
 
-/// The loop without a scene, and joints that answer currents as the test says.
+/// The loop without a scene, with joints that respond to currents as the test defines.
 struct Bench<'t> {
     haptics: Haptics<'t, 1>,
     sense: GuardInputs,
@@ -37,7 +37,7 @@ impl<'t> Bench<'t> {
         self.haptics.report()
     }
 
-    /// One tick; once a millisecond the encoders continue as `moves` says of the currents.
+    /// Runs a tick; once a millisecond the encoders move as `moves` computes from the currents.
     fn tick(&mut self, moves: impl Fn(Vec3) -> [i32; 3]) -> GuardOutputs {
         let drive = self.haptics.tick(&self.sense, true).drive;
         self.drives.push(drive);
@@ -49,7 +49,7 @@ impl<'t> Bench<'t> {
         drive
     }
 
-    /// Asks for a jog, presses the switch a moment later, and lets `ms` pass.
+    /// Requests a jog, presses the switch a moment later, and runs for `ms`.
     fn jog(&mut self, jog: Jog, ms: u32, moves: impl Fn(Vec3) -> [i32; 3]) {
         self.say(Command::Jog(jog));
         for tick in 0..self.rate.ticks(ms) {
@@ -65,7 +65,7 @@ const JOG: Jog = Jog {
     hold_ms: 500,
 };
 
-/// A held joint: it gives by some counts when the current has overcome its friction.
+/// A held joint: it moves by some counts when the current has overcome its friction.
 fn held(current: Vec3) -> [i32; 3] {
     [0, i32::from((0.05..0.052).contains(&-current.y)), 0]
 }
@@ -81,7 +81,7 @@ fn one_motor_gets_the_current_for_the_time_and_nothing_else() {
         let on = || bench.drives.iter().filter(|drive| drive.enabled);
         assert!(on().all(|drive| drive.currents_a * Vec3::Y == drive.currents_a));
         assert!(on().all(|drive| (-0.3..=0.0).contains(&drive.currents_a.y)));
-        // 2 s in, the time asked for, 0.1 s out; from the press on, 0.1 s before.
+        // 2 s ramp-up, the requested time, 0.1 s fade-out; and 0.1 s after the press before that.
         let (driven, full) = (on().count(), on().filter(|d| d.currents_a.y < -0.299));
         assert!(driven.abs_diff(2_600 * ms) <= 5 * ms, "{driven}");
         assert!(full.count().abs_diff(508 * ms) <= 5 * ms);
@@ -89,7 +89,7 @@ fn one_motor_gets_the_current_for_the_time_and_nothing_else() {
             let [a, b] = [pair[0], pair[1]].map(|drive| drive.currents_a.y);
             (a - b).abs()
         });
-        // No step beyond what the way out takes, 0.3 A in 100 ms.
+        // No step is larger than the fade-out's, 0.3 A in 100 ms.
         let most = steps.fold(0.0, f32::max);
         assert!(most <= 0.3 / (100 * ms) as f32 + 1e-5, "{most}");
     }
@@ -99,11 +99,11 @@ fn one_motor_gets_the_current_for_the_time_and_nothing_else() {
 fn it_takes_a_press_and_is_over_when_it_is_over() {
     let mut storage = TileArena::<1>::new();
     let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-    // Without a jog, and with nothing to feel, the arm cannot be armed.
+    // Without a jog and without a scene, the arm cannot be armed.
     bench.say(Command::Arm);
     (0..100).for_each(|_| _ = bench.tick(held));
     assert!(bench.report().decision.refused.contains(Blockers::NO_SCENE));
-    // Held from the beginning, the switch does not count.
+    // A switch that was held from the start does not count.
     bench.sense.dead_man = true;
     bench.say(Command::Jog(JOG));
     for _ in 0..1_000 {
@@ -112,7 +112,7 @@ fn it_takes_a_press_and_is_over_when_it_is_over() {
     bench.jog(JOG, 4_000, held);
     assert_eq!(bench.report().mode, Mode::Disarmed);
     assert!(bench.drives.iter().any(|drive| drive.enabled));
-    // To arm once more is not to jog once more.
+    // Another arm command does not repeat the jog.
     bench.drives.clear();
     bench.sense.dead_man = false;
     bench.say(Command::Arm);
@@ -121,7 +121,7 @@ fn it_takes_a_press_and_is_over_when_it_is_over() {
     assert!(bench.drives.iter().all(|drive| !drive.enabled));
 }
 
-/// Also where no tick came in between, and in the tick after its force has gone out.
+/// Also without a tick in between, and in the tick after the fade-out.
 #[test]
 fn a_plain_arm_does_not_arm_for_a_jog_of_before() {
     let mut storage = TileArena::<1>::new();
@@ -179,7 +179,7 @@ fn a_joint_that_runs_away_is_a_fault_whichever_it_is() {
         for speed in [9, -9, 30, 2] {
             let mut storage = TileArena::<1>::new();
             let mut bench = Bench::new(&mut storage, TickRate::DEFAULT);
-            // Not the motor's own joint, for two of the three.
+            // For two of the three, a joint that is not the motor's own.
             bench.jog(JOG, 4_000, |current| {
                 let mut moved = held(current);
                 moved[axis] += if current.y < -0.1 { speed } else { 0 };
@@ -199,7 +199,7 @@ fn a_motor_whose_encoder_stands_is_found_at_half_the_current() {
     for moves in [
         |_| [0; 3],
         |current: Vec3| {
-            // One channel dead: a count up and down. Another joint moves.
+            // One dead channel: a count up and down. Then another joint moves.
             [i32::from(current.y < -0.1 && current.y > -0.11), 0, 0]
         },
     ] {

@@ -1,4 +1,4 @@
-//! The bounds of force and currents.
+//! The limits of force and currents.
 
 use glam::Vec3;
 
@@ -6,9 +6,8 @@ use super::{Blockers, Fault, Guard, GuardOutputs, Limits, Mode, SMALL_FORCE_N};
 use crate::scalar::{clamp_length, is_finite};
 
 impl Guard {
-    /// The force that may be asked of the motors: no longer than the device
-    /// may make, less where the tip is too fast, coming in and going out
-    /// gently, slew-limited; zero unless the amplifiers are on.
+    /// Returns the force for the motors: clamped to the device's limit, reduced if the tip is too
+    /// fast, ramped up and faded out, and rate-limited; zero unless the amplifiers are on.
     #[must_use]
     pub fn limit_force(&mut self, wanted_n: Vec3) -> Vec3 {
         if !is_finite(wanted_n) {
@@ -54,7 +53,7 @@ impl Guard {
         let change = aim - self.force_n;
         let step = clamp_length(change, self.max_slew_n);
         self.force_n = if step == change {
-            // To the bit, so that a replay renders the same force.
+            // Exact to the bit, so that a replay renders the same force.
             aim
         } else {
             self.limits |= Limits::SLEW_LIMITED;
@@ -62,8 +61,8 @@ impl Guard {
         };
     }
 
-    /// The currents of a tick of the jog that is under way, A; none where there is no
-    /// jog. Ends the jog whose time is over.
+    /// Returns a tick's currents of the active jog, A; `None` without a jog. Ends a jog whose time
+    /// is over.
     #[must_use]
     pub fn jog_currents_a(&mut self) -> Option<Vec3> {
         let (mode, gain) = (self.mode(), self.arming.gain);
@@ -75,9 +74,8 @@ impl Guard {
         Some(currents_a)
     }
 
-    /// The currents that may reach the amplifiers for the next tick: all
-    /// scaled down together so that none exceeds what its motor may have now;
-    /// off unless the amplifiers may be on.
+    /// Returns the amplifiers' currents for the next tick: all scaled down together so that none
+    /// exceeds its motor's present limit; off unless the amplifiers may be on.
     #[must_use]
     pub fn limit_currents(&mut self, wanted_a: Vec3) -> GuardOutputs {
         if !is_finite(wanted_a) {
@@ -98,7 +96,7 @@ impl Guard {
             let excess = (load / allowed_a).max_element();
             (wanted_a / excess).clamp(-allowed_a, allowed_a)
         };
-        // An amplifier may give more than its command, which only a monitor shows.
+        // An amplifier may drive more than its command; only a monitor shows that.
         self.motors.heat(match self.feedback.has_monitors() {
             true => self.currents_a.abs().max(self.feedback.measured_a()),
             false => self.currents_a,

@@ -1,13 +1,12 @@
-//! The gate to the amplifiers: every failure ends in zero.
+//! The guard, the only path to the amplifiers: every failure sets the currents to zero.
 //!
-//! A tick calls three functions in this order: [`Guard::watch`] checks the inputs
-//! and what was measured, and decides whether anything may be driven at all;
-//! [`Guard::limit_force`] bounds the force; [`Guard::limit_currents`] bounds
-//! the currents.
+//! A tick calls three functions in this order: [`Guard::watch`] checks the inputs and the measured
+//! values, and decides whether anything may be driven at all; [`Guard::limit_force`] limits the
+//! force; [`Guard::limit_currents`] limits the currents.
 //!
-//! [`Fault`]s are latched and switch the amplifiers off. [`Limits`] say why a
-//! force is not what was asked for. [`Blockers`] say why the arm cannot
-//! be armed. The steps from off to on and back are in [`Mode`].
+//! [`Fault`]s are latched and switch the amplifiers off. [`Limits`] are the reasons for a reduced
+//! force. [`Blockers`] are the reasons why the arm cannot be armed. [`Mode`] has the steps from off
+//! to on and back.
 
 mod arming;
 mod blockers;
@@ -48,16 +47,13 @@ use speed::SpeedMonitor;
 use stall::StallDetector;
 use thermal::{Motors, Temperatures};
 
-/// Share of the record's largest force that the guard clamps to. An encoder that
-/// is wrong by twice what a tick's jump may be, some 7 mm at the tip, makes the
-/// levers, and with them the force at the tip, wrong by up to 9 %; this keeps it
-/// within the record's (swept in the tests).
+/// Share of the calibration's maximum force that the guard clamps to. An encoder error of twice the
+/// permitted jump per tick is some 7 mm at the tip. It changes the levers, and so the force at the
+/// tip, by up to 9 %; this share keeps it below the calibration's maximum (tested by a sweep).
 pub const WORKING_SHARE: f32 = 0.9;
-/// Most counts an encoder may move in a second: about 3 m/s at the tip of a
-/// Premium 1.5.
+/// Maximum counts of an encoder in a second: about 3 m/s at the tip of a Premium 1.5.
 pub const MAX_COUNTS_PER_S: u32 = 128_000;
-/// By this much a joint may read beyond its limits, rad: stops give, and
-/// limits are measured by hand.
+/// Tolerance of a joint's limits, rad: stops yield, and limits are measured by hand.
 pub const LIMIT_MARGIN_RAD: f32 = 0.087;
 
 /// Inputs of the guard: encoders, safety inputs and amplifiers.
@@ -69,16 +65,16 @@ pub struct GuardInputs {
     pub dead_man: bool,
     /// True if the emergency stop is pressed, or its wire broken.
     pub emergency_stop: bool,
-    /// True if the encoder or amplifier hardware says that it cannot work.
+    /// True if the encoder or amplifier hardware reports a failure.
     pub hardware_failed: bool,
-    /// True if a converter's settings do not read back as they were written.
+    /// True if a converter's settings read back differently from the written ones.
     pub outputs_not_as_set: bool,
-    /// True if an amplifier says that it is not ready, or its wire is broken.
+    /// True if an amplifier reports that it is not ready, or its wire is broken.
     pub amplifier_not_ready: bool,
-    /// Currents that flow in motors 1 to 3, mA, as of the tick before; none where the
-    /// amplifiers have no monitors.
+    /// Currents in motors 1 to 3, mA, as of the last tick; `None` if the amplifiers have no
+    /// monitors.
     pub measured_ma: Option<[i16; 3]>,
-    /// True if the clutch input is held, as it reads in this tick: it may bounce.
+    /// True if the clutch input is held in this tick; not debounced.
     pub clutch: bool,
 }
 
@@ -98,7 +94,7 @@ pub struct Surroundings<'a> {
 /// Kind of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SceneKind {
-    /// Nothing.
+    /// No scene.
     None,
     /// A scene for the arm.
     Arm,
@@ -106,15 +102,15 @@ pub enum SceneKind {
     Points,
 }
 
-/// Commands to the amplifiers.
+/// Commands to the amplifiers, and held outputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuardOutputs {
     /// Motor currents of the three axes, amperes. Zero unless enabled.
     pub currents_a: Vec3,
-    /// True if the amplifiers are to be on.
+    /// True if the amplifiers must be on.
     pub enabled: bool,
-    /// Shares of full scale, -1 to 1, that the outputs are held at while the amplifiers
-    /// are off ([`Guard::hold`]). Zero while they are on.
+    /// Shares of full scale, -1 to 1, at which the outputs are held while the amplifiers are off
+    /// ([`Guard::hold`]). Zero while they are on.
     pub held: Vec3,
 }
 
@@ -123,9 +119,9 @@ pub struct GuardOutputs {
 pub struct Report {
     /// Progress of arming.
     pub mode: Mode,
-    /// Reasons for which the amplifiers are off; empty while they are on.
+    /// Reasons why the amplifiers are off; empty while they are on.
     pub blockers: Blockers,
-    /// Reasons for which the last tick's force was reduced.
+    /// Reasons why the last tick's force was reduced.
     pub limits: Limits,
     /// The latched fault.
     pub fault: Option<Fault>,
@@ -169,20 +165,20 @@ pub struct Report {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
-    /// Most counts and newtons from one tick to the next.
+    /// Maximum counts and maximum change of force, N, in a tick.
     max_counts: u32,
     max_slew_n: f32,
-    /// Stops of the joints, with [`LIMIT_MARGIN_RAD`].
+    /// Joint limits, with [`LIMIT_MARGIN_RAD`].
     stops: JointLimits,
     arming: Arming,
     fault: Option<Fault>,
     blockers: Blockers,
     limits: Limits,
-    /// Counts at the last tick, once the arm is zeroed.
+    /// Counts in the last tick, once the arm is zeroed.
     counts: Option<[i32; 3]>,
     max_force_n: f32,
     force_n: Vec3,
-    /// While fading: the force at full gain.
+    /// The force at full gain, while fading.
     held_n: Vec3,
     currents_a: Vec3,
     speed: SpeedMonitor,
@@ -190,12 +186,12 @@ pub struct Guard {
     motors: Motors,
     feedback: Feedback,
     hold: Hold,
-    /// The jog that is armed for, or under way; none while disarmed.
+    /// The requested or active jog; `None` while disarmed.
     jog: Option<JogRun>,
 }
 
 impl Guard {
-    /// Makes a disarmed guard, with the fault found at boot, if any.
+    /// Creates a disarmed guard, with the fault found at boot, if any.
     #[must_use]
     pub fn new(rate: TickRate, found_at_boot: Option<Fault>) -> Self {
         Self {
@@ -220,7 +216,7 @@ impl Guard {
         }
     }
 
-    /// Takes the bounds of an arm.
+    /// Applies the limits of an arm.
     pub fn configure(&mut self, mechanism: &Kinematics) {
         self.max_force_n = WORKING_SHARE * mechanism.calibration().max_force_n;
         let limits = &mechanism.calibration().limits;
@@ -229,19 +225,19 @@ impl Guard {
         self.motors.configure(mechanism.calibration());
     }
 
-    /// Progress of arming.
+    /// Returns the progress of arming.
     #[must_use]
     pub const fn mode(&self) -> Mode {
         self.arming.mode
     }
 
-    /// Share of force and weight that is let through.
+    /// Returns the rendered share of force and weight compensation.
     #[must_use]
     pub const fn gain(&self) -> f32 {
         self.arming.gain
     }
 
-    /// The state of the guard after a tick.
+    /// Returns the state of the guard after a tick.
     #[must_use]
     pub const fn report(&self) -> Report {
         Report {
@@ -253,34 +249,33 @@ impl Guard {
         }
     }
 
-    /// The force that the motors have had since the last tick, N; zero unless the amplifiers
-    /// were on.
+    /// Returns the force of the motors since the last tick, N; zero unless the amplifiers were on.
     #[must_use]
     pub const fn force_n(&self) -> Vec3 {
         self.force_n
     }
 
-    /// Most force that it lets through, N.
+    /// Returns the maximum force that the guard lets through, N.
     #[must_use]
     pub const fn most_force_n(&self) -> f32 {
         self.max_force_n
     }
 
-    /// Shares of the force that [`Guard::limit_force`] is about to let through: that of a ramp,
-    /// and that of the speed limit. None while no force follows what is asked for: with the
-    /// amplifiers off, and while the last force goes out.
+    /// Returns the next shares of [`Guard::limit_force`]: those of the ramp and of the speed limit.
+    /// `None` while the force does not follow the wanted force: with the amplifiers off, and during
+    /// the fade-out.
     #[must_use]
     pub fn shares(&self) -> Option<[f32; 2]> {
         let ramp = self.arming.next_gain()?;
         Some([ramp, self.speed.share])
     }
 
-    /// Has the tick's report say this, too.
+    /// Adds limits to the tick's report.
     pub(crate) fn says(&mut self, limits: Limits) {
         self.limits |= limits;
     }
 
-    /// Returns the tip's velocity of a driven arm, device frame, mm/s, by the readings of every
+    /// Returns the tip's velocity of a driven arm, device frame, mm/s, from the readings of every
     /// millisecond (FOAW).
     #[must_use]
     pub fn tip_velocity_mm_s(&self, mechanism: &Kinematics, pose: &Pose) -> Vec3 {
@@ -293,8 +288,7 @@ impl Guard {
         &self.motors
     }
 
-    /// Begins with motors as warm as this; [`Guard::new`] takes them to be as cold as the
-    /// air.
+    /// Sets the initial motor temperatures; [`Guard::new`] assumes the temperature of the air.
     pub fn begin_at(&mut self, temperatures: Temperatures) {
         self.motors.begin_at(temperatures);
     }
@@ -305,22 +299,21 @@ impl Guard {
         self.off(Blockers::FAULT_LATCHED);
     }
 
-    /// Clears the fault. Arming begins from the start, and how warm the motors
-    /// are is not forgotten.
+    /// Clears the fault. Arming starts again from off; the motors' temperatures are kept.
     pub fn clear(&mut self) {
         self.fault = None;
         self.stop();
     }
 
-    /// Clears the fault as [`Self::clear`] does if it is the one that the user has seen.
+    /// Clears the fault like [`Self::clear`], if it is the one that the user has seen.
     pub fn clear_seen(&mut self, seen: Option<Fault>) {
         if self.fault.is_none() || self.fault == seen {
             self.clear();
         }
     }
 
-    /// The host asks to arm. A jog that was asked for before, and has driven nothing, is
-    /// forgotten; one under way continues.
+    /// Requests arming. An earlier jog that has not driven a motor is forgotten; an active one
+    /// continues.
     pub fn arm(&mut self) {
         self.hold.end();
         if !self.mode().drives() {
@@ -329,19 +322,19 @@ impl Guard {
         self.arming.request();
     }
 
-    /// The host asks to arm for a jog. What was driven before is switched off.
+    /// Requests arming for a jog. Anything driven before is switched off.
     pub fn jog(&mut self, jog: Jog) {
         self.stop();
         self.arming.request();
         self.jog = Some(JogRun::new(jog, self.arming.rate));
     }
 
-    /// Lowers the force to zero, then switches off.
+    /// Fades the force out, then switches off.
     pub fn disarm(&mut self) {
         self.hold.end();
         let gain = self.arming.gain;
         if self.mode().drives() && self.mode() != Mode::Fading {
-            // At the gain that there is, this is the force that there is.
+            // Divided by the gain, so that the fade starts at the present force.
             self.held_n = if gain > 0.0 {
                 self.force_n / gain
             } else {
@@ -365,7 +358,7 @@ impl Guard {
         self.jog = None;
     }
 
-    /// These counts follow from nothing before.
+    /// Restarts the counts, unrelated to the earlier ones.
     pub fn restart_counts(&mut self) {
         self.counts = None;
     }

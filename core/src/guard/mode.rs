@@ -1,9 +1,8 @@
-//! The steps between off and on.
+//! The modes between off and on.
 
 use serde::{Deserialize, Serialize};
 
-/// Progress of arming. Amplifiers are on in `Ramping`, `Armed` and
-/// `Fading`, and in no other.
+/// Progress of arming. The amplifiers are on only in `Ramping`, `Armed` and `Fading`.
 ///
 /// ```text
 ///            arm                  switch pressed           small force for 0.1 s
@@ -14,27 +13,27 @@ use serde::{Deserialize, Serialize};
 ///    └──────────── Fading ◀──────────────── disarm, goodbye ─────────────────┘
 /// ```
 ///
-/// From every one of them a fault leads to `Disarmed` within the tick.
+/// From every mode a fault leads to `Disarmed` within the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
-    /// Off. Where every boot begins.
+    /// Off, the mode after every boot.
     #[default]
     Disarmed,
-    /// The host has asked to arm; waits for the dead-man switch to be pressed.
+    /// The host has requested arming; waits for a press of the dead-man switch.
     Requested,
     /// The switch was pressed; waits for a small force on consecutive ticks.
     Confirming,
-    /// On; force comes in.
+    /// On; the force ramps up.
     Ramping,
     /// On.
     Armed,
-    /// On; force goes out.
+    /// On; the force fades out.
     Fading,
 }
 
 impl Mode {
-    /// The modes that may follow this one.
+    /// Returns the modes that may follow this one.
     #[must_use]
     pub const fn exits(self) -> &'static [Self] {
         match self {

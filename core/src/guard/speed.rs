@@ -1,34 +1,31 @@
-//! The tip's speed, estimated only as closely as the limit needs it.
+//! The tip's speed, estimated only as exactly as its limit requires.
 
 use glam::Vec3;
 
 use crate::phantom::{Kinematics, Pose, Readings};
 use crate::rate::TickRate;
 
-/// The tip may stay above twice the speed limit for this many readings, a
-/// millisecond each.
+/// Number of readings, a millisecond each, for which the tip may stay above twice the speed limit.
 const MAX_READINGS_TOO_FAST: u32 = 5;
 
-/// Watches the tip's speed, once a millisecond.
+/// Monitor of the tip's speed, once a millisecond.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SpeedMonitor {
     readings: Readings,
-    /// Ticks between two readings, and since the last.
+    /// Ticks between two readings, and since the last one.
     every: u32,
     ticks: u32,
     /// Readings a second.
     pub(super) hz: f32,
-    /// Counts of each axis from one reading to the next within which the tip
-    /// is below the limit in every pose.
+    /// Maximum counts of each axis between two readings at which the tip is below the limit in
+    /// every pose.
     surely_slow: [u32; 3],
-    /// By how much the tip's speed by the last two readings alone may differ from
-    /// that by FOAW, mm/s: no slope that it gives is more than a count from the
-    /// last difference.
+    /// Maximum difference between the tip's speed from the last two readings alone and that from
+    /// FOAW, mm/s: the slope of FOAW is within a count of the last difference.
     rough_mm_s: f32,
     limit_mm_s: f32,
     too_fast: u32,
-    /// The share of the force that may be made at this speed: 1 up to the limit, 0
-    /// from twice the limit on.
+    /// The share of the force at this speed: 1 up to the limit, 0 from twice the limit on.
     pub(super) share: f32,
 }
 
@@ -37,9 +34,9 @@ pub(super) struct SpeedMonitor {
 pub(super) enum SpeedCheck {
     /// Between two readings.
     NotYet,
-    /// A reading was taken; counts moved since the last.
+    /// A reading was taken, with the counts moved since the last one.
     Moved([i32; 3]),
-    /// The same, and the tip has been far too fast for too long.
+    /// The same, and the tip has been above twice the limit for too long.
     TooFast,
 }
 
@@ -58,15 +55,15 @@ impl SpeedMonitor {
         let record = mechanism.calibration();
         self.limit_mm_s = record.max_speed_mm_s;
         let (l1, l2) = (record.l1_mm, record.l2_mm);
-        // A third of the limit for each joint, with its longest lever; a count
-        // less, for the readings' error.
+        // A third of the limit for each joint, with its longest lever, minus a count for the
+        // readings' error.
         let levers_mm = Vec3::new(l1 + l2, l1, l2) * mechanism.radians_per_count().abs();
         self.rough_mm_s = self.hz * levers_mm.element_sum();
         let counts = self.limit_mm_s / (3.0 * self.hz * levers_mm);
         self.surely_slow = counts.to_array().map(|c| (c as u32).saturating_sub(1));
     }
 
-    /// Forgets what was: these counts follow from nothing before.
+    /// Restarts from counts that are unrelated to the earlier ones.
     pub(super) fn restart(&mut self, counts: [i32; 3]) {
         self.readings.restart(counts);
         self.ticks = 0;
@@ -74,8 +71,8 @@ impl SpeedMonitor {
         self.share = 1.0;
     }
 
-    /// Takes a tick's counts.
-    // It has one caller, and would be a call with copies of its arguments in every tick.
+    /// Processes a tick's counts.
+    // Inlined: it has one caller, and a call would copy its arguments in every tick.
     #[inline(always)]
     pub(super) fn check(
         &mut self,
@@ -119,8 +116,8 @@ impl SpeedMonitor {
         slow(0) && slow(1) && slow(2)
     }
 
-    /// Returns true if the last two readings alone tell that it is below the limit: FOAW
-    /// costs as much as all the rest of a tick.
+    /// Returns true if the last two readings alone show that the tip is below the limit: FOAW costs
+    /// as much as the rest of a tick.
     fn is_roughly_slow(&self, moved: [i32; 3], speed_of: impl Fn(Vec3) -> Vec3) -> bool {
         let [x, y, z] = moved.map(|moved| moved as f32);
         let most = self.limit_mm_s - self.rough_mm_s;
@@ -134,7 +131,7 @@ mod tests {
     use crate::cases::cases;
     use crate::phantom::Calibration;
 
-    /// A hand that speeds up and slows down at random, past the limit and back.
+    /// A hand that accelerates and decelerates at random, beyond the limit and back.
     #[test]
     fn the_rough_look_decides_as_the_close_one() {
         let mechanism = Kinematics::new(&Calibration::PREMIUM_1_5).expect("valid");

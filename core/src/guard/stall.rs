@@ -1,40 +1,40 @@
-//! A motor that pushes while its encoder does not move.
+//! Detection of a motor that pushes while its encoder does not move.
 //!
-//! Resting on a surface, that is how it should be, so a push against a
-//! standing encoder is suspicious only in two cases:
-//! - *All* encoders stand to the count for two seconds while a motor has more
-//!   than its continuous current. No hand is that calm under such a force.
-//! - *One* encoder stands, give or take a count, while its motor pushes and the
-//!   other joints travel. A hand trembles by more than a count, so along a way
-//!   that turns one joint only the others still move.
+//! In contact with a surface this is normal, so a push against a stationary encoder is suspicious
+//! only in two cases:
+//! - *All* encoders are stationary, to the count, for two seconds while a motor has more than its
+//!   continuous current. No hand is that steady under such a force.
+//! - *One* encoder is stationary, to within a count, while its motor pushes and the other joints
+//!   move. A hand trembles by more than a count, so in a motion that turns one joint only, the
+//!   other joints still move.
 
 use glam::Vec3;
 
-/// Readings (a millisecond each) that all encoders may stand under load.
+/// Readings (a millisecond each) for which all encoders may be stationary under load.
 const ALL_STILL: u32 = 2_000;
-/// Counts that the other joints may travel together while one stands: about
-/// 200 mm. Three times what a hand does that turns one joint only, at up to half
-/// a metre a second, with a tremor of 0.2 mm (measured on the virtual Phantom);
-/// and more than it does rubbing along a straight line without any.
+/// Counts that the other joints may move together while one is stationary: about 200 mm. A hand
+/// that turns one joint only, at up to half a metre a second, with a tremor of 0.2 mm (measured on
+/// the virtual Phantom), moves them by a third of this. A hand that rubs along a straight line
+/// without a tremor also moves them by less.
 pub const TRAVEL: u32 = 8_000;
-/// A joint stands while it stays this near, in counts, to where it was: with one
-/// of its two channels dead an encoder still goes one up and one down.
+/// Distance, in counts, within which a joint counts as stationary: an encoder with one dead channel
+/// still alternates by one count.
 const BAND: u32 = 1;
 
-/// Watches for motors that push in vain.
+/// Detector of motors that push without a motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StallDetector {
     all_still: u32,
-    /// Distance of each joint from where it began to stand.
+    /// Distance of each joint from the place where it became stationary.
     off: [i32; 3],
-    /// Travel of the other joints since.
+    /// Motion of the other joints since then.
     others: [u32; 3],
 }
 
 impl StallDetector {
-    /// Takes how far the encoders moved in a millisecond under these currents.
-    /// True if a motor pushes and nothing comes of it.
-    // It has one caller, and would be a call with copies of its arguments in every tick.
+    /// Processes the motion of the encoders in a millisecond under these currents. Returns true if
+    /// a motor pushes without a motion.
+    // Inlined: it has one caller, and a call would copy its arguments in every tick.
     #[inline(always)]
     pub(super) fn check(&mut self, moved: [i32; 3], currents_a: Vec3, continuous_a: Vec3) -> bool {
         let load = currents_a.abs();
@@ -80,7 +80,7 @@ mod tests {
     fn resting_and_sliding_are_not_suspicious() {
         assert_eq!(ticks_until_found([0; 3], Vec3::splat(1.2)), None);
         assert_eq!(ticks_until_found([3, 1, -1], Vec3::splat(5.5)), None);
-        // Along one joint only: the others do not push.
+        // Motion in one joint only: the others do not push.
         assert_eq!(ticks_until_found([5, 0, 0], Vec3::new(3.0, 0.5, 0.0)), None);
     }
 

@@ -1,4 +1,4 @@
-//! The guard tick by tick, with its surroundings played by the test.
+//! The guard tick by tick; the test provides its surroundings.
 
 mod feedback;
 mod hold;
@@ -45,7 +45,7 @@ impl Bench {
         }
     }
 
-    /// One tick in the order of the loop.
+    /// Runs a tick in the order of the loop.
     fn tick(&mut self) -> GuardOutputs {
         let pose = self.mechanism.pose(self.sense.counts, [0; 3]);
         let around = Surroundings {
@@ -150,7 +150,7 @@ fn each_blocker_is_named_and_refuses_by_itself() {
         assert_eq!(report.decision.refused, blocker);
         let by_hand = Blockers::HOST_DISARMED | Blockers::DEAD_MAN_RELEASED;
         assert_eq!(report.blockers, blocker | by_hand);
-        // And a switch pressed now changes nothing.
+        // A press of the switch now changes nothing.
         bench.sense.dead_man = true;
         bench.ticks(3_000);
         assert_eq!(bench.guard.mode(), Mode::Disarmed, "{blocker:?}");
@@ -214,7 +214,7 @@ fn a_large_force_keeps_it_confirming_and_a_release_goes_back_a_step() {
     );
     bench.sense.dead_man = true;
     bench.wanted_n = Vec3::Z * 0.2;
-    // A large force in between starts the hundred ticks again.
+    // A large force in between restarts the hundred ticks.
     bench.ticks(90);
     bench.wanted_n = Vec3::Z;
     bench.tick();
@@ -256,7 +256,7 @@ fn every_change_of_mode_is_one_that_the_mode_lists() {
     };
     let mut bench = Bench::new();
     for _ in 0..600 {
-        // On the way to being armed, as far as it goes.
+        // Through the modes of arming, as far as possible.
         bench.guard.clear();
         bench.note();
         bench.watchdog_live = true;
@@ -328,7 +328,7 @@ fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
         assert_eq!(bench.tick(), GuardOutputs::default(), "{fault:?}");
         assert_eq!(bench.guard.report().fault, Some(fault));
         assert_eq!(bench.force_n, Vec3::ZERO);
-        // The cause is gone; the fault is not.
+        // The cause has ended; the fault stays.
         bench.sense = before;
         (bench.watchdog_live, bench.calibrated) = (true, true);
         bench.wanted_n = Vec3::ZERO;
@@ -337,7 +337,7 @@ fn each_fault_is_zero_within_its_tick_and_latched_until_cleared() {
         bench.guard.arm();
         bench.ticks(3_000);
         assert_eq!(bench.guard.mode(), Mode::Disarmed, "{fault:?}");
-        // Cleared it is still off; only a new request and a new press arm.
+        // After the clear it is still off; only a new request and a new press arm.
         bench.guard.clear();
         bench.ticks(3_000);
         assert_eq!(
@@ -362,7 +362,7 @@ fn the_first_fault_stays() {
 
 #[test]
 fn joint_limits_and_linkage_trip_while_armed() {
-    // Slowly turned outwards until something happens: a count is 0.1 mrad.
+    // Turned outwards slowly until a fault: a count is 0.1 mrad.
     let turned = |axis: usize, sign: i32| {
         let mut bench = Bench::armed();
         while bench.guard.report().fault.is_none() {
@@ -462,7 +462,7 @@ fn hard_working_motor_is_derated_below_its_limit() {
     bench.wanted_n = Vec3::Z * 6.0;
     let mut derated = None;
     for tick in 0..60_000u32 {
-        // A hand that trembles: standing still would be another fault.
+        // A hand that trembles: a stationary one would be another fault.
         bench.sense.counts[1] = (tick as i32 / 50) % 2;
         let drive = bench.tick();
         let limits = bench.guard.report().limits;
@@ -482,18 +482,18 @@ fn hard_working_motor_is_derated_below_its_limit() {
 fn a_winding_above_its_limit_is_a_fault() {
     let mut bench = Bench::armed();
     for _ in 0..60_000 {
-        // As if the amplifier gave more than it was asked for.
+        // As if the amplifier drove more than its command.
         bench.guard.motors.heat(Vec3::Y * 5.5);
     }
     assert_eq!(bench.tick(), GuardOutputs::default());
     assert_eq!(bench.guard.report().fault, Some(Fault::MotorTooHot));
-    // Cleared while it is hot, it trips again; warmth is not forgotten.
+    // Cleared while it is hot, it trips again; the temperatures are kept.
     bench.guard.clear();
     bench.tick();
     assert_eq!(bench.guard.report().fault, Some(Fault::MotorTooHot));
 }
 
-/// Joint 2 turned at so many counts a tick while 1 N is wanted.
+/// Joint 2 turns by `counts_a_tick` while 1 N is wanted.
 fn hurried(counts_a_tick: i32, ticks: u32) -> Bench {
     let mut bench = Bench::armed();
     bench.wanted_n = Vec3::Z;
@@ -524,7 +524,7 @@ fn above_the_speed_limit_force_is_less_and_far_above_it_is_a_fault() {
 #[test]
 fn a_motor_that_pushes_in_vain_is_a_fault() {
     let mut bench = Bench::armed();
-    // 2 N on the lever of joint 2 is 1.6 A, above what it can have for ever.
+    // 2 N on the lever of joint 2 is 1.6 A, above its continuous current.
     bench.wanted_n = Vec3::Z * 2.0;
     bench.ticks(1_900);
     assert_eq!(bench.guard.report().fault, None);
@@ -539,7 +539,7 @@ fn disarmed_by_the_host_force_goes_out_without_a_step() {
     bench.ticks(20);
     let full = bench.force_n;
     bench.guard.disarm();
-    // Whatever is wanted from now on.
+    // The wanted force no longer matters.
     bench.wanted_n = Vec3::X * 8.0;
     let mut last = full;
     let mut ticks = 0;
@@ -552,7 +552,7 @@ fn disarmed_by_the_host_force_goes_out_without_a_step() {
     }
     assert!((99..=102).contains(&ticks), "{ticks}");
     assert_eq!(bench.guard.report().fault, None);
-    // Let go while it fades: off at once, and no fault, the host was first.
+    // Released during the fade: off at once, without a fault, because the host disarmed first.
     let mut bench = Bench::armed();
     bench.wanted_n = Vec3::Z;
     bench.ticks(5);

@@ -1,41 +1,39 @@
-//! Temperatures of the motors, and the currents that they still allow.
+//! Temperatures of the motors, and the currents that they permit.
 //!
-//! A winding heats in seconds, the housing around it in minutes, so two nodes
-//! a motor. The winding's resistance is taken hot, which errs on the warm side.
+//! A winding heats in seconds, the housing around it in minutes, so each motor has two nodes. The
+//! winding's resistance is the hot one, which errs on the warm side.
 //!
-//! Both change little in a tick, so little at 10 kHz that single precision
-//! would lose it. The heat of each tick is added up and the temperatures follow
-//! every 10 ms.
+//! Both change so little in a tick at 10 kHz that single precision would lose it. So the heat of
+//! the ticks is summed, and the temperatures are updated every 10 ms.
 //!
-//! A reset does not cool a motor. The model begins with [`Temperatures`] that the
-//! board kept over the reset, or with [`Temperatures::HOT`] where it kept none.
+//! A reset does not cool a motor. The model starts with the [`Temperatures`] that the board kept
+//! over the reset, or with [`Temperatures::HOT`] without them.
 
 use glam::Vec3;
 
 use crate::phantom::{Calibration, Thermal};
 use crate::rate::TickRate;
 
-/// Air, °C.
+/// Temperature of the air, °C.
 const AIR_C: f32 = 25.0;
-/// Between two steps of the temperatures, ms.
+/// Time between two updates of the temperatures, ms.
 const STEP_MS: u32 = 10;
 
-/// From this winding temperature on the current is reduced, °C.
+/// Winding temperature from which the current is reduced, °C.
 pub const DERATE_C: f32 = 80.0;
-/// Here no more than the continuous current is left, °C.
+/// Winding temperature at which only the continuous current is left, °C.
 pub const CONTINUOUS_C: f32 = 100.0;
-/// Here the guard trips, °C. Derating alone never comes this far.
+/// Winding temperature at which the guard trips, °C. With derating alone it is not reached.
 pub const TRIP_C: f32 = 110.0;
-/// By so much a winding may be warmer than the temperatures that were kept before a
-/// reset, K: 0.2 s of an RE25's peak current, 22 K a second. Temperatures are kept every
-/// 0.1 s, and a watchdog resets within 0.06 s.
+/// Maximum excess of a winding over the temperatures kept before a reset, K: 0.2 s of an RE25's
+/// peak current, 22 K a second. Temperatures are kept every 0.1 s, and a watchdog resets within
+/// 0.06 s.
 pub const UNSEEN_K: f32 = 5.0;
-/// More than any node can be above the one beside it, K. With the amplifiers off the model goes
-/// no farther, either: monitors without supply may tell of currents for hours that never flowed.
+/// Upper limit of a node above the one beside it, K, more than any can reach. The model stops there
+/// with the amplifiers off: monitors without supply may report false currents for hours.
 const MAX_K: Vec3 = Vec3::splat(200.0);
 
-/// Excess of the two nodes of each motor over the air, K: all that the model has to
-/// know of what was before.
+/// Excess of the two nodes of each motor over the air, K: the whole state of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Temperatures {
     /// Winding above housing, axes 1 to 3.
@@ -51,36 +49,32 @@ impl Temperatures {
         housing_k: Vec3::ZERO,
     };
 
-    /// Motors that have worked for hours as hard as derating lets them: the winding at
-    /// [`CONTINUOUS_C`], shared between the nodes as an RE25's 3.1 and 14 K/W share it.
-    /// Derating lets no motor become hotter (`derating_lets_no_motor_become_hotter`), so
-    /// no reset can have hidden more.
+    /// Motors after hours of maximum work under derating: the winding at [`CONTINUOUS_C`], divided
+    /// between the nodes by an RE25's 3.1 and 14 K/W. Derating keeps every motor at or below this
+    /// (`derating_lets_no_motor_become_hotter`), so a reset cannot hide more.
     ///
-    /// A motor that begins here may have its continuous current at once, and its peak
-    /// again after 70 s without load
-    /// (`hot_motor_has_continuous_current_at_once_and_peak_later`).
+    /// From here a motor has its continuous current at once, and its peak current after 70 s
+    /// without load (`hot_motor_has_continuous_current_at_once_and_peak_later`).
     pub const HOT: Self = Self {
         winding_k: Vec3::splat((CONTINUOUS_C - AIR_C) * 3.1 / 17.1),
         housing_k: Vec3::splat((CONTINUOUS_C - AIR_C) * 14.0 / 17.1),
     };
 
-    /// Temperatures of the windings, °C.
+    /// Returns the temperatures of the windings, °C.
     #[must_use]
     pub fn winding_c(&self) -> Vec3 {
         self.winding_k + self.housing_k + AIR_C
     }
 
-    /// Takes temperatures that were kept over a reset.
+    /// Returns the initial temperatures from those kept over a reset.
     ///
-    /// They are up to [`UNSEEN_K`] too low, because the motors had current after they
-    /// were kept. Nothing where a number is none that the model can have: no memory is
-    /// believed against sense.
+    /// The kept ones are up to [`UNSEEN_K`] too low, because the motors had current after they were
+    /// kept. Returns `None` if a number is outside of the model's range: the memory may be corrupt.
     #[must_use]
     pub fn after_reset(self) -> Option<Self> {
         let possible = |k: Vec3| k.cmpge(Vec3::ZERO).all() && k.cmple(MAX_K).all();
         let is_possible = possible(self.winding_k) && possible(self.housing_k);
-        // Not above what derating ends at: a board that resets over and over must not
-        // trip by that alone.
+        // Not above the end of derating: repeated resets alone must not trip the guard.
         let room = Vec3::splat(CONTINUOUS_C - AIR_C) - self.winding_k - self.housing_k;
         let unseen = room.clamp(Vec3::ZERO, Vec3::splat(UNSEEN_K));
         is_possible.then_some(Self {
@@ -90,28 +84,28 @@ impl Temperatures {
     }
 }
 
-/// Temperatures of the three motors above the air's, and what follows.
+/// Temperatures of the three motors above the air, and the permitted currents.
 #[derive(Clone, Copy, Debug)]
 pub struct Motors {
-    /// Ticks between two steps of the temperatures.
+    /// Ticks between two updates of the temperatures.
     step_ticks: u32,
     thermal: Thermal,
-    /// Largest current of each axis while it is cool, A.
+    /// Maximum current of each axis while it is cool, A.
     pub(super) peak_a: Vec3,
     /// Continuous current of each axis, A.
     pub(super) continuous_a: Vec3,
     at: Temperatures,
-    /// Σ I² since the last step, A², and of how many ticks.
+    /// Σ I² since the last update, A², and its number of ticks.
     squares: Vec3,
     ticks: u32,
-    /// The most that each axis may be given now, A.
+    /// The present current limit of each axis, A.
     pub(super) allowed_a: Vec3,
     /// True if a winding is too hot to continue.
     pub(super) too_hot: bool,
 }
 
 impl Motors {
-    /// Motors as cold as the air, that may have no current yet.
+    /// Creates motors as cold as the air, without a permitted current until configured.
     #[must_use]
     pub fn new(rate: TickRate) -> Self {
         Self {
@@ -127,7 +121,7 @@ impl Motors {
         }
     }
 
-    /// Takes ratings and time constants. How warm they are is not forgotten.
+    /// Sets ratings and time constants; the temperatures are kept.
     pub fn configure(&mut self, calibration: &Calibration) {
         self.thermal = calibration.thermal;
         self.peak_a = calibration.peak_current_a;
@@ -135,34 +129,34 @@ impl Motors {
         self.update_limits();
     }
 
-    /// Begins at these temperatures.
+    /// Sets the temperatures.
     pub fn begin_at(&mut self, temperatures: Temperatures) {
         self.at = temperatures;
         self.update_limits();
     }
 
-    /// Returns the state that a board keeps over a reset.
+    /// Returns the temperatures, which a board keeps over a reset.
     #[must_use]
     pub const fn temperatures(&self) -> Temperatures {
         self.at
     }
 
-    /// Estimated winding temperatures, °C.
+    /// Returns the estimated winding temperatures, °C.
     #[must_use]
     pub fn winding_c(&self) -> Vec3 {
         self.at.winding_c()
     }
 
-    /// A tick with the amplifiers off, in which all the same `measured_a` may flow.
+    /// Advances by a tick with the amplifiers off, in which `measured_a` may still flow.
     pub fn rest(&mut self, measured_a: Vec3) {
         self.heat(measured_a);
-        // With the amplifiers on, the arm trips long before.
+        // With the amplifiers on, the guard trips long before.
         self.at.winding_k = self.at.winding_k.min(MAX_K);
         self.at.housing_k = self.at.housing_k.min(MAX_K);
     }
 
-    /// Lets `currents_a` flow for a tick.
-    // A few instructions, but for the tick in ten that continues to the temperatures.
+    /// Advances by a tick with `currents_a`.
+    // A few instructions, except in the one tick in ten that updates the temperatures.
     #[inline(always)]
     pub fn heat(&mut self, currents_a: Vec3) {
         self.squares += currents_a * currents_a;
@@ -178,7 +172,7 @@ impl Motors {
         let mean = self.squares / self.ticks as f32;
         let toward = |from: Vec3, k_per_w: f32, time_s: f32| {
             let step_s = STEP_MS as f32 * 1e-3;
-            // K above the other node for A² flowing for ever, and part of the way.
+            // K above the other node for A² flowing for ever; then the part of it in this update.
             let end = mean * (thermal.resistance_ohm * k_per_w);
             from + (end - from) * (step_s / time_s)
         };
@@ -204,7 +198,7 @@ impl Motors {
         let warm = (winding_c - DERATE_C) / (CONTINUOUS_C - DERATE_C);
         let less = self.peak_a - self.continuous_a;
         self.allowed_a = self.peak_a - warm.clamp(Vec3::ZERO, Vec3::ONE) * less;
-        // Written so that what is not a number is too hot.
+        // Written so that NaN counts as too hot.
         self.too_hot = !winding_c.cmple(Vec3::splat(TRIP_C)).all();
     }
 }
@@ -213,7 +207,7 @@ impl Motors {
 mod tests {
     use super::*;
 
-    /// Asks for a current for some time, given what is allowed.
+    /// Requests a current for some time, limited to the permitted one.
     fn after(rate: TickRate, seconds: u32, wanted_a: f32) -> (Motors, Vec3) {
         let mut motors = Motors::new(rate);
         motors.configure(&Calibration::PREMIUM_1_5);
@@ -225,7 +219,7 @@ mod tests {
         (motors, given)
     }
 
-    /// Seconds without load until a motor may have its peak current again.
+    /// Seconds without load until a motor has its peak current again.
     fn seconds_to_peak(from: Temperatures) -> u32 {
         let mut motors = Motors::new(khz(1));
         motors.begin_at(from);
@@ -267,15 +261,15 @@ mod tests {
         }
     }
 
-    /// Whatever a hand does, no node passes the temperatures that are assumed where
-    /// nothing is known.
+    /// With any motion of a hand, no node exceeds the temperatures that are assumed without
+    /// information.
     #[test]
     fn derating_lets_no_motor_become_hotter() {
         let mut motors = Motors::new(khz(1));
         motors.configure(&Calibration::PREMIUM_1_5);
         let hot = Temperatures::HOT;
         let hottest_c = (hot.winding_k + hot.housing_k).x + AIR_C;
-        // Pressed for ever on axis 1, in bursts on the others.
+        // A constant press on axis 1, in bursts on the others.
         for ms in 0..4_000_000_u32 {
             let wanted = Vec3::new(
                 5.5,
@@ -300,7 +294,7 @@ mod tests {
         };
         let begun = kept.after_reset().expect("possible");
         let sum = begun.winding_k + begun.housing_k;
-        // Never beyond where derating ends, but never colder either.
+        // Never beyond the end of derating, and never colder either.
         assert!((sum - Vec3::new(5.0, 75.0, 80.0)).abs().max_element() < 1e-4);
         assert_eq!(begun.housing_k, kept.housing_k);
     }

@@ -1,37 +1,37 @@
 //! Absolute limits of each model and of the board, which no calibration record can raise.
 //!
-//! A record decides what the guard protects. One that is mistyped or hostile could name a
-//! motor that bears 20 A or that never warms, and the protection would be gone. So the
-//! numbers on which a person's hand and the motors depend are held to those of the
-//! model's preset, on the side that is dangerous. A record may be more careful, never
-//! less. Users of stronger motors change the presets and build the firmware.
+//! The guard protects what a record permits. A mistyped or hostile record could state a motor that
+//! bears 20 A or that never warms, which would disable the protection. So the numbers that protect
+//! a person's hand and the motors are limited on the dangerous side by those of the model's preset.
+//! A record may be more careful, never less. Users of stronger motors change the presets and build
+//! the firmware.
 //!
-//! [`Calibration::validate`] asks for all of it but the board's, so it holds wherever a
-//! record is taken, stored or found.
+//! [`Calibration::validate`] checks all of these but the board's, so they hold wherever a record is
+//! set, stored or read.
 
 use glam::Vec3;
 
 use super::calibration::Calibration;
 use super::check::{Bound, CalibrationError, CalibrationField, check};
 
-/// A record's speed limit may be above the preset's by this: at twice the limit no force
-/// is left, and that has to be below the speed at which counts are taken for a jump.
+/// Maximum ratio of a record's speed limit to the preset's: at twice the limit no force is left,
+/// which must be below the speed at which counts are a jump.
 const SPEED_SHARE: f32 = 1.25;
-/// Torque of a joint for an ampere, as a share of the preset's, below which a record is
-/// not believed: what the joint then really does would be more than twice what the
-/// force limits count with. Ratios and torque constants of one model differ by less.
+/// Minimum torque of a joint per ampere, as a share of the preset's: below it the joint's real
+/// force would be more than twice the one that the force limits assume. Ratios and torque constants
+/// of one model differ by less.
 const LEVERAGE_SHARE: f32 = 0.5;
-/// Links may be longer than the preset's by this: a longer link of the record's is a smaller
-/// force for a torque, so the true force would be larger than the one that is clamped.
+/// Maximum ratio of a link's length to the preset's: for the same torque a longer link means a
+/// smaller computed force, so the true force would exceed the clamped one.
 const LINK_SHARE: f32 = 1.15;
-/// Range of the counts of a radian, as shares of the preset's. More of them under-read every angle
-/// and speed by as much; half of them is what another encoder has.
+/// Valid counts per radian, as shares of the preset's. A record with more counts under-reads every
+/// angle and speed by the same factor; half of them fits another encoder.
 const COUNTS_SHARE: (f32, f32) = (0.5, 1.25);
-/// The same where the preset's ratios are a guess.
+/// The same if the preset's ratios are a guess.
 const COUNTS_SHARE_OF_A_GUESS: (f32, f32) = (0.5, 2.0);
-/// Stops may be measured wider than the preset's by this: 5°.
+/// Maximum by which stops may be wider than the preset's: 5°.
 const STOPS_RAD: f32 = 5.0 * (core::f32::consts::PI / 180.0);
-/// Room for the rounding of numbers that were written down in other units.
+/// Tolerance for the rounding of numbers that were written in other units.
 const ROUNDING: f32 = 1e-4;
 
 impl Calibration {
@@ -43,7 +43,7 @@ impl Calibration {
         self.each_at_most(CalibrationField::PeakCurrent, peak, preset.peak_current_a)?;
         let most = preset.continuous_current_a;
         self.each_at_most(CalibrationField::ContinuousCurrent, continuous, most)?;
-        // What warms less than the preset's motor, or later, is dangerous.
+        // A motor model that warms less than the preset's, or later, is dangerous.
         self.at_least(
             CalibrationField::Resistance,
             mine.resistance_ohm,
@@ -97,7 +97,7 @@ impl Calibration {
         Ok(())
     }
 
-    /// Checks that the arm is about as large, as finely counted and as free to turn as the model.
+    /// Checks that the arm has about the size, the count resolution and the range of its model.
     fn check_geometry(&self, preset: &Self) -> Result<(), CalibrationError> {
         self.at_most(CalibrationField::L1, self.l1_mm, LINK_SHARE * preset.l1_mm)?;
         self.at_most(CalibrationField::L2, self.l2_mm, LINK_SHARE * preset.l2_mm)?;
@@ -123,8 +123,8 @@ impl Calibration {
         )
     }
 
-    /// Checks that a radian of each joint has about as many counts as the model's. Where it has
-    /// not, the number that is farther from the preset's is named.
+    /// Checks that each joint has about as many counts per radian as the model's. If not, the error
+    /// contains the number that is farther from the preset's.
     fn check_counts(&self, preset: &Self) -> Result<(), CalibrationError> {
         let (least, most) = match preset.has_guessed_ratios() {
             true => COUNTS_SHARE_OF_A_GUESS,
@@ -140,7 +140,7 @@ impl Calibration {
                 true => (CalibrationField::Ratio, Some(axis), self.ratio[axis]),
                 false => (CalibrationField::CountsPerTurn, None, self.counts_per_turn),
             };
-            // What this number would be at the preset's counts, beside the other number.
+            // The number that would give the preset's counts, with the other number unchanged.
             let unit = value / (of_encoder * of_ratio);
             check(
                 field,
@@ -153,11 +153,11 @@ impl Calibration {
         Ok(())
     }
 
-    /// Checks that the board can command every current of the record.
-    /// `full_scale_a` is the current at the ends of its outputs' range, A.
+    /// Checks that the board can command every current of the record. `full_scale_a` is the current
+    /// at the ends of its outputs' range, A.
     ///
     /// # Errors
-    /// [`CalibrationError`] names the axis.
+    /// Returns a [`CalibrationError`] with the axis.
     pub fn check_board(&self, full_scale_a: f32) -> Result<(), CalibrationError> {
         for axis in 0..3 {
             let value = self.peak_current_a[axis];
@@ -232,10 +232,10 @@ mod tests {
         Model::Other,
     ];
 
-    /// A change to the dangerous side, and what is to be named.
+    /// A change to the dangerous side, and the field and axis of the expected error.
     type Case = (fn(&mut Calibration), CalibrationField, Option<u8>);
 
-    /// Each within the range of its number, so that only the ceiling can refuse it.
+    /// Each number is within its own range, so that only the absolute limit can refuse it.
     const RAISED: [Case; 19] = [
         (
             |c| c.peak_current_a.x *= 1.01,

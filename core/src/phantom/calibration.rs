@@ -1,9 +1,9 @@
-//! The numbers that make one Phantom differ from the next.
+//! The numbers in which one Phantom differs from another.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// The model that a record was made for; the preset it began as.
+/// The model of a record, whose preset it started from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Model {
@@ -23,26 +23,24 @@ pub enum Model {
 /// A Phantom's calibration record. Lengths in millimetres, angles in radians,
 /// vectors hold axes 1 to 3.
 ///
-/// Published values differ by a few per cent and cable ratios by rig, so these
-/// are data, never constants in code. [`Calibration::validate`] says whether a
-/// record can be worked with; nothing else checks its numbers again.
+/// Published values differ by a few per cent, and cable ratios by rig, so these are data, never
+/// constants in code. [`Calibration::validate`] checks them; nothing checks them again.
 ///
-/// There is no index on the encoders: where the joints are is known only after
-/// the arm was put into its zero pose since power-up. So the record holds the
-/// *angles* of that pose ([`zero_rad`](Self::zero_rad)), and the counts read in
-/// it are given to the loop each time ([`crate::tick::Command::Zero`]).
+/// The encoders have no index pulse: the joint angles are known only after the arm was in its zero
+/// pose since power-up. So the record stores the *angles* of that pose
+/// ([`zero_rad`](Self::zero_rad)), and the loop receives the counts in that pose after each
+/// power-up ([`crate::tick::Command::Zero`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Which Phantom this is.
+    /// The Phantom's model.
     pub model: Model,
-    /// Encoder counts a motor turn, four edges a line.
+    /// Encoder counts per motor turn, four edges per line.
     pub counts_per_turn: f32,
-    /// Motor turns a joint turn, positive.
+    /// Motor turns per joint turn, positive.
     pub ratio: Vec3,
-    /// +1 where counts rise as the joint's angle grows, −1 where they fall.
+    /// +1 if counts increase with the joint's angle, −1 if they decrease.
     pub encoder_sign: Vec3,
-    /// +1 where a positive current turns the joint towards larger angles, −1
-    /// otherwise.
+    /// +1 if a positive current turns the joint towards larger angles, −1 otherwise.
     pub motor_sign: Vec3,
     /// Joint angles of the pose in which the arm is zeroed.
     pub zero_rad: Vec3,
@@ -50,38 +48,38 @@ pub struct Calibration {
     pub l1_mm: f32,
     /// Length of the fore link, mm.
     pub l2_mm: f32,
-    /// Joint angles that the stops allow.
+    /// Joint angles within the stops.
     pub limits: JointLimits,
-    /// Torque that holds joint 2 against the arm's weight where cos q2 is 1, Nm.
+    /// Torque that holds joint 2 against the arm's weight at cos q2 = 1, Nm.
     pub gravity_2_nm: f32,
-    /// Torque that holds joint 3 against the arm's weight where sin q3 is 1, Nm.
+    /// Torque that holds joint 3 against the arm's weight at sin q3 = 1, Nm.
     pub gravity_3_nm: f32,
     /// Motor torque constants, Nm/A.
     pub torque_constant: Vec3,
-    /// Largest current a cool motor may be given, A.
+    /// Maximum current of a cool motor, A.
     pub peak_current_a: Vec3,
-    /// Current a motor can bear for ever, A.
+    /// Continuous current of a motor, A.
     pub continuous_current_a: Vec3,
     /// Thermal model of the motors.
     pub thermal: Thermal,
-    /// Largest force the device may make at the tip, N.
+    /// Maximum force at the tip, N.
     pub max_force_n: f32,
-    /// Speed of the tip from which force is reduced, mm/s. At twice this speed
-    /// nothing is left, and what stays above that is a fault.
+    /// Speed of the tip from which force is reduced, mm/s. At twice this speed no force is left,
+    /// and a longer time above that is a fault.
     pub max_speed_mm_s: f32,
 }
 
-/// Joint angles that the stops allow. The second and third are absolute link
-/// angles, so the parallel linkage also bounds their difference.
+/// Joint angles within the stops. The second and third are absolute link angles, so the parallel
+/// linkage also limits their difference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointLimits {
-    /// Smallest angle of each joint, rad.
+    /// Minimum angle of each joint, rad.
     pub min_rad: Vec3,
-    /// Largest angle of each joint, rad.
+    /// Maximum angle of each joint, rad.
     pub max_rad: Vec3,
-    /// Largest q2 − q3, rad; below π/2, where the links would be in line.
+    /// Maximum q2 − q3, rad; below π/2, where the links would be in line.
     pub q2_minus_q3_max_rad: f32,
-    /// Largest q3 − q2, rad; below π/2.
+    /// Maximum q3 − q2, rad; below π/2.
     pub q3_minus_q2_max_rad: f32,
 }
 
@@ -89,11 +87,11 @@ pub struct JointLimits {
 /// all three axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Thermal {
-    /// Winding resistance at 100 °C, Ω; taken hot, which errs on the warm side.
+    /// Winding resistance at 100 °C, Ω: the hot value, which errs on the warm side.
     pub resistance_ohm: f32,
-    /// Winding to housing, K/W.
+    /// Thermal resistance from winding to housing, K/W.
     pub winding_k_per_w: f32,
-    /// Housing to air, K/W.
+    /// Thermal resistance from housing to air, K/W.
     pub housing_k_per_w: f32,
     /// Time constant of the winding, s.
     pub winding_s: f32,
@@ -102,7 +100,7 @@ pub struct Thermal {
 }
 
 impl Calibration {
-    /// Encoder counts for a radian of each joint, with their signs.
+    /// Returns the encoder counts per radian of each joint, with their signs.
     #[must_use]
     pub fn counts_per_radian(&self) -> Vec3 {
         self.encoder_sign * self.ratio * (self.counts_per_turn / core::f32::consts::TAU)
@@ -110,7 +108,7 @@ impl Calibration {
 }
 
 impl JointLimits {
-    /// No pose lies inside.
+    /// Limits that contain no pose.
     pub(crate) const NOWHERE: Self = Self {
         min_rad: Vec3::INFINITY,
         max_rad: Vec3::NEG_INFINITY,
@@ -118,7 +116,7 @@ impl JointLimits {
         q3_minus_q2_max_rad: f32::NEG_INFINITY,
     };
 
-    /// The same, with `margin_rad` more room at every end.
+    /// Returns the same limits, with `margin_rad` more room at every end.
     #[must_use]
     pub fn widened(&self, margin_rad: f32) -> Self {
         let margin = Vec3::splat(margin_rad);
@@ -130,15 +128,14 @@ impl JointLimits {
         }
     }
 
-    /// Returns true if a pose lies inside, give or take `margin_rad`. Not-a-number
-    /// lies outside.
+    /// Returns true if a pose lies inside, within `margin_rad`. Not-a-number lies outside.
     #[must_use]
     pub fn allow(&self, q: Vec3, margin_rad: f32) -> bool {
         let wide = self.widened(margin_rad);
         wide.each_allows(q) && wide.linkage_allows(q)
     }
 
-    /// Returns true if each joint by itself lies inside.
+    /// Returns true if each joint alone lies inside.
     #[must_use]
     #[inline]
     pub fn each_allows(&self, q: Vec3) -> bool {

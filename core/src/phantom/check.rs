@@ -25,13 +25,13 @@ pub enum CalibrationField {
     L1,
     /// [`Calibration::l2_mm`].
     L2,
-    /// The joint limits' smallest angles.
+    /// The joint limits' minimum angles.
     MinAngle,
-    /// The joint limits' largest angles.
+    /// The joint limits' maximum angles.
     MaxAngle,
-    /// The linkage's largest q2 − q3.
+    /// The linkage's maximum q2 − q3.
     Q2MinusQ3,
-    /// The linkage's largest q3 − q2.
+    /// The linkage's maximum q3 − q2.
     Q3MinusQ2,
     /// [`Calibration::gravity_2_nm`].
     Gravity2,
@@ -45,9 +45,9 @@ pub enum CalibrationField {
     ContinuousCurrent,
     /// Winding resistance.
     Resistance,
-    /// Winding to housing.
+    /// Thermal resistance from winding to housing.
     WindingResistance,
-    /// Housing to air.
+    /// Thermal resistance from housing to air.
     HousingResistance,
     /// Time constant of the winding.
     WindingTime,
@@ -60,7 +60,7 @@ pub enum CalibrationField {
 }
 
 impl CalibrationField {
-    /// Smallest and largest value that make sense, and the unit.
+    /// Returns the minimum and maximum of the valid range, and the unit.
     #[must_use]
     pub const fn range(self) -> (f32, f32, &'static str) {
         const PI: f32 = core::f32::consts::PI;
@@ -70,7 +70,7 @@ impl CalibrationField {
             Self::EncoderSign | Self::MotorSign => (-1.0, 1.0, "(−1 or +1)"),
             Self::Zero | Self::MinAngle | Self::MaxAngle => (-1.5 * PI, 1.5 * PI, "rad"),
             Self::L1 | Self::L2 => (30.0, 1000.0, "mm"),
-            // Short of π/2, where the links are in line and the arm is singular.
+            // Below π/2, where the links are in line and the arm is singular.
             Self::Q2MinusQ3 | Self::Q3MinusQ2 => (0.1, 1.5, "rad"),
             Self::Gravity2 | Self::Gravity3 => (-1.0, 1.0, "Nm"),
             Self::TorqueConstant => (1e-3, 1.0, "Nm/A"),
@@ -84,7 +84,7 @@ impl CalibrationField {
         }
     }
 
-    /// Returns its meaning and its source.
+    /// Returns the number's meaning and its source.
     #[must_use]
     pub const fn advice(self) -> &'static str {
         match self {
@@ -119,38 +119,38 @@ impl CalibrationField {
     }
 }
 
-/// Reason for which a record is refused.
+/// Reason why a record is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CalibrationError {
-    /// The number that is wrong.
+    /// The wrong number.
     pub field: CalibrationField,
-    /// The axis, 1 to 3, where there is one for each.
+    /// The axis, 1 to 3, for a number that each axis has.
     pub axis: Option<u8>,
-    /// Its value.
+    /// The number's value.
     pub value: f32,
-    /// The bound that it breaks.
+    /// The violated bound.
     pub bound: Bound,
 }
 
-/// The bound that a number does not keep.
+/// The bound that a number violates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Bound {
-    /// [`CalibrationField::range`], or what the record's other numbers leave of it.
+    /// [`CalibrationField::range`], or its part that the record's other numbers permit.
     Range,
-    /// The ceiling of the record's model, which no record can raise.
+    /// The absolute limit of the record's model, which no record can raise.
     Model {
         /// The model.
         model: Model,
-        /// The smallest value that is let through.
+        /// The minimum.
         min: f32,
-        /// The largest.
+        /// The maximum.
         max: f32,
     },
     /// The current that the board's outputs can command.
     Board {
-        /// The largest value, A.
+        /// The maximum, A.
         max: f32,
     },
 }
@@ -190,11 +190,10 @@ impl fmt::Display for CalibrationError {
 impl core::error::Error for CalibrationError {}
 
 impl Calibration {
-    /// Checks that the loop can work with every number, and that it is within what the
-    /// model may have.
+    /// Checks that every number is in its valid range, and within the model's absolute limits.
     ///
     /// # Errors
-    /// [`CalibrationError`] names the first that is not.
+    /// Returns a [`CalibrationError`] for the first number that is not.
     pub fn validate(&self) -> Result<(), CalibrationError> {
         let (limits, thermal) = (&self.limits, &self.thermal);
         let (min, max) = (limits.min_rad, limits.max_rad);
@@ -218,7 +217,7 @@ impl Calibration {
         one(CalibrationField::Q3MinusQ2, limits.q3_minus_q2_max_rad)?;
         each_is(CalibrationField::MaxAngle, max, max.cmpgt(min))?;
         each(CalibrationField::Zero, self.zero_rad)?;
-        // The arm stands against its stops where some rigs are zeroed.
+        // Some rigs are zeroed with the arm against its stops.
         let inside = limits.allow(self.zero_rad, 0.05);
         each_is(CalibrationField::Zero, self.zero_rad, BVec3::splat(inside))?;
         each(CalibrationField::TorqueConstant, self.torque_constant)?;
@@ -230,8 +229,7 @@ impl Calibration {
             continuous,
             continuous.cmple(peak),
         )?;
-        // Holding the arm must leave motors room to push: half the current that
-        // they can bear for ever.
+        // Motors that hold the arm must keep a reserve to push: half of their continuous current.
         let bearable = 0.5 * continuous * self.ratio * self.torque_constant;
         let (gravity_2, gravity_3) = (self.gravity_2_nm, self.gravity_3_nm);
         one(CalibrationField::Gravity2, gravity_2)?;
@@ -253,8 +251,8 @@ impl Calibration {
     }
 }
 
-/// Names `field` of `axis`, counted from 0, with its `value` and the `bound` that it does
-/// not keep, unless it is `good`.
+/// Returns an error with `field`, `axis`, counted from 0, `value` and the violated `bound`, unless
+/// the number is `good`.
 pub(super) fn check(
     field: CalibrationField,
     axis: Option<usize>,
@@ -273,21 +271,21 @@ pub(super) fn check(
     }
 }
 
-/// A number in its range.
+/// Checks a number against its range.
 fn one(field: CalibrationField, value: f32) -> Result<(), CalibrationError> {
     let (min, max, _) = field.range();
     let good = (min..=max).contains(&value);
     check(field, None, value, Bound::Range, good)
 }
 
-/// A number for each axis in its range.
+/// Checks a number of each axis against its range.
 fn each(field: CalibrationField, values: Vec3) -> Result<(), CalibrationError> {
     let (min, max, _) = field.range();
     let (min, max) = (Vec3::splat(min), Vec3::splat(max));
     each_is(field, values, values.cmpge(min) & values.cmple(max))
 }
 
-/// A number for each axis that is as it has to be.
+/// Checks a number of each axis against a condition.
 fn each_is(field: CalibrationField, values: Vec3, good: BVec3) -> Result<(), CalibrationError> {
     (0..3).try_for_each(|axis| {
         let (value, good) = (values[axis], good.test(axis));

@@ -1,19 +1,17 @@
-//! From a tip back to joint angles.
+//! Inverse kinematics: from a tip position to joint angles.
 //!
-//! Not used by the tick, which never needs it: it is for planning, calibration
-//! and tests, and costs `libm`'s arc tangents.
+//! Not used by the tick: it is for planning, calibration and tests, and costs `libm`'s arc
+//! tangents.
 //!
-//! A tip has up to four poses: the arm turned towards it or leaning over
-//! backwards, each with the elbow on either side. The linkage keeps
-//! |q2 − q3| below 90°, which leaves one elbow; the joint limits choose
-//! between the two directions, the arm turned towards the tip first.
+//! A tip position has up to four poses: the arm turned towards it or leaning over backwards, each
+//! with the elbow on either side. The linkage keeps |q2 − q3| below 90°, which leaves one elbow;
+//! the joint limits select one of the two directions, first the arm turned towards the tip.
 //!
 //! # Near singular poses
 //!
-//! On the base's axis (r = 0) every q1 gives the same tip; the answer is one of
-//! them. With the links nearly in line the joint angles of a tip change as the
-//! square root of its distance; the *tip* of the answer still is the one asked
-//! for, within 1 µm (swept in the tests).
+//! On the base's axis (r = 0) every q1 gives the same tip; the result is one of them. With the
+//! links nearly in line, the joint angles change as the square root of the tip's distance; the
+//! *tip* of the result is still within 1 µm of the requested one (tested by a sweep).
 
 use core::f32::consts::{FRAC_PI_2, TAU};
 
@@ -22,33 +20,32 @@ use libm::{atan2f, sqrtf};
 
 use super::calibration::Calibration;
 
-/// Reason for which no pose puts the tip there.
+/// Reason why no pose has this tip position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Unreachable {
     /// A coordinate is not a finite number.
     #[error("the position is not a number")]
     NotFinite,
-    /// Farther out than both links in line.
+    /// Farther away than both links in line.
     #[error("farther out than the links reach")]
     TooFar,
-    /// Nearer than the links can fold.
+    /// Nearer than the folded links reach.
     #[error("nearer than the links can fold")]
     TooNear,
-    /// Only poses beyond the stops.
+    /// Only poses beyond the stops have this tip.
     #[error("only poses beyond the joint limits reach it")]
     BeyondLimits,
 }
 
-/// By this much the cosine of the elbow may miss what there is: rounding.
+/// Rounding by which the cosine of the elbow may exceed its range.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 impl Calibration {
-    /// Joint angles inside the limits that put the tip at `tip_mm` (device
-    /// frame).
+    /// Returns joint angles inside the limits that put the tip at `tip_mm` (device frame).
     ///
     /// # Errors
-    /// [`Unreachable`] says why there are none.
+    /// Returns [`Unreachable`] with the reason.
     pub fn joints_at(&self, tip_mm: Vec3) -> Result<Vec3, Unreachable> {
         if !tip_mm.is_finite() {
             return Err(Unreachable::NotFinite);
@@ -67,12 +64,11 @@ impl Calibration {
         found.ok_or(Unreachable::BeyondLimits)
     }
 
-    /// q2 − q3 + 90°, between 0 and 180°, from
-    /// r² + z² = l1² + l2² + 2·l1·l2·cos(elbow).
+    /// Returns q2 − q3 + 90°, between 0 and 180°, from r² + z² = l1² + l2² + 2·l1·l2·cos(elbow).
     fn elbow(&self, r: f32, z: f32) -> Result<f32, Unreachable> {
         let (l1, l2) = (self.l1_mm, self.l2_mm);
-        // Differences of squares as products: no digits are lost where the
-        // links are nearly in line, one way or the other.
+        // Differences of squares as products: no digits are lost with the links nearly in line,
+        // folded or stretched.
         let far = libm::hypotf(r, z);
         let short_of_full = (l1 + l2 - far) * (l1 + l2 + far) / (2.0 * l1 * l2);
         let past_folded = (far - (l1 - l2)) * (far + (l1 - l2)) / (2.0 * l1 * l2);
@@ -87,8 +83,8 @@ impl Calibration {
         Ok(2.0 * atan2f(sqrtf(less), sqrtf(more)))
     }
 
-    /// The same pose with whole turns taken off or added, if that brings it
-    /// inside the limits.
+    /// Returns the same pose with whole turns added or subtracted, if that moves it inside the
+    /// limits.
     fn turned_inside(&self, q: Vec3) -> Option<Vec3> {
         let turn = Vec3::new(0.0, TAU, TAU);
         [q, q + turn, q - turn]

@@ -1,4 +1,4 @@
-//! There and back, everywhere and at the edges.
+//! Tip to angles and back, everywhere and at the edges.
 
 use super::*;
 use crate::cases::cases;
@@ -46,7 +46,7 @@ fn every_tip_of_the_workspace_is_found_again_within_a_micrometre() {
             worst * 1e3
         );
         assert!(worst < 1e-3, "{model:?}: {worst} mm");
-        // Leaning over backwards has a twin that faces the tip.
+        // Most poses that lean over backwards have a second pose that faces the tip.
         assert!(same * 10 > poses * 8, "{same} of {poses}");
     }
 }
@@ -54,8 +54,7 @@ fn every_tip_of_the_workspace_is_found_again_within_a_micrometre() {
 #[test]
 fn the_branch_inside_the_limits_is_taken() {
     let record = Calibration::PREMIUM_1_5;
-    // Leaning over backwards, turned 80°: turning towards the tip would need
-    // −100°.
+    // Leaning over backwards, turned by 80°: turning towards the tip would need −100°.
     let q = Vec3::new(80f32.to_radians(), 115f32.to_radians(), 169f32.to_radians());
     assert!(record.limits.allow(q, 0.0));
     let at = tip(&record, q);

@@ -1,7 +1,7 @@
 //! Tip position and Jacobian of the parallel linkage.
 //!
-//! The second and third joint angles are absolute link angles, as the linkage
-//! makes them (notes of Çavuşoğlu, Feygin & Tendick 2002):
+//! The second and third joint angles are absolute link angles, because of the linkage (notes of
+//! Çavuşoğlu, Feygin & Tendick 2002):
 //!
 //! ```text
 //! r = l1·cos q2 + l2·sin q3
@@ -10,18 +10,17 @@
 //!
 //! # Singular poses
 //!
-//! `det J = ±l1·l2·r·cos(q2 − q3)`: at r = 0 the tip is on the base's axis, at
-//! |q2 − q3| = 90° the links are in line. Forces become torques by *Jᵀ*, which
-//! is a product and never an inverse, so nothing grows there; see
-//! [`Pose::torques_nm`] for the bound. Only the way back from a tip to joint
-//! angles ([`super::inverse`]) divides, and says what it does.
+//! `det J = ±l1·l2·r·cos(q2 − q3)`: at r = 0 the tip is on the base's axis, at |q2 − q3| = 90° the
+//! links are in line. Forces become torques by *Jᵀ*, a product without an inverse, so nothing grows
+//! there; [`Pose::torques_nm`] states the bound. Only the computation of joint angles from a tip
+//! ([`super::inverse`]) divides, and documents these poses.
 
 use glam::Vec3;
 
 use super::calibration::Calibration;
 use super::trig::sin_cos;
 
-/// A pose of the arm: what the Jacobian and the tip are computed from.
+/// A pose of the arm: the terms of the Jacobian and of the tip position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     angles: Vec3,
@@ -32,7 +31,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// From joint angles in radians.
+    /// Creates a pose from joint angles in radians.
     #[must_use]
     pub fn from_angles(calibration: &Calibration, q: Vec3) -> Self {
         let (s1, c1) = sin_cos(q.x);
@@ -47,20 +46,20 @@ impl Pose {
         }
     }
 
-    /// Joint angles, rad.
+    /// Returns the joint angles, rad.
     #[must_use]
     pub const fn angles(&self) -> Vec3 {
         self.angles
     }
 
-    /// Distance of the tip from the base's axis, mm; negative behind it.
+    /// Returns the distance of the tip from the base's axis, mm; negative behind it.
     #[must_use]
     pub fn reach_mm(&self) -> f32 {
         self.l1_mm * self.cos.y + self.l2_mm * self.sin.z
     }
 
-    /// Tip position in the device frame, mm. Within 0.2 µm of f64 for a
-    /// Premium 1.5's links, over the whole workspace (swept in the tests).
+    /// Returns the tip position in the device frame, mm, within 0.2 µm of f64 for a Premium 1.5's
+    /// links over the whole workspace (tested by a sweep).
     #[must_use]
     pub fn tip_mm(&self) -> Vec3 {
         let r = self.reach_mm();
@@ -71,12 +70,11 @@ impl Pose {
         )
     }
 
-    /// Joint torques in Nm that make `force_n` (device frame) at the tip:
-    /// τ = Jᵀ·F.
+    /// Returns the joint torques in Nm that give `force_n` (device frame) at the tip: τ = Jᵀ·F.
     ///
-    /// Bounded in every pose, singular ones included: |τ1| ≤ (l1 + l2)·|F|,
-    /// |τ2| ≤ l1·|F|, |τ3| ≤ l2·|F|, because each column of J is a joint's
-    /// lever and no lever is longer (swept in the tests).
+    /// Bounded in every pose, including singular ones: |τ1| ≤ (l1 + l2)·|F|, |τ2| ≤ l1·|F|, |τ3| ≤
+    /// l2·|F|, because each column of J is a joint's lever and no lever is longer (tested by a
+    /// sweep).
     #[must_use]
     pub fn torques_nm(&self, force_n: Vec3) -> Vec3 {
         let (s, c) = (self.sin, self.cos);
@@ -89,8 +87,8 @@ impl Pose {
         ) * 1e-3
     }
 
-    /// Velocity of the tip in the device frame for joint rates in rad/s, mm/s:
-    /// v = J·q̇.
+    /// Returns the velocity of the tip in the device frame, mm/s, for joint rates in rad/s: v =
+    /// J·q̇.
     #[must_use]
     pub fn tip_velocity_mm_s(&self, rates: Vec3) -> Vec3 {
         let (s, c) = (self.sin, self.cos);
@@ -104,14 +102,14 @@ impl Pose {
     }
 }
 
-/// A device-frame vector in the terrain frame: east is the device's y, north
-/// its −x.
+/// Converts a vector from the device frame to the terrain frame: east is the device's y, north its
+/// −x.
 #[must_use]
 pub fn to_terrain_frame(device: Vec3) -> Vec3 {
     Vec3::new(device.y, -device.x, device.z)
 }
 
-/// A terrain-frame vector in the device frame.
+/// Converts a vector from the terrain frame to the device frame.
 #[must_use]
 pub(crate) fn to_device_frame(terrain: Vec3) -> Vec3 {
     Vec3::new(-terrain.y, terrain.x, terrain.z)

@@ -1,11 +1,12 @@
-//! The pose against f64, and at its singular places.
+//! The pose against f64, and in singular poses.
 
 use super::*;
 use crate::cases::cases;
 
 const PREMIUM: Calibration = Calibration::PREMIUM_1_5;
 
-/// Every 7th degree or so (under Miri every 28th) of the joint limits, and beyond: singular poses too.
+/// Joint angles every 7 degrees or so (28 under Miri), within the limits and beyond, including
+/// singular poses.
 fn workspace() -> impl Iterator<Item = [f64; 3]> {
     let each = cases(7, 28) as usize;
     let steps =
@@ -39,7 +40,7 @@ fn lever_f64(q: [f64; 3], joint: usize) -> [f64; 3] {
 fn the_tip_is_within_its_bound_over_the_workspace() {
     let mut worst = 0.0_f64;
     for q in workspace() {
-        // The angle as f32 holds it is the input; its rounding is not ours.
+        // The input is the angle rounded to f32, so this rounding is not an error of the code.
         let angles = single(q);
         let truth = tip_f64(angles.to_array().map(f64::from));
         let tip = Pose::from_angles(&PREMIUM, angles).tip_mm();
@@ -76,7 +77,7 @@ fn torques_are_the_transposed_jacobian_and_velocity_is_the_jacobian() {
     }
 }
 
-/// Forces from all sides, of one newton.
+/// Forces of one newton in all directions.
 fn directions() -> impl Iterator<Item = Vec3> {
     (0..60).map(|i| {
         let turn = i as f32 * 2.399_963;
@@ -92,8 +93,8 @@ fn torques_stay_within_the_levers_in_every_pose_singular_ones_included() {
     let (l1, l2) = (PREMIUM.l1_mm * 1e-3, PREMIUM.l2_mm * 1e-3);
     let bound = Vec3::new(l1 + l2, l1, l2) * 1.000_01;
     let right = core::f32::consts::FRAC_PI_2;
-    // On the axis: l1·cos q2 = −l2·sin q3. In line: |q2 − q3| = 90°. Both at
-    // once, stretched up along the axis.
+    // On the axis: l1·cos q2 = −l2·sin q3. In line: |q2 − q3| = 90°. Both at once: stretched upward
+    // along the axis.
     let on_axis = |q2: f32| Vec3::new(0.3, q2, -libm::asinf(l1 * libm::cosf(q2) / l2));
     let singular = [on_axis(1.2), on_axis(1.5), Vec3::new(0.1, 0.4, 0.4 - right)]
         .into_iter()
@@ -113,7 +114,7 @@ fn torques_stay_within_the_levers_in_every_pose_singular_ones_included() {
             largest = largest.max(torques);
         }
     }
-    // The bound is not a loose one.
+    // The bound is tight.
     assert!(largest.cmpge(bound * 0.95).all(), "{largest} of {bound}");
 }
 
@@ -121,6 +122,6 @@ fn torques_stay_within_the_levers_in_every_pose_singular_ones_included() {
 fn frames_turn_into_each_other() {
     let v = Vec3::new(1.0, 2.0, 3.0);
     assert_eq!(to_terrain_frame(to_device_frame(v)), v);
-    // Away from the user is north, and that is toward the base.
+    // Away from the user is north, which is toward the base.
     assert_eq!(to_terrain_frame(Vec3::NEG_X), Vec3::Y);
 }

@@ -1,5 +1,4 @@
-//! A calibration record as the tick uses it: everything that does not change
-//! from tick to tick is worked out once, outside it.
+//! A calibration record prepared for the tick: constants are computed once, outside of it.
 
 use glam::Vec3;
 
@@ -7,9 +6,9 @@ use super::calibration::Calibration;
 use super::check::CalibrationError;
 use super::kinematics::Pose;
 
-/// A valid record and what follows from it.
+/// A valid calibration record and the constants derived from it.
 ///
-/// From encoder counts to the tip, and from a force there to motor currents:
+/// Converts encoder counts to the tip position, and a force at the tip to motor currents:
 ///
 /// ```
 /// use hapterra_core::Vec3;
@@ -42,7 +41,7 @@ impl Kinematics {
     /// Checks a record and prepares it.
     ///
     /// # Errors
-    /// [`CalibrationError`] names the number that cannot be worked with.
+    /// Returns a [`CalibrationError`] with the invalid number.
     pub fn new(calibration: &Calibration) -> Result<Self, CalibrationError> {
         calibration.validate()?;
         let per_ampere = calibration.motor_sign * calibration.ratio * calibration.torque_constant;
@@ -54,25 +53,25 @@ impl Kinematics {
         })
     }
 
-    /// The record.
+    /// Returns the calibration record.
     #[must_use]
     pub const fn calibration(&self) -> &Calibration {
         &self.calibration
     }
 
-    /// Radians of each joint for a count of its encoder, with their signs.
+    /// Returns the radians of each joint per count of its encoder, with their signs.
     #[must_use]
     pub const fn radians_per_count(&self) -> Vec3 {
         self.radians_per_count
     }
 
-    /// The tip where all joint angles are zero, device frame, mm.
+    /// Returns the tip position with all joint angles zero, device frame, mm.
     #[must_use]
     pub const fn home_mm(&self) -> Vec3 {
         self.home_mm
     }
 
-    /// Joint angles at encoder counts, given the counts read in the zero pose.
+    /// Returns the joint angles at encoder counts, given the counts in the zero pose.
     #[must_use]
     pub fn angles(&self, counts: [i32; 3], zero: [i32; 3]) -> Vec3 {
         let turned = |axis: usize| counts[axis].wrapping_sub(zero[axis]) as f32;
@@ -80,16 +79,15 @@ impl Kinematics {
         self.calibration.zero_rad + turned * self.radians_per_count
     }
 
-    /// The pose at encoder counts, given the counts read in the zero pose.
+    /// Returns the pose at encoder counts, given the counts in the zero pose.
     ///
-    /// Its tip is within 1 µm of the same in f64 over the whole workspace of
-    /// every preset (swept in the tests).
+    /// Its tip is within 1 µm of f64 over the whole workspace of every preset (tested by a sweep).
     #[must_use]
     pub fn pose(&self, counts: [i32; 3], zero: [i32; 3]) -> Pose {
         Pose::from_angles(&self.calibration, self.angles(counts, zero))
     }
 
-    /// The counts nearest to a pose, given the counts read in the zero pose.
+    /// Returns the counts nearest to a pose, given the counts in the zero pose.
     #[must_use]
     pub fn counts(&self, q: Vec3, zero: [i32; 3]) -> [i32; 3] {
         let turned = (q - self.calibration.zero_rad) / self.radians_per_count;
@@ -97,7 +95,7 @@ impl Kinematics {
         core::array::from_fn(|axis| zero[axis].wrapping_add(turned[axis] as i32))
     }
 
-    /// Torques in Nm that hold the arm against its weight.
+    /// Returns the torques in Nm that hold the arm against its weight.
     #[must_use]
     pub fn gravity_nm(&self, pose: &Pose) -> Vec3 {
         let record = &self.calibration;
@@ -108,7 +106,7 @@ impl Kinematics {
         )
     }
 
-    /// Motor currents in amperes for joint torques in Nm.
+    /// Returns the motor currents in amperes for joint torques in Nm.
     #[must_use]
     pub fn currents_a(&self, torques_nm: Vec3) -> Vec3 {
         torques_nm * self.amperes_per_nm

@@ -17,7 +17,7 @@ fn tip_f64(record: &Calibration, [q1, q2, q3]: [f64; 3]) -> [f64; 3] {
     [q1.cos() * r, q1.sin() * r, l1 * q2.sin() - l2 * q3.cos()]
 }
 
-/// The joint angles of counts, from the record's numbers taken as exact.
+/// The joint angles at these counts, with the record's numbers taken as exact.
 fn angles_f64(record: &Calibration, counts: [i32; 3]) -> [f64; 3] {
     core::array::from_fn(|axis| {
         let turn = f64::from(record.counts_per_turn) * f64::from(record.ratio[axis]);
@@ -26,7 +26,7 @@ fn angles_f64(record: &Calibration, counts: [i32; 3]) -> [f64; 3] {
     })
 }
 
-/// Every `step` degrees or so of what the joint limits and the linkage allow.
+/// Joint angles every `step` degrees or so, within the joint limits and the linkage's.
 fn workspace(record: &Calibration, step: usize) -> impl Iterator<Item = Vec3> {
     let limits = record.limits;
     let (low, high) = (limits.min_rad, limits.max_rad);

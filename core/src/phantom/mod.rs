@@ -1,14 +1,13 @@
 //! The Phantom: encoder counts to tip position, tip force to motor currents.
 //!
-//! Read `calibration` (what is known of an arm), [`Kinematics`] (what follows
-//! from it, worked out outside the tick), [`Pose`] (tip and torques), and
-//! [`Readings`] (velocity). `presets`, `check`, `absolute_limits` and `record` are about
-//! the calibration itself: records to begin with, checks, what no record can raise, and
-//! bytes in memory.
+//! Reading order: `calibration` (the data of an arm), [`Kinematics`] (constants derived from it
+//! outside of the tick), [`Pose`] (tip and torques), and [`Readings`] (velocity). `presets`,
+//! `check`, `absolute_limits` and `record` belong to the calibration: records to start from,
+//! checks, limits that no record can raise, and its bytes in memory.
 //!
-//! Two frames. The *device frame* has its origin where the joint axes meet, x
-//! away from the base toward the user, z up. The *terrain frame* is the user's
-//! view: x east (right), y north (away), z up. They differ by a quarter turn.
+//! Two frames. The *device frame* has its origin where the joint axes meet, x away from the base
+//! toward the user, z up. The *terrain frame* is the user's: x east (right), y north (away), z up.
+//! They differ by a quarter turn.
 
 mod absolute_limits;
 mod calibration;

@@ -1,15 +1,14 @@
-//! Calibration records to begin with.
+//! Calibration records to start from.
 //!
 //! Sources: `mahilab/Phantom` (a Premium 1.5 measured and driven, CAD and motor
 //! data), Çavuşoğlu, Feygin & Tendick (Presence, 2002), CHAI3D's device limits.
-//! A number with one weak source or none is marked *uncertain*: measure it before
-//! the first force.
+//! A number with one weak source or none is marked *uncertain*: measure it before the first force.
 
 use glam::Vec3;
 
 use super::calibration::{Calibration, JointLimits, Model, Thermal};
 
-/// Angles in degrees, which have to be multiplied out in a constant.
+/// Converts degrees to radians, as a constant function.
 const fn rad(degrees: f32) -> f32 {
     degrees * (core::f32::consts::PI / 180.0)
 }
@@ -32,7 +31,7 @@ const RE25: Thermal = Thermal {
 };
 
 impl Model {
-    /// The record to begin with; of a Premium 1.5 for [`Model::Other`].
+    /// Returns the record to start from; for [`Model::Other`], that of a Premium 1.5.
     #[must_use]
     pub const fn preset(self) -> Calibration {
         match self {
@@ -49,9 +48,9 @@ impl Model {
 }
 
 impl Calibration {
-    /// Returns true if the cable ratios are still a preset's without a published
-    /// measurement: every model's but the Premium 1.5's. Positions and forces are then
-    /// off by as much as the ratios are, so a calibration measures them.
+    /// Returns true if the cable ratios are still those of a preset without a published
+    /// measurement, that is, of every model but the Premium 1.5. The ratios' error is also the
+    /// error of positions and forces, so a calibration measures them.
     #[must_use]
     pub fn has_guessed_ratios(&self) -> bool {
         let is_published = matches!(self.model, Model::Premium15 | Model::Other);
@@ -82,12 +81,12 @@ impl Calibration {
         max_speed_mm_s: 1000.0,
     };
 
-    /// Phantom Premium 1.0: 8.5 N. Uncertain: link lengths (140 mm), and
-    /// everything else, which is a Premium 1.5's. Gravity is left to be fitted.
+    /// Phantom Premium 1.0: 8.5 N. Uncertain: link lengths (140 mm), and everything else, which is
+    /// copied from a Premium 1.5. Gravity must be measured.
     ///
-    /// The ratios contradict the resolution of 0.03 mm that is published for this model.
-    /// No source says which of the two is wrong, so the ruler of the calibration decides.
-    /// Encoder counts for a millimetre of the tip near the home pose:
+    /// The ratios contradict the published resolution of 0.03 mm for this model. No source shows
+    /// which is wrong, so the ruler of the calibration decides. Encoder counts per millimetre of
+    /// the tip near the home pose:
     ///
     /// | axis | with this preset's 13.3, 11.2, 11.2 | with 7.2, 7.2, 7.2 |
     /// | --- | --- | --- |
@@ -95,8 +94,8 @@ impl Calibration {
     /// | 2, tip up | 52 counts (19 µm) | 34 counts (30 µm) |
     /// | 3, tip towards the user | 52 counts (19 µm) | 34 counts (30 µm) |
     ///
-    /// With the wrong ones, motions are rendered 1.6 to 1.8 times too large or too small, and
-    /// so are forces. The absolute limits allow both.
+    /// With the wrong ratios, motions and forces are rendered 1.6 to 1.8 times too large or too
+    /// small. The absolute limits permit both.
     pub const PREMIUM_1_0: Self = Self {
         model: Model::Premium10,
         l1_mm: 140.0,
@@ -106,10 +105,9 @@ impl Calibration {
         ..Self::PREMIUM_1_5
     };
 
-    /// Phantom Premium 3.0: 22 N, 0.02 mm a count. Uncertain: all of it. The
-    /// links are a Premium 1.5's scaled by the workspaces' widths (838/381
-    /// mm), the ratios follow from 0.02 mm a count, motors and stops are a
-    /// Premium 1.5's. Gravity is left to be fitted.
+    /// Phantom Premium 3.0: 22 N, 0.02 mm a count. Uncertain: everything. The links are a Premium
+    /// 1.5's scaled by the workspaces' widths (838/381 mm), the ratios follow from 0.02 mm a count,
+    /// motors and stops are a Premium 1.5's. Gravity must be measured.
     pub const PREMIUM_3_0: Self = Self {
         model: Model::Premium30,
         ratio: Vec3::new(35.0, 35.0, 29.0),
@@ -121,9 +119,9 @@ impl Calibration {
         ..Self::PREMIUM_1_5
     };
 
-    /// Phantom Omni (Touch): 133.35 mm links, 3.3 N, 0.055 mm a count.
-    /// Uncertain: the ratios, which follow from that, stops and motors, which
-    /// are guesses on the careful side. Gravity is left to be fitted.
+    /// Phantom Omni (Touch): 133.35 mm links, 3.3 N, 0.055 mm a count. Uncertain: the ratios, which
+    /// follow from that, and stops and motors, which are cautious guesses. Gravity must be
+    /// measured.
     pub const OMNI: Self = Self {
         model: Model::Omni,
         ratio: Vec3::splat(3.72),
@@ -148,7 +146,7 @@ impl Calibration {
 mod tests {
     use super::*;
 
-    /// The tables here and in docs/reference/hardware.md.
+    /// Checks the tables here and in docs/reference/hardware.md.
     #[test]
     fn a_premium_1_0_counts_as_the_tables_say_with_either_ratio() {
         let counts_a_mm = |ratio: Vec3| {

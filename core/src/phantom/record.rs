@@ -1,11 +1,11 @@
-//! A calibration record as bytes: what a device keeps in flash and a file holds.
+//! A calibration record as bytes, for a device's flash and for a file.
 //!
 //! ```text
 //! "HAPC"   version (u16, little-endian)   postcard   CRC-32 (ISO-HDLC, little-endian)
 //! ```
 //!
-//! The check sum covers everything before it. Bytes after it are passed over:
-//! flash is read in larger pieces than it was written.
+//! The check sum covers everything before it. Bytes after it are ignored: flash is read in larger
+//! pieces than it was written.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,9 +13,9 @@ use super::calibration::Calibration;
 use super::check::CalibrationError;
 use crate::crc;
 
-/// Version of the layout, which increases with any change to [`Calibration`].
+/// Version of the layout, which increases with every change to [`Calibration`].
 pub const VERSION: u16 = 1;
-/// The longest record in bytes, and a multiple of every flash's write size.
+/// Maximum record length in bytes, a multiple of every flash's write size.
 pub const RECORD_BYTES: usize = 256;
 
 const MAGIC: [u8; 4] = *b"HAPC";
@@ -29,10 +29,10 @@ struct Record {
     calibration: Calibration,
 }
 
-/// Reason for which bytes are no calibration record.
+/// Reason why bytes are not a calibration record.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RecordError {
-    /// They do not begin as a record does.
+    /// The bytes do not start like a record.
     #[error("these bytes are no calibration record")]
     NotARecord,
     /// A record of another version of this program.
@@ -41,16 +41,16 @@ pub enum RecordError {
         /// The record's version.
         found: u16,
     },
-    /// A record, but cut short or with the wrong check sum.
+    /// A record that is incomplete or has the wrong check sum.
     #[error("the calibration record is damaged")]
     Damaged,
-    /// An undamaged record with a number that makes no sense.
+    /// An undamaged record with an invalid number.
     #[error("the calibration record does not make sense: {0}")]
     Invalid(#[source] CalibrationError),
 }
 
 impl Calibration {
-    /// Writes the record into `buffer`; returns the bytes to keep.
+    /// Writes the record into `buffer`; returns the bytes to store.
     #[must_use]
     pub fn encode<'b>(&self, buffer: &'b mut [u8; RECORD_BYTES]) -> &'b [u8] {
         let record = Record {
@@ -58,13 +58,13 @@ impl Calibration {
             version: VERSION,
             calibration: *self,
         };
-        crc::put(&record, buffer).unwrap_or(&[]) // a record fits, see the test
+        crc::put(&record, buffer).unwrap_or(&[]) // a record always fits, see the test
     }
 
-    /// Reads a record and checks it as a whole.
+    /// Reads and validates a record.
     ///
     /// # Errors
-    /// [`RecordError`].
+    /// Returns a [`RecordError`].
     pub fn decode(bytes: &[u8]) -> Result<Self, RecordError> {
         let rest = bytes.strip_prefix(&MAGIC).ok_or(RecordError::NotARecord)?;
         let version = rest.first_chunk().ok_or(RecordError::Damaged)?;
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn no_flipped_bit_and_no_missing_byte_gets_through() {
         let good = bytes();
-        // Miri is some hundred times slower: there, a few of each.
+        // Miri is some hundred times slower, so it tests only a few of each.
         let (bits, lengths) = if cfg!(miri) { (61, 17) } else { (1, 1) };
         for bit in (0..8 * good.len()).step_by(bits) {
             let mut bad = good.clone();

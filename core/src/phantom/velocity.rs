@@ -1,30 +1,28 @@
 //! Joint velocities from counts: first-order adaptive windowing
 //! (FOAW) with the best-fit slope (Janabi-Sharifi, Hayward & Chen 2000).
 //!
-//! A difference of two readings is off by up to one count, however slow the
-//! arm: at 1 kHz, 29 mm/s at the tip. Over a window of n readings the same
-//! error is spread over n ticks, but a long window lags behind. So the window
-//! is as long as a straight line through the newest reading stays within the
-//! encoder's error of *every* reading in it, and no longer: long where the arm
-//! moves evenly, short where it speeds up.
+//! A difference of two readings has an error of up to one count at any speed: 29 mm/s at the tip at
+//! 1 kHz. Over a window of n readings the same error is spread over n ticks, but a long window
+//! lags. So the window is the longest one in which a straight line through the newest reading stays
+//! within the encoder's error of *every* reading: long in a uniform motion, short during
+//! acceleration.
 //!
-//! The paper tries each length and tests all readings in it, 120 tests at worst
-//! for a window of 15. Here the slopes that each reading allows are kept as one
-//! interval that only shrinks, so each reading is looked at once: at most
-//! [`WINDOW`] steps an axis, whatever the signal.
+//! The paper tries each length and tests all readings in it, 120 tests at worst for a window of 15.
+//! Here the slopes that each reading permits are one interval that only shrinks, so each reading is
+//! processed once: at most [`WINDOW`] steps per axis, for any signal.
 
 use glam::Vec3;
 
 use crate::scalar::{larger, smaller};
 
-/// Longest window: readings before the newest.
+/// Maximum window: readings before the newest.
 pub const WINDOW: usize = 15;
-/// Largest error of two readings together, counts: half a count each.
+/// Maximum error of two readings together, counts: half a count each.
 const NOISE: f32 = 1.0;
-/// Readings kept, a power of two.
+/// Number of stored readings, a power of two.
 const KEPT: usize = WINDOW + 1;
 
-/// 1/i for the reading i ticks ago, from 1 on.
+/// 1/i for the reading i ticks ago, starting with 1.
 const RECIPROCAL: [f32; WINDOW] = {
     let mut values = [0.0; WINDOW];
     let mut i = 0;
@@ -45,19 +43,19 @@ const FIT: [f32; KEPT] = {
     values
 };
 
-/// The last readings of the three encoders, evenly spaced in time.
+/// The last readings of the three encoders, equally spaced in time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Readings {
-    /// From `newest` on, the newest first. All are there twice, so that from wherever the newest
-    /// is they lie in a row.
+    /// Readings from `newest` on, the newest first. Each is stored twice, so that they are
+    /// contiguous from every `newest`.
     counts: [[i32; 3]; 2 * KEPT],
     newest: usize,
-    /// Readings before the newest, at most [`WINDOW`].
+    /// Number of readings before the newest, at most [`WINDOW`].
     before: usize,
 }
 
 impl Readings {
-    /// Takes the next reading.
+    /// Adds the next reading.
     pub fn take(&mut self, counts: [i32; 3]) {
         self.newest = self.newest.wrapping_sub(1) % KEPT;
         self.counts[self.newest % KEPT] = counts;
@@ -65,13 +63,13 @@ impl Readings {
         self.before = (self.before + 1).min(WINDOW);
     }
 
-    /// Forgets everything but this reading.
+    /// Forgets all readings but this one.
     pub fn restart(&mut self, counts: [i32; 3]) {
         self.take(counts);
         self.before = 0;
     }
 
-    /// Counts moved between the last two readings.
+    /// Returns the counts moved between the last two readings.
     #[must_use]
     pub fn moved(&self) -> [i32; 3] {
         if self.before == 0 {
@@ -82,10 +80,10 @@ impl Readings {
         core::array::from_fn(|axis| newest[axis].wrapping_sub(before[axis]))
     }
 
-    /// Velocity of each axis, counts from one reading to the next.
+    /// Returns the velocity of each axis, counts per reading.
     ///
-    /// Even motion at any speed is met within 0.11 counts once 15 readings are
-    /// in (swept in the tests); raw differences are off by up to 1.
+    /// The error in a uniform motion is at most 0.11 counts at any speed, after 15 readings (tested
+    /// by a sweep); that of raw differences is up to 1.
     #[must_use]
     pub fn velocity(&self) -> Vec3 {
         let newest = self.newest % KEPT;
@@ -99,7 +97,7 @@ impl Readings {
     }
 }
 
-/// The slope of an axis in these readings, the newest first.
+/// Returns the slope of an axis in these readings, the newest first.
 #[inline(never)]
 fn slope(readings: &[[i32; 3]], axis: impl Fn(&[i32; 3]) -> i32) -> f32 {
     let Some((newest, before)) = readings.split_first() else {
@@ -119,8 +117,8 @@ fn slope(readings: &[[i32; 3]], axis: impl Fn(&[i32; 3]) -> i32) -> f32 {
         sum += fallen;
         sums += sum;
     }
-    // The least-squares line of the window's readings, kept to the slopes for which the window
-    // was chosen. The reading i ticks ago is in all but i - 1 of the `sums`.
+    // The least-squares line of the window's readings, clamped to the slopes that the window
+    // permits. The reading i ticks ago is in all but i - 1 of the `sums`.
     let fit = FIT.get(window).copied().unwrap_or(0.0);
     let slope = ((window + 2) as f32 * sum - 2.0 * sums) * fit;
     if slope < low {

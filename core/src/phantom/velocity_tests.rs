@@ -1,4 +1,4 @@
-//! The estimator against motions known in f64, seen through counts.
+//! The estimator against motions in f64, rounded to counts.
 
 use super::*;
 use crate::cases::cases;
@@ -23,8 +23,8 @@ impl Errors {
     }
 }
 
-/// Reads a motion (counts at a tick) for so many ticks; the errors of the
-/// estimate and of raw differences after the first `WINDOW`.
+/// Reads a motion (counts at a tick) for `ticks`; returns the errors of the estimate and of raw
+/// differences after the first `WINDOW`.
 fn errors(ticks: u32, at: impl Fn(f64) -> f64, speed: impl Fn(f64) -> f64) -> (Errors, Errors) {
     let mut readings = Readings::default();
     readings.restart([at(0.0).round() as i32; 3]);
@@ -59,9 +59,8 @@ fn even_motion_is_met_within_the_stated_bound() {
 
 #[test]
 fn a_hand_moving_to_and_fro_is_followed_better_than_by_differences() {
-    // Read a thousand times a second. The faster the speed changes, the
-    // shorter the window and the less there is to gain: ±20 mm at 2 Hz
-    // changes by 0.13 counts from one reading to the next.
+    // Read a thousand times a second. A fast change of speed shortens the window and its gain: ±20
+    // mm at 2 Hz changes by 0.13 counts from one reading to the next.
     for (amplitude, hz, share) in [(800.0, 2.0, 1.0), (800.0, 0.5, 0.15), (200.0, 0.5, 0.06)] {
         let w = core::f64::consts::TAU * hz * 1e-3;
         let (fitted, raw) = errors(

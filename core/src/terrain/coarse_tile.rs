@@ -1,8 +1,8 @@
-//! A tile of coarser samples than the scene's level, as a fallback has them.
+//! A tile with coarser samples than the scene's level, as part of a fallback.
 //!
-//! Its 33 × 33 samples lie [`CoarseTile::spacing`] cells of the scene's level apart, linear
-//! between them along rows and columns. Between coarse samples that is a bilinear patch again, also
-//! seen through the finer cells of the level. So where it is rendered, contact is as exact as anywhere.
+//! Its 33 × 33 samples are [`CoarseTile::spacing`] cells of the scene's level apart, with linear
+//! interpolation along rows and columns. Between coarse samples this is again a bilinear patch,
+//! also in each finer cell of the level. So contact on it is as exact as anywhere else.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,13 +21,13 @@ pub struct CoarseTile {
 }
 
 impl CoarseTile {
-    /// The finest, as a power of two: of a finer one more samples would be looked at when a tile
-    /// comes than a tick has time for.
+    /// Minimum shift: with a finer tile, the check of an arriving tile would read more samples than
+    /// a tick has time for.
     pub const LEAST_SHIFT: u8 = 2;
-    /// The coarsest, as a power of two: all that positions can count.
+    /// Maximum shift: a tile as large as the range of positions.
     pub const MAX_SHIFT: u8 = 24;
 
-    /// Returns true if it is one that the loop can work with, in a scene of this level.
+    /// Returns true if the tile is valid in a scene of this level.
     #[must_use]
     pub fn is_valid(&self, level: u8) -> bool {
         let Cell { x, y } = self.first;
@@ -36,13 +36,13 @@ impl CoarseTile {
             && x.unsigned_abs().max(y.unsigned_abs()) <= MAX_CELL.unsigned_abs()
     }
 
-    /// Cells of the scene's level from sample to sample.
+    /// Returns the cells of the scene's level from sample to sample.
     #[must_use]
     pub const fn spacing(&self) -> i32 {
         1 << self.shift
     }
 
-    /// The name of its tile on the link, in a scene of this level: coarser by
+    /// Returns the key of its tile on the link, in a scene of this level: coarser by
     /// [`Self::shift`], the first of its own grid.
     #[must_use]
     pub const fn key(&self, level: u8) -> TileKey {
@@ -52,8 +52,8 @@ impl CoarseTile {
         }
     }
 
-    /// The coarse cell that holds a sample of the scene's level, and how far in it the sample
-    /// lies, eastward and northward from 0 to 1. `None` beyond the tile.
+    /// Returns the coarse cell that holds a sample of the scene's level, and the sample's place in
+    /// it, eastward and northward from 0 to 1; `None` beyond the tile.
     #[inline(never)]
     fn place(&self, sample: Cell) -> Option<([usize; 2], [f32; 2])> {
         let span = (TILE_CELLS as i32) << self.shift;
@@ -71,15 +71,15 @@ impl CoarseTile {
         Some(([col, row], [east, north]))
     }
 
-    /// Returns true if it reaches under all of a tile of the scene's level.
+    /// Returns true if the tile covers all of a tile of the scene's level.
     pub(super) fn covers(&self, index: TileIndex) -> bool {
         let first = index.first_cell();
         let last = first.offset(TILE_CELLS as i32, TILE_CELLS as i32);
         self.place(first).is_some() && self.place(last).is_some()
     }
 
-    /// Returns its reach under a cell of the scene's level, and under one of its corners
-    /// at least.
+    /// Returns two flags: true if the tile covers a cell of the scene's level, and true if it
+    /// covers at least one of the cell's corners.
     pub(super) fn reaches(&self, cell: Cell) -> [bool; 2] {
         let span = (TILE_CELLS as i32) << self.shift;
         let off = [(cell.x, self.first.x), (cell.y, self.first.y)];
@@ -90,10 +90,10 @@ impl CoarseTile {
         ]
     }
 
-    /// The heights of `tile`, which is this one, at the corners of a cell of the scene's level that
-    /// it [reaches](Self::reaches) under, in the order of [`Tile::corners`] and as
-    /// [`Self::height`] has each of them, to the bit but for the sign of zero. `None` beside a hole of
-    /// it.
+    /// Returns the heights of `tile`, which must be this one, at the corners of a cell of the
+    /// scene's level that it [covers](Self::reaches), in the order of [`Tile::corners`]. Each is
+    /// equal to [`Self::height`] to the bit, except for the sign of zero. `None` beside its
+    /// no-data.
     pub(super) fn corners(&self, tile: &Tile, cell: Cell) -> Option<[f32; 4]> {
         let off = [cell.x - self.first.x, cell.y - self.first.y];
         let [col, row] = off.map(|off| off >> self.shift);
@@ -101,7 +101,7 @@ impl CoarseTile {
         if (sw + se + nw + ne).is_nan() {
             return None;
         }
-        // West and east of the cell, south and north of it, in the coarse one.
+        // West and east borders of the cell, and south and north ones, in the coarse cell.
         let ([west, east], [south, north]) = (self.shares(off[0]), self.shares(off[1]));
         let [south_west, south_east] = between(sw, se, west, east);
         let [north_west, north_east] = between(nw, ne, west, east);
@@ -110,25 +110,25 @@ impl CoarseTile {
         Some([west_south, east_south, west_north, east_north])
     }
 
-    /// Returns the begin and the end of a cell in its coarse cell, from 0 to 1.
+    /// Returns the start and the end of a cell in its coarse cell, from 0 to 1.
     fn shares(&self, off: i32) -> [f32; 2] {
         let rest = off & (self.spacing() - 1);
         let per_cell = 1.0 / self.spacing() as f32;
         [rest, rest + 1].map(|rest| rest as f32 * per_cell)
     }
 
-    /// The height of `tile`, which is this one, at a sample of the scene's level, in cells above
-    /// the tile's base; NaN where a corner that counts is a hole, `None` beyond it.
+    /// Returns the height of `tile`, which must be this one, at a sample of the scene's level, in
+    /// cells above the tile's base; NaN if a corner with weight is no-data, `None` beyond the tile.
     ///
-    /// The result depends on the sample alone, so two patches that share it agree to the bit.
+    /// The result depends only on the sample, so two patches that share it agree to the bit.
     pub(super) fn height(&self, tile: &Tile, sample: Cell) -> Option<f32> {
         let (cell, [east, north]) = self.place(sample)?;
         let posts = tile.corners(Cell::new(cell[0] as i32, cell[1] as i32));
         Some(mix(along(&posts, east), north))
     }
 
-    /// Lowest and highest of `tile`, which is this one, over a tile of the scene's level, in cells
-    /// above the base of `tile`; `None` if it has no height there.
+    /// Returns the minimum and maximum of `tile`, which must be this one, over a tile of the
+    /// scene's level, in cells above the base of `tile`; `None` if it has no height there.
     pub(super) fn range_over(&self, tile: &Tile, index: TileIndex) -> Option<[f32; 2]> {
         let first = index.first_cell();
         let along = |first: i32, own: i32| {
@@ -157,20 +157,20 @@ impl CoarseTile {
     }
 }
 
-/// Between the corners of a patch, so far east: south and north.
+/// Interpolates eastward between the corners of a patch: returns south and north.
 fn along([sw, se, nw, ne]: &[f32; 4], east: f32) -> [f32; 2] {
     [mix([*sw, *se], east), mix([*nw, *ne], east)]
 }
 
-/// Between two heights that are none of a hole, at a place before the last and at one that may
-/// be it: what [`mix`] gives.
+/// Interpolates between two heights, neither no-data, at a place before the end and at one that may
+/// be the end: the same as [`mix`].
 fn between(from: f32, to: f32, at: f32, or_at: f32) -> [f32; 2] {
     let up = to - from;
     let last = if or_at == 1.0 { to } else { from + up * or_at };
     [from + up * at, last]
 }
 
-/// Between two heights. One without weight does not count.
+/// Interpolates between two heights. A height without weight does not count, even NaN.
 fn mix([from, to]: [f32; 2], share: f32) -> f32 {
     if share == 0.0 {
         from
@@ -219,7 +219,7 @@ mod tests {
         }
         assert_eq!((height(-7, 100), height(249, 356)), (Some(1.0), Some(1.0)));
         assert_eq!((height(i32::MIN, 100), height(i32::MAX, 100)), (None, None));
-        // On the rim of the hole's cells nothing of it counts.
+        // On the border of the no-data cells, no-data has no weight.
         assert_eq!((height(1, 116), height(17, 116)), (Some(1.0), Some(1.0)));
         let is_hole = |x, y| height(x, y).is_some_and(f32::is_nan);
         assert!(is_hole(2, 116) && is_hole(9, 116));

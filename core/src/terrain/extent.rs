@@ -1,11 +1,11 @@
-//! Sizes of fields, and boxes of their cells.
+//! Sizes of fields, and boxes of cells.
 
 use serde::{Deserialize, Serialize};
 
 use super::index::{TILE_SHIFT, TileIndex};
 use crate::grid::{Cell, MAX_CELL};
 
-/// The size of a field in cells; it has one more sample each way.
+/// The size of a field in cells; it has one more sample in each direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FieldSize {
@@ -16,21 +16,20 @@ pub struct FieldSize {
 }
 
 impl FieldSize {
-    /// So many cells from west to east and from south to north.
+    /// Creates a size from the cells from west to east and from south to north.
     #[must_use]
     pub const fn new(columns: i32, rows: i32) -> Self {
         Self { columns, rows }
     }
 
-    /// Returns true if a field can have this size: from 1 to [`MAX_CELL`] cells
-    /// each way.
+    /// Returns true if a field can have this size: 1 to [`MAX_CELL`] cells in each direction.
     #[must_use]
     pub fn is_valid(self) -> bool {
         let ok = |cells| (1..=MAX_CELL).contains(&cells);
         ok(self.columns) && ok(self.rows)
     }
 
-    /// The north-east tile of the field; (-1, -1) for a field without cells.
+    /// Returns the north-east tile of the field; (-1, -1) for a field without cells.
     #[must_use]
     pub const fn last_tile(self) -> TileIndex {
         TileIndex::new(
@@ -39,28 +38,28 @@ impl FieldSize {
         )
     }
 
-    /// The tiles of the field, row by row from the south.
+    /// Returns the tiles of the field, row by row from the south.
     pub fn tiles(self) -> impl Iterator<Item = TileIndex> {
         let last = self.last_tile();
         (0..=last.row).flat_map(move |row| (0..=last.col).map(move |col| TileIndex::new(col, row)))
     }
 
-    /// Returns true if the field has the cell.
+    /// Returns true if the cell is in the field.
     #[must_use]
     #[inline]
     pub const fn has_cell(self, cell: Cell) -> bool {
-        // One unsigned comparison an axis catches negative indices too.
+        // One unsigned comparison per axis also excludes negative indices.
         (cell.x as u32) < self.columns as u32 && (cell.y as u32) < self.rows as u32
     }
 
-    /// Returns true if the field has the tile.
+    /// Returns true if the tile is in the field.
     #[must_use]
     pub fn has_tile(self, tile: TileIndex) -> bool {
         self.has(tile.col, tile.row, TILE_SHIFT)
     }
 
-    /// Returns true if some cell of the field lies in a square of 2ˢʰⁱᶠᵗ cells a side,
-    /// given by its column and row among such squares.
+    /// Returns true if a cell of the field lies in a square with sides of 2ˢʰⁱᶠᵗ cells, given by
+    /// its column and row among such squares.
     pub(super) fn has(self, col: i32, row: i32, shift: u32) -> bool {
         (0..=(self.columns - 1) >> shift).contains(&col)
             && (0..=(self.rows - 1) >> shift).contains(&row)
@@ -77,7 +76,7 @@ pub struct CellBox {
 }
 
 impl CellBox {
-    /// The box with these two cells at opposite corners.
+    /// Creates the box with these two cells at opposite corners.
     #[must_use]
     pub fn around(a: Cell, b: Cell) -> Self {
         Self {
@@ -86,7 +85,7 @@ impl CellBox {
         }
     }
 
-    /// The part of it inside a field; empty when `from` exceeds `to`.
+    /// Returns the part of the box inside a field; empty if `from` exceeds `to`.
     #[must_use]
     pub(super) fn clipped(self, size: FieldSize) -> Self {
         Self {
@@ -102,8 +101,8 @@ impl CellBox {
         self.from.x > self.to.x || self.from.y > self.to.y
     }
 
-    /// Side, as a power of two, of the smallest block of which at most two in
-    /// each direction cover the box; at least `least`.
+    /// Returns the side, as a power of two, of the smallest blocks that cover the box with at most
+    /// two in each direction; at least `least`.
     pub(super) fn cover_shift(&self, least: u32) -> u32 {
         let extent = (self.to.x - self.from.x).max(self.to.y - self.from.y);
         (32 - extent.leading_zeros()).max(least)

@@ -1,4 +1,4 @@
-//! Which tile, and which block of a tile.
+//! Indices of tiles, and sizes of their blocks.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,12 +12,12 @@ pub const TILE_CELLS: usize = 1 << TILE_SHIFT;
 /// next tile, so that a patch never needs two tiles.
 pub const TILE_SAMPLES: usize = TILE_CELLS + 1;
 
-/// Side of the smallest block whose maximum is kept, as a power of two.
+/// Side of the smallest block with a stored maximum, as a power of two.
 ///
-/// 8 cells: 21 maxima a tile, 0.08 byte a sample.
+/// 8 cells: 21 maxima per tile, 0.08 byte per sample.
 pub(crate) const BLOCK_SHIFT: u32 = 3;
 
-/// The column and row of a tile of 32 × 32 cells, whatever its level.
+/// The column and row of a tile of 32 × 32 cells, at any level.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
@@ -30,20 +30,20 @@ pub struct TileIndex {
 }
 
 impl TileIndex {
-    /// The tile in this column and row.
+    /// Creates the index of the tile in this column and row.
     #[must_use]
     pub const fn new(col: i32, row: i32) -> Self {
         Self { col, row }
     }
 
-    /// The tile that holds the patch over `cell`.
+    /// Returns the index of the tile that holds the patch over `cell`.
     #[must_use]
     #[inline]
     pub const fn holding(cell: Cell) -> Self {
         Self::new(cell.x >> TILE_SHIFT, cell.y >> TILE_SHIFT)
     }
 
-    /// The tile so many columns east and rows north.
+    /// Returns the index `east` columns east and `north` rows north.
     #[must_use]
     pub(super) const fn offset(self, east: i32, north: i32) -> Self {
         Self::new(
@@ -52,7 +52,7 @@ impl TileIndex {
         )
     }
 
-    /// Returns true if it is another tile's neighbour, along a side or at a corner, or that tile itself.
+    /// Returns true if the tiles are the same, or neighbours along a side or at a corner.
     #[must_use]
     pub(crate) fn is_beside(self, other: Self) -> bool {
         self.col
@@ -61,7 +61,7 @@ impl TileIndex {
             <= 1
     }
 
-    /// The tile's south-west cell.
+    /// Returns the tile's south-west cell.
     #[must_use]
     pub const fn first_cell(self) -> Cell {
         Cell::new(
@@ -71,10 +71,10 @@ impl TileIndex {
     }
 }
 
-/// Which tile of which level.
+/// Level and index of a tile.
 ///
-/// Level `L` is the field with every 2ᴸ-th sample; a tile has 32 × 32 cells of
-/// its own level at every level.
+/// Level `L` is the field with every 2ᴸ-th sample; at every level, a tile has 32 × 32 cells of that
+/// level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TileKey {
@@ -85,7 +85,7 @@ pub struct TileKey {
 }
 
 impl TileKey {
-    /// The tile of `level` in this column and row.
+    /// Creates the key of the tile of `level` in this column and row.
     #[must_use]
     pub const fn new(level: u8, col: i32, row: i32) -> Self {
         Self {
@@ -94,7 +94,7 @@ impl TileKey {
         }
     }
 
-    /// The tile of `level` that holds the patch over `cell`.
+    /// Returns the key of the tile of `level` that holds the patch over `cell`.
     #[must_use]
     pub const fn holding(level: u8, cell: Cell) -> Self {
         Self {
@@ -104,7 +104,7 @@ impl TileKey {
     }
 }
 
-/// A tile's column or row, wrapped onto a torus of `D` × `D` tiles.
+/// Returns a tile's column or row, wrapped onto a torus of `D` × `D` tiles.
 #[inline]
 pub(super) const fn wrap<const D: usize>(index: i32) -> usize {
     index as usize % D

@@ -1,45 +1,44 @@
-//! The maxima above the tiles: the highest sample of 2ᵏ × 2ᵏ tiles.
+//! The maxima above the level of tiles: the highest sample of 2ᵏ × 2ᵏ tiles.
 
 use super::index::{TILE_SHIFT, wrap};
 
 /// Maxima over 2ᵏ × 2ᵏ tiles of a torus of `D` × `D`, in whole cells.
 ///
-/// Level 0 is a tile. A node of a higher level is known only while all the
-/// tiles under it are held; unknown nodes read as `i32::MAX`, tiles outside
-/// the field as `i32::MIN`.
+/// Level 0 is a tile. A node of a higher level is known only while all tiles under it are stored;
+/// unknown nodes read as `i32::MAX`, tiles outside the field as `i32::MIN`.
 ///
-/// The first plane is level 0; the second holds levels 1 and up, one after the
-/// other, of which (D² − 1)/3 entries are used.
+/// The first plane is level 0; the second has levels 1 and up, one after the other, in (D² − 1)/3
+/// of its entries.
 pub(super) struct MaxPyramid<const D: usize>([[[i32; D]; D]; 2]);
 
 impl<const D: usize> MaxPyramid<D> {
-    /// log₂ D. A torus that is not a power of two has the maxima of its tiles alone: the tiles
-    /// under a node would not go round together.
+    /// log₂ D. If `D` is not a power of two, only the maxima of tiles are stored: the tiles under a
+    /// node would not wrap around together.
     pub(super) const HEIGHT: u32 = match D.is_power_of_two() {
         true => D.trailing_zeros(),
         false => 0,
     };
-    /// Side of the largest block there is a maximum of, as a power of two.
+    /// Side of the largest block with a maximum, as a power of two.
     pub(super) const TOP_SHIFT: u32 = TILE_SHIFT + Self::HEIGHT;
 
     pub(super) const fn unknown() -> Self {
         Self([[[i32::MAX; D]; D]; 2])
     }
 
-    /// The stored maximum of the node of `level` in torus place `(col, row)`.
+    /// Returns the stored maximum of the node of `level` at torus place `(col, row)`.
     #[inline]
     pub(super) fn node(&self, level: u32, col: i32, row: i32) -> i32 {
         let [plane, row, col] = Self::place(level, col, row);
         self.0[plane][row][col]
     }
 
-    /// Stores the maximum of the node of `level` in torus place `(col, row)`.
+    /// Stores the maximum of the node of `level` at torus place `(col, row)`.
     pub(super) fn set(&mut self, level: u32, col: i32, row: i32, top: i32) {
         let [plane, row, col] = Self::place(level, col, row);
         self.0[plane][row][col] = top;
     }
 
-    /// Returns the place where a node is: level `k` of the second plane is (D/2ᵏ)² long.
+    /// Returns the place of a node: level `k` of the second plane has (D/2ᵏ)² entries.
     #[inline]
     fn place(level: u32, col: i32, row: i32) -> [usize; 3] {
         if level == 0 {

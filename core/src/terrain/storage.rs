@@ -6,11 +6,10 @@ use super::tile::{MAX_STEP_CELLS, Tile};
 use super::window::Window;
 use crate::grid::MAX_CELL;
 
-/// Memory of a window of `D × D` tiles, 5.5 kB each; may hold a whole field.
+/// Memory of a window of `D × D` tiles, 5.5 kB each; it can hold a whole field.
 ///
-/// Without an allocator it lives wherever its owner puts it. On a desktop, put
-/// large ones on the heap: `Box::new(TileArena::<16>::new())`, then
-/// [`Self::fill`].
+/// Without an allocator it is stored wherever its owner puts it. On a desktop, put large ones on
+/// the heap: `Box::new(TileArena::<16>::new())`, then [`Self::fill`].
 ///
 /// ```
 /// use hapterra_core::grid::Cell;
@@ -32,21 +31,21 @@ pub struct TileArena<const D: usize> {
     size: FieldSize,
 }
 
-/// Reason for which a storage cannot hold heights as a field.
+/// Reason why heights cannot be stored as a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FieldError {
-    /// No cells, or more than there is room for.
+    /// No cells, or more than fit.
     #[error("a field of {} × {} cells; this storage holds from 1 × 1 to {most} × {most}", size.columns, size.rows)]
     Size {
         /// The field's size.
         size: FieldSize,
-        /// Most cells a side.
+        /// Maximum cells per side.
         most: i32,
     },
-    /// More or fewer heights than a field of the size has: so many.
+    /// The number of heights is wrong: a field of the size has this many.
     #[error("a field of this size has {0} heights: one more than cells each way")]
     Count(i32),
-    /// Too steep.
+    /// The heights are too steep.
     #[error(
         "neighbouring samples differ by more than {MAX_STEP_CELLS} cells: scale the heights down, or fill the samples"
     )]
@@ -54,7 +53,7 @@ pub enum FieldError {
 }
 
 impl<const D: usize> TileArena<D> {
-    /// Most cells a side that a field may have.
+    /// Maximum cells per side of a field.
     pub const MAX_CELLS: i32 = {
         assert!(
             D <= MAX_CELL as usize / TILE_CELLS,
@@ -63,7 +62,7 @@ impl<const D: usize> TileArena<D> {
         (D * TILE_CELLS) as i32
     };
 
-    /// Storage without a field.
+    /// Creates an arena without a field.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -72,12 +71,12 @@ impl<const D: usize> TileArena<D> {
         }
     }
 
-    /// Holds the field that a function makes of a sample's column (eastward) and
-    /// row (northward), both from 0 to the size inclusive: heights in cells, NaN
-    /// for a hole. It is called row by row from the south.
+    /// Creates the field of a function of a sample's column (eastward) and row (northward), both
+    /// from 0 to the size inclusive: heights in cells, NaN for no-data. The function is called in
+    /// rows from the south.
     ///
     /// # Errors
-    /// [`FieldError::Size`] when the size is not one that fits.
+    /// Returns [`FieldError::Size`] if the size does not fit.
     pub fn from_fn(
         size: FieldSize,
         mut height: impl FnMut(i32, i32) -> f32,
@@ -88,8 +87,8 @@ impl<const D: usize> TileArena<D> {
         Ok(storage)
     }
 
-    /// Holds a field of heights in cells, row by row from the south, each row from
-    /// west to east. NaN is a hole.
+    /// Creates a field of heights in cells, in rows from the south, each row from west to east. NaN
+    /// is no-data.
     ///
     /// ```
     /// # use hapterra_core::terrain::{FieldError, FieldSize, TileArena};
@@ -103,8 +102,8 @@ impl<const D: usize> TileArena<D> {
     /// ```
     ///
     /// # Errors
-    /// [`FieldError`] when the size is not one that fits, or there are more or fewer
-    /// heights than a field of this size has.
+    /// Returns a [`FieldError`] if the size does not fit, or if the number of heights is not that
+    /// of a field of this size.
     pub fn from_slice(size: FieldSize, heights: &[f32]) -> Result<Self, FieldError> {
         let mut storage = Self::new();
         let mut heights = heights.iter().copied();
@@ -115,7 +114,7 @@ impl<const D: usize> TileArena<D> {
         }
     }
 
-    /// Holds a field of rows of heights, as [`Self::from_slice`].
+    /// Creates a field from rows of heights, as in [`Self::from_slice`].
     ///
     /// ```
     /// # use hapterra_core::terrain::{FieldError, FieldSize, TileArena};
@@ -126,7 +125,7 @@ impl<const D: usize> TileArena<D> {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::from_slice`] for too few heights; what follows the last is left.
+    /// The same as [`Self::from_slice`] for too few heights; extra ones are ignored.
     pub fn from_rows<R: IntoIterator<Item = f32>>(
         size: FieldSize,
         rows: impl IntoIterator<Item = R>,
@@ -136,11 +135,11 @@ impl<const D: usize> TileArena<D> {
         Ok(storage)
     }
 
-    /// Takes a field in place of the one that is held, in place: for storage that is
-    /// too large to be moved. The heights come as in [`Self::from_slice`].
+    /// Replaces the stored field, in place: for an arena that is too large to be moved. The heights
+    /// are in the order of [`Self::from_slice`].
     ///
     /// # Errors
-    /// As [`Self::from_rows`]; nothing is held then.
+    /// The same as [`Self::from_rows`]; the arena is then empty.
     pub fn fill(
         &mut self,
         size: FieldSize,
@@ -186,13 +185,13 @@ impl<const D: usize> TileArena<D> {
         }
     }
 
-    /// The size of the field that is held; no cells where there is none.
+    /// Returns the size of the stored field; without cells if there is none.
     #[must_use]
     pub const fn size(&self) -> FieldSize {
         self.size
     }
 
-    /// A whole height in cells that no sample exceeds.
+    /// Returns an upper bound of all samples, in whole cells.
     #[must_use]
     pub fn top(&self) -> i32 {
         let held = self.tiles.as_flattened().iter();
@@ -200,15 +199,15 @@ impl<const D: usize> TileArena<D> {
         held.map(Tile::top).max().unwrap_or(i32::MIN)
     }
 
-    /// A window over the field that is held: nothing of it is missing.
+    /// Returns a window over the stored field, without missing tiles.
     pub fn window(&mut self) -> Window<'_, D> {
         let (size, top) = (self.size, self.top());
         let tiles = self.tiles.each_mut();
         Window::holding(tiles.map(<[Tile; D]>::each_mut), size, top)
     }
 
-    /// Buffers for [`Window::new`], and for the loop, which
-    /// fill them tile by tile. The field that was held is forgotten.
+    /// Returns buffers for [`Window::new`] and for the loop, which fill them tile by tile. Discards
+    /// the stored field.
     pub fn slots(&mut self) -> [[&mut Tile; D]; D] {
         self.size = FieldSize::new(0, 0);
         self.tiles.each_mut().map(<[Tile; D]>::each_mut)
@@ -221,13 +220,13 @@ impl<const D: usize> Default for TileArena<D> {
     }
 }
 
-/// Samples of a field.
+/// Returns the number of samples of a field.
 fn samples(size: FieldSize) -> i32 {
     (size.columns + 1).saturating_mul(size.rows + 1)
 }
 
-/// The tiles' columns (or rows) that share a sample's, and its place in each: the
-/// first sample of a tile is the last of the one before.
+/// Returns the tiles' columns (or rows) that share a sample's, and its place in each: the first
+/// sample of a tile is the last of the one before.
 fn shares(sample: usize) -> impl Iterator<Item = (usize, usize)> {
     let (tile, place) = (sample / TILE_CELLS, sample % TILE_CELLS);
     let before = tile.checked_sub(1).filter(|_| place == 0);

@@ -10,7 +10,7 @@ use super::tile::Tile;
 use super::window::Window;
 use crate::grid::Cell;
 
-/// Buffers for a window of `D × D` tiles, and some that go round.
+/// Buffers for a window of `D × D` tiles, and some spare ones.
 pub(crate) fn buffers<const D: usize>() -> Vec<Tile> {
     vec![Tile::VACANT; D * D + 4]
 }
@@ -25,7 +25,7 @@ pub(crate) struct Field<'t, const D: usize> {
 }
 
 impl<'t, const D: usize> Field<'t, D> {
-    /// A field in these buffers with nothing held yet.
+    /// An empty field in these buffers.
     pub(crate) fn over(
         buffers: &'t mut [Tile],
         size: FieldSize,
@@ -45,7 +45,7 @@ impl<'t, const D: usize> Field<'t, D> {
         }
     }
 
-    /// A field with every tile of it held.
+    /// A field with all of its tiles stored.
     pub(crate) fn held(
         buffers: &'t mut [Tile],
         size: FieldSize,
@@ -58,8 +58,8 @@ impl<'t, const D: usize> Field<'t, D> {
         field
     }
 
-    /// A square field of `size` cells, all held, moved by `shift` cells (whole
-    /// tiles) east, north and up; nothing lies west and south of it.
+    /// A square field of `size` cells, all stored, moved by `shift` cells (whole tiles) east, north
+    /// and up, without terrain west and south of it.
     pub(crate) fn shifted(
         buffers: &'t mut [Tile],
         size: i32,
@@ -79,7 +79,7 @@ impl<'t, const D: usize> Field<'t, D> {
         field
     }
 
-    /// Holds the D × D tiles around a cell, as far as they exist.
+    /// Stores the existing ones of the D × D tiles around a cell.
     pub(crate) fn hold_around(&mut self, cell: Cell) {
         let TileIndex { col, row } = TileIndex::holding(cell);
         let reach = D as i32 / 2;
@@ -102,7 +102,7 @@ impl<'t, const D: usize> Field<'t, D> {
         }
     }
 
-    /// Installs a tile; the buffer that returns goes round.
+    /// Installs a tile; the buffer that returns becomes spare.
     pub(crate) fn give_back(&mut self, key: TileKey) {
         let spent = self.install(key);
         self.spare.push(spent);

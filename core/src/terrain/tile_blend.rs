@@ -1,36 +1,37 @@
-//! Largest distance of each tile of a window from the coarse fallback while it blends in.
+//! Maximum distance of each tile of a window from the coarse fallback while it blends in.
 //!
-//! A tile that comes where the fallback was rendered does not take its place at once: each sample
-//! moves from the fallback's height to the tile's at a bounded rate. The sample of a tile that may
-//! be `a` cells away from the fallback is rendered at
+//! A tile that arrives where the fallback was rendered does not replace it at once: each sample
+//! moves from the fallback's height to the tile's at a limited rate. A sample of a tile that may be
+//! `a` cells away from the fallback is rendered at
 //!
 //! ```text
-//! c + (f − c brought within ±a)        c: the fallback's height there, f: the tile's
+//! c + (f − c clamped to ±a)             c: the fallback's height there, f: the tile's
 //! ```
 //!
-//! `a` grows from tick to tick until the tile is the surface as it is. A
-//! sample that several tiles share is that of the tile which may be farthest from the fallback,
-//! and of the fallback where none of them is here. So no border is open, a tile that has settled
-//! is rendered by its own samples alone, and what has not come bends to it along its border.
+//! `a` grows from tick to tick until the tile is rendered unchanged. A sample that several tiles
+//! share is that of the tile with the largest `a`, or that of the fallback if none of them is
+//! stored. So every border is closed, a blended tile is rendered from its own samples alone, and a
+//! missing tile's fallback bends to it along the border.
 //!
-//! In each tick the surface is bilinear in each cell, so the contact is as exact as over any
-//! other field. Where the fallback has no height (beyond it, in its holes, or before it comes) a
-//! tile is the surface at once.
+//! In each tick the surface is bilinear in each cell, so the contact is as exact as on any other
+//! field. Where the fallback has no height (beyond it, in its no-data, or before it arrives) a tile
+//! is the surface at once.
 
 use super::index::{TileIndex, wrap};
 
-/// Speed of the surface from the coarse fallback to an arrived tile, millimetres of the tip
-/// a second. So a force changes by it at most by this times the stiffness: 25 N/s at 0.5 N/mm, where the
-/// guard lets 1,000 N/s through.
+/// Speed of the surface from the coarse fallback to an arrived tile, millimetres of the tip a
+/// second. It changes a force by at most this times the stiffness: 25 N/s at 0.5 N/mm, compared
+/// with the guard's limit of 1,000 N/s.
 pub const SETTLING_MM_S: f32 = 50.0;
 
-/// Largest distance of a window's tiles from the coarse fallback.
+/// Maximum distance of a window's tiles from the coarse fallback.
 pub(super) struct TileBlend<const D: usize> {
-    /// By slot: how far now, and from how far on the tile is the surface as it is; cells.
+    /// For each slot, the present distance, and the distance from which the tile is rendered
+    /// unchanged; cells.
     pub(super) slots: [[Allowance; D]; D],
     /// Number of tiles that blend in.
     pub(super) count: u16,
-    /// True if the surface may have changed otherwise since the last tick.
+    /// True if the surface may have changed for another reason since the last tick.
     pub(super) has_changed: bool,
 }
 
@@ -41,7 +42,7 @@ pub(super) struct Allowance {
 }
 
 impl Allowance {
-    /// Of a slot whose tile does not settle: any.
+    /// Allowance of a slot whose tile does not blend: unlimited.
     const ANY: Self = Self {
         now: f32::INFINITY,
         far: 0.0,
@@ -59,7 +60,7 @@ impl<const D: usize> TileBlend<D> {
         (wrap::<D>(index.row), wrap::<D>(index.col))
     }
 
-    /// The tile in the slot of `index` settles from now on, or does not.
+    /// Starts the blend of the tile in the slot of `index`, or renders it unchanged.
     pub(super) fn begin(&mut self, index: TileIndex, far: Option<f32>) {
         let (row, col) = Self::slot(index);
         let slot = &mut self.slots[row][col];
@@ -79,8 +80,7 @@ impl<const D: usize> TileBlend<D> {
     }
 }
 
-/// A height brought within `allowed` of another; the very height where it is within, and where
-/// the other is none.
+/// Returns a height, clamped to within `allowed` of another; unchanged if the other is NaN.
 pub(super) fn within(height: f32, of: f32, allowed: f32) -> f32 {
     let off = height - of;
     if off > allowed {
@@ -88,7 +88,7 @@ pub(super) fn within(height: f32, of: f32, allowed: f32) -> f32 {
     } else if off < -allowed {
         of - allowed
     } else {
-        // Also where either is no number.
+        // Also if either is NaN.
         height
     }
 }

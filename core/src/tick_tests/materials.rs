@@ -7,7 +7,7 @@ use crate::contact::Friction;
 use crate::force::{MATERIAL_CHANGE_S, Material, MaterialTable, Pattern, Shading, Texture};
 use crate::terrain::TileIndex;
 
-/// Ticks of a whole change.
+/// Ticks of a complete transition.
 const CHANGE: u32 = (1e3 * MATERIAL_CHANGE_S) as u32;
 const SOFT: Material = Material {
     stiffness_n_per_mm: 0.4,
@@ -26,14 +26,14 @@ const GRATING: Texture = Texture {
     ..Texture::NONE
 };
 
-/// A level field of two tiles at height 0, whose samples from column `border` on are of material
-/// 1, fed by points.
+/// A level field of two tiles at height 0 in a replay; its samples from column `border` on have
+/// material 1.
 struct Ground<'t> {
     haptics: Haptics<'t, 2>,
     spare: Vec<&'t mut Tile>,
     border: i32,
     seq: u32,
-    /// Ticks that were run.
+    /// Number of ticks run.
     ticks: u32,
 }
 
@@ -80,7 +80,7 @@ impl<'t> Ground<'t> {
             .extend(self.haptics.accept(Command::Tile(tile)).expect("taken"));
     }
 
-    /// Returns the record at a place, where a missing tile arrives `late` ticks after it is missed.
+    /// Returns the record at a place; a missing tile arrives `late` ticks after its request.
     fn at(&mut self, [x, y, z]: [f32; 3], late: u32) -> TickRecord {
         let seq = self.seq;
         self.seq += 1;
@@ -107,7 +107,7 @@ impl<'t> Ground<'t> {
         panic!("no answer at {x} {y} {z}");
     }
 
-    /// The forces along a way at a depth.
+    /// The forces along a path at a depth.
     fn along(&mut self, xs: impl IntoIterator<Item = f32>, depth: f32) -> Vec<Vec3> {
         xs.into_iter()
             .map(|x| self.at([x, 0.5, -depth], 0).force_n)
@@ -119,7 +119,7 @@ fn tiles() -> Vec<Tile> {
     std::vec![Tile::VACANT; 7]
 }
 
-/// From a place in steps, `count` of them.
+/// `count` places from a place on, in steps.
 fn steps(from: f32, step: f32, count: u32) -> impl Iterator<Item = f32> {
     (0..count).map(move |i| from + step * i as f32)
 }
@@ -141,14 +141,14 @@ fn a_border_is_crossed_without_a_step_and_lies_half_way_between_the_samples() {
         let (begin, border) = (19.5 - 50.5 * step, 19.5);
         ground.at([begin, 0.5, 1.0], 0);
         let depth = 5.0;
-        // Down where the way begins, over the border and on.
+        // Down at the start of the path, over the border and on.
         let forces = ground.along(steps(begin, step, 200), depth);
         let (first, last) = match step > 0.0 {
             true => (SOFT, HARD),
             false => (SOFT, HARD),
         };
         let (from, to) = (first.stiffness_n_per_mm, last.stiffness_n_per_mm);
-        // A way westward begins on what is east of the border.
+        // A path westward starts east of the border.
         assert_eq!(forces[49].z, from * depth, "{step}: before {border}");
         assert!(forces[51].z > from * depth, "{step}: {}", forces[51]);
         assert_eq!(forces[51 + CHANGE as usize].z, to * depth, "{step}");
@@ -187,12 +187,12 @@ fn friction_changes_evenly_and_a_proxy_is_held_by_its_own_material() {
     assert!(forces[70].truncate().length() < 1e-5, "{}", forces[70]);
     let (held, pressed) = (-forces[399].x, forces[399].z);
     assert!((held / pressed - 0.8).abs() < 1e-3, "{held} {pressed}");
-    // The proxy is dragged for the share that came in a tick, and a hand goes 0.02.
+    // The maximum is the change of friction in a tick plus a hand's motion of 0.02 in a tick.
     let most = 0.4 * (depth * 0.8 / CHANGE as f32 + 0.02);
     let largest = largest_step(&forces[1..]);
     assert!(largest < 1.01 * most, "{largest} N, {most} at most");
 
-    // Stuck east of the border, with the HIP pulled over it: the proxy's material holds.
+    // The proxy sticks east of the border while the HIP moves over it: the proxy's material counts.
     let mut tiles = self::tiles();
     let mut ground = Ground::of(&mut tiles, &[SOFT, rough], 20, Shading::None);
     ground.at([20.2, 0.5, 1.0], 0);
@@ -234,9 +234,9 @@ fn a_texture_goes_out_before_another_one_comes_in() {
             let off = forces[from..to].iter().map(|force| (force.z - 0.4).abs());
             off.fold(0.0, f32::max)
         };
-        // The border is crossed with the 476th; 50 ms later nothing of either is rendered.
+        // The 476th tick crosses the border; 50 ms later neither texture is rendered.
         let (before, between, after) = (swing(100, 470), swing(524, 527), swing(700, 900));
-        // An even surface has nothing that would go out first.
+        // A surface without texture has nothing to fade out.
         let goes_out = !table[0].texture.is_none();
         assert!(!goes_out || between < 4e-3, "{table:?}: {between}");
         for (material, rendered) in table.iter().zip([before, after]) {
@@ -251,7 +251,7 @@ fn a_texture_goes_out_before_another_one_comes_in() {
                 "{rendered}"
             );
         }
-        // No more than a wave makes by itself: 2π A / λ times the stiffness and the way.
+        // No more than the wave itself: 2π A / λ times the stiffness and the path.
         let most = 0.4 * 0.02 * core::f32::consts::TAU * 0.1 * 2.0 + 0.04 / 25.0;
         let largest = largest_step(&forces[100..]);
         assert!(largest < most, "{table:?}: {largest} of {most}");
@@ -280,7 +280,7 @@ fn damping_is_that_of_the_material() {
     }
 }
 
-/// Returns the forces of points over a tile's border and one of classes, where tiles arrive late.
+/// Returns the forces of points over the border of a tile and one of classes, with late tiles.
 fn rendered(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) {
     let rough = Material {
         friction: Friction::coulomb(0.5),
@@ -294,7 +294,7 @@ fn rendered(late: u32, border: i32, shading: Shading) -> (Vec<TickRecord>, u32) 
     let way = steps(29.0, 0.02, 300);
     let rendered = way.map(|x| {
         let mut sample = ground.at([x, 0.5, -1.5], late);
-        // The time of a sample and its cost are not part of the force.
+        // The tick number and the cost of a sample are not part of the force.
         (sample.tick, sample.work, sample.missing_tile) = (0, 0, None);
         sample
     });
@@ -313,7 +313,7 @@ fn a_tick_that_is_repeated_for_a_tile_leaves_no_trace() {
     }
 }
 
-/// A replay of a table over a field, whose tiles come when they are asked for.
+/// A replay with a table over a field, whose tiles arrive on request.
 fn replayed<'t, const D: usize>(
     tiles: &'t mut [Tile],
     table: &[Material],
@@ -425,7 +425,7 @@ fn a_scene_whose_table_is_not_here_is_refused() {
         Ok(None)
     ));
     assert_eq!(ground.haptics.scene, Some(scene));
-    // A table that nothing can be done with is none, whatever its sum.
+    // An invalid table is ignored, even with the right check sum.
     for broken in [
         Material {
             stiffness_n_per_mm: f32::NAN,

@@ -6,11 +6,11 @@ use super::*;
 use crate::force::{Pattern, Shading, Texture};
 use crate::terrain::TileIndex;
 
-/// Points at one place, until nothing is known any more of how they came there.
+/// Points at one place, enough to forget the path to it.
 const REST: u32 = 60;
 
-/// Returns the forces of points that move by a fifth of a wave a tick over two tiles, the second of which arrives
-/// `late` ticks after it is asked for; and how many ticks it took.
+/// Returns the forces of points that move by a fifth of a wave a tick over two tiles, the second of
+/// which arrives `late` ticks after its request; and the number of ticks.
 fn rendered(late: u32) -> (Vec<Vec3>, u32) {
     let mut tiles = std::vec![Tile::VACANT; 6];
     let mut spare: Vec<_> = tiles.iter_mut().collect();
@@ -74,7 +74,7 @@ fn a_tile_that_is_waited_for_leaves_no_trace_in_the_texture() {
     let (late, more) = rendered(20);
     assert_eq!(more, ticks + 20);
     assert_eq!(early, late);
-    // All of them at a speed at which a part of the texture is rendered.
+    // All of them at a speed at which the texture is partly rendered.
     let textured = early
         .iter()
         .skip(REST as usize)

@@ -1,19 +1,19 @@
-//! The clutch, and views that are put in while it is open.
+//! The clutch, and changes of the placement while it is open.
 
 use super::*;
 use crate::clutch::ClutchHold::{self, InPlace, LetGo, WithHand};
 use crate::guard::MAX_SLEW_N_PER_S;
 use crate::scene::SceneChange;
 
-/// Most that the force may change in a tick, N.
+/// Maximum change of the force in a tick, N.
 const SLEW_N: f32 = MAX_SLEW_N_PER_S / 1000.0;
-/// Most that it changes in a tick while the clutch moves and the arm stands still: 8.5 N
-/// in 0.1 s, and rounding.
+/// Maximum change of the force in a tick while the clutch moves and the arm stands still: 8.5 N in
+/// 0.1 s, plus rounding.
 const GENTLE_N: f32 = 0.0851;
-/// Counts of the axes for a tip some 5 mm in the plane.
+/// Counts of the axes for a tip some 5 mm deep in the plane.
 const DEEP: [i32; 3] = [0, -170, 0];
 
-/// Watch over every tick: the arm stays armed, and the force makes no step.
+/// A monitor of every tick: the arm stays armed, and the force makes no step.
 struct Watched<'t> {
     device: Device<'t, 4>,
     last: Outcome,
@@ -22,7 +22,7 @@ struct Watched<'t> {
 }
 
 impl<'t> Watched<'t> {
-    /// Armed, and pressed into the ground.
+    /// An armed arm, pressed into the ground.
     fn pressed(tiles: &'t mut [Tile], height: fn(i32, i32) -> f32) -> Self {
         let mut device = Device::<4>::armed(tiles, height);
         let deeper = (0..-DEEP[1]).map(|n| [0, -n, 0]);
@@ -56,7 +56,7 @@ impl<'t> Watched<'t> {
         self.device.say(Command::Clutch(hold));
     }
 
-    /// Puts another view in, which has these heights.
+    /// Applies a new placement, with these heights.
     fn put(&mut self, view: SceneChange, height: fn(i32, i32) -> f32) {
         let scene = view.scene;
         self.device.height = height;
@@ -97,7 +97,7 @@ fn view(number: u8, level: u8, hip: GridPoint) -> SceneChange {
     }
 }
 
-/// A place in cells of half the size.
+/// The same place in cells of half the size.
 fn halved(point: GridPoint) -> GridPoint {
     let [x, y, z] = point.cell();
     let odd = Vec3::new((x & 1) as f32, (y & 1) as f32, (z & 1) as f32);
@@ -117,7 +117,7 @@ fn held_clutch_has_no_force_and_carries_the_terrain() {
     let open = arm.ticks(2);
     assert!(open.limits.contains(Limits::CLUTCH_OPEN));
     assert_eq!(open.force_n, Vec3::ZERO);
-    // The hand goes elsewhere, and the terrain goes with it.
+    // The hand moves, and the terrain follows it.
     for n in 0..200 {
         arm.counts = [n, DEEP[1] + 2 * n, -n];
         assert!(arm.tick().hip.is_same(&open.hip));
@@ -131,13 +131,13 @@ fn held_clutch_has_no_force_and_carries_the_terrain() {
     assert!((back.force_n - rendered.force_n).length() < 1e-3);
     let moved = before.to(&home(&arm));
     assert!(moved.length() > 5.0 && moved.z < -5.0, "{moved}");
-    // From here on it stands still again.
+    // From here on the hand stands still again.
     arm.counts = [199, DEEP[1] + 398 + 60, -199];
     arm.most_n = SLEW_N;
     assert!(arm.tick().hip.to(&open.hip).z < -1.0);
 }
 
-/// Moves the arm there, some counts in each tick.
+/// Moves the arm there, with `counts` in each tick.
 fn go(arm: &mut Watched<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
     let from = arm.counts;
     for n in 1..=ticks {
@@ -154,7 +154,7 @@ fn terrain_stays_while_held_for_another_placement() {
     let rendered = arm.tick();
     arm.clutch(InPlace);
     let open = arm.ticks(105);
-    // The hand gives way, some 2 mm, and then 3 mm to the side.
+    // The hand yields by some 2 mm, and then moves 3 mm to the side.
     go(&mut arm, [60, DEEP[1] - 70, 0], 100);
     assert!(arm.last.sample.hip.is_same(&open.hip));
     // The same ground, twice as large.
@@ -171,7 +171,7 @@ fn terrain_stays_while_held_for_another_placement() {
         "{}",
         deeper.force_n
     );
-    // It is pushed back to where it was.
+    // The arm is pushed back to its earlier place.
     let back = go(&mut arm, DEEP, 300);
     let change = back.force_n - rendered.force_n;
     assert!(
@@ -215,7 +215,7 @@ fn taken_along_once_the_terrain_has_gone_with_the_hand() {
         arm.clutch(LetGo);
         let back = arm.ticks(510).hip;
         assert!(hip.to(&back).length() < 1e-3, "{holds:?}: {back:?}");
-        // The next time begins anew.
+        // The next time starts from zero.
         arm.clutch(InPlace);
         arm.ticks(110);
         go(&mut arm, [0, DEEP[1] + 60, 0], 50);
@@ -234,7 +234,7 @@ fn the_boards_input_opens_the_clutch_and_all_who_hold_it_have_to_let_go() {
     let open = arm.ticks(105);
     let limits = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
     assert_eq!((open.limits, open.force_n), (limits, Vec3::ZERO));
-    // The terrain goes with the hand, whatever the host asks for.
+    // The terrain follows the hand, even if the host requests otherwise.
     arm.clutch(InPlace);
     go(&mut arm, [0, DEEP[1] + 100, 0], 50);
     arm.clutch(LetGo);
@@ -304,8 +304,8 @@ fn placement_keeps_the_depth_and_the_arm_stays_armed() {
     let depth = arm.depth_mm(1.0);
     assert!(depth > 3.0, "{depth}");
     let ticks_before = arm.last.sample.tick;
-    // Half of the samples, and as large in the hand: zoomed out by two. The height is wrong
-    // on purpose: the device computes its own.
+    // Half of the samples, at the same size in the hand: zoomed out by two. The height is wrong
+    // intentionally: the device computes its own.
     let hip = halved(arm.last.sample.hip);
     let [x, y, z] = hip.cell();
     let wrong = GridPoint::new([x, y, z + 9], hip.frac());
@@ -436,7 +436,7 @@ fn no_host_makes_the_force_step() {
         let after = arm.tick().force_n.length();
         given_n += (after - before).max(0.0);
     }
-    // All of it comes in no faster than once in 0.5 s.
+    // The full force returns no faster than once in 0.5 s.
     let most = 7.65 * cases(20_000, 2_000) as f32 / 500.0;
     assert!(given_n <= most, "{given_n} N came in, {most} at most");
 }
@@ -486,7 +486,7 @@ fn points_go_on_in_another_view() {
     device.say(Command::SceneChange(wanted));
     let after = device.step(2, wanted.hip);
     assert_eq!((after.state, after.view), (ContactState::Touching, 1));
-    // As it does on an arm.
+    // The same as on an arm.
     assert!(after.force_n.length() < 0.1 * before.force_n.length());
     let after = (3..40).map(|seq| device.step(seq, wanted.hip)).last();
     let after = after.expect("points");

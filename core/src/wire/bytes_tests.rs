@@ -1,5 +1,5 @@
-//! The bytes of messages, pinned: a type in them may be named or built otherwise,
-//! but what travels stays the same.
+//! The bytes of messages, pinned: a type in a message may get another name or structure, but its
+//! bytes stay the same.
 
 use std::vec::Vec;
 
@@ -27,7 +27,7 @@ fn bytes<T: Serialize>(message: &T) -> Vec<u8> {
     bytes.to_vec()
 }
 
-/// An `f32` as it travels.
+/// An `f32` as bytes on the link.
 fn float(x: f32) -> Vec<u8> {
     x.to_le_bytes().to_vec()
 }
@@ -94,7 +94,7 @@ fn a_scene() {
         float(-45.0),
         std::vec![0xAC, 0x02],
         std::vec![1, 1],
-        // Its materials.
+        // The scene's materials.
         std::vec![1, 0xAC, 0x02],
     ];
     assert_eq!(bytes(&ToDevice::Scene(scene)), wanted.concat());
@@ -127,7 +127,7 @@ fn a_sample() {
         float(0.0),
         float(0.0),
         float(1.0),
-        // View; state; the tile; mode, limits, fault.
+        // Placement, state, tile, mode, limits, fault.
         std::vec![3, 2, 1, 0x01, 0x8C, 0x01, 4, 0x80, 0x01, 1, 13],
         std::vec![0xC8, 0x01, 1, 2, 3],
     ]

@@ -6,23 +6,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::crc::{self, CRC};
 
-/// Longest frame in bytes, its zero included: a tile with materials and what is around it.
+/// Maximum frame length in bytes, with its zero: a tile with materials and the bytes around it.
 pub const MAX_FRAME: usize = 5120;
 
-/// Reason for which a frame was not understood. It is dropped; the link continues.
+/// Reason why a frame was invalid. It is dropped; the link continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FrameError {
-    /// Longer than the reader's buffer.
+    /// The frame is longer than the reader's buffer.
     TooLong,
-    /// Not COBS.
+    /// The bytes are not valid COBS.
     Encoding,
     /// The check sum or the content is wrong.
     Content,
 }
 
-/// Writes `message` as one frame into `buffer`; returns the bytes to send.
-/// `None` when it does not fit.
+/// Writes `message` as one frame into `buffer`; returns the bytes to send, or `None` if it does not
+/// fit.
 pub fn encode<'b, T: Serialize + ?Sized>(message: &T, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
     let cobs = Cobs::try_new(Slice::new(buffer)).ok()?;
     let framing = Framing(CrcModifier::new(cobs, CRC.digest()));
@@ -31,8 +31,8 @@ pub fn encode<'b, T: Serialize + ?Sized>(message: &T, buffer: &'b mut [u8]) -> O
         .map(|frame| &*frame)
 }
 
-/// Check sum and COBS of a frame under way, each once in an image: they would be copied
-/// to every place where a message's number is written.
+/// Check sum and COBS of a frame in progress. Each function is once in an image; otherwise it would
+/// be copied to every place where a message's number is written.
 struct Framing<'b>(CrcModifier<'static, Cobs<Slice<'b>>, u32>);
 
 impl<'b> Flavor for Framing<'b> {
@@ -56,8 +56,8 @@ impl<'b> Flavor for Framing<'b> {
 /// Reads a message from a frame's decoded bytes, check sum included.
 ///
 /// # Errors
-/// [`FrameError::Content`] when the check sum does not fit, or the bytes are no
-/// `T` or more than one.
+/// Returns [`FrameError::Content`] if the check sum is wrong, or if the bytes are not exactly one
+/// `T`.
 pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, FrameError> {
     match crc::take(bytes) {
         Some((message, [])) => Ok(message),
@@ -65,17 +65,17 @@ pub fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, FrameError> 
     }
 }
 
-/// Collects bytes into frames. `N` is the longest frame it takes.
+/// Reader that collects bytes into frames of up to `N` bytes.
 #[derive(Default)]
 pub struct FrameReader<const N: usize> {
     frame: Vec<u8, N>,
     overflowed: bool,
-    /// The frame was given out: the next byte begins another.
+    /// True if the frame was returned: the next byte starts another.
     ended: bool,
 }
 
 impl<const N: usize> FrameReader<N> {
-    /// An empty reader.
+    /// Creates an empty reader.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -85,11 +85,11 @@ impl<const N: usize> FrameReader<N> {
         }
     }
 
-    /// Takes bytes up to and including the end of one frame.
+    /// Reads bytes up to and including the end of one frame.
     ///
-    /// Returns how many bytes were taken and, at a frame's end, its decoded
-    /// bytes (to be read with [`decode`]) or why there are none. Empty frames
-    /// are passed over: a sender may put a zero in front to start clean.
+    /// Returns the number of bytes read and, at a frame's end, its decoded bytes (for [`decode`])
+    /// or an error. Empty frames are ignored: a sender may start with a zero to end earlier
+    /// garbage.
     pub fn push(&mut self, bytes: &[u8]) -> (usize, Option<Result<&[u8], FrameError>>) {
         if self.ended {
             (self.ended, self.overflowed) = (false, false);
@@ -166,7 +166,7 @@ mod tests {
             bad.extend(frame(5));
             let found = frames(&mut FrameReader::new(), &bad);
             let understood: Vec<_> = found.into_iter().flatten().collect();
-            // A flip of the zero itself may swallow the next frame too.
+            // A flip in the zero itself may also destroy the next frame.
             assert!(
                 understood.iter().all(|n| *n == 5),
                 "bit {bit}: {understood:?}"

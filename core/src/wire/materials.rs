@@ -1,4 +1,4 @@
-//! Materials on the link: the table that comes with a scene, and the materials of a tile.
+//! Materials on the link: the table of a scene, and the materials of a tile.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,23 +10,23 @@ use super::tile::TileMessage;
 
 /// Samples of a tile.
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
-/// Bytes of a tile's materials at most: two samples a byte.
+/// Maximum bytes of a tile's materials: two samples per byte.
 pub const MAX_TILE_BYTES: usize = SAMPLES.div_ceil(2);
-/// Bytes of a table at most.
+/// Maximum bytes of a table.
 pub const MAX_TABLE_BYTES: usize = 640;
 
-/// A scene with materials, and their table: so neither comes without the other.
+/// A scene with materials, together with their table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialScene<'a> {
-    /// The scene, which names the table by its check sum ([`Scene::materials`]).
+    /// The scene, which contains the table's check sum ([`Scene::materials`]).
     pub scene: Scene,
-    /// The table as postcard writes it ([`table_bytes`]), at most [`MAX_TABLE_BYTES`].
+    /// The table in postcard's format ([`table_bytes`]), at most [`MAX_TABLE_BYTES`].
     #[serde(borrow)]
     pub table: &'a [u8],
 }
 
 impl MaterialScene<'_> {
-    /// The table, where it is one that can be rendered and the one that the scene names.
+    /// Returns the table, if it is valid and has the scene's check sum.
     #[must_use]
     pub fn table(&self) -> Option<MaterialTable> {
         let (table, rest) = postcard::take_from_bytes::<MaterialTable>(self.table).ok()?;
@@ -35,7 +35,7 @@ impl MaterialScene<'_> {
     }
 }
 
-/// Writes a table as it travels; every table fits.
+/// Writes a table in the link's format; every table fits.
 #[must_use]
 pub fn table_bytes<'b>(table: &MaterialTable, room: &'b mut [u8; MAX_TABLE_BYTES]) -> &'b [u8] {
     match postcard::to_slice(table, room) {
@@ -47,28 +47,29 @@ pub fn table_bytes<'b>(table: &MaterialTable, room: &'b mut [u8; MAX_TABLE_BYTES
 /// A tile of a scene with materials.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialTile<'a> {
-    /// Its heights.
+    /// The tile's heights.
     #[serde(borrow)]
     pub tile: TileMessage<'a>,
-    /// Its materials.
+    /// The tile's materials.
     #[serde(borrow)]
     pub materials: TileMaterials<'a>,
 }
 
-/// Which material of the scene's table each sample of a tile has, by rows from the south.
+/// The material of each sample of a tile, as an index into the scene's table, in rows from the
+/// south.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TileMaterials<'a> {
-    /// All samples have this one.
+    /// All samples have this material.
     One(u8),
-    /// Pairs of bytes: a material, and how many samples more than one in turn have it.
+    /// Pairs of bytes: a material, and the number of consecutive samples that have it, minus one.
     Runs(#[serde(borrow)] &'a [u8]),
-    /// Two samples a byte, the first in the lower half: [`MAX_TILE_BYTES`] bytes, the last
-    /// half of which is zero.
+    /// Two samples per byte, the first in the lower half: [`MAX_TILE_BYTES`] bytes; the last half
+    /// byte is zero.
     Each(#[serde(borrow)] &'a [u8]),
 }
 
 impl<'a> TileMaterials<'a> {
-    /// The materials of a tile's samples, below 16 each, in the form that takes fewest bytes.
+    /// Packs the materials of a tile's samples, each below 16, in the shortest form.
     #[must_use]
     pub fn pack(materials: &[u8; SAMPLES], room: &'a mut [u8; MAX_TILE_BYTES]) -> Self {
         if materials.iter().all(|material| *material == materials[0]) {
@@ -87,11 +88,11 @@ impl<'a> TileMaterials<'a> {
         }
     }
 
-    /// Gives a filled tile these materials of a table of `count`.
+    /// Sets the materials of a filled tile, from a table of `count`.
     ///
     /// # Errors
-    /// [`TileError::Materials`] unless they are those of 33 × 33 samples, and of the table. The
-    /// buffer is left vacant.
+    /// Returns [`TileError::Materials`] unless there are 33 × 33 samples, all in the table. The
+    /// buffer is then vacant.
     pub fn fill(&self, tile: &mut Tile, count: usize) -> Result<(), TileError> {
         match *self {
             Self::One(material) => {
@@ -104,7 +105,7 @@ impl<'a> TileMaterials<'a> {
                     .flat_map(|[material, more]| {
                         core::iter::repeat_n(*material, usize::from(*more) + 1)
                     })
-                    // Half a run is beyond every table.
+                    // An incomplete run gives a material that no table has.
                     .chain(rest.iter().map(|_| u8::MAX));
                 tile.set_materials(count, samples)
             }
@@ -120,11 +121,11 @@ impl<'a> TileMaterials<'a> {
     }
 }
 
-/// Writes runs; how many bytes they take, where that is less than two samples a byte.
+/// Writes runs; returns their number of bytes, if it is less than with two samples per byte.
 fn runs(materials: &[u8; SAMPLES], room: &mut [u8; MAX_TILE_BYTES]) -> Option<usize> {
     let mut length = 0;
     let alike = materials.chunk_by(|one, next| one == next);
-    // A byte counts 256 samples.
+    // A byte counts up to 256 samples.
     for run in alike.flat_map(|run| run.chunks(256)) {
         let pair = room.get_mut(length..length + 2)?;
         let more = u8::try_from(run.len() - 1).ok()?;
@@ -155,7 +156,7 @@ mod tests {
         core::array::from_fn(|i| of(i % TILE_SAMPLES, i / TILE_SAMPLES))
     }
 
-    /// Returns the content of a tile after it was filled.
+    /// Returns the content of a filled tile.
     fn read(tile: &Tile) -> Vec<u8> {
         let at = |i: usize| {
             let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
@@ -185,7 +186,7 @@ mod tests {
             let mut tile = filled();
             assert_eq!(packed.fill(&mut tile, 16), Ok(()));
             assert_eq!(read(&tile), all);
-            // And the table has to have them all.
+            // The table must have all of them.
             let largest = usize::from(*all.iter().max().expect("some"));
             assert_eq!(
                 packed.fill(&mut filled(), largest),

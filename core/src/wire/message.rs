@@ -1,7 +1,7 @@
-//! The table of messages. What each end says when is in [`super`].
+//! The table of messages. [`super`] specifies when each end sends them.
 //!
-//! Each message travels in an [`InSession`](super::session::InSession). Any change to
-//! a type here, or to one it holds, is a new [`PROTOCOL`](super::hello::PROTOCOL).
+//! Each message is in an [`InSession`](super::session::InSession). Any change to a type here, or to
+//! a type in it, requires a new [`PROTOCOL`](super::hello::PROTOCOL).
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -17,65 +17,63 @@ use crate::phantom::Calibration;
 use crate::scene::{HipCommand, Scene, SceneChange, TickRecord};
 use crate::terrain::TileKey;
 
-/// Samples in a telemetry message, at most.
+/// Maximum number of samples in a telemetry message.
 pub const BATCH: usize = 8;
 
 /// Host to device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ToDevice<'a> {
-    /// Opens the session of its frame. Where that is open already it is answered
-    /// again and changes nothing.
+    /// Opens the session of its frame. If that is open already, it is answered again and changes
+    /// nothing.
     Hello(HostHello),
-    /// The scene to render. Starts afresh, unless the device already holds
-    /// this very scene.
+    /// The scene to render. Replaces the present scene, unless it is the same.
     Scene(Scene),
-    /// A tile that was asked for.
+    /// A requested tile.
     #[serde(borrow)]
     Tile(TileMessage<'a>),
     /// A haptic interface point for one tick, in a scene fed by points.
     Hip(HipCommand),
-    /// The host is there. Answered by [`ToHost::Heartbeat`].
+    /// Shows that the host is alive. Answered by [`ToHost::Heartbeat`].
     Heartbeat,
-    /// Asks for something to be done, once.
+    /// Requests an action, to be done once.
     Request {
-        /// Tells requests of a session apart: one more than the last, wrapping.
+        /// Number of the request within a session: one more than the last, wrapping.
         number: u8,
         /// The requested action.
         request: Request,
     },
-    /// Asks for a [`ToHost::Status`].
+    /// Requests a [`ToHost::Status`].
     Status {
-        /// Tells questions apart: one more than the last, wrapping. The answer repeats it.
+        /// Number of the query: one more than the last, wrapping. The answer repeats it.
         number: u8,
     },
-    /// Asks for a [`ToHost::Calibration`].
+    /// Requests a [`ToHost::Calibration`].
     GetCalibration {
-        /// Tells questions apart, as that of [`ToDevice::Status`].
+        /// Number of the query, as in [`ToDevice::Status`].
         number: u8,
     },
-    /// Ends the session: disarms and drops the scene. Answered by
-    /// [`ToHost::Goodbye`] when the amplifiers are off.
+    /// Closes the session: disarms and drops the scene. Answered by [`ToHost::Goodbye`] when the
+    /// amplifiers are off.
     Bye,
-    /// The host has heard the goodbye and is gone. The emulated board ends its
+    /// Reports that the host received the goodbye and leaves. The emulated board then ends its
     /// program.
     Close,
-    /// Ends the session and leaves the arm and the scene as they are: the host has only
-    /// looked. Answered by [`ToHost::Detached`].
+    /// Closes the session without a change to arm or scene: the host has only read. Answered by
+    /// [`ToHost::Detached`].
     Detach,
-    /// Another view of the scene in force, while the clutch is open
-    /// ([`Request::Clutch`]): the arm stays armed. Answered by [`ToHost::SceneAck`] with
-    /// the epoch of the view's scene.
+    /// A new placement of the present scene, while the clutch is open ([`Request::Clutch`]): the
+    /// arm stays armed. Answered by [`ToHost::SceneAck`] with the epoch of the new scene.
     SceneChange(SceneChange),
-    /// As [`Self::Scene`], of a scene with materials.
+    /// The same as [`Self::Scene`], for a scene with materials.
     #[serde(borrow)]
     MaterialScene(MaterialScene<'a>),
-    /// As [`Self::Tile`], of a scene with materials.
+    /// The same as [`Self::Tile`], for a scene with materials.
     #[serde(borrow)]
     MaterialTile(MaterialTile<'a>),
 }
 
 /// Device to host.
-// Made on the stack, written out and dropped; there is no heap to box it on.
+// Built on the stack, written and dropped; there is no heap for a box.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ToHost {
@@ -85,17 +83,17 @@ pub enum ToHost {
     SceneAck {
         /// The scene's epoch.
         epoch: u32,
-        /// True if the scene was valid and is now in force.
+        /// True if the scene was valid and is now used.
         accepted: bool,
     },
-    /// Asks for a tile.
+    /// Requests a tile.
     TileRequest {
-        /// The scene it belongs to.
+        /// The epoch of the tile's scene.
         epoch: u32,
-        /// Which tile.
+        /// The tile's key.
         key: TileKey,
     },
-    /// Samples, tick by tick.
+    /// Samples of consecutive ticks.
     Telemetry(Telemetry),
     /// Answers one point.
     PointAnswer {
@@ -104,65 +102,62 @@ pub enum ToHost {
         /// The tick's sample.
         sample: TickRecord,
     },
-    /// The state of the guard; sent at the beginning of a session and whenever
-    /// it changes.
+    /// The state of the guard; sent at the start of a session and on every change.
     Guard(Report),
     /// Answers [`ToDevice::Status`].
     Status {
-        /// The question's number.
+        /// The query's number.
         number: u8,
         /// Status of the device.
         status: Status,
     },
     /// Answers [`ToDevice::GetCalibration`].
     Calibration {
-        /// The question's number.
+        /// The query's number.
         number: u8,
-        /// The calibration in force, if there is one.
+        /// The present calibration, if there is one.
         calibration: Option<Calibration>,
     },
     /// Answers a request.
     Answer(Answer),
     /// Answers [`ToDevice::Heartbeat`].
     Heartbeat {
-        /// The samples of this session that were sent before this message.
+        /// Number of samples of this session sent before this message.
         count: SampleCount,
-        /// Epoch of the scene that the device holds, if any.
+        /// Epoch of the scene that the device stores, if any.
         epoch: Option<u32>,
-        /// The state of the guard, so that a lost [`ToHost::Guard`] does not leave
-        /// the host with an old one.
+        /// The state of the guard, in case a [`ToHost::Guard`] was lost.
         report: Report,
     },
-    /// Answers [`ToDevice::Bye`]: the amplifiers are off, nothing follows, and these
-    /// were the session's samples.
+    /// Answers [`ToDevice::Bye`]: the amplifiers are off, nothing follows, and this is the number
+    /// of the session's samples.
     Goodbye(SampleCount),
-    /// Answers [`ToDevice::Detach`]: the session is over.
+    /// Answers [`ToDevice::Detach`]: the session is closed.
     Detached,
-    /// Answers a hello of a session that is over and opens no more.
+    /// Answers a hello of a closed session, which cannot be opened again.
     SessionClosed {
-        /// The number of the hello that this answers.
+        /// The number of the answered hello.
         number: u8,
-        /// Reason: [`SessionEnd::Replaced`] where another session was opened since,
-        /// [`SessionEnd::HostSilent`] where none was.
+        /// Reason: [`SessionEnd::Replaced`] if another session was opened since then,
+        /// [`SessionEnd::HostSilent`] if not.
         end: SessionEnd,
     },
     /// Answers [`Request::Mark`].
     Marked {
         /// The request's number.
         number: u8,
-        /// The tick that was marked ([`TickRecord::tick`]).
+        /// The marked tick ([`TickRecord::tick`]).
         tick: u32,
     },
 }
 
-/// A run of samples. Numbers are consecutive over the session, so a gap
-/// between messages is loss on the link.
+/// Consecutive samples. They are numbered over the session, so a gap between messages shows a loss
+/// on the link.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Telemetry {
     /// Number of the first sample.
     pub first: u32,
-    /// Samples of this session that the device itself dropped because the
-    /// link was slow.
+    /// Samples of this session that the device dropped because the link was slow.
     pub dropped: u32,
     /// The samples.
     pub samples: Vec<TickRecord, BATCH>,

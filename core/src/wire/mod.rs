@@ -1,5 +1,5 @@
-//! The link between device and host: one table of
-//! messages, one framing. This page is the specification of the conversation.
+//! The link between device and host: one table of messages, one framing. This page is the
+//! specification of the protocol.
 //!
 //! # Frames
 //!
@@ -7,11 +7,10 @@
 //! little-endian), COBS-encoded, and ended by a zero byte. A reader that joins
 //! in the middle, or meets garbage, finds the next frame at the next zero.
 //!
-//! A frame holds an [`InSession`](session::InSession): the number of a session and a
-//! message. What belongs to another session is not heard, except
-//! [`ToDevice::Hello`](message::ToDevice::Hello), which opens one. The only other
-//! frames are those with which two versions tell each other apart:
-//! [`version`].
+//! A frame contains an [`InSession`](session::InSession): the number of a session and a message.
+//! Messages of other sessions are ignored, except [`ToDevice::Hello`](message::ToDevice::Hello),
+//! which opens a session. The only other frames are those with which two protocol versions detect
+//! each other: [`version`].
 //!
 //! ```
 //! use hapterra_core::wire::frame::{FrameReader, MAX_FRAME, decode, encode};
@@ -29,106 +28,106 @@
 //! assert_eq!((taken, decode(content)), (frame.len(), Ok(alive)));
 //! ```
 //!
-//! The line may lose, damage, delay, repeat and reorder frames. Every message is
-//! therefore either repeated until it is answered, or makes no difference when it is
-//! lost (telemetry, which is counted) or comes twice.
+//! The line may lose, damage, delay, repeat and reorder frames. So a message is either repeated
+//! until it is answered, or does no harm if it is lost (telemetry, which is counted) or arrives
+//! twice.
 //!
 //! # The host
 //!
-//! | state | says | leaves it when | gives up |
+//! | state | sends | exit | time-out |
 //! | --- | --- | --- | --- |
 //! | closed | nothing | a command to open: greeting | |
-//! | greeting | a version check and hello, every 0.4 s | the device's hello comes: scene sent, or open where there is no scene. A refusal that names another protocol: an error | after 4 s, whatever else is heard |
-//! | scene sent | the scene, every 0.4 s; after 0.75 s without an answer hello, too | the scene is taken: open. It is refused: an error | after 4 s, whatever else is heard |
-//! | open | alive, every 0.5 s of its own or of the device's time; its request, its questions, every 0.4 s; tiles and points; after 0.75 s without an answer hello, every 0.4 s | it is told to leave: leaving. A hello of a device that was restarted (another hello opened the session) or holds another scene: scene sent | after 4 s without an answer; after 1.5 s where frames of another session come meanwhile: another host has taken the device |
-//! | leaving | hello and bye, every 0.4 s; answers requests for tiles no more | goodbye comes: close is sent once, and it is closed | after 3 s: an error reports that the board may be armed |
-//! | detaching | hello and detach, every 0.4 s | detached comes: closed | after 3 s |
+//! | greeting | a version check and a hello, every 0.4 s | the device's hello: scene sent, or open if there is no scene. A refusal with another protocol: an error | after 4 s, even if other frames arrive |
+//! | scene sent | the scene, every 0.4 s; after 0.75 s without an answer also a hello | the scene is accepted: open. It is refused: an error | after 4 s, even if other frames arrive |
+//! | open | a heartbeat, every 0.5 s of its own or of the device's time; its request and its queries, every 0.4 s; tiles and points; after 0.75 s without an answer a hello, every 0.4 s | a command to leave: leaving. A hello of a device that was restarted (another hello opened the session) or stores another scene: scene sent | after 4 s without an answer; after 1.5 s if frames of another session arrive meanwhile: another host uses the device |
+//! | leaving | a hello and a bye, every 0.4 s; answers no more requests for tiles | goodbye: sends close once and is closed | after 3 s: an error reports that the board may be armed |
+//! | detaching | a hello and a detach, every 0.4 s | detached: closed | after 3 s |
 //!
-//! A host that has put no scene in force and asked for nothing that drives leaves by
-//! detaching: what another host left is none of its business.
+//! A host that has sent no scene and requested nothing that drives leaves by detaching: it does not
+//! change what another host left.
 //!
-//! A session that is over on the device is none any more, whatever its host believes. A
-//! host gets that in answer to its hello (over), and heeds that only in its own session
-//! and only to its last hello: what comes late of an earlier session, or from before a
-//! restart of the device, says nothing about the present one. Where another session was
-//! opened since, another host has taken the device: an error at once, in each state but
-//! detaching, which is closed. Where the device has let go the arm of a host that was
-//! silent, the host continues in a new session; one that leaves waits for its goodbye.
+//! A session that the device has closed stays closed, even if its host does not know. The host
+//! receives a session-closed message in answer to its hello. It accepts that only for its own
+//! session and its last hello: a late message from an earlier session, or from before a restart of
+//! the device, is not about the present one. If another session was opened since then, another host
+//! uses the device: an error at once in every state except detaching, which becomes closed. If the
+//! device disarmed because the host was silent, the host continues in a new session; a host that
+//! leaves waits for its goodbye.
 //!
-//! An answer is a frame of this session that answers a message of the host:
-//! hello, scene taken, point answer, answer, marked, status, calibration, alive, goodbye,
-//! detached, over.
-//! Telemetry is none, because it also comes where the device hears nothing.
-//! The times are those for a board in real time.
+//! An answer is a frame of this session that answers a message of the host: hello, scene
+//! acknowledgement, point answer, answer, marked, status, calibration, heartbeat, goodbye,
+//! detached, session closed. Telemetry is not an answer, because it also arrives if the device
+//! receives nothing. The times are for a board in real time.
 //!
-//! One request is under way at a time; the next waits for its answer. A request that
-//! is not answered in 4 s (and 10 s more for a press, where it is to store), while
-//! other answers come, is given up and reported; where it
-//! was to arm, a request to disarm follows, which makes the device ignore the first
-//! should it still arrive.
+//! Only one request is active at a time; the next waits for its answer. If a request is not
+//! answered in 4 s (plus 10 s for a press before storing) while other answers arrive, it is
+//! cancelled and reported. If it was an arm request, a disarm request follows, so that the device
+//! ignores the first one if it still arrives.
 //!
-//! A mark ([`Request::Mark`](request::Request::Mark)) is answered by the tick that was marked
-//! ([`ToHost::Marked`](message::ToHost::Marked)) when its pulse is over, or by a refusal.
+//! The answer to a mark ([`Request::Mark`](request::Request::Mark)) is the marked tick
+//! ([`ToHost::Marked`](message::ToHost::Marked)) after its pulse, or a refusal.
 //!
-//! Questions, for status and calibration, are repeated in the same way. They have numbers
-//! of their own, which their answers repeat: a host takes the answer to its present
-//! question only. One that comes late, to a question before, tells what was.
+//! Queries, for status and calibration, are repeated in the same way. They have their own numbers,
+//! which the answers repeat: a host accepts only the answer to its present query. A late answer to
+//! an earlier query is outdated.
 //!
-//! A host that continues over a new line draws a new number, unless the last one was
-//! never answered. The device's hello tells what became of the session before, and
-//! how many samples that had: loss at its end is counted, too.
+//! A host that continues over a new line draws a new session number, unless the last one was never
+//! answered. The device's hello reports the end of the previous session and the number of its
+//! samples, so that a loss at its end is also counted.
 //!
 //! # The device
 //!
-//! | state | hears | leaves it when |
+//! | state | accepts | exit |
 //! | --- | --- | --- |
-//! | closed | hello | hello comes: open |
-//! | open | everything | bye: leaving. Detach: detached, which is answered. `silence_s` without a frame of this session while armed, or being armed: ended, after a command to disarm. Hello of another session: open, replaced |
-//! | leaving | alive, status, calibration, bye | the amplifiers are off and the telemetry has left: it says goodbye and is ended. Hello of another session: open |
-//! | detached | detach: answered by detached; bye | bye: leaving. `silence_s` while armed, as when open: ended, after a command to disarm. Hello of another session: open |
+//! | closed | hello | hello: open |
+//! | open | everything | bye: leaving. Detach: detached, which is answered. `silence_s` without a frame of this session while armed, or during arming: ended, after a command to disarm. Hello of another session: open, replaced |
+//! | leaving | heartbeat, status, calibration, bye | the amplifiers are off and the telemetry is sent: it sends goodbye and is ended. Hello of another session: open |
+//! | detached | detach: answered by detached; bye | bye: leaving. `silence_s` while armed, as in open: ended, after a command to disarm. Hello of another session: open |
 //! | ended | bye: answered by goodbye; detach: answered by detached; close: the emulated board ends its program | hello of another session: open |
 //!
-//! - A hello of the session that is open is answered and changes nothing. A hello of a
-//!   session that is ended, or of the eight before the present one, is stale: it opens
-//!   none. It is answered by over where another session was opened since, or where the
-//!   host was silent for too long. A host that has left hears goodbye, or detached,
-//!   instead. Nothing else of such a session is answered, and no host answers over: it
-//!   comes once for each hello.
-//! - A hello that names no time for silence, of a session that is not open, opens none:
-//!   its host only looks. It is answered, and so are its questions for status and
-//!   calibration, in its own session's number; the last such host is known. A host that reads
-//!   takes no arm from its host, and keeps none armed whose host is gone.
-//! - The session before, of which a hello tells, is the last one that was not detached.
-//!   Who looks does not hide what became of it.
-//! - What waits for a press of the dead-man switch (an arm command before anything is
-//!   driven, a calibration to be stored) ends after 2 s without a frame of the session:
-//!   its host is not there to see what the press does.
-//! - The tiles of a scene's fallback are asked for before the others, and by keys of their own
-//!   ([`Fallback::keys`](crate::terrain::Fallback::keys)); each view brings its own.
-//! - A scene with materials comes with their table
-//!   ([`ToDevice::MaterialScene`](message::ToDevice::MaterialScene)), and is refused where the table is not the one
-//!   that the scene names, or is none that can be rendered. Each of its tiles comes with materials
-//!   ([`ToDevice::MaterialTile`](message::ToDevice::MaterialTile)), and its fallback without; any other is a bad frame. Its
-//!   views keep the table, or have none.
-//! - A new session keeps the scene and every tile that is held; samples and requests
-//!   are numbered anew. Where the arm was being armed but nothing is driven yet, that
-//!   is ended: the new host has to ask itself. So it is where its host detaches.
-//! - Each request is done once. The number of the last one again: it is answered again,
-//!   or is still under way. An older number (by less than 128, wrapping) is not heard.
-//!   To arm is answered when the loop has decided, to store when it is stored.
-//! - Another view of the scene in force ([`ToDevice::SceneChange`](message::ToDevice::SceneChange)) is put in
-//!   only while no force is rendered: with the clutch held ([`Request::Clutch`](request::Request::Clutch)) and
-//!   open, as a sample of the view in force says; in a replay between two points. It is answered as a scene is, also where
-//!   it is refused, and nothing is disarmed. The host says it every 0.4 s until it is answered, and gives
-//!   it up after 4 s. A number that is not newer (by less than 128, wrapping) than that of the view in force is
-//!   not heard, but for the same view again. A clutch is let go when its session ends. The board's clutch input
-//!   (the limit [`CLUTCH_INPUT`](crate::guard::Limits::CLUTCH_INPUT)) opens the clutch, too, and lets no view in by itself.
-//! - While its time stands still (an emulated board in lock-step), what the device has
-//!   requested and not got is requested again after two messages alive.
+//! - A hello of the open session is answered and changes nothing. A hello of an ended session, or
+//!   of the eight sessions before the present one, is stale: it opens none. The answer is session
+//!   closed, if another session was opened since then or if the host was silent for too long. A
+//!   host that has left receives goodbye or detached instead. Nothing else of such a session is
+//!   answered. No host answers session closed: it is sent once for each hello.
+//! - A hello with a silence time of zero, of a session that is not open, opens none: its host only
+//!   reads. The hello is answered, and so are its queries for status and calibration, with the
+//!   number of its own session; the device stores the last such host. A host that only reads does
+//!   not take an arm from its host, and does not keep an arm armed whose host has gone.
+//! - The previous session in a hello is the last one that was not detached. A host that only reads
+//!   does not hide its end.
+//! - A wait for a press of the dead-man switch (an arm command before anything is driven, a
+//!   calibration to be stored) ends after 2 s without a frame of the session: its host could not
+//!   observe the effect of the press.
+//! - The tiles of a scene's fallback are requested before the others, by their own keys
+//!   ([`Fallback::keys`](crate::terrain::Fallback::keys)); each new placement has its own fallback.
+//! - A scene with materials is sent with their table
+//!   ([`ToDevice::MaterialScene`](message::ToDevice::MaterialScene)), and is refused if the table
+//!   is invalid or does not have the scene's check sum. Each of its tiles has materials
+//!   ([`ToDevice::MaterialTile`](message::ToDevice::MaterialTile)), and its fallback has none; any
+//!   other tile is a bad frame. A new placement keeps the table, or has none.
+//! - A new session keeps the scene and every stored tile; the numbers of samples and requests start
+//!   again. If arming was in progress but nothing was driven yet, it is cancelled: the new host
+//!   must request it again. The same happens when its host detaches.
+//! - Each request is done once. A repeated number of the last request is answered again, unless the
+//!   request is still active. An older number (by less than 128, wrapping) is ignored. An arm
+//!   request is answered when the loop has decided, a store request when the calibration is stored.
+//! - A new placement of the present scene
+//!   ([`ToDevice::SceneChange`](message::ToDevice::SceneChange)) is applied only while no force is
+//!   rendered: with the clutch held ([`Request::Clutch`](request::Request::Clutch)) and open, as a
+//!   sample of the present scene shows; in a replay, between two points. It is answered like a
+//!   scene, also if it is refused, and nothing is disarmed. The host repeats it every 0.4 s until
+//!   it is answered, and cancels it after 4 s. A number that is not newer (by less than 128,
+//!   wrapping) than the present one is ignored, except for a repetition of the same placement. A
+//!   clutch is released at the end of its session. The board's clutch input (the limit
+//!   [`CLUTCH_INPUT`](crate::guard::Limits::CLUTCH_INPUT)) also opens the clutch, but does not
+//!   permit a new placement by itself.
+//! - While the device's time does not advance (an emulated board in lock-step), it repeats
+//!   unanswered requests after two heartbeats.
 //!
-//! Nothing is driven before the host has asked for it
-//! ([`Request::Arm`](request::Request::Arm)) and the dead-man switch was pressed after
-//! that; the remaining blockers are in [`ToHost::Guard`](message::ToHost::Guard).
+//! Nothing is driven before the host has requested it ([`Request::Arm`](request::Request::Arm)) and
+//! the dead-man switch was pressed after that; [`ToHost::Guard`](message::ToHost::Guard) has the
+//! remaining blockers.
 
 pub mod frame;
 pub mod hello;

@@ -7,19 +7,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::guard::GuardInputs;
 
-/// Plant to board: what the encoders and switches say at a tick.
+/// Message from plant to board: the state of encoders and switches at a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sensed {
-    /// The tick this is for.
+    /// Number of the tick.
     pub tick: u32,
     /// Encoders and switches.
     pub sense: GuardInputs,
 }
 
-/// Board to plant: what the amplifiers were given in a tick.
+/// Message from board to plant: the commands of the amplifiers in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Currents {
-    /// The tick these currents came from.
+    /// The tick of these currents.
     pub tick: u32,
     /// Motor currents of the three axes, amperes.
     pub currents_a: [f32; 3],

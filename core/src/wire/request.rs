@@ -1,9 +1,7 @@
-//! Requests of a host and their answers: each is done once, however
-//! often it is asked.
+//! Requests of a host and their answers: each request is done once, even if it is repeated.
 //!
-//! A request travels in [`ToDevice::Request`](super::message::ToDevice::Request)
-//! under a number that counts up from request to request, wrapping. The host
-//! repeats it under that number until it is answered.
+//! A request is sent in [`ToDevice::Request`](super::message::ToDevice::Request) with a number that
+//! counts requests, wrapping. The host repeats it with the same number until it is answered.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,77 +9,74 @@ use crate::clutch::ClutchHold;
 use crate::guard::{Blockers, Fault, Jog};
 use crate::phantom::{Calibration, CalibrationError};
 
-/// Request of a host to a device. New kinds go to the end.
+/// Request of a host to a device. New variants must be the last.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-// It is made on the stack and taken apart there; there is no heap to box it on.
+// Built and consumed on the stack; there is no heap for a box.
 #[allow(clippy::large_enum_variant)]
 pub enum Request {
-    /// To arm: once nothing blocks it, the dead-man switch has to be let go and
-    /// pressed. Answered when it is known whether anything blocks it.
+    /// Arms: once nothing blocks it, the dead-man switch must be released and pressed. Answered
+    /// when the blockers are known.
     Arm,
-    /// To disarm; force goes out gently.
+    /// Disarms after a fade-out of the force.
     Disarm,
-    /// To take what the encoders read in the zero pose of the calibration.
+    /// Sets the encoder counts of the calibration's zero pose.
     Zero {
         /// Counts of axes 1 to 3.
         counts: [i32; 3],
     },
-    /// To put a calibration in force. Only while disarmed.
+    /// Sets the calibration. Only while disarmed.
     SetCalibration {
         /// The record.
         calibration: Calibration,
     },
-    /// To store the calibration in force in the device's memory, once the user has
-    /// pressed the dead-man switch, which no host can. Only while disarmed. Answered when
-    /// it is stored.
+    /// Stores the present calibration in the device's memory after a press of the dead-man switch,
+    /// which no host can replace. Only while disarmed. Answered when it is stored.
     StoreCalibration,
-    /// To clear a latched fault: the one that the user has seen. Another one, which came
-    /// after what the user was shown, stays ([`Refusal::Blocked`]). Its field is none where
-    /// no fault was shown; it then clears none.
+    /// Clears the latched fault that the user has seen. A later fault stays ([`Refusal::Blocked`]).
+    /// `None`, if no fault was shown, clears none.
     ClearFault {
         /// The fault that was shown.
         seen: Option<Fault>,
     },
-    /// To drop the scene: disarms, and force goes out gently.
+    /// Drops the scene: disarms after a fade-out of the force.
     DropScene,
-    /// To enter the loader in the chip's ROM, for an update. Only while disarmed.
-    /// The device answers and is gone; it does nothing else that is asked for then.
+    /// Enters the loader in the chip's ROM, for an update. Only while disarmed. The device answers
+    /// and then leaves; it handles no later request.
     EnterLoader,
-    /// To drop the scene and to arm for a jog. Only while disarmed. Answered as
-    /// [`Request::Arm`] is.
+    /// Drops the scene and arms for a jog. Only while disarmed. Answered like [`Request::Arm`].
     Jog(Jog),
-    /// To hold the outputs at these shares of full scale, -1 to 1, with the amplifiers
-    /// off, or no longer. Only while disarmed and without a fault; it ends by itself
+    /// Holds the outputs at these shares of full scale, -1 to 1, with the amplifiers off, or ends
+    /// the hold. Only while disarmed and without a fault; it ends automatically
     /// ([`HOLD_S`](crate::guard::HOLD_S)).
     HoldOutputs(Option<[f32; 3]>),
-    /// To hold the clutch, or to let it go: while it is held there is no force, and another
-    /// view may be put in. It is let go when the session ends.
+    /// Holds or releases the clutch: while it is held there is no force, and the placement may
+    /// change. It is released when the session ends.
     Clutch {
-        /// Its use from now on.
+        /// Use of the clutch from now on.
         hold: ClutchHold,
     },
-    /// To mark a tick: the board's mark pin is high for
+    /// Marks a tick: the board's mark pin is high for
     /// [`MARK_PULSE_MS`](crate::scene::MARK_PULSE_MS) from the end of that tick on. Answered by
     /// [`ToHost::Marked`](super::message::ToHost::Marked) when the pin may rise again.
     Mark,
 }
 
-/// Reason for which a request was refused. Nothing was touched.
+/// Reason why a request was refused. Nothing was changed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 pub enum Refusal {
     /// The arm cannot be armed.
     #[error("the arm cannot be armed")]
     Blocked(Blockers),
-    /// Not while the arm is armed or being armed.
+    /// The arm is armed or being armed.
     #[error("not while the arm is armed or being armed: disarm first")]
     NotWhileArmed,
-    /// The calibration has a number that cannot be worked with.
+    /// The calibration has an invalid number.
     #[error("the calibration cannot be used: {0}")]
     Calibration(CalibrationError),
-    /// There is no calibration to do this with.
+    /// There is no calibration for this request.
     #[error("there is no calibration")]
     NoCalibration,
-    /// The device has no memory to store a calibration in.
+    /// The device has no memory for a calibration.
     #[error("this device has no memory to store a calibration in")]
     NoMemory,
     /// The device's memory failed.
@@ -95,7 +90,7 @@ pub enum Refusal {
     /// [`PRESS_MS`]: super::status::PRESS_MS
     #[error("the dead-man switch was not pressed: the calibration is in use but not stored")]
     NotPressed,
-    /// The device's memory has no room left; it makes room when it starts.
+    /// The device's memory is full; the device frees memory at its start.
     #[error(
         "the device's memory is full until it is started again: the calibration is in force but not stored"
     )]
@@ -103,7 +98,7 @@ pub enum Refusal {
     /// The device has no loader to enter.
     #[error("this device has no loader in a ROM")]
     NoLoader,
-    /// A jog with more current or time than a jog may have, or of no axis.
+    /// A jog with too much current or time, or without a valid axis.
     #[error("the jog exceeds the largest current or time, or the axis does not exist")]
     NoSuchJog,
 }

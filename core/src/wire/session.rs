@@ -1,31 +1,30 @@
-//! Sessions: which conversation a frame belongs to, how a session ended, and how
-//! many of its samples there were.
+//! Sessions: the session of a frame, its end, and the number of its samples.
 
 use serde::{Deserialize, Serialize};
 
-/// A session's number. The host draws it at random for each session, so that what is
-/// left on the line of one session is not taken for part of another.
+/// A session's number. The host draws it at random for each session, so that late frames of one
+/// session are not taken for frames of another.
 ///
-/// No number is below 128: its first byte on the wire has its highest bit set, which
-/// tells a frame of a session from a [`VersionCheck`](super::version::VersionCheck).
+/// No number is below 128: its first byte on the wire has its highest bit set, which distinguishes
+/// a frame of a session from a [`VersionCheck`](super::version::VersionCheck).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct SessionNumber(u32);
 
 impl SessionNumber {
-    /// A number from 32 random bits, of which 31 count.
+    /// Creates a number from 32 random bits, of which 31 count.
     #[must_use]
     pub const fn new(random: u32) -> Self {
         Self(random | 0x80)
     }
 
-    /// The number.
+    /// Returns the number.
     #[must_use]
     pub const fn get(self) -> u32 {
         self.0
     }
 }
 
-/// Content of a frame of the link: a message and the session that it belongs to.
+/// Content of a frame of the link: a message and its session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InSession<M> {
     /// The session.
@@ -37,9 +36,9 @@ pub struct InSession<M> {
 /// Number of samples in a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleCount {
-    /// Number of samples that were put into messages and given to the line.
+    /// Number of samples that were put into messages and sent.
     pub sent: u32,
-    /// Samples that the device itself dropped because the line was slow.
+    /// Number of samples that the device dropped because the line was slow.
     pub dropped: u32,
 }
 
@@ -47,36 +46,35 @@ pub struct SampleCount {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SessionEnd {
-    /// There was no session since the device started.
+    /// There has been no session since the start of the device.
     #[default]
     None,
     /// The host closed the session: the arm was disarmed.
     Goodbye,
-    /// Another session was opened. The device continued with what it held.
+    /// Another session was opened. The device kept its state.
     Replaced,
-    /// The host was silent for too long: the force was let out and the arm disarmed.
+    /// The host was silent for too long: the force was faded out and the arm disarmed.
     HostSilent,
 }
 
-/// The session before the present one, not counting those that were detached
-/// ([`ToDevice::Detach`](super::message::ToDevice::Detach)): a host that only looked does
-/// not hide what became of the session before it.
+/// The previous session, without those that were detached
+/// ([`ToDevice::Detach`](super::message::ToDevice::Detach)): a host that only read does not hide
+/// the end of the session before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LastSession {
-    /// Its number; zero where there was none.
+    /// The session's number; zero if there was none.
     pub session: u32,
     /// The number of the hello that opened it.
     pub opened_by: u8,
-    /// Its end.
+    /// The session's end.
     pub end: SessionEnd,
-    /// Its samples.
+    /// The number of the session's samples.
     pub count: SampleCount,
 }
 
-/// Bounds of the time for which a host may be silent while the arm is armed, seconds.
+/// Minimum and maximum time for which a host may be silent while the arm is armed, seconds.
 pub const SILENCE_S: (u16, u16) = (5, 3_600);
-/// Session number of a host that only looks: it opens no session, and is no host
-/// whose silence ends anything.
+/// Silence time of a host that only reads: it opens no session, and its silence ends nothing.
 pub const ONLY_LOOKS: u16 = 0;
-/// The time of a session whose host states none, seconds.
+/// The silence time of a session whose host states none, seconds.
 pub const DEFAULT_SILENCE_S: u16 = 180;

@@ -1,5 +1,4 @@
-//! A device's report about itself: how it booted, the state of its guard, what
-//! it measures.
+//! A device's status: its start, the state of its guard, its measurements.
 
 use heapless::String;
 use serde::{Deserialize, Serialize};
@@ -13,22 +12,22 @@ use crate::scene::Health;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetCause {
-    /// The chip does not say, or there is no chip.
+    /// The chip does not report it, or there is no chip.
     #[default]
     Unknown,
-    /// Power came up.
+    /// The power was switched on.
     PowerOn,
     /// The reset button, or a debug probe.
     Pin,
-    /// The program asked for it.
+    /// The program requested it.
     Software,
     /// A watchdog was not fed.
     Watchdog,
-    /// The supply was too low for a moment.
+    /// The supply voltage was too low for a moment.
     BrownOut,
 }
 
-/// Kind of end of the program.
+/// Kind of a crash of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -39,60 +38,59 @@ pub enum CrashKind {
     HardFault = 2,
     /// An interrupt without a handler; its number is `status`.
     UnhandledInterrupt = 3,
-    /// The stack ran into what guards its end; `pc` is zero where no stack was left to
-    /// keep it.
+    /// The stack reached the guard at its end; `pc` is zero if no stack was left to store it.
     StackOverflow = 4,
-    /// The supply fell below what the chip watches it for.
+    /// The supply voltage fell below the chip's monitored level.
     SupplyLow = 5,
 }
 
-/// Bytes of a file's name that a crash keeps: its end.
+/// Number of stored bytes of a file's name in a crash: its end.
 pub const CRASH_FILE: usize = 24;
 
-/// End of the program before the board was reset.
+/// Crash of the program before the board was reset.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crash {
-    /// Its kind.
+    /// The crash's kind.
     pub kind: CrashKind,
-    /// Address of the instruction; zero where it is not known.
+    /// Address of the instruction; zero if it is unknown.
     pub pc: u32,
-    /// Return address at that moment; zero where it is not known.
+    /// Return address at that moment; zero if it is unknown.
     pub lr: u32,
     /// The chip's fault status (CFSR of a Cortex-M), or an interrupt's number.
     pub status: u32,
-    /// Line of the source file; zero where there is none.
+    /// Line of the source file; zero if there is none.
     pub line: u32,
-    /// Ticks since that program had started.
+    /// Ticks since the start of that program.
     pub tick: u32,
     /// End of the source file's path.
     pub file: String<CRASH_FILE>,
 }
 
-/// Findings of the board at its start.
+/// The board's report about its start.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BootReport {
     /// Cause of the start.
     pub cause: ResetCause,
-    /// End of the program before, if it crashed.
+    /// Crash of the previous program, if any.
     pub crash: Option<Crash>,
-    /// Supply below which the chip holds itself in reset, as its option bytes have it,
-    /// millivolts; zero where no chip reports it.
+    /// Supply voltage below which the chip holds itself in reset, from its option bytes,
+    /// millivolts; zero if no chip reports it.
     pub resets_below_mv: u16,
 }
 
-/// The lowest [`BootReport::resets_below_mv`] that a board should have, millivolts: the
-/// highest level of each chip is above it, and all others are below.
+/// Minimum of [`BootReport::resets_below_mv`] for a board, millivolts: the highest level of each
+/// chip is above it, all others are below.
 pub const RESETS_BELOW_MV: u16 = 2_600;
 
 impl BootReport {
-    /// Returns true if the chip runs on at a supply at which it need not work.
+    /// Returns true if the chip runs at a supply voltage below its working range.
     #[must_use]
     pub fn lacks_brown_out_reset(&self) -> bool {
         (1..RESETS_BELOW_MV).contains(&self.resets_below_mv)
     }
 
-    /// The fault to begin with: a board that crashed reports it before it drives
-    /// anything again.
+    /// Returns the initial fault: a board that crashed reports the crash before it drives anything
+    /// again.
     #[must_use]
     pub fn fault(&self) -> Option<Fault> {
         match (&self.crash, self.cause) {
@@ -109,22 +107,22 @@ impl BootReport {
     }
 }
 
-/// Source of the calibration in force.
+/// Source of the present calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CalibrationSource {
-    /// There is none.
+    /// There is no calibration.
     #[default]
     None,
     /// The device's memory.
     Stored,
-    /// This session's host; it is gone when the device restarts.
+    /// This session's host; the calibration is lost when the device restarts.
     Session,
-    /// There is none: the stored record is whole, and cannot be worked with.
+    /// There is no calibration: the stored record is undamaged, but invalid.
     Refused(CalibrationError),
 }
 
-/// Ticks and what they cost, in counts of the device's clock.
+/// Number of ticks and their cost, in counts of the device's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TickFigures {
     /// Ticks since the start, wrapping.
@@ -133,61 +131,61 @@ pub struct TickFigures {
     pub cost: u32,
     /// Maximum cost.
     pub worst_cost: u32,
-    /// Ticks that began or ended too late.
+    /// Number of ticks that started or ended too late.
     pub late: u32,
 }
 
-/// The stack, in bytes; zero where the board does not measure it.
+/// The stack, in bytes; zero if the board does not measure it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StackFigures {
-    /// Its size.
+    /// The stack's size.
     pub size: u32,
     /// Maximum use.
     pub high_water: u32,
 }
 
 /// The state of the clock recovery of a board's USB: its oscillator follows the host's
-/// start-of-frames, or is too inaccurate for some hosts.
+/// start-of-frames; otherwise it is too inaccurate for some hosts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UsbClock {
-    /// There is none, or it was not measured yet.
+    /// The board has none, or it was not measured yet.
     #[default]
     Unknown,
-    /// It followed all of them in the last second.
+    /// It followed all start-of-frames in the last second.
     Locked,
-    /// It did not.
+    /// It did not follow all of them.
     Unlocked,
 }
 
-/// Everything worth knowing about a device.
+/// The status of a device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     /// Board, versions, rates, scene.
     pub device: DeviceHello,
-    /// Its start.
+    /// The report about its start.
     pub boot: BootReport,
-    /// Source of the calibration in force, and its model.
+    /// Source of the present calibration.
     pub calibration: CalibrationSource,
-    /// The calibration's model.
+    /// The present calibration's model.
     pub model: Option<Model>,
-    /// The loop, as it last reported.
+    /// The state of the loop, as last reported.
     pub health: Health,
-    /// Its ticks.
+    /// The number and cost of its ticks.
     pub ticks: TickFigures,
     /// The stack.
     pub stack: StackFigures,
-    /// The oscillator of USB.
+    /// The state of the USB oscillator.
     pub usb_clock: UsbClock,
-    /// Frames that were not understood.
+    /// Number of invalid frames.
     pub bad_frames: u32,
-    /// Frames of a session that is not the open one.
+    /// Number of frames of a session that is not the open one.
     pub foreign_frames: u32,
-    /// Samples that were dropped.
+    /// Number of dropped samples.
     pub dropped: u32,
 }
 
-/// For how long a request that is kept for good waits for a press of the dead-man switch,
-/// ms.
+/// Time for which a request to store something permanently waits for a press of the dead-man
+/// switch, ms.
 pub const PRESS_MS: u32 = 10_000;
 
 #[cfg(test)]

@@ -7,16 +7,16 @@ use crate::terrain::TileKey;
 /// A tile's content.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TileMessage<'a> {
-    /// The scene it belongs to.
+    /// The epoch of the tile's scene.
     pub epoch: u32,
-    /// Which tile.
+    /// The tile's key.
     pub key: TileKey,
     /// The heights.
     #[serde(borrow)]
     pub heights: Heights<'a>,
 }
 
-/// The heights of a tile. A constant tile is one number.
+/// The heights of a tile. A constant tile is a single number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Heights<'a> {
     /// No surface anywhere.
@@ -28,8 +28,7 @@ pub enum Heights<'a> {
         /// Cells above the base.
         height: f32,
     },
-    /// 33 × 33 little-endian `f32`, rows from the south, cells above the base;
-    /// NaN where there is no surface.
+    /// 33 × 33 little-endian `f32`, in rows from the south, cells above the base; NaN is no-data.
     Samples {
         /// Whole cells.
         base: i32,
@@ -37,8 +36,8 @@ pub enum Heights<'a> {
         #[serde(borrow)]
         bytes: &'a [u8],
     },
-    /// The same samples in the form of [`packed`](crate::terrain::packed): bit for bit,
-    /// but for the bits of a NaN.
+    /// The same samples in the [`packed`](crate::terrain::packed) form: lossless to the bit, except
+    /// for the bits of a NaN.
     Packed {
         /// Whole cells.
         base: i32,

@@ -1,17 +1,15 @@
 //! The version check between two ends of different protocols.
 //!
-//! These frames belong to no session. They are the same in every protocol, the first
-//! included: protocols 1 to 3 had a hello of variant 0 and a refusal of variant 1,
-//! each followed by the protocol's number and nothing more.
+//! These frames belong to no session. They are the same in every protocol, including the first
+//! ones: protocols 1 to 3 had a hello of variant 0 and a refusal of variant 1, each followed only
+//! by the protocol's number.
 //!
-//! - A host says [`VersionCheck::Asked`] before each hello. A device of protocol 3
-//!   answers it with its refusal; a device of this protocol passes it over, because
-//!   the hello follows.
-//! - A device answers [`VersionCheck::Asked`] of another protocol with
-//!   [`VersionCheck::Refused`]. That changes nothing else: a session that is open
-//!   stays open.
-//! - A host believes a refusal only while it waits for the device's hello, and only
-//!   when it names another protocol than its own.
+//! - A host sends [`VersionCheck::Asked`] before each hello. A device of protocol 3 answers with
+//!   its refusal; a device of this protocol ignores it, because the hello follows.
+//! - A device answers [`VersionCheck::Asked`] of another protocol with [`VersionCheck::Refused`].
+//!   That changes nothing else: an open session stays open.
+//! - A host accepts a refusal only while it waits for the device's hello, and only if the refusal
+//!   contains another protocol than its own.
 //!
 //! The first byte is 0 or 1. In every other frame it is at least 128, see
 //! [`SessionNumber`](super::session::SessionNumber).
@@ -21,13 +19,12 @@ use serde::{Deserialize, Serialize};
 /// A frame that belongs to no session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum VersionCheck {
-    /// Host to device: the protocol that the host speaks.
+    /// From host to device: the host's protocol.
     Asked {
         /// The host's protocol.
         protocol: u16,
     },
-    /// Device to host: the protocol that the device speaks, where the host speaks
-    /// another.
+    /// From device to host: the device's protocol, if the host's is another.
     Refused {
         /// The device's protocol.
         protocol: u16,
@@ -35,7 +32,7 @@ pub enum VersionCheck {
 }
 
 impl VersionCheck {
-    /// Returns true if a frame's decoded bytes are a version check and no part of a session.
+    /// Returns true if a frame's decoded bytes are a version check and not part of a session.
     #[must_use]
     pub fn is_in(content: &[u8]) -> bool {
         content.first().is_some_and(|first| *first < 128)

@@ -1,9 +1,8 @@
 //! Continuation of the descent from a point of a patch's border.
 //!
-//! The distance to the HIP has a slope into each patch that meets there, and its
-//! way continues in the one into which the slope is steepest: in a mirrored scene
-//! that is the mirrored patch. The offer of a neighbour is searched for
-//! before the way goes there.
+//! The distance to the HIP has a slope into each patch that meets there. The descent continues into
+//! the patch with the steepest slope, so that a mirrored scene gives the mirrored patch. The
+//! neighbour's closest point is computed before the proxy enters it.
 
 use super::on_patch::{Nearest, finest_resolution, resolution, search};
 use crate::contact::budget::{Budget, SLOPE};
@@ -19,7 +18,7 @@ use crate::terrain::{CellContent, Window};
 pub(super) enum Onward {
     /// Into a neighbouring patch, as [`Asking::best`] has it.
     Into,
-    /// It may continue in a tile that is not here.
+    /// The descent may continue in a missing tile.
     Missing,
     /// The budget is spent.
     Suspended,
@@ -30,21 +29,21 @@ pub(super) enum Onward {
 /// Offer of a neighbouring patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Offer {
-    /// Place where the way enters the neighbour.
+    /// Place where the path enters the neighbour.
     pub(super) entry: SurfacePoint,
     /// The neighbour's closest point.
     pub(super) closest: Nearest,
-    /// By how much the squared distance gets less, cells².
+    /// Reduction of the squared distance, cells².
     gain: f32,
-    /// The rounding of that.
+    /// Rounding error of `gain`.
     noise: f32,
-    /// True if it gets less by more than the last places of both points may be off.
+    /// True if the reduction exceeds the rounding of both points.
     pub(super) is_surely_nearer: bool,
-    /// Distance of the HIP in that direction, cells: of two equal directions
-    /// the one toward it is taken, however the scene is turned.
+    /// Distance of the HIP in that direction, cells: of two equal directions, the one toward the
+    /// HIP is chosen, so that rotation of the scene does not matter.
     toward: f32,
-    /// Slope of the distance into the neighbour, of half the squared distance,
-    /// squared, cells².
+    /// Steepness of the distance into the neighbour: the squared slope of half the squared
+    /// distance, cells².
     steepness: f32,
 }
 
@@ -56,25 +55,25 @@ impl Offer {
 }
 
 /// A neighbour into which the distance falls.
-// One that is filled in, not an option that is moved: that costs 150 instructions.
+// Filled in place: moving an `Option` would cost 150 instructions.
 struct Neighbour {
     side: Side,
     entry: SurfacePoint,
     patch: Patch,
-    /// Squared slope of half the squared distance into it, cells²; 0 where
-    /// rounding hides it, and below 0 where there is no such neighbour.
+    /// Squared slope of half the squared distance into it, cells²; 0 if rounding hides the slope,
+    /// below 0 if there is no such neighbour.
     steepness: f32,
-    /// That of the next less steep neighbour.
+    /// Steepness into the next less steep neighbour.
     runner_up: f32,
-    /// Its bit in [`Asking::asked`].
+    /// The neighbour's bit in [`Asking::asked`].
     bit: u8,
 }
 
-/// Asks the neighbours of a patch, from its closest point, which is on or beside
-/// its border: the steepest way down first.
+/// Search of a patch's neighbours, steepest descent first, from the patch's closest point, which is
+/// on or beside its border.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asking {
-    /// Neighbours asked already, a bit each in the order of [`Side::neighbour`].
+    /// Neighbours searched already, one bit each in the order of [`Side::neighbour`].
     asked: u8,
     /// Best candidate.
     pub(super) best: Option<Offer>,
@@ -87,21 +86,21 @@ pub(super) struct Start<'d> {
 }
 
 impl Asking {
-    /// No neighbour was asked yet.
+    /// State before any neighbour is searched.
     pub(super) const NONE: Self = Self {
         asked: 0,
         best: None,
     };
 
-    /// Forgets what was asked.
+    /// Forgets the searched neighbours.
     #[inline]
     pub(super) const fn restart(&mut self) {
         self.asked = 0;
         self.best = None;
     }
 
-    /// Searches until the downhill direction is known. `patch` becomes that of the best offer, if that is made
-    /// now.
+    /// Searches until the downhill direction is known. Sets `patch` to the patch of a best offer
+    /// found in this call.
     #[inline]
     pub(super) fn advance<const D: usize>(
         &mut self,
@@ -111,7 +110,7 @@ impl Asking {
         patch: &mut Patch,
         budget: &mut Budget,
     ) -> Onward {
-        // Up a wall a proxy may stand beside the edge without being on it.
+        // On a wall a proxy may be beside the edge without being on it.
         let (p, q) = view.in_patch(start.at.cell);
         let beside = |hip: f32| smaller(BESIDE * finest_resolution(hip), COARSEST_RESOLUTION);
         let border = start.at.border_within([beside(p), beside(q)]);
@@ -121,7 +120,7 @@ impl Asking {
         self.over_border(window, view, start, border, patch, budget)
     }
 
-    // What a descent is made of, each borrowed from another place.
+    // The arguments are borrowed from several places.
     #[allow(clippy::too_many_arguments)]
     #[inline(never)]
     fn over_border<const D: usize>(
@@ -177,18 +176,18 @@ impl Asking {
         }
     }
 
-    /// Returns true if the best offer is down a way that is steeper than another.
+    /// Returns true if the best offer's descent is steeper than `steepness`.
     #[inline]
     fn has_steeper_than(&self, steepness: f32) -> bool {
         let is_steeper = |best: &Offer| steepness < best.steepness * (1.0 - EQUALLY_STEEP);
         self.best.as_ref().is_some_and(is_steeper)
     }
 
-    /// Makes `next` the neighbour, of those not asked yet, with the steepest way down.
+    /// Sets `next` to the unsearched neighbour with the steepest descent.
     ///
     /// # Errors
-    /// The reason for which it is not known now.
-    // A call, which fills `next` in place: inlined, its fields are moved to and fro.
+    /// The reason why that neighbour is not known in this tick.
+    // Not inlined, and fills `next` in place: otherwise its fields are copied back and forth.
     #[inline(never)]
     fn steepest<const D: usize>(
         &self,
@@ -211,7 +210,7 @@ impl Asking {
             let entry = start.at.across(side);
             let patch = match window.ground(entry.cell) {
                 CellContent::Hole => continue,
-                // It might be the better way: the proxy waits to know.
+                // This might be the steepest neighbour: the proxy waits for its tile.
                 CellContent::Missing => {
                     budget.lacks(entry.cell);
                     return Err(Onward::Missing);
@@ -238,12 +237,12 @@ impl Asking {
     }
 }
 
-/// Returns the steepness of the distance from a point of a patch's border into the
-/// patch: the squared slope of half the squared distance, cells²; 0 where
-/// rounding hides it; `None` where it does not fall. `side` is the way in.
+/// Returns the steepness of the distance from a point of a patch's border into the patch: the
+/// squared slope of half the squared distance, cells²; 0 if rounding hides it; `None` if the
+/// distance does not fall. `side` is the direction into the patch.
 ///
-/// Along the border the patch on the other side is at its minimum already: only the
-/// way across counts.
+/// Along the border the patch on the other side is at its minimum already, so only the direction
+/// across the border counts.
 fn fall_into(
     patch: &Patch,
     view: &HipView,
@@ -254,8 +253,8 @@ fn fall_into(
     let (p, q) = view.in_patch(entry.cell);
     let (u, v) = (entry.u, entry.v);
     let z = patch.height(u, v);
-    // For a far HIP a place counts as beside the edge from far off, but only where the
-    // edge is as high as the place is.
+    // With a far HIP, a place may count as beside the edge at a large distance; accept it only if
+    // its height agrees with the edge's.
     let beside = [
         here.u - side.east as f32 - u,
         here.v - side.north as f32 - v,
@@ -266,13 +265,13 @@ fn fall_into(
         return None;
     }
     let (zu, zv) = (patch.slope_u(v), patch.slope_v(u));
-    // Up a wall, the last place of a coordinate is a lot of height; across the
-    // border there is none, the place is on it.
+    // On a wall, the last place of a coordinate is worth much height. Not so across the border,
+    // where the place is exact.
     let sizes = patch.with_sizes();
     let along = |way: i32, slope: f32| if way == 0 { slope.abs() } else { 0.0 };
     let rounding = sizes.height(u, v) + along(side.east, zu) + along(side.north, zv);
-    // Up a wall beside the edge the slope at the edge says nothing of the place itself; of
-    // a place on the edge it does, though the last place of its coordinate is much height.
+    // On a wall, a place beside the edge may have another slope than the edge. For a place on the
+    // edge the slope is valid, although the last place of its coordinate is worth much height.
     let is_on_edge = beside == [0.0, 0.0];
     let from_here = is_on_edge || (here.z - z).abs() < BESIDE * RESOLUTION * (1.0 + z.abs());
     let falls = |way: i32, off: f32, slope: f32| {
@@ -287,8 +286,8 @@ fn fall_into(
     }
 }
 
-/// Returns the offer of a neighbour, whose closest point to a HIP at `hip`, in its
-/// coordinates, is this one; `None` if nothing.
+/// Returns the neighbour's offer for its closest point `closest`, with the HIP at `hip` in its
+/// coordinates; `None` if that is no improvement.
 fn offer(next: &Neighbour, hip: (f32, f32), here: &Nearest, closest: Nearest) -> Option<Offer> {
     let Neighbour {
         side,
@@ -318,12 +317,12 @@ fn offer(next: &Neighbour, hip: (f32, f32), here: &Nearest, closest: Nearest) ->
     })
 }
 
-/// By how much the squared distance from a HIP at `(p, q)` is less `there` than
-/// `here`, which is in the patch on the other side of a border; the rounding of
-/// that; and what the last places of both points make of it.
+/// Returns by how much the squared distance from a HIP at `(p, q)` is smaller at `there` than at
+/// `here`, which is in the patch across a border; its rounding error; and the maximum error due to
+/// the rounding of both points.
 ///
-/// The difference of the squares by their factors: of a far HIP the squares
-/// themselves would tell nothing.
+/// The difference of squares is computed from its factors: with a far HIP the squares themselves
+/// would lose it to rounding.
 fn gain(here: &Nearest, there: &Nearest, (p, q): (f32, f32), side: Side) -> (f32, f32, f32) {
     let (u, v) = (here.u - side.east as f32, here.v - side.north as f32);
     let (du, dv, dz) = (u - there.u, v - there.v, here.z - there.z);
@@ -339,9 +338,9 @@ fn gain(here: &Nearest, there: &Nearest, (p, q): (f32, f32), side: Side) -> (f32
     (gain, noise, 2.0 * RESOLUTION * (moved + left))
 }
 
-/// Takes a point on a border of its patch to the one into which the distance falls most
-/// steeply, of those that meet at it; leaves it where it is if there is none, or if the tile
-/// of one of them is not here.
+/// Moves a point on a border of its patch into the patch, among those that meet there, into which
+/// the distance falls most steeply. Does not move it if there is none, or if the tile of one is
+/// missing.
 #[inline(never)]
 pub(super) fn to_steepest_patch<const D: usize>(
     window: &Window<'_, D>,
@@ -385,7 +384,7 @@ fn steepness_at(patch: &Patch, (p, q): (f32, f32), at: &SurfacePoint, border: Si
     let z = patch.height(at.u, at.v);
     let east = (at.u - p) + z * patch.slope_u(at.v);
     let north = (at.v - q) + z * patch.slope_v(at.u);
-    // On a border only the way back into the patch counts.
+    // On a border only the direction back into the patch counts.
     let falls = |border: i32, slope: f32| {
         let outward = border as f32 * slope < 0.0;
         if outward { 0.0 } else { slope * slope }
@@ -401,9 +400,8 @@ mod tests {
     use crate::contact::surface::{HipView, SurfacePoint};
     use crate::grid::{Cell, GridPoint};
 
-    /// Half way up a wall of 300 the last place of a coordinate is 10⁻⁵ of height: the
-    /// height of the place and that of the way to it differ by as much (seed 4243,
-    /// scene 6738).
+    /// Half way up a wall of 300 cells, the last place of a coordinate is worth 10⁻⁵ of height: the
+    /// heights of the place and of the entry differ by that much (seed 4243, scene 6738).
     #[test]
     fn a_place_on_an_edge_up_a_wall_knows_the_slope_beyond() {
         let patch = Patch::new([-150.406_48, 149.704_83, -150.454_4, 149.704_83]);
@@ -421,14 +419,14 @@ mod tests {
             evaluations: 1,
         };
         let falls = |v: f32| fall_into(&patch, &view, &entry, side, &here(v));
-        // Of half the squared distance: height over the HIP times slope northward.
+        // Slope of half the squared distance: height over the HIP times slope northward.
         let slope = 0.003_328_f32 * 0.0479 * (1.0 - entry.u);
         let steepness = falls(1.0).expect("it falls");
         assert!(
             (steepness / (slope * slope) - 1.0).abs() < 0.02,
             "{steepness:e}"
         );
-        // Beside the edge its slope says nothing.
+        // Beside the edge its slope is not valid.
         assert_eq!(falls(1.0 - 2e-7), Some(0.0));
     }
 }

@@ -1,11 +1,10 @@
 //! The closest point of a patch over which the squared distance is convex.
 //!
-//! While a·z is small the squared distance to the HIP is convex, so there is one
-//! minimum, and where a search for it begins does not matter. It begins at the
-//! place over a shallow HIP: there half the gradient is z·∇z, so that the
-//! Hessian's first step has a closed form.
+//! While a·z is small, the squared distance to the HIP is convex: it has one minimum, and the start
+//! of the search does not matter. The search starts at the place above a shallow HIP. There half
+//! the gradient is z·∇z, so the Hessian's first step has a closed form.
 
-// `!(a <= b)` is how what is not a number is left to the search by rulings.
+// `!(a <= b)` passes NaN on to the search by rulings.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 use crate::contact::surface::Side;
@@ -13,24 +12,24 @@ use crate::contact::surface::is_well_inside;
 use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{CONVEX, LEVEL, NEWTON_ERROR, SHALLOW, STEEPEST_CONVEX};
 
-/// Newton steps at most where the first two were not exact enough.
+/// Maximum number of Newton steps if the first two were not exact enough.
 const STEPS: u32 = 4;
 
-/// Conditions for Newton's method on a patch. They depend on
-/// the patch's shape alone, not on its height above the HIP.
+/// Conditions for Newton's method on a patch. They depend only on the patch's shape, not on its
+/// height above the HIP.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Convexity {
-    /// |a| + |b| + |c|: no two points of the patch differ by more in height.
+    /// |a| + |b| + |c|, the maximum difference in height of two points of the patch.
     steepest: f32,
     /// |a|
     twist: f32,
-    /// Depth of the HIP, in cells, up to which the search begins over it.
+    /// Maximum depth of the HIP, in cells, at which the search starts above it.
     shallow: f32,
-    /// Height above the HIP of any one point of the patch, in cells, up to which
-    /// the squared distance is convex all over the patch.
+    /// Maximum height of a point of the patch above the HIP, in cells, at which the squared
+    /// distance is convex all over the patch.
     convex: f32,
-    /// Change of the Hessian, at most, over a step of a cell: the error that
-    /// Newton's method leaves after a step s is `bend`·s² at most.
+    /// Maximum change of the Hessian over a step of one cell: after a step s, the error of Newton's
+    /// method is at most `bend`·s².
     bend: f32,
 }
 
@@ -43,7 +42,7 @@ pub(in crate::contact) struct Place {
 }
 
 impl Convexity {
-    /// `None` if the patch is too steep.
+    /// Returns the conditions of a patch, or `None` if it is too steep.
     #[inline]
     pub(in crate::contact) fn of(patch: &Patch) -> Option<Self> {
         let twist = patch.a.abs();
@@ -61,15 +60,15 @@ impl Convexity {
         })
     }
 
-    /// Returns true if the squared distance is convex all over the patch, a point of which
-    /// is `z` cells above the HIP.
+    /// Returns true if the squared distance is convex all over the patch, given one point `z` cells
+    /// above the HIP.
     #[inline]
     fn all_over(&self, z: f32) -> bool {
         z <= self.convex
     }
 
-    /// Returns true if the squared distance is convex between two places, the second one
-    /// `to.z` cells above the HIP, and wherever a path downhill may swing out to.
+    /// Returns true if the squared distance is convex between two places, the second `to.z` cells
+    /// above the HIP, and everywhere that a path downhill may reach.
     fn between(&self, (u, v): (f32, f32), to: &Place) -> bool {
         let moved = (to.u - u).abs().max((to.v - v).abs());
         // A sublevel set around a minimum, of a function whose curvature lies
@@ -79,9 +78,8 @@ impl Convexity {
         self.twist * (to.z + rise) <= CONVEX
     }
 
-    /// Returns the closest point of the patch, continued beyond its borders, to a shallow
-    /// HIP at `hip`, in patch coordinates, and whether that is exact; `None` if the HIP
-    /// is not shallow.
+    /// Returns the closest point of the patch, extended beyond its borders, to a shallow HIP at
+    /// `hip`, in patch coordinates, and true if it is exact; `None` if the HIP is not shallow.
     #[inline]
     pub(in crate::contact) fn at_once(
         &self,
@@ -92,14 +90,14 @@ impl Convexity {
         (height <= self.shallow).then(|| self.by_one_hessian(patch, hip, height))
     }
 
-    /// Returns true if an exact place inside the patch is its closest point, all over it.
+    /// Returns true if an exact place inside the patch is the closest point of the whole patch.
     #[inline]
     pub(in crate::contact) fn is_closest(&self, place: &Place) -> bool {
         place.z >= 0.0 && self.all_over(place.z)
     }
 
-    /// The closest point to a HIP at `hip`, in patch coordinates, for a proxy at
-    /// `from`; `None` where it takes the search by rulings to tell.
+    /// Returns the closest point to a HIP at `hip`, in patch coordinates, for a proxy at `from`;
+    /// `None` if only the search by rulings can decide.
     pub(super) fn closest(
         &self,
         patch: &Patch,
@@ -114,7 +112,7 @@ impl Convexity {
         self.closest_after(patch, hip, from, begin)
     }
 
-    /// As [`Self::closest`], where it is known what [`Self::at_once`] comes to.
+    /// Does the same as [`Self::closest`], with the result of [`Self::at_once`].
     #[inline]
     pub(in crate::contact) fn closest_after(
         &self,
@@ -138,9 +136,8 @@ impl Convexity {
         }
     }
 
-    /// Returns the closest point of the patch, continued beyond its borders, to the
-    /// HIP, by two steps with one Hessian; and whether the error is within
-    /// [`NEWTON_ERROR`].
+    /// Returns the closest point of the patch, extended beyond its borders, to the HIP, by two
+    /// steps with one Hessian; and true if its error is within [`NEWTON_ERROR`].
     #[inline(always)]
     fn by_one_hessian(&self, patch: &Patch, (p, q): (f32, f32), height: f32) -> (Place, bool) {
         let slope = patch.b[0] + patch.a * q;
@@ -151,12 +148,12 @@ impl Convexity {
         let scale = 1.0 / (uu * vv - uv * uv);
         let drop = height * scale;
         let (du, dv) = ((zv * uv - zu * vv) * drop, (zu * uv - zv * uu) * drop);
-        // The gradient that is left there, and what the same Hessian makes of it.
+        // The remaining gradient, and the step by the same Hessian.
         let (zu, zv) = (zu + patch.a * dv, zv + patch.a * du);
         let z = height + (slope * du + zv * dv);
         let (gu, gv) = (z * zu + du, z * zv + dv);
         let (eu, ev) = ((gv * uv - gu * vv) * scale, (gu * uv - gv * uu) * scale);
-        // The first step's error, less by what the Hessian has changed over it.
+        // The first step's error, corrected for the change of the Hessian over it.
         let (first, second) = (du * du + dv * dv, eu * eu + ev * ev);
         let is_exact = (self.bend * self.bend) * (first * second) <= NEWTON_ERROR * NEWTON_ERROR;
         let place = Place {
@@ -167,8 +164,7 @@ impl Convexity {
         (place, is_exact)
     }
 
-    /// Newton's method (eq. 8-11) from a place; `None` where [`STEPS`] are not
-    /// enough.
+    /// Runs Newton's method (eq. 8-11) from a place; returns `None` if [`STEPS`] are not enough.
     fn by_newton(&self, patch: &Patch, (p, q): (f32, f32), from: Place) -> Option<Place> {
         let (mut u, mut v) = (from.u, from.v);
         for _ in 0..STEPS {
@@ -189,11 +185,10 @@ impl Convexity {
         None
     }
 
-    /// The patch's closest point, if it lies on an edge or vertex toward a side.
+    /// Returns the patch's closest point, if it lies on an edge or vertex toward a side.
     ///
-    /// A point of an edge from which the distance falls out of the patch is the
-    /// patch's minimum, as the distance is convex; so is a vertex from which it
-    /// falls out over both edges.
+    /// The distance is convex. So a point of an edge from which the distance falls out of the patch
+    /// is the patch's minimum, and so is a vertex from which it falls out over both edges.
     fn closest_on_border(&self, patch: &Patch, hip: (f32, f32), side: Side) -> Option<Place> {
         let edges = [Side { north: 0, ..side }, Side { east: 0, ..side }];
         edges
@@ -207,7 +202,7 @@ impl Convexity {
     }
 }
 
-/// On which side of its patch a place lies beyond the border, or beside it.
+/// Returns the side of its patch on which a place lies beyond or beside the border.
 fn side_beyond(place: &Place) -> Side {
     let [east, north] = [place.u, place.v].map(|x| match () {
         () if is_well_inside(x) => 0,
@@ -217,8 +212,7 @@ fn side_beyond(place: &Place) -> Side {
     Side { east, north }
 }
 
-/// The point of an edge closest to a HIP, and the side on which it lies: toward a
-/// vertex, if it is one.
+/// Returns the point of an edge closest to a HIP, and its side: toward a vertex, if it is one.
 #[inline(always)]
 fn closest_on_edge(patch: &Patch, (p, q): (f32, f32), edge: Side) -> (Place, Side) {
     let [sw, se, nw, ne] = patch.corners;
@@ -237,11 +231,11 @@ fn closest_on_edge(patch: &Patch, (p, q): (f32, f32), edge: Side) -> (Place, Sid
     }
 }
 
-/// The point of an edge, between two heights above the HIP, closest to a HIP so
-/// far along it: its coordinate, its height, and which end it is (−1, 1, or 0).
+/// Returns the point closest to a HIP at coordinate `hip` on an edge between two heights above it:
+/// its coordinate, its height, and which end it is (−1, 1, or 0).
 #[inline(always)]
 fn closest_on_line(hip: f32, slope: f32, [start, end]: [f32; 2]) -> (f32, f32, i32) {
-    // From the edge's end: the line's height above a far HIP would cancel.
+    // Computed from the edge's end: with a far HIP, the line's height above it would cancel.
     let x = (hip - slope * start) / (1.0 + slope * slope);
     match () {
         () if is_well_inside(x) => (x, start * (1.0 - x) + end * x, 0),

@@ -1,12 +1,11 @@
-//! The convex patch's closest point beside the search by rulings, which shares
-//! nothing with it.
+//! The convex patch's closest point against the search by rulings, which shares no code with it.
 
 use super::super::ruling_search::Rulings;
 use super::*;
 use crate::cases::cases;
 use crate::contact::test_random::Random;
 
-/// The closest point as the convex patch finds it.
+/// The closest point by the convex patch.
 fn convex(heights: [f32; 4], hip: (f32, f32), from: (f32, f32)) -> Option<(f32, f32)> {
     let patch = Patch::new(heights);
     let place = Convexity::of(&patch)?.closest(&patch, hip, from)?;
@@ -15,7 +14,7 @@ fn convex(heights: [f32; 4], hip: (f32, f32), from: (f32, f32)) -> Option<(f32, 
     Some((place.u, place.v))
 }
 
-/// The closest point as the search by rulings finds it, both ways round.
+/// The closest point by the search by rulings: over v, or over u if that ends at a border.
 fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) {
     let search = |patch: &Patch, hip, start| {
         let (looked, most) = (0, u32::MAX);
@@ -37,9 +36,8 @@ fn by_rulings(patch: &Patch, hip: (f32, f32), (u, v): (f32, f32)) -> (f32, f32) 
 
 const CASES: u32 = cases(20_000, 200);
 
-/// Patches up to a slope, HIPs within a tenth of a cell beside the last answer, and
-/// what both ways of solving say: how many were left to the rulings, and how many
-/// not.
+/// Compares both solvers on patches up to a slope, for HIPs within a tenth of a cell of the last
+/// answer. Returns how many queries fell back to rulings and how many did not.
 fn agree(slope: f64, depths: [f64; 2], bound: f32) -> [u32; 2] {
     let mut random = Random(41);
     let mut seen = [0; 2];
@@ -93,7 +91,7 @@ fn leaves_what_is_not_plain_to_the_rulings() {
     );
     assert_eq!(convex([0.0, 9.0, 0.0, 9.0], inside, inside), None, "steep");
     assert_eq!(convex([f32::NAN; 4], inside, inside), None, "nothing");
-    // Twisted so far above the HIP that the middle is a saddle.
+    // Twisted and so far above the HIP that the middle is a saddle.
     let saddle = [1.5, 2.5, 2.5, 1.5];
     assert_eq!(convex(saddle, inside, inside), None, "a saddle");
     assert!(
@@ -102,7 +100,7 @@ fn leaves_what_is_not_plain_to_the_rulings() {
     );
 }
 
-/// Sought from the edge's line above a HIP 1,170 cells off it was 7e-3 beside.
+/// The search from the edge's line above a HIP 1,170 cells away was off by 7e-3.
 #[test]
 fn a_far_hip_finds_the_closest_point_of_an_edge() {
     let patch = Patch::new([620.019, 621.900_7, 619.995_4, 621.877_14]);

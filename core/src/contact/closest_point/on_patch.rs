@@ -1,19 +1,17 @@
 //! The closest point of one patch to the HIP (paper §4.3.2, eq. 8-11).
 //!
-//! The paper minimises the squared distance D(u, v) by Newton's method in two
-//! variables. Where the patch is gentle that is what is done here, too
-//! (`on_convex_patch`). On twisted patches that Hessian is indefinite, and the
-//! iteration leaves, cycles or rests on a saddle. There one variable is
-//! eliminated exactly: with v fixed, the patch is a straight line, a ruling, whose
-//! closest point is known in closed form (`on_ruling`).
+//! The paper minimises the squared distance D(u, v) by Newton's method in two variables;
+//! `on_convex_patch` does so on gentle patches. On twisted patches the Hessian is indefinite, and
+//! the iteration diverges, cycles or ends at a saddle. There one variable is eliminated exactly:
+//! with v fixed, the patch is a straight line, a ruling, whose closest point has a closed form
+//! (`on_ruling`).
 //!
 //! The rest, F(v) = min over u of D(u, v), is continuously differentiable
 //! because D is a parabola in u: a minimum of F is a minimum of D over the
 //! square, edges and corners included, and no saddle of D is one.
 //!
-//! The steeper of the two directions is the one eliminated: its closed form
-//! gives z without cancellation, where evaluating a steep height at a rounded
-//! v would not.
+//! The steeper of the two directions is eliminated: its closed form gives z without cancellation,
+//! unlike the height of a steep patch at a rounded v.
 //!
 //! `docs/explanation/contact.md` has the error analysis.
 
@@ -25,8 +23,8 @@ use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{COARSEST_RESOLUTION, RESOLUTION};
 use crate::scalar::smaller;
 
-/// Searches by rulings at most: one, and one more each time the other variable
-/// turns out to be the better one to eliminate.
+/// Maximum number of searches by rulings: one, and one more each time the other variable turns out
+/// to be the better one to eliminate.
 pub const MAX_PASSES: u32 = 3;
 
 /// A point of a patch.
@@ -38,7 +36,7 @@ pub struct Nearest {
     pub v: f32,
     /// Height above the HIP, cells.
     pub z: f32,
-    /// Evaluations of the distance spent on it.
+    /// Evaluations of the distance that it took.
     pub evaluations: u32,
 }
 
@@ -64,11 +62,12 @@ pub struct Nearest {
 #[must_use]
 pub fn nearest_downhill(patch: &Patch, hip: (f32, f32), start: (f32, f32)) -> Nearest {
     let mut budget = Budget::new(u32::MAX);
-    // Without a limit it is always found.
+    // Without a limit, a point is always found.
     search(patch, hip, start, &mut budget).unwrap_or(Nearest::NONE)
 }
 
-/// As [`nearest_downhill`], within a budget: `None` where that does not reach for all of it.
+/// Does the same as [`nearest_downhill`] within a budget; returns `None` if the budget is too
+/// small.
 pub(super) fn search(
     patch: &Patch,
     hip: (f32, f32),
@@ -88,7 +87,7 @@ pub(super) fn search(
     Some(found)
 }
 
-/// The search by rulings; `None` where the budget ends it.
+/// Searches by rulings; returns `None` if the budget ends.
 #[inline(never)]
 fn by_rulings(
     patch: &Patch,
@@ -135,7 +134,7 @@ fn by_rulings(
     None
 }
 
-/// The closest point of a patch that is convex enough for Newton's method.
+/// Returns the closest point of a patch that is convex enough for Newton's method.
 fn closest_if_convex(patch: &Patch, hip: (f32, f32), from: (f32, f32)) -> Option<Nearest> {
     let place = Convexity::of(patch)?.closest(patch, hip, from)?;
     Some(Nearest::from_convex(place))
@@ -145,37 +144,36 @@ const fn exchanged_if(turned: bool, (u, v): (f32, f32)) -> (f32, f32) {
     if turned { (v, u) } else { (u, v) }
 }
 
-/// Returns true if the patch is steeper northward than eastward at a place; of two slopes
-/// alike, as at the foot of a raised corner, the HIP's direction is decisive,
-/// which a mirrored scene shares.
+/// Returns true if the patch is steeper northward than eastward at a place. If both slopes are
+/// equal, as at the foot of a raised corner, the HIP's direction decides, so that a mirrored scene
+/// gives the mirrored answer.
 fn is_steeper_north(patch: &Patch, (p, q): (f32, f32), (u, v): (f32, f32)) -> bool {
     let (east, north) = (patch.slope_u(v).abs(), patch.slope_v(u).abs());
     north > east || (north == east && (q - v).abs() > (p - u).abs())
 }
 
-/// Returns true if the eliminated variable ended at a limit while the searched one did
-/// not, or is no longer the steeper one: the other search is then better
-/// conditioned.
+/// Returns true if the eliminated variable ended at a limit and the searched one did not, or if it
+/// is no longer the steeper one: the other search is then better conditioned.
 fn wants_turning(found: &Ruling) -> bool {
     let inside_by = |margin: f32| found.v > margin && 1.0 - found.v > margin;
     let steeper = found.across.abs() > 4.0 * found.along.abs() + 4.0;
     (found.at_end && inside_by(RESOLUTION)) || (steeper && inside_by(0.0))
 }
 
-/// Places in a patch closer than this, in cells, cannot be distinguished for a HIP at
-/// coordinate `hip`.
+/// Returns the distance, in cells, below which two places in a patch cannot be distinguished for a
+/// HIP at coordinate `hip`.
 pub(super) fn resolution(hip: f32) -> f32 {
     smaller(finest_resolution(hip), COARSEST_RESOLUTION)
 }
 
-/// As [`resolution`], without its limit.
+/// Does the same as [`resolution`], without its limit.
 #[inline]
 pub(super) fn finest_resolution(hip: f32) -> f32 {
     RESOLUTION * (1.0 + 2.0 * hip.abs())
 }
 
-/// A coordinate, put on the border if its distance from it is below the rounding for
-/// a HIP at coordinate `hip`.
+/// Returns the coordinate, moved to the border if its distance from the border is below the
+/// rounding for a HIP at coordinate `hip`.
 fn snapped(x: f32, hip: f32) -> f32 {
     let resolution = resolution(hip);
     if x < resolution {
@@ -188,7 +186,7 @@ fn snapped(x: f32, hip: f32) -> f32 {
 }
 
 impl Nearest {
-    /// No point yet.
+    /// The state before a point is found.
     pub(super) const NONE: Self = Self {
         u: 0.0,
         v: 0.0,
@@ -196,7 +194,7 @@ impl Nearest {
         evaluations: 0,
     };
 
-    /// The closest point of a convex patch.
+    /// Converts the closest point of a convex patch.
     #[inline]
     pub(super) const fn from_convex(Place { u, v, z }: Place) -> Self {
         let evaluations = 1;
@@ -208,7 +206,7 @@ impl Nearest {
         }
     }
 
-    /// The point put on the border, where it is as good as on it.
+    /// Returns the point, moved to the border if it is on it within rounding.
     fn snapped(self, patch: &Patch, (p, q): (f32, f32)) -> Self {
         let (u, v) = (snapped(self.u, p), snapped(self.v, q));
         if (u, v) == (self.u, self.v) {

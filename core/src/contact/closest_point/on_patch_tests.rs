@@ -5,8 +5,7 @@ use super::*;
 use crate::cases::cases;
 use crate::contact::test_random::Random;
 
-/// F′(v)/2 and the point of the ruling at `v`, in f64, for coefficients as f32
-/// holds them.
+/// F′(v)/2 and the point of the ruling at `v`, in f64, for coefficients rounded to f32.
 fn ruling64(patch: &Patch, hip: (f64, f64), v: f64) -> (f64, f64) {
     let [a, b, c, d] = [patch.a, patch.b[0], patch.c[0], patch.corners[0]].map(f64::from);
     let m = b + a * v;
@@ -64,7 +63,7 @@ fn conditioning(patch: &Patch, hip: (f64, f64), v: f64) -> f64 {
 }
 
 struct Errors {
-    /// Queries off by more than 2e-6 cell, conditioning counted.
+    /// Queries with an error of more than 2e-6 cell, conditioning included.
     off: u32,
     worst: f64,
     mean_evaluations: f64,
@@ -93,7 +92,7 @@ fn survey(slope: f64, depth: f64, twist: f64) -> Errors {
         let hip = (f64::from(hip.0), f64::from(hip.1));
         let truth = minimum64(&patch, hip, f64::from(found.v));
         let error = (f64::from(found.u) - truth.0).hypot(f64::from(found.v) - truth.1);
-        // However near to an edge: the height is the surface's at that place.
+        // Even close to an edge, the height is the surface's at that place.
         let off = (f64::from(found.z) - height64(&patch, &found)).abs();
         let steepness = f64::from(patch.slope_u(found.v)).hypot(f64::from(patch.slope_v(found.u)));
         let largest = patch
@@ -124,8 +123,8 @@ fn within_two_millionths_of_a_cell_on_any_slope() {
             for twist in [0.0, 1e-9, slope, 3.0 * slope] {
                 let errors = survey(slope, depth, twist);
                 let at = std::format!("slope {slope} depth {depth} twist {twist}");
-                // The few are HIPs at the centre of curvature of a steep
-                // patch, where f32 cannot tell which way is down.
+                // The few are HIPs at the centre of curvature of a steep patch, where f32 cannot
+                // resolve the downhill direction.
                 let few = if slope > 1.0 { 4 } else { 0 };
                 assert!(errors.off <= few, "{} of 4000 off: {at}", errors.off);
                 assert!(errors.worst < 1e-3, "{:e}: {at}", errors.worst);
@@ -142,7 +141,7 @@ fn within_two_millionths_of_a_cell_on_any_slope() {
 
 #[test]
 fn a_saddle_is_no_answer() {
-    // HIP in the middle under a strongly twisted patch: (½, ½) is stationary.
+    // The HIP is under the middle of a strongly twisted patch: (½, ½) is stationary.
     let patch = Patch::new([4.0, -2.0, -2.0, 4.0].map(|h| h + 1.0));
     let found = nearest_downhill(&patch, (0.5, 0.5), (0.5, 0.5));
     assert!(
@@ -162,8 +161,8 @@ fn warm_started_it_takes_two_evaluations() {
     assert!(next.evaluations <= 3, "{next:?}");
 }
 
-/// Of a HIP far off the squared distance itself does not tell which of two
-/// places is nearer, and on a steep twist what cancels hides it, too.
+/// With a far HIP, the squared distance cannot decide which of two places is nearer, and on a steep
+/// twist cancellation hides it as well.
 #[test]
 fn ends_at_a_minimum_where_the_squares_do_not_tell() {
     type Place = (f32, f32);

@@ -1,7 +1,7 @@
 //! One ruling of a patch, and its point closest to the HIP.
 //!
-//! With v fixed, a patch is a straight line, a ruling, of slope m = b + a·v,
-//! and its closest point to a HIP at (p, q) is known in closed form:
+//! With v fixed, a patch is a straight line, a ruling, with slope m = b + a·v. Its closest point to
+//! a HIP at (p, q) has a closed form:
 //!
 //! ```text
 //! g = z(p, v)                    height of the ruling's line over the HIP
@@ -9,21 +9,20 @@
 //! u = p − m·z                    clamped to [0, 1]
 //! ```
 //!
-//! On a steep ruling u is taken from the height instead, (z − z(0, v))/m, and
-//! 1 − u likewise from the other end: both then are right to the last place
-//! however near to an end, or however far from the HIP, the point is. Height
-//! and slopes across come from the two, with nothing cancelled.
+//! On a steep ruling, u is computed from the height instead, as (z − z(0, v))/m, and 1 − u in the
+//! same way from the other end. Both are then exact to the last place, at any distance from an end
+//! or from the HIP. Height and slopes across are computed from both without cancellation.
 
 use crate::contact::surface::patch::Patch;
 
-/// A ruling's closest point, and how the distance changes from ruling to ruling.
+/// A ruling's closest point, and the derivatives of the distance from ruling to ruling.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ruling {
     pub(super) u: f32,
     pub(super) v: f32,
     /// Height above the HIP, cells.
     pub(super) z: f32,
-    /// East and north of the HIP, cells.
+    /// Displacement from the HIP, east and north, cells.
     pub(super) off: (f32, f32),
     /// F′(v)/2
     pub(super) slope: f32,
@@ -33,21 +32,20 @@ pub(super) struct Ruling {
     pub(super) along: f32,
     /// Slope of the patch across the ruling at the point.
     pub(super) across: f32,
-    /// True if the point is an end of the ruling, beyond which it would continue.
+    /// True if the point is an end of the ruling, and the closest point of its line lies beyond.
     pub(super) at_end: bool,
 }
 
 /// Rounding noise of a ruling.
 pub(super) struct Noise {
-    /// Of F(v), the squared distance from the HIP, cells².
+    /// Noise of F(v), the squared distance from the HIP, cells².
     pub(super) f: f32,
-    /// Of F′(v)/2.
+    /// Noise of F′(v)/2.
     pub(super) slope: f32,
 }
 
 impl Ruling {
-    /// The closest point of the ruling at `v`, for a HIP at `(p, q)` in patch
-    /// coordinates.
+    /// Returns the closest point of the ruling at `v`, for a HIP at `(p, q)` in patch coordinates.
     #[inline]
     pub(super) fn at(patch: &Patch, (p, q): (f32, f32), v: f32) -> Self {
         let left = 1.0 - v;
@@ -98,10 +96,10 @@ impl Ruling {
         }
     }
 
-    /// By how much F is less here than at another ruling.
+    /// Returns by how much F is smaller here than at another ruling.
     ///
-    /// The difference of the squares by their factors: of a far HIP the squares
-    /// themselves would tell nothing.
+    /// The difference of squares is computed from its factors: with a far HIP the squares
+    /// themselves would lose it to rounding.
     pub(super) fn gain_on(&self, other: &Self) -> f32 {
         let (east, north) = (self.off.0 + other.off.0, self.off.1 + other.off.1);
         (other.u - self.u) * east
@@ -109,10 +107,10 @@ impl Ruling {
             + (other.z - self.z) * (other.z + self.z)
     }
 
-    /// Returns its rounding noise, for a HIP `p` east.
+    /// Returns the rounding noise for a HIP at `p` east.
     ///
-    /// A ruling's ends and its slope are mixed from the corners and may cancel; of
-    /// a place only the way to the nearer end counts.
+    /// A ruling's ends and its slope are interpolated between the corners and may cancel; for a
+    /// place, only the part up to the nearer end counts.
     pub(super) fn noise(&self, patch: &Patch, p: f32) -> Noise {
         let [sw, se, nw, ne] = patch.with_sizes().corners;
         let mix = |south: f32, north: f32| south * (1.0 - self.v) + north * self.v;
@@ -136,9 +134,9 @@ impl Ruling {
         let of_across = patch.a.abs() * of_u + across;
         let (du, dv) = (self.off.0.abs(), self.off.1.abs());
         Noise {
-            // At worst: where this hides which is nearer, the slope decides.
+            // Worst case: if this hides which point is nearer, the slope decides.
             f: 4.0 * f32::EPSILON * (du * (0.5 + of_u) + z * of_z),
-            // As it is most often: the search is over where this hides the slope.
+            // Typical case: the search ends if this hides the slope.
             slope: 0.5 * f32::EPSILON * (dv + across * of_z + z * of_across),
         }
     }

@@ -11,23 +11,23 @@ use crate::contact::tolerance::HEIGHT_NOISE;
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::terrain::{CellContent, Window};
 
-/// Patches entered in a row without getting nearer to the HIP until the descent is
-/// taken to be at its end: up a wall rounding may send it to and fro.
+/// Number of patches entered in a row without getting nearer to the HIP after which the descent
+/// ends: on a wall, rounding may send it back and forth.
 const IDLE: u32 = 16;
 
 /// End of a descent.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum Ended {
-    /// No direction on the surface leads closer to the HIP, which is below; or patches
-    /// were entered [`IDLE`] times for nothing; or the proxy may not leave.
+    /// No direction on the surface leads closer to the HIP, which is below; or [`IDLE`] patches in
+    /// a row brought the proxy no nearer; or the proxy must not leave.
     Rests,
-    /// From here the straight way to the HIP leads off the surface.
+    /// From here the straight path to the HIP leads off the surface.
     Leaves,
-    /// The next patch is in a tile that is not here.
+    /// The next patch is in a missing tile.
     Missing,
     /// The budget is spent.
     Suspended,
-    /// There is no surface under the proxy any more.
+    /// The surface under the proxy no longer exists.
     Lost,
 }
 
@@ -36,14 +36,14 @@ pub(in crate::contact) enum Ended {
 pub(in crate::contact) enum Leave {
     /// Anywhere.
     Anywhere,
-    /// Not here: it has just tried to, and was held at once.
+    /// Anywhere else: a departure from here ended on the surface at once.
     ButAt(SurfacePoint),
-    /// Nowhere any more: it has left too often. Here it was held last, above the HIP.
+    /// Nowhere: there were too many departures. The proxy last hit the surface here, above the HIP.
     NoMore(SurfacePoint),
 }
 
 impl Leave {
-    /// Returns true if it may leave at a point.
+    /// Returns true if the proxy may leave at a point.
     #[inline]
     pub(in crate::contact) fn is_allowed_at(&self, point: &SurfacePoint) -> bool {
         match self {
@@ -54,37 +54,36 @@ impl Leave {
     }
 }
 
-/// A proxy's way downhill to one HIP.
+/// A proxy's path downhill to one HIP.
 ///
-/// It can be cut short after any piece of work and gone on with later to the same
-/// bits: what it does next depends on nothing but what is kept here, the terrain
-/// and the HIP.
+/// It can be suspended after any piece of work and resumed later with the same bits: each step
+/// depends only on this state, the terrain and the HIP.
 #[derive(Clone, Debug)]
 pub(in crate::contact) struct Descent {
-    /// Point of entry into the patch; its closest point, once that is known.
+    /// Point of entry into the patch; later its closest point.
     at: SurfacePoint,
     stage: Stage,
-    /// The patch's closest point, in the stages that know it.
+    /// The patch's closest point, in the stages after it is computed.
     here: Nearest,
     asking: Asking,
-    /// The nearest place so far, and patches entered since without getting nearer.
+    /// The nearest place until now, and the number of patches entered since then.
     idle: Option<(GridPoint, u32)>,
 }
 
-/// Next stage of the descent in a patch. Its data are beside it in
-/// [`Descent`]: writing it anew with every patch would cost more than the search.
+/// Next stage of the descent in a patch. Its data are separate, in [`Descent`]: rewriting them for
+/// every patch would cost more than the search.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     /// The patch was entered.
     Arrived,
     /// The patch was entered, and its closest point is known.
     ArrivedKnowing,
-    /// The neighbours are asked.
+    /// The neighbours are searched.
     Asking,
 }
 
 impl Descent {
-    /// A way downhill from a point of the surface.
+    /// Creates a descent from a point of the surface.
     pub(in crate::contact) const fn from(at: SurfacePoint) -> Self {
         Self {
             at,
@@ -95,16 +94,16 @@ impl Descent {
         }
     }
 
-    /// Another way, from a point of the surface to another HIP.
+    /// Restarts the descent from a point of the surface, for another HIP.
     pub(in crate::contact) const fn restart(&mut self, at: SurfacePoint) {
         self.at = at;
         self.stage = Stage::Arrived;
         self.idle = None;
     }
 
-    /// Another way, from a point inside a patch, if it is known that the proxy does not
-    /// leave the surface there, and where the patch is closest to the other HIP. Counts
-    /// the work as if it were done here: the budget ends where it would without.
+    /// Restarts the descent from a point inside a patch at which the proxy surely does not leave
+    /// the surface, with the patch's closest point to the other HIP. Counts the work as if it were
+    /// done here, so that the budget ends at the same place.
     pub(in crate::contact) fn restart_knowing(
         &mut self,
         at: SurfacePoint,
@@ -119,18 +118,18 @@ impl Descent {
         self.knows_here();
     }
 
-    /// Returns its start, or the last point of entry into a patch.
+    /// Returns the start of the descent, or the last point of entry into a patch.
     pub(in crate::contact) const fn entry(&self) -> SurfacePoint {
         self.at
     }
 
-    /// The patch that the proxy is on.
+    /// Returns the cell of the proxy's patch.
     pub(in crate::contact) const fn cell(&self) -> Cell {
         self.at.cell
     }
 
-    /// The nearest point found so far and its height above the HIP; `None` where
-    /// its patch is not there.
+    /// Returns the nearest point found until now and its height above the HIP; `None` if its patch
+    /// does not exist.
     #[inline]
     pub(in crate::contact) fn nearest<const D: usize>(
         &self,
@@ -144,7 +143,7 @@ impl Descent {
         self.nearest_so_far(window, view)
     }
 
-    /// As [`Self::nearest`], in the stages that do not know the patch's closest point.
+    /// Does the same as [`Self::nearest`], in the stages before the patch's closest point is known.
     #[inline(never)]
     fn nearest_so_far<const D: usize>(
         &self,
@@ -163,7 +162,7 @@ impl Descent {
         leave: &Leave,
         budget: &mut Budget,
     ) -> Ended {
-        // Not by `patch_at`: a call costs 20 instructions more.
+        // Not by `patch_at`: a call would cost 20 more instructions.
         let cell = self.at.cell;
         let mut patch = match window.ground(cell) {
             CellContent::Patch(corners) => view.patch(&corners),
@@ -190,7 +189,7 @@ impl Descent {
                         return ended;
                     }
                     if is_resumed {
-                        // The best neighbour may be one of an earlier tick.
+                        // The best neighbour may have been found in an earlier tick.
                         patch = match patch_at(window, view, &self.at) {
                             Some(patch) => patch,
                             None => return Ended::Lost,
@@ -204,8 +203,8 @@ impl Descent {
         }
     }
 
-    /// A patch was entered: is it the end of the surface's way, and if not, where
-    /// does the search begin?
+    /// Checks, for an entered patch, whether the path leaves the surface there; if not, finds the
+    /// patch's closest point.
     fn arrive<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -241,7 +240,7 @@ impl Descent {
         None
     }
 
-    /// The patch's closest point is known: the neighbours are asked next.
+    /// Continues with the neighbours once the patch's closest point is known.
     #[inline]
     const fn knows_here(&mut self) {
         self.at = self.at.moved_to(self.here.u, self.here.v);
@@ -249,7 +248,7 @@ impl Descent {
         self.stage = Stage::Asking;
     }
 
-    /// The way continues in a neighbouring patch, whose closest point is known.
+    /// Continues in a neighbouring patch, whose closest point is known.
     fn enter<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -259,7 +258,7 @@ impl Descent {
         let Some(offer) = &self.asking.best else {
             return Some(Ended::Rests);
         };
-        // Once a patch was entered for nothing, only the nearest place of all counts.
+        // After one patch was entered without gain, only the nearest place of all counts.
         if self.idle.is_some() || !offer.is_surely_nearer {
             let position = position(window, view, &self.at, self.here.z);
             if count_unless_nearer(&mut self.idle, position, view) >= IDLE {
@@ -272,7 +271,7 @@ impl Descent {
         None
     }
 
-    /// No neighbour offers a way.
+    /// Ends the descent where no neighbour offers a continuation.
     fn ends<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -289,8 +288,9 @@ impl Descent {
         if leaves { Ended::Leaves } else { Ended::Rests }
     }
 
-    /// Rests, and not below the HIP where it may leave no more: there it would pull. A patch's
-    /// closest point may lie there; the place where the proxy was held does not.
+    /// Rests, but not below the HIP if the proxy must not leave any more: there the force would
+    /// pull. A patch's closest point may lie there; the place where the proxy last hit the surface
+    /// does not.
     #[inline(never)]
     fn rests(&mut self, leave: &Leave) -> Ended {
         if let Leave::NoMore(held) = leave
@@ -302,7 +302,7 @@ impl Descent {
     }
 }
 
-/// The patch of a point, as the HIP sees it.
+/// Returns the patch of a point, relative to the HIP.
 fn patch_at<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
@@ -314,15 +314,15 @@ fn patch_at<const D: usize>(
     }
 }
 
-/// Returns true if a proxy that rests `z` cells above the HIP may in truth be below it,
-/// and would pull: up a wall rounding decides.
+/// Returns true if a proxy that rests `z` cells above the HIP may really be below it because of
+/// rounding on a wall, where the force would pull.
 fn is_hardly_above(patch: &Patch, z: f32) -> bool {
     let [sw, se, nw, ne] = patch.with_sizes().corners;
     z <= HEIGHT_NOISE * ((sw + se) + (nw + ne))
 }
 
-/// Returns true if the straight way from a point, on this border of its patch, to the HIP
-/// begins above the surface: above the one-sided slope of the patch it leads into.
+/// Returns true if the straight path from a point on this border of its patch to the HIP begins
+/// above the surface, that is, above the one-sided slope of the patch that it enters.
 #[inline(always)]
 fn leads_off<const D: usize>(
     window: &Window<'_, D>,
@@ -340,7 +340,7 @@ fn leads_off<const D: usize>(
     leads_off_beyond(window, view, &at.across(side), (east, north))
 }
 
-/// The same in the patch that the way leads into, so far east and north.
+/// Does the same in the patch that the path enters, for a HIP `east` and `north` of the point.
 #[inline(never)]
 fn leads_off_beyond<const D: usize>(
     window: &Window<'_, D>,
@@ -350,13 +350,13 @@ fn leads_off_beyond<const D: usize>(
 ) -> bool {
     match window.ground(entered.cell) {
         CellContent::Patch(corners) => passes_over(&view.patch(&corners), entered, way),
-        // At the border of the data the proxy is held; see `edge_fade`.
+        // At the border of the data the proxy does not leave; see `edge_fade`.
         CellContent::Hole | CellContent::Missing => false,
     }
 }
 
-/// Returns true if the HIP, so far east and north of a point, lies above the tangent plane
-/// of the patch there.
+/// Returns true if the HIP, `east` and `north` of a point, lies above the tangent plane of the
+/// patch there.
 #[inline]
 pub(in crate::contact) fn passes_over(
     patch: &Patch,
@@ -367,8 +367,8 @@ pub(in crate::contact) fn passes_over(
     patch.height(at.u, at.v) + rise < 0.0
 }
 
-/// The position of a point of the surface, no matter how far the HIP is; `None`
-/// where there is no patch.
+/// Returns the position of a point of the surface, exact for any distance of the HIP; `None` if
+/// there is no patch.
 pub(in crate::contact) fn position_on<const D: usize>(
     window: &Window<'_, D>,
     at: &SurfacePoint,
@@ -376,15 +376,15 @@ pub(in crate::contact) fn position_on<const D: usize>(
     let CellContent::Patch(corners) = window.ground(at.cell) else {
         return None;
     };
-    // Counted from a cell nearby: of a high place the fraction has no bits.
+    // Heights are relative to a nearby cell: at a large height the fraction would lose its bits.
     let patch = Patch::new(corners.heights);
     let up = corners.base.saturating_add(patch.height(at.u, at.v) as i32);
     let near = patch.relative_to(Altitude::new(up, 0.0), corners.base);
     Some(at.position(up, near.height(at.u, at.v)))
 }
 
-/// The position of a point of the surface, `z` cells above the HIP: up a wall that
-/// height is known better than the place tells it, of a far HIP worse.
+/// Returns the position of a point of the surface, `z` cells above the HIP. On a wall `z` is more
+/// exact than the patch's height at the place; with a far HIP it is less exact.
 fn position<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,
@@ -399,8 +399,8 @@ fn position<const D: usize>(
         .unwrap_or_else(|| view.position(at, z))
 }
 
-/// Counts how often in a row a position is no nearer to the HIP than the nearest
-/// one before, which is kept in `nearest`.
+/// Counts the positions in a row that are no nearer to the HIP than the nearest one until now,
+/// which is stored in `nearest`.
 fn count_unless_nearer(
     nearest: &mut Option<(GridPoint, u32)>,
     position: GridPoint,

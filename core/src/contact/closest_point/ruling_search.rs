@@ -1,15 +1,15 @@
-//! Which ruling of a patch has the point closest to the HIP.
+//! Search for the ruling of a patch with the point closest to the HIP.
 //!
-//! F(v), the squared distance to the ruling at v, is continuously differentiable. From the
-//! first ruling F falls toward one end of the patch. A minimum lies between two rulings of which
-//! F falls from the one and rises at the other, or is higher there: Newton steps from either,
-//! or the middle, bring them together.
+//! F(v), the squared distance to the ruling at v, is continuously differentiable. From the first
+//! ruling, F falls toward one end of the patch. A minimum lies between two rulings if F falls at
+//! the first and, at the second, rises or is higher. Newton steps from either, or bisection, bring
+//! them together.
 //!
-//! Newton's method may pass a crest on its way and come down lower. So the rulings from the
-//! first to the last are looked at in the end; where F is above its start there, the search
-//! begins again with that ruling as the far one. Looks are taken at even angles: as a patch
-//! twists, the height of a ruling's line over the HIP along its normal is a sine of the angle,
-//! so a crest is about as wide as an angle, however narrow it is in v.
+//! Newton's method may pass a crest and end lower beyond it. So the rulings between the first and
+//! the last are checked at the end; if F exceeds its start at one of them, the search restarts with
+//! that ruling as the far one. The checks are at even angles. As a patch twists, the height of a
+//! ruling's line over the HIP along its normal is a sine of the angle. So a crest is about as wide
+//! as an angle, even if it is narrow in v.
 
 use super::on_ruling::Ruling;
 use crate::contact::straight_path::StraightWay;
@@ -17,25 +17,25 @@ use crate::contact::surface::patch::Patch;
 use crate::contact::tolerance::{DOUBTFUL_STEP, LEAST_STEP, RESOLUTION};
 use crate::scalar::{larger, smaller};
 
-/// Rulings looked at in one patch before a search ends with the best one, at most. None of ten
-/// million random searches needed as many.
+/// Maximum number of evaluated rulings in one patch; the search then ends with the best one. Ten
+/// million random searches never reached it.
 pub const MAX_EVALUATIONS: u32 = 40;
-/// Of the angle from one ruling to another, parts of either half that are looked at for a crest.
+/// Number of parts of either half of the angle between two rulings that are checked for a crest.
 const HALF: u8 = 4;
 
-/// A patch with a HIP in its coordinates, and the rulings of it that have been looked at.
+/// A patch with a HIP in its coordinates, and the count of its evaluated rulings.
 pub(super) struct Rulings<'p> {
     pub(super) patch: &'p Patch,
     pub(super) hip: (f32, f32),
-    /// The number.
+    /// Number of evaluated rulings.
     pub(super) looked: u32,
-    /// Their largest number.
+    /// Maximum number of evaluated rulings.
     pub(super) most: u32,
 }
 
 /// The far side of a minimum.
 enum Far {
-    /// An end of the patch, not looked at yet.
+    /// An end of the patch, not evaluated yet.
     End(f32),
     /// A ruling at which F rises, or is higher than at the near one.
     Ruling(Ruling),
@@ -51,8 +51,8 @@ impl Far {
 }
 
 impl Rulings<'_> {
-    /// The closest ruling of those that are joined with the one at `v` by rulings no farther than
-    /// it.
+    /// Returns the closest ruling that can be reached from the one at `v` over rulings no farther
+    /// from the HIP than it.
     pub(super) fn closest_to(&mut self, v: f32) -> Ruling {
         let first = self.look_at(v);
         let end = if first.slope < 0.0 { 1.0 } else { 0.0 };
@@ -66,7 +66,7 @@ impl Rulings<'_> {
         closest
     }
 
-    /// Returns true if as many were looked at as there may be.
+    /// Returns true if the maximum number of rulings is evaluated.
     pub(super) const fn is_spent(&self) -> bool {
         self.looked >= self.most
     }
@@ -76,7 +76,7 @@ impl Rulings<'_> {
         Ruling::at(self.patch, self.hip, v)
     }
 
-    /// The minimum between a ruling, from which F falls, and the far side.
+    /// Returns the minimum between a ruling, from which F falls, and the far side.
     fn minimum(&mut self, mut near: Ruling, mut far: Far) -> Ruling {
         let toward = far.v() - near.v;
         let (mut newest, mut steps) = (near, [f32::INFINITY; 2]);
@@ -116,8 +116,8 @@ impl Rulings<'_> {
         }
     }
 
-    /// Returns true if the straight way between the closest points of two rulings is surely nowhere
-    /// farther from the HIP than its start. A patch that is not twisted has no crest.
+    /// Returns true if the straight path between the closest points of two rulings is surely
+    /// nowhere farther from the HIP than at its start. A patch without twist has no crest.
     fn is_plainly_downhill(&self, from: &Ruling, to: &Ruling) -> bool {
         let way = (to.u - from.u, to.v - from.v);
         self.patch.a == 0.0
@@ -126,13 +126,13 @@ impl Rulings<'_> {
                 .never_rises_above_start(0.0)
     }
 
-    /// The first ruling on the way from one to another that is farther from the HIP than the
-    /// first: in between is a crest.
+    /// Returns the first ruling between two that is farther from the HIP than `from`: a crest lies
+    /// between.
     #[inline(never)]
     fn crest(&mut self, from: &Ruling, to: &Ruling) -> Option<Ruling> {
         let cos = |ruling: &Ruling| 1.0 / libm::sqrtf(1.0 + ruling.along * ruling.along);
         let (first, last) = (cos(from), cos(to));
-        // Half way between two angles is the sum of their unit vectors.
+        // The direction half way between two angles is the sum of their unit vectors.
         let sum = 2.0 + 2.0 * (1.0 + from.along * to.along) * first * last;
         let middle = (first + last) / libm::sqrtf(larger(sum, f32::EPSILON));
         let between = from.v + (to.v - from.v) * (last / (first + last));
@@ -151,9 +151,9 @@ impl Rulings<'_> {
     }
 }
 
-/// The next ruling between two to look at; `None` where there is none.
+/// Returns the next ruling between two to evaluate; `None` if there is none.
 ///
-/// A Newton step that does not halve the last but one is not taken: the middle is.
+/// A Newton step that is not less than half the last step but one is replaced by bisection.
 fn next(near: &Ruling, far: &Far, before: f32) -> Option<f32> {
     let room = far.v() - near.v;
     if room.abs() < RESOLUTION {

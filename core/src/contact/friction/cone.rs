@@ -1,9 +1,8 @@
 //! The friction cone: pull along the surface, pressure, and the limit that friction holds.
 //!
-//! With `D` the vector from the proxy to the HIP, the pull is the part of `D` along the
-//! steepest direction in which the proxy could go, over all patches that meet at it;
-//! the rest of `D` presses. On an edge or a vertex a patch offers only the directions
-//! that lead into it.
+//! `D` is the vector from the proxy to the HIP. The pull is the component of `D` along the steepest
+//! direction in which the proxy can move, over all patches that meet at it. The rest of `D`
+//! presses. On an edge or a vertex, each patch offers only the directions that lead into it.
 
 use glam::Vec3;
 
@@ -14,17 +13,18 @@ use crate::contact::tolerance::{BESIDE, RESOLUTION};
 use crate::grid::GridPoint;
 use crate::scalar::root;
 
-/// A walk ends where the pull is less than what friction holds, by at most this part of it.
+/// Tolerance for the end of a walk: the pull is less than the friction limit by at most this
+/// fraction.
 const SHORT: f32 = 5e-4;
 
 /// The vector from a proxy to the HIP, in two parts at right angles to each other.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Pull {
-    /// Along the surface, cells: zero where every direction leads away from the HIP.
+    /// Component along the surface, cells: zero if every direction leads away from the HIP.
     pub(in crate::contact) along: Vec3,
-    /// Its length squared, cells².
+    /// Squared length of `along`, cells².
     pub(in crate::contact) pulls: f32,
-    /// Length squared of the rest, cells².
+    /// Squared length of the rest, cells².
     pub(in crate::contact) presses: f32,
     /// True if the HIP is above the tangent plane: nothing presses then.
     pub(in crate::contact) is_above: bool,
@@ -33,7 +33,7 @@ pub(in crate::contact) struct Pull {
 }
 
 impl Pull {
-    /// None.
+    /// No pull and no pressure.
     pub(in crate::contact) const NONE: Self = Self {
         along: Vec3::ZERO,
         pulls: 0.0,
@@ -42,7 +42,8 @@ impl Pull {
         rounding: 0.0,
     };
 
-    /// The pull at a point of one patch, in the directions that do not lead over these borders.
+    /// Returns the pull at a point of one patch, in the directions that do not lead over these
+    /// borders.
     #[inline(never)]
     pub(in crate::contact) fn in_patch(
         patch: &Patch,
@@ -59,33 +60,33 @@ impl Pull {
             pulls: along.length_squared(),
             presses: (way - along).length_squared(),
             is_above: su * way.x + sv * way.y - way.z < 0.0,
-            // Of the coordinates, and of the height that the last place of one of them is worth; on
-            // a border it is exact.
+            // Rounding of the coordinates, and of the height that their last place is worth; on a
+            // border a coordinate is exact.
             rounding: RESOLUTION
                 * (1.0 + way.x.abs() + way.y.abs() + off(su, border.east) + off(sv, border.north)),
         }
     }
 }
 
-/// Returns the error of a height for each cell of error of the place, on this side of a patch.
+/// Returns the error of a height per cell of error of the place, on this side of a patch.
 fn off(slope: f32, side: i32) -> f32 {
     if side == 0 { slope.abs() } else { 0.0 }
 }
 
-/// The friction cone's hold.
+/// The limit of friction.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Cone {
     /// Coulomb's coefficient.
     pub(in crate::contact) mu: f32,
-    /// The viscous part, as the number of ticks by whose motion the proxy trails.
+    /// The viscous part, as the number of ticks of motion by which the proxy trails.
     pub(in crate::contact) drag: f32,
-    /// Place where the proxy was when the tick began; the chord from there is the motion.
+    /// Position of the proxy at the start of the tick; the chord from there is its motion.
     pub(in crate::contact) from: GridPoint,
 }
 
 impl Cone {
-    /// The pull beside how much of it friction holds, cells, at a point of a patch that counts its
-    /// heights from the HIP.
+    /// Returns the pull and the friction limit, cells, at a point of a patch with heights relative
+    /// to the HIP.
     pub(in crate::contact) fn excess(
         &self,
         pull: &Pull,
@@ -108,19 +109,19 @@ impl Cone {
     }
 }
 
-/// A pull beside what friction holds, cells.
+/// A pull and the friction limit, cells.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Excess {
-    /// The pull less what a walk aims at: a little less than what friction holds.
+    /// The pull minus the walk's target, which is slightly less than the friction limit.
     pub(in crate::contact) over: f32,
     /// The pull.
     pub(in crate::contact) pulls: f32,
-    /// The friction cone's hold.
+    /// The friction limit.
     held: f32,
 }
 
 impl Excess {
-    /// Returns true if a walk ends here: friction holds, and by hardly more than it has to.
+    /// Returns true if a walk ends here: friction holds, with hardly any reserve.
     pub(in crate::contact) fn is_small(&self) -> bool {
         self.over.abs() <= 0.5 * SHORT * self.held
     }
@@ -135,7 +136,7 @@ impl Excess {
         self.over > 0.0
     }
 
-    /// The part of the pull that friction holds.
+    /// Returns the share of the pull that friction holds.
     pub(in crate::contact) fn held_share(&self) -> f32 {
         if self.held < self.pulls {
             self.held / self.pulls
@@ -145,14 +146,14 @@ impl Excess {
     }
 }
 
-/// From a place to a point of the surface, eastward and northward, cells.
+/// Returns the vector from a place to a point of the surface, eastward and northward, cells.
 fn view_from(from: &GridPoint, to: &SurfacePoint) -> (f32, f32) {
     let from = from.relative_to([to.cell.x, to.cell.y, 0]);
     (to.u - from.x, to.v - from.y)
 }
 
-/// The border that a point lies on, or as near to as rounding may have put a point of it: where
-/// a path from the air meets the surface in a concave edge, the last bits of the place differ.
+/// Returns the border that a point lies on, within rounding: where a path from the air meets the
+/// surface in a concave edge, the last bits of the place differ.
 pub(in crate::contact) fn border(point: &SurfacePoint) -> Side {
     point.border_within([BESIDE * RESOLUTION; 2])
 }

@@ -2,23 +2,24 @@
 
 use super::cone::Excess;
 
-/// The search: Newton's steps until the cone holds, then false position (Illinois: an end that
-/// stays twice counts half).
+/// The search: Newton steps until the cone holds, then false position (Illinois: an end that stays
+/// twice counts half).
 pub(super) struct ConeRoot {
-    /// The last place where the proxy was pulled on, and the excess there.
+    /// The last place where the pull exceeded friction, and the excess there.
     low: (f32, f32),
-    /// The first place where it was held, and the excess there, below zero.
+    /// The first place where friction held, and the excess there, below zero.
     high: Option<(f32, f32)>,
-    /// By how much the excess falls over the way on a plane.
+    /// Decrease of the excess over the whole path on a plane.
     falls: f32,
     /// Next place to evaluate.
     next: f32,
-    /// Looks in a row that moved the same end: above zero the lower one.
+    /// Evaluations in a row that moved the same end: positive for the lower end.
     stayed: i32,
 }
 
 impl ConeRoot {
-    /// A search from the start of a way, where the proxy is pulled, to what it has at 1 on a plane.
+    /// Creates a search from the start of a path, where the pull exceeds friction; on a plane the
+    /// foot of the HIP is at 1.
     pub(super) fn new(start: Excess, drag: f32) -> Self {
         let falls = (1.0 + drag) * start.pulls;
         Self {
@@ -35,23 +36,24 @@ impl ConeRoot {
         self.next
     }
 
-    /// Returns the end of a path whose evaluations are used up: the farthest place at which the
-    /// proxy is still pulled, from which the next way continues; only where that is the start, the
-    /// nearest place at which the cone holds.
+    /// Returns the end of a path after the last evaluation: the farthest place where the pull still
+    /// exceeds friction, from which the next path continues. If that is the start, returns the
+    /// nearest place where the cone holds.
     pub(super) fn so_far(&self) -> Option<f32> {
         let (low, _) = self.low;
         let high = self.high.map(|(t, _)| t);
         if low > 0.0 { Some(low) } else { high }
     }
 
-    /// Takes a look at `t` into account.
+    /// Updates the search with the evaluation at `t`.
     pub(super) fn look(&mut self, t: f32, excess: &Excess) {
         let over = excess.over;
         if over > 0.0 {
             let fell = (self.low.1 - over) / (t - self.low.0);
             self.low = (t, over);
             let Some((_, at_high)) = &mut self.high else {
-                // By the last two looks, or as on a plane where they tell less.
+                // The rate comes from the last two evaluations, or from a plane if those differ too
+                // little.
                 let rate = if fell > 0.25 * self.falls {
                     fell
                 } else {

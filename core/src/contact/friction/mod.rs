@@ -1,9 +1,9 @@
 //! Friction: a rough surface holds the proxy back (Salisbury et al. 1995; the friction
 //! cone: Harwin and Melder 2002).
 //!
-//! A proxy stays where it is while the HIP pulls it from inside the static friction cone over
-//! the surface there. Outside of it the proxy slides: it follows the pull until dynamic and
-//! viscous friction hold it (`stick_or_slide`). `cone` measures how the HIP pulls, and what friction holds.
+//! A proxy stays where it is while the HIP pulls it from inside the static friction cone over the
+//! surface there. Outside of the cone the proxy slides: it follows the pull until dynamic and
+//! viscous friction hold it (`stick_or_slide`). `cone` computes the pull and the friction limit.
 
 mod cone;
 mod cone_root;
@@ -18,29 +18,29 @@ pub(super) use stick_or_slide::{Walk, Walked};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Friction {
-    /// Coulomb's coefficient at rest: tangential over normal force up to which the
-    /// proxy is held. Not below `dynamic_mu`.
+    /// Coulomb's coefficient at rest: the maximum ratio of tangential to normal force at which the
+    /// proxy stays. Not below `dynamic_mu`.
     pub static_mu: f32,
     /// Coulomb's coefficient while the proxy slides.
     pub dynamic_mu: f32,
-    /// The viscous part, as a time in seconds: its coefficient (N·s/mm) over the
-    /// stiffness (N/mm). At a speed v the proxy trails by v times this farther.
+    /// The viscous part, as a time in seconds: its coefficient (N·s/mm) divided by the stiffness
+    /// (N/mm). At a speed v the proxy trails by v times this in addition.
     pub viscous_s: f32,
 }
 
 impl Friction {
-    /// The largest coefficient there may be: tan 84°.
+    /// Maximum coefficient: tan 84°.
     pub const MOST: f32 = 10.0;
-    /// The longest [`Self::viscous_s`] there may be.
+    /// Maximum of [`Self::viscous_s`].
     pub const MAX_VISCOUS_S: f32 = 1.0;
-    /// A surface like ice: the proxy is the surface's closest point.
+    /// A frictionless surface: the proxy is the surface's closest point.
     pub const NONE: Self = Self {
         static_mu: 0.0,
         dynamic_mu: 0.0,
         viscous_s: 0.0,
     };
 
-    /// The same coefficient at rest and while it slides.
+    /// Creates friction with the same coefficient at rest and during sliding.
     #[must_use]
     pub const fn coulomb(mu: f32) -> Self {
         Self {
@@ -50,13 +50,13 @@ impl Friction {
         }
     }
 
-    /// Returns true if there is none.
+    /// Returns true if the surface is frictionless.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// Returns true if every number is one that a contact can work with.
+    /// Returns true if every number is in its valid range.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let ordered = self.dynamic_mu <= self.static_mu;

@@ -1,10 +1,11 @@
 //! Friction as a walk: the proxy follows the pull and stops where the cone holds (Moreau's
 //! catching-up).
 //!
-//! From where the proxy is the walk goes straight along the pull through one patch, to the first
-//! of: the cone holds; the border; no nearer to the HIP. There it asks again. Every straight way
-//! ends nearer to the HIP than it began and crosses no crest, so the proxy is never farther from
-//! the HIP than it was, and a walk that is cut short is a point of the surface and nothing else.
+//! From the proxy's place the walk follows the pull straight through one patch, to the first of:
+//! the cone holds; the border; the minimum of the distance to the HIP. There the pull is computed
+//! again. Every straight path ends nearer to the HIP than it began and crosses no crest. So the
+//! proxy never gets farther from the HIP, and the only state of a suspended walk is a point of the
+//! surface.
 
 use glam::Vec3;
 
@@ -18,21 +19,21 @@ use crate::contact::surface::{HipView, Side, SurfacePoint};
 use crate::scalar::smaller;
 use crate::terrain::{CellContent, Window};
 
-/// Looks at the cone on one straight way, at most.
+/// Maximum number of evaluations of the cone on one straight path.
 pub(in crate::contact) const LOOKS: u32 = 8;
-/// Straight ways at most for one HIP, some four for each cell of a window. Where rounding sends a
-/// proxy to and fro across a border it rests then.
+/// Maximum number of straight paths for one HIP, some four for each cell of a window. It stops a
+/// proxy that rounding sends back and forth across a border.
 const WAYS: u32 = 1_024;
-/// Straight ways along the pull within a patch after which Newton's direction takes its place: in
-/// the bent valley of a twisted patch the pull leads across rather than along.
+/// Straight paths along the pull within a patch before Newton's direction replaces it: in the bent
+/// valley of a twisted patch the pull leads across rather than along.
 const ACROSS: u32 = 3;
 
 /// End of a walk.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) enum Walked {
-    /// Friction holds the proxy, or no straight way brings it nearer.
+    /// Friction holds the proxy, or no straight path brings it nearer.
     Rests,
-    /// The same, beside a tile that is not here.
+    /// The same, beside a missing tile.
     Missing,
     /// The straight path to the HIP leads off the surface.
     Leaves,
@@ -42,7 +43,7 @@ pub(in crate::contact) enum Walked {
     Suspended,
 }
 
-/// Knowledge at a walk's place: the steepest pull, and its patch.
+/// State at a walk's place: the steepest pull, and its patch.
 struct Asked {
     pull: Pull,
     at: SurfacePoint,
@@ -52,7 +53,7 @@ struct Asked {
 }
 
 impl Asked {
-    /// Nothing is known there yet.
+    /// Creates the state of a place before any evaluation.
     fn nothing(at: SurfacePoint) -> Self {
         Self {
             pull: Pull::NONE,
@@ -71,8 +72,8 @@ impl Asked {
     }
 }
 
-/// Returns the outcome for a proxy from which the straight path to the HIP leads off the surface.
-/// After such a path has ended on the surface, it is on the ground.
+/// Returns the outcome for a proxy from which the straight path to the HIP leads off the surface;
+/// `None` after such a path has ended on the surface at once: the proxy is on the ground.
 fn off(leave: &Leave, point: &SurfacePoint) -> Option<Walked> {
     match leave {
         leave if leave.is_allowed_at(point) => Some(Walked::Leaves),
@@ -84,20 +85,20 @@ fn off(leave: &Leave, point: &SurfacePoint) -> Option<Walked> {
 /// A walk under way.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Walk {
-    /// Its place.
+    /// Position of the proxy.
     pub(in crate::contact) point: SurfacePoint,
-    /// The coefficient of a proxy that has not moved yet.
+    /// Static coefficient of a proxy that has not moved yet.
     pub(in crate::contact) at_rest: Option<f32>,
-    /// Straight ways for this HIP.
+    /// Number of straight paths for this HIP.
     pub(in crate::contact) ways: u32,
-    /// Of these, the last ones that ended inside of one patch.
+    /// Number of the last of these that ended inside one patch.
     pub(in crate::contact) inside: u32,
     /// Limit of friction at the end of the last straight path, cells.
     pub(in crate::contact) held: Vec3,
 }
 
 impl Walk {
-    /// Continues to where friction holds.
+    /// Continues to the place where friction holds.
     pub(in crate::contact) fn advance<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -147,7 +148,7 @@ impl Walk {
     }
 }
 
-/// Newton's direction to the minimum of the distance, if that is downhill, inside of a patch.
+/// Returns Newton's direction to the minimum of the distance, if it leads downhill, inside a patch.
 #[inline(never)]
 fn newton(at: &Asked, view: &HipView) -> Option<(f32, f32)> {
     let Asked { at, patch, .. } = at;
@@ -165,18 +166,18 @@ fn newton(at: &Asked, view: &HipView) -> Option<(f32, f32)> {
     (det > 0.0 && du * gu + dv * gv < 0.0).then_some((du, dv))
 }
 
-/// The end of one straight way.
+/// The end of one straight path.
 struct End {
-    /// Limit of friction there, cells.
+    /// Friction limit there, cells.
     held: Vec3,
     /// True if the cone holds there.
     rests: bool,
-    /// True if the pull is that of the patch there, and the HIP not above.
+    /// True if the pull is the one of the patch there, and the HIP is not above.
     is_known: bool,
 }
 
-/// Goes one straight way, from where the pull is in excess by so much; `None` where
-/// the budget does not reach for all of it.
+/// Follows one straight path, from a place with the given excess pull; returns `None` if the budget
+/// is too small for all of it.
 #[inline(never)]
 fn straight(
     here: &mut Asked,
@@ -242,7 +243,7 @@ fn straight(
     })
 }
 
-/// The border that a way leads along, and over which it can lead nowhere.
+/// Returns the border that a path runs along, and therefore cannot cross.
 fn runs_along(border: Side, way: (f32, f32)) -> Side {
     Side {
         east: if way.0 == 0.0 { border.east } else { 0 },
@@ -251,9 +252,9 @@ fn runs_along(border: Side, way: (f32, f32)) -> Side {
 }
 
 impl Asked {
-    /// As [`Self::asks`], at the end of a straight way, whose patch and pull are known: where the pull
-    /// leads over one edge, only the patch beyond is asked. It offers all that this one does along the
-    /// edge.
+    /// Does the same as [`Self::asks`], at the end of a straight path, where patch and pull are
+    /// known: if the pull leads over one edge, only the patch beyond is evaluated. Along the edge
+    /// it offers the same directions.
     fn goes_on<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -286,8 +287,8 @@ impl Asked {
         self.asks(window, view, leave, budget)
     }
 
-    /// Finds the steepest pull over the patches that meet at the point; how the walk ends, if it
-    /// does.
+    /// Finds the steepest pull over the patches that meet at the point; returns the walk's end, if
+    /// it ends there.
     #[inline(never)]
     fn asks<const D: usize>(
         &mut self,
@@ -313,7 +314,7 @@ impl Asked {
         self.pull = Pull::in_patch(&self.patch, view, &self.at, border);
         match border {
             Side::NONE if self.pull.is_above => {
-                // Nothing presses a proxy that may not leave here.
+                // Nothing presses a proxy that must not leave here.
                 self.pull.presses = 0.0;
                 off(leave, &self.at)
             }
@@ -322,9 +323,9 @@ impl Asked {
         }
     }
 
-    /// Asks the patches across a border, too. The path to the HIP leads off the surface if the HIP is
-    /// above the patch that the path leads into; at a hole nothing presses a proxy whose HIP is above
-    /// all patches.
+    /// Evaluates the patches across a border as well. The path to the HIP leads off the surface if
+    /// the HIP is above the patch that the path enters; beside no-data nothing presses a proxy
+    /// whose HIP is above all patches.
     #[inline(never)]
     fn asks_neighbours<const D: usize>(
         &mut self,

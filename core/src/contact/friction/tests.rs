@@ -16,7 +16,7 @@ fn at(p: [f32; 3]) -> GridPoint {
     GridPoint::new([20, 20, 0], Vec3::from_array(p))
 }
 
-/// A contact on `height`, with the steps of its HIP.
+/// Runs a contact on `height` over the given HIPs.
 fn step(
     friction: Friction,
     height: impl Fn(i32, i32) -> f32 + 'static,
@@ -30,7 +30,7 @@ fn step(
         .collect()
 }
 
-/// Tangential over normal force on a plane of these slopes.
+/// Ratio of tangential to normal force on a plane with these slopes.
 fn ratio(output: &ContactOutput, slope: [f32; 2]) -> f32 {
     let normal = Vec3::new(-slope[0], -slope[1], 1.0).normalize();
     let pressed = output.displacement.dot(normal);
@@ -62,7 +62,8 @@ fn on_a_plane_of_any_slope_it_slides_at_its_coefficient() {
     }
 }
 
-/// A tick that crosses a crease ends where friction would have ended it, beyond the crease or on it.
+/// A tick that crosses a concave edge ends where friction would have ended it, beyond the edge or
+/// on it.
 #[test]
 fn a_crease_in_the_middle_of_a_tick_lets_it_go_no_farther() {
     const MU: f32 = 0.4;
@@ -78,7 +79,7 @@ fn a_crease_in_the_middle_of_a_tick_lets_it_go_no_farther() {
                 let [cell, _, _] = output.proxy.cell();
                 let x = cell as f32 + output.proxy.frac().x;
                 if (x - 24.0).abs() < 1e-3 {
-                    continue; // on the crease, where there are two planes
+                    continue; // on the concave edge, between two planes
                 }
                 let is = ratio(output, [if x < 24.0 { 0.0 } else { bend }, 0.0]);
                 assert!(
@@ -147,8 +148,8 @@ fn an_encoder_count_now_and_then_does_not_make_it_stick() {
     }
 }
 
-/// On cells of 30 mm a count of 0.029 mm was less than the speed, in cells a tick, at which a proxy
-/// came to rest: a steady hand chattered.
+/// On cells of 30 mm, an encoder count of 0.029 mm was less than the speed, in cells a tick, below
+/// which a proxy comes to rest: a steady hand chattered.
 #[test]
 fn a_steady_hand_breaks_away_once_at_every_cell_size() {
     let friction = Friction {
@@ -249,8 +250,8 @@ fn what_is_no_friction_is_not_taken() {
     }
 }
 
-/// A hand of half a cell a tick over rough ground: a tick that slid twice was cut off by its budget,
-/// one of two.
+/// A hand moves half a cell a tick over rough ground: the budget cut off half of the ticks that
+/// slid twice.
 #[test]
 fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
     let mut tiles = buffers::<2>();
@@ -282,9 +283,9 @@ fn a_fast_hand_over_rough_ground_is_answered_within_its_tick() {
     );
 }
 
-/// The distance that friction held a proxy back is known to the last place of the path. Times the ticks that
-/// the proxy trails by it was more than the friction that the proxy was judged by, and one of
-/// seven went for the HIP itself.
+/// The distance that friction held a proxy back is exact to the last place of the path. Multiplied
+/// by the ticks of trailing, it exceeded the friction that the proxy was compared with, and one in
+/// seven proxies moved to the HIP itself.
 #[test]
 fn a_proxy_that_trails_a_far_hip_does_not_go_for_it() {
     let friction = Friction {

@@ -1,27 +1,27 @@
-//! Count of departures from the surface for one HIP: by rounding there could be no end of them.
+//! Count of departures from the surface for one HIP: rounding could repeat them without end.
 
 use crate::contact::closest_point::{Leave, position_on};
 use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::GridPoint;
 use crate::terrain::Window;
 
-/// After so many departures without getting nearer to the HIP the proxy may leave the
-/// surface no more: it only moves to and fro by rounding.
+/// Maximum number of departures that bring the proxy no nearer to the HIP. After that it must not
+/// leave the surface: rounding only moves it back and forth.
 const DEPARTURES: u32 = 32;
 
-/// The departures from the surface since the HIP last found the proxy on it, if there was
-/// one.
+/// The departures from the surface since the HIP last had the proxy on it; `None` if there were
+/// none.
 pub(super) type Departures = Option<Departed>;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Departed {
-    /// The place nearest to the HIP from which the proxy has left.
+    /// The place nearest to the HIP from which the proxy left.
     nearest: GridPoint,
-    /// Departures since from where it was no nearer.
+    /// Departures since then from places that were no nearer.
     in_vain: u32,
 }
 
-/// Counts a departure, and how it compares with the nearest one before.
+/// Counts a departure, and compares it with the nearest one before.
 pub(super) fn count_departure(departures: &mut Departures, from: GridPoint, view: &HipView) {
     let Some(before) = departures else {
         *departures = Some(Departed {
@@ -37,7 +37,7 @@ pub(super) fn count_departure(departures: &mut Departures, from: GridPoint, view
     }
 }
 
-/// Returns the place where a proxy that has hit the surface may leave it again.
+/// Returns the places where a proxy that has hit the surface may leave it again.
 pub(super) fn may_leave<const D: usize>(
     window: &Window<'_, D>,
     view: &HipView,

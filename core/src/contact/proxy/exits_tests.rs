@@ -1,4 +1,4 @@
-//! Every exit of every phase is walked, and no other.
+//! Each phase takes all of its exits and no other.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use crate::terrain::testing::{Field, buffers};
 
 const SIZE: i32 = 128;
 
-/// Rough ground with holes, around which a HIP goes that leaps now and then.
+/// A HIP wanders around rough ground with no-data, and leaps now and then.
 #[test]
 fn every_exit_of_a_phase_is_walked_and_no_other() {
     let mut random = Random(39);

@@ -1,4 +1,4 @@
-//! A tick of a proxy in the air, which goes straight for the HIP until it meets the surface.
+//! A tick of a proxy in the air, which moves straight to the HIP until it meets the surface.
 
 use super::departures::{Departures, may_leave};
 use super::{Contact, OnSurface, Phase, Sweeping, Turn};
@@ -10,7 +10,7 @@ use crate::grid::GridPoint;
 use crate::terrain::{CellContent, Window};
 
 impl Contact {
-    /// [`Phase::Unseeded`] ends when the HIP is above the patch it is over, or above everything.
+    /// Ends [`Phase::Unseeded`] when the HIP is above the patch under it, or above everything.
     #[inline(never)]
     pub(super) fn looks_around<const D: usize>(
         &mut self,
@@ -41,7 +41,7 @@ impl Contact {
         })
     }
 
-    /// A free proxy has to wait: it is as far as its path is known to be free.
+    /// Stops a free proxy that has to wait, at the end of the known free part of its path.
     pub(super) fn waits_at(&mut self, proxy: GridPoint) -> Turn {
         self.answers(ContactOutput {
             state: ContactState::Free,
@@ -50,7 +50,7 @@ impl Contact {
         })
     }
 
-    /// The proxy is free, at the HIP; the tick ends.
+    /// Ends the tick with the proxy free, at the HIP.
     pub(super) fn becomes_free(&mut self, hip: GridPoint) -> Turn {
         self.phase = Phase::Free;
         self.answers(ContactOutput {
@@ -61,7 +61,7 @@ impl Contact {
         })
     }
 
-    /// In free space the proxy is the HIP, if it still is.
+    /// Moves the proxy to the HIP in free space, if the path is clear.
     ///
     /// Most paths end within the tick; those are not worth storing.
     #[inline(never)]
@@ -87,7 +87,7 @@ impl Contact {
         self.arrives(window, hip, swept, (Departures::None, 1.0), budget)
     }
 
-    /// Continues with a path from an earlier tick, or off the surface.
+    /// Continues a path of an earlier tick, or one off the surface.
     #[inline(never)]
     pub(super) fn sweeps<const D: usize>(
         &mut self,
@@ -113,7 +113,7 @@ impl Contact {
         self.arrives(window, hip, swept, (departures, fade), budget)
     }
 
-    /// Returns the outcome of a path's end: on the surface the tick continues.
+    /// Handles the end of a path; on the surface the tick continues.
     fn arrives<const D: usize>(
         &mut self,
         window: &Window<'_, D>,

@@ -1,5 +1,4 @@
-//! A contact that begins on the surface: where the proxy was in the hand before another
-//! view of the terrain was put in.
+//! A contact that begins on the surface, where the hand had the proxy before the placement changed.
 
 use glam::Vec3;
 
@@ -15,16 +14,16 @@ use crate::terrain::{CellContent, Window};
 /// Start of a contact.
 #[derive(Clone, Debug)]
 pub(super) struct Landing {
-    /// Over or under the place of the surface; the height does not count.
+    /// Place over or under the surface; the height does not count.
     at: GridPoint,
-    /// From the HIP to the proxy, cells.
+    /// Vector from the HIP to the proxy, cells.
     displacement: Vec3,
 }
 
 impl Contact {
-    /// A contact whose proxy begins on the surface over the column of a place, with the
-    /// HIP as far from it as `displacement` says, cells. No force is rendered before the terrain
-    /// there is known, and [`Contact::land`] has set the HIP by it.
+    /// Creates a contact whose proxy begins on the surface at the column of a place, with the
+    /// vector `displacement` from the HIP to it, cells. No force is rendered before the terrain
+    /// there is known and [`Contact::land`] has placed the HIP.
     #[must_use]
     pub fn landing(settings: ContactSettings, at: GridPoint, displacement: Vec3) -> Self {
         Self {
@@ -39,7 +38,7 @@ impl Contact {
         self.landing.is_some()
     }
 
-    /// The proxy as it is seen from the HIP, cells, while it touches or is about to.
+    /// Returns the vector from the HIP to the proxy, cells, while the proxy touches or is about to.
     #[must_use]
     pub fn displacement(&self) -> Option<Vec3> {
         match &self.landing {
@@ -51,11 +50,10 @@ impl Contact {
         }
     }
 
-    /// Puts the proxy of a contact that is landing onto the surface, as soon as the
-    /// terrain there is known, and returns the HIP that is as deep as before. In a hole
-    /// there is no contact.
+    /// Puts the proxy of a landing contact onto the surface as soon as the terrain there is known,
+    /// and returns the HIP at the same depth as before. At no-data there is no contact.
     ///
-    /// The force comes in as it does after a late tile.
+    /// The force fades in as after a late tile.
     #[must_use]
     pub fn land<const D: usize>(&mut self, window: &Window<'_, D>) -> Option<GridPoint> {
         let Landing { at, displacement } = self.landing.as_ref()?;
@@ -79,7 +77,7 @@ impl Contact {
 }
 
 impl Landing {
-    /// The answer while the terrain at the place is not here yet.
+    /// Returns the output while the terrain at the place is missing.
     #[cold]
     pub(super) fn waits(&self, budget: &mut Budget) -> ContactOutput {
         budget.lacks(self.at.column());
@@ -109,7 +107,7 @@ mod tests {
     fn it_lands_as_deep_as_before_and_stays_on_its_side_of_a_wall() {
         let mut tiles = buffers::<2>();
         let field = Field::<2>::held(&mut tiles, FieldSize::new(40, 40), wall);
-        // Pushed three cells into the wall from the west, as the HIP sees the proxy.
+        // Three cells deep in the wall from the west, relative to the proxy.
         let displacement = Vec3::new(-3.0, 0.1, 0.0);
         let mut contact =
             Contact::landing(ContactSettings::AT_1_KHZ, column(10.5, 20.5), displacement);

@@ -1,4 +1,4 @@
-//! A tick of a proxy on the surface, and of one that lost it.
+//! A tick of a proxy on the surface, and of one whose surface has ended.
 
 use glam::Vec3;
 
@@ -19,7 +19,7 @@ use crate::terrain::Window;
 pub(super) enum Came {
     /// Nothing is left to do.
     ToRest,
-    /// It stands beside a tile that is not here.
+    /// The proxy is beside a missing tile.
     ToMissingTile,
     /// The budget is spent.
     AsFarAsWork,
@@ -28,14 +28,14 @@ pub(super) enum Came {
 /// The touched point of the surface.
 pub(super) struct SurfaceContact {
     pub(super) point: SurfacePoint,
-    /// Its place.
+    /// Position of the proxy.
     pub(super) proxy: GridPoint,
-    /// From the HIP to it, cells.
+    /// Vector from the HIP to it, cells.
     pub(super) displacement: Vec3,
 }
 
 impl Contact {
-    /// On the surface: downhill to the closest point.
+    /// Moves downhill on the surface to the closest point.
     #[inline]
     pub(super) fn descends<const D: usize>(
         &mut self,
@@ -56,9 +56,8 @@ impl Contact {
         }
     }
 
-    /// From the surface into the air, straight to the HIP. The path begins at the
-    /// nearest point that is known: that of the patch which was entered, if the proxy
-    /// leaves on the border of it.
+    /// Leaves the surface for the air, straight to the HIP. The path begins at the nearest known
+    /// point: in the entered patch, if the proxy leaves on its border.
     #[inline(never)]
     pub(super) fn leaves<const D: usize>(
         &mut self,
@@ -69,7 +68,7 @@ impl Contact {
         let Phase::OnSurface(on) = &mut self.phase else {
             return Turn::Ends;
         };
-        // The descent has just stood on a patch there.
+        // The descent has just evaluated a patch there.
         let nearest = on.descent.nearest(window, view);
         let from = nearest.and_then(|(point, _)| position_on(window, &point));
         let from = from.unwrap_or(self.output.proxy);
@@ -84,7 +83,7 @@ impl Contact {
         Turn::GoesOn
     }
 
-    /// The answer in contact at the nearest point that is known, faded where the surface ends.
+    /// Sets the output in contact at the nearest known point, faded where the surface ends.
     pub(super) fn touches<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -110,7 +109,7 @@ impl Contact {
         self.touches_at(window, hip, touched, came, budget)
     }
 
-    /// The answer in contact, faded where the surface ends.
+    /// Sets the output in contact, faded where the surface ends.
     pub(super) fn touches_at<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -125,7 +124,7 @@ impl Contact {
         };
         let point = touched.point;
         let mut may_follow = self.settings.fast_paths;
-        // What is left over of a tick is no tick of its own.
+        // A suspended tick is not a whole tick, so the fade does not move.
         if came != Came::AsFarAsWork {
             let target = edge_fade::target(window, &hip, point.cell, budget);
             may_follow &= target.over_patch;
@@ -137,7 +136,7 @@ impl Contact {
         }
         let converged = came == Came::ToRest;
         let displacement = touched.displacement * on.fade;
-        // A proxy that has stayed in its patch is likely to stay for another tick.
+        // A proxy that stayed in its patch is likely to stay for another tick.
         let [x, y, _] = self.output.proxy.cell();
         let stayed = point.cell == Cell::new(x, y);
         if converged
@@ -148,7 +147,7 @@ impl Contact {
         {
             on.follow = Some(follow);
         }
-        // Field by field: a whole answer would be made elsewhere first, and copied.
+        // Field by field: a whole struct would be built elsewhere and copied.
         self.output.state = ContactState::Touching;
         self.output.proxy = touched.proxy;
         self.output.displacement = displacement;
@@ -156,7 +155,7 @@ impl Contact {
         Turn::Ends
     }
 
-    /// The contact is lost: its last force fades out in place.
+    /// Ends the contact: its last force fades out in place.
     pub(super) fn loses_contact<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -174,7 +173,7 @@ impl Contact {
         self.fades_out(window, hip, budget)
     }
 
-    /// A tick of fading out.
+    /// Runs a tick of the fade-out.
     pub(super) fn fades_out<const D: usize>(
         &mut self,
         window: &Window<'_, D>,

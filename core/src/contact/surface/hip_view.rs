@@ -1,4 +1,4 @@
-//! The surface as the haptic interface point (HIP) sees it.
+//! The surface relative to the haptic interface point (HIP).
 
 use glam::Vec3;
 
@@ -8,8 +8,8 @@ use crate::contact::tolerance::RESOLUTION;
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::terrain::{CellContent, Corners, Window};
 
-/// A point to see patches from, with its place in their coordinates and their
-/// heights counted from its own: the HIP, or where a path of the HIP begins.
+/// A reference point for patches, whose coordinates and heights are relative to it: the HIP, or the
+/// start of its path.
 #[derive(Clone, Copy)]
 pub(crate) struct HipView {
     hip: GridPoint,
@@ -25,31 +25,30 @@ impl HipView {
         Altitude::new(self.hip.cell()[2], self.hip.frac().z)
     }
 
-    /// The cell that the HIP is over.
+    /// Returns the cell under the HIP.
     #[inline]
     pub(crate) fn column(&self) -> Cell {
         self.hip.column()
     }
 
-    /// The HIP in a patch's coordinates.
+    /// Returns the HIP in a patch's coordinates.
     #[inline]
     pub(crate) fn in_patch(&self, cell: Cell) -> (f32, f32) {
         let local = self.hip.relative_to([cell.x, cell.y, 0]);
         (local.x, local.y)
     }
 
-    /// The patch of these corners, with heights counted from the HIP.
+    /// Returns the patch of these corners, with heights relative to the HIP.
     #[inline]
     pub(crate) fn patch(&self, corners: &Corners) -> Patch {
         Patch::new(corners.heights).relative_to(self.altitude(), corners.base)
     }
 
-    /// The cell that the HIP is over and what lies there: of cells that share the place,
-    /// one that is no hole.
+    /// Returns the cell under the HIP and its content; at a border, a cell that is not no-data.
     pub(crate) fn ground<const D: usize>(&self, window: &Window<'_, D>) -> (Cell, CellContent) {
         let (place, column) = (self.hip.frac(), self.column());
         let shared = Side::sharing(place.x, place.y);
-        // A loop around one call: as an iterator it takes 240 bytes of an image more.
+        // A loop around one call: an iterator would add 240 bytes to an image.
         for place in 0..4 {
             let side = match place {
                 0 => Side::NONE,
@@ -64,35 +63,34 @@ impl HipView {
         (column, CellContent::Hole)
     }
 
-    /// Returns true if the HIP is above the patch of these corners, which it is over.
+    /// Returns true if the HIP is above the patch of these corners, in the cell under it.
     pub(crate) fn is_above(&self, cell: Cell, corners: &Corners) -> bool {
         let (u, v) = self.in_patch(cell);
         self.patch(corners).height(u, v) < 0.0
     }
 
-    /// Height of the HIP above another place, cells.
+    /// Returns the height of the HIP above another place, cells.
     #[inline]
     pub(crate) fn above(&self, other: &GridPoint) -> f32 {
         other.to(&self.hip).z
     }
 
-    /// The position of a point of the surface, `z` cells above the HIP.
+    /// Returns the position of a point of the surface, `z` cells above the HIP.
     #[inline]
     pub(crate) fn position(&self, point: &SurfacePoint, z: f32) -> GridPoint {
         point.position(self.hip.cell()[2], self.hip.frac().z + z)
     }
 
-    /// From the HIP to a point of the surface, `z` cells above it.
+    /// Returns the vector from the HIP to a point of the surface, `z` cells above it.
     #[inline]
     pub(crate) fn displacement(&self, point: &SurfacePoint, z: f32) -> Vec3 {
         let (p, q) = self.in_patch(point.cell);
         Vec3::new(point.u - p, point.v - q, z)
     }
 
-    /// Returns true if one position is nearer to the HIP than another, by more than the
-    /// last places of the two may be off: of a far HIP the squared distances
-    /// themselves would not tell.
-    // A call: five copies of it would be a kilobyte.
+    /// Returns true if one position is nearer to the HIP than another by more than their rounding.
+    /// With a far HIP the squared distances themselves could not decide.
+    // Not inlined: five copies would take a kilobyte.
     #[inline(never)]
     pub(crate) fn is_nearer(&self, this: &GridPoint, other: &GridPoint) -> bool {
         let (way, left) = (other.to(this), this.to(&self.hip));

@@ -1,4 +1,4 @@
-//! The surface: its patches, points on it, and both as the HIP sees them.
+//! The surface: its patches and points, and both relative to the HIP.
 
 pub mod patch;
 

@@ -6,11 +6,11 @@ use crate::grid::Altitude;
 
 /// z(u, v) = `d + b·u + c·v + a·u·v` in cells, u (east) and v (north) in [0, 1].
 ///
-/// Most often the heights count from the haptic interface point's own height
-/// ([`Self::relative_to`]), so that no bit is spent on how high the terrain lies.
+/// Usually the heights are relative to the haptic interface point's own height
+/// ([`Self::relative_to`]), so that the altitude of the terrain costs no bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
-    /// Twist, eq. 2's A: how much the slope along u changes with v.
+    /// Twist, A in eq. 2: the change of the slope along u with v.
     pub a: f32,
     /// Slope along u at v = 0 (B) and at v = 1.
     pub b: [f32; 2],
@@ -22,7 +22,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// From the corner heights: south-west, south-east, north-west, north-east.
+    /// Creates a patch from the corner heights: south-west, south-east, north-west, north-east.
     #[must_use]
     #[inline]
     pub fn new(corners: [f32; 4]) -> Self {
@@ -35,24 +35,24 @@ impl Patch {
         }
     }
 
-    /// The patch with its heights, which count from `base` whole cells, counted
-    /// from the altitude `from`.
+    /// Returns the patch with heights relative to the altitude `from`; its own heights count from
+    /// `base` whole cells.
     #[must_use]
     #[inline]
     pub fn relative_to(self, from: Altitude, base: i32) -> Self {
         self.with_corners(|height| from.up_to(base, height))
     }
 
-    /// The patch with the sizes of its corners' heights, to bound rounding by.
+    /// Returns the patch with the magnitudes of its corners' heights, for rounding bounds.
     #[inline]
     pub(in crate::contact) fn with_sizes(self) -> Self {
         self.with_corners(f32::abs)
     }
 
-    /// The patch with other corners, its slopes kept.
+    /// Returns the patch with other corners and the same slopes.
     #[inline]
     fn with_corners(self, change: impl Fn(f32) -> f32) -> Self {
-        // Not `map`, which is compiled as a loop with calls: a third of a tick.
+        // Not `map`, which compiles to a loop with calls: a third of a tick.
         let [sw, se, nw, ne] = self.corners;
         Self {
             corners: [change(sw), change(se), change(nw), change(ne)],
@@ -60,7 +60,7 @@ impl Patch {
         }
     }
 
-    /// The patch with u and v exchanged.
+    /// Returns the patch with u and v exchanged.
     #[must_use]
     #[inline]
     pub const fn transposed(&self) -> Self {
@@ -73,8 +73,8 @@ impl Patch {
         }
     }
 
-    /// Height at a place in the patch, cells. Exact on the edges and relatively
-    /// accurate all over: a spike in one corner costs no bit in the others.
+    /// Returns the height at a place in the patch, cells. Exact on the edges and relatively
+    /// accurate everywhere: a spike in one corner costs no bit in the others.
     #[must_use]
     #[inline]
     pub fn height(&self, u: f32, v: f32) -> f32 {
@@ -82,38 +82,37 @@ impl Patch {
         mix(mix(sw, se, u), mix(nw, ne, u), v)
     }
 
-    /// Height as the polynomial gives it, also beyond the borders. It takes fewer
-    /// instructions than [`Self::height`], and loses the bits that a spike cancels.
+    /// Returns the height by the polynomial, also beyond the borders. It takes fewer instructions
+    /// than [`Self::height`], and loses the bits that a spike cancels.
     #[must_use]
     #[inline]
     pub fn polynomial(&self, u: f32, v: f32) -> f32 {
         (self.corners[0] + self.b[0] * u) + (self.c[0] + self.a * u) * v
     }
 
-    /// ∂z/∂u, the slope eastward. Exact on the edges.
+    /// Returns ∂z/∂u, the slope eastward. Exact on the edges.
     #[must_use]
     #[inline]
     pub fn slope_u(&self, v: f32) -> f32 {
         mix(self.b[0], self.b[1], v)
     }
 
-    /// ∂z/∂v, the slope northward. Exact on the edges.
+    /// Returns ∂z/∂v, the slope northward. Exact on the edges.
     #[must_use]
     #[inline]
     pub fn slope_v(&self, u: f32) -> f32 {
         mix(self.c[0], self.c[1], u)
     }
 
-    /// The upward normal, not normalised: its z is 1.
+    /// Returns the upward normal, not normalised: its z is 1.
     #[must_use]
     pub fn normal(&self, u: f32, v: f32) -> Vec3 {
         Vec3::new(-self.slope_u(v), -self.slope_v(u), 1.0)
     }
 
-    /// The polar form (blossom) of the height: symmetric, affine in each
-    /// point, and equal to [`Self::height`] where both agree. It is the middle
-    /// Bernstein coefficient of the height along the straight line between
-    /// the two points.
+    /// Returns the polar form (blossom) of the height: symmetric, affine in each point, and equal
+    /// to [`Self::height`] if both points are equal. It is the middle Bernstein coefficient of the
+    /// height along the straight line between the two points.
     #[must_use]
     #[inline]
     pub fn blossom(&self, (u0, v0): (f32, f32), (u1, v1): (f32, f32)) -> f32 {
@@ -121,7 +120,7 @@ impl Patch {
     }
 }
 
-/// From `x` at 0 to `y` at 1, both exactly.
+/// Interpolates from `x` at 0 to `y` at 1, exact at both.
 #[inline]
 pub(crate) fn mix(x: f32, y: f32, t: f32) -> f32 {
     x * (1.0 - t) + y * t

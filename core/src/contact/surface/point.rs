@@ -1,11 +1,11 @@
-//! A point on the surface: a patch, and the place in it.
+//! A point on the surface: a patch, and a place in it.
 
 use glam::Vec3;
 
 use crate::contact::tolerance::BORDER;
 use crate::grid::{Cell, GridPoint};
 
-/// Toward which neighbours of a patch: −1, 0 or 1 eastward and northward.
+/// Direction to a neighbour of a patch: −1, 0 or 1 eastward and northward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Side {
     /// Eastward.
@@ -18,8 +18,8 @@ impl Side {
     /// Neither east nor north: inside the patch.
     pub const NONE: Self = Self { east: 0, north: 0 };
 
-    /// Toward the cells to the west and south that have a place of a cell on their own
-    /// border.
+    /// Returns the direction to the cells in the west and south that share a place on the border of
+    /// a cell.
     #[inline]
     pub(in crate::contact) fn sharing(u: f32, v: f32) -> Self {
         Self {
@@ -28,8 +28,8 @@ impl Side {
         }
     }
 
-    /// The neighbours over a border toward this side: one over an edge, three around
-    /// a vertex. [`Self::NONE`] where a place is empty.
+    /// Returns the neighbours over a border toward this side: one over an edge, three around a
+    /// vertex. [`Self::NONE`] if there is none for `place`.
     #[inline]
     pub(in crate::contact) const fn neighbour(self, place: u8) -> Self {
         let Self { east, north } = self;
@@ -41,8 +41,8 @@ impl Side {
         }
     }
 
-    /// Of a point on a border toward this side: the border as the patch beyond `side`
-    /// has it.
+    /// Returns, for a point on a border toward this side, the same border relative to the patch
+    /// beyond `side`.
     #[inline]
     pub(in crate::contact) const fn across(self, side: Self) -> Self {
         Self {
@@ -59,7 +59,7 @@ impl Side {
         }
     }
 
-    /// Of a point on this border: the side on which a way to `to` leads over it.
+    /// Returns, for a point on this border, the side on which a path to `to` crosses it.
     #[inline]
     pub(in crate::contact) fn toward(self, to: (f32, f32), (u, v): (f32, f32)) -> Self {
         let toward = |border: i32, way: f32| if border as f32 * way > 0.0 { border } else { 0 };
@@ -70,7 +70,7 @@ impl Side {
     }
 }
 
-/// A point on the surface; its height is its patch's.
+/// A point on the surface, at the height of its patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfacePoint {
     /// The patch.
@@ -82,8 +82,8 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
-    /// The same point as the neighbouring patch on a side has it, for a point on,
-    /// or as good as on, the border that both share.
+    /// Returns the same point relative to the neighbouring patch on a side, for a point on the
+    /// shared border or beside it within rounding.
     #[must_use]
     pub fn across(&self, side: Side) -> Self {
         Self {
@@ -93,13 +93,13 @@ impl SurfacePoint {
         }
     }
 
-    /// The neighbouring patch on a side.
+    /// Returns the neighbouring cell on a side.
     #[inline]
     pub(in crate::contact) const fn neighbour(&self, side: Side) -> Cell {
         Cell::new(self.cell.x + side.east, self.cell.y + side.north)
     }
 
-    /// Another place of the same patch.
+    /// Returns another place of the same patch.
     pub(in crate::contact) const fn moved_to(&self, u: f32, v: f32) -> Self {
         Self {
             cell: self.cell,
@@ -108,8 +108,7 @@ impl SurfacePoint {
         }
     }
 
-    /// Returns true if it is the very place that `other` is, also where they name it in
-    /// different patches.
+    /// Returns true if both are the same place, even in the coordinates of different patches.
     pub(in crate::contact) fn is_same_place(&self, other: &Self) -> bool {
         let place = |point: &Self| {
             let Cell { x, y } = point.cell;
@@ -118,15 +117,14 @@ impl SurfacePoint {
         place(self) == place(other)
     }
 
-    /// On which side of its patch the point lies on the border;
-    /// [`Side::NONE`] inside.
+    /// Returns the side of its patch on whose border the point lies; [`Side::NONE`] inside.
     #[must_use]
     pub fn border(&self) -> Side {
         self.border_within([0.0, 0.0])
     }
 
-    /// As [`Self::border`], for a point that may be as far as that from the
-    /// border, eastward and northward.
+    /// Does the same as [`Self::border`], with a tolerance for the distance from the border,
+    /// eastward and northward.
     pub(in crate::contact) fn border_within(&self, [east, north]: [f32; 2]) -> Side {
         let near = |x: f32, by: f32| i32::from(x >= 1.0 - by) - i32::from(x <= by);
         Side {
@@ -135,18 +133,18 @@ impl SurfacePoint {
         }
     }
 
-    /// Returns true if it is farther from its patch's border than any rounding.
+    /// Returns true if the point is farther from its patch's border than any rounding.
     #[inline]
     pub(in crate::contact) fn is_well_inside(&self) -> bool {
         is_well_inside(self.u) && is_well_inside(self.v)
     }
 
-    /// Its position, `height` cells above the floor of the cells `up`.
+    /// Returns its position, `height` cells above the floor of the cells `up`.
     #[inline]
     pub(in crate::contact) fn position(&self, up: i32, height: f32) -> GridPoint {
         let cell = [self.cell.x, self.cell.y, up];
         if self.is_well_inside() {
-            // Only the height may carry: fewer instructions for the same bits.
+            // Only the height can carry here: fewer instructions for the same bits.
             return GridPoint::over(cell, [self.u, self.v], height);
         }
         GridPoint::new(cell, Vec3::new(self.u, self.v, height))
@@ -159,7 +157,7 @@ pub(in crate::contact) fn is_well_inside(x: f32) -> bool {
     x > BORDER && x < 1.0 - BORDER
 }
 
-/// A coordinate as the patch so many patches on has it, where both share it.
+/// Returns a coordinate relative to the patch `patches` farther on, where both share it.
 fn beyond(x: f32, patches: i32) -> f32 {
     match patches {
         0 => x,

@@ -1,4 +1,4 @@
-//! The cells under a straight path, one after the other.
+//! The cells under a straight path, in order.
 
 use crate::contact::surface::patch::Patch;
 use crate::contact::surface::{Side, SurfacePoint};
@@ -10,7 +10,7 @@ use crate::terrain::{CellContent, Window};
 /// The part of a path over one cell.
 pub(super) struct Step {
     pub(super) cell: Cell,
-    /// Begin and end of the part in it, `[0, 1]`.
+    /// Start and end of the part in the cell, `[0, 1]`.
     from: (f32, f32),
     to: (f32, f32),
     /// Heights above the start of the path, cells.
@@ -19,7 +19,8 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Too short to come to other ground than where it begins, and not downward.
+    /// Returns true if the part is too short to reach other ground than at its start, and not
+    /// downward.
     pub(super) fn is_tiny(&self) -> bool {
         (self.to.0 - self.from.0)
             .abs()
@@ -28,7 +29,7 @@ impl Step {
             && self.z_from - self.z_to < TINY_STEP
     }
 
-    /// The patch's height over the path, cells, as Bernstein coefficients.
+    /// Returns the patch's height over the path, cells, as Bernstein coefficients.
     #[inline]
     pub(super) fn gap(&self, patch: &Patch) -> [f32; 3] {
         [
@@ -38,14 +39,14 @@ impl Step {
         ]
     }
 
-    /// Toward the cells to the west and south that have some of this part on their border:
-    /// a patch has its east and its north border, too.
+    /// Returns the direction to the cells in the west and south that share part of this step on
+    /// their border: a patch includes its east and north borders.
     pub(super) fn sharing(&self) -> Side {
         Side::sharing(self.to.0, self.to.1)
     }
 
-    /// Returns the part on the border of the cell on that side, as that has it: all
-    /// of the part, or only where it ends.
+    /// Returns this part relative to the cell on that side, on whose border it is: the whole part,
+    /// or only its end.
     pub(super) fn on_border_of(&self, side: Side) -> Self {
         let runs_along =
             (side.east == 0 || self.from.0 == 0.0) && (side.north == 0 || self.from.1 == 0.0);
@@ -63,12 +64,12 @@ impl Step {
         }
     }
 
-    /// Returns true if it is no more than a point.
+    /// Returns true if the part is a single point.
     pub(super) fn is_point(&self) -> bool {
         self.from == self.to && self.z_from == self.z_to
     }
 
-    /// The point of the surface under a fraction of this part.
+    /// Returns the point of the surface under a fraction of this part.
     pub(super) fn point(&self, s: f32) -> SurfacePoint {
         let between = |a: f32, b: f32| (a + s * (b - a)).clamp(0.0, 1.0);
         SurfacePoint {
@@ -79,7 +80,7 @@ impl Step {
     }
 }
 
-/// Returns the content beside a step over no data: a patch on whose border it is, or no data.
+/// Returns the content beside a step over no-data: a patch on whose border it is, or no-data.
 #[inline(never)]
 pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Step, CellContent) {
     for place in 0..3 {
@@ -96,8 +97,8 @@ pub(super) fn beside<const D: usize>(window: &Window<'_, D>, step: Step) -> (Ste
     (step, CellContent::Hole)
 }
 
-/// The cells under a straight path, in order; each begins exactly where the one
-/// before ended, so that nothing slips through between them.
+/// The cells under a straight path, in order; each begins exactly where the one before ended, so
+/// that the path has no gap between them.
 pub(super) struct Steps {
     east: Axis,
     north: Axis,
@@ -109,7 +110,7 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// The cells under a path.
+    /// Creates the steps of a path.
     pub(super) fn between(at: &GridPoint, end: &GridPoint) -> Self {
         let axis = |axis: usize| {
             let (first, last) = (at.cell()[axis], end.cell()[axis]);
@@ -127,7 +128,7 @@ impl Steps {
         }
     }
 
-    /// Returns true if the last cell has been given.
+    /// Returns true if the last cell was returned.
     pub(super) fn is_done(&self) -> bool {
         self.done
     }
@@ -166,26 +167,25 @@ impl Steps {
     }
 }
 
-/// The squares of a lattice that a path passes along one axis. Places are counted
-/// in sides of a square from the first square's lower border.
+/// The squares of a lattice that a path passes along one axis. Places are in sides of a square from
+/// the first square's lower border.
 struct Axis {
     start: f32,
     end: f32,
     way: f32,
     per_way: f32,
-    /// Square now, its lower border, and how many squares are still to come.
+    /// Current square, its lower border, and the number of squares after it.
     square: i32,
     floor: f32,
     left: u32,
-    /// +1 or −1: where they lie.
+    /// Direction of travel, +1 or −1.
     toward: i32,
-    /// At which fraction of the path the next border is reached; infinite when the
-    /// path ends before.
+    /// Fraction of the path at which it reaches the next border; infinite if the path ends before.
     t: f32,
 }
 
 impl Axis {
-    /// From the first square to the last, from one place to another as seen from the first.
+    /// Creates an axis from the first square to the last; both places are relative to the first.
     #[inline]
     fn new(first: i32, last: i32, [start, end]: [f32; 2]) -> Self {
         let way = end - start;
@@ -204,7 +204,7 @@ impl Axis {
         axis
     }
 
-    /// Goes over the border ahead.
+    /// Crosses the border ahead.
     #[inline]
     fn crosses(&mut self) {
         self.square = self.square.wrapping_add(self.toward);
@@ -223,19 +223,19 @@ impl Axis {
         }
     }
 
-    /// Returns the place where in a square the border ahead is.
+    /// Returns the coordinate, in a square, of the border ahead.
     #[inline]
     fn ahead(&self) -> f32 {
         if self.toward > 0 { 1.0 } else { 0.0 }
     }
 
-    /// Returns the place where in the square the path is after a fraction of it.
+    /// Returns the coordinate in the square after a fraction of the path.
     #[inline]
     fn at(&self, t: f32) -> f32 {
         (self.start + self.way * t - self.floor).clamp(0.0, 1.0)
     }
 
-    /// Returns the place where in the last square the path ends.
+    /// Returns the coordinate in the last square where the path ends.
     #[inline]
     fn ends(&self) -> f32 {
         (self.end - self.floor).clamp(0.0, 1.0)

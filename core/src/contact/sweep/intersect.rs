@@ -1,13 +1,12 @@
 //! The first crossing of a straight line from above a patch to below it.
 
-/// First root of the height gap along a segment, as a fraction of it, from the
-/// gap's Bernstein coefficients: at the start, blossom, at the end.
+/// Returns the first root of the height gap along a segment, as a fraction of it, from the gap's
+/// Bernstein coefficients: at the start, blossom, at the end.
 ///
-/// The gap is surface minus line: negative while the line is above. The start
-/// is taken to be above or on the surface. A start that is not above is a
-/// crossing at 0. Written so that nothing cancels and nothing is divided by
-/// the twist: flat, sloped and twisted patches are one case (Kahan's form of
-/// the quadratic), and a segment that stays clear is recognised without a root.
+/// The gap is surface minus line: negative while the line is above. The start must be above or on
+/// the surface; a start that is not above is a crossing at 0. Nothing cancels and nothing is
+/// divided by the twist: flat, sloped and twisted patches are one case (Kahan's form of the
+/// quadratic), and a segment that stays clear is recognised without a root.
 #[must_use]
 #[inline]
 pub fn first_crossing(start: f32, middle: f32, end: f32) -> Option<f32> {
@@ -31,8 +30,8 @@ pub fn first_crossing(start: f32, middle: f32, end: f32) -> Option<f32> {
     })
 }
 
-/// As [`first_crossing`], for a line that starts *on* the surface and leaves
-/// it upward: the start is no crossing. `None` also when it does not leave.
+/// Does the same as [`first_crossing`], for a line that starts *on* the surface and leaves it
+/// upward: the start is no crossing. Returns `None` also if the line does not leave.
 #[must_use]
 #[inline]
 pub fn next_crossing(middle: f32, end: f32) -> Option<f32> {

@@ -1,11 +1,10 @@
-//! The first true crossing of the HIP's path with the bilinear surface.
+//! The first crossing of the HIP's path with the bilinear surface.
 //!
-//! The path is halved until a piece is known to be clear, by one look at the
-//! maximum pyramid, or is short enough to be intersected cell by cell. Half-way points are exact to 2⁻²⁴ cell at any
-//! distance, so a sweep of thousands of cells is as accurate as one of a tenth.
-//! Pieces are always the
-//! same halves of halves, so a sweep that runs out of budget or meets a missing tile
-//! continues later to the same bits.
+//! The path is halved until a piece is clear, by one lookup in the maximum pyramid, or is short
+//! enough to be intersected cell by cell. Midpoints are exact to 2⁻²⁴ cell at any distance, so a
+//! sweep of thousands of cells is as accurate as one of a tenth. Pieces are always the same halves
+//! of halves, so a sweep that runs out of budget or meets a missing tile continues later with the
+//! same bits.
 
 use heapless::Vec;
 
@@ -16,15 +15,14 @@ use crate::contact::surface::{HipView, SurfacePoint};
 use crate::grid::{Altitude, GridPoint};
 use crate::terrain::{CellBox, CellContent, Window};
 
-/// Most columns, or rows, that a piece which is intersected cell by cell continues
-/// from its first: it is over nine cells at most, which a tick's budget is enough
-/// for.
+/// Maximum number of columns, or rows, of a piece that is intersected cell by cell, beyond its
+/// first: it covers nine cells at most, which fit in a tick's budget.
 const WALK_CELLS: u32 = 4;
-/// Tallest piece, in cells, that is intersected.
+/// Maximum height of a piece, in cells, that is intersected.
 const WALK_HEIGHT: u32 = 16;
-/// Halvings that bring a path of 4,096 cells, eight windows, down to a walk, and two: where
-/// the path began, and where it leads since the HIP has moved. A longer one is walked in
-/// longer pieces.
+/// Halvings from a path of 4,096 cells, eight windows, down to an intersected piece, and two more:
+/// the start of the path, and its new end after a motion of the HIP. A longer path is intersected
+/// in longer pieces.
 const DEPTH: usize = 12;
 
 /// End of a sweep.
@@ -32,46 +30,46 @@ const DEPTH: usize = 12;
 pub(in crate::contact) enum Swept {
     /// The whole path is free.
     Clear,
-    /// The path goes through the surface from above here.
+    /// The path crosses the surface from above here.
     Hit(SurfacePoint),
-    /// The path enters the solid from the side, out of a hole or over the
-    /// border of the data: nothing was crossed from above.
+    /// The path enters the solid from the side, out of no-data or over the border of the data,
+    /// without a crossing from above.
     Under,
-    /// A tile on the path is not here.
+    /// A tile on the path is missing.
     Missing,
     /// The budget is spent.
     Suspended,
 }
 
-/// A sweep under way: where the proxy has come, and what is still to do.
+/// A sweep in progress: the proxy's place, and the pieces that are left.
 #[derive(Clone, Debug)]
 pub(in crate::contact) struct Path {
-    /// As far as the path is known to be free.
+    /// End of the known free part of the path.
     at: GridPoint,
-    /// Ends of the pieces still to do, the last one first.
+    /// Ends of the remaining pieces, the last one first.
     ends: Vec<GridPoint, DEPTH>,
-    /// The path starts on the surface and leaves it.
+    /// True if the path starts on the surface and leaves it.
     on_surface: bool,
-    /// The last cell passed holds no patch: a hole, or beyond the data.
+    /// True if the last cell passed holds no patch: no-data, or beyond the data.
     over_hole: bool,
-    /// A tile is waited for, and not work.
+    /// True if the sweep waits for a tile, and not for budget.
     is_missing: bool,
 }
 
 impl Path {
-    /// A path through the air.
+    /// Creates a path through the air.
     pub(in crate::contact) fn through_air(from: GridPoint, to: GridPoint) -> Self {
         Self::new(from, to, false)
     }
 
-    /// A path that leaves the surface at `from`.
+    /// Creates a path that leaves the surface at `from`.
     pub(in crate::contact) fn off_surface(from: GridPoint, to: GridPoint) -> Self {
         Self::new(from, to, true)
     }
 
     fn new(from: GridPoint, to: GridPoint, on_surface: bool) -> Self {
         let mut ends = Vec::new();
-        // Capacity is DEPTH > 1.
+        // Cannot fail: DEPTH > 1.
         let _ = ends.push(to);
         Self {
             at: from,
@@ -82,11 +80,11 @@ impl Path {
         }
     }
 
-    /// The path leads to another place from now on.
+    /// Redirects the path to another place.
     ///
-    /// A piece that work has begun on is gone through first if it leads nearer to there: if
-    /// it were given up whenever the HIP moves, a piece that takes more than a tick would
-    /// never come to its end. One that waits for a tile is given up; the new path may not
+    /// A piece that is already partly intersected is completed first if it leads nearer to the new
+    /// place: if every motion of the HIP cancelled it, a piece that takes more than a tick would
+    /// never be completed. A piece that waits for a tile is cancelled, since the new path may not
     /// need it.
     #[inline(never)]
     pub(in crate::contact) fn redirect(&mut self, to: GridPoint) {
@@ -94,19 +92,19 @@ impl Path {
             |end: &GridPoint| !self.is_missing && HipView::new(to).is_nearer(end, &self.at);
         let begun = self.ends.last().copied().filter(leads_on);
         self.ends.clear();
-        // Capacity is DEPTH > 2.
+        // Cannot fail: DEPTH > 2.
         let _ = self.ends.push(to);
         if let Some(end) = begun {
             let _ = self.ends.push(end);
         }
     }
 
-    /// Returns the end of the part of the path that is known to be free.
+    /// Returns the end of the known free part of the path.
     pub(in crate::contact) const fn at(&self) -> GridPoint {
         self.at
     }
 
-    /// Sweeps on until something ends it.
+    /// Continues the sweep until something ends it.
     pub(in crate::contact) fn advance<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -122,11 +120,11 @@ impl Path {
             let span = with_borders(around, &end);
             let low = lower(&self.at, &end);
             if window.is_clear(span, low) || window.is_clear_nearby(around, low) {
-                // Above all that is around, so only the field's border matters.
+                // The path is above everything around, so only the field's border matters.
                 self.over_hole = !window.has_cell(end.column());
                 self.on_surface = false;
             } else if !self.is_walked(&end) {
-                // Not full: such a piece is walked.
+                // If this is full, the piece is intersected instead.
                 let _ = self.ends.push(self.at.midpoint(&end));
                 continue;
             } else if let Some(ended) = self.walk(window, end, budget) {
@@ -138,8 +136,8 @@ impl Path {
         Swept::Clear
     }
 
-    /// Returns true if the piece up to `end` is intersected cell by cell: it is short, and
-    /// in height, too, which would otherwise cost bits.
+    /// Returns true if the piece up to `end` is intersected cell by cell: it is short, and also in
+    /// height, where a long one would cost bits.
     fn is_walked(&self, end: &GridPoint) -> bool {
         let span = CellBox::around(self.at.column(), end.column());
         let is_low = self.at.cell()[2].abs_diff(end.cell()[2]) <= WALK_HEIGHT;
@@ -164,7 +162,7 @@ impl Path {
             budget.spend(INTERSECTION);
             let is_last = steps.is_done() && self.ends.len() == 1;
             if on_surface && step.is_tiny() && !is_last {
-                // A corner of a cell, or of a hole, touched on leaving an edge.
+                // The path leaves an edge and touches a corner of a cell or of no-data.
                 continue;
             }
             let mut ground = window.ground(step.cell);
@@ -204,23 +202,23 @@ impl Path {
     }
 }
 
-/// The cells under a piece of a path, and those on whose border it ends.
+/// Returns the cells under a piece of a path, and those on whose border it ends.
 fn with_borders(mut span: CellBox, end: &GridPoint) -> CellBox {
     if end.is_on_grid_line() {
-        // A cell more than need be does no harm.
+        // An extra cell does no harm.
         span.from = span.from.offset(-1, -1);
     }
     span
 }
 
-/// The lower end of a path.
+/// Returns the altitude of the lower end of a path.
 #[inline]
 pub(in crate::contact) fn lower(a: &GridPoint, b: &GridPoint) -> Altitude {
     let low = if a.is_below(b) { a } else { b };
     Altitude::new(low.cell()[2], low.frac().z)
 }
 
-/// Columns or rows, whichever are more, that a box goes beyond its first.
+/// Returns the number of columns or rows, whichever is larger, beyond a box's first.
 fn longer_side(span: CellBox) -> u32 {
     let columns = span.to.x.abs_diff(span.from.x);
     let rows = span.to.y.abs_diff(span.from.y);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Ticks until the fault comes with the amplifiers on, at most `at_most` so many.
+/// Runs until the fault, with the amplifiers on, for at most `at_most` ticks.
 fn ticks_until(bench: &mut Bench, fault: Fault, at_most: u32) -> u32 {
     for ticks in 1..=at_most {
         bench.tick();
@@ -14,8 +14,8 @@ fn ticks_until(bench: &mut Bench, fault: Fault, at_most: u32) -> u32 {
     panic!("no fault within {at_most} ticks");
 }
 
-/// Pushes up with 3 N, each motor's current measured as `measure` makes it of the command
-/// of the tick before the last. Returns the ticks until the fault, if it comes.
+/// Pushes up with 3 N; `measure` maps the command of the tick before the last to each motor's
+/// measured current. Returns the ticks until the fault, if any.
 fn compared(measure: impl Fn(Vec3) -> Vec3) -> Option<u32> {
     let mut bench = Bench::armed();
     bench.sense.measured_ma = Some([0; 3]);
@@ -39,7 +39,7 @@ fn an_amplifier_that_is_not_ready_is_a_fault_in_the_third_tick() {
     let mut bench = Bench::armed();
     bench.sense.amplifier_not_ready = true;
     assert_eq!(ticks_until(&mut bench, Fault::AmplifierNotReady, 10), 3);
-    // A spike of two ticks is none.
+    // A spike of two ticks is no fault.
     let mut bench = Bench::armed();
     for ticks in 0..300 {
         bench.sense.amplifier_not_ready = ticks % 3 != 0;
@@ -71,7 +71,7 @@ fn an_amplifier_has_ten_milliseconds_to_become_ready_after_the_enable() {
 #[test]
 fn currents_that_follow_their_commands_are_no_fault() {
     assert_eq!(compared(|a| a), None);
-    // A reading that is 3 % and 0.2 A off.
+    // A reading with an error of 3 % and 0.2 A.
     assert_eq!(compared(|a| a * 1.03 + 0.2), None);
 }
 
@@ -85,8 +85,8 @@ fn a_current_that_was_not_commanded_is_a_fault() {
     assert!(swapped.is_some(), "the motors' wires are swapped");
 }
 
-/// A sine of an amplitude (A) and a frequency (Hz) on top of motor 2's command, as it is
-/// sampled at the beginning of each tick.
+/// A sine of an amplitude (A) and a frequency (Hz) on top of motor 2's command, sampled at the
+/// start of each tick.
 fn oscillating(amplitude_a: f32, hz: f32) -> impl Fn(Vec3) -> Vec3 {
     let ticks = core::cell::Cell::new(0.0_f32);
     move |a: Vec3| {
@@ -160,7 +160,7 @@ fn fastest_force_change_is_no_mismatch_for_late_amplifier() {
     let mut bench = Bench::armed();
     let mut commands = [Vec3::ZERO; 3];
     for ticks in 0..2_000 {
-        // 7.65 N to and fro as fast as the slew lets it.
+        // 7.65 N back and forth, as fast as the rate limit permits.
         let side = if (ticks / 100) % 2 == 0 { 50.0 } else { -50.0 };
         bench.wanted_n = Vec3::new(side, 0.0, side);
         let late = commands[0] * 1e3;
@@ -189,7 +189,7 @@ fn monitors_that_are_gone_while_armed_are_a_fault_and_none_at_all_are_not() {
     bench.tick();
     bench.sense.measured_ma = None;
     assert_eq!(ticks_until(&mut bench, Fault::Hardware, 2), 1);
-    // Off, they may come and go.
+    // With the amplifiers off, monitors may appear and disappear.
     bench.guard.clear();
     for measured in [Some([0; 3]), None, Some([0; 3]), None] {
         bench.sense.measured_ma = measured;

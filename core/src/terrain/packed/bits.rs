@@ -1,13 +1,13 @@
-//! Bits out of bytes and into bytes, the highest of a byte first.
+//! Reading and writing of bits, the highest bit of a byte first.
 
-/// Reads bits; zeros when the bytes are used up, which [`Self::is_at_end`] tells.
+/// Reader of bits. It returns zeros after the last byte; [`Self::is_at_end`] detects that.
 pub(super) struct BitReader<'b> {
     bytes: core::slice::Iter<'b, u8>,
-    /// The next bits, from the highest on; zeros below them.
+    /// The next bits, from the highest on, with zeros below them.
     ahead: u32,
-    /// Number of held bits.
+    /// Number of valid bits in `ahead`.
     held: u32,
-    /// Bytes that were wanted after the last.
+    /// Bytes requested after the last one.
     beyond: u32,
 }
 
@@ -21,7 +21,7 @@ impl<'b> BitReader<'b> {
         }
     }
 
-    /// Sees to it that at least 25 bits are ahead. At most four bytes are taken.
+    /// Loads at least 25 bits, from at most four bytes.
     #[inline(never)] // once in an image
     fn refill(&mut self) {
         while self.held <= 24 {
@@ -34,8 +34,7 @@ impl<'b> BitReader<'b> {
         }
     }
 
-    /// Takes the zeros in front of a one, and the one; as many zeros as `most` (at most 24)
-    /// are taken alone.
+    /// Reads the zeros before a one, and the one; after `most` zeros (at most 24) reads no one.
     #[inline(never)]
     pub(super) fn zeros(&mut self, most: u32) -> u32 {
         if self.held < most {
@@ -46,7 +45,7 @@ impl<'b> BitReader<'b> {
         zeros
     }
 
-    /// The next `count` bits, at most 32, as a number.
+    /// Reads the next `count` bits, at most 32, as a number.
     #[inline(never)]
     pub(super) fn number(&mut self, count: u32) -> u32 {
         let (mut number, mut left) = (0, count);
@@ -68,17 +67,17 @@ impl<'b> BitReader<'b> {
         self.held -= count;
     }
 
-    /// Returns true if all bytes were used, and what is left of the last one is zeros.
+    /// Returns true if all bytes were used, and the rest of the last one is zeros.
     pub(super) fn is_at_end(&self) -> bool {
         let unused = self.held as i32 - 8 * self.beyond as i32;
         self.bytes.len() == 0 && self.ahead == 0 && (0..8).contains(&unused)
     }
 }
 
-/// Writes bits; `None` when the bytes are used up.
+/// Writer of bits. It returns `None` if the buffer is full.
 pub(super) struct BitWriter<'b> {
     bytes: &'b mut [u8],
-    /// Bits written.
+    /// Number of written bits.
     length: usize,
 }
 
@@ -87,7 +86,7 @@ impl<'b> BitWriter<'b> {
         Self { bytes, length: 0 }
     }
 
-    /// The lowest `count` bits of a number, at most 32.
+    /// Writes the lowest `count` bits of a number, at most 32.
     pub(super) fn number(&mut self, number: u32, count: u32) -> Option<()> {
         for place in (0..count).rev() {
             let (byte, bit) = (self.length / 8, 7 - self.length % 8);
@@ -101,7 +100,7 @@ impl<'b> BitWriter<'b> {
         Some(())
     }
 
-    /// Bytes begun.
+    /// Returns the number of started bytes.
     pub(super) const fn len(&self) -> usize {
         self.length.div_ceil(8)
     }

@@ -1,8 +1,8 @@
-//! From a whole number to a height: `(offset + k · step) · 2⁻ᵉ`, rounded once.
+//! Conversion of an integer to a height: `(offset + k · step) · 2⁻ᵉ`, rounded once.
 
 use super::LINE;
 
-/// A line of heights over whole numbers.
+/// A linear function from integers to heights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Line {
     pub(super) exponent: i8,
@@ -11,14 +11,14 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Zero, whatever the number.
+    /// Zero for every number.
     pub(super) const NONE: Self = Self {
         exponent: 0,
         offset: 0,
         step: 0,
     };
 
-    /// As it is written; `None` for an exponent that no `f32` has.
+    /// Reads the written form; returns `None` for an exponent that no `f32` has.
     pub(super) fn read(bytes: [u8; LINE]) -> Option<Self> {
         let [exponent, offset @ .., _, _, _, _, _, _, _, _] = bytes;
         let [_, _, _, _, _, _, _, _, _, step @ ..] = bytes;
@@ -47,14 +47,14 @@ impl Line {
         sum as f32 * unit
     }
 
-    /// The line that has a height at the number `at` and rises by `step` a number, as
-    /// exactly as numbers up to `span` from there leave room for.
+    /// Returns the line with a given height at the number `at` and a rise of `step` per number, as
+    /// exact as possible for numbers up to `span` away.
     pub(super) fn through(at: i64, height: f64, step: f64, span: f64) -> Option<Self> {
         let reach = height.abs() + step.abs() * span.abs().max(1.0);
         if !(reach.is_finite() && reach > 0.0) {
             return None;
         }
-        // What the sum is stays below 2^62, while the parts of it may wrap.
+        // The sum stays below 2^62, although its parts may wrap.
         let exponent = 60 - libm::ilogb(reach);
         let whole = |x: f64| libm::rint(libm::ldexp(x, exponent)) as i64;
         let step = whole(step);
@@ -66,13 +66,13 @@ impl Line {
     }
 }
 
-/// The image of an `f32` that rises with it: of the highest bit and the 31 others.
+/// Returns an integer that increases with the `f32`, made of its highest bit and the 31 others.
 pub(super) const fn rank(height: f32) -> i32 {
     let bits = height.to_bits() as i32;
     bits ^ ((bits >> 31) as u32 >> 1) as i32
 }
 
-/// The `f32` of a rank.
+/// Returns the `f32` of a rank.
 #[inline]
 pub(super) const fn of_rank(rank: i32) -> f32 {
     f32::from_bits((rank ^ ((rank >> 31) as u32 >> 1) as i32) as u32)

@@ -1,4 +1,4 @@
-//! The encoder, which a host uses.
+//! The encoder, used by a host.
 
 use super::bits::BitWriter;
 use super::line::{Line, of_rank, rank};
@@ -8,36 +8,36 @@ use super::{HEAD, HOLES, LINE, PARAMETER_SHIFT};
 use crate::grid::MAX_CELL;
 use crate::terrain::TILE_SAMPLES;
 
-/// A height in cells above the base that single precision tells to 2⁻⁴⁴ of a cell, which
-/// is as exact as `f64` tells it above a base far up.
+/// Height in cells above the base below which single precision resolves 2⁻⁴⁴ of a cell: as exact as
+/// `f64` above a high base.
 const TINY: f64 = 1.0 / (1 << 20) as f64;
 /// Samples of a tile.
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
-/// Longest packed form, bytes: one less than the samples take as they are.
+/// Maximum packed length, bytes: one less than the unpacked samples.
 pub const MAX_PACKED: usize = 4 * SAMPLES - 1;
 
-/// Of what heights may be whole multiples.
+/// Unit of heights that are whole multiples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// A height is a multiple of so many cells.
+    /// A height is a multiple of this many cells.
     Cells(f64),
-    /// A height is a multiple of `unit`, held in single precision, times `cells`: a file
-    /// of centimetres that holds `f32` metres.
+    /// A height is a multiple of `unit`, rounded to single precision, times `cells`: for example a
+    /// file in centimetres that stores `f32` metres.
     Single {
-        /// In the file's vertical unit.
+        /// The unit, in the file's vertical unit.
         unit: f64,
-        /// Cells a vertical unit.
+        /// Cells per vertical unit.
         cells: f64,
     },
 }
 
-/// Packs the heights of a tile, in cells above `base`, row by row from the south; NaN is a
-/// hole, and so is what is beyond ±[`MAX_CELL`].
+/// Packs the heights of a tile, in cells above `base`, in rows from the south; NaN is no-data, and
+/// so is a height beyond ±[`MAX_CELL`].
 ///
-/// The first of the `steps` is taken of which every height is made bit for bit. Where
-/// there is none the bits of the heights are packed. `None` where the packed form does not
-/// fit `buffer`: with [`MAX_PACKED`] bytes, where packing does not pay.
+/// Uses the first of the `steps` that reproduces every height bit for bit; if none does, packs the
+/// bits of the heights. Returns `None` if the packed form does not fit `buffer`: with
+/// [`MAX_PACKED`] bytes, if packing saves nothing.
 pub fn pack<'b>(
     heights: &[f32; SAMPLES],
     base: i32,
@@ -77,18 +77,18 @@ fn is_hole(height: f32) -> bool {
     height.is_nan() || height.abs() > MAX_CELL as f32
 }
 
-/// The lines by which heights are made of a step.
+/// The lines that compute heights from multiples of a step.
 struct Lines {
     lines: [Line; 2],
     count: usize,
-    /// The number of a height is `(height + up) · per_cell`, counted from `from`.
+    /// The number of a height is `(height + up) · per_cell - from`.
     up: f64,
     per_cell: f64,
     from: f64,
 }
 
 impl Lines {
-    /// `height` is that of the heights which is nearest to the base.
+    /// Creates the lines of a step; `height` is the one nearest to the base.
     fn of(step: &Step, heights: &[f32; SAMPLES], height: f32, base: f64) -> Option<Self> {
         let known = || heights.iter().filter(|height| !is_hole(**height));
         let above = |height: f32| f64::from(height) + base;
@@ -100,7 +100,7 @@ impl Lines {
             Step::Single { unit, cells } => (unit * cells, unit),
         };
         let from = libm::rint(above(height) / step_cells);
-        // The lowest height is next to the base, where a rounding anywhere else would be seen.
+        // A height this near to the base is exact only as it is: the product would be rounded.
         let there = |number: f64, cells: f64| match f64::from(height) {
             tiny if tiny.abs() < TINY => tiny,
             _ => libm::fma(number, cells, -base),
@@ -119,7 +119,7 @@ impl Lines {
                 if !least.is_finite() {
                     return None;
                 }
-                // Of single precision at the lowest height, times its last place.
+                // The last place of the lowest height in single precision.
                 let place = libm::ldexp(1.0, libm::ilogb(least) - 23);
                 let single = |number: f64| f64::from((number * unit) as f32) / place;
                 let (middle, step, cell) = (single(from), unit / place, place * cells);
@@ -146,7 +146,7 @@ impl Lines {
         &self.lines[..self.count]
     }
 
-    /// Finds the numbers of all heights; whether the lines make these very heights of them.
+    /// Computes the numbers of all heights. Returns true if the lines reproduce every height.
     fn number(&self, heights: &[f32; SAMPLES], numbers: &mut [i32; SAMPLES]) -> bool {
         numbers.iter_mut().zip(heights).all(|(number, height)| {
             let exact = (f64::from(*height) + self.up) * self.per_cell - self.from;
@@ -216,7 +216,7 @@ fn write<'b>(
     buffer.get(..length)
 }
 
-/// The Rice parameter that suits the first samples that are known.
+/// Returns the Rice parameter that suits the first samples with a height.
 fn parameter(heights: &[f32; SAMPLES], numbers: &[i32; SAMPLES], predicted: i32) -> u32 {
     let known = heights.iter().zip(numbers);
     let known = known.filter(|(height, _)| !is_hole(**height));

@@ -1,17 +1,17 @@
-//! Prediction of a sample's number from those before it.
+//! Prediction of a sample's number from earlier samples.
 
 use crate::terrain::TILE_SAMPLES;
 
-/// The numbers of the row before, and of the present one as far as it is known.
+/// The numbers of the last row, and of the known part of the present row.
 pub(super) struct Prediction {
-    /// West of the next sample: of its row; from there on, of the row before.
+    /// Numbers of the present row, west of the next sample; east of it, of the last row.
     row: [i32; TILE_SAMPLES],
     west: i32,
     corner: i32,
 }
 
 impl Prediction {
-    /// With the number that the first sample is to have.
+    /// Creates the state before the first sample, with its predicted number.
     pub(super) const fn new(first: i32) -> Self {
         Self {
             row: [first; TILE_SAMPLES],
@@ -20,8 +20,8 @@ impl Prediction {
         }
     }
 
-    /// Tells the number of the sample in a column, which `number` makes of the number that is
-    /// predicted for it and the one to its west. Columns come in turn, row by row.
+    /// Returns the number of the sample in a column, computed by `number` from its prediction and
+    /// from the number to the west. Columns must be in order, row by row.
     #[inline]
     pub(super) fn next(&mut self, col: usize, number: impl FnOnce(i32, i32) -> i32) -> i32 {
         let Some(place) = self.row.get_mut(col) else {

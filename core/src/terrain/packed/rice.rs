@@ -1,17 +1,17 @@
-//! Rice codes whose parameter follows the mean of what was coded.
+//! Rice codes whose parameter follows the mean of the coded numbers.
 
 use super::bits::{BitReader, BitWriter};
 
-/// As many zeros announce a number of 32 bits.
+/// Number of zeros that precede a number of 32 bits.
 const MAX_ZEROS: u32 = 20;
-/// Longest parameter.
+/// Maximum parameter.
 pub(super) const MAX_PARAMETER: u32 = 27;
-/// Bits by which the mean is divided: it follows some sixteen numbers.
+/// Bits of the mean's divisor: it follows some sixteen numbers.
 const SLOWNESS: u32 = 4;
-/// Bits after the first of a run's length, at most: more than a tile's samples need.
+/// Maximum bits of a run's length after the first: more than a tile's samples need.
 const MAX_RUN_BITS: u32 = 15;
 
-/// Position of the parameter.
+/// State of the parameter.
 pub(super) struct Rice {
     /// Sixteen times the mean.
     sum: u32,
@@ -65,7 +65,7 @@ impl Rice {
     }
 }
 
-/// Reads the length of a run, one at least.
+/// Reads the length of a run, at least one.
 #[inline(never)]
 pub(super) fn read_run(bits: &mut BitReader<'_>) -> u32 {
     let zeros = bits.zeros(MAX_RUN_BITS);

@@ -1,6 +1,6 @@
-//! Packed tiles: bit for bit what they were; other bytes are refused.
+//! Packed tiles: lossless to the bit; invalid bytes are refused.
 //!
-//! The judge is [`Tile::load`] with the bytes of the same heights.
+//! The oracle is [`Tile::load`] with the bytes of the same heights.
 
 use std::boxed::Box;
 use std::vec::Vec;
@@ -14,11 +14,11 @@ mod reference_decoder;
 const KEY: TileKey = TileKey::new(0, 2, 5);
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
 
-/// The bits of all samples that a tile holds.
+/// The bits of all samples of a tile.
 fn held(tile: &Tile) -> Vec<u32> {
     let sample = |i: usize| {
         let (col, row) = (i % TILE_SAMPLES, i / TILE_SAMPLES);
-        // The last row and column are corners of the patches before them.
+        // The samples of the last row and column are corners of the patches before them.
         let (u, v) = (col.min(TILE_SAMPLES - 2), row.min(TILE_SAMPLES - 2));
         tile.corners(Cell::new(u as i32, v as i32))[(col - u) + 2 * (row - v)].to_bits()
     };
@@ -33,8 +33,7 @@ fn loaded(heights: &[f32; SAMPLES]) -> Vec<u32> {
     held(&tile)
 }
 
-/// Packs heights, and says what the tile that is unpacked of them is; `None` where packing
-/// does not pay.
+/// Packs heights, and checks the tile unpacked from them; `None` if packing saves nothing.
 fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[Step]) -> Option<Vec<u8>> {
     let mut buffer = [0xAA; MAX_PACKED];
     let bytes = pack(heights, base, steps, &mut buffer)?.to_vec();
@@ -48,7 +47,7 @@ fn packed(heights: &[f32; SAMPLES], base: i32, steps: &[Step]) -> Option<Vec<u8>
     Some(bytes)
 }
 
-/// Numbers that look random, the same in every run.
+/// Pseudo-random numbers, the same in every run.
 struct Random(u64);
 
 impl Random {
@@ -68,7 +67,7 @@ fn by_sample(mut height: impl FnMut(usize, usize) -> f32) -> [f32; SAMPLES] {
     core::array::from_fn(|i| height(i % TILE_SAMPLES, i / TILE_SAMPLES))
 }
 
-/// Hills in whole metres, in cells of some length above a base.
+/// Hills in whole metres, in cells above a base.
 fn hills(metres_a_cell: f64, base: i32) -> [f32; SAMPLES] {
     by_sample(|col, row| {
         let (x, y) = (col as f64, row as f64);
@@ -100,7 +99,7 @@ fn centimetres_in_single_precision_are_two_lines() {
             Step::Single { unit: 0.01, cells },
         ];
         let bytes = packed(&heights, base, &steps).unwrap();
-        // Single precision of the file's heights is that of the tile's: one line will do.
+        // The file's single precision is then the tile's, so one line is enough.
         let same = base == 0 && cells == 1.0;
         assert_eq!(bytes[0] & 7, if same { 1 } else { 2 }, "{base} {cells}");
         assert!(bytes.len() < 500, "{}", bytes.len());
@@ -223,7 +222,7 @@ fn random_bits_do_not_pay_or_are_whole() {
     assert!((90..180).contains(&packs), "{packs}");
 }
 
-/// Some packed tiles of every kind.
+/// Examples of packed tiles of every kind.
 fn some() -> Vec<Vec<u8>> {
     let mut hollow = hills(30.0, 50);
     for i in (0..SAMPLES).filter(|i| i % 37 < 9) {
@@ -236,7 +235,7 @@ fn some() -> Vec<Vec<u8>> {
         unit: 0.01,
         cells: 1.0,
     }];
-    // A last code of 19 bits, of 25 that the reader holds: none of the bytes that may follow.
+    // The last code has 19 bits, and the reader loads 25: it must not need the bytes after it.
     let last = by_sample(|col, row| match (col, row) {
         (32, 32) => 9.0,
         (0, _) => 4.0,
@@ -307,7 +306,7 @@ fn any_bytes_are_taken_or_refused() {
     let mut tile = Box::new(Tile::VACANT);
     for _ in 0..3000 {
         let length = random.below(5000);
-        // Long zeros and long ones as well.
+        // Long runs of zeros and of ones are included.
         let calm = random.below(4);
         let mut bytes: Vec<u8> = (0..length)
             .map(|_| match random.below(1 + 8 * calm) {

@@ -1,4 +1,4 @@
-//! Packed bytes, sample by sample.
+//! Decoding of packed bytes, sample by sample.
 
 use super::bits::BitReader;
 use super::line::{Line, of_rank};
@@ -6,7 +6,7 @@ use super::prediction::Prediction;
 use super::rice::{MAX_PARAMETER, Rice, read_run};
 use super::{HEAD, HOLES, LINE, PARAMETER_SHIFT};
 
-/// A tile's heights under way out of their packed form.
+/// State of the decoding of a tile's heights.
 pub(in crate::terrain) struct Unpacker<'b> {
     bits: BitReader<'b>,
     prediction: Prediction,
@@ -18,8 +18,7 @@ pub(in crate::terrain) struct Unpacker<'b> {
 }
 
 impl<'b> Unpacker<'b> {
-    /// Reads what stands in front of the codes; `None` where that is nothing that
-    /// [`super::pack`] writes.
+    /// Reads the header before the codes; returns `None` if [`super::pack`] cannot have written it.
     pub(in crate::terrain) fn new(bytes: &'b [u8]) -> Option<Self> {
         let ([kind, predicted @ ..], bytes) = bytes.split_first_chunk::<HEAD>()?;
         let (lines, parameter) = (kind & 3, u32::from(kind >> PARAMETER_SHIFT));
@@ -40,7 +39,7 @@ impl<'b> Unpacker<'b> {
         })
     }
 
-    /// The height of the next sample, whose column is given; NaN for a hole.
+    /// Returns the height of the next sample, in the given column; NaN for no-data.
     #[inline]
     pub(in crate::terrain) fn next(&mut self, col: usize) -> f32 {
         let (rice, bits) = (&mut self.rice, &mut self.bits);
@@ -59,13 +58,13 @@ impl<'b> Unpacker<'b> {
         }
     }
 
-    /// Returns true if the bytes were those of all samples until now, and no more.
+    /// Returns true if the bytes end exactly after the samples decoded until now.
     pub(in crate::terrain) fn is_at_end(&self) -> bool {
         self.bits.is_at_end() && self.runs.as_ref().is_none_or(|runs| runs.left == 0)
     }
 }
 
-/// A line in front of the codes, where there is one.
+/// Reads a line before the codes, if there is one.
 fn line(there_is: bool, bytes: &[u8]) -> Option<(Line, &[u8])> {
     if !there_is {
         return Some((Line::NONE, bytes));
@@ -74,15 +73,15 @@ fn line(there_is: bool, bytes: &[u8]) -> Option<(Line, &[u8])> {
     Some((Line::read(*line)?, rest))
 }
 
-/// Runs of samples with and without a height, in turn.
+/// Runs of samples with and without a height, alternating.
 struct Runs {
-    /// Samples left of this run.
+    /// Samples left in this run.
     left: u32,
     holes: bool,
 }
 
 impl Runs {
-    /// The first bit tells what the first run is of.
+    /// Reads the first bit, which defines the kind of the first run.
     fn new(bits: &mut BitReader<'_>) -> Self {
         Self {
             left: 0,
@@ -90,7 +89,7 @@ impl Runs {
         }
     }
 
-    /// Returns true if the next sample is a hole.
+    /// Returns true if the next sample is no-data.
     #[inline]
     fn is_hole(&mut self, bits: &mut BitReader<'_>) -> bool {
         if self.left == 0 {

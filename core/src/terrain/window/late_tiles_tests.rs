@@ -1,4 +1,4 @@
-//! The surface between fallback and tiles, against a model of its own in f64.
+//! The surface between fallback and tiles, against a separate model in f64.
 
 use std::boxed::Box;
 use std::collections::BTreeMap;
@@ -15,12 +15,12 @@ use crate::terrain::testing::buffers;
 use crate::terrain::{CellBox, CoarseTile, FieldSize};
 
 const SIZE: FieldSize = FieldSize::new(640, 640);
-/// Under tiles 2 to 9 each way.
+/// Under tiles 2 to 9 in each direction.
 const WIDE: CoarseTile = CoarseTile {
     first: Cell::new(64, 64),
     shift: 3,
 };
-/// Its border goes through tiles.
+/// Its border crosses tiles.
 const NEAR: CoarseTile = CoarseTile {
     first: Cell::new(112, 104),
     shift: 2,
@@ -29,7 +29,7 @@ const FALLBACK: Fallback = Fallback {
     wide: WIDE,
     near: Some(NEAR),
 };
-/// Heights of tiles count from here, those of the fallback from below.
+/// Base of the tiles' heights; those of the fallback have a lower base.
 const BASE: i32 = 10;
 
 /// Hills of some cells with a rough part.
@@ -46,7 +46,7 @@ fn coarse(x: i32, y: i32) -> Option<f64> {
     through(NEAR, x, y, &near_sample).or_else(|| through(WIDE, x, y, &hills))
 }
 
-/// The samples of the near tile: on its border those of the wide one.
+/// The samples of the near tile: on its border, those of the wide one.
 fn near_sample(x: i32, y: i32) -> f64 {
     let last = NEAR.first.offset(32 * NEAR.spacing(), 32 * NEAR.spacing());
     match [NEAR.first.x, last.x].contains(&x) || [NEAR.first.y, last.y].contains(&y) {
@@ -74,7 +74,7 @@ fn through(tile: CoarseTile, x: i32, y: i32, sample: &dyn Fn(i32, i32) -> f64) -
     Some(south * (1.0 - t) + north * t)
 }
 
-/// A window over the hills, and how far the model has each tile that came from the fallback.
+/// A window over the hills, and the model's distance of each arrived tile from the fallback.
 struct Bed<'t> {
     window: Window<'t, 4>,
     spare: Vec<&'t mut Tile>,
@@ -123,7 +123,7 @@ impl<'t> Bed<'t> {
         self.spare.extend(spent);
     }
 
-    /// A tile arrives while the HIP is in that cell.
+    /// Delivers a tile while the HIP is in a cell.
     fn comes(&mut self, col: i32, row: i32, rendered: Cell) {
         let key = TileKey::new(0, col, row);
         let tile = self.spare.pop().expect("a buffer");
@@ -170,7 +170,7 @@ impl<'t> Bed<'t> {
         }
     }
 
-    /// Judges every patch in a box of tiles.
+    /// Compares every patch in a box of tiles with the model.
     fn judge(&self, tiles: core::ops::Range<i32>) -> usize {
         let mut patches = 0;
         for x in tiles.start * 32..tiles.end * 32 {
@@ -222,7 +222,7 @@ fn it_is_the_model_s_whatever_has_come_and_settled() {
     assert!(bed.window.is_settled(Cell::new(5 * 32, 5 * 32)));
 }
 
-/// Cells on either side of the near tile's border, too.
+/// Cells on either side of the near tile's border are included.
 #[test]
 fn cells_that_share_samples_of_the_fallback_agree_to_the_bit() {
     let mut room = room();
@@ -288,7 +288,7 @@ fn blended_samples_keep_their_speed_and_end_at_the_tile() {
         corners.heights[0],
         (hills(140, 140) - f64::from(BASE)) as f32
     );
-    // Patches of the tile from before it settled must not be used any more.
+    // Patches of the tile from before its blend must not be used any more.
     let low = Altitude::new(40, 0.0);
     assert!(
         bed.window
@@ -302,14 +302,14 @@ fn untouched_tile_is_the_surface_at_once() {
     let mut bed = Bed::with_fallback(&mut room);
     bed.comes(6, 4, HERE);
     assert!(bed.window.is_settled(Cell::new(6 * 32, 140)));
-    // Beside the hand's, which is the fallback still: it would bend at once.
+    // Beside the hand's tile, which is still the fallback: it would bend at once.
     bed.comes(5, 4, HERE);
     assert!(!bed.window.is_settled(Cell::new(5 * 32, 140)));
     bed.judge(3..7);
     bed.settles(100.0);
     bed.comes(4, 4, HERE);
     bed.settles(100.0);
-    // The hand's is the surface now: nothing bends any more.
+    // The hand's tile is now the surface: nothing bends any more.
     bed.comes(3, 4, HERE);
     assert!(bed.window.is_settled(Cell::new(3 * 32, 140)));
     bed.judge(3..7);
@@ -485,8 +485,7 @@ fn buffers_are_neither_lost_nor_doubled() {
     assert!(bed.window.take_spare().is_none());
 }
 
-/// The sample in the middle of the hand's tile where that is farthest above the fallback, or
-/// farthest below it.
+/// The sample in the middle of the hand's tile that is farthest above or below the fallback.
 fn where_it_moves(up: bool) -> (i32, i32) {
     let rise = |&(x, y): &(i32, i32)| {
         let rise = hills(x, y) - coarse(x, y).expect("known");
@@ -500,8 +499,8 @@ fn where_it_moves(up: bool) -> (i32, i32) {
     most
 }
 
-/// Depth and state in each tick of a hand that holds still, `above` the fallback, while the tile
-/// under it comes in tick 50.
+/// Depth and state in each tick of a hand that does not move, `above` the fallback, while the tile
+/// under it arrives in tick 50.
 fn held_still(friction: Friction, up: bool, above: f64) -> Vec<(f64, ContactState)> {
     let mut room = room();
     let mut bed = Bed::with_fallback(&mut room);
@@ -560,7 +559,7 @@ fn a_hand_that_holds_still_feels_the_surface_move_and_no_step() {
             let change = pair[1].0 - pair[0].0;
             let bound = 1.001 * f64::from(STEP) + 1e-5;
             assert!(change < bound, "{mu} {up} {above} {tick}: {pair:?}");
-            // What friction has held may slide when the ground under it has turned.
+            // A proxy that friction held may slide when the ground under it has turned.
             assert!(mu > 0.0 || change > -bound, "{up} {above} {tick}: {pair:?}");
             most = most.max(change.abs());
         }

@@ -1,9 +1,8 @@
-//! A second reader, written from what the module says of its bytes and from nothing else;
-//! slow, and sure of what it gets.
+//! A second reader, written only from the module's specification of the bytes; slow and simple.
 
 use std::vec::Vec;
 
-/// Largest height that can be addressed.
+/// Maximum height that can be addressed.
 const MOST: f32 = 536_870_912.0;
 
 struct Bits(Vec<bool>, usize);
@@ -37,7 +36,7 @@ fn int(bytes: &[u8]) -> i64 {
     (number - if below_zero { 1 << top } else { 0 }) as i64
 }
 
-/// The bits of the heights that packed bytes are.
+/// Decodes packed bytes into the bits of the heights.
 pub(super) fn heights(bytes: &[u8]) -> Vec<u32> {
     let (kind, lines) = (bytes[0], usize::from(bytes[0] & 3));
     let line = |i: usize| {
