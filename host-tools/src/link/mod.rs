@@ -13,11 +13,11 @@
 //!   either end may fail and reconnect.
 //! - `prefetch` reads the tiles ahead of the HIP before the device requests them.
 //! - [`ControlSession`] sends queries and requests without a terrain: status, calibration, arming.
-//! - Transports are [`Tcp`], [`Usb`], and [`Native`], a device in this
-//!   program's memory; [`DeviceAddress`] is how a user names one.
+//! - Transports are [`Tcp`], [`Usb`], and [`Native`], a device in this program's memory; a
+//!   [`DeviceAddress`] selects one.
 //! - [`heightfield::printable_text`] escapes text of a device before a terminal shows it.
-//! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual
-//!   Phantom at its second line.
+//! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual Phantom at its second
+//!   line.
 
 mod bulk;
 mod client;
