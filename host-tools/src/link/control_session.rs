@@ -25,11 +25,11 @@ const MOMENT: Duration = Duration::from_millis(150);
 /// Handler of an unrequested message; the returned message is sent in answer.
 type OnMessage<'o> = &'o mut dyn FnMut(&ToHost) -> Option<ToDevice<'static>>;
 
-/// A session with a device, without a terrain. Every end of it is sent to the device. A session that
-/// has set a scene or driven the arm closes, which disarms the arm. A session that has only read, or
-/// changed settings, detaches and leaves arm and scene as they are. [`ControlSession::end`] waits for
-/// the answer and returns it. A session that is dropped waits, too, up to [`Timeouts::goodbye`], and
-/// logs that the arm may still be armed if there is no answer.
+/// A session with a device, without a terrain. It always sends its end to the device. A session
+/// that has set a scene or driven the arm closes, which disarms the arm. A session that has only
+/// read, or changed settings, detaches and leaves arm and scene as they are.
+/// [`ControlSession::end`] waits for the answer and returns it. A dropped session also waits, up to
+/// [`Timeouts::goodbye`], and logs that the arm may still be armed if there is no answer.
 pub struct ControlSession<'t> {
     exchange: Exchange<'t>,
     device: DeviceHello,
@@ -92,8 +92,8 @@ impl<'t> ControlSession<'t> {
     /// Ends the session, and returns when the device has confirmed it.
     ///
     /// # Errors
-    /// [`LinkError::NotConfirmed`] and [`LinkError::Taken`] where the arm may be armed; else
-    /// [`LinkError`].
+    /// [`LinkError::NotConfirmed`] and [`LinkError::Taken`] if the arm may be armed; otherwise
+    /// another [`LinkError`].
     pub fn end(mut self) -> Result<(), LinkError> {
         self.exchange.end()
     }
@@ -476,7 +476,7 @@ mod tests {
         look(&mut control, calibration);
     }
 
-    /// A scene for the arm.
+    /// Returns a scene for the arm.
     fn scene() -> Scene {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
@@ -499,7 +499,7 @@ mod tests {
             assert_eq!((last.end, epoch), (SessionEnd::Goodbye, None));
             assert!(looking.status().is_ok());
         }
-        // After a request to arm, even a refused one, the session closes, so the device counts it.
+        // A session that has requested arming, even in vain, closes, so the device records it.
         let before = open(&mut device).device().last.session;
         let mut arming = open(&mut device);
         let blocked = arming.request(&Request::Arm).expect("it answers");

@@ -1,5 +1,5 @@
-//! The host's states of [`hapterra_core::wire`], as a state machine without I/O and without a clock:
-//! the caller passes the time.
+//! The host's states of [`hapterra_core::wire`], as a state machine without I/O and without a
+//! clock: the caller passes the time.
 
 use std::time::Duration;
 

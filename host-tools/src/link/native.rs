@@ -51,7 +51,8 @@ impl TickClock for HostClock {
         0
     }
 
-    /// The virtual arm stops with this program, so no force lasts while the program is stopped.
+    /// Returns the period: the virtual arm stops with this program, so no force lasts while it is
+    /// stopped.
     fn since_last_tick(&mut self) -> u32 {
         Self::PERIOD
     }

@@ -63,8 +63,8 @@ impl Tcp {
 impl Transport for Tcp {
     fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         let began = Instant::now();
-        // The time-out holds for all bytes, so a device that reads a byte now and then is gone,
-        // too.
+        // The time-out holds for all bytes, so a device that reads a byte now and then also counts
+        // as gone.
         while !bytes.is_empty() {
             let left = TIMEOUT.saturating_sub(began.elapsed());
             if left.is_zero() {

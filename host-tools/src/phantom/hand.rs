@@ -28,9 +28,9 @@ pub struct HandModel {
 }
 
 impl Default for HandModel {
-    /// A relaxed precision grip, not a fit to one person. The values are chosen inside the ranges
-    /// that identification studies report for fingers and wrists on a stylus (0.1-0.3 kg, 200-500
-    /// N/m, 5-10 N·s/m towards the target; a grip several times stiffer).
+    /// Returns a relaxed precision grip, not a fit to one person. The values are chosen inside the
+    /// ranges that identification studies report for fingers and wrists on a stylus (0.1-0.3 kg,
+    /// 200-500 N/m, 5-10 N·s/m towards the target; a grip several times stiffer).
     fn default() -> Self {
         Self {
             mass_kg: 0.15,

@@ -7,8 +7,7 @@ use glam::{DMat3, DVec3};
 const WALL_N_PER_MM: f64 = 0.5;
 const TICK_S: f64 = 1e-3;
 
-/// A minimal controller for a flat surface at height zero: it computes currents from counts alone,
-/// as a device does.
+/// Computes the currents for a flat surface at height zero from counts alone, as a device does.
 fn wall_currents(model: &PhantomModel, placement: &ArmFrame, counts: [i32; 3]) -> [f64; 3] {
     let q = std::array::from_fn(|i| Encoder::new(&model.drive[i]).angle_rad(counts[i]));
     let [_, _, height_mm] = placement.to_terrain_mm(model, kinematics::tip(model, q));

@@ -126,7 +126,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
         Patch::new(self.heights.corners(cell).map(R::of))
     }
 
-    /// Step 1 from free space.
+    /// Finds the candidate patch: step 1 from free space.
     #[inline]
     fn candidate(&self, from: &[R; 3], to: &[R; 3]) -> Option<[i32; 2]> {
         let low = if from[2] < to[2] { from[2] } else { to[2] };
@@ -138,7 +138,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
             })
     }
 
-    /// Step 2 in one patch.
+    /// Finds the closest point in one patch: step 2.
     #[inline]
     fn closest_in(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
         let [x, y] = cell.map(R::from_whole);
@@ -147,7 +147,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
             .closest(cell, &local, start, self.iterations)
     }
 
-    /// Step 2 across patches.
+    /// Finds the closest point across patches: step 2.
     #[inline]
     fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
         let mut here = self.closest_in(cell, hip, start);
@@ -171,7 +171,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
         here
     }
 
-    /// Step 3: (LCP − HIP)·n > 0, n averaged at edges and vertices.
+    /// Returns true if (LCP − HIP)·n > 0, with n averaged at edges and vertices: step 3.
     #[inline]
     fn is_inside(&self, place: &Place<R>) -> bool {
         let normal = self.patch(place.cell).normal(place.u, place.v);
@@ -195,7 +195,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
     }
 }
 
-/// The one patch that shares the edge, or the three that share the vertex.
+/// Returns the one patch that shares the edge, or the three that share the vertex.
 #[inline]
 fn around<R: Real>(place: &Place<R>) -> impl Iterator<Item = [i32; 2]> + use<R> {
     let ([x, y], [east, north]) = (place.cell, place.border);
@@ -239,7 +239,7 @@ impl<R: Real> Patch<R> {
         }
     }
 
-    /// eq. 8-11. Returns `None` if the Jacobian is singular.
+    /// Iterates eq. 8-11. Returns `None` if the Jacobian is singular.
     #[inline]
     fn newton(&self, [p, q, r]: &[R; 3], start: (R, R), iterations: u32) -> Option<(R, R)> {
         let (mut u, mut v) = start;
@@ -300,8 +300,8 @@ impl<R: Real> Patch<R> {
     }
 }
 
-/// Step 2 in one patch, to compare the solver alone: returns the point in the unit square found
-/// from the middle.
+/// Returns the point that step 2 finds in the unit square from its middle, to compare the solver
+/// alone.
 #[inline]
 pub fn newton<R: Real>(corners: [R; 4], hip: [R; 3], iterations: u32) -> (R, R) {
     let middle = (R::HALF, R::HALF);

@@ -23,7 +23,7 @@ pub trait SessionHandler<'t> {
         None
     }
 
-    /// May show the progress; called after each poll of the line.
+    /// Shows the progress, if wanted; called after each poll of the line.
     fn show(&mut self, tally: &LinkStats);
 
     /// Returns true if the service should end.

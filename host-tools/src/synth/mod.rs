@@ -67,7 +67,8 @@ impl Synth {
         (height * self.amplitude) as f32
     }
 
-    /// Returns the rise of a plane of `columns` × `rows` samples from its lowest corner to its highest.
+    /// Returns the rise of a plane of `columns` × `rows` samples between its lowest and highest
+    /// corners.
     pub fn rise(&self, columns: u32, rows: u32) -> f64 {
         f64::from(self.height(columns - 1, rows - 1)) - f64::from(self.height(0, 0))
     }
