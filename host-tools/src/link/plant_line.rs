@@ -34,7 +34,7 @@ pub fn serve_plant(
                 return Ok(());
             }
         };
-        // A failed board reports its failure with an invalid tick number.
+        // A failed board sends a tick number that does not match.
         if currents.tick != tick && !currents.enabled {
             return Err(io::Error::other("the board has failed"));
         }

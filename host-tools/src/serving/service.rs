@@ -36,7 +36,7 @@ pub struct Service<'s, 't> {
     pub device: String,
     /// Time between two tries to find a lost device.
     pub retry: Duration,
-    /// Returns false if the user wants to end.
+    /// Returns true while the user wants to continue.
     pub goes_on: &'t dyn Fn() -> bool,
     /// Prints the messages that must reach the user in every case.
     pub tell: &'s dyn Fn(&str),
