@@ -4,34 +4,34 @@
 //! Read top to bottom, the modules follow the data:
 //!
 //! - [`heightfield`], a crate of its own: terrain files become one [`heightfield::Raster`];
-//! - [`synth`]: terrains made by formula, for trying and testing;
+//! - [`synth`]: terrains made by formula, for trials and tests;
 //! - [`terrain`]: a raster at a scale, cut into tiles;
 //! - [`named_surfaces`]: surfaces that an option can name;
 //! - [`materials`]: classes of ground over a terrain, each with its surface;
 //! - [`link`]: the terrain served to a device, tile by tile;
-//! - [`serving`]: that session from its first line to an end that is known;
+//! - [`serving`]: that session from its first message to its confirmed end;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
-//! - [`stability`]: how stiff a surface may be before a hand on that Phantom feels the ticks;
+//! - [`stability`]: the stiffness above which a hand on that Phantom feels the ticks;
 //! - [`published`]: the paper's algorithm, for comparison;
 //! - [`replay`]: a trajectory rendered in lock-step, and recordings;
-//! - [`place`]: where a terrain lies in front of the arm, and how large;
-//! - [`steering`]: another view of the terrain while it is touched;
-//! - [`telemetry`]: what a device reports while it is touched, in numbers;
+//! - [`place`]: a terrain's position in front of the arm, and its size;
+//! - [`steering`]: changes of the placement during a session;
+//! - [`telemetry`]: the numbers that a device reports during a session;
 //! - [`events`]: contacts, materials and marks as lines of JSON on a local socket;
 //! - [`picture`]: sessions drawn as PNG files;
-//! - [`view_feed`]: the same, live, to a viewer that never delays the loop;
-//! - [`board`]: boards, probes, and images onto chips;
-//! - [`calibrate`]: from ruler and scale to a calibration record;
+//! - [`view_feed`]: the same, live, for a viewer that never delays the loop;
+//! - [`board`]: boards, debug probes, and the writing of images to chips;
+//! - [`calibrate`]: measurements with ruler and scale, as a calibration record;
 //! - [`bringup`]: the first power-up of a board and its arm, step by step;
 //! - [`output`]: files that appear only when they are complete;
-//! - [`cli`]: the `hapterra` command, one file a subcommand.
+//! - [`cli`]: the `hapterra` command, one file for each subcommand.
 
 #![forbid(unsafe_code)]
 
-// Before all others: its macros hold from here on.
+// Before all others: modules see the macros only if they are declared after it.
 #[macro_use]
 mod print_macros;
-// What the tests of all crates wait with, of which each uses its part.
+// Time-outs for the tests of all crates; each crate uses a part of them.
 #[cfg(test)]
 #[path = "../../tests/src/timeouts.rs"]
 #[allow(dead_code, unreachable_pub)]

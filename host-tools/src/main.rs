@@ -1,4 +1,4 @@
-//! The `hapterra` command; everything it does is in the library.
+//! The `hapterra` command; its code is in the library.
 
 #![forbid(unsafe_code)]
 

@@ -3,7 +3,7 @@
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Material, Pattern, Texture};
 
-/// A surface that has a name.
+/// A surface with a name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NamedSurface {
     /// Its name.
@@ -12,8 +12,8 @@ pub struct NamedSurface {
     pub material: Material,
 }
 
-/// The surfaces that have names. Their numbers are choices for a Phantom Premium 1.5, whose users
-/// hold 0.4 to 0.8 N/mm; no ground was measured.
+/// The named surfaces. Their numbers are chosen for a Phantom Premium 1.5, whose users tolerate 0.4
+/// to 0.8 N/mm; they are not measurements of ground.
 pub static NAMED_SURFACES: [NamedSurface; 3] = [
     NamedSurface {
         name: "ice",
@@ -61,7 +61,7 @@ pub static NAMED_SURFACES: [NamedSurface; 3] = [
 ];
 
 impl NamedSurface {
-    /// The surface with a name.
+    /// Returns the surface with a name.
     #[must_use]
     pub fn find(name: &str) -> Option<&'static Self> {
         NAMED_SURFACES.iter().find(|surface| surface.name == name)

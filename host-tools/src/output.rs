@@ -1,9 +1,8 @@
-//! Files that appear only when they are complete, and what killed processes left of
-//! them.
+//! Files that appear only when they are complete, and the partial files of killed processes.
 //!
-//! A file `OUT` grows as `OUT.XXXXXX.partial` beside its place, with a lock that the
-//! system lets go when the process ends, however it ends. A partial file without a
-//! lock is therefore one that will never be completed.
+//! A file `OUT` is written as `OUT.XXXXXX.partial` beside its place, with a lock that the system
+//! releases whenever the process ends. A partial file without a lock will therefore never be
+//! completed.
 
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
@@ -20,28 +19,28 @@ use tempfile::TempPath;
 pub struct OutputError {
     /// The file.
     pub path: PathBuf,
-    /// Its reason.
+    /// The reason.
     #[source]
     pub source: io::Error,
 }
 
-/// A file being written. Dropped before [`Output::finish`], it leaves nothing
-/// behind, but for a recording that could not be written on ([`Output::of_recording`]).
+/// A file being written. If it is dropped before [`Output::finish`], no file remains, except for a
+/// recording with a write error ([`Output::of_recording`]).
 pub struct Output {
     path: PathBuf,
     writer: BufWriter<File>,
-    /// Temporary file beside the one that it will replace; none for a
-    /// pipe, a device and standard output, where there is nothing to replace.
+    /// Temporary file beside the file that it will replace; `None` for a pipe, a device and
+    /// standard output, which are not replaced.
     beside: Option<TempPath>,
-    /// True if the written part stays after a write error.
+    /// True if a partial file remains after a write error.
     is_recording: bool,
-    /// Bytes that it may still have.
+    /// Bytes that may still be written.
     room: u64,
 }
 
 impl Output {
-    /// Begins a file. `-` names none: it stands for standard output, which most commands
-    /// write to themselves.
+    /// Begins a file. `-` creates none: it stands for standard output, to which most commands write
+    /// directly.
     ///
     /// # Errors
     /// When its folder cannot be written to.
@@ -71,7 +70,7 @@ impl Output {
         })
     }
 
-    /// Begins a file; where the path is `-`, writes to standard output.
+    /// Begins a file; writes to standard output if the path is `-`.
     ///
     /// # Errors
     /// As [`Output::create`].
@@ -92,9 +91,9 @@ impl Output {
         })
     }
 
-    /// The same of a recording: as it cannot be made again, its partial file stays where it
-    /// cannot be written to the end. It takes `most` bytes at most, because a device decides how
-    /// fast it grows.
+    /// Makes this the file of a recording. It cannot be repeated, so its partial file remains after
+    /// a write error. Its size is limited to `most` bytes, because the device determines its
+    /// growth.
     #[must_use]
     pub fn of_recording(self, most: u64) -> Self {
         Self {
@@ -104,29 +103,29 @@ impl Output {
         }
     }
 
-    /// Keeps what is written of a recording.
+    /// Keeps the partial file of a recording.
     fn keep(&mut self) {
         if let (true, Some(beside)) = (self.is_recording, &mut self.beside) {
             beside.disable_cleanup(true);
         }
     }
 
-    /// The file's path.
+    /// Returns the file's path.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Returns the path of its partial file; none for a pipe, a device and standard output.
+    /// Returns the path of the partial file; `None` for a pipe, a device and standard output.
     #[must_use]
     pub fn partial(&self) -> Option<&Path> {
         self.beside.as_deref()
     }
 
-    /// Puts the complete file in its place.
+    /// Moves the complete file to its place.
     ///
     /// # Errors
-    /// When it cannot be written to the end.
+    /// When the rest cannot be written.
     pub fn finish(mut self) -> Result<(), OutputError> {
         let flushed = self.writer.flush().inspect_err(|_| self.keep());
         let path = self.path;
@@ -171,22 +170,22 @@ fn is_standard_output(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Standard output as a file, without the line buffer of the standard library's handle.
+/// Returns standard output as a file, without the line buffer of the standard library's handle.
 #[cfg(unix)]
 fn standard_output() -> io::Result<File> {
     use std::os::fd::AsFd;
     Ok(File::from(io::stdout().as_fd().try_clone_to_owned()?))
 }
 
-/// Standard output as a file, without the line buffer of the standard library's handle.
+/// Returns standard output as a file, without the line buffer of the standard library's handle.
 #[cfg(windows)]
 fn standard_output() -> io::Result<File> {
     use std::os::windows::io::AsHandle;
     Ok(File::from(io::stdout().as_handle().try_clone_to_owned()?))
 }
 
-/// Checks that no output is one of the inputs: by the same name or another, through links
-/// of either kind. To be called before anything is written.
+/// Checks that no output is one of the inputs, also by another name or through links of either
+/// kind. Call it before anything is written.
 ///
 /// # Errors
 /// [`OutputError`] names the output and the input.
@@ -196,7 +195,7 @@ pub fn keep_apart(
 ) -> Result<(), OutputError> {
     let inputs: Vec<&Path> = inputs.iter().map(AsRef::as_ref).collect();
     for output in outputs.iter().map(AsRef::as_ref) {
-        // What is not there cannot be the same.
+        // A missing file cannot be an input.
         let same = |input: &&&Path| is_same_file(output, input).unwrap_or(false);
         if let Some(input) = inputs.iter().find(same) {
             let input = input.display();
@@ -209,18 +208,18 @@ pub fn keep_apart(
     Ok(())
 }
 
-/// A folder that is made for outputs, and is gone again where nothing came to lie in it.
+/// A folder for outputs, which is removed again if it is still empty.
 #[derive(Debug)]
 pub struct OutputFolder {
-    /// The folder, where it was not there before.
+    /// The folder, if this program created it.
     made: Option<PathBuf>,
 }
 
 impl OutputFolder {
-    /// Makes the folder, and those that it lies in.
+    /// Creates the folder and its parent folders.
     ///
     /// # Errors
-    /// When it cannot be made.
+    /// When it cannot be created.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
         let was_there = path.exists();
         std::fs::create_dir_all(path).map_err(|source| OutputError {
@@ -235,12 +234,12 @@ impl OutputFolder {
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
-        // A folder with anything in it cannot be removed, and is not to be.
+        // The system refuses to remove a folder that is not empty.
         let _ = self.made.as_ref().map(std::fs::remove_dir);
     }
 }
 
-/// The folder that a file lies in, or will.
+/// Returns the folder of a file, which need not exist yet.
 #[must_use]
 pub fn folder_of(path: &Path) -> &Path {
     match path.parent() {
@@ -258,8 +257,8 @@ pub struct PartialFile {
     pub bytes: u64,
 }
 
-/// Returns the partial files that killed processes left beside `path`, by name. Nothing here
-/// touches it.
+/// Returns the partial files that killed processes left beside `path`, by name. They are only
+/// listed.
 #[must_use]
 pub fn partial_files(path: &Path) -> Vec<PartialFile> {
     let beginning = beginning_of_partial(path);
@@ -281,8 +280,7 @@ pub fn partial_files(path: &Path) -> Vec<PartialFile> {
 const RANDOM: usize = 6;
 const SUFFIX: &str = ".partial";
 
-/// Bytes of a file's own name that its partial file bears, at most: file systems end
-/// names at 255.
+/// Max bytes of a file's own name in the name of its partial file: file systems limit names to 255.
 const OWN_NAME: usize = 200;
 
 /// Returns the beginning of the name of a partial file of `path`.
@@ -292,7 +290,7 @@ fn beginning_of_partial(path: &Path) -> String {
     format!("{}.", name.get(..cut).unwrap_or_default())
 }
 
-/// Returns true if a name that begins so is that of a partial file.
+/// Returns true if a name with this beginning is a partial file's.
 fn is_partial(beginning: &str, name: &OsStr) -> bool {
     let random = name
         .to_str()
@@ -310,12 +308,11 @@ fn temporary(path: &Path) -> io::Result<(File, TempPath)> {
     let prefix = beginning_of_partial(path);
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(SUFFIX).rand_bytes(RANDOM);
-    // Readable by whom the user's mask says, as any other file.
+    // The user's mask limits the permissions, as for any other file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let (file, place) = builder.tempfile_in(folder_of(path))?.into_parts();
-    // A file system without locks has files that look as if they were not in use: they are
-    // named to the user, and nothing more.
+    // On a file system without locks, all partial files look abandoned; they are only listed.
     let _ = file.try_lock();
     Ok((file, place))
 }
@@ -370,7 +367,7 @@ mod tests {
         assert_eq!(partial_files(&path), []);
         let dead = folder.path().join("out.csv.a1B2c3.partial");
         std::fs::write(&dead, "t_s,x_mm").expect("written");
-        // Of other files, or of another name.
+        // Partial files of other files, or files with other names.
         for other in [
             "out.csv.b.csv.a1B2c3.partial",
             "out.csv.partial",

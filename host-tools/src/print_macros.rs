@@ -1,26 +1,24 @@
-//! `print!`, `println!`, `eprint!` and `eprintln!` of this crate, under the names of the
-//! standard library's. Those panic if the reader is gone: `hapterra list | head
-//! -1` would end in a crash, and `hapterra run FILE | head -1` without letting go of the
-//! arm. These continue in silence.
+//! `print!`, `println!`, `eprint!` and `eprintln!` of this crate, under the names of the standard
+//! library's macros. Those panic if the reader is gone: `hapterra list | head -1` would crash, and
+//! `hapterra run FILE | head -1` would crash without disarming the arm. These ignore the error.
 //!
-//! For commands that hold no device. Where an arm may be armed, `cli::terminal::writer`
+//! They are for commands that control no device. If an arm may be armed, `cli::terminal::writer`
 //! writes, and callers do not wait for it.
 //!
-//! Output that a command was asked to write (files, `replay -o -`), and the report that is a command's
-//! result (`cli::report`), do not use them: there, a write error ends the command. `list` prints each
-//! line as soon as it is known, because a silent board takes more than a second, and succeeds even if
-//! the reader is gone.
+//! They are not for output that is a command's result (files, `replay -o -`, `cli::report`): there,
+//! a write error ends the command. `list` prints each line as soon as it is known, because a silent
+//! board takes more than a second, and succeeds even if the reader is gone.
 
-/// Says something on standard output.
+/// Writes text to standard output.
 macro_rules! print {
     ($($what:tt)*) => {{
         use std::io::Write as _;
-        // The reader has closed it.
+        // Fails if the reader has closed it.
         let _ = std::io::stdout().lock().write_all(heightfield::printable_text::printable_lines(&format!($($what)*)).as_bytes());
     }};
 }
 
-/// Says a line on standard output.
+/// Writes a line to standard output.
 macro_rules! println {
     ($($what:tt)*) => {{
         use std::io::Write as _;
@@ -28,7 +26,7 @@ macro_rules! println {
     }};
 }
 
-/// Says a line on standard error.
+/// Writes a line to standard error.
 macro_rules! eprintln {
     ($($what:tt)*) => {{
         use std::io::Write as _;

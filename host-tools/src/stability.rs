@@ -1,17 +1,16 @@
-//! Limits of stiffness that trials on the virtual arm found, and the warnings of a surface above
-//! them.
+//! Stiffness limits from trials on the virtual arm, and the warnings about a surface above them.
 //!
-//! `hapterra-lab stability` makes the trials; its tests hold these tables to them.
+//! `hapterra-lab stability` runs the trials; its tests check these tables.
 
 use hapterra_core::force::{MaterialTable, SurfaceParams, Texture};
 use hapterra_core::rate::TickRate;
 use hapterra_core::wire::hello::DeviceHello;
 
-/// Stiffness up to which a press is still in a light grasp, N/mm: ticks a second, without and
-/// with the passivity controller.
+/// Stiffness up to which a press in a light grasp is stable, N/mm: ticks a second, without and with
+/// the passivity controller.
 pub type StillUpTo = [(u32, f32, f32); 4];
 
-/// At [`SHORT_US`]. Tried again in the tests.
+/// Limits at [`SHORT_US`]. The tests repeat the trials.
 pub const STILL_N_PER_MM: StillUpTo = [
     (1_000, 2.0, 6.0),
     (2_000, 3.0, 8.0),
@@ -19,7 +18,7 @@ pub const STILL_N_PER_MM: StillUpTo = [
     (10_000, 4.0, 8.0),
 ];
 
-/// At [`LONG_US`].
+/// Limits at [`LONG_US`].
 pub const STILL_LATE_N_PER_MM: StillUpTo = [
     (1_000, 1.0, 3.0),
     (2_000, 1.0, 3.0),
@@ -27,26 +26,26 @@ pub const STILL_LATE_N_PER_MM: StillUpTo = [
     (10_000, 1.5, 3.0),
 ];
 
-/// Stiffness up to which force comes in well on an arm with a tenth of the model's friction, with
-/// the controller, N/mm (`Entered::is_good` of the trials), by ticks a second: in the ramp, and
-/// while the clutch closes. Tried again in the tests.
+/// Stiffness up to which the force ramps up well on an arm with a tenth of the model's friction,
+/// with the controller, N/mm (`Entered::is_good` of the trials), by ticks a second: in the ramp,
+/// and while the clutch closes. The tests repeat the trials.
 pub const ENTERS_N_PER_MM: [(u32, f32); 4] =
     [(1_000, 1.0), (2_000, 2.0), (4_000, 2.0), (10_000, 2.0)];
 
-/// The same at [`LONG_US`].
+/// Limits at [`LONG_US`].
 pub const ENTERS_LATE_N_PER_MM: [(u32, f32); 4] =
     [(1_000, 1.0), (2_000, 1.0), (4_000, 1.0), (10_000, 0.5)];
 
-/// Latencies that were tried, µs: that of boards whose converters command the amplifiers, and that
-/// of duty cycles. Each is at least what such a board states; a test of the images compares them.
+/// Latencies of the trials, µs: of boards whose converters command the amplifiers, and of boards
+/// with duty cycles. Each is at least the latency that such a board reports; a test of the images
+/// checks this.
 pub const SHORT_US: u16 = 310;
 /// See [`SHORT_US`].
 pub const LONG_US: u16 = 1_240;
 
-/// Share of that on a textured surface, whose steepest slopes rock a light grasp, too; and
-/// what is left at [`LONG_US`].
+/// Factor for a textured surface at [`SHORT_US`]: its steepest slopes also excite a light grasp.
 pub const LEFT_WITH_TEXTURE: f32 = 0.5;
-/// See [`LEFT_WITH_TEXTURE`].
+/// Factor for a textured surface at [`LONG_US`].
 pub const LEFT_LATE_WITH_TEXTURE: f32 = 1.0 / 3.0;
 
 /// Warns of a surface that is too stiff for a device's tick rate and latency.
@@ -63,7 +62,7 @@ pub fn warn(params: &SurfaceParams, device: &DeviceHello) {
     }
 }
 
-/// The same of a surface of several materials, once for each warning. The device takes the
+/// As [`warn`], for a surface of several materials, once for each warning. The device sets its
 /// controller for the stiffest of them.
 pub fn warn_of(params: &SurfaceParams, materials: Option<&MaterialTable>, device: &DeviceHello) {
     let Some(table) = materials else {
@@ -111,8 +110,8 @@ fn too_fine(texture: &Texture, rate: TickRate) -> Option<String> {
     })
 }
 
-/// Returns the warning about a surface at a device's rate and latency; `None` if every hand on the
-/// virtual arm holds it still, and theory does not speak against it.
+/// Returns the warning about a surface at a device's rate and latency; `None` if it is within the
+/// limits of the trials.
 #[must_use]
 fn warning(params: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<String> {
     let (stiffness, hz) = (params.stiffness_n_per_mm, rate.hz());
@@ -141,7 +140,7 @@ fn warning(params: &SurfaceParams, rate: TickRate, latency_us: u16) -> Option<St
     })
 }
 
-/// As [`still_n_per_mm`], for force that comes in.
+/// As [`still_n_per_mm`], for a force that ramps up.
 fn enters_n_per_mm(rate: TickRate, latency_us: u16) -> f32 {
     let tried = match latency_us > SHORT_US {
         true => ENTERS_LATE_N_PER_MM,
@@ -151,7 +150,7 @@ fn enters_n_per_mm(rate: TickRate, latency_us: u16) -> f32 {
     slower.unwrap_or(&tried[0]).1
 }
 
-/// Of the rates that were tried, the fastest that is no faster counts; of the latencies, the one
+/// Returns the limit from the trials at the fastest rate that is not faster, and at the latency
 /// that is not shorter.
 fn still_n_per_mm(rate: TickRate, latency_us: u16, is_controlled: bool, texture: &Texture) -> f32 {
     let (tried, left) = match latency_us > SHORT_US {
@@ -220,7 +219,7 @@ mod tests {
         let both = told(&[soft, stiff, fine, stiff], &params);
         assert_eq!(both.matches("a stiffness of 8 N/mm").count(), 1, "{both}");
         assert!(both.contains("wavelength of 0.3 mm"));
-        // A scene that is twice as stiff is so on each of them.
+        // A scene of twice the stiffness doubles that of each material.
         let twice = SurfaceParams {
             stiffness_n_per_mm: 1.0,
             ..params
@@ -304,7 +303,7 @@ mod tests {
         };
         assert!(shakes(1.5, Controller::Off) && !shakes(1.5, Controller::On));
         assert!(shakes(4.0, Controller::On) && !shakes(3.0, Controller::On));
-        // Still without the latency.
+        // Stable without the latency.
         assert!(!told_late(4.0, 1000, SHORT_US, Controller::On).contains("shakes"));
     }
 }

@@ -1,5 +1,5 @@
-//! `hapterra flash --check` on the boards' own images, which `cargo xtask test`
-//! builds and names. Here, as the command has to be built with its feature.
+//! Tests `hapterra flash --check` with the boards' own images, which `cargo xtask test` builds and
+//! names. They are here because the command has to be built with its feature.
 
 use std::process::{Command, Output};
 
@@ -58,7 +58,7 @@ fn own_checkout_is_built_wherever_it_is_run() {
     let manifest = "[package]\nname = \"hapterra-firmware\"\n";
     fs::create_dir(here.join("firmware")).expect("made");
     fs::write(here.join("firmware/Cargo.toml"), manifest).expect("written");
-    // In the place of cargo: it says where it was started, and makes no image.
+    // Replaces cargo: it prints its working folder, and makes no image.
     let cargo = here.join("cargo");
     fs::write(&cargo, "#!/bin/sh\npwd -P >&2\nexit 1\n").expect("written");
     fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).expect("set");

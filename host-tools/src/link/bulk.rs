@@ -1,5 +1,5 @@
-//! The link on USB: devices and transfers, apart from the
-//! system's USB: a device in memory can stand in its place.
+//! The link on USB: devices and transfers, without the system's USB, so that a device in memory can
+//! replace it.
 
 use std::io;
 use std::time::Duration;
@@ -10,28 +10,28 @@ use nusb::transfer::Direction;
 
 use super::transport::{Transport, is_time_out};
 
-/// Most bytes in a transfer, a multiple of the packet size.
+/// Max bytes of a transfer, a multiple of the packet size.
 pub(super) const TRANSFER: usize = 64 * PACKET;
 
-/// Returns true if a device with these numbers, and this product string where it can
-/// be read, is a hapterra board.
+/// Returns true if a device with these numbers is a hapterra board, and its product string agrees
+/// if it can be read.
 #[must_use]
 pub fn is_hapterra(vendor: u16, product: u16, name: Option<&str>) -> bool {
     let named = name.is_none_or(|name| name.contains(PRODUCT));
     vendor == VENDOR_ID && product == PRODUCT_ID && named
 }
 
-/// Reason for which no board on USB is chosen.
+/// Reason why no board on USB is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotOne {
-    /// None fits.
+    /// No board matches.
     None,
-    /// Several fit.
+    /// Several boards match.
     Several,
 }
 
-/// The board with a serial number among those with `serials`, or the only one: its
-/// position. A choice is never made between two, because an arm is behind each.
+/// Returns the index of the board with the serial number `wanted`, or of the only board. It never
+/// chooses between two boards, because each has an arm.
 ///
 /// # Errors
 /// [`NotOne`].
@@ -49,7 +49,7 @@ pub fn the_one(serials: &[Option<String>], wanted: Option<&str>) -> Result<usize
     }
 }
 
-/// A text of a device's without what a terminal might act on.
+/// Returns a device's text without characters that a terminal might act on.
 #[must_use]
 pub fn printable(text: &str) -> String {
     let shown = |c: &char| c.is_ascii_graphic();
@@ -68,8 +68,7 @@ pub struct BulkEndpoints {
 }
 
 impl BulkEndpoints {
-    /// The first interface of the link's class that has a bulk endpoint in
-    /// each direction.
+    /// Finds the first interface of the link's class that has a bulk endpoint in each direction.
     #[must_use]
     pub fn find(configuration: &ConfigurationDescriptor<'_>) -> Option<Self> {
         let mut settings = configuration.interface_alt_settings();
@@ -94,17 +93,17 @@ fn bulk(setting: &InterfaceDescriptor<'_>, direction: Direction) -> Option<u8> {
     found.map(|endpoint| endpoint.address())
 }
 
-/// The two bulk pipes of a device, on whatever USB.
+/// The two bulk pipes of a device, on any USB implementation.
 pub trait Pipes {
-    /// Sends one transfer of at most 4 KiB, cut into whole packets and a
-    /// shorter last one; no empty packet ends it.
+    /// Sends one transfer of at most 4 KiB, cut into whole packets and a shorter last one; no empty
+    /// packet ends it.
     ///
     /// # Errors
-    /// When the device is gone or does not take it.
+    /// When the device is gone or does not accept the transfer.
     fn send(&mut self, transfer: &[u8]) -> io::Result<()>;
 
-    /// Receives what has come, after waiting for at most `wait` for the first
-    /// byte. A time-out may be zero or an error that reports it.
+    /// Receives the available bytes; waits at most `wait` for the first. A time-out may be zero
+    /// bytes or an error that reports it.
     ///
     /// # Errors
     /// When the device is gone.
@@ -198,7 +197,7 @@ mod tests {
         assert_eq!(found(&[other, half, ours]), Some(expected));
     }
 
-    /// Pipes that take so much and give what they were given.
+    /// Pipes that accept a limited number of bytes and return scripted ones.
     struct Scripted {
         sent: Vec<usize>,
         answer: fn() -> io::Result<usize>,

@@ -28,19 +28,18 @@ use crate::terrain::{Terrain, TileBuffer};
 /// A message from the device, for the user of the session.
 #[derive(Debug)]
 pub enum Event<'e> {
-    /// The scene is in force. `resumed` tells whether the device held it
-    /// already and continues where it was.
+    /// The scene is in force.
     Opened {
-        /// Returns the device's introduction.
+        /// The device's introduction.
         device: &'e DeviceHello,
-        /// True if it continues with the scene it held.
+        /// True if the device still had the scene and continues with it.
         resumed: bool,
     },
-    /// The sample of one tick of a scene whose HIP comes from the encoders.
+    /// The sample of one tick, in a scene whose HIP position is computed from the encoders.
     Sample(&'e TickRecord),
     /// The sample at one point of a replay.
     Rendered {
-        /// The number that the host gave the point.
+        /// The number that the host gave to the point.
         seq: u32,
         /// HIP, proxy, force and state at the point.
         sample: &'e TickRecord,
@@ -48,15 +47,15 @@ pub enum Event<'e> {
     /// State of the device's guard; sent at the beginning of a session, at each change, and twice a
     /// second.
     Guard(&'e Report),
-    /// A view was put in ([`Client::put_view`]), or was not: the device refuses it, does
-    /// not answer, or was restarted meanwhile.
+    /// A scene change ([`Client::put_view`]) is in force, or failed: the device refused it, did not
+    /// answer, or was restarted meanwhile.
     Viewed {
-        /// The view.
+        /// The scene change.
         view: &'e SceneChange,
         /// True if it is in force.
         taken: bool,
     },
-    /// The answer to a question for the status.
+    /// The answer to a status query.
     Status(&'e Status),
     /// The calibration in force.
     Calibration(Option<&'e Calibration>),
@@ -64,23 +63,23 @@ pub enum Event<'e> {
     Answered {
         /// The request.
         request: &'e Request,
-        /// Success, or the reason of the refusal.
+        /// Success, or the reason for the refusal.
         result: Result<(), Refusal>,
     },
-    /// A tick was marked, as was asked for by [`Request::Mark`].
+    /// The device marked a tick, as [`Request::Mark`] requested.
     Marked {
         /// The tick ([`TickRecord::tick`]).
         tick: u32,
     },
-    /// A tile of the scene's level was sent to the device, which may lose it and ask again.
+    /// A tile of the scene's level was sent to the device, which may lose it and request it again.
     TileSent(TileKey),
-    /// A request was given up: the device does not answer it, or was
-    /// restarted meanwhile. Whether it was done is not known.
+    /// A request was given up: the device did not answer it, or was restarted meanwhile. The device
+    /// may have executed it.
     Unanswered(&'e HostRequest),
 }
 
-/// Arming of the device in a session, as soon as the scene is in force. A device that comes
-/// back after it was lost is armed again by itself only where the arm is virtual.
+/// Arming of the device in a session, as soon as the scene is in force. After a lost device
+/// returns, it is armed again automatically only if the arm is virtual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arming {
     /// Encoder readings in the zero pose, if the host has them.
@@ -92,30 +91,28 @@ impl Arming {
     pub const VIRTUAL: Self = Self { zero: Some([0; 3]) };
 }
 
-/// Samples after which the host says that it is there: half a second of a device whose
-/// time runs faster than the host's.
+/// Samples after which the host sends a sign of life: half a second of a device whose time runs
+/// faster than the host's.
 const SAMPLES_A_SIGN: u32 = 500;
-/// Bytes that are sent per reception at most, but for the tile that reaches beyond
-/// them: a device has four requests under way, of 4.5 KiB each. What is left out is asked
-/// for again.
+/// Max bytes sent for each reception; the last tile may exceed them. A device has at most four
+/// requests pending, of 4.5 KiB each, and repeats requests that were not answered.
 const SAID_AT_ONCE: usize = 32 * 1024;
-/// Tiles that are held back, or sent to one reception, at most.
+/// Max tiles withheld, or sent for one reception.
 const WITHHELD: usize = 16;
-/// For so long a tile that is on its way from elsewhere is sent when it comes: a device asks
-/// again for what it still wants ([`hapterra_core::terrain`]).
+/// Time for which the client waits for a tile from another source and sends it on arrival: after
+/// that, a device repeats its request if it still needs the tile ([`hapterra_core::terrain`]).
 const AWAITED_FOR: Duration = Duration::from_secs(1);
-/// Tiles that are awaited at once, at most.
+/// Max tiles awaited at once.
 const AWAITED: usize = 64;
-/// Between two lines of the log about requests for tiles that there are not.
+/// Time between two log lines about requests for tiles that do not exist.
 const LOG_EVERY: Duration = Duration::from_secs(1);
 
-/// Serves one terrain to one device. Bytes from the device go into
-/// [`Client::receive`]; bytes for it come out of there and of
-/// [`Client::due`], which is to be called now and then. `now` is the time since any
-/// fixed moment.
+/// Serves one terrain to one device. [`Client::receive`] processes bytes from the device; it and
+/// [`Client::due`], which must be called regularly, append bytes for the device. `now` is the time
+/// since any fixed moment.
 pub struct Client<'t> {
     terrain: Lent<'t>,
-    /// The terrain of a view that is not in force yet.
+    /// The terrain of a scene change that is not in force yet.
     next: Option<(SceneChange, Terrain<'t>)>,
     scene: Scene,
     arming: Option<Arming>,
@@ -125,16 +122,16 @@ pub struct Client<'t> {
     materials: MaterialBuffer,
     /// The device of the present session.
     device: Option<DeviceHello>,
-    /// The scene was not taken yet in this session.
+    /// True until the device accepts the scene in this session.
     is_new: bool,
-    /// The scene was taken in some session, and the device asked to arm.
+    /// True if the scene was accepted in some session, and the device was requested to arm.
     has_armed: bool,
-    /// Tiles that are sent once the device has its zero: work before the
-    /// first tick must not depend on how long a message takes.
+    /// Tiles that are sent once the device has its zero: the work before the first tick must not
+    /// depend on the duration of a message.
     withheld: Vec<TileKey>,
-    /// Tiles that the present reception was answered with.
+    /// Tiles sent for the present reception.
     sent: Vec<TileKey>,
-    /// Tiles whose heights have not come yet from elsewhere, and when they were asked for.
+    /// Tiles whose heights have not arrived yet from another source, and the time of their request.
     awaited: Vec<(TileKey, Duration)>,
     /// Tiles ahead of the HIP.
     prefetch: Prefetch,
@@ -146,7 +143,7 @@ pub struct Client<'t> {
     logged: Option<Duration>,
 }
 
-/// A terrain that is served: the one that the client was lent, or that of another view.
+/// The served terrain: the borrowed one, or the one of a scene change.
 enum Lent<'t> {
     Whole(&'t Terrain<'t>),
     SceneChange(Box<Terrain<'t>>),
@@ -164,8 +161,8 @@ impl<'t> Deref for Lent<'t> {
 }
 
 impl<'t> Client<'t> {
-    /// A client that has not sent anything yet. It arms the device at the
-    /// beginning of each session, if `arming` says how.
+    /// Creates a client that has not sent anything yet. It arms the device at the beginning of each
+    /// session if `arming` is set.
     #[must_use]
     pub fn new(
         terrain: &'t Terrain<'t>,
@@ -176,7 +173,7 @@ impl<'t> Client<'t> {
         Self::numbered(terrain, scene, arming, patience, fastrand::u64(..))
     }
 
-    /// The same, with the numbers of its sessions drawn from a seed.
+    /// As [`Client::new`], with session numbers drawn from a seed.
     #[must_use]
     pub fn numbered(
         terrain: &'t Terrain<'t>,
@@ -210,37 +207,37 @@ impl<'t> Client<'t> {
         }
     }
 
-    /// The scene that is served.
+    /// Returns the served scene.
     #[must_use]
     pub const fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// Statistics of the link.
+    /// Returns the statistics of the link.
     #[must_use]
     pub const fn tally(&self) -> &LinkStats {
         &self.tally
     }
 
-    /// State of the conversation.
+    /// Returns the state of the conversation.
     #[must_use]
     pub const fn state(&self) -> State {
         self.talk.state()
     }
 
-    /// The session that is spoken in, or will be.
+    /// Returns the number of the present or next session.
     #[must_use]
     pub const fn session(&self) -> SessionNumber {
         self.talk.session()
     }
 
-    /// Time-outs.
+    /// Returns the time-outs.
     #[must_use]
     pub const fn patience(&self) -> &Timeouts {
         self.talk.patience()
     }
 
-    /// Begins a session, the first or another: appends the hello to `out`.
+    /// Begins a session, the first or another: appends the open message to `out`.
     pub fn greet(&mut self, now: Duration, out: &mut Vec<u8>) {
         *self.reader = FrameReader::new();
         self.is_new = true;
@@ -253,20 +250,20 @@ impl<'t> Client<'t> {
         }
     }
 
-    /// Ends the session: appends the goodbye to `out`. The device is known to be
+    /// Ends the session: appends the close message to `out`. The device has confirmed that it is
     /// disarmed when the state is [`State::Closed`].
     pub fn leave(&mut self, now: Duration, out: &mut Vec<u8>) {
         self.talk.leave(now, out);
     }
 
-    /// Asks for something, after what was asked for before.
+    /// Adds a request after the earlier ones.
     pub fn ask(&mut self, ask: HostRequest) {
         self.talk.ask(ask);
     }
 
-    /// Puts another view of the scene in, of this terrain: says it until it is answered
-    /// ([`Event::Viewed`]). The clutch has to be open
-    /// ([`Request::Clutch`]). What lies around the HIP there is read meanwhile.
+    /// Puts a scene change in force, with its terrain: repeats it until it is answered
+    /// ([`Event::Viewed`]). The clutch has to be open ([`Request::Clutch`]). Meanwhile the tiles
+    /// around the new HIP position are read.
     pub fn put_view(
         &mut self,
         now: Duration,
@@ -279,8 +276,8 @@ impl<'t> Client<'t> {
         self.talk.put_view(view, now, out);
     }
 
-    /// The view that was put in is in force, if the protocol says so; or it is not and
-    /// will not be. Tells which.
+    /// Ends the pending scene change if the protocol reports that it is in force, or if it has
+    /// failed (`over`), and reports the result.
     fn settle_view(&mut self, over: bool, on: &mut dyn FnMut(Event<'_>)) {
         let epoch = self.talk.scene().map(|scene| scene.epoch);
         let taken = |view: &SceneChange| epoch == Some(view.scene.epoch);
@@ -303,7 +300,7 @@ impl<'t> Client<'t> {
         self.talk.say(&ToDevice::Hip(point), out);
     }
 
-    /// Appends what is due to `out`.
+    /// Appends the messages that are due to `out`.
     ///
     /// # Errors
     /// When a deadline has passed: [`LinkError::Silent`], [`LinkError::Taken`],
@@ -345,12 +342,12 @@ impl<'t> Client<'t> {
         }
     }
 
-    /// Takes bytes from the device, appends the answers to `out` and reports
-    /// what happened. Frames that make no sense are counted and passed over.
+    /// Processes bytes from the device, appends the answers to `out` and reports events. Invalid
+    /// frames are counted and skipped.
     ///
     /// # Errors
     /// [`LinkError::Version`] and [`LinkError::SceneRefused`]; [`LinkError::Taken`] and
-    /// [`LinkError::LetGo`] where the device says that the session is over.
+    /// [`LinkError::LetGo`] if the device reports that the session is over.
     pub fn receive(
         &mut self,
         now: Duration,
@@ -406,7 +403,7 @@ impl<'t> Client<'t> {
             self.zeroing = false;
             self.tally.restarted();
         } else {
-            // Where a restart came between, only the session's last part is known.
+            // After a restart, only the session's last part is known.
             let LastSession {
                 session,
                 opened_by,
@@ -425,8 +422,8 @@ impl<'t> Client<'t> {
             return;
         }
         let again = std::mem::replace(&mut self.has_armed, true);
-        // A real arm that has returned is as it is: armed, or its user says when it is
-        // to be.
+        // A real arm that returns keeps its state: it is armed already, or its user decides when to
+        // arm it.
         if let Some(Arming { zero }) = self.arming.filter(|a| !again || a.zero.is_some()) {
             if let Some(counts) = zero {
                 self.zeroing = true;
@@ -450,7 +447,7 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
-        // The next goes out at once.
+        // Send the next request at once.
         self.talk.say_pending(now, out);
         if matches!(ask, HostRequest::Request(Request::Zero { .. })) {
             self.hand_over_withheld(out, on);
@@ -479,7 +476,7 @@ impl<'t> Client<'t> {
         let is_open = self.state() == State::Open;
         match message {
             ToHost::TileRequest { epoch, key } if is_open && epoch == self.scene.epoch => {
-                // A device that asks more often than it reads is not answered more often.
+                // A device that requests tiles faster than it reads is not answered faster.
                 let known = match self.zeroing {
                     true => &mut self.withheld,
                     false => &mut self.sent,
@@ -495,7 +492,7 @@ impl<'t> Client<'t> {
             ToHost::Telemetry(telemetry) => {
                 let samples = telemetry.samples.len() as u32;
                 self.samples_since_sign = self.samples_since_sign.saturating_add(samples);
-                // Until the scene is taken they are of another, or of none.
+                // Until the scene is accepted, the samples belong to another scene or to none.
                 if self.tally.received(&telemetry) && !self.is_new {
                     if let (Some(device), Some(last)) = (&self.device, telemetry.samples.last()) {
                         let tick_hz = f64::from(device.tick_hz);
@@ -518,7 +515,7 @@ impl<'t> Client<'t> {
                 on(Event::Guard(&report));
             }
             ToHost::Goodbye(count) => self.tally.told(count),
-            // Said twice, or of a scene that is not served any more.
+            // A repeated message, or one about a scene that is not served any more.
             _ => {}
         }
     }
@@ -540,7 +537,7 @@ impl<'t> Client<'t> {
         let Some((heights, status)) = self.terrain.tile_of(&self.scene, key, &mut self.tile) else {
             return self.on_no_tile(now, key);
         };
-        // The fallback comes without.
+        // Fallback tiles have no materials.
         let materials = match key.level == self.scene.level {
             true => self.terrain.materials_of(key, &mut self.materials),
             false => None,
@@ -562,14 +559,14 @@ impl<'t> Client<'t> {
         self.talk.say(&message, out);
         let bytes = out.len() - before;
         if key.level != self.scene.level {
-            // Each view has its own fallback, and all have one name.
+            // Each placement has its own fallback, but all have the same key.
             return self.tally.sent_fallback(bytes);
         }
         self.tally.sent_tile(key, bytes);
         on(Event::TileSent(key));
     }
 
-    /// Sends a tile when its heights have come.
+    /// Registers a tile to be sent when its heights arrive.
     fn wait_for(&mut self, asked: Duration, key: TileKey) {
         self.awaited.retain(|(other, _)| *other != key);
         if self.awaited.len() < AWAITED {
@@ -577,7 +574,7 @@ impl<'t> Client<'t> {
         }
     }
 
-    /// Sends the tiles whose heights have come since.
+    /// Sends the awaited tiles whose heights have arrived.
     fn say_awaited(&mut self, now: Duration, out: &mut Vec<u8>, on: &mut dyn FnMut(Event<'_>)) {
         for (key, asked) in std::mem::take(&mut self.awaited) {
             let is_wanted = now.saturating_sub(asked) <= AWAITED_FOR;
@@ -589,7 +586,8 @@ impl<'t> Client<'t> {
         }
     }
 
-    /// A device may ask for anything, as often as it likes.
+    /// Counts a request for a tile that does not exist; the log is limited, because a device may
+    /// repeat such requests at any rate.
     fn on_no_tile(&mut self, now: Duration, key: TileKey) {
         self.tally.no_tiles += 1;
         let due = |at: Duration| now.saturating_sub(at) >= LOG_EVERY;

@@ -28,7 +28,7 @@ pub(crate) fn hello() -> DeviceHello {
     }
 }
 
-/// A client, and what a device says to it by hand.
+/// A client, and the messages of its device, written by the test.
 struct Bench<'t> {
     client: Client<'t>,
     now: Duration,
@@ -37,7 +37,7 @@ struct Bench<'t> {
     unanswered: Vec<HostRequest>,
     /// Reported calibrations.
     told: Vec<Option<Calibration>>,
-    /// Views and whether they were taken.
+    /// Scene changes, and whether they were accepted.
     viewed: Vec<(u8, bool)>,
 }
 
@@ -104,7 +104,7 @@ impl Bench<'_> {
         assert_eq!(self.client.state(), State::Open);
     }
 
-    /// Puts a view in; the epoch of its scene.
+    /// Sends a scene change and returns the epoch of its scene.
     fn put_view(&mut self, number: u8) -> u32 {
         let terrain = (*self.client.terrain).clone();
         let scene = Scene {
@@ -294,7 +294,7 @@ fn an_answer_to_the_question_before_is_not_taken_for_the_present_one() {
                 .iter()
                 .find_map(|said| said.strip_suffix(" GetCalibration"));
             let number: u8 = number.expect("asked").parse().expect("a number");
-            // Said again after 0.4 s: the second answer is still on its way.
+            // Repeated after 0.4 s: the second answer is still in transit.
             bench.hear(&told(number, Some(old)));
             bench.client.ask(HostRequest::Calibration);
             bench.pass(ms(10)).expect("patient");
@@ -386,7 +386,7 @@ fn a_device_that_was_restarted_gets_its_scene_again() {
             opened_by: 2,
             ..hello()
         };
-        // The answer to the first hello comes late: it tells what was.
+        // The late answer to the first open message reports an old state.
         bench.hear(&ToHost::Hello(hello()));
         assert_eq!(bench.client.state(), State::Open);
         bench.hear(&ToHost::Hello(again.clone()));
@@ -413,7 +413,7 @@ fn another_host_is_noticed() {
         };
         assert!(matches!(error, LinkError::Taken), "{error}");
         assert_eq!(bench.client.tally().samples, 0, "none of it is recorded");
-        // While this session is answered, another's frames are but noise.
+        // While the device answers this session, frames of other sessions are ignored.
     });
     on_bench(None, |bench| {
         bench.open();
@@ -428,7 +428,7 @@ fn another_host_is_noticed() {
     });
 }
 
-/// The answer to the hello of this number of a session that is over.
+/// Returns the answer to the open message `number` of a session that is over.
 const fn over(number: u8, end: SessionEnd) -> ToHost {
     ToHost::SessionClosed { number, end }
 }
@@ -439,7 +439,7 @@ fn a_host_whose_session_is_over_is_told_why_at_once() {
         (SessionEnd::Replaced, false),
         (SessionEnd::HostSilent, true),
     ] {
-        // Said in greeting, with a scene sent, and open after silence.
+        // Received while greeting, with a scene sent, and open after silence.
         for steps in 0..3 {
             on_bench(None, |bench| {
                 let session = bench.client.session();
@@ -459,7 +459,7 @@ fn a_host_whose_session_is_over_is_told_why_at_once() {
                 let is_taken = matches!(error, LinkError::Taken);
                 assert!(is_taken != is_passing, "{error}");
                 assert_eq!(error.is_passing(), is_passing, "{error}");
-                // The next host has another session.
+                // The next session has another number.
                 bench.client.greet(bench.now, &mut bench.out);
                 assert_ne!(bench.client.session(), session);
             });
@@ -481,8 +481,8 @@ fn an_old_word_that_a_session_is_over_ends_no_other() {
         }));
         bench.hear(&bench.taken());
         let other = SessionNumber::new(7);
-        // Of sessions before, of others, and in answer to a hello that was answered, or
-        // that another followed.
+        // For earlier sessions, for others, and in answer to an open message that was already
+        // answered or replaced by a later one.
         for end in ends {
             for (session, number) in [(first, 1), (first, 2), (other, 2), (second, 1), (second, 2)]
             {
@@ -490,7 +490,7 @@ fn an_old_word_that_a_session_is_over_ends_no_other() {
                 heard.expect("passed over");
             }
         }
-        // The device has no other host: it is silent.
+        // The device has no other host, so it is silent.
         let error = loop {
             for session in [first, other] {
                 let heard = bench.hear_in(session, &over(2, SessionEnd::Replaced));
@@ -569,7 +569,7 @@ fn new_line_draws_a_new_session_number() {
         }));
         bench.client.greet(bench.now, &mut bench.out);
         assert_ne!(bench.client.session(), first);
-        // The device tells how the last one ended.
+        // The device reports how the last session ended.
         let last = LastSession {
             session: first.get(),
             opened_by: 1,
@@ -615,7 +615,7 @@ fn a_real_arm_that_comes_back_is_not_armed_by_itself() {
             };
             bench.open();
             assert_eq!(arms(bench), 1);
-            // Its host was silent, and it was disarmed.
+            // The device disarmed the arm because its host was silent.
             bench.client.greet(bench.now, &mut bench.out);
             bench.hear(&ToHost::Hello(DeviceHello {
                 number: 2,
@@ -652,7 +652,7 @@ fn a_device_that_asks_for_much_at_once_gets_each_tile_once_and_so_many() {
             .receive(bench.now, &bytes, &mut bench.out, &mut |_| {});
         heard.expect("understood");
         assert_eq!(count_of(&bench.said(), "Tile"), 1);
-        // The next reception may ask for it again.
+        // The next reception may request it again.
         let heard = bench
             .client
             .receive(bench.now, &bytes, &mut bench.out, &mut |_| {});
@@ -666,7 +666,7 @@ fn a_view_is_said_until_it_is_answered_and_in_force_from_then_on() {
     on_bench(None, |bench| {
         bench.open();
         let (before, epoch) = (bench.client.scene().epoch, bench.put_view(1));
-        // A device that has it already, and whose answer is lost, gets no scene again.
+        // A device that already has the scene, and whose answer was lost, gets no scene again.
         bench.out.clear();
         bench.hear(&ToHost::Heartbeat {
             count: SampleCount::default(),

@@ -25,11 +25,11 @@ const MOMENT: Duration = Duration::from_millis(150);
 /// Handler of an unrequested message; the returned message is sent in answer.
 type OnMessage<'o> = &'o mut dyn FnMut(&ToHost) -> Option<ToDevice<'static>>;
 
-/// A session with a device, without a terrain. Every end of it is sent to the device. A session that
-/// has set a scene or driven the arm closes, which disarms the arm. A session that has only read, or
-/// changed settings, detaches and leaves arm and scene as they are. [`ControlSession::end`] waits for
-/// the answer and returns it. A session that is dropped waits, too, up to [`Timeouts::goodbye`], and
-/// logs that the arm may still be armed if there is no answer.
+/// A session with a device, without a terrain. It always sends its end to the device. A session
+/// that has set a scene or driven the arm closes, which disarms the arm. A session that has only
+/// read, or changed settings, detaches and leaves arm and scene as they are.
+/// [`ControlSession::end`] waits for the answer and returns it. A dropped session also waits, up to
+/// [`Timeouts::goodbye`], and logs that the arm may still be armed if there is no answer.
 pub struct ControlSession<'t> {
     exchange: Exchange<'t>,
     device: DeviceHello,
@@ -40,23 +40,23 @@ struct Exchange<'t> {
     line: Line<'t>,
     talk: HostProtocol,
     reader: Box<FrameReader<MAX_FRAME>>,
-    /// It has put a scene in force, or asked for something that drives.
+    /// True if the session has put a scene in force, or sent a request that drives the arm.
     drives: bool,
-    /// Its end was sent, or the other end is gone.
+    /// True if its end was sent, or the other end is gone.
     is_over: bool,
 }
 
 impl<'t> ControlSession<'t> {
-    /// Says hello.
+    /// Opens a session.
     ///
     /// # Errors
-    /// [`LinkError`]: no answer within `patience`, or in another protocol.
+    /// [`LinkError`]: no answer within `patience`, or a different protocol.
     pub fn open(transport: Box<dyn Transport + 't>, patience: Duration) -> Result<Self, LinkError> {
         Self::with(transport, Timeouts::of_a_dialogue(patience))
     }
 
-    /// Only looks: the device answers questions for its status and its calibration, hears
-    /// no request, and keeps the host that it has.
+    /// Opens a read-only session: the device answers status and calibration queries, ignores
+    /// requests, and keeps its present host.
     ///
     /// # Errors
     /// As [`ControlSession::open`].
@@ -65,7 +65,7 @@ impl<'t> ControlSession<'t> {
     }
 
     fn with(transport: Box<dyn Transport + 't>, patience: Timeouts) -> Result<Self, LinkError> {
-        // Where no session is opened there is none to end.
+        // A read-only session is never opened, so it needs no end.
         let is_over = patience.silence_s == ONLY_LOOKS;
         let mut exchange = Exchange {
             line: Line::new(transport),
@@ -92,8 +92,8 @@ impl<'t> ControlSession<'t> {
     /// Ends the session, and returns when the device has confirmed it.
     ///
     /// # Errors
-    /// [`LinkError::NotConfirmed`] and [`LinkError::Taken`] where the arm may be armed; else
-    /// [`LinkError`].
+    /// [`LinkError::NotConfirmed`] and [`LinkError::Taken`] if the arm may be armed; otherwise
+    /// another [`LinkError`].
     pub fn end(mut self) -> Result<(), LinkError> {
         self.exchange.end()
     }
@@ -107,7 +107,7 @@ impl<'t> ControlSession<'t> {
         self.end()
     }
 
-    /// The state of the device as it answers: guard, calibration, ticks, stack.
+    /// Queries the state of the device: guard, calibration, ticks, stack.
     ///
     /// # Errors
     /// [`LinkError`].
@@ -119,8 +119,8 @@ impl<'t> ControlSession<'t> {
             })
     }
 
-    /// As [`ControlSession::status`], after a moment, so that nothing that happened before is still on
-    /// its way.
+    /// As [`ControlSession::status`], after a short wait for messages in transit, so that the
+    /// status is newer than everything before the call.
     ///
     /// # Errors
     /// [`LinkError`].
@@ -129,7 +129,7 @@ impl<'t> ControlSession<'t> {
         self.status()
     }
 
-    /// The calibration in force on the device; none where it has none.
+    /// Queries the calibration in force on the device; `None` if there is none.
     ///
     /// # Errors
     /// [`LinkError`].
@@ -141,7 +141,7 @@ impl<'t> ControlSession<'t> {
             })
     }
 
-    /// Asks for something to be done; the device does it, once, or says why not.
+    /// Sends a request; the device executes it once, or returns the reason for a refusal.
     ///
     /// # Errors
     /// [`LinkError`].
@@ -156,7 +156,7 @@ impl<'t> ControlSession<'t> {
                 _ => None,
             })
             .inspect(|result| {
-                // The device that enters its loader hears nothing more.
+                // A device in its loader does not read the link any more.
                 self.exchange.is_over |= *request == Request::EnterLoader && result.is_ok();
             })
     }
@@ -175,12 +175,12 @@ impl<'t> ControlSession<'t> {
         exchange.wait_for(|event| matches!(event, ProtocolEvent::SceneAck).then_some(()))
     }
 
-    /// Lets `ms` of the device's time pass, or less where it is `enough`; tells `on` of what
-    /// comes unasked, and says what `on` says to it. Returns the state of the device at the
-    /// end.
+    /// Lets `ms` of the device's time pass, or less if `enough` returns true; calls `on` for each
+    /// unrequested message, and sends the message that `on` returns. Returns the last state of the
+    /// device.
     ///
     /// # Errors
-    /// [`LinkError`]; also where the device's time stands still.
+    /// [`LinkError`]; also if the device's time stands still.
     pub fn pass(
         &mut self,
         ms: u32,
@@ -206,8 +206,7 @@ impl<'t> ControlSession<'t> {
         }
     }
 
-    /// Puts a calibration in force and has it stored, once the user has pressed the
-    /// dead-man switch.
+    /// Puts a calibration in force and requests its storage, which needs the user's dead-man press.
     ///
     /// # Errors
     /// [`LinkError`].
@@ -220,13 +219,13 @@ impl<'t> ControlSession<'t> {
 }
 
 impl Exchange<'_> {
-    /// Asks for something and waits for the answer.
+    /// Sends a request and waits for the answer.
     fn ask<T>(
         &mut self,
         ask: HostRequest,
         mut read: impl FnMut(ToHost) -> Option<T>,
     ) -> Result<T, LinkError> {
-        // Between two questions the line is not read: the user may think for a while.
+        // The line is not read between two queries: the user may think for a while.
         self.talk.listen_from(self.line.now());
         self.talk.ask(ask);
         self.wait_for(|event| match event {
@@ -235,7 +234,7 @@ impl Exchange<'_> {
         })
     }
 
-    /// Asks for the status and converses until it comes.
+    /// Queries the status and runs the conversation until the answer arrives.
     fn status(&mut self, on: OnMessage<'_>) -> Result<Status, LinkError> {
         self.talk.ask(HostRequest::Status);
         loop {
@@ -254,7 +253,7 @@ impl Exchange<'_> {
         }
     }
 
-    /// Takes what has come, and says what `on` says to what comes unasked.
+    /// Processes received messages, and sends the answers that `on` returns for unrequested ones.
     fn converse(
         &mut self,
         answered: &mut dyn FnMut(ProtocolEvent),
@@ -286,7 +285,7 @@ impl Exchange<'_> {
         }
     }
 
-    /// Hears what the device tells for a while.
+    /// Processes the device's messages for `time`.
     fn listen(&mut self, time: Duration) -> Result<(), LinkError> {
         self.talk.listen_from(self.line.now());
         let end = self.line.now() + time;
@@ -298,7 +297,7 @@ impl Exchange<'_> {
 
     fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(ProtocolEvent)) -> Result<(), LinkError> {
         let polled = self.try_poll(wait, on);
-        // Another host has the device: it is not this one's to say an end to.
+        // Another host controls the device: this session must not close it.
         self.is_over |= matches!(polled, Err(LinkError::Taken));
         polled
     }
@@ -324,14 +323,14 @@ impl Exchange<'_> {
                         on(event);
                     }
                 }
-                // The rest of something earlier.
+                // The rest of an earlier message.
                 Err(_) => {}
             }
         }
         line.flush()
     }
 
-    /// Says the end that fits what was asked for, and waits for the answer, once.
+    /// Sends the close or detach message that fits the session, and waits for the answer, once.
     fn end(&mut self) -> Result<(), LinkError> {
         if std::mem::replace(&mut self.is_over, true) {
             return Ok(());
@@ -343,7 +342,7 @@ impl Exchange<'_> {
             false => self.talk.detach(line.now(), &mut line.out),
         }
         if !has_opened {
-            // Whether it was heard is not known, and not worth another wait.
+            // The delivery is unknown, but a second wait would not help.
             return line.flush();
         }
         while self.talk.state() != State::Closed {
@@ -361,7 +360,7 @@ impl Exchange<'_> {
     }
 }
 
-/// Returns true if a request may lead to something being driven.
+/// Returns true if a request may drive the arm.
 const fn drives(request: &Request) -> bool {
     matches!(
         request,
@@ -440,8 +439,8 @@ mod tests {
         assert!(matches!(blocked, Err(Refusal::Blocked(_))), "{blocked:?}");
     }
 
-    /// A device all of whose answers come again before each new one: as where a line takes
-    /// longer than a question waits to be repeated.
+    /// A device that repeats all its answers before each new one, as on a line that is slower than
+    /// the host's repetition.
     struct Late(Native<StoppedClock>, Vec<u8>);
 
     impl Transport for Late {
@@ -477,7 +476,7 @@ mod tests {
         look(&mut control, calibration);
     }
 
-    /// A scene for the arm.
+    /// Returns a scene for the arm.
     fn scene() -> Scene {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
         let scale = Scale::new(1.0, 1.0).expect("scale");
@@ -500,7 +499,7 @@ mod tests {
             assert_eq!((last.end, epoch), (SessionEnd::Goodbye, None));
             assert!(looking.status().is_ok());
         }
-        // Asked to arm, even in vain, it says goodbye: a session of its own.
+        // A session that has requested arming, even in vain, closes, so the device records it.
         let before = open(&mut device).device().last.session;
         let mut arming = open(&mut device);
         let blocked = arming.request(&Request::Arm).expect("it answers");
@@ -517,7 +516,7 @@ mod tests {
         let held = scene();
         let mut vanishes = open(&mut device);
         vanishes.put_scene(held).expect("taken");
-        // As where its program is killed.
+        // As if its program were killed.
         vanishes.exchange.is_over = true;
         drop(vanishes);
         for _ in 0..3 {
@@ -529,7 +528,7 @@ mod tests {
         }
     }
 
-    /// A device that hears nothing any more after so many sends, and the time.
+    /// A device that ignores everything after a number of sends, and the time.
     struct Deaf(Native<StoppedClock>, usize, Rc<Cell<Duration>>);
 
     impl Transport for Deaf {
@@ -576,7 +575,7 @@ mod tests {
         within(began);
     }
 
-    /// Something that listens and says one thing.
+    /// A transport that sends one message, then only receives.
     struct Says(Vec<u8>);
 
     impl Transport for Says {

@@ -1,4 +1,4 @@
-//! Which device, as the user names it, and the way to it.
+//! The address of a device, as the user writes it, and the connection to it.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,7 +9,7 @@ use super::tcp::Tcp;
 use super::transport::Transport;
 use super::usb::Usb;
 
-/// A device by the name that the command line gives it.
+/// A device's address on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceAddress {
     /// `usb` or `usb:SERIAL`: a board on USB, the only one or that with this serial
@@ -17,15 +17,15 @@ pub enum DeviceAddress {
     Usb(Option<String>),
     /// `tcp:HOST:PORT`: an emulated board, or one behind a network.
     Tcp(String),
-    /// The application in this program's memory.
+    /// The device's application in this program's memory.
     Native,
 }
 
 impl DeviceAddress {
-    /// Connects to the device; `native` makes the one in this program's memory.
+    /// Connects to the device; `native` creates the one in this program's memory.
     ///
     /// # Errors
-    /// [`LinkError::Absent`] says where it looked.
+    /// [`LinkError::Absent`] names the searched device.
     pub fn connect<'t>(
         &self,
         native: impl FnOnce() -> Native<HostClock>,
@@ -39,8 +39,8 @@ impl DeviceAddress {
 }
 
 impl DeviceAddress {
-    /// The same device for good: the board that is the only one now, even when another
-    /// one is plugged in later.
+    /// Fixes the address to the board that is the only one now, even if another is plugged in
+    /// later.
     #[must_use]
     pub fn pinned(self) -> Self {
         match self {

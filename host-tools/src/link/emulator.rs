@@ -1,8 +1,8 @@
 //! The emulated board: QEMU as a child of this program.
 //!
-//! The image may be from any source. QEMU runs without semihosting, through which an image
-//! could read and write every file that its user can: what it has to say goes over
-//! three serial lines, and a reset is its end.
+//! The image may be from any source. QEMU runs without semihosting, because an image could use it
+//! to read and write all files of the user: all its output uses three serial lines, and a reset
+//! ends it.
 
 use std::io::{self, Read};
 use std::net::{Ipv4Addr, TcpListener};
@@ -20,22 +20,21 @@ pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_ELF";
 pub const QEMU_VARIABLE: &str = "HAPTERRA_QEMU";
 /// QEMU's name when no option says otherwise.
 pub const QEMU: &str = "qemu-system-arm";
-/// Time that QEMU may take to connect its lines.
+/// Max time for QEMU to connect its lines.
 const START: Duration = Duration::from_secs(60);
-/// Time that the board may take to end after a goodbye, on a machine that others use, too.
+/// Max time for the board to end after a close message, on a shared machine.
 const END: Duration = Duration::from_secs(60);
 
-/// Bytes of a report that are read, at most.
+/// Max bytes of a report.
 const SAID: u64 = 16 << 10;
 
-/// The board whose clock counts instructions, as it calls itself.
+/// The name of the board whose clock counts instructions.
 pub const EMULATED: &str = "mps2-an386";
-/// Instructions that the emulated board executes for each count of its clock:
-/// `-icount shift=3` makes an instruction 8 ns, a count of its 25 MHz clock is
-/// 40 ns.
+/// Instructions for each count of the emulated board's clock: `-icount shift=3` makes an
+/// instruction 8 ns, and a count of its 25 MHz clock is 40 ns.
 pub const INSTRUCTIONS_PER_COUNT: f64 = 5.0;
 
-/// Reason for which the board cannot be emulated.
+/// Reason why the board cannot be emulated.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
     /// The image was not stated.
@@ -59,7 +58,7 @@ pub enum EmulatorError {
         #[source]
         source: io::Error,
     },
-    /// QEMU ended, or does not connect.
+    /// QEMU ended, or did not connect.
     #[error("{} did not bring the board up: {said}", path.display())]
     NotUp {
         /// The program.
@@ -67,12 +66,12 @@ pub enum EmulatorError {
         /// Its output, or its exit status.
         said: String,
     },
-    /// A socket for the lines cannot be had.
+    /// A socket for the lines cannot be opened.
     #[error("cannot listen on the loopback address")]
     Listen(#[source] io::Error),
 }
 
-/// A running emulated board; it ends with this value.
+/// A running emulated board, which is ended when this value is dropped.
 #[derive(Debug)]
 pub struct Emulator {
     child: Child,
@@ -92,7 +91,7 @@ impl Emulator {
     /// Starts the board from an image and connects its two lines.
     ///
     /// # Errors
-    /// [`EmulatorError`] names the missing part or has QEMU's message.
+    /// [`EmulatorError`] names the missing part or contains QEMU's message.
     pub fn start(qemu: &Path, image: &Path) -> Result<(Self, Lines), EmulatorError> {
         let path = image.to_owned();
         regular_file::open(image).map_err(|source| EmulatorError::Image { path, source })?;
@@ -108,16 +107,15 @@ impl Emulator {
         Ok((emulator, Lines { link, plant }))
     }
 
-    /// Waits for the board to end by itself, as it does after a goodbye; ends
-    /// it otherwise.
+    /// Waits for the board to end by itself, as it does after a close message; ends it otherwise.
     ///
     /// # Errors
-    /// When it has to be ended, or says that it failed.
+    /// When it has to be ended, or reports a failure.
     pub fn finish(mut self) -> io::Result<()> {
         let deadline = Instant::now() + END;
         while Instant::now() < deadline {
             if let Some(status) = self.child.try_wait()? {
-                // A board that ended well has reported nothing.
+                // A board that ended without an error has an empty report.
                 let report = self.report();
                 return match status.success() && report.is_empty() {
                     true => Ok(()),
@@ -135,7 +133,7 @@ impl Emulator {
     /// Returns the output of the board or QEMU if it has ended by itself; ends it otherwise.
     #[must_use]
     pub fn failure(mut self) -> Option<String> {
-        // The link breaks a moment before the process has ended.
+        // The link breaks a moment before the process ends.
         std::thread::sleep(Duration::from_millis(200));
         let status = self.child.try_wait().ok().flatten()?;
         Some(format!("{status}; {}", self.said()))
@@ -152,7 +150,7 @@ impl Emulator {
                 return Err(self.not_up(status.to_string()));
             }
             if Instant::now() > deadline {
-                // What it wrote can only be read to the end once it has ended.
+                // Its output can be read to the end only after it has ended.
                 let _ = self.child.kill();
                 return Err(self.not_up(format!("no connection in {START:?}")));
             }
@@ -168,7 +166,7 @@ impl Emulator {
         [report, complaint].join(" ").trim().to_owned()
     }
 
-    /// The board's report, read to its end: QEMU has ended.
+    /// Returns the board's report, read to its end: QEMU has ended.
     fn report(&mut self) -> String {
         self.child.stdout.take().map_or(String::new(), text)
     }
@@ -190,13 +188,13 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // It has ended already, or it ends now.
+        // Ends QEMU if it still runs.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Returns the printable text of a stream: the beginning of an endless one, and nothing of one that
+/// Returns the printable text of a stream: the beginning of an endless one, and nothing if it
 /// cannot be read.
 fn text(from: impl Read) -> String {
     let mut said = Vec::new();
@@ -214,7 +212,7 @@ fn command(qemu: &Path, image: &Path, lines: &[TcpListener; 2]) -> Command {
     let mut command = Command::new(qemu);
     command.args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"]);
     command.args(["-icount", "shift=3,sleep=off"]);
-    // A reset is the end: the board has no other way to end the program.
+    // A reset is the only way for the board to end the program.
     command.arg("-no-reboot");
     for (index, line) in lines.iter().enumerate() {
         let port = line.local_addr().map_or(0, |address| address.port());
@@ -224,7 +222,8 @@ fn command(qemu: &Path, image: &Path, lines: &[TcpListener; 2]) -> Command {
     command.args(["-chardev", "stdio,id=report,signal=off,mux=off"]);
     command.args(["-serial", "chardev:report"]);
     command.arg("-kernel").arg(image);
-    // A Ctrl-C at the terminal is this program's: it ends the session, and then the board.
+    // Without its own group, QEMU would get the terminal's Ctrl-C: this program ends the session
+    // first, and then the board.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command

@@ -5,39 +5,39 @@ use std::time::Duration;
 
 use hapterra_core::wire::hello::PROTOCOL;
 
-/// Reason for which there is no link, or no longer.
+/// Reason why a link cannot be opened, or was lost.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// Nothing there to talk to.
+    /// No device was found.
     #[error("no device: looked for {looked_for}: {why}")]
     Absent {
-        /// Sought device and place.
+        /// The searched device and place.
         looked_for: String,
-        /// Finding in its place.
+        /// The finding in its place.
         why: String,
     },
-    /// Several devices could be meant.
+    /// Several devices match.
     #[error("several hapterra boards: {}", .0.join(", "))]
     Several(Vec<String>),
     /// The transport broke while the device was in use.
     #[error("the device is gone")]
     Gone(#[source] io::Error),
-    /// The transport stands, but there is no answer.
+    /// The transport is open, but the device does not answer.
     #[error("the device has not answered for {0:.1?}")]
     Silent(Duration),
-    /// The device has another host.
+    /// Another host controls the device.
     #[error("another host has taken the device: the arm may be armed")]
     Taken,
-    /// The device has not heard this host for too long, and has disarmed the arm.
+    /// The device has not received a message of this host for too long, and has disarmed the arm.
     #[error("the device has not heard this computer for too long, and has disarmed the arm")]
     LetGo,
-    /// Goodbye was not answered.
+    /// The close message was not answered.
     #[error("the board did not confirm that it is disarmed: switch the amplifiers off")]
     NotConfirmed,
-    /// The user wants no more.
+    /// The user has ended the command.
     #[error("interrupted")]
     Interrupted,
-    /// The two ends speak different protocols.
+    /// Host and device use different protocols.
     #[error(
         "version mismatch: the device speaks link protocol {theirs}, this command speaks {ours}"
     )]
@@ -47,19 +47,19 @@ pub enum LinkError {
         /// The device's protocol.
         theirs: u16,
     },
-    /// The device would not take the scene.
+    /// The device refused the scene.
     #[error("the device refused the scene: it finds a number in it that it cannot work with")]
     SceneRefused,
-    /// In the middle of something that cannot be taken up again.
+    /// The device was restarted during an operation that cannot be resumed.
     #[error("the device was restarted and lost its session")]
     Restarted,
-    /// A point of a replay is never answered.
+    /// The device does not answer a point of a replay.
     #[error("the device did not finish point {0} of the trajectory")]
     Stuck(u32),
 }
 
 impl LinkError {
-    /// The device speaks another protocol than this program.
+    /// Returns the error for a device with another protocol than this program.
     pub(super) const fn version(theirs: u16) -> Self {
         Self::Version {
             ours: PROTOCOL,
@@ -67,7 +67,7 @@ impl LinkError {
         }
     }
 
-    /// Returns true if trying again later can help.
+    /// Returns true if a later try can succeed.
     #[must_use]
     pub const fn is_passing(&self) -> bool {
         matches!(

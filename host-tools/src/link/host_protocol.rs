@@ -1,5 +1,5 @@
-//! The host's states of [`hapterra_core::wire`], as a state machine without I/O and without a clock:
-//! the caller passes the time.
+//! The host's states of [`hapterra_core::wire`], as a state machine without I/O and without a
+//! clock: the caller passes the time.
 
 use std::time::Duration;
 
@@ -21,33 +21,32 @@ use super::timeouts::Timeouts;
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// Nothing was sent yet, or close or detach was answered.
+    /// Nothing was sent yet, or the close or detach message was answered.
     Closed,
-    /// The hello was sent.
+    /// The open message was sent.
     Greeting,
     /// The scene was sent.
     SceneSent,
     /// The scene is in force.
     Open,
-    /// The close was sent.
+    /// The close message was sent.
     Leaving,
-    /// Detach was sent: the arm stays as it is.
+    /// The detach message was sent: the arm stays as it is.
     Detaching,
 }
 
 /// Meaning of a device's message for the session.
 #[derive(Debug)]
 pub(super) enum ProtocolEvent {
-    /// The device has introduced itself: its samples are numbered from zero. `restarted`
-    /// tells that it was in this session before and has lost everything.
+    /// The device has introduced itself: its samples are numbered from zero. `restarted` is set if
+    /// it was in this session before and has lost its state.
     Greeted {
         device: DeviceHello,
         restarted: bool,
     },
     /// The scene is in force.
     SceneAck,
-    /// The placement that was sent is answered: it is in force, where its scene is the one that
-    /// is to be.
+    /// The scene change was answered: it is in force if the device's scene has its epoch.
     SceneChange,
     /// This message answers the request.
     Answered(HostRequest, ToHost),
@@ -60,30 +59,30 @@ pub(super) enum ProtocolEvent {
 pub(super) struct HostProtocol {
     numbers: fastrand::Rng,
     session: SessionNumber,
-    /// The hello that opened it; zero until the device has sent it.
+    /// The number of the open message that opened it; zero until the device has sent it.
     opened_by: u8,
-    /// The session before, and the hello that opened it; its last frames are no other
-    /// host's.
+    /// The session before, and the number of its open message; its last frames do not mean another
+    /// host.
     previous: Option<(SessionNumber, u8)>,
-    /// The device has answered in this session.
+    /// True if the device has answered in this session.
     confirmed: bool,
     scene: Option<Scene>,
-    /// The table of its materials, where it has some.
+    /// The scene's material table, if it has one.
     materials: Option<MaterialTable>,
-    /// Another placement that was sent without an answer: the first and the last time.
+    /// The unanswered scene change, and the times when it was first and last sent.
     view: Option<(SceneChange, Duration, Duration)>,
     patience: Timeouts,
     state: State,
     /// The time when the state began, and when its message was last sent.
     since: Duration,
     said: Duration,
-    /// When something was answered last.
+    /// Time of the last answer.
     heard: Duration,
     alive_said: Duration,
     alive_is_due: bool,
-    /// When a frame of another session came last.
+    /// Time of the last frame of another session.
     foreign: Option<Duration>,
-    /// The last hello's number, and whether it was answered.
+    /// The number of the last open message; true if it was answered.
     hello: u8,
     hello_answered: bool,
     asking: RequestQueue,
@@ -119,7 +118,7 @@ impl HostProtocol {
         }
     }
 
-    /// The same about a scene with materials.
+    /// Returns the same protocol, for a scene with materials.
     #[must_use]
     pub(super) fn with_materials(self, table: Option<&MaterialTable>) -> Self {
         Self {
@@ -136,7 +135,7 @@ impl HostProtocol {
         self.session
     }
 
-    /// The session before the present one, and the hello that opened it.
+    /// Returns the session before the present one, and the number of its open message.
     pub(super) const fn previous(&self) -> Option<(SessionNumber, u8)> {
         self.previous
     }
@@ -145,9 +144,9 @@ impl HostProtocol {
         &self.patience
     }
 
-    /// Begins, or begins anew over a new line. Returns whether a new session was
-    /// drawn: one that was never answered is tried again, so that no session is opened
-    /// that no host remembers.
+    /// Begins a session, or begins again over a new line. Returns true if a new session number was
+    /// drawn: an unanswered session keeps its number, so that the device opens no session that the
+    /// host has forgotten.
     pub(super) fn greet(&mut self, now: Duration, out: &mut Vec<u8>) -> bool {
         let draws = self.confirmed || self.foreign.is_some();
         if draws {
@@ -163,12 +162,12 @@ impl HostProtocol {
         draws
     }
 
-    /// Ends the conversation, and has the device disarm.
+    /// Ends the session; the device disarms.
     pub(super) fn leave(&mut self, now: Duration, out: &mut Vec<u8>) {
         self.end_by(State::Leaving, now, out);
     }
 
-    /// Ends the conversation, and leaves the arm and the scene as they are.
+    /// Ends the session, and leaves the arm and the scene as they are.
     pub(super) fn detach(&mut self, now: Duration, out: &mut Vec<u8>) {
         self.end_by(State::Detaching, now, out);
     }
@@ -183,20 +182,19 @@ impl HostProtocol {
         self.say_state(now, out);
     }
 
-    /// Returns true if its close was sent and is not answered.
+    /// Returns true if the close or detach message was sent and is not answered.
     pub(super) const fn is_ending(&self) -> bool {
         matches!(self.state, State::Leaving | State::Detaching)
     }
 
-    /// Puts a scene in force, or another one than before.
+    /// Puts a scene in force, in place of an earlier one.
     pub(super) fn put_scene(&mut self, scene: Scene, now: Duration, out: &mut Vec<u8>) {
         self.scene = Some(scene);
         self.enter(State::SceneSent, now);
         self.say_state(now, out);
     }
 
-    /// Puts another view of the scene in, in place of one that is not answered yet. It is
-    /// sent until it is answered.
+    /// Sends a scene change until it is answered; it replaces an unanswered one.
     pub(super) fn put_view(&mut self, view: SceneChange, now: Duration, out: &mut Vec<u8>) {
         self.view = Some((view, now, now));
         if self.state == State::Open {
@@ -204,7 +202,7 @@ impl HostProtocol {
         }
     }
 
-    /// An unanswered placement, once.
+    /// Removes and returns the scene change if it is still unanswered after `give_up`.
     pub(super) fn take_lost_view(&mut self, now: Duration) -> Option<SceneChange> {
         let give_up = self.patience.give_up;
         let is_lost = |since: Duration| now.saturating_sub(since) >= give_up;
@@ -212,7 +210,7 @@ impl HostProtocol {
         lost.map(|(view, _, _)| view)
     }
 
-    /// Says the view again, where that is due.
+    /// Repeats the scene change if it is due.
     fn repeat_view(&mut self, now: Duration, out: &mut Vec<u8>) {
         if let Some((view, since, said)) = self.view
             && self.is_due(said, now)
@@ -231,22 +229,22 @@ impl HostProtocol {
         }
     }
 
-    /// The scene that is to be in force.
+    /// Returns the requested scene.
     pub(super) const fn scene(&self) -> Option<&Scene> {
         self.scene.as_ref()
     }
 
-    /// No scene is to be in force any more: the host asks for its end.
+    /// Forgets the scene, because the host requests its end.
     pub(super) const fn forget_scene(&mut self) {
         self.scene = None;
     }
 
-    /// Asks for something, after what was asked for before.
+    /// Adds a request after the earlier ones.
     pub(super) fn ask(&mut self, ask: HostRequest) {
         self.asking.ask(ask);
     }
 
-    /// The line was not read for a while: silence counts from now.
+    /// Restarts the silence time-out, after a time in which the line was not read.
     pub(super) fn listen_from(&mut self, now: Duration) {
         self.heard = now;
         self.alive_said = now;
@@ -257,7 +255,7 @@ impl HostProtocol {
         self.asking.take_unanswered()
     }
 
-    /// Says what is due.
+    /// Appends the messages that are due.
     ///
     /// # Errors
     /// When a deadline has passed.
@@ -291,7 +289,7 @@ impl HostProtocol {
 
     fn check_silence(&self, now: Duration) -> Result<(), LinkError> {
         let quiet = now.saturating_sub(self.heard);
-        // What comes right after the last answer may have been on its way before.
+        // A frame right after the last answer may have been in transit before it.
         let late = self.heard + self.patience.greet_again;
         let others = self.foreign.is_some_and(|at| at > late);
         if others && quiet >= 2 * self.patience.greet_again {
@@ -312,13 +310,13 @@ impl HostProtocol {
         (self.since, self.said) = (now, now);
     }
 
-    /// Says what the state repeats.
+    /// Appends the messages that the state repeats.
     fn say_state(&mut self, now: Duration, out: &mut Vec<u8>) {
         self.said = now;
         match self.state {
             State::Closed => {}
             State::Greeting => {
-                // A zero first ends whatever may have been under way.
+                // A zero ends any incomplete frame.
                 out.push(0);
                 append(&VersionCheck::Asked { protocol: PROTOCOL }, out);
                 self.say_hello(out);
@@ -333,8 +331,8 @@ impl HostProtocol {
             }
             State::Open => self.say_hello(out),
             State::Leaving => {
-                // A device that was restarted, or has not heard of this session yet,
-                // has to before it can say goodbye to it.
+                // A device that was restarted, or has not received this session's open message yet,
+                // has to receive it before the close message.
                 self.say_hello(out);
                 self.say(&ToDevice::Bye, out);
             }
@@ -345,7 +343,7 @@ impl HostProtocol {
         }
     }
 
-    /// Says a scene, with its materials where it has some.
+    /// Appends a scene, with its materials if it has some.
     fn say_scene(&self, scene: Scene, out: &mut Vec<u8>) {
         let Some(table) = self
             .materials
@@ -363,7 +361,7 @@ impl HostProtocol {
     }
 
     fn say_hello(&mut self, out: &mut Vec<u8>) {
-        // Zero stands for a hello that was never answered.
+        // Zero stands for an open message that was never answered.
         self.hello = self.hello.checked_add(1).unwrap_or(1);
         self.hello_answered = false;
         out.push(0);
@@ -375,7 +373,7 @@ impl HostProtocol {
         self.say(&ToDevice::Hello(hello), out);
     }
 
-    /// Says that the host is there.
+    /// Appends a sign of life if it is due.
     fn say_alive(&mut self, now: Duration, out: &mut Vec<u8>) {
         if self.alive_is_due || now.saturating_sub(self.alive_said) >= self.patience.alive {
             (self.alive_is_due, self.alive_said) = (false, now);
@@ -383,12 +381,12 @@ impl HostProtocol {
         }
     }
 
-    /// Says at the next chance that the host is there: time has passed on the device.
+    /// Makes the next sign of life due at once: time has passed on the device.
     pub(super) const fn hasten_alive(&mut self) {
         self.alive_is_due = true;
     }
 
-    /// Says what is asked for, where it is due.
+    /// Appends the pending request if it is due.
     pub(super) fn say_pending(&mut self, now: Duration, out: &mut Vec<u8>) {
         if self.state != State::Open {
             return;
@@ -404,7 +402,7 @@ impl HostProtocol {
         append(&InSession { session, message }, out);
     }
 
-    /// Takes a refusal. It counts only where it can be meant.
+    /// Processes a protocol refusal, which counts only before the device has answered.
     pub(super) fn on_version_check(&self, check: VersionCheck) -> Result<(), LinkError> {
         match check {
             VersionCheck::Refused { protocol }
@@ -416,8 +414,7 @@ impl HostProtocol {
         }
     }
 
-    /// Takes a frame; none where it belongs to another session or is an answer that is
-    /// not waited for.
+    /// Processes a frame; returns `None` if it belongs to another session or nothing waits for it.
     pub(super) fn hear(
         &mut self,
         now: Duration,
@@ -461,8 +458,8 @@ impl HostProtocol {
         })
     }
 
-    /// A frame of another session tells of another host; not one that says that its
-    /// session is over, nor one that is left of the session before.
+    /// Records a frame of another session as a sign of another host, unless it reports that its
+    /// session is over or belongs to the session before.
     fn notice(&mut self, now: Duration, frame: &InSession<ToHost>) {
         let previous = self.previous.map(|(session, _)| session);
         let is_over = matches!(frame.message, ToHost::SessionClosed { .. });
@@ -471,13 +468,13 @@ impl HostProtocol {
         }
     }
 
-    /// Returns true if a message answers the last hello and is the first that does. What answers
-    /// an earlier one, and a double, tells what was.
+    /// Returns true if a message is the first answer to the last open message. Answers to earlier
+    /// ones, and repeated answers, report an old state.
     fn answers_hello(&mut self, number: u8) -> bool {
         number == self.hello && !std::mem::replace(&mut self.hello_answered, true)
     }
 
-    /// The device has ended this session.
+    /// Processes the device's report that it has ended this session.
     fn on_over(
         &mut self,
         now: Duration,
@@ -490,7 +487,7 @@ impl HostProtocol {
         self.heard = now;
         match (self.state, end) {
             (State::Detaching, _) => self.enter(State::Closed, now),
-            // The close that was sent after the hello is answered, too.
+            // The close message after the open message is answered with it.
             (State::Leaving, SessionEnd::HostSilent) => {}
             (_, SessionEnd::HostSilent) => return Err(LinkError::LetGo),
             _ => return Err(LinkError::Taken),
@@ -516,8 +513,8 @@ impl HostProtocol {
             return Ok(None);
         }
         self.opened_by = device.opened_by;
-        // Another session, or another life of the device: what it holds tells whether it took
-        // the view.
+        // A new session, or a restarted device: the epoch of its scene shows whether the scene
+        // change is in force.
         self.settle_view(device.epoch);
         let restarted = !is_first;
         if self.is_ending() {
@@ -539,7 +536,7 @@ impl HostProtocol {
         Ok(Some(ProtocolEvent::Greeted { device, restarted }))
     }
 
-    /// Returns true if there is a scene to be rendered and this is not its epoch.
+    /// Returns true if a scene is to be rendered and the device has another epoch.
     fn lacks_scene(&self, epoch: Option<u32>) -> bool {
         self.scene.is_some_and(|scene| epoch != Some(scene.epoch))
     }
@@ -593,10 +590,10 @@ impl HostProtocol {
         if let ToHost::Heartbeat { epoch, .. } = message
             && self.state == State::Open
             && self.lacks_scene(*epoch)
-            // The answer to a view comes, or is asked for again.
+            // The answer to a scene change will arrive, or it is sent again.
             && self.view.is_none_or(|(view, _, _)| *epoch != Some(view.scene.epoch))
         {
-            // The device has taken no scene, or lost it, and its host has missed that.
+            // The device has no scene, or lost it, and the message about that was lost.
             self.enter(State::SceneSent, now);
             self.say_state(now, out);
         }

@@ -6,13 +6,12 @@ use std::time::Duration;
 use super::error::LinkError;
 use super::transport::{NoLine, Transport};
 
-/// Between two looks at the clock while something is waited for.
+/// Time between two checks of the clock during a wait.
 pub(super) const LOOK: Duration = Duration::from_millis(50);
-/// Time that a device may take for the bytes of one message before it counts as gone.
+/// Max time for a device to read the bytes of one message before it counts as gone.
 const TAKES: Duration = Duration::from_secs(5);
 
-/// Line on which [`Session`](super::Session) and [`ControlSession`](super::ControlSession) hold their
-/// conversation over.
+/// Line of a [`Session`](super::Session) or [`ControlSession`](super::ControlSession).
 pub(super) struct Line<'t> {
     transport: Box<dyn Transport + 't>,
     is_open: bool,
@@ -38,19 +37,19 @@ impl<'t> Line<'t> {
         self.out.clear();
     }
 
-    /// The time since a fixed moment ([`Transport::now`]).
+    /// Returns the time since a fixed moment ([`Transport::now`]).
     pub(super) fn now(&self) -> Duration {
         self.transport.now()
     }
 
-    /// Closes the line. Some devices can be opened once only: another line to them comes
-    /// after this one is closed.
+    /// Closes the line. Some devices can be opened only once: another line to them can be opened
+    /// after this call.
     pub(super) fn hang_up(&mut self) {
         self.replace(Box::new(NoLine(self.now())));
         self.is_open = false;
     }
 
-    /// Returns true if there is a line.
+    /// Returns true if the line is open.
     pub(super) const fn is_open(&self) -> bool {
         self.is_open
     }
@@ -60,8 +59,8 @@ impl<'t> Line<'t> {
         self.flush_while(None, &|| true)
     }
 
-    /// Sends the pending bytes. A device that takes none of them for a while, or has not
-    /// taken them by `until`, is gone; if no more is wanted, the rest is not sent.
+    /// Sends the pending bytes. A device that reads none of them for a while, or has not read all
+    /// by `until`, counts as gone; if `goes_on` returns false, the rest is not sent.
     pub(super) fn flush_while(
         &mut self,
         until: Option<Duration>,
@@ -89,7 +88,7 @@ impl<'t> Line<'t> {
         Ok(())
     }
 
-    /// Receives bytes within `wait`: the time, the bytes, and the buffer for answers.
+    /// Receives bytes within `wait`; returns the time, the bytes, and the buffer for answers.
     pub(super) fn receive(
         &mut self,
         wait: Duration,

@@ -1,4 +1,4 @@
-//! Traffic of the link, and losses.
+//! Traffic and losses of the link.
 
 use std::collections::HashSet;
 
@@ -6,34 +6,34 @@ use hapterra_core::terrain::TileKey;
 use hapterra_core::wire::message::Telemetry;
 use hapterra_core::wire::session::SampleCount;
 
-/// Counts over all sessions with a device. Of every sample that the device made in a
-/// session of this host, it was received, lost or dropped, and counted once.
+/// Counts over all sessions with a device. Each sample of the device in a session of this host is
+/// counted once: as received, lost or dropped.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LinkStats {
     /// Tiles sent.
     pub tiles: u64,
-    /// Of those, tiles that had been sent before: lost on the way, or asked
-    /// for again because the window had moved on and returned.
+    /// Tiles among them that were sent before: lost in transit, or requested again after the window
+    /// had moved away and back.
     pub again: u64,
-    /// Bytes of the tiles sent, framing included.
+    /// Bytes of the sent tiles, with framing.
     pub tile_bytes: u64,
     /// Telemetry samples received.
     pub samples: u64,
-    /// Samples lost on the link: by the gaps in their numbers, and by the device's own
-    /// count of what it has sent.
+    /// Samples lost on the link, from the gaps in their numbers and the device's own count of sent
+    /// samples.
     pub lost: u64,
     /// Samples that the device dropped because the link was slow.
     pub dropped: u64,
-    /// Sessions whose end is not known, because the device was restarted or another
-    /// host came between: more may be lost than was counted.
+    /// Sessions whose end is unknown, because the device was restarted or another host opened one
+    /// in between: more samples may be lost than were counted.
     pub uncertain: u64,
-    /// Frames that were not understood.
+    /// Invalid frames.
     pub bad_frames: u64,
-    /// Frames of sessions of others, or of one that was over.
+    /// Frames of other hosts' sessions, or of one that was over.
     pub foreign_frames: u64,
-    /// Requests for tiles that there are not.
+    /// Requests for tiles that do not exist.
     pub no_tiles: u64,
-    /// Requests and questions that were given up without an answer.
+    /// Requests and queries that were given up without an answer.
     pub unanswered: u64,
     /// Sessions opened.
     pub sessions: u64,
@@ -41,27 +41,27 @@ pub struct LinkStats {
     /// Samples lost before the last one that was received, and in sessions that ended.
     gaps: u64,
     now: Numbering,
-    /// The session before, until the device has reported its end.
+    /// The session before, until the device has reported its last count.
     before: Option<Numbering>,
 }
 
 /// The samples of one session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Numbering {
-    /// Number that the next sample should have.
+    /// Expected number of the next sample.
     expected: u32,
     /// Device's counts of sent and dropped samples.
     told: SampleCount,
 }
 
 impl Numbering {
-    /// Samples that were sent and are not here, after the last one that is.
+    /// Returns the number of sent samples that are missing after the last received one.
     fn tail(&self) -> u64 {
         u64::from(ahead(self.expected, self.told.sent))
     }
 
-    /// Takes the device's count; returns how many samples it has dropped since the
-    /// last. A count that comes late tells nothing.
+    /// Stores the device's count; returns the number of samples dropped since the last count. A
+    /// late count changes nothing.
     fn told(&mut self, count: SampleCount) -> u64 {
         self.told.sent = self
             .told
@@ -82,7 +82,7 @@ fn ahead(earlier: u32, later: u32) -> u32 {
 }
 
 impl LinkStats {
-    /// A new session's number was drawn: its samples are numbered from zero.
+    /// Begins a new session: its samples are numbered from zero.
     pub(super) fn drawn(&mut self) {
         if self.now != Numbering::default() || self.sessions > 0 {
             self.settle(None);
@@ -91,15 +91,15 @@ impl LinkStats {
         self.count_lost();
     }
 
-    /// The session is open. `last`: how many samples the one before had, if the device
-    /// remembers.
+    /// Counts an opened session. `last` is the sample count of the session before, if the device
+    /// still has it.
     pub(super) fn opened(&mut self, last: Option<SampleCount>) {
         self.sessions += 1;
         self.settle(last);
         self.count_lost();
     }
 
-    /// The device was restarted: samples are numbered from zero again.
+    /// Counts a restart of the device: samples are numbered from zero again.
     pub(super) fn restarted(&mut self) {
         self.sessions += 1;
         self.before = Some(std::mem::take(&mut self.now));
@@ -107,7 +107,7 @@ impl LinkStats {
         self.count_lost();
     }
 
-    /// Closes the account of the session before.
+    /// Completes the counts of the session before.
     fn settle(&mut self, last: Option<SampleCount>) {
         let Some(mut before) = self.before.take() else {
             return;
@@ -132,8 +132,8 @@ impl LinkStats {
         self.tile_bytes += bytes as u64;
     }
 
-    /// Takes the count of a message; false if it is one that was seen before, or that
-    /// was given up as lost.
+    /// Counts the samples of a message; returns false if they were received before or given up as
+    /// lost.
     pub(super) fn received(&mut self, telemetry: &Telemetry) -> bool {
         let count = telemetry.samples.len() as u32;
         let gap = telemetry.first.wrapping_sub(self.now.expected);
@@ -150,7 +150,7 @@ impl LinkStats {
         true
     }
 
-    /// Takes the device's own count of this session.
+    /// Stores the device's own count of this session.
     pub(super) fn told(&mut self, count: SampleCount) {
         self.dropped += self.now.told(count);
         self.count_lost();
@@ -191,7 +191,7 @@ mod tests {
         assert!(!tally.received(&batch(0, 0)));
         assert!(tally.received(&batch(12, 3)));
         assert_eq!(counted(&tally), (8, 8, 3));
-        // What overtook and comes after all stays counted as lost, once.
+        // A sample that arrives after later ones stays counted as lost, once.
         assert!(!tally.received(&batch(4, 1)));
         assert_eq!(counted(&tally), (8, 8, 3));
     }

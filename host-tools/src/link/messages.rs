@@ -12,20 +12,20 @@ use serde::de::DeserializeOwned;
 
 use super::transport::Transport;
 
-/// Appends a frame of at most [`MAX_FRAME`] bytes to `out`; every message is.
+/// Appends a frame to `out`. All messages fit in [`MAX_FRAME`] bytes.
 pub(super) fn append(content: &impl Serialize, out: &mut Vec<u8>) {
     let mut frame = [0; MAX_FRAME];
     out.extend_from_slice(encode(content, &mut frame).unwrap_or(&[]));
 }
 
-/// Sends a message of at most [`MAX_FRAME`] bytes; every message is.
+/// Sends a message. All messages fit in [`MAX_FRAME`] bytes.
 pub(super) fn send(transport: &mut dyn Transport, message: &impl Serialize) -> io::Result<()> {
     let mut frame = [0; MAX_FRAME];
     transport.send(encode(message, &mut frame).unwrap_or(&[]))
 }
 
-/// Takes the next frame's content out of `bytes`, which keep what comes after it, and
-/// has it read; none where no frame ends in them.
+/// Removes the next frame from `bytes`, which keep the rest, and reads its content with `read`;
+/// returns `None` if no frame ends in them.
 pub(super) fn next_frame<T>(
     reader: &mut FrameReader<MAX_FRAME>,
     bytes: &mut &[u8],
@@ -43,12 +43,12 @@ pub(super) fn next_frame<T>(
 
 /// Content of a device's frame.
 #[derive(Debug)]
-// Made, taken apart and dropped.
+// Short-lived, so its size does not matter.
 #[allow(clippy::large_enum_variant)]
 pub(super) enum FromDevice {
     /// A message of a session.
     Message(InSession<ToHost>),
-    /// That it speaks another protocol.
+    /// The device's protocol, if it is another one.
     Version(VersionCheck),
 }
 
@@ -60,17 +60,17 @@ pub(super) fn from_device(content: &[u8]) -> Result<FromDevice, FrameError> {
     }
 }
 
-/// Messages as they come from a transport, one at a time.
+/// Messages received from a transport, one at a time.
 #[derive(Default)]
 pub(super) struct Inbox {
     reader: Box<FrameReader<MAX_FRAME>>,
-    /// Received and not read yet.
+    /// Received bytes that are not read yet.
     unread: Vec<u8>,
 }
 
 impl Inbox {
-    /// The next message; none where none has come after waiting for at most
-    /// `wait`. What is not understood is the rest of something earlier.
+    /// Returns the next message, or `None` if none arrives within `wait`. Invalid frames are
+    /// skipped: they are the rest of earlier messages.
     ///
     /// # Errors
     /// When the device is gone.

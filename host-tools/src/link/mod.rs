@@ -6,18 +6,19 @@
 //!      queries ── ControlSession ┘
 //! ```
 //!
-//! - `host_protocol`: the host's states of [`hapterra_core::wire`], without I/O and without a clock;
-//!   `host_request` and `request_queue`: the host's requests, repeated until they are answered.
-//! - [`Client`] serves a terrain by that protocol, and [`Session`] runs it over a [`Transport`]. The
-//!   device requests tiles and the host answers, so a new session needs nothing from the one before:
-//!   either end may fail and reconnect.
+//! - `host_protocol`: the host's states of [`hapterra_core::wire`], without I/O and without a
+//!   clock; `host_request` and `request_queue`: the host's requests, repeated until they are
+//!   answered.
+//! - [`Client`] serves a terrain by that protocol, and [`Session`] runs it over a [`Transport`].
+//!   The device requests tiles and the host answers, so a new session needs nothing from the one
+//!   before: either end may fail and reconnect.
 //! - `prefetch` reads the tiles ahead of the HIP before the device requests them.
 //! - [`ControlSession`] sends queries and requests without a terrain: status, calibration, arming.
-//! - Transports are [`Tcp`], [`Usb`], and [`Native`], a device in this
-//!   program's memory; [`DeviceAddress`] is how a user names one.
+//! - Transports are [`Tcp`], [`Usb`], and [`Native`], a device in this program's memory; a
+//!   [`DeviceAddress`] selects one.
 //! - [`heightfield::printable_text`] escapes text of a device before a terminal shows it.
-//! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual
-//!   Phantom at its second line.
+//! - [`Emulator`] runs the emulated board; [`serve_plant`] moves the virtual Phantom at its second
+//!   line.
 
 mod bulk;
 mod client;

@@ -1,4 +1,4 @@
-//! The device's own application in this program's memory.
+//! The device's application in this program's memory.
 
 use std::collections::VecDeque;
 use std::io;
@@ -18,18 +18,18 @@ use crate::phantom::HeldPhantom;
 
 /// Tiles along the side of the window, as on the emulated board.
 const WINDOW: usize = 16;
-/// Ticks run while waiting for the device to say something, at most.
+/// Max ticks run while the host waits for a message.
 const TICKS_A_CALL: u32 = 1000;
 
-/// A device in real time runs as far ahead of the clock before it waits, and catches up as
-/// much.
+/// Max lead of a device in real time over the clock before it waits, and the lag above which it
+/// restarts its schedule.
 const AHEAD: Duration = Duration::from_millis(4);
 const BEHIND: Duration = Duration::from_millis(100);
-/// Ticks after which the host of such a device looks around.
+/// Ticks between two returns of such a device to its host.
 const STEPS_IN_REAL_TIME: u32 = 16;
 
-/// Host time as the device's clock: ticks are never late, and cost what they
-/// cost here.
+/// Host time as the device's clock: ticks are never late, and their cost is measured on this
+/// machine.
 #[derive(Clone, Copy, Debug)]
 pub struct HostClock(Instant);
 
@@ -51,7 +51,8 @@ impl TickClock for HostClock {
         0
     }
 
-    /// The virtual arm stands still with this program, so no force is held meanwhile.
+    /// Returns the period: the virtual arm stops with this program, so no force lasts while it is
+    /// stopped.
     fn since_last_tick(&mut self) -> u32 {
         Self::PERIOD
     }
@@ -63,11 +64,11 @@ impl TickClock for HostClock {
     }
 }
 
-/// A device in memory, in lock-step: its time passes while the host waits for
-/// it to say something, and only as long as it waits for nothing itself.
+/// A device in memory, in lock-step: its time passes only while the host waits for a message, and
+/// stops when the device waits for the host.
 ///
-/// Without an arm of its own the device's arm rests in its home pose, and no hand holds the
-/// dead-man switch.
+/// Without an arm of its own, the device's arm rests in its home pose, and the dead-man switch is
+/// not pressed.
 pub struct Native<C: TickClock = StoppedClock> {
     device: Device<C, WINDOW>,
     arm: Option<Box<HeldPhantom>>,
@@ -75,32 +76,32 @@ pub struct Native<C: TickClock = StoppedClock> {
     drive: GuardOutputs,
     meddler: Option<FaultInjector>,
     restless: bool,
-    /// Ticks run while waiting for the device to say something, at most.
+    /// Max ticks run while the host waits for a message.
     ticks_a_call: u32,
     ticks: u64,
     /// Bytes from the device that arrived during a send.
     pending: VecDeque<u8>,
 }
 
-/// Stands between arm and device: gets the number of the next tick and what
-/// the amplifiers got in the last one, and may change what encoders and
-/// switches say. How tests make things go wrong, and see what comes of it.
+/// Injector between arm and device: it receives the number of the next tick and the amplifiers'
+/// last commands, and may change the readings of encoders and switches. Tests use it to inject
+/// faults and observe the result.
 pub type FaultInjector = Box<dyn FnMut(u64, &mut GuardInputs, &GuardOutputs)>;
 
 impl Native<StoppedClock> {
-    /// A device to replay trajectories on: no tick takes any time.
+    /// Creates a device for replays: ticks take no time.
     #[must_use]
     pub fn for_replay() -> Self {
         Self::new(StoppedClock, None)
     }
 
-    /// The same at any tick rate.
+    /// Creates the same device at any tick rate.
     #[must_use]
     pub fn for_replay_at(rate: TickRate) -> Box<dyn Transport> {
         fn at<const KHZ: u32>() -> Box<dyn Transport> {
             Box::new(Native::new(StoppedClock::<KHZ>, None))
         }
-        // The rate is part of the application's type, as it is on a board.
+        // The tick rate is part of the application's type, as on a board.
         match rate.hz() / 1_000 {
             10 => at::<10>(),
             9 => at::<9>(),
@@ -117,15 +118,14 @@ impl Native<StoppedClock> {
 }
 
 impl<C: TickClock> Native<C> {
-    /// A device whose arm is `arm`, a Premium 1.5, with that calibration in
-    /// its memory.
+    /// Creates a device with an arm, a Premium 1.5, and that arm's calibration in its memory.
     #[must_use]
     pub fn new(clock: C, arm: Option<Box<HeldPhantom>>) -> Self {
         let stored = Stored::Found(Calibration::PREMIUM_1_5);
         Self::started(clock, arm, stored, BootReport::default())
     }
 
-    /// A device that finds this in its memory, and this about its start.
+    /// Creates a device with the given stored calibration and reset cause.
     #[must_use]
     pub fn started(
         clock: C,
@@ -133,8 +133,8 @@ impl<C: TickClock> Native<C> {
         stored: Stored,
         boot: BootReport,
     ) -> Self {
-        // The two halves of the application hand tile buffers to each other by
-        // reference, for as long as the program runs.
+        // The two halves of the application exchange tile buffers by reference, until the program
+        // ends.
         let tiles = Box::leak(Box::new(TileBuffers::VACANT));
         let memory = Box::leak(Box::new(WorkingMemory::new()));
         let mut native = Self {
@@ -152,7 +152,7 @@ impl<C: TickClock> Native<C> {
         native
     }
 
-    /// The same device with something between it and its arm.
+    /// Adds a fault injector between the device and its arm.
     #[must_use]
     pub fn meddled_with(mut self, meddler: FaultInjector) -> Self {
         self.meddler = Some(meddler);
@@ -160,30 +160,30 @@ impl<C: TickClock> Native<C> {
         self
     }
 
-    /// The same device, whose time passes whenever the line is read, as a
-    /// board's does: also while it waits for nothing but the host.
+    /// Lets time pass whenever the line is read, as on a board: also while the device waits only
+    /// for the host.
     #[must_use]
     pub fn restless(mut self) -> Self {
         self.restless = true;
         self
     }
 
-    /// The same device, which says this of the oscillator of its USB.
+    /// Sets the reported state of the device's USB oscillator.
     #[must_use]
     pub fn with_usb_clock(self, clock: UsbClock) -> Self {
         self.device.monitor().measure_usb_clock(clock);
         self
     }
 
-    /// The same device, which lets its host look around after so many ticks at least.
+    /// Sets the ticks that the device runs before it returns to its host.
     #[must_use]
     pub fn in_steps_of(mut self, ticks: u32) -> Self {
         self.ticks_a_call = ticks;
         self
     }
 
-    /// The same device, whose time does not run ahead of this machine's, for a host that
-    /// looks on. What it falls behind by more than a moment it does not catch up.
+    /// Limits the device's time to this machine's clock, for a host that shows the session. A
+    /// longer lag than a moment is not made up for.
     #[must_use]
     pub fn in_real_time(self) -> Self {
         let tick = Duration::from_secs(1) * C::PERIOD / C::HZ;
@@ -202,7 +202,7 @@ impl<C: TickClock> Native<C> {
         self.meddled_with(pace).in_steps_of(STEPS_IN_REAL_TIME)
     }
 
-    /// The virtual arm, if the device has one.
+    /// Returns the virtual arm, if the device has one.
     #[must_use]
     pub fn arm(&self) -> Option<&HeldPhantom> {
         self.arm.as_deref()
@@ -220,7 +220,7 @@ impl<C: TickClock> Native<C> {
         self.device.memory()
     }
 
-    /// Lets time pass while the line is not read, as a board does whose host is gone.
+    /// Lets time pass while the line is not read, as on a board whose host is gone.
     pub fn pass(&mut self, ticks: u32) {
         for _ in 0..ticks {
             self.tick();
@@ -237,7 +237,7 @@ impl<C: TickClock> Native<C> {
         self.read_sensors();
     }
 
-    /// Reads what encoders and switches say now, or what the meddler makes of it.
+    /// Reads encoders and switches, and applies the fault injector.
     fn read_sensors(&mut self) {
         if let Some(arm) = &self.arm {
             self.sense = arm.sense();
@@ -247,7 +247,7 @@ impl<C: TickClock> Native<C> {
         }
     }
 
-    /// Lets the device do what it has to do before it can take more.
+    /// Runs the device until it can accept more bytes.
     fn make_room(&mut self) {
         let mut chunk = [0; 512];
         let said = self.device.link.transmit(&mut chunk);

@@ -1,5 +1,5 @@
-//! The virtual Phantom at the emulated board's second line: encoders and
-//! switches in, motor currents out, one exchange a tick.
+//! The virtual Phantom at the emulated board's second line: encoders and switches in, motor
+//! currents out, one exchange in each tick.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,8 +11,8 @@ use super::messages::{Inbox, send};
 use super::transport::Transport;
 use crate::phantom::HeldPhantom;
 
-/// Moves the arm with the board's ticks until `stop` returns true or the board is
-/// gone. The board's time stands still until each tick's counts are there.
+/// Moves the arm with the board's ticks until `stop` returns true or the board is gone. The board's
+/// time stops until it has received a tick's counts.
 ///
 /// # Errors
 /// When the board is gone.
@@ -34,7 +34,7 @@ pub fn serve_plant(
                 return Ok(());
             }
         };
-        // A board that failed reports it with a number of its own.
+        // A failed board sends a tick number that does not match.
         if currents.tick != tick && !currents.enabled {
             return Err(io::Error::other("the board has failed"));
         }
@@ -45,8 +45,8 @@ pub fn serve_plant(
     Ok(())
 }
 
-/// Moves the arm at a board's plant line, in a thread of its own, for as long
-/// as `talk` takes; gives what `talk` gives.
+/// Moves the arm at a board's plant line in a separate thread while `talk` runs; returns the result
+/// of `talk`.
 pub fn move_arm_while<T>(
     line: &mut (dyn Transport + Send),
     arm: &mut HeldPhantom,
@@ -55,7 +55,7 @@ pub fn move_arm_while<T>(
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
-            // At the end the board may go first.
+            // At the end the board may close the line first.
             if let Err(error) = serve_plant(line, arm, &|| done.load(Ordering::Relaxed)) {
                 tracing::debug!("the plant's line ended: {error}");
             }

@@ -5,7 +5,7 @@ use hapterra_core::terrain::TILE_CELLS;
 
 use crate::terrain::Terrain;
 
-/// Time ahead of the HIP, seconds: longer than the answer of a distant server takes.
+/// Time ahead of the HIP, seconds: longer than the response time of a distant server.
 const AHEAD_S: f64 = 0.5;
 /// Time between two positions, seconds: positions of adjacent ticks give no useful speed.
 const BETWEEN_S: f64 = 0.05;
@@ -13,7 +13,7 @@ const BETWEEN_S: f64 = 0.05;
 /// arrive after it has passed them.
 const MAX_TILES: i32 = 8;
 
-/// Follows the HIP, and prefetches the tiles ahead of it.
+/// Prefetch of the tiles ahead of the HIP.
 #[derive(Debug, Default)]
 pub(super) struct Prefetch {
     /// A tick, and the HIP's position in it.
@@ -23,12 +23,12 @@ pub(super) struct Prefetch {
 }
 
 impl Prefetch {
-    /// Begins anew, for another scene or another device.
+    /// Resets the prefetch, for another scene or another device.
     pub(super) fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// Takes the HIP's position in a tick, at `tick_hz` ticks a second.
+    /// Prefetches tiles for the HIP's position in a tick, at `tick_hz` ticks a second.
     pub(super) fn follow(
         &mut self,
         terrain: &Terrain<'_>,
@@ -68,8 +68,8 @@ pub(super) fn read_around(terrain: &Terrain<'_>, hip: &GridPoint) {
     terrain.prefetch(from, to);
 }
 
-/// Returns the first and last tile, east and north, between the HIP and its position after `times`
-/// the time since `was`; `None` if it is too fast.
+/// Returns the first and last tile, east and north, between the HIP and its extrapolated position;
+/// `times` is the extrapolation time over the time since `was`. `None` if the HIP is too fast.
 fn tiles(was: &GridPoint, is: &GridPoint, times: f64) -> Option<[[i32; 2]; 2]> {
     let along = |axis: usize| {
         let at = |point: &GridPoint| f64::from(point.cell()[axis]) + f64::from(point.frac()[axis]);
@@ -99,7 +99,7 @@ mod tests {
             tiles(&at(40, 40), &at(40, 40), 10.0),
             Some([[1, 1], [1, 1]])
         );
-        // A cell in a twentieth of a second: ten in half a second.
+        // One cell in a twentieth of a second is ten cells in half a second.
         assert_eq!(
             tiles(&at(56, 40), &at(57, 40), 10.0),
             Some([[1, 1], [2, 1]])

@@ -83,7 +83,7 @@ impl RequestQueue {
                 pending.ask,
                 HostRequest::Request(Request::Arm | Request::Jog(_))
             ) {
-                // Its number makes the device ignore the first, should that still come.
+                // Its number makes the device ignore the first one, even if that arrives later.
                 self.waiting
                     .push_front(HostRequest::Request(Request::Disarm));
             }
@@ -104,12 +104,12 @@ impl RequestQueue {
         }
     }
 
-    /// Takes the answer with a request's number, and returns that request if it is pending.
+    /// Returns the pending request if the answer has its number.
     pub(super) fn request_answered(&mut self, number: u8) -> Option<HostRequest> {
         self.answered(number, |ask| matches!(ask, HostRequest::Request(_)))
     }
 
-    /// Takes the answer with a query's number, and returns that query if it is pending.
+    /// Returns the pending query if the answer has its number.
     pub(super) fn question_answered(
         &mut self,
         asked: HostRequest,

@@ -1,4 +1,4 @@
-//! A client over a transport, and its clock.
+//! A client with a transport and its clock.
 
 use std::time::Duration;
 
@@ -20,14 +20,14 @@ use crate::terrain::Terrain;
 pub struct Session<'t> {
     client: Client<'t>,
     line: Line<'t>,
-    /// True if it is to continue; what a device does not read is not waited for else.
+    /// Returns false if the session should stop waiting for the device to read.
     goes_on: &'t dyn Fn() -> bool,
-    /// Until then the close has to be sent and answered.
+    /// Deadline for the close message and its answer.
     leaves_by: Option<Duration>,
 }
 
 impl<'t> Session<'t> {
-    /// A session that has sent nothing yet.
+    /// Creates a session that has sent nothing yet.
     #[must_use]
     pub fn new(
         terrain: &'t Terrain<'t>,
@@ -44,19 +44,17 @@ impl<'t> Session<'t> {
         }
     }
 
-    /// The same session, which ends its beginning, and what a device is slow to read, when
-    /// `goes_on` says no.
+    /// Stops opening, and stops waiting for a slow device, when `goes_on` returns false.
     #[must_use]
     pub fn heeding(mut self, goes_on: &'t dyn Fn() -> bool) -> Self {
         self.goes_on = goes_on;
         self
     }
 
-    /// Shakes hands, puts the scene in force and asks the device to arm, if
-    /// `arming` says how.
+    /// Opens the session, puts the scene in force and requests arming if `arming` is set.
     ///
     /// # Errors
-    /// [`LinkError`]: no answer, another protocol, a scene refused.
+    /// [`LinkError`]: no answer, a different protocol, or a refused scene.
     pub fn open(
         terrain: &'t Terrain<'t>,
         scene: Scene,
@@ -69,8 +67,7 @@ impl<'t> Session<'t> {
         Ok((session, device))
     }
 
-    /// Shakes hands over the line that it has. The session can be closed if
-    /// that fails, too.
+    /// Opens the session over its present line. The session can also be closed if that fails.
     ///
     /// # Errors
     /// As [`Session::open`]; [`LinkError::Interrupted`].
@@ -78,8 +75,8 @@ impl<'t> Session<'t> {
         self.shake_hands(self.goes_on, on)
     }
 
-    /// Continues over a new transport after the old one was lost, for as long as `go_on`
-    /// returns true. Returns the device, whose hello tells in `epoch` what it still held.
+    /// Continues over a new transport after the old one was lost, as long as `go_on` returns true.
+    /// Returns the device, whose `epoch` is that of the scene it still had.
     ///
     /// # Errors
     /// As [`Session::open`]; [`LinkError::Interrupted`].
@@ -93,54 +90,54 @@ impl<'t> Session<'t> {
         self.shake_hands(go_on, on)
     }
 
-    /// Goes over to another line, in the session that it is in.
+    /// Continues the present session over another line.
     pub fn go_over(&mut self, transport: Box<dyn Transport + 't>) {
         self.line.replace(transport);
     }
 
-    /// Closes the line. Some devices can be opened once only: another line to them comes
-    /// after this one is closed.
+    /// Closes the line. Some devices can be opened only once: another line to them can be opened
+    /// after this call.
     pub fn hang_up(&mut self) {
         self.line.hang_up();
     }
 
-    /// Returns true if it has a line.
+    /// Returns true if the line is open.
     #[must_use]
     pub const fn has_line(&self) -> bool {
         self.line.is_open()
     }
 
-    /// The scene that is served.
+    /// Returns the served scene.
     #[must_use]
     pub const fn scene(&self) -> &Scene {
         self.client.scene()
     }
 
-    /// Statistics of the link.
+    /// Returns the statistics of the link.
     #[must_use]
     pub const fn tally(&self) -> &LinkStats {
         self.client.tally()
     }
 
-    /// Time-outs.
+    /// Returns the time-outs.
     #[must_use]
     pub const fn patience(&self) -> &Timeouts {
         self.client.patience()
     }
 
-    /// Asks for something; an event tells what came of it. It goes out with the next
-    /// poll, or when what was asked for before is answered.
+    /// Adds a request; an event reports its result. The request is sent in the next poll, or when
+    /// the earlier ones are answered.
     pub fn ask(&mut self, ask: HostRequest) {
         self.client.ask(ask);
     }
 
-    /// Asks for something to be done, as [`Session::ask`].
+    /// Requests an action, as [`Session::ask`].
     pub fn request(&mut self, request: Request) {
         self.ask(HostRequest::Request(request));
     }
 
-    /// Puts another view of the scene in, of this terrain; the clutch has to be open. An
-    /// [`Event::Viewed`] tells what came of it.
+    /// Puts a scene change in force, with its terrain; the clutch has to be open. An
+    /// [`Event::Viewed`] reports the result.
     ///
     /// # Errors
     /// [`LinkError::Gone`].
@@ -160,12 +157,11 @@ impl<'t> Session<'t> {
         self.flush()
     }
 
-    /// Waits for bytes from the device for at most `wait`, answers what it asks,
-    /// says what is due and reports what it tells.
+    /// Waits for bytes from the device for at most `wait`, answers its requests, sends the messages
+    /// that are due and reports events.
     ///
     /// # Errors
-    /// [`LinkError`]. After one that is passing the session can be taken up again with
-    /// [`Session::resume`].
+    /// [`LinkError`]. After a passing one the session can continue with [`Session::resume`].
     pub fn poll(&mut self, wait: Duration, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         let line = &mut self.line;
         self.client.due(line.now(), &mut line.out, on)?;
@@ -175,15 +171,15 @@ impl<'t> Session<'t> {
         self.flush()
     }
 
-    /// Ends the session. The device has let its force out, switched its amplifiers off
-    /// and dropped the scene when this returns; an emulated board ends its program.
+    /// Ends the session. When this returns, the device has ramped its force down, switched its
+    /// amplifiers off and dropped the scene; an emulated board ends its program.
     ///
     /// # Errors
-    /// [`LinkError::NotConfirmed`] where the device does not say so in time;
-    /// [`LinkError::Taken`] where another host has taken the device.
+    /// [`LinkError::NotConfirmed`] if the device does not confirm in time; [`LinkError::Taken`] if
+    /// another host controls the device.
     pub fn say_goodbye(&mut self, on: &mut dyn FnMut(Event<'_>)) -> Result<(), LinkError> {
         self.client.leave(self.line.now(), &mut self.line.out);
-        // The user wants the end, and the end is to be heard.
+        // The user has ended the session, but the device must still receive the close message.
         self.goes_on = &|| true;
         self.leaves_by = Some(self.line.now() + self.client.patience().goodbye);
         while self.client.state() != State::Closed {
@@ -198,8 +194,8 @@ impl<'t> Session<'t> {
         Ok(())
     }
 
-    /// As [`Session::say_goodbye`], to a device that was not greeted yet: what another
-    /// host has left armed is disarmed.
+    /// As [`Session::say_goodbye`], for a device that was not opened yet: it disarms an arm that
+    /// another host has left armed.
     ///
     /// # Errors
     /// As [`Session::say_goodbye`].

@@ -11,22 +11,22 @@ use super::transport::{Transport, is_time_out};
 #[derive(Debug)]
 pub struct Tcp {
     stream: TcpStream,
-    /// For how long reads and writes wait now.
+    /// The present time-outs of reads and writes.
     wait: Duration,
     write_wait: Duration,
 }
 
-/// Time that a connection may take, and how long the device may take over what is sent at
-/// once before it counts as gone.
+/// Max time for a connection, and for the device to read the bytes of one send before it counts as
+/// gone.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// The shortest wait: none at all would be for ever.
+/// The shortest time-out: a socket rejects zero.
 const AT_LEAST: Duration = Duration::from_micros(1);
 
 impl Tcp {
     /// Connects to `HOST:PORT`.
     ///
     /// # Errors
-    /// [`LinkError::Absent`] says where it looked.
+    /// [`LinkError::Absent`] names the searched address.
     pub fn connect(address: &str) -> Result<Self, LinkError> {
         let absent = |why: io::Error| LinkError::Absent {
             looked_for: format!("a device at {address} (TCP)"),
@@ -42,7 +42,7 @@ impl Tcp {
         Err(absent(failure))
     }
 
-    /// Takes a connection that stands already.
+    /// Wraps an open connection.
     ///
     /// # Errors
     /// When the connection cannot be configured.
@@ -63,7 +63,8 @@ impl Tcp {
 impl Transport for Tcp {
     fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         let began = Instant::now();
-        // A device that reads a byte now and then is not waited for, either.
+        // The time-out holds for all bytes, so a device that reads a byte now and then also counts
+        // as gone.
         while !bytes.is_empty() {
             let left = TIMEOUT.saturating_sub(began.elapsed());
             if left.is_zero() {

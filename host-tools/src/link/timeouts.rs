@@ -1,4 +1,4 @@
-//! Time-outs of both ends.
+//! Time-outs of host and device.
 
 use std::time::Duration;
 
@@ -11,25 +11,24 @@ use super::host_request::HostRequest;
 /// The times of the table in [`hapterra_core::wire`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timeouts {
-    /// Between two tries to be understood.
+    /// Time between two tries to send a message.
     pub again: Duration,
-    /// Between two signs of life.
+    /// Time between two signs of life.
     pub alive: Duration,
-    /// After so long without an answer the host says hello again, which a device that
-    /// was restarted needs, and which changes nothing else.
+    /// Time without an answer after which the host sends the open message again. A restarted device
+    /// needs it; otherwise it changes nothing.
     pub greet_again: Duration,
-    /// After so long without an answer the device counts as gone.
+    /// Time without an answer after which the device counts as gone.
     pub give_up: Duration,
-    /// So long the device may take to disarm and to say so.
+    /// Max time for the device to disarm and confirm it.
     pub goodbye: Duration,
-    /// For so long, in seconds, the device lets an armed arm be while the host is
-    /// silent.
+    /// Time, in seconds, for which the device keeps the arm armed while the host is silent.
     pub silence_s: u16,
 }
 
 impl Timeouts {
-    /// Time for which an armed real board tolerates a silent host, unless the user says
-    /// otherwise, seconds: longer than a host that continues takes to return.
+    /// Time for which an armed real board tolerates a silent host, unless the user sets another,
+    /// seconds: longer than a host needs to reconnect.
     pub const REAL_SILENCE_S: u16 = 30;
 
     /// For a device that runs in real time.
@@ -42,8 +41,7 @@ impl Timeouts {
         silence_s: Self::REAL_SILENCE_S,
     };
 
-    /// For an emulated board, or a device in this program, whose speed is that of a shared
-    /// machine.
+    /// For an emulated board, or a device in this program, on a shared machine.
     pub const EMULATED: Self = Self {
         again: Duration::from_secs(5),
         alive: Duration::from_millis(500),
@@ -53,8 +51,8 @@ impl Timeouts {
         silence_s: DEFAULT_SILENCE_S,
     };
 
-    /// Time-out of an answer: the user has to press a switch before a calibration is
-    /// stored.
+    /// Returns the time-out of an answer: storing a calibration waits for the user's dead-man
+    /// press.
     pub(super) fn with(&self, ask: &HostRequest) -> Duration {
         const PRESS: Duration = Duration::from_millis(PRESS_MS as u64);
         match ask {
@@ -63,7 +61,7 @@ impl Timeouts {
         }
     }
 
-    /// For a device that is only looked at, whatever its host: all of it within `give_up`.
+    /// Time-outs for a read-only session: all of it within `give_up`.
     #[must_use]
     pub fn of_a_look(give_up: Duration) -> Self {
         Self {
@@ -72,7 +70,7 @@ impl Timeouts {
         }
     }
 
-    /// For a device that is only asked something: all of it within `give_up`.
+    /// Time-outs for a session of queries and requests: all of it within `give_up`.
     #[must_use]
     pub fn of_a_dialogue(give_up: Duration) -> Self {
         Self {

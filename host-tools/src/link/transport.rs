@@ -12,15 +12,15 @@ pub trait Transport {
     /// When the device is gone.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Receives what has come, after waiting for at most `wait` for the first
-    /// byte; zero when none came in that time.
+    /// Receives the available bytes; waits at most `wait` for the first. Returns zero if none
+    /// arrived in that time.
     ///
     /// # Errors
     /// When the device is gone.
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize>;
 
-    /// Sends as much of `bytes` as the device takes within about `wait`; returns how many
-    /// bytes that were. A transport that never waits for its device sends all of them.
+    /// Sends as much of `bytes` as the device reads within about `wait`; returns the number of sent
+    /// bytes. A transport that never waits for its device sends all of them.
     ///
     /// # Errors
     /// When the device is gone.
@@ -29,8 +29,8 @@ pub trait Transport {
         self.send(bytes).map(|()| bytes.len())
     }
 
-    /// The time since a fixed moment, by which a conversation over it is timed: this
-    /// machine's, unless the transport stands for a device in another time.
+    /// Returns the time since a fixed moment, for the time-outs of a conversation: this machine's
+    /// time, unless the device has its own.
     fn now(&self) -> Duration {
         static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
         BEGAN.elapsed()
@@ -55,7 +55,7 @@ impl<T: Transport + ?Sized> Transport for &mut T {
     }
 }
 
-/// The line of a device that has hung up, at this time.
+/// A closed line, with the time of its closing.
 pub(super) struct NoLine(pub(super) Duration);
 
 impl Transport for NoLine {
@@ -72,7 +72,7 @@ impl Transport for NoLine {
     }
 }
 
-/// Returns true if a read ended because nothing came in time.
+/// Returns true if a read ended because no byte arrived in time.
 pub(super) fn is_time_out(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), TimedOut | WouldBlock | Interrupted)

@@ -11,16 +11,16 @@ use nusb::transfer::{self, In, Out};
 use super::bulk::{Bulk, BulkEndpoints, NotOne, Pipes, TRANSFER, is_hapterra, printable, the_one};
 use super::error::LinkError;
 
-/// Transfers under way from the device, so that none of its packets waits.
+/// Number of concurrent transfers from the device, so that none of its packets waits.
 const TRANSFERS: usize = 4;
-/// Time for which the board may leave a transfer unread before it counts as gone. A board reads
-/// within milliseconds, and an end that is asked for waits for this.
+/// Max time for the board to read a transfer before it counts as gone. A board reads within
+/// milliseconds, and the user's end of a session waits for this.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A hapterra board on USB.
 pub type Usb = Bulk<SystemPipes>;
 
-/// A board's two bulk pipes, by the system's USB.
+/// A board's two bulk pipes, through the system's USB.
 pub struct SystemPipes {
     reader: EndpointRead<transfer::Bulk>,
     writer: EndpointWrite<transfer::Bulk>,
@@ -30,8 +30,8 @@ impl Usb {
     /// Opens the board with a serial number, or the only one.
     ///
     /// # Errors
-    /// [`LinkError::Absent`] says what was looked for and what is there;
-    /// [`LinkError::Several`] names the boards that could be meant.
+    /// [`LinkError::Absent`] reports the searched and the found devices; [`LinkError::Several`]
+    /// names the boards that match.
     pub fn connect(serial: Option<&str>) -> Result<Self, LinkError> {
         let (found, looked_at) = Self::list();
         let serials: Vec<_> = found.iter().map(serial_of).collect();
@@ -55,7 +55,7 @@ impl Usb {
         }
     }
 
-    /// The serial number of the only board, if there is just one and it has one.
+    /// Returns the serial number of the only board, if there is exactly one and it has a number.
     #[must_use]
     pub fn only_serial() -> Option<String> {
         let (found, _) = Self::list();
@@ -65,7 +65,7 @@ impl Usb {
         }
     }
 
-    /// The boards on USB, and how many USB devices there are in all.
+    /// Returns the boards on USB, and the number of all USB devices.
     #[must_use]
     pub fn list() -> (Vec<nusb::DeviceInfo>, usize) {
         let devices = usb_devices();
@@ -73,13 +73,13 @@ impl Usb {
         (devices.into_iter().filter(is_board).collect(), count)
     }
 
-    /// Returns the vendor and product numbers that are searched on USB, in words.
+    /// Returns the description of the searched USB devices.
     #[must_use]
     pub fn looked_for() -> String {
         format!("a hapterra board on USB ({VENDOR_ID:04x}:{PRODUCT_ID:04x})")
     }
 
-    /// A board as `--device` takes it, and where it is plugged in.
+    /// Returns a board's `--device` address and its USB port.
     #[must_use]
     pub fn place(info: &nusb::DeviceInfo) -> String {
         let serial =
@@ -90,7 +90,7 @@ impl Usb {
     /// Opens a board.
     ///
     /// # Errors
-    /// [`LinkError::Absent`] says why not.
+    /// [`LinkError::Absent`] reports the reason.
     pub fn open(info: &nusb::DeviceInfo) -> Result<Self, LinkError> {
         let cannot = |error: nusb::Error| absent(format!("found it, but cannot open it: {error}"));
         let device = info.open().wait().map_err(cannot)?;
@@ -125,7 +125,7 @@ impl Pipes for SystemPipes {
     }
 }
 
-/// All USB devices; none where the system has no USB to list.
+/// Returns all USB devices, or none if the system cannot list them.
 pub(crate) fn usb_devices() -> Vec<nusb::DeviceInfo> {
     match nusb::list_devices().wait() {
         Ok(devices) => devices.collect(),

@@ -1,31 +1,31 @@
-//! Reason for which classes cannot be placed on a terrain.
+//! Errors of classes that cannot be placed on a terrain.
 
 use heightfield::{Raster, Sides, System};
 
 /// Reason for which classes cannot be placed on a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GroundError {
-    /// One of the two says where it lies, and the other does not.
+    /// One of the two files states its position, and the other does not.
     #[error(
         "{unplaced} does not state its reference system, and {placed} does: the classes cannot be placed on the terrain"
     )]
     NoSystem {
-        /// The file that says nothing.
+        /// The file without a reference system.
         unplaced: String,
-        /// The other.
+        /// The other file.
         placed: String,
     },
-    /// Their reference systems differ, and there is no way from one to the other.
+    /// Their reference systems differ, and no conversion between them is known.
     #[error(
         "{file} is in a reference system without known longitudes and latitudes, which is not that of {other}"
     )]
     NoWay {
         /// The file in that system.
         file: String,
-        /// The other.
+        /// The other file.
         other: String,
     },
-    /// They are of different bodies.
+    /// They belong to different bodies.
     #[error("{classes} is on another body than {terrain}")]
     OtherBody {
         /// The file of classes.
@@ -33,24 +33,24 @@ pub enum GroundError {
         /// The terrain.
         terrain: String,
     },
-    /// They lie apart.
+    /// They do not overlap.
     #[error("{classes} lies elsewhere than {terrain}: {there}, and the terrain {here}")]
     Apart {
         /// The file of classes.
         classes: String,
         /// The terrain.
         terrain: String,
-        /// Place where the classes lie.
+        /// Position of the classes.
         there: String,
-        /// Place where the terrain lies.
+        /// Position of the terrain.
         here: String,
     },
-    /// More materials than a device has room for.
+    /// More materials than a device can store.
     #[error("{0} classes; a scene has at most 15, and the default")]
     TooMany(usize),
 }
 
-/// Returns the place of a raster, in longitude and latitude if they are known.
+/// Returns the position of a raster, in longitude and latitude if they are known.
 pub(super) fn place_of(raster: &Raster) -> String {
     if let Some(bounds) = raster.bounds_lonlat() {
         let (west, south, east, north) = (bounds.west, bounds.south, bounds.east, bounds.north);

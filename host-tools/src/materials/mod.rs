@@ -1,9 +1,8 @@
-//! Materials: a raster of classes over a terrain, and what each class feels like.
+//! Materials: a raster of classes over a terrain, and the surface of each class.
 //!
-//! The raster has a grid and a reference system of its own. Each haptic sample of the terrain takes
-//! the class of the pixel in which it lies. The device gets
-//! the table of the materials ([`MaterialTable`]) and an index of it for each sample, so it knows
-//! nothing of the file's numbers.
+//! The raster has its own grid and reference system. Each haptic sample of the terrain gets the
+//! class of the pixel in which it lies. The device receives the material table ([`MaterialTable`])
+//! and an index into it for each sample, but not the class numbers of the file.
 
 mod ground;
 mod pixels;
@@ -26,7 +25,7 @@ use pixels::Pixels;
 
 /// Samples of a tile.
 const SAMPLES: usize = TILE_SAMPLES * TILE_SAMPLES;
-/// Places along each side of a terrain that are looked at to tell which classes it has.
+/// Places along each side of a terrain that are searched for its classes.
 const LOOKED_AT: u32 = 24;
 
 /// Material of a class of the file.
@@ -41,25 +40,25 @@ pub struct ClassMaterial {
     pub material: Material,
 }
 
-/// The materials of a scene, as a file of classes and a table say.
+/// The materials of a scene, from a file of classes and a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Looks {
-    /// Material where the file has no class, or one without a name.
+    /// Material where the file has no class, or a class without an entry here.
     pub default: Material,
-    /// The classes that are named, at most 15.
+    /// The classes with an entry, at most 15.
     #[serde(default)]
     pub class: Vec<ClassMaterial>,
 }
 
 impl Looks {
-    /// The table that the device gets.
+    /// Returns the table for the device.
     fn table(&self) -> Option<MaterialTable> {
         let named = self.class.iter().map(|class| class.material);
         let all: Vec<_> = std::iter::once(self.default).chain(named).collect();
         MaterialTable::new(&all)
     }
 
-    /// The index in that table of what the file has at a place; NaN where it has nothing.
+    /// Returns the table index of a value in the file; NaN means no value.
     fn index(&self, value: f64) -> u8 {
         let is_it = |class: &ClassMaterial| class.class as f64 == value;
         let place = self.class.iter().position(is_it);
@@ -67,7 +66,7 @@ impl Looks {
     }
 }
 
-/// A raster of classes over a terrain, and what they feel like.
+/// A raster of classes over a terrain, and their surfaces.
 #[derive(Debug)]
 pub struct Materials {
     file: String,
@@ -78,17 +77,16 @@ pub struct Materials {
 }
 
 impl Materials {
-    /// Lays the classes of a file over a terrain.
+    /// Maps the classes of a file to a terrain.
     ///
     /// # Errors
-    /// [`GroundError`] if the places of the classes are unknown, or none lies on the
-    /// terrain.
+    /// [`GroundError`] if the position of the classes is unknown, or none lies on the terrain.
     pub fn over(
         terrain: (&str, &Raster),
         (file, classes): (&str, Raster),
         looks: Looks,
     ) -> Result<Self, GroundError> {
-        // Recordings and messages have the name.
+        // The name is written to recordings and messages, so it must not contain a key.
         let file = without_key(Path::new(file));
         let pixels = Pixels::over(terrain, (&file, classes))?;
         let table = looks
@@ -103,32 +101,32 @@ impl Materials {
         })
     }
 
-    /// The file of classes, as it was named, but for the key of a URL.
+    /// Returns the file of classes as the user named it, without the key of a URL.
     #[must_use]
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// The raster of classes.
+    /// Returns the raster of classes.
     #[must_use]
     pub const fn classes(&self) -> &Raster {
         self.pixels.raster()
     }
 
-    /// Surfaces of the classes.
+    /// Returns the surfaces of the classes.
     #[must_use]
     pub const fn looks(&self) -> &Looks {
         &self.looks
     }
 
-    /// The table that the device gets.
+    /// Returns the table for the device.
     #[must_use]
     pub const fn table(&self) -> &MaterialTable {
         &self.table
     }
 
-    /// Hash of all classes, as [`crate::terrain::Terrain::fingerprint`] is of heights, and of where
-    /// they lie.
+    /// Returns a hash of all classes and their position, as
+    /// [`crate::terrain::Terrain::fingerprint`] does for heights.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         *self.fingerprint.get_or_init(|| {
@@ -146,22 +144,23 @@ impl Materials {
         })
     }
 
-    /// Surface parameters over the default material: that of a scene with these materials.
+    /// Returns the surface parameters of a scene with these materials: the given ones over the
+    /// default material.
     #[must_use]
     pub const fn params(&self, params: &SurfaceParams) -> SurfaceParams {
         self.looks.default.params(params)
     }
 
-    /// The index in the table of the material at a place of a grid, in the coordinates of its file,
-    /// and whether it is known.
+    /// Returns the table index of the material at a point of a grid, in the coordinates of the
+    /// grid's file, and whether it is known.
     pub fn index_at(&self, grid: &HapticGrid<'_>, ground: [f64; 2]) -> (u8, ReadStatus) {
         let on_terrain = grid.raster().georeference();
         let (value, status) = self.pixels.from(&on_terrain).value(ground, grid.wait());
         (self.looks.index(value), status)
     }
 
-    /// The materials of a tile over a grid, whose samples are `step` of the grid's cells apart, as they
-    /// are sent. Beyond the field they continue as it ends there. And whether they are complete.
+    /// Returns the materials of a tile over a grid, with samples `step` grid cells apart, as they
+    /// are sent, and whether they are complete. Beyond the raster, its border is continued.
     pub(crate) fn tile<'b>(
         &self,
         (grid, last, step): (&HapticGrid<'_>, [i32; 2], f64),
@@ -189,9 +188,8 @@ impl Materials {
         )
     }
 
-    /// Returns the materials of a terrain's ground, for a line to be read: those that were found at
-    /// some hundred places, and how many of these have the default. Of a file at a URL nothing is
-    /// fetched for it.
+    /// Describes the materials of a terrain in one line: those found at some hundred places, and
+    /// the share of the default. Nothing is fetched if the file is at a URL.
     #[must_use]
     pub fn told(&self, grid: &HapticGrid<'_>) -> String {
         let count = self.looks.class.len();
@@ -232,7 +230,7 @@ impl Materials {
     }
 }
 
-/// Room for one tile's materials, used again for each.
+/// Buffer for one tile's materials, reused for each tile.
 pub struct MaterialBuffer {
     indices: Box<[u8; SAMPLES]>,
     bytes: Box<[u8; MAX_TILE_BYTES]>,

@@ -3,22 +3,22 @@
 use super::ground::{GroundError, place_of};
 use heightfield::{Georeference, LonLat, Raster, ReadStatus, Wait};
 
-/// Places along each side of a raster that are tried to find whether two overlap.
+/// Places along each side of a raster that are tested for an overlap of two rasters.
 const TRIED: u32 = 33;
 
-/// A raster of classes, and how places of a terrain come to its coordinates.
+/// A raster of classes, and the conversion of a terrain's points to its coordinates.
 #[derive(Debug)]
 pub(super) struct Pixels {
     raster: Raster,
     way: Way,
 }
 
-/// From the coordinates of one raster to those of another.
+/// Conversion from the coordinates of one raster to those of another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
-    /// They are the same.
+    /// Both have the same coordinates.
     Same,
-    /// By longitude and latitude.
+    /// Through longitude and latitude.
     LonLat,
 }
 
@@ -79,7 +79,8 @@ impl Way {
     }
 }
 
-/// The radius of the body that longitudes and latitudes are of; none is the Earth's.
+/// Returns the radius of the body on which longitudes and latitudes are given; `None` for the
+/// Earth.
 fn radius_m(on: &Georeference<'_>) -> Option<f64> {
     match on.lonlat() {
         LonLat::OfBody { radius_m, .. } => Some(radius_m),
@@ -87,7 +88,7 @@ fn radius_m(on: &Georeference<'_>) -> Option<f64> {
     }
 }
 
-/// A raster of classes, seen from a terrain.
+/// A raster of classes, and the terrain whose points are converted.
 pub(super) struct From<'p> {
     pixels: &'p Pixels,
     terrain: &'p Georeference<'p>,
@@ -95,8 +96,8 @@ pub(super) struct From<'p> {
 }
 
 impl From<'_> {
-    /// Returns the value of the file's pixel at a place in the terrain's coordinates; NaN in a hole
-    /// and beyond the file. And whether it is known.
+    /// Returns the value of the file's pixel at a point in the terrain's coordinates, NaN in
+    /// no-data and beyond the file; and whether it is known.
     pub(super) fn value(&self, ground: [f64; 2], wait: Wait) -> (f64, ReadStatus) {
         let there = self.pixels.way.lead(self.terrain, &self.classes, ground);
         let place = there.map(|at| self.classes.transform().to_samples(at));
@@ -114,7 +115,7 @@ impl Pixels {
     ) -> Result<Self, GroundError> {
         let (on_terrain, on_classes) = (ground.georeference(), raster.georeference());
         let way = Way::between((terrain, &on_terrain), (file, &on_classes))?;
-        // Either may be much larger than the other.
+        // Tested in both directions, because either raster may be much larger than the other.
         let overlap = has_place_on(way, (&on_terrain, ground), (&on_classes, &raster))
             || has_place_on(way, (&on_classes, &raster), (&on_terrain, ground));
         match overlap {
@@ -141,7 +142,7 @@ impl Pixels {
     }
 }
 
-/// Returns true if one of many places of a raster lies on another.
+/// Returns true if one of the tested places of a raster lies on another.
 fn has_place_on(
     way: Way,
     (from, of): (&Georeference<'_>, &Raster),
@@ -156,7 +157,8 @@ fn has_place_on(
     })
 }
 
-/// The pixel whose middle is nearest to a place in columns and rows; none beyond the field.
+/// Returns the pixel whose centre is nearest to a position in columns and rows; `None` beyond the
+/// raster.
 fn pixel(raster: &Raster, [column, row]: [f64; 2]) -> Option<[u32; 2]> {
     let along = |place: f64, count: u32| {
         let nearest = (place + 0.5).floor();

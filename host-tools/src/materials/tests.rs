@@ -1,4 +1,4 @@
-//! Classes over a terrain: which lies where.
+//! Tests of the classes' positions on a terrain.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
@@ -11,7 +11,8 @@ use crate::terrain::{HapticCells, Scale, Terrain};
 use crate::timeouts::wait_until;
 use heightfield::{GroundTransform, OpenOptions, Wait};
 
-/// A raster whose south-west sample is at `origin`, in steps of so much, in the system of a code.
+/// Returns a raster with its south-west sample at `origin` and a given step, in the reference
+/// system of an EPSG code.
 fn raster(
     (columns, rows): (u32, u32),
     origin: [f64; 2],
@@ -41,7 +42,7 @@ fn over(terrain: &Raster, classes: Raster, looks: Looks) -> Result<Materials, Gr
     Materials::over(("t.tif", terrain), ("c.tif", classes), looks)
 }
 
-/// The index of the material at a place, which is in memory.
+/// Returns the index of the material at a point, which is in memory.
 fn index_at(materials: &Materials, terrain: &Raster, ground: [f64; 2]) -> u8 {
     let grid = HapticGrid::new(terrain, HapticCells::Stored);
     let (index, status) = materials.index_at(&grid, ground);
@@ -53,7 +54,7 @@ fn index_at(materials: &Materials, terrain: &Raster, ground: [f64; 2]) -> u8 {
 fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
     let utm = Some(32632);
     let terrain = raster((61, 61), [500_000.0, 5_000_000.0], 10.0, utm, |_, _| 1.0);
-    // Pixels of 37 m whose first middle lies 3 m west and 5 m south of the terrain.
+    // Pixels of 37 m; the centre of the first lies 3 m west and 5 m south of the terrain.
     let class = |column, row| if (column + row) % 2 == 0 { 10.0 } else { 20.0 };
     let classes = raster((9, 9), [499_997.0, 4_999_995.0], 37.0, utm, class);
     let materials = over(&terrain, classes, looks(&[20, 10])).expect("they overlap");
@@ -74,7 +75,7 @@ fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
         let index = index_at(&materials, &terrain, [500_000.0 + x, 5_000_000.0 + y]);
         assert_eq!(index, wanted, "{x} {y}");
     }
-    // Beyond the pixels, and where nothing is known, is the default.
+    // The default applies beyond the pixels and in no-data.
     assert_eq!(index_at(&materials, &terrain, [500_400.0, 5_000_100.0]), 0);
     let holes = raster((9, 9), [500_000.0, 5_000_000.0], 37.0, utm, |column, _| {
         if column == 4 { f32::NAN } else { 30.0 }
@@ -86,7 +87,7 @@ fn a_place_has_the_class_of_the_pixel_that_it_lies_in() {
 
 #[test]
 fn classes_in_another_system_lie_where_they_are_on_the_globe() {
-    // A meridian is the border: 9° east is the middle of zone 32.
+    // The border is a meridian: 9° east is the middle of zone 32.
     let terrain = raster(
         (101, 101),
         [499_500.0, 5_000_000.0],
@@ -188,18 +189,18 @@ fn what_cannot_be_laid_over_a_terrain_is_told() {
         told.contains("longitude 9.127") && told.contains("longitude 8.999"),
         "{told}"
     );
-    // One that is small and lies between the places that are tried first.
+    // A small raster between the places that are tested first.
     let large = raster((4_001, 3), [0.0; 2], 1.0, None, |_, _| 1.0);
     let small = raster((2, 2), [61.0, 0.2], 0.1, None, |_, _| 1.0);
     assert!(over(&large, small, looks(&[1])).is_ok());
-    // Neither says anything: both count in their own columns and rows.
+    // Neither has a reference system: both are placed by columns and rows.
     assert!(over(&unplaced, unplaced.clone(), looks(&[1])).is_ok());
     let many: Vec<i64> = (0..16).collect();
     let bad = over(&unplaced, unplaced.clone(), looks(&many));
     assert!(matches!(bad, Err(GroundError::TooMany(16))));
 }
 
-/// A raster around the meridian and the equator of the body of a geographic system.
+/// Returns a raster around the meridian and equator of a geographic system's body.
 fn of_body(wkt: &str) -> Raster {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("body.asc");
@@ -232,7 +233,7 @@ fn classes_of_another_body_are_not_laid_over_a_terrain() {
     let bad = over(&moon, earth.clone(), looks(&[1])).expect_err("the Earth's");
     assert_eq!(bad, other);
     assert!(over(&moon, moon.clone(), looks(&[1])).is_ok());
-    // The same body in another system, of degrees that are half as large.
+    // The same body in a system whose unit is half a degree.
     let halves = of_body(&system("Moon_2000", "\"Moon\",1737400.0,0.0", 0.5));
     assert!(over(&moon, halves, looks(&[1])).is_ok());
     assert!(over(&earth, earth.clone(), looks(&[1])).is_ok());
@@ -249,7 +250,7 @@ fn the_key_of_a_url_is_in_no_recording_and_in_no_message() {
     };
     let materials = at(500_000.0).expect("they overlap");
     assert_eq!(materials.file(), "https://host/c.tif");
-    // Nothing is fetched to tell what is where.
+    // Nothing is fetched to describe the materials.
     let grid = HapticGrid::new(&terrain, HapticCells::Stored);
     assert!(materials.told(&grid).contains("read where it is touched"));
     let apart = at(900_000.0).expect_err("elsewhere").to_string();

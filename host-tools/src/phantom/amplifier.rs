@@ -1,5 +1,5 @@
-//! From a current command to joint torque: the amplifier's limit, the current
-//! loop's lag, the motor and the cable ratio; and what the amplifier says about itself.
+//! From a current command to joint torque: the amplifier's limit, the current loop's lag, the motor
+//! and the cable ratio; and the amplifier's ready line and current monitor.
 
 use libm::exp;
 
@@ -8,7 +8,7 @@ use super::model::AxisDrive;
 /// Fault of an amplifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AmplifierFault {
-    /// It is not there, or has no supply: it is not ready, and no current flows.
+    /// The amplifier is missing or has no supply: it is not ready, and no current flows.
     Missing,
     /// The motor's wire is broken: the amplifier is ready, and no current flows.
     MotorOpen,
@@ -24,7 +24,7 @@ pub struct Amplifier {
 }
 
 impl Amplifier {
-    /// An amplifier without current.
+    /// Creates an amplifier without current.
     #[must_use]
     pub fn new(axis: AxisDrive) -> Self {
         Self {
@@ -45,25 +45,25 @@ impl Amplifier {
         };
     }
 
-    /// Breaks the amplifier, or mends it.
+    /// Sets or removes a fault.
     pub fn set_fault(&mut self, fault: Option<AmplifierFault>) {
         self.fault = fault;
     }
 
-    /// Returns true if its ready line says that it is ready.
+    /// Returns true if its ready line is active.
     #[must_use]
     pub fn is_ready(&self) -> bool {
         self.fault != Some(AmplifierFault::Missing)
     }
 
-    /// Returns the reading of its current monitor, mA, to the next lower one.
+    /// Returns the reading of its current monitor, mA, rounded towards zero.
     #[must_use]
     pub fn monitor_ma(&self) -> i16 {
         // The cast saturates.
         (1e3 * self.current_a) as i16
     }
 
-    /// Lets the current follow the command for `h_s` seconds.
+    /// Moves the current towards the command for `h_s` seconds.
     pub fn advance(&mut self, h_s: f64) {
         let aim_a = match self.fault {
             None => self.command_a,
@@ -73,13 +73,13 @@ impl Amplifier {
         self.current_a = aim_a + (self.current_a - aim_a) * keep;
     }
 
-    /// The current that flows, A.
+    /// Returns the present current, A.
     #[must_use]
     pub fn current_a(&self) -> f64 {
         self.current_a
     }
 
-    /// Torque on the joint, N·m.
+    /// Returns the torque on the joint, N·m.
     #[must_use]
     pub fn torque_nm(&self) -> f64 {
         self.current_a * self.axis.motor.kt_nm_per_a * self.axis.ratio * self.axis.sign

@@ -7,15 +7,14 @@ use super::kinematics;
 use super::model::PhantomModel;
 use super::script::Script;
 
-/// Lays the terrain frame (mm) onto the device frame (m).
+/// Mapping of the terrain frame (mm) to the device frame (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmFrame {
-    /// The terrain point at the tip of the arm in its home pose `q = 0`, mm
-    /// east, north, up.
+    /// The terrain point at the tip of the arm in its home pose `q = 0`, mm east, north, up.
     pub home_mm: [f64; 3],
 }
 
-/// The script asks for a point that the arm cannot get to.
+/// A point of the script is out of the arm's reach.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the arm cannot reach ({:.1}, {:.1}, {:.1}) mm of the terrain, with ({:.1}, {:.1}, {:.1}) mm at its home",
@@ -29,7 +28,7 @@ pub struct OutOfReach {
 }
 
 impl ArmFrame {
-    /// Terrain millimetres to device metres.
+    /// Converts terrain millimetres to device metres.
     #[must_use]
     pub fn to_device_m(&self, model: &PhantomModel, terrain_mm: [f64; 3]) -> [f64; 3] {
         let [east, north, up] = std::array::from_fn(|i| (terrain_mm[i] - self.home_mm[i]) * 1e-3);
@@ -37,7 +36,7 @@ impl ArmFrame {
         [x - north, y + east, z + up]
     }
 
-    /// Device metres to terrain millimetres.
+    /// Converts device metres to terrain millimetres.
     #[must_use]
     pub fn to_terrain_mm(&self, model: &PhantomModel, device_m: [f64; 3]) -> [f64; 3] {
         let home_m = kinematics::tip(model, [0.0; 3]);
@@ -46,23 +45,22 @@ impl ArmFrame {
         [east + y, north - x, up + z]
     }
 
-    /// Turns a direction (force, velocity) from the device's frame into the
-    /// terrain's, unit unchanged.
+    /// Rotates a direction (force, velocity) from the device frame to the terrain frame, unit
+    /// unchanged.
     #[must_use]
     pub fn turn_to_terrain(device: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = device;
         [y, -x, z]
     }
 
-    /// Turns a direction from the terrain's frame into the device's, unit
-    /// unchanged.
+    /// Rotates a direction from the terrain frame to the device frame, unit unchanged.
     #[must_use]
     pub fn turn_to_device(terrain: [f64; 3]) -> [f64; 3] {
         let [east, north, up] = terrain;
         [-north, east, up]
     }
 
-    /// The joint angles that bring the tip to a terrain point, rad.
+    /// Returns the joint angles for the tip at a terrain point, rad.
     ///
     /// # Errors
     /// [`OutOfReach`]: the point lies beyond the links or the stops.
@@ -78,7 +76,7 @@ impl ArmFrame {
     /// Checks that the arm reaches every point of a script.
     ///
     /// # Errors
-    /// [`OutOfReach`] names the first corner that it does not get to.
+    /// [`OutOfReach`] names the first corner that the arm does not reach.
     pub fn check(&self, model: &PhantomModel, script: &Script) -> Result<(), OutOfReach> {
         let mut corners = script.corners_mm();
         corners.try_for_each(|at_mm| self.joints_at(model, at_mm).map(drop))

@@ -1,8 +1,7 @@
-//! Dynamics of the joints: the mass matrix, the velocity-dependent
-//! torques that go with it, gravity and the stops.
+//! Dynamics of the joints: the mass matrix, its velocity-dependent torques, gravity and the stops.
 //!
-//! `M(q)·q̈ + c(q, q̇) + G(q) + B·q̇ + friction = τ + Jᵀ·F`, with `c` derived from
-//! `M` by Lagrange's equations so that energy is neither made nor lost.
+//! `M(q)·q̈ + c(q, q̇) + G(q) + B·q̇ + friction = τ + Jᵀ·F`, with `c` derived from `M` by
+//! Lagrange's equations, so that energy is conserved.
 
 use glam::{DMat3, DVec3};
 
@@ -13,12 +12,12 @@ use super::model::PhantomModel;
 #[derive(Clone, Copy, Debug)]
 pub struct Dynamics {
     model: PhantomModel,
-    /// Rotor inertia as the joint sees it, `J·η²`, kg·m².
+    /// Rotor inertia at the joint, `J·η²`, kg·m².
     rotor: DVec3,
 }
 
 impl Dynamics {
-    /// Equations for `model`.
+    /// Creates the equations for `model`.
     #[must_use]
     pub fn new(model: PhantomModel) -> Self {
         let rotor = model
@@ -30,7 +29,7 @@ impl Dynamics {
         }
     }
 
-    /// The mass matrix at a pose, kg·m²; symmetric.
+    /// Returns the mass matrix in a pose, kg·m²; symmetric.
     pub(super) fn mass(&self, pose: &Pose) -> DMat3 {
         let l = &self.model.lumped;
         let ([_, s2, s3], [_, c2, c3]) = (pose.s, pose.c);
@@ -44,13 +43,13 @@ impl Dynamics {
         )
     }
 
-    /// Torque that holds the arm against its weight at a pose, N·m.
+    /// Returns the torque that balances the arm's weight in a pose, N·m.
     pub(super) fn gravity(&self, pose: &Pose) -> DVec3 {
         let (g, l) = (self.model.gravity_m_s2, &self.model.lumped);
         DVec3::new(0.0, g * l.g2 * pose.c[1], g * l.g3 * pose.s[2])
     }
 
-    /// Coriolis and centrifugal torque `c(q, q̇)`.
+    /// Returns the Coriolis and centrifugal torque `c(q, q̇)`.
     pub(super) fn coriolis(&self, pose: &Pose, rate: DVec3) -> DVec3 {
         let l = &self.model.lumped;
         let ([_, s2, s3], [_, c2, c3]) = (pose.s, pose.c);
@@ -65,12 +64,12 @@ impl Dynamics {
         )
     }
 
-    /// Viscous friction as a torque on the joints.
+    /// Returns the viscous friction torque of the joints.
     pub(super) fn viscous(&self, rate: DVec3) -> DVec3 {
         -DVec3::from(self.model.viscous_nms_per_rad) * rate
     }
 
-    /// Torque of the mechanical stops: a spring and damper that only push.
+    /// Returns the torque of the mechanical stops: a spring and damper that only push.
     pub(super) fn stops(&self, q: DVec3, rate: DVec3) -> DVec3 {
         let limits = &self.model.limits;
         let press = |past: f64, speed: f64| {
@@ -89,7 +88,7 @@ impl Dynamics {
         DVec3::new(one(0), one(1) + linkage, one(2) - linkage)
     }
 
-    /// Kinetic plus potential energy, J. The stops' springs are not included.
+    /// Returns the kinetic plus potential energy, J, without the stops' springs.
     #[must_use]
     pub fn energy_j(&self, q_rad: [f64; 3], rate_rad_s: [f64; 3]) -> f64 {
         let pose = Pose::new(DVec3::from(q_rad));
@@ -113,7 +112,7 @@ mod tests {
         let grams = |joint: usize, arm: f64| 1e3 * mass.col(joint)[joint] / (arm * arm);
         for (joint, arm) in [(0, model.l1_m), (1, model.l1_m), (2, model.l2_m)] {
             let tip = grams(joint, arm);
-            // Joint 1 also turns the base with its two motors.
+            // Joint 1 also rotates the base with its two motors.
             assert!((35.0..90.0).contains(&tip), "joint {joint}: {tip} g");
         }
     }

@@ -1,5 +1,5 @@
-//! From joint angle to counts: an incremental encoder on the motor shaft, seen
-//! through the cable ratio, with no index.
+//! From joint angle to counts: an incremental encoder on the motor shaft, behind the cable ratio,
+//! without an index.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// A counter that reads zero at joint angle zero.
+    /// Creates a counter that reads zero at joint angle zero.
     #[must_use]
     pub fn new(axis: &AxisDrive) -> Self {
         Self {
@@ -22,26 +22,26 @@ impl Encoder {
         }
     }
 
-    /// Reading at a joint angle in radians: the nearest count, an error of at
-    /// most half a count.
+    /// Returns the reading at a joint angle in radians: the nearest count, with an error of at most
+    /// half a count.
     #[must_use]
     pub fn counts(&self, angle_rad: f64) -> i32 {
         self.absolute(angle_rad).wrapping_sub(self.zero)
     }
 
-    /// Makes the counter read zero here, as it does when it is powered up.
+    /// Sets the counter to zero at this angle, as at power-up.
     pub fn power_up(&mut self, angle_rad: f64) {
         self.zero = self.absolute(angle_rad);
     }
 
-    /// Joint angle of a whole number of counts from joint angle zero, radians.
+    /// Returns the joint angle, radians, at which the counter reads `counts`.
     #[must_use]
     pub fn angle_rad(&self, counts: i32) -> f64 {
         f64::from(counts.wrapping_add(self.zero)) / self.counts_per_rad
     }
 
     fn absolute(&self, angle_rad: f64) -> i32 {
-        // A half turn of the joint is 27,000 counts: far inside i32.
+        // Half a turn of the joint is 27,000 counts: far inside i32.
         (angle_rad * self.counts_per_rad + 0.5).floor() as i32
     }
 }

@@ -1,4 +1,4 @@
-//! Coulomb friction that really sticks.
+//! Coulomb friction with exact sticking.
 //!
 //! A smoothed sign (`tanh`) lets a loaded arm creep. Here each step solves for
 //! the friction that the velocity step needs: a joint stops and stays if less
@@ -7,14 +7,14 @@
 
 use glam::{DMat3, DVec3};
 
-/// Sweeps over the three joints; the coupling of a Phantom's joints is weak
-/// and each sweep gains more than a digit.
+/// Max sweeps over the three joints; the coupling of a Phantom's joints is weak, and each sweep
+/// improves the result by more than a digit.
 const MAX_SWEEPS: usize = 40;
 
-/// The joint rates after friction has acted for `h_s` seconds on the rates
-/// `free` that the arm would have without it.
+/// Returns the joint rates after friction has acted for `h_s` seconds; `free` are the rates without
+/// friction.
 ///
-/// `inverse_mass` is `M⁻¹`; `coulomb_nm` the highest friction torque.
+/// `inverse_mass` is `M⁻¹`; `coulomb_nm` is the max friction torque.
 pub(super) fn settle(free: DVec3, inverse_mass: &DMat3, coulomb_nm: DVec3, h_s: f64) -> DVec3 {
     if coulomb_nm == DVec3::ZERO {
         return free;
@@ -35,7 +35,7 @@ pub(super) fn settle(free: DVec3, inverse_mass: &DMat3, coulomb_nm: DVec3, h_s: 
             break;
         }
     }
-    // What is held is held: rounding must not let it creep.
+    // A held joint gets exactly zero: rounding must not let it creep.
     DVec3::select(impulse.abs().cmplt(limit), DVec3::ZERO, rate)
 }
 

@@ -28,10 +28,9 @@ pub struct HandModel {
 }
 
 impl Default for HandModel {
-    /// A relaxed precision grip. Values are a stated choice inside the ranges
-    /// that identification studies report for fingers and wrists on a stylus
-    /// (0.1-0.3 kg, 200-500 N/m, 5-10 N·s/m towards the target; a grip several
-    /// times stiffer), not a fit to one person.
+    /// Returns a relaxed precision grip, not a fit to one person. The values are chosen inside the
+    /// ranges that identification studies report for fingers and wrists on a stylus (0.1-0.3 kg,
+    /// 200-500 N/m, 5-10 N·s/m towards the target; a grip several times stiffer).
     fn default() -> Self {
         Self {
             mass_kg: 0.15,
@@ -44,7 +43,8 @@ impl Default for HandModel {
 }
 
 impl HandModel {
-    /// Returns the tip's lag behind the target for each newton, m/N.
+    /// Returns the compliance of arm and grip, m/N: the tip's lag behind the target for each
+    /// newton.
     #[must_use]
     pub fn give_m_per_n(&self) -> f64 {
         1.0 / self.arm_n_per_m + 1.0 / self.grip_n_per_m
@@ -62,7 +62,7 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// A hand at rest at a point, wanting to be there.
+    /// Creates a hand at rest at a point, which is also its target.
     #[must_use]
     pub fn new(model: HandModel, at_m: [f64; 3]) -> Self {
         let at = DVec3::from(at_m);
@@ -81,20 +81,20 @@ impl Hand {
         self.target_speed = DVec3::from(speed_m_s);
     }
 
-    /// Force of the grip on the tip, N.
+    /// Returns the force of the grip on the tip, N.
     pub(super) fn force_on_tip(&self, tip: DVec3, tip_speed: DVec3) -> DVec3 {
         self.model.grip_n_per_m * (self.at - tip)
             + self.model.grip_ns_per_m * (self.speed - tip_speed)
     }
 
-    /// Acceleration of the hand's mass while it pulls the tip with `on_tip`.
+    /// Returns the acceleration of the hand's mass while it pulls the tip with `on_tip`.
     pub(super) fn acceleration(&self, on_tip: DVec3) -> DVec3 {
         let arm = self.model.arm_n_per_m * (self.target - self.at)
             + self.model.arm_ns_per_m * (self.target_speed - self.speed);
         (arm - on_tip) / self.model.mass_kg
     }
 
-    /// Lets time pass for the positions.
+    /// Moves the hand at its speed for `h_s` seconds.
     pub(super) fn drift(&mut self, h_s: f64) {
         self.at += self.speed * h_s;
         self.target += self.target_speed * h_s;

@@ -1,5 +1,5 @@
-//! A virtual Phantom in a hand: all that a device has outside of
-//! itself. A hand follows a script, and the terrain lies in front of both.
+//! A virtual Phantom in a hand: a device's whole environment. The hand follows a script over a
+//! terrain.
 
 use hapterra_core::guard::GuardInputs;
 
@@ -10,8 +10,7 @@ use super::model::PhantomModel;
 use super::plant::Plant;
 use super::script::Script;
 
-/// When a hand that waits for the arm to be armed presses the dead-man switch,
-/// s.
+/// Time of the dead-man press by a hand that waits for arming, s.
 const PRESS_S: f64 = 0.5;
 /// A scripted hand on a virtual Phantom over a placed terrain.
 #[derive(Clone, Debug)]
@@ -19,10 +18,10 @@ pub struct HeldPhantom {
     plant: Plant,
     placement: ArmFrame,
     script: Script,
-    /// When the script begins, s.
+    /// Start of the script, s.
     begin_s: f64,
     t_s: f64,
-    /// Readings of the current monitors a step ago: a board reads what was converted in
+    /// Readings of the current monitors in the step before: a board reads the values converted in
     /// the tick before.
     measured_ma: [i16; 3],
 }
@@ -30,8 +29,7 @@ pub struct HeldPhantom {
 impl HeldPhantom {
     /// Puts the tip, and the hand on it, at the script's first point.
     ///
-    /// # Errors
-    /// [`OutOfReach`] names the first corner of the script that lies beyond
+    /// [`OutOfReach`] names the first corner of the script that is beyond the links or the stops.
     /// the links or the stops.
     pub fn new(
         model: PhantomModel,
@@ -52,40 +50,40 @@ impl HeldPhantom {
         })
     }
 
-    /// The same hand, first letting the device arm: it rests at the script's
-    /// first point, presses the dead-man switch after half a second, holds it
-    /// from then on, and begins its script [`Self::ARMED_S`] after the start.
+    /// Lets the device arm first: the hand rests at the script's first point, presses the dead-man
+    /// switch after half a second and holds it, and begins its script [`Self::ARMED_S`] after the
+    /// start.
     #[must_use]
     pub fn arming(self) -> Self {
         self.arming_for(Self::ARMED_S)
     }
 
-    /// The same hand, which begins its script so long after the start, s: before the force is in,
-    /// where that is shorter than [`Self::ARMED_S`].
+    /// As [`Self::arming`], with another start of the script, s. Before [`Self::ARMED_S`] the force
+    /// is not fully ramped up.
     #[must_use]
     pub fn arming_for(mut self, begin_s: f64) -> Self {
         self.begin_s = begin_s;
         self
     }
 
-    /// When its script begins, s.
+    /// Returns the start of the script, s.
     #[must_use]
     pub fn begin_s(&self) -> f64 {
         self.begin_s
     }
 
-    /// The same hand, which follows its script so many times.
+    /// Repeats the script `times` times.
     #[must_use]
     pub fn repeated(mut self, times: u32) -> Self {
         self.script = self.script.repeated(times);
         self
     }
 
-    /// When force begins to come in, s: the device has seen the press and confirmed.
+    /// Time at which the force begins to ramp up, s: the device has detected the press and
+    /// confirmed.
     pub const RAMPS_S: f64 = PRESS_S + 0.1;
 
-    /// When a script begins whose hand lets the device arm first, s: after the
-    /// device has confirmed and force has come in.
+    /// Start of a script after arming, s: the device has confirmed and the force is ramped up.
     pub const ARMED_S: f64 = 3.0;
 
     /// Returns the duration of the script, s.
@@ -109,8 +107,8 @@ impl HeldPhantom {
         }
     }
 
-    /// Applies current commands (A) for `dt_s` seconds while the hand follows
-    /// its script, and reads the encoders at the end.
+    /// Applies current commands (A) for `dt_s` seconds while the hand follows its script; returns
+    /// the encoder counts at the end.
     pub fn step(&mut self, currents_a: [f64; 3], dt_s: f64) -> [i32; 3] {
         let target = self.script.target(self.t_s - self.begin_s);
         let at_m = self
@@ -123,12 +121,12 @@ impl HeldPhantom {
         self.plant.step(currents_a, dt_s)
     }
 
-    /// Breaks the amplifier of an axis (0 to 2), or mends it.
+    /// Sets or removes a fault of the amplifier of an axis (0 to 2).
     pub fn set_amplifier_fault(&mut self, axis: usize, fault: Option<AmplifierFault>) {
         self.plant.set_amplifier_fault(axis, fault);
     }
 
-    /// The arm and its hand.
+    /// Returns the arm and its hand.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant

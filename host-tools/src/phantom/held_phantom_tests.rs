@@ -7,8 +7,7 @@ use glam::{DMat3, DVec3};
 const WALL_N_PER_MM: f64 = 0.5;
 const TICK_S: f64 = 1e-3;
 
-/// A controller of three lines for a flat surface at height zero: what a
-/// device would do, from counts alone.
+/// Computes the currents for a flat surface at height zero from counts alone, as a device does.
 fn wall_currents(model: &PhantomModel, placement: &ArmFrame, counts: [i32; 3]) -> [f64; 3] {
     let q = std::array::from_fn(|i| Encoder::new(&model.drive[i]).angle_rad(counts[i]));
     let [_, _, height_mm] = placement.to_terrain_mm(model, kinematics::tip(model, q));
@@ -21,13 +20,13 @@ fn wall_currents(model: &PhantomModel, placement: &ArmFrame, counts: [i32; 3]) -
     })
 }
 
-/// True height of the tip, mm, terrain frame.
+/// Returns the true height of the tip, mm, terrain frame.
 fn height_mm(arm: &HeldPhantom) -> f64 {
     let plant = &arm.plant;
     arm.placement.to_terrain_mm(plant.model(), plant.tip_m())[2]
 }
 
-/// Runs the loop until a time, telling `watch` the height and force each tick.
+/// Runs the loop until a time; calls `watch` with the height and force in each tick.
 fn run(arm: &mut HeldPhantom, until_s: f64, mut watch: impl FnMut(f64, [f64; 3])) {
     while arm.t_s < until_s {
         let currents = wall_currents(arm.plant().model(), &arm.placement, arm.plant.counts());
@@ -56,8 +55,8 @@ fn pressed_with_two_newtons_it_rests_at_four_millimetres() {
     let mut last = Vec::new();
     run(&mut arm, until, |height, force| last.push((height, force)));
     let settled = &last[last.len() - 300..];
-    // Friction carries at most 0.01 N·m on an arm of 0.21 m against the wall's
-    // and the hand's springs together; the encoder is half a count off.
+    // Friction carries at most 0.01 N·m on an arm of 0.21 m, against the springs of wall and hand
+    // together; the encoder's error is half a count.
     let friction_n = 0.01 / arm.plant().model().l1_m;
     let hand_n_per_mm = 1e-3 / HandModel::default().give_m_per_n();
     let bound_mm = friction_n / (WALL_N_PER_MM + hand_n_per_mm) + 0.015;
@@ -90,7 +89,7 @@ fn lifted_there_is_no_force() {
     });
 }
 
-/// Tapping at speed: the loop stays inside what the wall can do.
+/// At tapping speed the loop remains stable.
 #[test]
 fn tapped_it_stays_stable() {
     let hand = HandModel::default();

@@ -1,4 +1,4 @@
-//! Joint angles to tip and back, in f64 and metres, device frame.
+//! Joint angles to tip position and the inverse, in f64 and metres, device frame.
 //!
 //! ```text
 //! r = l1·cos q2 + l2·sin q3     x = r·cos q1   y = r·sin q1   z = l1·sin q2 − l2·cos q3
@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::model::PhantomModel;
 
-/// Sines and cosines of a pose, worked out once.
+/// Sines and cosines of a pose, computed once.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pose {
     pub(super) s: [f64; 3],
@@ -30,13 +30,13 @@ impl Pose {
     }
 }
 
-/// Tip position in metres at joint angles in radians.
+/// Returns the tip position in metres at joint angles in radians.
 #[must_use]
 pub fn tip(model: &PhantomModel, q_rad: [f64; 3]) -> [f64; 3] {
     tip_at(model, &Pose::new(DVec3::from(q_rad))).to_array()
 }
 
-/// The Jacobian, rows x, y, z (metres), columns q1, q2, q3 (radians).
+/// Returns the Jacobian, rows x, y, z (metres), columns q1, q2, q3 (radians).
 #[must_use]
 pub fn jacobian(model: &PhantomModel, q_rad: [f64; 3]) -> [[f64; 3]; 3] {
     jacobian_at(model, &Pose::new(DVec3::from(q_rad)))
@@ -62,9 +62,9 @@ pub(super) fn jacobian_at(model: &PhantomModel, pose: &Pose) -> DMat3 {
     )
 }
 
-/// Joint angles that bring the tip to a position in metres, elbow on the side
-/// that the linkage allows (`|q2 − q3| < 90°`), or `None` beyond the links'
-/// reach. Stops are not looked at: see [`within_stops`].
+/// Returns the joint angles for a tip position in metres, with the elbow on the side that the
+/// linkage allows (`|q2 − q3| < 90°`), or `None` beyond the links' reach. Stops are not checked:
+/// see [`within_stops`].
 #[must_use]
 pub fn inverse(model: &PhantomModel, tip_m: [f64; 3]) -> Option<[f64; 3]> {
     let (l1, l2) = (model.l1_m, model.l2_m);

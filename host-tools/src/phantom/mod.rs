@@ -1,8 +1,8 @@
 //! The virtual Phantom and the hand that holds it.
 //!
-//! The motion of a real arm between two ticks of the haptic loop, in f64 and
-//! independent of the code under test: motor currents go in, encoder counts
-//! come out. Read it in the direction the data flows:
+//! The model computes the motion of a real arm between two ticks of the haptic loop, in f64 and
+//! independently of the code under test: its inputs are motor currents, its outputs encoder counts.
+//! Read it in the direction of the data flow:
 //!
 //! ```text
 //! currents ─ amplifier ─ motor torque ─┐
@@ -10,9 +10,9 @@
 //! script ─ target ─ hand ─ tip force ──┘            (plant)
 //! ```
 //!
-//! [`HeldPhantom`] is the whole of it: the arm ([`Plant`]), the person's hand
-//! on it ([`Hand`]) and the plan that the hand follows ([`Script`], which
-//! [`Touch`] and [`TourPlan`] write). [`PlacedTerrain`] puts a terrain in front of that arm.
+//! [`HeldPhantom`] contains all of it: the arm ([`Plant`]), the hand on it ([`Hand`]) and the
+//! hand's plan ([`Script`], which [`Touch`] and [`TourPlan`] create). [`PlacedTerrain`] puts a
+//! terrain in front of that arm.
 //!
 //! Nothing here reads a clock or draws a random number, and the trigonometry
 //! is `libm`'s, so the same inputs give the same bits on every machine.
@@ -21,8 +21,8 @@
 //! - *Device frame*, metres: origin where the joint axes meet, z up, x away
 //!   from the base towards the user, right-handed: for the user, who faces the
 //!   device, y points to the right.
-//! - *Terrain frame*, millimetres as the hand feels them: x east, y north,
-//!   z up. [`ArmFrame`] lays one onto the other.
+//! - *Terrain frame*, device millimetres: x east, y north, z up. [`ArmFrame`] maps one to the
+//!   other.
 
 mod amplifier;
 mod arm_frame;

@@ -1,4 +1,4 @@
-//! The numbers that make a Phantom: one record a model, each with its source.
+//! The parameters of a Phantom: one record for each model, with their sources.
 //!
 //! Two open sources describe a Premium 1.5 in full. *CAD* is the solid model
 //! and motor data of `mahilab/Phantom`, taken from an opened device; *C2002*
@@ -21,7 +21,7 @@ pub struct PhantomModel {
     pub limits: JointLimits,
     /// Inertia and gravity of the links, without the rotors.
     pub lumped: Lumped,
-    /// Acceleration of free fall, m/s². Zero makes an arm without weight.
+    /// Acceleration of free fall, m/s². Zero removes the arm's weight.
     pub gravity_m_s2: f64,
     /// Coulomb friction of each joint, N·m.
     pub coulomb_nm: [f64; 3],
@@ -31,8 +31,8 @@ pub struct PhantomModel {
     pub drive: [AxisDrive; 3],
 }
 
-/// Stops of the joints, radians. `q2` and `q3` are absolute link
-/// angles, so the parallel linkage adds a bound on their difference.
+/// Stops of the joints, radians. `q2` and `q3` are absolute link angles, so the parallel linkage
+/// adds a bound on their difference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
     /// Lowest angle of each joint.
@@ -62,9 +62,9 @@ pub struct JointLimits {
 pub struct Lumped {
     /// Pose-independent inertia about the vertical axis.
     pub m11: f64,
-    /// Its part that follows the upper link.
+    /// Part of the inertia that depends on the upper link's angle.
     pub m11_c2: f64,
-    /// Its part that follows the fore link.
+    /// Part of the inertia that depends on the fore link's angle.
     pub m11_c3: f64,
     /// Inertia about joint 2.
     pub m22: f64,
@@ -72,13 +72,13 @@ pub struct Lumped {
     pub m23: f64,
     /// Inertia about joint 3.
     pub m33: f64,
-    /// First moment about joint 2 (negative: the counterweight wins).
+    /// First moment about joint 2 (negative: the counterweight dominates).
     pub g2: f64,
     /// First moment about joint 3.
     pub g3: f64,
 }
 
-/// One joint's way from current to torque and from angle to counts.
+/// One joint's conversion from current to torque and from angle to counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisDrive {
     /// Motor turns per joint turn.
@@ -100,9 +100,9 @@ pub struct Motor {
     pub rotor_kg_m2: f64,
     /// Winding resistance at 25 °C, Ω.
     pub resistance_ohm: f64,
-    /// Current that may flow for ever, A.
+    /// Continuous current limit, A.
     pub continuous_a: f64,
-    /// Current that the amplifier cuts at, A.
+    /// Peak current limit of the amplifier, A.
     pub peak_a: f64,
     /// Time constant of the current loop, s.
     pub current_lag_s: f64,
@@ -119,7 +119,7 @@ pub struct Motor {
 }
 
 impl PhantomModel {
-    /// The same arm with so large a part of its friction.
+    /// Multiplies the friction by `part`.
     #[must_use]
     pub fn with_friction(self, part: f64) -> Self {
         Self {
@@ -129,9 +129,8 @@ impl PhantomModel {
         }
     }
 
-    /// The Premium 1.5: link lengths, stops, ratios and friction from CAD;
-    /// inertia and gravity identified in C2002 (with C2002's own lengths, as
-    /// they were fitted together).
+    /// Returns the Premium 1.5: link lengths, stops, ratios and friction from CAD; inertia and
+    /// gravity identified in C2002 (with C2002's own lengths, as they were fitted together).
     #[must_use]
     pub fn premium_1_5() -> Self {
         Self {
@@ -153,8 +152,8 @@ impl PhantomModel {
 }
 
 impl JointLimits {
-    /// Angles from CAD. The stop's stiffness and damping are a choice: 30 N at
-    /// the tip press a stop by 3°, and a stop does not ring.
+    /// Angles from CAD. The stop's stiffness and damping are chosen: 30 N at the tip press a stop
+    /// by 3°, and a stop does not oscillate.
     fn premium_1_5() -> Self {
         Self {
             min_rad: [-90.0, -124.0, -29.0].map(f64::to_radians),
@@ -195,9 +194,9 @@ impl Lumped {
 }
 
 impl Motor {
-    /// Maxon RE25 118743 as fitted to a Premium 1.5 (data sheet; rotor inertia
-    /// between the 10.3 and 10.8 g·cm² of two sources). The current loop's lag
-    /// is a choice: the electrical time constant L/R = 0.238 mH / 2.18 Ω.
+    /// Returns the Maxon RE25 118743, as in a Premium 1.5 (data sheet; rotor inertia between the
+    /// 10.3 and 10.8 g·cm² of two sources). The current loop's lag is chosen: the electrical time
+    /// constant L/R = 0.238 mH / 2.18 Ω.
     #[must_use]
     pub fn maxon_118743() -> Self {
         Self {
@@ -221,7 +220,7 @@ mod tests {
     use super::*;
 
     impl PhantomModel {
-        /// The same arm without weight.
+        /// Removes the arm's weight.
         pub(in crate::phantom) fn weightless(self) -> Self {
             Self {
                 gravity_m_s2: 0.0,
@@ -229,7 +228,7 @@ mod tests {
             }
         }
 
-        /// The same arm without Coulomb and viscous friction.
+        /// Removes the Coulomb and viscous friction.
         pub(in crate::phantom) fn frictionless(self) -> Self {
             Self {
                 coulomb_nm: [0.0; 3],

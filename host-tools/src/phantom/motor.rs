@@ -1,11 +1,11 @@
 //! Thermal model of a motor: winding and housing, two nodes.
 //!
-//! Only watched, never acted upon: protecting the motor is the guard's job,
-//! and this is how a test sees whether it did.
+//! It changes nothing in the simulation: the guard must protect the motor, and tests use this model
+//! to check that it does.
 
 use super::model::Motor;
 
-/// Copper's resistance rises by this much a kelvin.
+/// Relative rise of copper's resistance for each kelvin.
 const COPPER_PER_K: f64 = 0.003_93;
 /// Data sheets state resistance and limits at this temperature, °C.
 const AMBIENT_C: f64 = 25.0;
@@ -19,7 +19,7 @@ pub struct MotorTemperature {
 }
 
 impl MotorTemperature {
-    /// A motor at 25 °C.
+    /// Creates a motor at 25 °C.
     #[must_use]
     pub fn new(motor: Motor) -> Self {
         Self {
@@ -29,14 +29,13 @@ impl MotorTemperature {
         }
     }
 
-    /// Winding temperature, °C.
+    /// Returns the winding temperature, °C.
     #[must_use]
     pub fn winding_c(&self) -> f64 {
         self.winding_c
     }
 
-    /// Lets `current_a` flow for `dt_s` seconds (well below the winding's time
-    /// constant of 12 s).
+    /// Applies `current_a` for `dt_s` seconds (well below the winding's time constant of 12 s).
     pub fn advance(&mut self, current_a: f64, dt_s: f64) {
         let m = &self.motor;
         let warm = 1.0 + COPPER_PER_K * (self.winding_c - AMBIENT_C);
@@ -60,8 +59,8 @@ mod tests {
         motor.winding_c()
     }
 
-    /// Two independent entries of the data sheet meet: the continuous current
-    /// is the one that warms the winding to its limit.
+    /// Checks two independent entries of the data sheet: the continuous current heats the winding
+    /// exactly to its limit.
     #[test]
     fn continuous_current_ends_at_the_winding_limit() {
         let motor = Motor::maxon_118743();

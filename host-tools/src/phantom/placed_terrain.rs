@@ -6,14 +6,14 @@ use hapterra_core::scene::{Scene, Source};
 use super::{HandModel, HeldPhantom, OutOfReach, PhantomModel, TourPlan};
 use crate::terrain::Terrain;
 
-/// Force of the hand's slide, N; it presses with half as much again.
+/// Force of the hand's slide, N; presses and taps are 1.5 times as strong.
 const PUSH_N: f64 = 1.0;
-/// Places of the plan are so far apart, mm: a hand follows nothing finer.
+/// Distance between the points of the plan, mm: a hand cannot follow finer detail.
 const PLANNED_APART_MM: f64 = 0.5;
 /// Rest after the tour, s.
 const REST_S: f64 = 0.25;
 
-/// A terrain, how it feels, and a held Premium 1.5 in whose reach it lies.
+/// A terrain with its surface, and a held Premium 1.5 in whose reach it lies.
 pub struct PlacedTerrain<'t> {
     terrain: &'t Terrain<'t>,
     scene: Scene,
@@ -22,23 +22,23 @@ pub struct PlacedTerrain<'t> {
     duration_s: f64,
 }
 
-/// Reason for which a terrain cannot be placed in front of the arm.
+/// Reason why a terrain cannot be placed in front of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlacingError {
     /// No part of it is within the arm's reach.
     #[error("the terrain cannot be toured: {0}")]
     OutOfReach(#[from] OutOfReach),
-    /// The place to touch is farther out than can be addressed.
+    /// The place to touch is too far from the origin for its coordinates.
     #[error("the place to touch, ({:.0}, {:.0}, {:.0}) mm, is too far from the origin", .0[0], .0[1], .0[2])]
     FarAway([f64; 3]),
-    /// The user has asked for an end meanwhile.
+    /// The user has interrupted the command.
     #[error("interrupted")]
     Interrupted,
 }
 
 impl<'t> PlacedTerrain<'t> {
-    /// Finds the place with the fewest holes and enough relief and puts it in
-    /// the middle of the arm's reach.
+    /// Finds the place with the least no-data and enough relief, and puts it in the middle of the
+    /// arm's reach.
     ///
     /// # Errors
     /// [`PlacingError`].
@@ -46,9 +46,9 @@ impl<'t> PlacedTerrain<'t> {
         Self::toured(terrain, params, None, &|| true)
     }
 
-    /// Leaves the terrain where a view has it, with this point of it at the tip in the home pose
-    /// (device millimetres), and tours what the arm gets to of it; planning ends if `goes_on`
-    /// returns false.
+    /// Keeps the terrain at its placement, with the point `home_mm` at the tip in the home pose
+    /// (device millimetres), and plans a tour of the part that the arm reaches; planning ends if
+    /// `goes_on` returns false.
     ///
     /// # Errors
     /// [`PlacingError`].
@@ -68,7 +68,7 @@ impl<'t> PlacedTerrain<'t> {
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Self, PlacingError> {
         let (model, hand) = (PhantomModel::premium_1_5(), HandModel::default());
-        // Without heights the plan is complete in a moment, and dropped.
+        // After an interrupt the surface has no heights: the plan ends quickly and is dropped.
         let surface = |east: f64, north: f64| {
             let height = || terrain.planned_mm(east, north, PLANNED_APART_MM);
             goes_on().then(height).flatten()
@@ -100,7 +100,7 @@ impl<'t> PlacedTerrain<'t> {
         })
     }
 
-    /// The same tour so many times.
+    /// Repeats the tour `times` times.
     #[must_use]
     pub fn repeated(mut self, times: u32) -> Self {
         self.arm = self.arm.repeated(times);
@@ -108,39 +108,38 @@ impl<'t> PlacedTerrain<'t> {
         self
     }
 
-    /// The terrain that is placed.
+    /// Returns the placed terrain.
     #[must_use]
     pub const fn terrain(&self) -> &'t Terrain<'t> {
         self.terrain
     }
 
-    /// The scene that the arm feels.
+    /// Returns the scene for the device.
     #[must_use]
     pub const fn scene(&self) -> Scene {
         self.scene
     }
 
-    /// The surface parameters.
+    /// Returns the surface parameters.
     #[must_use]
     pub const fn params(&self) -> SurfaceParams {
         self.scene.params
     }
 
-    /// The point of the terrain that is at the tip in the arm's home pose, device
-    /// millimetres.
+    /// Returns the point of the terrain at the tip in the arm's home pose, device millimetres.
     #[must_use]
     pub const fn home_mm(&self) -> [f64; 3] {
         self.home_mm
     }
 
-    /// The virtual Phantom, held at the beginning of the tour by a hand that
-    /// lets the device arm first.
+    /// Returns the virtual Phantom, held at the beginning of the tour by a hand that lets the
+    /// device arm first.
     #[must_use]
     pub fn held_phantom(&self) -> HeldPhantom {
         self.arm.clone()
     }
 
-    /// Returns the duration of the tour with arming before it and a rest at its end, s.
+    /// Returns the duration of the arming, the tour and the rest after it, s.
     #[must_use]
     pub const fn duration_s(&self) -> f64 {
         self.duration_s

@@ -1,10 +1,9 @@
-//! The arm in time: joints, motors and encoders, and the hand on the tip.
+//! The moving arm: joints, motors and encoders, and the hand on the tip.
 //!
-//! Each step is cut into substeps of at most 50 µs (20 in a millisecond). A
-//! substep is half a kick, a drift, half a kick (velocity Verlet), with the
-//! friction of `friction.rs` in each kick: second order, so the error falls
-//! fourfold when the substep is halved; `halving_the_substep_...` measures it
-//! below a tenth of a micrometre, 1/200 of an encoder count.
+//! Each step is cut into substeps of at most 50 µs (20 in a millisecond). A substep is half a kick,
+//! a drift, half a kick (velocity Verlet), with the friction of `friction.rs` in each kick. The
+//! method has second order: half the substep gives a quarter of the error, which
+//! `halving_the_substep_...` measures below a tenth of a micrometre, 1/200 of an encoder count.
 
 use glam::{DMat3, DVec3};
 
@@ -17,7 +16,7 @@ use super::kinematics::{self, Pose};
 use super::model::PhantomModel;
 use super::motor::MotorTemperature;
 
-/// Longest step of the integration, s.
+/// Max substep of the integration, s.
 pub const MAX_SUBSTEP_S: f64 = 50e-6;
 
 /// A virtual Phantom, with or without a hand on it.
@@ -35,8 +34,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// An arm at rest in a pose, without a hand. Its counters read zero in
-    /// the pose `q = 0`; see [`Plant::power_up`].
+    /// Creates an arm at rest in a pose, without a hand. Its counters read zero in the pose
+    /// `q = 0`; see [`Plant::power_up`].
     #[must_use]
     pub fn new(model: PhantomModel, q_rad: [f64; 3]) -> Self {
         Self {
@@ -52,21 +51,21 @@ impl Plant {
         }
     }
 
-    /// The same arm with a hand at rest on its tip.
+    /// Adds a hand at rest on the tip.
     #[must_use]
     pub fn held_by(mut self, hand: HandModel) -> Self {
         self.hand = Some(Hand::new(hand, self.tip_m()));
         self
     }
 
-    /// The same arm without a hand.
+    /// Removes the hand.
     #[must_use]
     pub fn let_go(mut self) -> Self {
         self.hand = None;
         self
     }
 
-    /// Makes all counters read zero here, as after switching on.
+    /// Sets all counters to zero in this pose, as at power-up.
     pub fn power_up(&mut self) {
         for (encoder, angle) in self.encoders.iter_mut().zip(self.q.to_array()) {
             encoder.power_up(angle);
@@ -85,16 +84,15 @@ impl Plant {
         }
     }
 
-    /// Sets the hand's target, m and m/s in the device frame. Within a
-    /// step the target continues at that speed. Without a hand, nothing.
+    /// Sets the hand's target, m and m/s in the device frame. Within a step the target continues at
+    /// that speed. Does nothing without a hand.
     pub fn aim(&mut self, target_m: [f64; 3], speed_m_s: [f64; 3]) {
         if let Some(hand) = &mut self.hand {
             hand.aim(target_m, speed_m_s);
         }
     }
 
-    /// Applies current commands (A) for `dt_s` seconds and reads the counters
-    /// at the end.
+    /// Applies current commands (A) for `dt_s` seconds; returns the counters' readings at the end.
     pub fn step(&mut self, currents_a: [f64; 3], dt_s: f64) -> [i32; 3] {
         for (amplifier, current) in self.amplifiers.iter_mut().zip(currents_a) {
             amplifier.command(current);
@@ -117,14 +115,14 @@ impl Plant {
         std::array::from_fn(|i| self.encoders[i].counts(angles[i]))
     }
 
-    /// Breaks the amplifier of an axis (0 to 2), or mends it. Of another axis, nothing.
+    /// Sets or removes a fault of the amplifier of an axis (0 to 2). Ignores other axes.
     pub fn set_amplifier_fault(&mut self, axis: usize, fault: Option<AmplifierFault>) {
         if let Some(amplifier) = self.amplifiers.get_mut(axis) {
             amplifier.set_fault(fault);
         }
     }
 
-    /// Returns true if all amplifiers say that they are ready.
+    /// Returns true if all amplifiers report that they are ready.
     #[must_use]
     pub fn amplifiers_are_ready(&self) -> bool {
         self.amplifiers.iter().all(Amplifier::is_ready)
@@ -136,31 +134,31 @@ impl Plant {
         self.amplifiers.map(|amplifier| amplifier.monitor_ma())
     }
 
-    /// The model in use.
+    /// Returns the model.
     #[must_use]
     pub fn model(&self) -> &PhantomModel {
         &self.model
     }
 
-    /// True joint angles, rad.
+    /// Returns the true joint angles, rad.
     #[must_use]
     pub fn q_rad(&self) -> [f64; 3] {
         self.q.to_array()
     }
 
-    /// True joint rates, rad/s. Exactly zero while friction holds a joint.
+    /// Returns the true joint rates, rad/s. They are exactly zero while friction holds a joint.
     #[must_use]
     pub fn rate_rad_s(&self) -> [f64; 3] {
         self.rate.to_array()
     }
 
-    /// True tip position, m, device frame.
+    /// Returns the true tip position, m, device frame.
     #[must_use]
     pub fn tip_m(&self) -> [f64; 3] {
         kinematics::tip(&self.model, self.q.to_array())
     }
 
-    /// Force of the hand on the tip, N, device frame; zero without a hand.
+    /// Returns the force of the hand on the tip, N, device frame; zero without a hand.
     #[must_use]
     pub fn hand_force_n(&self) -> [f64; 3] {
         let pose = Pose::new(self.q);
@@ -170,20 +168,20 @@ impl Plant {
             .map_or([0.0; 3], |hand| hand.force_on_tip(tip, speed).to_array())
     }
 
-    /// True position of the hand, m, device frame; none without a hand.
+    /// Returns the true position of the hand, m, device frame; `None` without a hand.
     #[must_use]
     pub fn hand_m(&self) -> Option<[f64; 3]> {
         self.hand.map(|hand| hand.at.to_array())
     }
 
-    /// Winding temperatures, °C.
+    /// Returns the winding temperatures, °C.
     #[must_use]
     pub fn winding_c(&self) -> [f64; 3] {
         self.motors.map(|m| m.winding_c())
     }
 
     fn substep(&mut self, h: f64) {
-        // The torque in the middle of the substep stands for all of it.
+        // The torque in the middle of the substep is used for all of it.
         self.advance_currents(0.5 * h);
         let torque = DVec3::from(self.amplifiers.map(|a| a.torque_nm()));
         self.kick(torque, 0.5 * h);
@@ -201,8 +199,8 @@ impl Plant {
         }
     }
 
-    /// Changes the velocities for `h` seconds at fixed positions; the torques
-    /// that depend on velocity are taken half-way.
+    /// Changes the velocities for `h` seconds at fixed positions; velocity-dependent torques are
+    /// evaluated half-way.
     fn kick(&mut self, torque: DVec3, h: f64) {
         let pose = Pose::new(self.q);
         let fixed = Fixed {
@@ -226,7 +224,7 @@ impl Plant {
         }
     }
 
-    /// Accelerations of the joints (without Coulomb friction) and of the hand.
+    /// Returns the accelerations of the joints (without Coulomb friction) and of the hand.
     fn accelerations(&self, at: &Fixed, rate: DVec3, hand: Option<Hand>) -> (DVec3, DVec3) {
         let on_tip = hand.map_or(DVec3::ZERO, |hand| {
             hand.force_on_tip(at.tip, at.jacobian * rate)

@@ -2,23 +2,23 @@
 
 use super::*;
 
-/// Queries of tests.
+/// Test queries.
 impl Plant {
-    /// The same arm with the joints turning, rad/s.
+    /// Sets the joint rates, rad/s.
     pub(in crate::phantom) fn moving(mut self, rate_rad_s: [f64; 3]) -> Self {
         self.rate = DVec3::from(rate_rad_s);
         self
     }
 
-    /// Force that the motors make at the tip at rest, N, device frame: the
-    /// solution of `τ = Jᵀ·F`. Not finite in a singular pose.
+    /// Returns the force of the motors at the resting tip, N, device frame: the solution of
+    /// `τ = Jᵀ·F`. Not finite in a singular pose.
     pub(in crate::phantom) fn motor_force_n(&self) -> [f64; 3] {
         let jacobian = kinematics::jacobian_at(&self.model, &Pose::new(self.q));
         (jacobian.transpose().inverse() * DVec3::from(self.amplifiers.map(|a| a.torque_nm())))
             .to_array()
     }
 
-    /// Kinetic plus potential energy of the arm (no hand, no stops), J.
+    /// Returns the kinetic plus potential energy of the arm (no hand, no stops), J.
     pub(in crate::phantom) fn energy_j(&self) -> f64 {
         self.dynamics
             .energy_j(self.q.to_array(), self.rate.to_array())
@@ -93,11 +93,11 @@ fn a_loaded_arm_under_its_friction_does_not_creep() {
     let model = premium();
     let held = Dynamics::new(model).gravity(&Pose::new(level.into()));
     assert!(held[1].abs() < 0.01 && held[2].abs() > 0.01, "{held:?}");
-    // The motor carries what friction cannot.
+    // The motor carries the part that friction cannot.
     let per_amp = model.drive[2].ratio * model.drive[2].motor.kt_nm_per_a;
     let currents = [0.0, 0.0, (held[2] + 0.008) / per_amp];
     let mut plant = Plant::new(model, level);
-    // The current needs a moment to rise, in which the arm falls a little.
+    // While the current rises, the arm falls a little.
     for _ in 0..200 {
         plant.step(currents, 1e-3);
     }
@@ -110,7 +110,7 @@ fn a_loaded_arm_under_its_friction_does_not_creep() {
     assert!(fallen.length() < 1e-4, "{fallen}");
 }
 
-/// The firmware's own kinematics, f32 and from counts, see the arm where it is.
+/// The firmware's own kinematics, in f32 and from counts, agree with the plant's true position.
 #[test]
 fn the_firmware_reads_the_counts_as_the_plant_means_them() {
     use hapterra_core::phantom::{Calibration, Kinematics};
@@ -137,7 +137,7 @@ fn the_stops_catch_a_thrown_arm() {
     }
 }
 
-/// A hand pulls the arm about, friction and a wall's current steps included.
+/// Moves the arm by a hand, with friction and with the current steps of a wall.
 fn dragged(substep_s: f64) -> DVec3 {
     let mut plant = Plant::new(premium(), [0.0; 3]).held_by(HandModel::default());
     plant.substep_s = substep_s;

@@ -1,11 +1,11 @@
-//! The hand's target as a function of time: legs along
-//! polylines with smooth starts and ends, mm, terrain frame.
+//! The hand's target as a function of time: legs along polylines with smooth starts and ends, mm,
+//! terrain frame.
 
 use glam::DVec3;
 
-/// Time to get up to speed and to come to rest, s.
+/// Duration of an acceleration or deceleration, s.
 const RAMP_S: f64 = 0.15;
-/// Speed of the way back to the beginning of a plan, mm/s.
+/// Speed of the return to the beginning of a plan, mm/s.
 const BACK_MM_S: f64 = 60.0;
 
 /// The hand's target at one moment.
@@ -17,7 +17,7 @@ pub struct Target {
     pub speed_mm_s: [f64; 3],
 }
 
-/// A hand's plan: a list of legs one after the other, then rest.
+/// A hand's plan: a list of consecutive legs, then rest.
 #[derive(Clone, Debug)]
 pub struct Script {
     legs: Vec<Leg>,
@@ -26,7 +26,7 @@ pub struct Script {
 }
 
 impl Script {
-    /// A plan that starts at a point.
+    /// Creates a plan that starts at a point.
     #[must_use]
     pub fn start(at_mm: [f64; 3]) -> Self {
         Self {
@@ -36,21 +36,20 @@ impl Script {
         }
     }
 
-    /// Stays for a while.
+    /// Adds a wait.
     #[must_use]
     pub fn wait(mut self, seconds: f64) -> Self {
         self.duration_s += seconds;
         self
     }
 
-    /// Goes straight to a point at up to `speed_mm_s`.
+    /// Adds a straight line to a point, at up to `speed_mm_s`.
     #[must_use]
     pub fn go(self, to_mm: [f64; 3], speed_mm_s: f64) -> Self {
         self.along(&[to_mm], speed_mm_s)
     }
 
-    /// Goes along a polyline from where it is, at up to `speed_mm_s`, measured
-    /// along the line.
+    /// Adds a polyline from the present end, at up to `speed_mm_s`, measured along the line.
     #[must_use]
     pub fn along(mut self, points_mm: &[[f64; 3]], speed_mm_s: f64) -> Self {
         let mut points = vec![self.end_mm];
@@ -64,8 +63,7 @@ impl Script {
         self
     }
 
-    /// The plan so many times one after the other; in between the hand goes straight back to
-    /// where it began.
+    /// Repeats the plan `times` times; in between the hand returns straight to the beginning.
     #[must_use]
     pub fn repeated(self, times: u32) -> Self {
         let begin_mm = self.target(0.0).position_mm;
@@ -88,25 +86,25 @@ impl Script {
         }
     }
 
-    /// When the last leg ends, s.
+    /// Returns the end of the last leg, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// Returns the end of the plan, mm.
+    /// Returns the end point of the plan, mm.
     #[must_use]
     pub fn end_mm(&self) -> [f64; 3] {
         self.end_mm.to_array()
     }
 
-    /// Every corner of the plan in order, mm: what an arm must reach.
+    /// Returns all corners of the plan in order, mm: the points that an arm must reach.
     pub fn corners_mm(&self) -> impl Iterator<Item = [f64; 3]> {
         let legs = self.legs.iter().flat_map(|leg| &leg.points);
         legs.map(|p| p.to_array()).chain([self.end_mm()])
     }
 
-    /// The target at a time from the start, s. Before and after: at rest.
+    /// Returns the target at a time from the start, s. Before and after the plan it is at rest.
     #[must_use]
     pub fn target(&self, t_s: f64) -> Target {
         let begun = self.legs.partition_point(|leg| leg.start_s <= t_s);
@@ -122,7 +120,7 @@ impl Script {
     }
 }
 
-/// One polyline, walked once.
+/// One polyline, followed once.
 #[derive(Clone, Debug)]
 struct Leg {
     start_s: f64,
@@ -144,7 +142,7 @@ impl Leg {
         if length == 0.0 {
             return None;
         }
-        // A short leg is walked slower, never with a sharper start.
+        // A short leg gets a lower speed, not a sharper start.
         let speed_mm_s = speed_mm_s.min(length / RAMP_S);
         Some(Self {
             start_s,
@@ -170,8 +168,8 @@ impl Leg {
         (from + along * (length - done), along * speed)
     }
 
-    /// Way made (mm) and speed (mm/s) at a time after the leg's start. The
-    /// speed rises and falls as the smooth step 3u² − 2u³.
+    /// Returns the distance (mm) and speed (mm/s) at a time after the leg's start. The speed rises
+    /// and falls as the smooth step 3u² − 2u³.
     fn progress(&self, t_s: f64) -> (f64, f64) {
         let ramp = |u: f64| {
             let way = self.speed_mm_s * RAMP_S * u * u * u * (1.0 - 0.5 * u);

@@ -1,21 +1,21 @@
 //! Plans that follow a terrain: approach, press, slide, tap, lift.
 //!
-//! The hand is a spring, so to press with N newtons it aims below the surface
-//! by what the wall, the grip and the arm give way together. It uses the
-//! surface itself, as a person who remembers it would.
+//! The hand is a spring: for a force of N newtons its target lies below the surface by the sum of
+//! the deflections of wall, grip and arm. It follows the true surface, like a person who remembers
+//! it.
 
 use super::hand::HandModel;
 use super::script::Script;
 
-/// Height of the surface in mm at (east, north) in mm; `None` in a hole.
+/// Height of the surface in mm at (east, north) in mm; `None` in no-data.
 pub type Surface<'a> = &'a dyn Fn(f64, f64) -> Option<f64>;
 
 /// Distance between the points of a slide, mm.
 const SLIDE_STEP_MM: f64 = 0.5;
-/// A slide aims at the mean surface of this many points to either side: a hand
-/// does not copy every cliff.
+/// A slide follows the mean surface of this many points on both sides: a hand does not copy every
+/// cliff.
 const SLIDE_SMOOTHING: usize = 4;
-/// Over a hole the hand stays this much above the rim, mm.
+/// Height of the hand above the rim of no-data while it crosses, mm.
 const OVER_HOLE_MM: f64 = 3.0;
 /// Speed of approach and tapping, mm/s.
 const APPROACH_MM_S: f64 = 60.0;
@@ -28,9 +28,8 @@ pub struct Touch<'a> {
 }
 
 impl<'a> Touch<'a> {
-    /// A hand that starts `above_mm` over the surface at a place, facing walls
-    /// of the given stiffness. In a hole the nearest ground within 200 mm
-    /// counts, and height zero where there is none.
+    /// Starts `above_mm` over the surface at a place, for walls of the given stiffness. In no-data
+    /// the nearest ground within 200 mm counts, or height zero if there is none.
     #[must_use]
     pub fn start(
         surface: Surface<'a>,
@@ -48,7 +47,7 @@ impl<'a> Touch<'a> {
         }
     }
 
-    /// Presses straight down with a force and holds it for a while.
+    /// Presses straight down with a force and holds it for some seconds.
     #[must_use]
     pub fn press(mut self, newtons: f64, seconds: f64) -> Self {
         let target = self.below(newtons);
@@ -64,7 +63,7 @@ impl<'a> Touch<'a> {
         self
     }
 
-    /// Returns the length of such a slide, ups and downs included, mm.
+    /// Returns the length of such a slide in three dimensions, mm.
     #[must_use]
     pub fn slide_length_mm(&self, line_mm: &[[f64; 2]], newtons: f64) -> f64 {
         let points = self.follow(&self.course(line_mm), newtons);
@@ -73,7 +72,7 @@ impl<'a> Touch<'a> {
         pairs.map(|pair| step(pair[0], pair[1])).sum()
     }
 
-    /// Closely spaced points from where the hand is along a line.
+    /// Returns closely spaced points from the hand's position along a line.
     fn course(&self, line_mm: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let [x, y, _] = self.script.end_mm();
         let mut line = vec![[x, y]];
@@ -99,13 +98,13 @@ impl<'a> Touch<'a> {
         self
     }
 
-    /// The unfinished plan.
+    /// Returns the unfinished plan.
     #[must_use]
     pub fn script(&self) -> &Script {
         &self.script
     }
 
-    /// The plan.
+    /// Returns the plan.
     #[must_use]
     pub fn finish(self) -> Script {
         self.script
@@ -119,8 +118,8 @@ impl<'a> Touch<'a> {
         }
     }
 
-    /// Aims for each point of a line: the smoothed surface less the press, or
-    /// over a hole the last rim plus some room.
+    /// Returns the targets for the points of a line: the smoothed surface minus the press, or over
+    /// no-data a height above the last rim.
     fn follow(&self, line: &[[f64; 2]], newtons: f64) -> Vec<[f64; 3]> {
         let ground: Vec<_> = line.iter().map(|[x, y]| (self.surface)(*x, *y)).collect();
         let mut rim = ground.iter().flatten().next().copied();
@@ -143,7 +142,7 @@ impl<'a> Touch<'a> {
     }
 }
 
-/// Ground at a place or on the first of growing rings around it that has any.
+/// Returns the ground at a place, or the first ground found on growing rings around it.
 fn nearest_ground(surface: Surface<'_>, x: f64, y: f64) -> Option<f64> {
     let on_ring = |radius: u32| {
         (0..24).find_map(|turn| {
@@ -154,7 +153,7 @@ fn nearest_ground(surface: Surface<'_>, x: f64, y: f64) -> Option<f64> {
     surface(x, y).or_else(|| (1..=200).find_map(on_ring))
 }
 
-/// Points at most [`SLIDE_STEP_MM`] apart along a line.
+/// Returns points at most [`SLIDE_STEP_MM`] apart along a line.
 fn resample(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut points = vec![line[0]];
     for pair in line.windows(2) {

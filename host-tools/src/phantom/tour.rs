@@ -1,4 +1,4 @@
-//! The demonstration that suits a terrain: where to touch it and how.
+//! The demonstration that suits a terrain: its place and its motions.
 
 use glam::DVec3;
 
@@ -8,36 +8,35 @@ use super::model::PhantomModel;
 use super::script::Script;
 use super::touch::{Surface, Touch};
 
-/// Half the size of the place that is touched, east and north, mm: most of
-/// what a Premium 1.5 reaches at any height.
+/// Half the size of the touched place, east and north, mm: most of a Premium 1.5's reach at any
+/// height.
 const HALF_MM: [f64; 2] = [70.0, 35.0];
-/// Share of the terrain's half size that is used at most.
+/// Max share of the terrain's half size that is used.
 const INSIDE: f64 = 0.84;
-/// Tried one after the other until the arm reaches all of the plan and there
-/// are hardly any holes.
+/// Factors tried in order until the arm reaches all of the plan and there is hardly any no-data.
 const SHRINK: [f64; 5] = [1.0, 0.6, 0.35, 0.2, 0.1];
-/// Share of known ground that is good enough not to look for a smaller place.
+/// Share of known ground at which no smaller place is searched.
 const HARDLY_ANY_HOLES: f64 = 0.97;
 /// Places tried in each direction.
 const PLACES: u32 = 11;
-/// More relief than this makes a place no more worth touching, mm.
+/// Relief above which a place gets no higher score, mm.
 const ENOUGH_RELIEF_MM: f64 = 25.0;
-/// Presses and taps against the slide. With a slide of 1 N all of it stays
-/// below the 1.55 N that a Premium 1.5 holds upwards for ever (1.24 A).
+/// Force of presses and taps relative to the slide. With a slide of 1 N, all forces are below the
+/// 1.55 N that a Premium 1.5 can hold upwards continuously (1.24 A).
 const STRONG: f64 = 1.5;
-/// A plan's middle is at most this far from a settled home along each axis, mm: about as
-/// far as a Premium 1.5 reaches to its sides.
+/// Max distance of a plan's middle from a fixed home position along each axis, mm: about the
+/// sideways reach of a Premium 1.5.
 const FAR_MM: f64 = 250.0;
-/// Slowest and fastest slide, mm/s, and its length aimed at, s.
+/// Min and max speed of the slide, mm/s, and its intended duration, s.
 const SLIDE_MM_S: (f64, f64) = (45.0, 120.0);
 const SLIDE_S: f64 = 7.0;
 
-/// A plan and where the terrain has to lie for it.
+/// A plan and the terrain's position for it.
 #[derive(Clone, Debug)]
 pub struct Tour {
-    /// Come down, press, slide along a winding line, tap three times, lift.
+    /// Approach, press, slide along a winding line, three taps, lift.
     pub script: Script,
-    /// The middle of the plan at the arm's home.
+    /// Placement with the middle of the plan at the arm's home.
     pub placement: ArmFrame,
 }
 
@@ -54,20 +53,20 @@ pub struct TourPlan<'a> {
     pub hand: HandModel,
     /// Stiffness of the surface, N/mm.
     pub wall_n_per_mm: f64,
-    /// Force of the slide, N; presses and taps are half as strong again.
+    /// Force of the slide, N; presses and taps are 1.5 times as strong.
     pub push_n: f64,
-    /// The terrain point at the arm's home, mm east, north, up, where that is settled; else
-    /// the middle of the plan.
+    /// The terrain point at the arm's home, mm east, north, up, if it is fixed; otherwise the
+    /// middle of the plan is there.
     pub home_mm: Option<[f64; 3]>,
 }
 
 impl TourPlan<'_> {
-    /// Finds the place with the fewest holes and enough relief, the more
-    /// central the better, and plans a tour there.
+    /// Finds the place with the least no-data and enough relief, preferably in the centre, and
+    /// plans a tour there.
     ///
     /// # Errors
-    /// [`OutOfReach`] if even a small tour has points beyond the arm's reach:
-    /// the terrain is too tall for the hand.
+    /// [`OutOfReach`] if even a small tour has points beyond the arm's reach: the terrain is too
+    /// high.
     pub fn plan(&self) -> Result<Tour, OutOfReach> {
         let mut best: Option<(f64, Tour)> = None;
         let mut first_failure = None;
@@ -94,7 +93,8 @@ impl TourPlan<'_> {
             }))
     }
 
-    /// Heights along a line. Each may take a ball's whole surroundings: a line asks once.
+    /// Returns the heights along a line. With a ball each height is expensive, so a line is sampled
+    /// once.
     fn heights(&self, line: &[[f64; 2]]) -> Vec<Option<f64>> {
         line.iter().map(|p| (self.surface)(p[0], p[1])).collect()
     }
@@ -125,8 +125,8 @@ impl TourPlan<'_> {
         best.map_or(self.size_mm.map(|side| 0.5 * side), |best| best.1)
     }
 
-    /// Returns the range for the middle of a plan along an axis: on the terrain and, where the home
-    /// is settled, not so far from it that no arm gets there.
+    /// Returns the range for the middle of a plan along an axis: on the terrain and, if the home
+    /// position is fixed, within [`FAR_MM`] of it.
     fn room(&self, axis: usize, half: f64) -> [f64; 2] {
         let (middle, room) = (0.5 * self.size_mm[axis], half / INSIDE);
         let room = (middle - room).max(0.0);
@@ -139,7 +139,7 @@ impl TourPlan<'_> {
         }
     }
 
-    /// Share of a line that the arm cannot get to from a settled home.
+    /// Returns the share of a line beyond the arm's reach from a fixed home position.
     fn beyond(&self, line: &[[f64; 2]], heights: &[Option<f64>]) -> f64 {
         let Some(home_mm) = self.home_mm else {
             return 0.0;
@@ -151,8 +151,8 @@ impl TourPlan<'_> {
         beyond.count() as f64 / line.len() as f64
     }
 
-    /// Returns the value of a place: known ground counts most, then relief up to what
-    /// is enough, then being central.
+    /// Returns the score of a place: known ground counts most, then relief up to
+    /// [`ENOUGH_RELIEF_MM`], then closeness to the centre.
     fn worth(&self, place: [f64; 2], half: [f64; 2]) -> f64 {
         let line = winding(place, half);
         let heights = self.heights(&line);
@@ -162,7 +162,7 @@ impl TourPlan<'_> {
         }
         let relief = (high - low).clamp(0.0, ENOUGH_RELIEF_MM) / ENOUGH_RELIEF_MM;
         let off = |axis: usize| (2.0 * place[axis] / self.size_mm[axis] - 1.0).abs();
-        // It comes down at one end and taps at the other.
+        // The hand approaches at one end and taps at the other.
         let ends = [heights.first(), heights.last()];
         let holes = ends.iter().flatten().filter(|height| height.is_none());
         10.0 * known(&heights) + relief
@@ -172,12 +172,12 @@ impl TourPlan<'_> {
     }
 }
 
-/// Share of a line that lies on known ground.
+/// Returns the share of a line on known ground.
 fn known(heights: &[Option<f64>]) -> f64 {
     heights.iter().flatten().count() as f64 / heights.len() as f64
 }
 
-/// The middle of the box around a script.
+/// Returns the middle of the box around a script.
 fn middle(script: &Script) -> [f64; 3] {
     let corners = || script.corners_mm().map(DVec3::from);
     let low = corners().fold(DVec3::MAX, DVec3::min);
@@ -185,7 +185,7 @@ fn middle(script: &Script) -> [f64; 3] {
     (0.5 * (low + high)).to_array()
 }
 
-/// One and a half waves from west to east.
+/// Returns one and a half waves from west to east.
 fn winding(centre_mm: [f64; 2], half_mm: [f64; 2]) -> Vec<[f64; 2]> {
     (0..=240)
         .map(|i| {

@@ -1,27 +1,26 @@
-//! Wiring of a board to an arm, with the mistakes that people make.
+//! Wiring of a board to an arm, with common mistakes.
 
-/// Which motor each command reaches, and which encoder each counter reads.
+/// Assignment of commands to motors and of counters to encoders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wiring {
-    /// The motor (0 to 2) that each of the three commands reaches.
+    /// The motor (0 to 2) that each of the three commands drives.
     pub motor: [usize; 3],
-    /// Factor of each command: −1 where a motor's two wires
-    /// are crossed, 0 where its amplifier or its cable is missing, 2 where an
-    /// amplifier's full scale is twice what the board believes.
+    /// Factor of each command: −1 if a motor's two wires are crossed, 0 if its amplifier or its
+    /// cable is missing, 2 if an amplifier's full scale is twice the board's setting.
     pub gain: [f64; 3],
-    /// True if each encoder's counter stands still.
+    /// True for each encoder whose counter does not change.
     pub dead_encoder: [bool; 3],
 }
 
 impl Wiring {
-    /// As the wiring pages say.
+    /// Wiring as documented.
     pub const RIGHT: Self = Self {
         motor: [0, 1, 2],
         gain: [1.0; 3],
         dead_encoder: [false; 3],
     };
 
-    /// The commands of two axes exchanged.
+    /// Exchanges the commands of two axes.
     #[must_use]
     pub fn swapped(self, one: usize, other: usize) -> Self {
         let mut wiring = self;
@@ -29,7 +28,7 @@ impl Wiring {
         wiring
     }
 
-    /// One command multiplied by `gain`.
+    /// Multiplies one command by `gain`.
     #[must_use]
     pub fn with_gain(self, axis: usize, gain: f64) -> Self {
         let mut wiring = self;
@@ -37,7 +36,7 @@ impl Wiring {
         wiring
     }
 
-    /// One encoder that does not count.
+    /// Disables the counter of one encoder.
     #[must_use]
     pub fn with_dead_encoder(self, axis: usize) -> Self {
         let mut wiring = self;
@@ -45,7 +44,7 @@ impl Wiring {
         wiring
     }
 
-    /// The motors' currents, A, for the board's commands.
+    /// Returns the motors' currents, A, for the board's commands.
     #[must_use]
     pub fn currents_a(&self, commands_a: [f64; 3]) -> [f64; 3] {
         let mut currents_a = [0.0; 3];
@@ -55,7 +54,7 @@ impl Wiring {
         currents_a
     }
 
-    /// Returns the readings of the board's counters where the encoders have turned to `counts`.
+    /// Returns the readings of the board's counters for encoders at `counts`.
     #[must_use]
     pub fn counts(&self, counts: [i32; 3]) -> [i32; 3] {
         std::array::from_fn(|axis| match self.dead_encoder[axis] {
@@ -75,7 +74,7 @@ mod tests {
         assert_eq!(Wiring::RIGHT.currents_a(commands), commands);
         let swapped = Wiring::RIGHT.swapped(1, 2);
         assert_eq!(swapped.currents_a(commands), [1.0, 3.0, 2.0]);
-        // What becomes of a command belongs to the command, wherever it goes.
+        // A command's gain follows the command, whichever motor it drives.
         let swapped = swapped.with_gain(1, -1.0);
         assert_eq!(swapped.currents_a(commands), [1.0, 3.0, -2.0]);
         let missing = Wiring::RIGHT.with_gain(0, 0.0);

@@ -1,4 +1,4 @@
-//! Chart frames: axes with titles, ticks and a quiet grid.
+//! Chart frames: axes with titles, ticks and a pale grid.
 
 use plotters::chart::{ChartBuilder, ChartContext, MeshStyle};
 use plotters::coord::Shift;
@@ -14,28 +14,28 @@ use std::ops::Range;
 use super::canvas::{Pen, PictureError};
 use super::style::{self, px, stroke};
 
-/// A part of the sheet.
+/// An area of the sheet.
 pub type Area<'a> = DrawingArea<Pen<'a>, Shift>;
 /// A chart, with linear axes by default.
 pub type Chart<'a, X = RangedCoordf64, Y = RangedCoordf64> =
     ChartContext<'a, Pen<'a>, Cartesian2d<X, Y>>;
 
-/// Room left of a chart for its labels, finished pixels.
+/// Width of the labels left of a chart, finished pixels.
 pub const LEFT_PX: i32 = 80;
-/// Room below a chart for its labels, finished pixels.
+/// Height of the labels below a chart, finished pixels.
 pub const BELOW_PX: i32 = 52;
 
 /// Titles of the axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Titles<'a> {
-    /// Along x, with its unit; empty leaves the x axis without any text.
+    /// Title of the x axis, with its unit; an empty one leaves the axis without text.
     pub x: &'a str,
-    /// Along y, with its unit.
+    /// Title of the y axis, with its unit.
     pub y: &'a str,
 }
 
-/// A chart that fills an area, axes drawn, ready for its curves. Ranges may be
-/// linear or any other `plotters` range of numbers, such as `(1..9).log_scale()`.
+/// Creates a chart that fills an area, with axes, ready for its curves. Ranges may be linear or any
+/// other `plotters` range of numbers, such as `(1..9).log_scale()`.
 ///
 /// # Errors
 /// [`PictureError::Layout`] if the area has no room.
@@ -75,7 +75,7 @@ where
     Ok(chart)
 }
 
-/// Writes a line of type; the middle of its height is at `at`, its `side` at that place.
+/// Writes a line of text, vertically centred on `at`, with its `side` there.
 ///
 /// # Errors
 /// As `plotters`.
@@ -90,12 +90,12 @@ pub fn write(
     Ok(area.draw(&Text::new(text.to_owned(), at, style))?)
 }
 
-/// A number as a person writes it on an axis: at most six digits, powers of
-/// ten from a million on and below a ten-thousandth.
+/// Formats a number for an axis: at most six digits, and powers of ten from a million on and below
+/// a ten-thousandth.
 #[must_use]
 pub fn number(value: &f64) -> String {
     let size = value.abs();
-    // Ticks are sums of steps: what is left at zero is rounding.
+    // Ticks are sums of steps: a remainder near zero is rounding.
     if size < 1e-13 {
         return "0".to_owned();
     }
@@ -112,7 +112,7 @@ pub fn number(value: &f64) -> String {
     format!("{sign}{}e{power}", bare(mantissa))
 }
 
-/// Digits without the zeros that say nothing.
+/// Returns the digits without trailing zeros.
 fn bare(digits: &str) -> &str {
     if digits.contains('.') {
         digits.trim_end_matches('0').trim_end_matches('.')
@@ -121,7 +121,7 @@ fn bare(digits: &str) -> &str {
     }
 }
 
-/// A range that shows all finite values with some air around, never empty.
+/// Returns a range that contains all finite values with a margin; it is never empty.
 #[must_use]
 pub fn spread(values: impl Iterator<Item = f64>, air: f64) -> Range<f64> {
     let (low, high) = values

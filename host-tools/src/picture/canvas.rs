@@ -1,5 +1,5 @@
-//! A drawing backend for `plotters`: `tiny-skia` draws with soft edges, `lettering`
-//! sets the type.
+//! A drawing backend for `plotters`: `tiny-skia` draws with antialiasing, `lettering` sets the
+//! text.
 
 use plotters_backend::text_anchor::{HPos, VPos};
 use plotters_backend::{
@@ -19,10 +19,10 @@ use crate::output::{Output, OutputError};
 /// A picture could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// The file could not be made or filled.
+    /// The file could not be created or written.
     #[error("{0}: {source}", source = .0.source)]
     Write(OutputError),
-    /// `plotters` gave up, for example on an area without room.
+    /// `plotters` failed, for example on an area without room.
     #[error("cannot lay out the picture: {0}")]
     Layout(String),
 }
@@ -35,7 +35,7 @@ impl<E: std::error::Error + Send + Sync> From<plotters::drawing::DrawingAreaErro
     }
 }
 
-/// The image that is drawn on.
+/// The image for the drawing.
 pub struct Canvas {
     width: u32,
     height: u32,
@@ -44,7 +44,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A white sheet of a finished size in pixels.
+    /// Creates a white sheet of a finished size in pixels.
     #[must_use]
     pub fn new(width: u16, height: u16) -> Self {
         Self {
@@ -54,18 +54,18 @@ impl Canvas {
         }
     }
 
-    /// The backend to hand to `plotters`.
+    /// Returns the backend for `plotters`.
     pub fn pen(&mut self) -> Pen<'_> {
         Pen { canvas: self }
     }
 
-    /// The finished size in pixels.
+    /// Returns the finished size in pixels.
     #[must_use]
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
 
-    /// The finished picture, RGB, row by row from the top.
+    /// Returns the finished picture, RGB, row by row from the top.
     #[must_use]
     pub fn to_rgb(&self) -> Vec<u8> {
         let pixels = self.rgba.as_chunks::<4>().0;
@@ -76,7 +76,7 @@ impl Canvas {
     /// Writes the finished picture as a PNG file, which appears when it is complete.
     ///
     /// # Errors
-    /// [`PictureError::Write`] if the file cannot be made or filled.
+    /// [`PictureError::Write`] if the file cannot be created or written.
     pub fn save(&self, path: &Path) -> Result<(), PictureError> {
         let mut output = Output::create(path).map_err(PictureError::Write)?;
         let encoded = self.encode(&mut output).map_err(|source| OutputError {
@@ -95,7 +95,7 @@ impl Canvas {
         Ok(writer.finish()?)
     }
 
-    /// Fills a path in drawing coordinates that are first moved by `place`.
+    /// Fills a path in drawing coordinates, transformed by `place`.
     fn fill(&mut self, path: Option<tiny_skia::Path>, ink: BackendColor, place: Transform) {
         let pixmap = PixmapMut::from_bytes(&mut self.rgba, self.width, self.height);
         if let Some((mut pixmap, path)) = pixmap.zip(path) {
@@ -104,7 +104,7 @@ impl Canvas {
         }
     }
 
-    /// Draws along a path in drawing coordinates, with round joins and ends.
+    /// Draws a path in drawing coordinates, with round joins and ends.
     fn stroke(&mut self, path: Option<tiny_skia::Path>, style: &impl BackendStyle) {
         let stroke = Stroke {
             width: style.stroke_width() as f32,
@@ -119,7 +119,7 @@ impl Canvas {
     }
 }
 
-/// From drawing coordinates to finished pixels.
+/// Returns the transformation from drawing coordinates to finished pixels.
 fn to_pixels() -> Transform {
     let scale = 1.0 / SCALE as f32;
     Transform::from_scale(scale, scale)
@@ -132,7 +132,7 @@ fn paint(ink: BackendColor) -> Paint<'static> {
     paint
 }
 
-/// A path through the middles of points.
+/// Returns a path through the centres of points.
 fn polyline(points: impl IntoIterator<Item = BackendCoord>) -> PathBuilder {
     let mut path = PathBuilder::new();
     for (x, y) in points {
@@ -151,7 +151,7 @@ fn set<T: BackendTextStyle>(text: &str, style: &T) -> TextLine {
     TextLine::new(text, bold, style.size() as f32)
 }
 
-/// The [`Canvas`] as `plotters` sees it.
+/// The `plotters` backend of a [`Canvas`].
 pub struct Pen<'a> {
     canvas: &'a mut Canvas,
 }
@@ -178,7 +178,7 @@ impl DrawingBackend for Pen<'_> {
         self.draw_rect(at, at, &color, true)
     }
 
-    /// A level or upright line is sharp on the finished picture's pixels.
+    /// Draws a line; a horizontal or vertical one is aligned to the finished pixels, to be sharp.
     fn draw_line<S: BackendStyle>(
         &mut self,
         from: BackendCoord,
@@ -285,7 +285,7 @@ impl DrawingBackend for Pen<'_> {
         Ok((line.width.ceil() as u32, line.height.ceil() as u32))
     }
 
-    /// Each pixel of the bitmap becomes one finished pixel.
+    /// Copies each pixel of the bitmap to one finished pixel.
     fn blit_bitmap(&mut self, at: BackendCoord, size: (u32, u32), rgb: &[u8]) -> Drawn {
         let (x, y) = (at.0 / SCALE, at.1 / SCALE);
         let (width, height) = (self.canvas.width as i32, self.canvas.height as i32);

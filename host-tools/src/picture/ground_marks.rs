@@ -12,24 +12,24 @@ use super::style::{self, INK, px};
 /// Facts about the ground for a picture.
 #[derive(Clone, Copy)]
 pub struct GroundFacts<'a> {
-    /// Ground metres a device millimetre, if the terrain has a size.
+    /// Ground metres for each device millimetre, if the terrain has a size.
     pub metres_per_mm: Option<f64>,
-    /// Coordinates of a place in device millimetres east and north, short.
+    /// Returns the coordinates of a place in device millimetres east and north, as short text.
     pub place_of: &'a dyn Fn(f64, f64) -> String,
-    /// Scale and place for the panel: name and value with its unit, short.
+    /// Scale and place for the panel: short names, and values with their units.
     pub lines: &'a [(String, String)],
 }
 
-/// The bar is at most this share of the map's width.
+/// Max share of the map's width for the bar.
 const BAR_SHARE: f64 = 0.25;
-/// Between the marks and the map's sides, and around their text, finished pixels.
+/// Distance of the marks from the map's sides, and padding around their text, finished pixels.
 const AWAY_PX: i32 = 10;
 const AIR_PX: i32 = 6;
 /// Height of a line of text, and of the bar, finished pixels.
 const LINE_PX: i32 = 22;
 const BAR_PX: i32 = 6;
 
-/// Draws the marks onto the map's own area.
+/// Draws the marks on the map's area.
 pub(super) fn draw(
     area: &Area<'_>,
     window: &MapView,
@@ -61,7 +61,7 @@ pub(super) fn draw(
     Ok(())
 }
 
-/// Text on a light plate whose upper corner at one side is at `at`.
+/// Draws text on a light plate, with an upper corner (`side`) at `at`.
 fn plate(area: &Area<'_>, text: &str, at: (i32, i32), side: HPos) -> Result<(), PictureError> {
     let font = style::text(18, &INK);
     let wide = area.estimate_text_size(text, &font)?.0.cast_signed() + 2 * px(AIR_PX);
@@ -92,7 +92,7 @@ struct Bar {
 }
 
 impl Bar {
-    /// The longest round length that takes its share of a map's width, mm.
+    /// Returns the longest round length within its share of a map's width, mm.
     fn of(width_mm: f64, metres_per_mm: f64) -> Self {
         let most = BAR_SHARE * width_mm * metres_per_mm;
         let power = 10f64.powf(most.log10().floor());
@@ -106,7 +106,7 @@ impl Bar {
         }
     }
 
-    /// Its length on the ground and in the hand.
+    /// Returns its length on the ground and in device millimetres.
     fn text(&self) -> String {
         let ground = match self.metres {
             metres if metres >= 1000.0 => format!("{} km", axes::number(&(metres / 1000.0))),

@@ -1,4 +1,4 @@
-//! Type as outlines: Noto Sans (SIL Open Font License), from the `notosans` crate.
+//! Text as outlines: Noto Sans (SIL Open Font License), from the `notosans` crate.
 
 use ab_glyph::{Font, FontRef, OutlineCurve, Point, ScaleFont};
 use std::sync::LazyLock;
@@ -9,7 +9,7 @@ static REGULAR: LazyLock<Option<FontRef<'static>>> =
 static BOLD: LazyLock<Option<FontRef<'static>>> =
     LazyLock::new(|| FontRef::try_from_slice(notosans::BOLD_TTF).ok());
 
-/// A line of type, y downwards, its pen starting at the origin on the baseline.
+/// A line of text, y downwards, its pen starting at the origin on the baseline.
 #[derive(Default)]
 pub(super) struct TextLine {
     /// Outline that is filled with ink; `None` for blanks.
@@ -23,7 +23,7 @@ pub(super) struct TextLine {
 impl TextLine {
     /// Sets a text with kerning, at a `size` from the lowest to the highest letter.
     pub(super) fn new(text: &str, bold: bool, size: f32) -> Self {
-        // A broken file inside a crate cannot happen; text would be missing.
+        // The font is part of the crate, so it is valid; otherwise text would be missing.
         let Some(font) = (if bold { &*BOLD } else { &*REGULAR }) else {
             return Self::default();
         };
@@ -50,7 +50,7 @@ impl TextLine {
     }
 }
 
-/// Appends a curve; one that does not start where the last ended starts a new contour.
+/// Appends a curve; it starts a new contour if it does not start at the end of the last.
 fn append(path: &mut PathBuilder, curve: OutlineCurve, place: impl Fn(Point) -> (f32, f32)) {
     let (OutlineCurve::Line(from, _)
     | OutlineCurve::Quad(from, ..)
@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn both_faces_are_readable() {
         assert!(REGULAR.is_some() && BOLD.is_some());
-        // None of what the pictures write comes out as an empty box.
+        // The font has all characters of the pictures.
         for letter in "aZ09.,:−×·µ°()%±".chars() {
             for font in [&REGULAR, &BOLD] {
                 let known = font.as_ref().map(|f| f.glyph_id(letter).0 != 0);

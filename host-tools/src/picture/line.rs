@@ -1,5 +1,5 @@
-//! Curves with more points than pixels: thinned before they are drawn, so
-//! that the work is bounded and no peak is lost.
+//! Curves with more points than pixels, reduced before they are drawn: the work is bounded and no
+//! peak is lost.
 
 use plotters::coord::ranged1d::Ranged;
 use plotters::element::PathElement;
@@ -30,9 +30,8 @@ where
     Ok(())
 }
 
-/// A curve over x (rising) as polylines of at most four points in each of
-/// `columns` equal parts of the range: first, lowest, highest and last. A
-/// missing value makes a gap.
+/// Reduces a curve over x (rising) to polylines of at most four points in each of `columns` equal
+/// parts of the range: first, lowest, highest and last. A missing value makes a gap.
 pub fn curve(
     points: impl Iterator<Item = (f64, Option<f64>)>,
     range: &std::ops::Range<f64>,
@@ -59,8 +58,8 @@ pub fn curve(
     pieces
 }
 
-/// A path on a map without the points that lie nearer than `step` to the last
-/// one kept. A missing point makes a gap.
+/// Reduces a path on a map: removes the points nearer than `step` to the last kept one. A missing
+/// point makes a gap.
 pub fn path(points: impl Iterator<Item = Option<(f64, f64)>>, step: f64) -> Vec<Vec<(f64, f64)>> {
     let mut pieces = Vec::new();
     let mut piece: Vec<(f64, f64)> = Vec::new();
@@ -75,7 +74,7 @@ pub fn path(points: impl Iterator<Item = Option<(f64, f64)>>, step: f64) -> Vec<
     pieces
 }
 
-/// The runs of `true` over x, as ranges, joined where the gap is below `gap`.
+/// Returns the runs of `true` over x, as ranges, joined if the gap is below `gap`.
 pub fn runs(points: impl Iterator<Item = (f64, bool)>, gap: f64) -> Vec<(f64, f64)> {
     let mut runs: Vec<(f64, f64)> = Vec::new();
     for (x, _) in points.filter(|(_, on)| *on) {
@@ -87,7 +86,7 @@ pub fn runs(points: impl Iterator<Item = (f64, bool)>, gap: f64) -> Vec<(f64, f6
     runs
 }
 
-/// A piece as a line; a single point becomes a dot.
+/// Returns a piece as a line, and a single point as a dot.
 fn take_line(piece: &mut Vec<(f64, f64)>) -> Option<Vec<(f64, f64)>> {
     let mut piece = std::mem::take(piece);
     if let [only] = piece[..] {

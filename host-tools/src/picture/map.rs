@@ -1,4 +1,4 @@
-//! The map: relief, the paths of HIP and proxy, and where the map lies.
+//! The map: relief, the paths of HIP and proxy, and an inset with the map's position.
 
 use plotters::element::{Circle, Drawable, PointCollection, Rectangle};
 use plotters::prelude::DrawingBackend;
@@ -45,8 +45,8 @@ pub(super) fn draw(
     Ok(relief)
 }
 
-/// The proxy's path as a ribbon and the HIP's as a line on it, so that both are
-/// seen where they lie over each other.
+/// Draws the proxy's path as a wide band and the HIP's as a line on it, so that both are visible
+/// where they coincide.
 fn paths(chart: &mut Chart<'_>, records: &[Record], pixel_mm: f64) -> Result<(), PictureError> {
     let flat = |p: [f64; 3]| (p[0], p[1]);
     let hip = line::path(records.iter().map(|r| Some(flat(r.hip_mm))), pixel_mm);
@@ -65,7 +65,7 @@ fn paths(chart: &mut Chart<'_>, records: &[Record], pixel_mm: f64) -> Result<(),
     Ok(())
 }
 
-/// A dot with its name on a light plate.
+/// Draws a dot with its name on a light plate.
 fn mark(
     chart: &mut Chart<'_>,
     at: (f64, f64),
@@ -81,7 +81,7 @@ fn mark(
     let font = style::bold(18, &INK);
     let (width, _) = plain.estimate_text_size(name, &font)?;
     let (width, room) = (width.cast_signed(), plain.dim_in_pixel().0.cast_signed());
-    // To the left of the dot where there is no room to its right.
+    // To the left of the dot if there is no room to its right.
     let left = if x + px(20) + width > room {
         x - px(18) - width
     } else {
@@ -95,8 +95,8 @@ fn mark(
     axes::write(&plain, name, (left, y), font, HPos::Left)
 }
 
-/// The whole terrain, small, with the map's window framed; as large as the
-/// area allows.
+/// Draws the whole terrain, small, with a frame around the map's window; as large as the area
+/// allows.
 pub(super) fn inset(
     area: &Area<'_>,
     surface: &Surface<'_>,
@@ -116,7 +116,7 @@ pub(super) fn inset(
     };
     let (left, bottom) = place(window.west, window.south);
     let (right, top) = place(window.west + window.width, window.south + window.height);
-    // A window smaller than a few pixels is still to be found.
+    // A tiny window is enlarged to stay visible.
     let grow = (px(8) - (right - left).max(bottom - top)).max(0) / 2;
     let corners = [(left - grow, top - grow), (right + grow, bottom + grow)];
     area.draw(&Rectangle::new(corners, stroke(&WHITE, 5.0)))?;
@@ -127,8 +127,7 @@ pub(super) fn inset(
     Ok(())
 }
 
-/// A relief at the upper left of an area, each of its pixels one finished
-/// pixel.
+/// A relief at the upper left of an area, each of its pixels one finished pixel.
 struct Image<'r>(&'r Relief);
 
 impl<'a> PointCollection<'a, (i32, i32)> for &'a Image<'_> {

@@ -1,4 +1,4 @@
-//! Which part of the terrain a map shows, and how large it becomes.
+//! The part of the terrain on a map, and the map's size.
 
 /// A rectangle on the map, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,15 +9,15 @@ pub(super) struct MapView {
     pub(super) height: f64,
 }
 
-/// Most finished pixels of a map.
+/// Max finished pixels of a map.
 pub(super) const MAP_PX: (f64, f64) = (1096.0, 800.0);
-/// A path that crosses this share of the terrain is shown on all of it.
+/// Share of the terrain's extent from which a path is shown on all of it.
 const WHOLE_SHARE: f64 = 0.55;
-/// So is any path on a terrain of at most this many cells in each direction.
+/// A terrain of at most this many cells in each direction is always shown whole.
 const SMALL_CELLS: f64 = 160.0;
-/// Air around a path, as a share of its extent.
+/// Margin around a path, as a share of its extent.
 const MARGIN: f64 = 0.25;
-/// Fewest cells shown.
+/// Min number of cells on a map.
 const FEWEST_CELLS: f64 = 24.0;
 
 impl MapView {
@@ -30,12 +30,12 @@ impl MapView {
         }
     }
 
-    /// The whole of a terrain.
+    /// Returns the whole of a terrain.
     pub(super) fn whole(size_mm: [f64; 2]) -> Self {
         Self::new(0.0, 0.0, size_mm[0], size_mm[1])
     }
 
-    /// The smallest rectangle around points; `None` without any.
+    /// Returns the smallest rectangle around points; `None` without any.
     pub(super) fn around(points: impl Iterator<Item = [f64; 2]>) -> Option<Self> {
         let finite = points.filter(|p| p.iter().all(|v| v.is_finite()));
         let (low, high) = finite.fold(None, |bounds, p| {
@@ -51,9 +51,8 @@ impl MapView {
         ))
     }
 
-    /// The view for a path on a terrain: all of it when it is small or the
-    /// path goes far, else the path with some room, in the map's proportions
-    /// and inside the terrain.
+    /// Chooses the view for a path on a terrain: all of it if it is small or the path is long,
+    /// otherwise the path with a margin, in the map's proportions and inside the terrain.
     pub(super) fn choose(path: Option<Self>, size_mm: [f64; 2], cell_mm: f64) -> Self {
         let whole = Self::whole(size_mm);
         let Some(path) = path else {
@@ -74,7 +73,7 @@ impl MapView {
         Self::new(west, south, width, height).union(path)
     }
 
-    /// Finished pixels of the map: as large as fits, true to scale.
+    /// Returns the finished pixels of the map: the largest that fit, true to scale.
     pub(super) fn map_px(&self) -> (i32, i32) {
         let scale = (MAP_PX.0 / self.width).min(MAP_PX.1 / self.height);
         let pixels = |extent: f64| ((extent * scale).round() as i32).max(40);
@@ -94,8 +93,8 @@ impl MapView {
     }
 }
 
-/// Start and length of an interval around `centre`, moved or cut to lie
-/// between zero and `limit`.
+/// Returns the start and length of an interval around `centre`, moved or cut to lie between zero
+/// and `limit`.
 fn inside(centre: f64, length: f64, limit: f64) -> (f64, f64) {
     let length = length.min(limit);
     ((centre - 0.5 * length).clamp(0.0, limit - length), length)

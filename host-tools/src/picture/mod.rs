@@ -1,11 +1,10 @@
 //! Pictures of sessions, as PNG files.
 //!
-//! `plotters` lays out charts, axes and labels; all it draws ends in [`canvas`], where
-//! `tiny-skia` draws soft edges and `lettering` sets Noto Sans (SIL Open Font License)
-//! from the `notosans` crate: no system font, no C library, no screen.
+//! `plotters` lays out charts, axes and labels; [`canvas`] receives its drawing commands:
+//! `tiny-skia` draws with antialiasing, and `lettering` sets Noto Sans (SIL Open Font License) from
+//! the `notosans` crate. No system font, C library or screen is needed.
 //!
-//! [`canvas`], [`style`] and [`axes`] know nothing about terrain and serve any
-//! other picture too.
+//! [`canvas`], [`style`] and [`axes`] do not depend on terrain and serve any other picture.
 
 pub mod axes;
 pub mod canvas;

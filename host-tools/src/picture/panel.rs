@@ -1,4 +1,4 @@
-//! Beside the map: the key, the colour scale, where the map lies, and figures.
+//! The panel beside the map: the key, the colour scale, the map's position, and figures.
 
 use plotters::element::{Circle, PathElement, Rectangle};
 use plotters::style::{Color, ShapeStyle, WHITE};
@@ -13,12 +13,12 @@ use super::style::{self, HIP, INK, PROXY, SOFT_INK, SURFACE, TOUCHING, TOUCHING_
 
 /// Height of a line of text, finished pixels.
 const LINE_PX: i32 = 30;
-/// Widest inset and colour scale.
+/// Max width of the inset and colour scale.
 const WIDE_PX: i32 = 330;
-/// Least height of the inset.
+/// Min height of the inset.
 const LEAST_INSET_PX: i32 = 120;
 
-/// A heading, and names with values under it.
+/// A heading, and the names and values under it.
 pub(super) type Table<'a> = (&'a str, &'a [(String, String)]);
 
 /// Writes the panel from the top down.
@@ -41,8 +41,8 @@ pub(super) fn draw(
     Ok(())
 }
 
-/// Height that the panel needs for these tables, finished pixels, of a window and a
-/// terrain.
+/// Returns the height that the panel needs for these tables, a window and a terrain, finished
+/// pixels.
 pub(super) fn needed_px(surface: &Surface<'_>, window: &MapView, tables: &[Table<'_>]) -> i32 {
     let listed = tables.iter().filter(|table| !table.1.is_empty());
     let tables: i32 = listed
@@ -52,11 +52,11 @@ pub(super) fn needed_px(surface: &Surface<'_>, window: &MapView, tables: &[Table
         true => 0,
         false => 20 + LEAST_INSET_PX,
     };
-    // The key and the scale of heights with all that they may hold.
+    // The key and the scale of heights with all optional lines.
     8 + 4 + 6 * LINE_PX + 16 + 18 + 16 + 16 + 24 + 14 + 20 + tables + inset
 }
 
-/// The whole terrain with the map's window in it, in what room there is.
+/// Draws the whole terrain with the map's window in it, in the remaining room.
 fn where_the_map_lies(
     area: &Area<'_>,
     y: i32,
@@ -129,7 +129,7 @@ fn key(area: &Area<'_>, top: i32, holes: bool) -> Result<i32, PictureError> {
     Ok(y)
 }
 
-/// The colours of the heights.
+/// Draws the colours of the heights.
 fn scale(area: &Area<'_>, top: i32, relief: &Relief) -> Result<i32, PictureError> {
     heading(area, top, "Height of the surface (mm)")?;
     let width = area.dim_in_pixel().0.cast_signed().min(px(WIDE_PX));
@@ -141,7 +141,7 @@ fn scale(area: &Area<'_>, top: i32, relief: &Relief) -> Result<i32, PictureError
     }
     let y = bar_bottom + px(16);
     let (low, high) = relief.range_mm;
-    // As many decimals as tell the middle from the ends.
+    // Enough decimals to distinguish the middle from the ends.
     let decimals = (1.0 - (high - low).max(1e-9).log10())
         .ceil()
         .clamp(0.0, 9.0);
@@ -162,7 +162,7 @@ fn scale(area: &Area<'_>, top: i32, relief: &Relief) -> Result<i32, PictureError
     Ok(y + px(14))
 }
 
-/// Names on the left, values on the right.
+/// Writes names on the left, values on the right.
 fn figures(
     area: &Area<'_>,
     top: i32,

@@ -1,19 +1,18 @@
 //! Shaded relief: a colour for height, a shade for slope.
 //!
-//! The work depends on the picture's size only: each pixel takes the mean of
-//! at most 3 × 3 heights spread over the ground it covers, whatever the size
-//! of the surface, and nothing is copied.
+//! The work depends only on the picture's size: each pixel gets the mean of at most 3 × 3 heights
+//! spread over its ground, whatever the size of the surface, and nothing is copied.
 
 use plotters::style::RGBColor;
 
 use super::map_view::MapView;
 use super::style::{self, PAPER};
 
-/// The surface that a picture shows.
+/// The surface of a picture.
 #[derive(Clone, Copy)]
 pub struct Surface<'a> {
-    /// Height in mm at (east, north) in mm, looked at in places so far apart, mm; `None` in a
-    /// hole and off the data.
+    /// Height in mm at (east, north) in mm, sampled at a distance in mm (third argument); `None` in
+    /// no-data and off the data.
     pub height_mm: &'a dyn Fn(f64, f64, f64) -> Option<f64>,
     /// Extent east and north from the south-west sample, mm.
     pub size_mm: [f64; 2],
@@ -21,14 +20,14 @@ pub struct Surface<'a> {
     pub cell_mm: f64,
 }
 
-/// Samples a pixel in each direction, at most.
+/// Max samples of a pixel in each direction.
 const MAX_SAMPLES: u32 = 3;
 /// Slopes are exaggerated until this share of them is below 45°.
 const BELOW_45_SHARE: f64 = 0.85;
-/// But not more than this.
+/// Max exaggeration of slopes.
 const MAX_EXAGGERATION: f64 = 30.0;
-/// Directions towards the lights (east, north, up) and their strengths: the
-/// main one in the north-west, as maps have it.
+/// Directions towards the lights (east, north, up) and their strengths: the main light is in the
+/// north-west, as on maps.
 const LIGHTS: [([f64; 3], f64); 3] = [
     ([-0.5, 0.5, 0.707], 0.65),
     ([-0.77, -0.2, 0.6], 0.2),
@@ -43,7 +42,7 @@ const TINTS: [RGBColor; 6] = [
     RGBColor(206, 180, 150),
     RGBColor(245, 241, 236),
 ];
-/// Ground of a hole, and the stripes on it.
+/// Colour of no-data, and of the stripes on it.
 pub(super) const HOLE: RGBColor = RGBColor(232, 234, 240);
 const STRIPE: RGBColor = RGBColor(178, 184, 198);
 
@@ -55,22 +54,22 @@ pub(super) struct Relief {
     pub(super) rgb: Vec<u8>,
     /// Heights of the first and last tint, mm.
     pub(super) range_mm: (f64, f64),
-    /// The lowest and the highest pixel, mm: what is beyond the tints is clipped.
+    /// The lowest and the highest pixel, mm; heights beyond the tints are clipped.
     pub(super) ends_mm: (f64, f64),
     pub(super) holes: bool,
 }
 
-/// Share of the pixels that is lower than the first tint, and higher than the last.
+/// Share of the pixels lower than the first tint, and share higher than the last.
 pub(super) const CLIPPED_SHARE: f64 = 0.002;
 
-/// The tint of a height, `t` from 0 (low) to 1 (high).
+/// Returns the tint of a height, `t` from 0 (low) to 1 (high).
 pub(super) fn tint(t: f64) -> RGBColor {
     let at = t.clamp(0.0, 1.0) * (TINTS.len() - 1) as f64;
     let below = (at as usize).min(TINTS.len() - 2);
     style::mix(TINTS[below], TINTS[below + 1], at - below as f64)
 }
 
-/// The colour of a hole's pixel.
+/// Returns the colour of a no-data pixel.
 pub(super) fn hole(x: i32, y: i32) -> RGBColor {
     if (x + y).rem_euclid(8) < 2 {
         STRIPE
@@ -110,7 +109,7 @@ pub(super) fn shade(surface: &Surface<'_>, window: &MapView, columns: i32, rows:
     }
 }
 
-/// A tint under the lights; a level surface keeps it.
+/// Returns a tint under the lights; a level surface keeps its tint.
 fn lit(tint: RGBColor, slope: [f64; 2]) -> RGBColor {
     let [east, north] = slope;
     let length = (east * east + north * north + 1.0).sqrt();
@@ -167,7 +166,7 @@ impl PixelHeights {
         inside.then(|| self.heights[(y * self.columns + x) as usize])?
     }
 
-    /// Rise towards the east and the north, from the neighbours there are.
+    /// Returns the slope towards the east and the north, from the known neighbours.
     fn slope(&self, x: i32, y: i32) -> [f64; 2] {
         let here = self.at(x, y);
         let rise = |low: Option<f64>, high: Option<f64>| match (low, here, high) {
@@ -182,8 +181,8 @@ impl PixelHeights {
         ]
     }
 
-    /// Heights that nearly all pixels lie between, so that one spike does not make the
-    /// rest one colour, and those that all lie between.
+    /// Returns the range of nearly all pixels, so that one spike does not give the rest one colour,
+    /// and the range of all.
     fn ranges(&self) -> ((f64, f64), (f64, f64)) {
         let known = sorted(self.heights.iter().flatten().copied());
         let between = |clipped: f64| {
@@ -203,7 +202,7 @@ impl PixelHeights {
         slope.map_or(1.0, |slope| (1.0 / slope).clamp(0.2, MAX_EXAGGERATION))
     }
 
-    /// Returns true if a pixel's middle lies off the data, rather than in a hole.
+    /// Returns true if a pixel's centre lies off the data, rather than in no-data.
     fn outside(&self, surface: &Surface<'_>, window: &MapView, x: i32, y: i32) -> bool {
         let east = window.west + (f64::from(x) + 0.5) * self.pixel_mm;
         let north = window.south + window.height - (f64::from(y) + 0.5) * self.pixel_mm;
@@ -211,7 +210,7 @@ impl PixelHeights {
     }
 }
 
-/// Every `step`-th pixel of every `step`-th row, row by row from the north.
+/// Returns every `step`-th pixel of every `step`-th row, row by row from the north.
 fn places(columns: i32, rows: i32, step: usize) -> impl Iterator<Item = (i32, i32)> {
     let rows = (0..rows).step_by(step);
     rows.flat_map(move |y| (0..columns).step_by(step).map(move |x| (x, y)))
@@ -223,14 +222,14 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values
 }
 
-/// The value that a `share` of sorted ones do not exceed.
+/// Returns the value that a `share` of sorted values does not exceed.
 fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     Some(sorted[(last as f64 * share) as usize])
 }
 
-/// Mean of the known among `samples`² heights in a pixel; a pixel that is half
-/// hole is a hole.
+/// Returns the mean of the known among `samples`² heights in a pixel; `None` if half of them are
+/// no-data.
 fn mean(surface: &Surface<'_>, corner: [f64; 2], step: [f64; 2], samples: u32) -> Option<f64> {
     let (mut sum, mut known) = (0.0, 0);
     let apart = step[0].abs().min(step[1].abs()) / f64::from(samples);
@@ -258,7 +257,7 @@ mod tests {
 
     #[test]
     fn light_comes_from_the_north_west_and_a_hole_is_striped() {
-        // A cone with a hole at its top.
+        // A cone with no-data at its top.
         let height = |x: f64, y: f64, _: f64| {
             let r = (x - 50.0).hypot(y - 50.0);
             (r > 12.0).then_some(100.0 - r)

@@ -13,20 +13,20 @@ use super::style::{self, INK, SOFT_INK, px};
 use super::{map, panel, timeline};
 use crate::replay::Record;
 
-/// All that the picture of a session shows.
+/// The contents of a session's picture.
 #[derive(Clone, Copy)]
 pub struct SessionPicture<'a> {
-    /// First line, large: what was touched.
+    /// First line, large: the terrain.
     pub title: &'a str,
-    /// Second line: how, where, how large a cell is in the hand.
+    /// Second line: the settings, and the size of a cell in device millimetres.
     pub subtitle: &'a str,
     /// The terrain.
     pub surface: Surface<'a>,
-    /// Records in order of time; terrain frame.
+    /// Records in order of time, terrain frame.
     pub records: &'a [Record],
-    /// Further figures for the panel, name and value with its unit, short.
+    /// Further figures for the panel: short names, and values with their units.
     pub facts: &'a [(String, String)],
-    /// The terrain's place on the ground, where it is shown.
+    /// The terrain's position on the ground, if it is shown.
     pub ground: Option<GroundFacts<'a>>,
 }
 
@@ -46,10 +46,10 @@ impl SessionPicture<'_> {
         self.draw()?.save(path)
     }
 
-    /// Draws the picture. Its width is fixed, its height follows the map's.
+    /// Draws the picture. Its width is fixed; its height depends on the map's.
     ///
     /// # Errors
-    /// [`PictureError::Layout`] as `plotters` reports it.
+    /// [`PictureError::Layout`] from `plotters`.
     pub fn draw(&self) -> Result<Canvas, PictureError> {
         let (surface, records) = (&self.surface, self.records);
         let path = MapView::around(records.iter().map(|r| [r.hip_mm[0], r.hip_mm[1]]));
@@ -92,7 +92,7 @@ impl SessionPicture<'_> {
         axes::write(area, self.subtitle, (0, px(68)), line, HPos::Left)
     }
 
-    /// The session's own figures, then the caller's.
+    /// Returns the session's own figures, then the caller's.
     fn figures(&self) -> Vec<(String, String)> {
         let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         let depth = |r: &Record| length(std::array::from_fn(|i| r.proxy_mm[i] - r.hip_mm[i]));

@@ -1,4 +1,4 @@
-//! Whole pictures, drawn and read back.
+//! Tests of whole pictures, drawn and read back.
 
 use super::*;
 use crate::picture::style::{HIP, PROXY};
@@ -43,12 +43,12 @@ fn session<'a>(records: &'a [Record], size_mm: [f64; 2]) -> SessionPicture<'a> {
     }
 }
 
-/// Pixels of a colour in rows from the first to before the second.
+/// Counts pixels of a colour from the first row to before the second.
 fn count(canvas: &Canvas, color: plotters::style::RGBColor, rows: [i32; 2]) -> usize {
     count_from(0, canvas, color, rows)
 }
 
-/// The same from a column eastwards.
+/// As `count`, from a column eastwards.
 fn count_from(
     column: usize,
     canvas: &Canvas,
@@ -81,7 +81,7 @@ fn a_session_shows_hip_and_proxy_on_map_and_profile() {
     assert_eq!(count(&empty, HIP, profile), 0);
 }
 
-/// However much the panel says, a part of a terrain is shown on the whole of it.
+/// A map of a part shows its position on the whole terrain, whatever the length of the panel.
 #[test]
 fn a_map_of_a_part_shows_where_it_lies() {
     let samples = walk();

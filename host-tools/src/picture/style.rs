@@ -1,4 +1,4 @@
-//! Colours, sizes and type: what makes the pictures look alike.
+//! Colours, sizes and fonts of all pictures.
 
 use plotters::style::{Color, FontStyle, IntoTextStyle, RGBColor, ShapeStyle, TextStyle};
 
@@ -21,12 +21,11 @@ pub const PROXY: RGBColor = RGBColor(226, 84, 28);
 pub const SURFACE: RGBColor = RGBColor(120, 105, 82);
 /// Ground under the surface in a profile.
 pub const GROUND: RGBColor = RGBColor(233, 226, 212);
-/// Behind the times of contact, laid on with [`TOUCHING_INK`].
+/// Background of the times of contact, drawn with the opacity [`TOUCHING_INK`].
 pub const TOUCHING: RGBColor = RGBColor(248, 205, 165);
 /// Opacity of [`TOUCHING`].
 pub const TOUCHING_INK: f64 = 0.32;
-/// For the points and curves of other pictures: six hues that differ in
-/// lightness too.
+/// For the points and curves of other pictures: six hues that also differ in lightness.
 pub const SERIES: [RGBColor; 6] = [
     HIP,
     PROXY,
@@ -39,13 +38,13 @@ pub const SERIES: [RGBColor; 6] = [
 /// Name of the only font in `plotters`.
 const FAMILY: &str = "Noto Sans";
 
-/// Finished pixels to drawing coordinates.
+/// Converts finished pixels to drawing coordinates.
 #[must_use]
 pub const fn px(pixels: i32) -> i32 {
     pixels * SCALE
 }
 
-/// A line in a colour, its width in finished pixels.
+/// Returns a line style; its width is in finished pixels.
 #[must_use]
 pub fn stroke(color: &RGBColor, pixels: f64) -> ShapeStyle {
     ShapeStyle {
@@ -55,7 +54,7 @@ pub fn stroke(color: &RGBColor, pixels: f64) -> ShapeStyle {
     }
 }
 
-/// Regular type of a size in finished pixels.
+/// Returns regular text of a size in finished pixels.
 #[must_use]
 pub fn text(size: i32, color: &RGBColor) -> TextStyle<'static> {
     (FAMILY, px(size))
@@ -63,7 +62,7 @@ pub fn text(size: i32, color: &RGBColor) -> TextStyle<'static> {
         .into_text_style(&(1, 1))
 }
 
-/// Bold type of a size in finished pixels.
+/// Returns bold text of a size in finished pixels.
 #[must_use]
 pub fn bold(size: i32, color: &RGBColor) -> TextStyle<'static> {
     (FAMILY, px(size), FontStyle::Bold)
@@ -71,7 +70,7 @@ pub fn bold(size: i32, color: &RGBColor) -> TextStyle<'static> {
         .into_text_style(&(1, 1))
 }
 
-/// A colour between two, `t` from 0 to 1.
+/// Returns a colour between two, `t` from 0 to 1.
 #[must_use]
 pub fn mix(a: RGBColor, b: RGBColor, t: f64) -> RGBColor {
     let part = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * t).round() as u8;

@@ -14,7 +14,7 @@ use super::style::{
 };
 use crate::replay::Record;
 
-/// Heights of the surface under the HIP, of the HIP and of the proxy.
+/// Draws the heights of the surface under the HIP, of the HIP and of the proxy.
 pub(super) fn heights(
     area: &Area<'_>,
     surface: &Surface<'_>,
@@ -38,7 +38,7 @@ pub(super) fn heights(
     plot.line(|r| Some(r.hip_mm[2]), stroke(&HIP, 1.8))
 }
 
-/// The force's size, and its parts as thin lines.
+/// Draws the magnitude of the force, and its components as thin lines.
 pub(super) fn forces(
     area: &Area<'_>,
     records: &[Record],
@@ -63,10 +63,10 @@ pub(super) fn forces(
     key(&plot.chart)
 }
 
-/// The parts of the force: name and colour.
+/// The components of the force: name and colour.
 const PARTS: [(&str, RGBColor); 3] = [("east", SERIES[2]), ("north", SERIES[3]), ("up", SERIES[4])];
 
-/// Names of the force's lines, in their colours, at the upper right.
+/// Writes the names of the force's lines, in their colours, at the upper right.
 fn key(chart: &Chart<'_>) -> Result<(), PictureError> {
     let area = chart.plotting_area().strip_coord_spec();
     let mut right = area.dim_in_pixel().0.cast_signed() - px(12);
@@ -79,19 +79,19 @@ fn key(chart: &Chart<'_>) -> Result<(), PictureError> {
     Ok(())
 }
 
-/// A chart of something against time.
+/// A chart of quantities against time.
 struct Plot<'a, 'r> {
     chart: Chart<'a>,
     records: &'r [Record],
     time: &'r Range<f64>,
-    /// Of the upright axis.
+    /// Range of the vertical axis.
     range: Range<f64>,
-    /// Finished pixels from side to side.
+    /// Width in finished pixels.
     columns: u32,
 }
 
 impl<'a, 'r> Plot<'a, 'r> {
-    /// Axes, and light bands behind the times of contact.
+    /// Draws axes, and light bands behind the times of contact.
     fn new(
         area: &Area<'a>,
         records: &'r [Record],
@@ -110,7 +110,7 @@ impl<'a, 'r> Plot<'a, 'r> {
         Ok(plot)
     }
 
-    /// A band from top to bottom for each run of times.
+    /// Draws a band from top to bottom for each run of times.
     fn bands(
         &mut self,
         when: impl Fn(&Record) -> bool,
@@ -125,7 +125,7 @@ impl<'a, 'r> Plot<'a, 'r> {
         Ok(())
     }
 
-    /// Ground under a profile.
+    /// Fills the ground under a profile.
     fn fill_below(&mut self, profile: impl Fn(&Record) -> Option<f64>) -> Result<(), PictureError> {
         let floor = self.range.start;
         let ground = self.curve(profile).into_iter().map(|piece| {

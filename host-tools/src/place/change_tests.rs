@@ -5,7 +5,7 @@ use crate::timeouts::wait_until;
 use hapterra_core::phantom::Calibration;
 use heightfield::Raster;
 
-/// 2049 × 2049 samples, 10 m apart, that rise by 1 m each to the east.
+/// Returns 2049 × 2049 samples, 10 m apart, that rise by 1 m each to the east.
 fn raster() -> Raster {
     let raster = Raster::from_fn(2049, 2049, |x, _| x as f32).expect("raster");
     let mut cell = raster.cell().expect("metres");
@@ -26,7 +26,7 @@ impl Bench {
         }
     }
 
-    /// Does something with the terrain at 0.05 mm a cell, and its bounds.
+    /// Calls `look` with the terrain at 0.05 mm a cell, and its bounds.
     fn with<T>(&self, look: impl FnOnce(&Terrain<'_>, Bounds) -> T) -> T {
         let options = PlacementOptions {
             target: Target::Whole,
@@ -52,7 +52,7 @@ impl Bench {
     }
 }
 
-/// 2 mm under the ground of the middle, and a proxy beside it.
+/// Returns a hand with the HIP 2 mm under the ground of the middle, and a proxy beside it.
 fn pressing(terrain: &Terrain<'_>) -> Hand {
     let ground = terrain.height_mm(51.0, 51.2).expect("ground");
     Hand {
@@ -73,7 +73,7 @@ fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
         let view = changed.laid.view;
         assert!((view.scale.cell_mm() - 0.4).abs() < 1e-12);
         assert_eq!(view.exaggeration, before.view.exaggeration);
-        // The proxy's ground, eight times as far from the first sample.
+        // The proxy's ground, now eight times as far from the first sample.
         let ground = changed.terrain.height_mm(408.0, 409.6).expect("ground");
         let [x, y, z] = changed.hip_mm;
         assert!(
@@ -87,7 +87,7 @@ fn zoomed_about_the_proxy_its_ground_and_the_depth_are_the_same() {
             let now = view.home_mm[axis] - changed.hip_mm[axis];
             assert!((then - now).abs() < 1e-9);
         }
-        // What is laid in front of the arm has become as much larger.
+        // The part in front of the arm has grown by the same factor.
         for (now, then) in view.laid_mm.iter().zip(before.view.laid_mm) {
             assert!((now - 8.0 * then).abs() < 1e-9, "{now} {then}");
         }
@@ -114,7 +114,7 @@ fn the_level_is_chosen_as_a_fit_does_and_a_stated_one_stays() {
                 let changed = bounds.apply(terrain, &bounds.first, &zoom, &hand);
                 changed.expect("zoomed").laid.view.level
             };
-            // A count is 0.029 mm.
+            // One count is 0.029 mm.
             assert_eq!([level(1.0), level(0.1), level(10.0)], expected);
         });
     }
@@ -198,7 +198,7 @@ fn what_cannot_be_had_is_said_and_names_the_bound() {
             assert!(said.contains(says), "{change:?}: {said}");
         }
     });
-    // What is too large already may be made smaller.
+    // A terrain that is already too large may be made smaller.
     let bench = Bench::new();
     bench.with(|terrain, bounds| {
         let hand = pressing(terrain);
@@ -249,7 +249,7 @@ fn pending_ground_is_not_known_ground() {
         assert!(!first.ground_is_known);
         assert_eq!(first.hip_mm[2], 50.0, "the height of before");
         wait_until("the ground", || changed().ground_is_known);
-        // Twice as high as what rises by 1 unit a cell.
+        // Twice the height of a terrain that rises by 1 unit for each cell.
         assert!(changed().hip_mm[2] > 50.0);
     });
 }

@@ -1,11 +1,11 @@
-//! Reasons for which a terrain cannot be placed in front of the arm as requested.
+//! Reasons why a terrain cannot be placed in front of the arm as requested.
 
 use crate::terrain::ScaleError;
 
-/// Reason for which a place or a scale is refused.
+/// Reason why a place or a scale is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlaceError {
-    /// Longitude and latitude of a file whose reference system is not known.
+    /// Longitude and latitude, in a file with an unknown reference system.
     #[error(
         "the file states no reference system, so it is not known where a longitude and latitude are in it; it covers {bounds}"
     )]
@@ -13,7 +13,7 @@ pub enum PlaceError {
         /// Bounds of the terrain, in its own coordinates.
         bounds: String,
     },
-    /// Longitude and latitude of a file whose projection is not known.
+    /// Longitude and latitude, in a file with an unknown projection.
     #[error(
         "the projection of the file's reference system ({system}) is not known here, so it is not known where a longitude and latitude are in it; it covers {bounds}"
     )]
@@ -23,12 +23,12 @@ pub enum PlaceError {
         /// Bounds of the terrain, in its own coordinates.
         bounds: String,
     },
-    /// A longitude and latitude that the projection does not have.
+    /// A longitude and latitude outside the projection.
     #[error(
         "longitude {}, latitude {} is no place of the file's map ({system}); it covers {bounds}", .lonlat[0], .lonlat[1]
     )]
     NotOnMap {
-        /// As asked for, degrees.
+        /// The requested ones, degrees.
         lonlat: [f64; 2],
         /// The file's reference system.
         system: String,
@@ -38,7 +38,7 @@ pub enum PlaceError {
     /// A code without a reference system.
     #[error("no reference system EPSG:{0} is known here")]
     UnknownCode(u16),
-    /// A reference system without a transformation to that of the file.
+    /// A reference system without a transformation to the file's.
     #[error("EPSG:{code} and the file's reference system ({system}) have no datum in common")]
     OtherDatum {
         /// The code.
@@ -46,15 +46,15 @@ pub enum PlaceError {
         /// The file's reference system.
         system: String,
     },
-    /// A place that its reference system does not have.
+    /// A place outside its reference system.
     #[error("{},{} is no place of EPSG:{code}", .place[0], .place[1])]
     NotInSystem {
         /// The code.
         code: u16,
-        /// As asked for, x and y.
+        /// The requested place, x and y.
         place: [f64; 2],
     },
-    /// A latitude and longitude in the place of a longitude and latitude.
+    /// Probably latitude and longitude in exchanged order.
     #[error(
         "{},{} is not in the terrain, {},{} is: longitude comes first", .0[0], .0[1], .0[1], .0[0]
     )]
@@ -62,7 +62,7 @@ pub enum PlaceError {
     /// A place beyond the samples.
     #[error("{place} is outside of the terrain, which covers {bounds}")]
     Outside {
-        /// As asked for.
+        /// The requested place.
         place: String,
         /// Bounds of the terrain.
         bounds: String,
@@ -70,21 +70,21 @@ pub enum PlaceError {
     /// A place without a height.
     #[error("there is no data at {place}; the terrain covers {bounds}")]
     Hole {
-        /// As asked for.
+        /// The requested place.
         place: String,
         /// Bounds of the terrain.
         bounds: String,
     },
-    /// Heights that cannot be read at present: they are no holes.
+    /// Heights that cannot be read at present: they are not no-data.
     #[error("the heights at {place} cannot be read at present")]
     Unread {
-        /// As asked for.
+        /// The requested place.
         place: String,
     },
     /// A box whose sides are in the wrong order.
     #[error("a box is west,south,east,north: {0} is not")]
     NoBox(String),
-    /// A box whose west lies east of its east, of a terrain that is not around the globe.
+    /// A box whose west lies east of its east, in a terrain that does not go around the globe.
     #[error(
         "a box is west,south,east,north: {} is east of {}, and the terrain does not go around the globe", .0[0], .0[2]
     )]
@@ -92,69 +92,69 @@ pub enum PlaceError {
     /// A box beyond the samples.
     #[error("the box {place} is outside of the terrain, which covers {bounds}")]
     BoxOutside {
-        /// As asked for.
+        /// The requested box.
         place: String,
         /// Bounds of the terrain.
         bounds: String,
     },
-    /// A box around nothing but holes.
+    /// A box with nothing but no-data.
     #[error("there is no data in the box {place}; the terrain covers {bounds}")]
     BoxOfHoles {
-        /// As asked for.
+        /// The requested box.
         place: String,
         /// Bounds of the terrain.
         bounds: String,
     },
-    /// A box that holds no patch.
+    /// A box without a whole patch.
     #[error("the box {place} is smaller than a cell of the terrain, which covers {bounds}")]
     BoxTooSmall {
-        /// As asked for.
+        /// The requested box.
         place: String,
         /// Bounds of the terrain.
         bounds: String,
     },
-    /// A box of longitude and latitude that a map does not hold in one piece.
+    /// A box of longitude and latitude that is not in one piece on the map.
     #[error("the box {place} lies across the seam of the file's map ({system})")]
     BoxAcrossSeam {
-        /// As asked for.
+        /// The requested box.
         place: String,
         /// The file's reference system.
         system: String,
     },
-    /// A box across the end of a field that goes around the globe.
+    /// A box across the border of a raster that goes around the globe.
     #[error(
         "the box {place} lies across the end of the terrain, which goes around the globe: its parts are --bbox {} and --bbox {}, ask for one of them", .parts[0], .parts[1]
     )]
     BoxInTwoParts {
-        /// As asked for.
+        /// The requested box.
         place: String,
         /// Both parts in the file's own coordinates.
         parts: [String; 2],
     },
-    /// Ground metres, of a file without a size.
+    /// A scale in ground metres, for a file without a size.
     #[error("the file does not state its cell size on the ground")]
     NoGroundSize,
-    /// A scale that is none.
+    /// An invalid scale.
     #[error("{0} ground metres a device millimetre: it must be above zero, and finite")]
     GroundScale(f64),
-    /// An exaggeration that is none.
+    /// An invalid exaggeration.
     #[error("heights × {0}: it must be finite and not zero")]
     Exaggeration(f64),
-    /// Heights that the arm does not reach, however small the terrain is.
+    /// Heights beyond the arm's reach at any size of the terrain.
     #[error("the relief is {relief_mm:.0} mm high in the hand; the arm reaches {reach_mm:.0} mm")]
     TooTall {
-        /// Of the terrain in the hand.
+        /// Relief of the terrain, device millimetres.
         relief_mm: f64,
-        /// From the lowest to the highest point that the arm gets to.
+        /// Height of the arm's workspace, mm.
         reach_mm: f64,
     },
-    /// A home position that is farther out than can be addressed.
+    /// A home position too far from the origin for its coordinates.
     #[error("the place under the home position, ({:.0}, {:.0}, {:.0}) mm, is too far from the origin", .0[0], .0[1], .0[2])]
     FarAway([f64; 3]),
-    /// A calibration whose stops leave no room.
+    /// A calibration whose stops leave no workspace.
     #[error("the calibration leaves the arm no room to lay a terrain into")]
     NoReach,
-    /// Numbers that no terrain can be scaled with.
+    /// Numbers that are no valid scale.
     #[error(transparent)]
     Scale(#[from] ScaleError),
 }

@@ -3,37 +3,38 @@
 use super::error::PlaceError;
 use super::reach::Reach;
 
-/// Room over the highest point, for a hand that lifts, and below the lowest, for one
-/// that presses, mm.
+/// Space above the highest point, for a hand that lifts, and below the lowest, for one that
+/// presses, mm.
 pub(super) const ABOVE_MM: f64 = 15.0;
 const BELOW_MM: f64 = 10.0;
-/// The scale is found to this share: a step of the reach's profile is coarser.
+/// Bisections of the search for the scale, far finer than a step of the reach's profile.
 const HALVINGS: usize = 24;
-/// A terrain is laid smaller than the reach by up to this factor, for its heights.
+/// Min size of a terrain as a share of the largest: its heights may require a small one.
 const SMALLEST: f64 = 1e-6;
 
 /// Extent to fit to the workspace.
 pub(super) struct Extent<'a> {
-    /// East and north, haptic cells.
+    /// Extent east and north, haptic cells.
     pub(super) cells: [f64; 2],
-    /// Lowest and highest point in the hand, mm, with cells of a size in the hand, mm.
+    /// Lowest and highest point, device millimetres, as a function of the cell size, device
+    /// millimetres.
     pub(super) heights_mm: &'a dyn Fn(f64) -> [f64; 2],
 }
 
 /// Result of a fit to the workspace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
-    /// Device millimetres a haptic cell.
+    /// Device millimetres for each haptic cell.
     pub(super) cell_mm: f64,
-    /// The middle of the extent east and north of the home position, mm.
+    /// The middle of the extent, east and north of the home position, mm.
     pub(super) middle_mm: [f64; 2],
-    /// Height of the terrain at the home position's height, mm.
+    /// The terrain's height coordinate at the home position, mm.
     pub(super) home_up_mm: f64,
 }
 
 impl Extent<'_> {
-    /// Lays the extent into the reach as large as it fits; `round` makes a cell that fits
-    /// smaller by a little, for a scale in round numbers.
+    /// Fits the extent to the workspace, as large as possible; `round` reduces a fitting cell size
+    /// to a round number.
     pub(super) fn fit(
         &self,
         reach: &Reach,
@@ -42,7 +43,7 @@ impl Extent<'_> {
         let longest = self.cells[0].max(self.cells[1]);
         let widest = reach.middle_of([1.0, 1.0, ABOVE_MM + BELOW_MM]);
         widest.ok_or(PlaceError::NoReach)?;
-        // No arm reaches twice its home pose's distances to each side.
+        // No arm reaches more than twice its home pose's distances to each side.
         let mut too_large = 4.0 * reach.height_mm().max(1.0) / longest;
         let mut fitting = too_large * SMALLEST;
         if !self.fits(reach, fitting) {

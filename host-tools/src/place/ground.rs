@@ -1,4 +1,4 @@
-//! From the coordinates that a user gives to places in a haptic grid.
+//! The user's coordinates as places in a haptic grid.
 
 use super::coordinates::Coordinates;
 use super::error::PlaceError;
@@ -10,17 +10,17 @@ use heightfield::{
     Georeference, LonLat, ReadStatus, ReadTracker, ReferenceSystem, Sides, System, around,
 };
 
-/// Points along each side of a box in another system than the file's: its sides are bent on a map.
+/// Points along each side of a box in another reference system: its sides are curved on the map.
 const ALONG: u32 = 24;
-/// Neighbours on a side of a box that are farther apart than this share of it lie on two
-/// sides of a map's seam.
+/// Distance of neighbours on a side of a box, as a share of the box, above which they lie on
+/// different sides of a map's seam.
 const TORN: f64 = 0.5;
-/// A place this far beyond the outermost sample is on it, in samples.
+/// Tolerance for a place beyond the outermost sample, in samples.
 const ON_SAMPLE: f64 = 1e-6;
-/// Samples looked at along each side of a box for its lowest and highest point.
+/// Samples along each side of a box that are read for its lowest and highest point.
 const LOOKS: u32 = 257;
 
-/// A place in the file's coordinates.
+/// Returns a place in the file's coordinates.
 pub(super) fn place(
     file: &Georeference<'_>,
     place: [f64; 2],
@@ -56,7 +56,7 @@ pub(super) fn place(
     })
 }
 
-/// Longitude and latitude, as the file counts them, of a place in another reference system.
+/// Returns the file's longitude and latitude of a place in another reference system.
 fn lonlat_of(file: &Georeference<'_>, code: u16, place: [f64; 2]) -> Result<[f64; 2], PlaceError> {
     let system = ReferenceSystem::from_code(code).ok_or(PlaceError::UnknownCode(code))?;
     let is_wgs84 = |kind| matches!(kind, LonLat::Wgs84 | LonLat::ShiftedToWgs84 { .. });
@@ -75,14 +75,14 @@ fn lonlat_of(file: &Georeference<'_>, code: u16, place: [f64; 2]) -> Result<[f64
     Ok([longitude, latitude])
 }
 
-/// Returns true if the place lies in the field once its two numbers are swapped.
+/// Returns true if the place lies in the raster after its two numbers are exchanged.
 fn is_latitude_first(file: &Georeference<'_>, [one, other]: [f64; 2]) -> bool {
     let [west, south, east, north] = file.bounds();
     let swapped = file.of_lonlat([other, one]);
     swapped.is_some_and(|[x, y]| (west..=east).contains(&x) && (south..=north).contains(&y))
 }
 
-/// Points around a box, in the file's coordinates.
+/// Returns points around a box, in the file's coordinates.
 pub(super) fn outline(
     file: &Georeference<'_>,
     asked: Sides,
@@ -99,7 +99,7 @@ pub(super) fn outline(
         east += turn;
         if let System::Geographic { degrees } = file.system() {
             let [first, _, last, _] = file.bounds();
-            // More than half of the globe, of a field that has less.
+            // More than half of the globe, for a raster with less.
             if east - west > 0.5 * turn && (last - first) * degrees < 180.0 {
                 return Err(PlaceError::WestInTheEast(asked));
             }
@@ -140,9 +140,9 @@ pub(super) fn outline(
     }
 }
 
-/// The outline of a box in a field of degrees. A field that goes all around the globe ends
-/// somewhere, and a box across that end has two parts: only one piece can be laid before
-/// an arm. A box around the globe is the whole field.
+/// Returns the outline of a box in a raster in degrees. A raster around the whole globe has a
+/// border, and a box across that border has two parts, of which only one can be placed in front of
+/// an arm. A box around the globe is the whole raster.
 fn in_one_piece(
     file: &Georeference<'_>,
     asked: Sides,
@@ -173,7 +173,7 @@ fn in_one_piece(
     }
 }
 
-/// A longitude that can be asked for.
+/// Returns the place with a longitude that the projection accepts.
 fn within_turn([longitude, latitude]: [f64; 2]) -> [f64; 2] {
     match longitude > 360.0 {
         true => [longitude - 360.0, latitude],
@@ -181,7 +181,7 @@ fn within_turn([longitude, latitude]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// A place with its longitude in the turn in which it is so many degrees east of another.
+/// Returns a place with its longitude in the turn where it is about `east` degrees east of another.
 fn in_turn_of(file: &Georeference<'_>, other: [f64; 2], east: f64, [x, y]: [f64; 2]) -> [f64; 2] {
     let System::Geographic { degrees } = file.system() else {
         return [x, y];
@@ -201,7 +201,7 @@ fn is_torn(points: &[[f64; 2]]) -> bool {
         .any(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1]) > TORN * whole)
 }
 
-/// A place in haptic cells that has a height, and this height in the file's vertical unit.
+/// Returns a place with a height, in haptic cells, and the height in the file's vertical unit.
 pub(super) fn spot(
     grid: &HapticGrid<'_>,
     asked: [f64; 2],
@@ -238,7 +238,7 @@ pub(super) fn spot(
     }
 }
 
-/// The part of a terrain in a box: haptic cells, and its lowest and highest point in the
+/// Returns the part of a terrain in a box: haptic cells, and its lowest and highest point in the
 /// file's vertical unit.
 pub(super) fn area(
     grid: &HapticGrid<'_>,
@@ -263,7 +263,7 @@ pub(super) fn area(
     }
     let cells = [west, south, east, north];
     match heights(grid, cells) {
-        // The range of what was read would be too small.
+        // The range of the available heights would be too small.
         (_, ReadStatus::Pending) => Err(PlaceError::Unread {
             place: format!("the box {}", told().0),
         }),
@@ -275,8 +275,8 @@ pub(super) fn area(
     }
 }
 
-/// Lowest and highest of the samples in a rectangle of haptic cells, or of many of them
-/// where they are very many. And whether all of these were read.
+/// Returns the lowest and highest sample in a rectangle of haptic cells, of a subset if there are
+/// very many; and whether all of them were read.
 fn heights(
     grid: &HapticGrid<'_>,
     [west, south, east, north]: Sides,

@@ -1,9 +1,9 @@
 //! Placement of a terrain in front of the arm.
 //!
-//! [`Target`] and [`PlacementOptions`] are what the user asks for. [`Reach`] is what an arm can
-//! get to, by its calibration. [`Placement::new`] makes of both and of a grid the one answer: the
-//! place under the home position, scale, level and heights, from which terrain and scene
-//! follow. [`PlacementChange`] makes another view of it while it is rendered.
+//! [`Target`] and [`PlacementOptions`] are the user's request. [`Reach`] is the workspace of an
+//! arm, from its calibration. [`Placement::new`] computes from both and a grid the place under the
+//! home position, scale, level and heights, which determine terrain and scene. [`PlacementChange`]
+//! changes the placement during a session.
 
 mod change;
 mod coordinates;

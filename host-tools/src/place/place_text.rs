@@ -3,8 +3,7 @@
 use super::coordinates::Coordinates;
 use heightfield::{Georeference, LonLat, Sides, System, around};
 
-/// Returns the bounds of a terrain in its own coordinates and, where they are known, in longitude
-/// and latitude.
+/// Returns the bounds of a terrain in its own coordinates and, if known, in longitude and latitude.
 #[must_use]
 pub fn bounds_in_words(file: &Georeference<'_>) -> String {
     let [west, south, east, north] = file.bounds();
@@ -32,7 +31,7 @@ pub fn bounds_in_words(file: &Georeference<'_>) -> String {
     }
 }
 
-/// A place in the file's coordinates and, where it is known, in longitude and latitude.
+/// Returns a place in the file's coordinates and, if known, in longitude and latitude.
 #[must_use]
 pub fn place_in_words(file: &Georeference<'_>, ground: [f64; 2]) -> String {
     let own = asked_in_words(file, ground, Coordinates::Own);
@@ -66,14 +65,14 @@ fn kind_in_words(kind: LonLat<'_>) -> String {
     }
 }
 
-/// Two coordinates without their names, as a map has them at its corners.
+/// Returns two coordinates without their names, for the corners of a map.
 #[must_use]
 pub fn coordinates_in_words(file: &Georeference<'_>, ground: [f64; 2]) -> String {
     let digits = Digits::of(file);
     ground.map(|value| digits.say(value)).join(", ")
 }
 
-/// A place as it was asked for.
+/// Returns a place in the user's coordinates.
 pub(super) fn asked_in_words(
     file: &Georeference<'_>,
     [a, b]: [f64; 2],
@@ -90,18 +89,18 @@ pub(super) fn asked_in_words(
     }
 }
 
-/// A box in the file's own coordinates, as it can be asked for.
+/// Returns a box in the file's own coordinates, in the form of the option.
 pub(super) fn own_box_in_words(file: &Georeference<'_>, sides: Sides) -> String {
     let digits = Digits::of(file);
     sides.map(|side| digits.say(side)).join(",")
 }
 
-/// A box as it was asked for.
+/// Returns a box in the form of the option.
 pub(super) fn box_in_words(sides: Sides) -> String {
     sides.map(|side| side.to_string()).join(",")
 }
 
-/// The file's reference system in a word or two.
+/// Returns a short name of the file's reference system.
 pub(super) fn system_in_words(file: &Georeference<'_>) -> String {
     match file.system() {
         System::Cells => "cells from the south-west sample".into(),
@@ -117,7 +116,7 @@ pub(super) fn system_in_words(file: &Georeference<'_>) -> String {
     }
 }
 
-/// The unit of angles that are not degrees.
+/// Returns the unit of angles that are not degrees.
 fn angle_in_words(system: System) -> &'static str {
     match system {
         System::Geographic { degrees: 1.0 } | System::Projected => "",
@@ -126,8 +125,8 @@ fn angle_in_words(system: System) -> &'static str {
     }
 }
 
-/// Returns the names of a file's two coordinates: longitude and latitude are those that can be
-/// asked for.
+/// Returns the names of a file's two coordinates; longitude and latitude only if options accept
+/// them as such.
 fn names(file: &Georeference<'_>) -> [&'static str; 2] {
     match file.system() {
         System::Cells => ["column", "row"],
@@ -136,7 +135,7 @@ fn names(file: &Georeference<'_>) -> [&'static str; 2] {
     }
 }
 
-/// As many decimals as tell hundredths of a sample apart.
+/// Number of decimals that resolve hundredths of a sample.
 struct Digits(usize);
 
 impl Digits {

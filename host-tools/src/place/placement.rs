@@ -12,36 +12,36 @@ use crate::terrain::{
     Distortion, HapticGrid, MAX_TIP_CELLS, Scale, ScaleError, Terrain, TerrainError,
 };
 
-/// Relief that a terrain gets in the hand where the file does not know how large its cells
-/// are, so that it has no true proportions, mm.
+/// Relief of a fitted terrain without true proportions, because its file does not state its cell
+/// size, mm.
 const RELIEF_MM: f64 = 25.0;
-/// Relief that a hand feels well, mm.
+/// Relief that a hand feels clearly, mm.
 pub(crate) const FELT_MM: f64 = 15.0;
-/// Device millimetres a haptic cell at a place without a stated scale.
+/// Device millimetres for each haptic cell, at a place without a stated scale.
 const CELL_MM: f64 = 1.0;
 
 /// Requested size of the terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Sizing {
-    /// The target fills the arm's reach; of a place, 1 mm is a haptic cell.
+    /// The target fills the arm's workspace; at a place, a haptic cell is 1 mm.
     #[default]
     Fit,
-    /// Device millimetres a haptic cell of level 0.
+    /// Device millimetres for each haptic cell of level 0.
     CellMm(f64),
-    /// Ground metres a device millimetre.
+    /// Ground metres for each device millimetre.
     GroundMPerMm(f64),
 }
 
 /// Requested height of the terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Heights {
-    /// So many times its true proportions. A file that does not know how large its cells are has
-    /// none: its relief is then 25 mm times this where it is fitted, and a vertical unit is 1 mm
-    /// times this where its scale is stated.
+    /// A multiple of its true proportions. A file without a cell size has none: its relief is then
+    /// 25 mm times this if it is fitted, and a vertical unit is 1 mm times this if its scale is
+    /// stated.
     Exaggerated(f64),
-    /// [`suited_height`].
+    /// Height from [`suited_height`].
     Suited,
-    /// Device millimetres a vertical unit of the file.
+    /// Device millimetres for each vertical unit of the file.
     MmPerUnit(f64),
 }
 
@@ -51,8 +51,9 @@ impl Default for Heights {
     }
 }
 
-/// Device millimetres a vertical unit for a terrain that may be too flat to be rendered: `plain`,
-/// which is true to scale, or as much more as makes a `relief` (vertical units) 15 mm high.
+/// Returns device millimetres for each vertical unit of a terrain that may be too flat to feel:
+/// `plain`, which is true to scale, or more if that is needed to make a `relief` (vertical units)
+/// 15 mm high.
 #[must_use]
 pub fn suited_height(plain: f64, relief: f64) -> f64 {
     match relief > 0.0 {
@@ -64,13 +65,13 @@ pub fn suited_height(plain: f64, relief: f64) -> f64 {
 /// Requested placement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlacementOptions {
-    /// Which part of the terrain.
+    /// Part of the terrain.
     pub target: Target,
     /// Its size.
     pub sizing: Sizing,
     /// Its height.
     pub heights: Heights,
-    /// Level of detail; chosen by the encoders' resolution if it is not stated.
+    /// Level of detail; by default it depends on the encoders' resolution.
     pub level: Option<u8>,
 }
 
@@ -80,35 +81,34 @@ pub struct Placement {
     /// The point of the terrain under the tip in its home pose, device millimetres east,
     /// north and up from the south-west sample at height zero.
     pub home_mm: [f64; 3],
-    /// The same place in the file's coordinates.
+    /// The same point in the file's coordinates.
     pub home_ground: [f64; 2],
-    /// Of level 0.
+    /// Scale of level 0.
     pub scale: Scale,
     /// Level L: every 2ᴸ-th sample is rendered.
     pub level: u8,
     /// Side of a haptic cell of level 0 on the ground, m, if the file states it.
     pub side_m: Option<f64>,
-    /// Height of the terrain, in its true proportions' height, where the file
-    /// states them.
+    /// Height of the terrain relative to its true proportions, if the file states them.
     pub exaggeration: Option<f64>,
-    /// The part in front of the arm, from west, south to east, north, device millimetres;
-    /// the whole terrain where only place and scale are stated.
+    /// The part in front of the arm: west, south, east, north, device millimetres; the whole
+    /// terrain if only place and scale are stated.
     pub laid_mm: [f64; 4],
-    /// Lowest and highest point of that in the hand, mm.
+    /// Lowest and highest point of that part, device millimetres.
     pub heights_mm: [f64; 2],
     /// The arm's workspace ([`Reach::sides_mm`]).
     pub reach_mm: [f64; 4],
 }
 
 impl Placement {
-    /// Lays a terrain in front of an arm.
+    /// Computes the placement of a terrain in front of an arm.
     ///
-    /// The grid is the target's own ([`Target::grid`]): its cells are square at the place.
+    /// The grid must be the target's own ([`Target::grid`]): its cells are square at the place.
     ///
     /// # Errors
-    /// [`PlaceError`]: no such place or box, nothing known there, a scale that is none,
-    /// heights that the arm does not reach. [`heightfield::Raster::check_complete`] returns the
-    /// reason for [`PlaceError::Unread`].
+    /// [`PlaceError`]: no such place or box, nothing known there, an invalid scale, or heights
+    /// beyond the arm's reach. [`heightfield::Raster::check_complete`] returns the reason for
+    /// [`PlaceError::Unread`].
     pub fn new(
         grid: &HapticGrid<'_>,
         reach: &Reach,
@@ -124,7 +124,7 @@ impl Placement {
             (Target::Whole, Sizing::CellMm(_) | Sizing::GroundMPerMm(_)) => {
                 let scale = wanted.stated_scale()?;
                 let haptic = wanted.last().map(|last| 0.5 * last);
-                // The middle may be a hole; what is around it is rendered all the same.
+                // The middle may be no-data; the ground around it is rendered all the same.
                 let [low, high] = wanted.whole_heights();
                 let (height, status) = grid.read_surface(haptic);
                 if !status.is_complete() {
@@ -145,26 +145,27 @@ impl Placement {
         }
     }
 
-    /// Ground metres a device millimetre, if the file states its size.
+    /// Returns ground metres for each device millimetre, if the file states its cell size.
     #[must_use]
     pub fn ground_m_per_mm(&self) -> Option<f64> {
         self.side_m.map(|side| side / self.scale.cell_mm())
     }
 
-    /// Ground metres a haptic cell of the view's level, if the file states its size.
+    /// Returns ground metres for each haptic cell of the placement's level, if the file states its
+    /// cell size.
     #[must_use]
     pub fn haptic_cell_m(&self) -> Option<f64> {
         self.side_m.map(|side| side * f64::from(self.level).exp2())
     }
 
-    /// Device millimetres a haptic cell of the view's level.
+    /// Returns device millimetres for each haptic cell of the placement's level.
     #[must_use]
     pub fn haptic_cell_mm(&self) -> f64 {
         self.scale.at_level(self.level).cell_mm()
     }
 
-    /// The haptic cell within the arm's reach that is farthest from its true shape; of the
-    /// view's own grid. `None` where the file does not state its cell size.
+    /// Returns the most distorted haptic cell within the arm's reach, in the placement's own grid.
+    /// `None` if the file does not state its cell size.
     #[must_use]
     pub fn worst_reached(&self, grid: &HapticGrid<'_>) -> Option<Distortion> {
         let cells =
@@ -172,8 +173,8 @@ impl Placement {
         grid.worst_in([0, 1, 2, 3].map(cells))
     }
 
-    /// The same at another scale: device millimetres a haptic cell of level 0, and a vertical
-    /// unit. The place has yet to be [`Self::moved_to`].
+    /// Returns the placement at another scale: device millimetres for each haptic cell of level 0,
+    /// and for each vertical unit. The caller then has to call [`Self::moved_to`].
     pub(super) fn scaled(self, cell_mm: f64, height_mm_per_unit: f64) -> Result<Self, ScaleError> {
         let scale = Scale::new(cell_mm, height_mm_per_unit)?;
         let steeper = scale.height_cells(1.0) / self.scale.height_cells(1.0);
@@ -184,8 +185,8 @@ impl Placement {
         })
     }
 
-    /// The same over cells that are measured at another place: as large on the ground and in
-    /// the hand, so that scale and exaggeration stay. The place has yet to be
+    /// Returns the placement over cells measured at another place, equally large on the ground and
+    /// in device millimetres, so that scale and exaggeration stay. The caller then has to call
     /// [`Self::moved_to`].
     pub(super) fn measured_as(self, anew: &HapticGrid<'_>) -> Result<Self, ScaleError> {
         let cell_mm = self.scale.cell_mm() * self.as_large_as_in(anew);
@@ -203,8 +204,8 @@ impl Placement {
         sides.map_or(1.0, |(there, here)| there / here)
     }
 
-    /// The same with another point under the tip in its home pose, device millimetres, after
-    /// a view at another scale and of another grid.
+    /// Returns the placement with another point under the tip in the home pose, device millimetres,
+    /// after a change of scale or grid.
     pub(super) fn moved_to(
         self,
         grid: &HapticGrid<'_>,
@@ -227,7 +228,7 @@ impl Placement {
         }
     }
 
-    /// The terrain at the view's scale and level.
+    /// Returns the terrain at the placement's scale and level.
     ///
     /// # Errors
     /// [`TerrainError`].
@@ -235,10 +236,10 @@ impl Placement {
         Terrain::over(grid, self.scale, self.level)
     }
 
-    /// The scene in which the arm feels the view's terrain.
+    /// Returns the scene of the placement's terrain for an arm.
     ///
     /// # Errors
-    /// [`PlaceError::FarAway`] where the home position is farther out than can be addressed.
+    /// [`PlaceError::FarAway`] if the home position is too far from the origin for its coordinates.
     pub fn scene(&self, terrain: &Terrain<'_>, params: SurfaceParams) -> Result<Scene, PlaceError> {
         let home = terrain.scale().to_grid(self.home_mm);
         let home = home.ok_or(PlaceError::FarAway(self.home_mm))?;
@@ -276,7 +277,7 @@ impl<'g> Wanted<'g> {
         })
     }
 
-    /// Columns and rows of the last rendered sample.
+    /// Returns column and row of the last rendered sample.
     fn last(&self) -> [f64; 2] {
         [self.grid.columns(), self.grid.rows()].map(|count| f64::from(count) - 1.0)
     }
@@ -296,8 +297,8 @@ impl<'g> Wanted<'g> {
         Ok(Scale::new(cell_mm, self.height_mm_per_unit(cell_mm, None))?)
     }
 
-    /// Device millimetres a vertical unit with cells of a size in the hand; `relief` is that
-    /// of what is fitted, in vertical units.
+    /// Returns device millimetres for each vertical unit, for a cell size in device millimetres;
+    /// `relief` is that of a fitted part, in vertical units.
     fn height_mm_per_unit(&self, cell_mm: f64, relief: Option<f64>) -> f64 {
         let plain = match (self.grid.cells_per_vertical_unit(), relief) {
             (Some(cells), _) => cells * cell_mm,
@@ -314,7 +315,7 @@ impl<'g> Wanted<'g> {
         }
     }
 
-    /// A place of the terrain under the home position.
+    /// Returns a placement with a place of the terrain under the home position.
     fn over(
         &self,
         reach: &Reach,
@@ -323,14 +324,14 @@ impl<'g> Wanted<'g> {
         height: f64,
     ) -> Result<Placement, PlaceError> {
         let [east, north] = haptic.map(|cells| cells * scale.cell_mm());
-        // In the home pose the tip hangs in the air over its place.
+        // In the home pose the tip is above the ground of its place.
         let up = height * scale.height_mm_per_unit() + ABOVE_MM;
         let [columns, rows] = self.last();
         let cells = [0.0, 0.0, columns, rows];
         Ok(self.view(reach, scale, [east, north, up], cells, self.whole_heights()))
     }
 
-    /// Part of the terrain in the middle of the reach.
+    /// Returns a placement with a part of the terrain in the middle of the reach.
     fn fitted(
         &self,
         reach: &Reach,
@@ -385,8 +386,8 @@ impl<'g> Wanted<'g> {
     }
 }
 
-/// The finest level whose cells are not finer than a count of the encoders, and in which the tip
-/// is not too many cells large; a lower one where that would leave no patch.
+/// Returns the finest level whose cells are not finer than a count of the encoders, and in which
+/// the tip's radius is at most [`MAX_TIP_CELLS`], or the coarsest level with a patch.
 pub(super) fn finest_level(grid: &HapticGrid<'_>, resolution_mm: f64, scale: &Scale) -> u8 {
     let fewest = grid.columns().min(grid.rows()) - 1;
     let last = fewest.max(1).ilog2() as u8;
@@ -399,15 +400,15 @@ fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// The smallest number of three digits that is not below a positive one.
+/// Returns the smallest number with three digits that is not below `x` (positive).
 fn rounded_up(x: f64) -> f64 {
     let unit = 10f64.powf(x.log10().floor() - 2.0);
     let rounded = (x / unit - 1e-9).ceil() * unit;
-    // The digits that people read: 0.3, not 0.30000000000000004.
+    // Removes binary rounding: 0.3, not 0.30000000000000004.
     format!("{rounded:.2e}").parse().unwrap_or(rounded)
 }
 
-/// The largest number of three digits that is not above a positive one.
+/// Returns the largest number with three digits that is not above `x` (positive).
 fn rounded_down(x: f64) -> f64 {
     let unit = 10f64.powf(x.log10().floor() - 2.0);
     let rounded = (x / unit + 1e-9).floor() * unit;

@@ -1,4 +1,4 @@
-//! Every kind of grid at every kind of place: what is asked for is under the hand.
+//! Tests with every kind of grid at every kind of place: the requested place is under the hand.
 
 use super::*;
 use crate::place::{Coordinates, ReachBox};
@@ -11,7 +11,7 @@ use heightfield::{CellSize, CellUnit, Certainty, Globe, GroundTransform, Raster,
 const LONLAT: Coordinates = Coordinates::LonLat;
 const OWN: Coordinates = Coordinates::Own;
 
-/// Hills of 41 × 31 samples, with heights from 0 to 100 units.
+/// Returns hills of 41 × 31 samples, with heights from 0 to 100 units.
 fn hills() -> Raster {
     let raster = Raster::from_fn(41, 31, |column, row| {
         let (x, y) = (column as f32 * 0.2, row as f32 * 0.3);
@@ -33,7 +33,7 @@ fn cell(sides: (f64, f64), unit: CellUnit, lean: f64) -> CellSize {
     }
 }
 
-/// A raster at a place: name, raster, and whether its place on the globe is known.
+/// Returns rasters at places: name, raster, and whether the place on the globe is known.
 fn made() -> Vec<(&'static str, Raster, bool)> {
     let metre = CellUnit::Length { metres: 1.0 };
     let at = |origin, column, row, epsg, size| {
@@ -99,7 +99,7 @@ fn reach() -> Reach {
     Reach::of(&Calibration::PREMIUM_1_5)
 }
 
-/// The view, and the grid that it is of.
+/// Returns the placement and its grid.
 fn seen<'r>(
     raster: &'r Raster,
     options: &PlacementOptions,
@@ -124,7 +124,7 @@ fn boxed(sides: [f64; 4], coordinates: Coordinates) -> PlacementOptions {
     }
 }
 
-/// The coordinates under the home position of the scene that a device would get.
+/// Returns the coordinates under the home position of a device's scene.
 fn ground_at_home(grid: &HapticGrid<'_>, view: &Placement) -> [f64; 2] {
     let terrain = view.terrain(*grid).expect("a terrain");
     let scene = view
@@ -151,7 +151,7 @@ fn what_is_asked_for_is_under_the_home_position() {
                     let wanted = grid.of_ground(ground);
                     let off = (found[0] - wanted[0]).hypot(found[1] - wanted[1]);
                     assert!(off < 0.5, "{name}, {sample:?}: {off} cells");
-                    // Far better, in truth.
+                    // The real error is much smaller.
                     assert!(off < 1e-3, "{name}, {sample:?}: {off} cells");
                     let height = grid.surface(wanted).expect("known");
                     let up = height * view.scale.height_mm_per_unit();
@@ -307,7 +307,7 @@ fn box_is_centred_and_no_finer_than_the_encoders() {
         .expect("whole")
         .1;
     let resolution = reach().resolution_mm();
-    // Samples are finer than a count, pairs of them are not.
+    // Single samples are finer than a count, pairs of them are not.
     assert!(whole.scale.cell_mm() < resolution, "{whole:?}");
     assert!(whole.haptic_cell_mm() >= resolution, "{whole:?}");
     assert_eq!(whole.level, 1, "{} mm", whole.haptic_cell_mm());
@@ -320,7 +320,7 @@ fn box_is_centred_and_no_finer_than_the_encoders() {
     for (found, wanted) in corners.as_flattened().iter().zip(sides) {
         assert!((found - wanted).abs() < 1e-3, "{corners:?}");
     }
-    // The middle is straight before the home position.
+    // The middle is directly in front of the home position.
     assert!((view.home_ground[0] - 501_030.0).abs() < 1e-3, "{view:?}");
     assert!(whole.ground_m_per_mm() > view.ground_m_per_mm());
 }
@@ -346,7 +346,7 @@ fn boxes_by_longitude_and_latitude_also_over_the_antimeridian() {
     let [west, south] = file.to_lonlat([386_100.0, 3_790_100.0]).expect("there");
     let [east, north] = file.to_lonlat([386_200.0, 3_790_200.0]).expect("there");
     assert!(by(utm, [west, south, east, north], LONLAT).is_ok());
-    // From 179.99 to 180.01, however its longitudes are written.
+    // From 179.99 to 180.01, in any notation of the longitudes.
     let pacific = &grids[1].1;
     let first = by(pacific, [179.99, -9.99, -179.99, -9.98], LONLAT).expect("there");
     for sides in [
@@ -364,7 +364,7 @@ fn boxes_by_longitude_and_latitude_also_over_the_antimeridian() {
         }
     }
     assert!(by(pacific, [179.99, -9.99, -179.99, -9.98], OWN).is_ok());
-    // The world's own map is torn there.
+    // The map of the world has its seam there.
     let web = &grids[3].1;
     let torn = by(web, [170.0, -10.0, -170.0, 10.0], LONLAT);
     assert!(
@@ -373,7 +373,7 @@ fn boxes_by_longitude_and_latitude_also_over_the_antimeridian() {
     );
 }
 
-/// A quarter of a degree between columns: no field around the globe.
+/// With a quarter of a degree between columns, the raster does not go around the globe.
 #[test]
 fn box_with_west_and_east_swapped_is_refused() {
     let raster = Raster::from_fn(4, 4, |column, row| (column + row) as f32).expect("raster");
@@ -391,7 +391,7 @@ fn box_with_west_and_east_swapped_is_refused() {
     }
 }
 
-/// Fields around the globe end somewhere, and half of a box is an error.
+/// Rasters around the globe have a border, and half of a box is an error.
 #[test]
 fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
     let globe = |west: f64| {
@@ -423,7 +423,7 @@ fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
                 assert!(said.contains(part), "{part} in: {said}");
             }
         }
-        // Each part can be had, and so can a box elsewhere and the globe as a whole.
+        // Each part is accepted, and so are a box elsewhere and the whole globe.
         for part in parts {
             let numbers = part.trim_start_matches("--bbox ").split(',');
             let numbers: Vec<f64> = numbers
@@ -437,7 +437,7 @@ fn a_box_across_the_end_of_a_globe_is_refused_with_its_two_parts() {
         let columns = (whole.laid_mm[2] - whole.laid_mm[0]) / whole.scale.cell_mm();
         assert!(columns > 358.0, "{columns} columns");
     }
-    // A field that is longer on one side of 180° than the box has one part only.
+    // A raster that extends farther beyond 180° than the box contains it in one part.
     assert!(seen(&globe(0.5), &boxed(asked, LONLAT)).is_ok());
 }
 
@@ -580,7 +580,7 @@ fn place_in_another_reference_system_is_the_same_place() {
     let near = |found: [f64; 2], place: [f64; 2], within: f64| {
         (0..2).all(|axis| (found[axis] - place[axis]).abs() < within)
     };
-    // NAD83 and WGS 84 count as one.
+    // NAD83 and WGS 84 are treated as the same.
     let place = [386_200.0, 3_790_100.0];
     for code in [26911, 32611] {
         let found = ground(utm, place, Coordinates::Epsg(code)).expect("there");
@@ -625,7 +625,7 @@ fn heights_that_were_not_read_are_no_holes() {
     let raster = in_file(folder.path(), [600, 600], |x, y| (x + y) as f32);
     let grid = HapticGrid::new(&raster, HapticCells::Stored).with_wait(Wait::Never);
     for (target, words) in [
-        // Each reads a block that nothing before it has read.
+        // Each case reads a block that no earlier case has read.
         (Target::At([30.0, 20.0], OWN), "column 30, row 20"),
         (Target::Whole, "the middle of the terrain"),
         (

@@ -1,20 +1,20 @@
-//! Workspace and resolution of an arm by its calibration.
+//! Workspace and resolution of an arm, from its calibration.
 
 use std::f64::consts::PI;
 
 use hapterra_core::Vec3;
 use hapterra_core::phantom::Calibration;
 
-/// Distance from the stops at which a pose counts as reached, rad: 5°, so that a hand at the
-/// terrain's border does not touch them.
+/// Distance from the stops that poses must keep, rad: 5°, so that a hand at the terrain's border
+/// does not touch the stops.
 const MARGIN_RAD: f32 = 5.0 * (std::f32::consts::PI / 180.0);
-/// Nearest to the base's axis that a tip is taken to, as a share of both links: there
-/// the first joint turns far for a small step to the side.
+/// Min distance of the tip from the base's axis, as a share of both links' length: nearer to the
+/// axis, the first joint turns far for a small step to the side.
 const NEAREST: f64 = 0.25;
-/// Places looked at along the links' whole length.
+/// Places of the profile along the links' whole length.
 const PLACES: usize = 96;
 
-/// A box around terrain, mm: east, north and up of the tip in its home pose.
+/// A box around terrain, mm: east, north and up from the tip in its home pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReachBox {
     /// West, south and lowest.
@@ -24,7 +24,7 @@ pub struct ReachBox {
 }
 
 impl ReachBox {
-    /// A box of a size around a middle.
+    /// Returns a box of a size around a middle.
     #[must_use]
     pub fn around(middle: [f64; 3], size: [f64; 3]) -> Self {
         Self {
@@ -36,28 +36,28 @@ impl ReachBox {
 
 /// Workspace of an arm.
 ///
-/// The arm turns about the base's axis, so its reach is a profile of distances from
-/// this axis and heights, swept through the angles of the first joint.
+/// The arm turns about the base's axis, so its workspace is a profile of distances from this axis
+/// and heights, rotated through the angles of the first joint.
 #[derive(Clone, Debug)]
 pub struct Reach {
-    /// Between two places of the profile, mm.
+    /// Distance of two places of the profile, mm.
     step_mm: f64,
     /// Distance from the axis and height of the tip in the home pose, mm, device frame.
     home_mm: [f64; 2],
-    /// Of the first joint, rad.
+    /// Angles of the first joint, rad.
     turn_rad: [f64; 2],
-    /// Places of the profile outwards, from the axis on.
+    /// Places of the profile outwards from the axis.
     columns: usize,
-    /// Places of the profile upwards, from both links' length below the axis on.
+    /// Places of the profile upwards, from both links' length below the axis.
     rows: usize,
-    /// Number of unreached places inwards of and below a place.
+    /// Number of unreachable places inwards of and below each place.
     missing: Vec<u32>,
-    /// Of the tip in the home pose, the coarsest axis, mm a count.
+    /// Resolution of the coarsest axis at the tip in the home pose, mm for each count.
     resolution_mm: f64,
 }
 
 impl Reach {
-    /// The reach of an arm with a calibration.
+    /// Computes the reach of an arm from its calibration.
     #[must_use]
     pub fn of(record: &Calibration) -> Self {
         let whole = f64::from(record.l1_mm) + f64::from(record.l2_mm);
@@ -80,15 +80,15 @@ impl Reach {
         reach
     }
 
-    /// Returns the resolution of the encoders at the tip in the home pose, mm: the coarsest
-    /// axis. The levers of the axes are there the upper link, the upper link and the fore
+    /// Returns the resolution of the encoders at the tip in the home pose, mm: that of the coarsest
+    /// axis. The levers of the three axes are there the upper link, the upper link and the fore
     /// link.
     #[must_use]
     pub const fn resolution_mm(&self) -> f64 {
         self.resolution_mm
     }
 
-    /// From the lowest to the highest point of the profile, mm.
+    /// Returns the height from the lowest to the highest point of the profile, mm.
     #[must_use]
     pub fn height_mm(&self) -> f64 {
         let reached = |row: usize| {
@@ -101,8 +101,8 @@ impl Reach {
         high.saturating_sub(low) as f64 * self.step_mm
     }
 
-    /// The rectangle around all that the arm gets to, whatever the height: west, south, east
-    /// and north of the tip in its home pose, mm.
+    /// Returns the rectangle around the workspace at all heights: west, south, east and north of
+    /// the tip in its home pose, mm.
     #[must_use]
     pub fn sides_mm(&self) -> [f64; 4] {
         let is_reached =
@@ -123,7 +123,7 @@ impl Reach {
         ]
     }
 
-    /// Returns true if the arm gets to every point of a box.
+    /// Returns true if the arm reaches every point of a box.
     #[must_use]
     pub fn holds(&self, of: &ReachBox) -> bool {
         let ([west, south, low], [east, north, high]) = (of.low, of.high);
@@ -131,8 +131,8 @@ impl Reach {
             .is_some_and(|out| self.reaches_all(out, [low, high]))
     }
 
-    /// Returns the middle of a box of a size in the workspace: the one that is closest to the tip
-    /// in its home pose, mm east, north, up of it; not to the side.
+    /// Returns the middle of a box of a size in the workspace, the closest to the tip in its home
+    /// pose and not to the side: mm east, north, up from that tip.
     #[must_use]
     pub fn middle_of(&self, size: [f64; 3]) -> Option<[f64; 3]> {
         let half = size.map(|side| 0.5 * side);
@@ -155,8 +155,8 @@ impl Reach {
         best.map(|(_, middle)| middle)
     }
 
-    /// Nearest and farthest distance from the axis in a rectangle east and north of the
-    /// home pose, mm; `None` where the first joint does not turn so far.
+    /// Returns the nearest and farthest distance from the axis in a rectangle east and north of the
+    /// home pose, mm; `None` if the first joint does not turn that far.
     fn outwards(&self, [west, east]: [f64; 2], [south, north]: [f64; 2]) -> Option<[f64; 2]> {
         // The user faces the device: north is towards the base's axis.
         let [near, far] = [self.home_mm[0] - north, self.home_mm[0] - south];
@@ -179,8 +179,8 @@ impl Reach {
         self.step_mm * (row as f64 - PLACES as f64)
     }
 
-    /// Returns true if all of a rectangle of the profile is reached, from and to distances from the
-    /// axis and heights over the home pose, mm: all places around it are.
+    /// Returns true if a rectangle of the profile is reachable, with all places around it:
+    /// distances from the axis and heights over the home pose, mm.
     fn reaches_all(&self, out_mm: [f64; 2], up_mm: [f64; 2]) -> bool {
         let place = |mm: f64| mm / self.step_mm;
         let columns = [place(out_mm[0]).floor(), place(out_mm[1]).ceil()];
@@ -190,11 +190,11 @@ impl Reach {
             && columns[1] < self.columns as f64
             && rows[0] >= 0.0
             && rows[1] < self.rows as f64;
-        // All four are whole numbers from zero on here.
+        // All four are whole numbers not below zero here.
         inside && self.missing_in(columns.map(|c| c as usize), rows.map(|r| r as usize)) == 0
     }
 
-    /// Returns the number of unreached places in a rectangle, ends included.
+    /// Returns the number of unreachable places in a rectangle, ends included.
     fn missing_in(&self, columns: [usize; 2], rows: [usize; 2]) -> u32 {
         let until = |column: usize, row: usize| {
             let index = row * (self.columns + 1) + column;
@@ -205,7 +205,7 @@ impl Reach {
             .wrapping_sub(until(west, high).wrapping_add(until(east, low)))
     }
 
-    /// Sums of missing places before each column and row.
+    /// Returns the number of unreachable places before each column and row.
     fn sums(&self, record: &Calibration, nearest_mm: f64) -> Vec<u32> {
         let width = self.columns + 1;
         let mut sums = vec![0; width * (self.rows + 1)];
@@ -223,12 +223,12 @@ impl Reach {
     }
 }
 
-/// Returns true if a pose inside the stops by a margin brings the tip to a distance from the axis
-/// and a height, mm.
+/// Returns true if a pose inside the stops, with the margin, has its tip at a distance from the
+/// axis and a height, mm.
 fn is_reached(record: &Calibration, out_mm: f64, up_mm: f64) -> bool {
-    // Straight on where the first joint may stand so, else in the middle of its angles.
+    // Straight ahead if the first joint's stops allow it, otherwise the nearest allowed angle.
     let limits = &record.limits;
-    // No record is too wrong for this: a clamp would not do.
+    // `clamp` would panic on a calibration with exchanged limits.
     let turn = 0.0_f32.max(limits.min_rad.x).min(limits.max_rad.x);
     let (sin, cos) = turn.sin_cos();
     let out = out_mm as f32;
@@ -281,7 +281,7 @@ mod tests {
         }
     }
 
-    /// Against poses of all joints within their stops.
+    /// Checked against poses of all joints within their stops.
     #[test]
     fn the_sides_of_the_reach_are_around_every_pose_and_no_farther_out() {
         for record in PRESETS {
@@ -356,7 +356,7 @@ mod tests {
         }
     }
 
-    /// The figures of docs/how-to/place-and-scale.md.
+    /// The numbers of docs/how-to/place-and-scale.md.
     #[test]
     fn the_encoders_tell_what_the_docs_say() {
         let counts = PRESETS.map(|record| Reach::of(&record).resolution_mm());

@@ -1,4 +1,4 @@
-//! Changes of a surface while it is touched.
+//! Changes of a surface during a session.
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Shading, SurfaceParams, Texture};
@@ -8,9 +8,9 @@ use crate::named_surfaces::NamedSurface;
 /// Change of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SurfaceChange {
-    /// Coefficients of friction: while the tip slides, and at rest.
+    /// Coefficients of friction: dynamic and static.
     Friction {
-        /// While it slides.
+        /// While the tip slides.
         dynamic_mu: f32,
         /// At rest.
         static_mu: f32,
@@ -19,18 +19,18 @@ pub enum SurfaceChange {
     ViscousFriction(f32),
     /// Damping along the force, N·s/m.
     Damping(f32),
-    /// Which normals the force follows.
+    /// The normals for the force's direction.
     Shading(Shading),
     /// The micro-relief.
     Texture(Texture),
-    /// Another surface with its stiffness.
+    /// Another surface, including its stiffness.
     Named(&'static NamedSurface),
 }
 
-/// Reason for which a surface cannot be changed. It stays as it is.
+/// Reason why a surface cannot be changed. It stays as it is.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
-    /// Coefficients that a contact cannot work with.
+    /// Coefficients outside their range.
     #[error(
         "a friction of {dynamic_mu}, and {static_mu} at rest: from 0 to {most}, and at rest not less than while the tip slides",
         most = Friction::MOST
@@ -41,13 +41,13 @@ pub enum SurfaceError {
         /// At rest.
         static_mu: f32,
     },
-    /// A time that a contact cannot work with.
+    /// A time outside its range.
     #[error("a viscous friction of {0} s: from 0 to {most} s can be had", most = Friction::MAX_VISCOUS_S)]
     ViscousFriction(f32),
-    /// More or less damping than can be had.
+    /// Damping outside its range.
     #[error("a damping of {0} N·s/m: from 0 to {most} N·s/m can be had", most = Damping::MAX_NS_PER_M)]
     Damping(f32),
-    /// A relief that no hand could feel or no tick could make.
+    /// A texture outside its range, or too fine for a tick.
     #[error(
         "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {most} mm can be had",
         shortest = Texture::WAVELENGTHS_MM.0,
@@ -57,10 +57,10 @@ pub enum SurfaceError {
     Texture {
         /// Height above and below the surface.
         amplitude_mm: f32,
-        /// From ridge to ridge.
+        /// Distance from ridge to ridge.
         wavelength_mm: f32,
     },
-    /// A quantity of each material.
+    /// A quantity that each material of the scene has for itself.
     #[error(
         "each material of the scene has its own: change the table and begin anew, or begin without --materials"
     )]
@@ -68,8 +68,8 @@ pub enum SurfaceError {
 }
 
 impl SurfaceChange {
-    /// The surface parameters after this change; `has_materials` if the ground has several
-    /// materials.
+    /// Returns the surface parameters after this change; `has_materials` is true if the ground has
+    /// several materials.
     ///
     /// # Errors
     /// [`SurfaceError`].

@@ -1,4 +1,4 @@
-//! Which part of a terrain is asked for.
+//! The requested part of a terrain.
 
 use super::coordinates::Coordinates;
 use super::error::PlaceError;
@@ -6,24 +6,24 @@ use super::ground;
 use crate::terrain::{HapticCells, HapticGrid};
 use heightfield::{Georeference, Raster, Sides, around};
 
-/// Which part of a terrain is asked for.
+/// The requested part of a terrain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Target {
     /// All of it.
     #[default]
     Whole,
-    /// A rectangle. Of degrees its west may be larger than its east: then it lies across
-    /// the line where longitudes begin anew.
+    /// A rectangle. In degrees its west may be larger than its east: it then lies across the line
+    /// where longitudes start again.
     Box(Sides, Coordinates),
-    /// The place under the tip in the home pose.
+    /// A place under the tip in the home pose.
     At([f64; 2], Coordinates),
 }
 
 impl Target {
-    /// The haptic grid of a raster at this target: its cells are square there.
+    /// Returns the haptic grid of a raster for this target: its cells are square there.
     ///
     /// # Errors
-    /// [`PlaceError`] where there is no such place.
+    /// [`PlaceError`] if there is no such place.
     pub fn grid<'r>(
         &self,
         raster: &'r Raster,
@@ -35,7 +35,7 @@ impl Target {
         })
     }
 
-    /// The middle of the target in the file's coordinates; of the whole terrain nothing.
+    /// Returns the middle of the target in the file's coordinates; `None` for the whole terrain.
     ///
     /// # Errors
     /// As [`Target::grid`].

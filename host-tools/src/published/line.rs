@@ -1,19 +1,19 @@
-//! The cells under a segment, one after the other (Amanatides & Woo 1987).
+//! The cells under a segment, in order (Amanatides & Woo 1987).
 
 use super::real::Real;
 
-/// Iterates over the cells from one point to another.
+/// Iterator over the cells from one point to another.
 pub struct Line<R> {
     cell: [i32; 2],
     step: [i32; 2],
-    /// Part of the segment at which the next border is reached.
+    /// Part of the segment up to the next border.
     next: [R; 2],
     each: [R; 2],
     left: u32,
 }
 
 impl<R: Real> Line<R> {
-    /// From one point to another.
+    /// Creates an iterator from one point to another.
     #[must_use]
     #[inline]
     pub fn new(from: [R; 2], to: [R; 2]) -> Self {

@@ -1,10 +1,10 @@
-//! The paper's algorithm as published (§4.3), as plainly as it can be written: Newton
-//! in two variables, the bounded point over edges and vertices, averaged normals, the
-//! candidate patch by the lowest height of the whole segment.
+//! The paper's algorithm as published (§4.3), as simply as possible: Newton's method in two
+//! variables, the bounded point over edges and vertices, averaged normals, the candidate patch by
+//! the lowest height of the whole segment.
 //!
-//! `hapterra-lab replay --contact paper` renders it, and the speed tables compare with it
-//! ("× plain"). No device implements it. Two properties are the paper's own: the first candidate
-//! may not be the first patch hit, and a fast HIP passes through what is thin.
+//! `hapterra-lab replay --contact paper` renders it, and the speed tables compare with it ("×
+//! plain"). No device implements it. Two properties are the paper's own: the first candidate may
+//! not be the first patch hit, and a fast HIP passes through thin terrain.
 
 mod line;
 mod real;
@@ -16,10 +16,10 @@ pub use real::Real;
 
 /// The heights of a field, cells.
 pub trait Heights {
-    /// Returns true if there is such a patch.
+    /// Returns true if the patch exists.
     fn has(&self, cell: [i32; 2]) -> bool;
 
-    /// The corners of a patch that exists: south-west, south-east, north-west, north-east.
+    /// Returns the corners of a patch that exists: south-west, south-east, north-west, north-east.
     fn corners(&self, cell: [i32; 2]) -> [f32; 4];
 }
 
@@ -35,16 +35,16 @@ impl<H: Heights + ?Sized> Heights for &H {
     }
 }
 
-/// Start of Newton's iteration in the patch that held the last closest point.
+/// Start of Newton's iteration in the patch with the last closest point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// In the middle of the patch, always.
+    /// Always in the middle of the patch.
     Centre,
     /// At the last closest point.
     LastPoint,
 }
 
-/// Patches looked at in one tick, at most.
+/// Max patches in one tick.
 const PATCHES: u32 = 1024;
 
 /// eq. 1-5 on the unit grid: z = d + b·u + c·v + a·u·v
@@ -56,16 +56,16 @@ struct Patch<R> {
     d: R,
 }
 
-/// A place in a patch.
+/// A point in a patch.
 #[derive(Clone, Copy, Debug)]
 struct Place<R> {
     cell: [i32; 2],
     u: R,
     v: R,
-    /// From the HIP to this place.
+    /// Vector from the HIP to this point.
     displacement: [R; 3],
     squared: R,
-    /// Toward which neighbours it lies on the border.
+    /// Sides of the patch on whose border the point lies: -1, 0 or 1 east and north.
     border: [i32; 2],
 }
 
@@ -79,7 +79,7 @@ pub struct Paper<H, R> {
 }
 
 impl<H: Heights, R: Real> Paper<H, R> {
-    /// At most `iterations` Newton steps a patch, from `start`.
+    /// Creates the algorithm with at most `iterations` Newton steps for each patch, from `start`.
     #[must_use]
     pub const fn new(heights: H, start: Start, iterations: u32) -> Self {
         Self {
@@ -97,8 +97,8 @@ impl<H: Heights, R: Real> Paper<H, R> {
         self.contact = None;
     }
 
-    /// One tick: the displacement from the HIP, counted from the origin, to the proxy in
-    /// contact, cells.
+    /// Computes one tick: returns the displacement from the HIP to the proxy in contact, cells. The
+    /// HIP is relative to the origin.
     #[inline]
     pub fn step(&mut self, hip: [R; 3]) -> Option<[R; 3]> {
         match self.last_hip.replace(hip) {
@@ -126,7 +126,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
         Patch::new(self.heights.corners(cell).map(R::of))
     }
 
-    /// Step 1 from free space.
+    /// Finds the candidate patch: step 1 from free space.
     #[inline]
     fn candidate(&self, from: &[R; 3], to: &[R; 3]) -> Option<[i32; 2]> {
         let low = if from[2] < to[2] { from[2] } else { to[2] };
@@ -138,7 +138,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
             })
     }
 
-    /// Step 2 in one patch.
+    /// Finds the closest point in one patch: step 2.
     #[inline]
     fn closest_in(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
         let [x, y] = cell.map(R::from_whole);
@@ -147,7 +147,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
             .closest(cell, &local, start, self.iterations)
     }
 
-    /// Step 2 across patches.
+    /// Finds the closest point across patches: step 2.
     #[inline]
     fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R)) -> Place<R> {
         let mut here = self.closest_in(cell, hip, start);
@@ -171,7 +171,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
         here
     }
 
-    /// Step 3: (LCP − HIP)·n > 0, n averaged at edges and vertices.
+    /// Returns true if (LCP − HIP)·n > 0, with n averaged at edges and vertices: step 3.
     #[inline]
     fn is_inside(&self, place: &Place<R>) -> bool {
         let normal = self.patch(place.cell).normal(place.u, place.v);
@@ -195,7 +195,7 @@ impl<H: Heights, R: Real> Paper<H, R> {
     }
 }
 
-/// The one patch that shares the edge, or the three that share the vertex.
+/// Returns the one patch that shares the edge, or the three that share the vertex.
 #[inline]
 fn around<R: Real>(place: &Place<R>) -> impl Iterator<Item = [i32; 2]> + use<R> {
     let ([x, y], [east, north]) = (place.cell, place.border);
@@ -229,7 +229,7 @@ impl<R: Real> Patch<R> {
         [-(self.b + self.a * v), -(self.c + self.a * u), R::one()]
     }
 
-    /// Newton's point, or where that is outside the patch the bounded one.
+    /// Returns Newton's point, or the bounded one if that is outside the patch.
     #[inline]
     fn closest(&self, cell: [i32; 2], hip: &[R; 3], start: (R, R), iterations: u32) -> Place<R> {
         let inside = |x: R| x >= R::zero() && x <= R::one();
@@ -239,7 +239,7 @@ impl<R: Real> Patch<R> {
         }
     }
 
-    /// eq. 8-11. `None` where the Jacobian is singular.
+    /// Iterates eq. 8-11. Returns `None` if the Jacobian is singular.
     #[inline]
     fn newton(&self, [p, q, r]: &[R; 3], start: (R, R), iterations: u32) -> Option<(R, R)> {
         let (mut u, mut v) = start;
@@ -262,7 +262,7 @@ impl<R: Real> Patch<R> {
         Some((u, v))
     }
 
-    /// The nearest point over the four edges, vertices included.
+    /// Returns the nearest point on the four edges, vertices included.
     #[inline]
     fn bounded(&self, cell: [i32; 2], hip: &[R; 3]) -> Place<R> {
         let [p, q, r] = *hip;
@@ -300,8 +300,8 @@ impl<R: Real> Patch<R> {
     }
 }
 
-/// Step 2 in one patch, for the solver's own comparison: the place in the unit
-/// square that is found from the middle.
+/// Returns the point that step 2 finds in the unit square from its middle, to compare the solver
+/// alone.
 #[inline]
 pub fn newton<R: Real>(corners: [R; 4], hip: [R; 3], iterations: u32) -> (R, R) {
     let middle = (R::HALF, R::HALF);

@@ -1,4 +1,4 @@
-//! Single or double precision, for the same lines of code.
+//! Single or double precision for the same code.
 
 use std::fmt::Debug;
 
@@ -8,15 +8,15 @@ use num_traits::Float;
 pub trait Real: Float + Debug {
     /// 1/2
     const HALF: Self;
-    /// A Newton step below this many cells is the last.
+    /// Length of a Newton step, cells, below which the iteration ends.
     const LAST_STEP: Self;
-    /// Nearest value.
+    /// Converts to the nearest value.
     fn of(value: f32) -> Self;
-    /// Downwards.
+    /// Rounds down.
     fn whole(self) -> i32;
-    /// Exact up to 2²⁴.
+    /// Converts a whole number; exact up to 2²⁴.
     fn from_whole(whole: i32) -> Self;
-    /// To single precision.
+    /// Converts to single precision.
     fn single(self) -> f32;
 }
 
@@ -33,7 +33,7 @@ macro_rules! real {
             fn whole(self) -> i32 {
                 self.floor() as i32
             }
-            // Exact for f64 only: the cast is what both can do.
+            // Exact for f64 only, but both types support the cast.
             #[allow(clippy::cast_lossless)]
             #[inline]
             fn from_whole(whole: i32) -> Self {

@@ -1,5 +1,5 @@
-//! The columns that a recording of `run` and `demo` has after the usual ones: what the
-//! loop and its guard did in the tick.
+//! The additional columns in a recording of `run` and `demo`: state of the loop and its guard in
+//! the tick.
 
 use hapterra_core::guard::Mode;
 use hapterra_core::scene::TickRecord;
@@ -10,11 +10,11 @@ use super::state_name;
 /// The loop's part of a row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LoopColumns {
-    /// The view in which it was rendered, counted from 0.
+    /// Number of the row's placement, from 0.
     view: u32,
     state: &'static str,
     mode: &'static str,
-    /// Names of the limits that made the force less, joined by spaces.
+    /// Names of the limits that reduced the force, joined by spaces.
     limits: String,
 }
 
@@ -27,7 +27,7 @@ impl LoopColumns {
         Column::Count("view"),
     ];
 
-    /// The loop's part of a sample that was rendered in a view of the recording.
+    /// Returns the loop's part of a sample in a placement of the recording.
     #[must_use]
     pub fn of(sample: &TickRecord, view: usize) -> Self {
         let limits: Vec<_> = sample.limits.iter_names().map(|(name, _)| name).collect();
@@ -39,13 +39,13 @@ impl LoopColumns {
         }
     }
 
-    /// The view in which it was rendered, counted from 0.
+    /// Returns the number of the row's placement, from 0.
     #[must_use]
     pub const fn view(&self) -> u32 {
         self.view
     }
 
-    /// The values, in the order of [`Self::COLUMNS`].
+    /// Returns the values, in the order of [`Self::COLUMNS`].
     #[must_use]
     pub fn values(&self) -> [Value<'_>; 4] {
         [
@@ -57,7 +57,7 @@ impl LoopColumns {
     }
 }
 
-/// A mode's name in a recording.
+/// Returns a mode's name in a recording.
 #[must_use]
 pub fn mode_name(mode: Mode) -> &'static str {
     match mode {

@@ -1,12 +1,10 @@
-//! Replay: a trajectory of the HIP goes through the loop tick by tick, and
-//! the samples come out. Also the recording that `run` and `demo` write,
-//! which has the same format.
+//! Replay: renders a trajectory of the HIP tick by tick and returns the samples. Also the
+//! recordings of `run` and `demo`, in the same format.
 //!
-//! In lock-step: the device feels one point a tick, answers, and only then gets the
-//! next. Every point is rendered exactly once, with all the terrain it needs, so
-//! the result depends on nothing but the terrain, the surface parameters, the trajectory
-//! and the tick rate.
-//! [`Ticks`] says where the HIP is in each tick.
+//! A replay is in lock-step: the device renders one point in each tick, answers, and only then gets
+//! the next. Every point is rendered exactly once, with all the terrain it needs, so the result
+//! depends only on the terrain, the surface parameters, the trajectory and the tick rate. [`Ticks`]
+//! computes the HIP's position in each tick.
 
 mod loop_columns;
 mod marks;
@@ -39,7 +37,7 @@ use crate::output::{Output, OutputError};
 use crate::terrain::{HapticGrid, Terrain, TerrainError};
 use settings::PlacementSettings;
 
-/// Reason for which a replay ended early. Nothing is left at the output's path.
+/// Reason why a replay ended early. No file remains at the output's path.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The trajectory.
@@ -51,15 +49,15 @@ pub enum ReplayError {
     /// The device.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// A view of the recording that its terrain cannot be rendered in.
+    /// A placement of the recording whose terrain cannot be rendered.
     #[error("placement {number} of the recording cannot be rendered: {why}")]
     Placement {
-        /// The view.
+        /// Number of the placement.
         number: u32,
         /// Reason for the refusal.
         why: TerrainError,
     },
-    /// The user.
+    /// The user interrupted the replay.
     #[error("interrupted")]
     Interrupted,
 }
@@ -67,33 +65,31 @@ pub enum ReplayError {
 /// Summary of a replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
-    /// Ticks rendered, a row of the output each.
+    /// Rendered ticks, one row of the output for each.
     pub rows: u64,
-    /// Of those, rows in contact.
+    /// Rows in contact.
     pub in_contact: u64,
-    /// Of those, rows below the ground that were not rendered, because the HIP had not been
-    /// above it.
+    /// Rows below the ground that were not rendered, because the HIP had not been above it.
     pub below_ground: u64,
-    /// Of those, rows whose HIP is more than a window of the device away from the one before:
-    /// contact begins anew there.
+    /// Rows whose HIP is more than a window of the device away from the row before: contact starts
+    /// again there.
     pub leaps: u64,
 }
 
-/// The columns that a replay's recording has after the usual ones; the view only where
-/// there are several.
+/// The additional columns of a replay's recording; the placement only if there are several.
 const MORE: [Column; 2] = [Column::Text("state"), Column::Count("view")];
 
-/// Receives each sample and its row, and the number of its view with its terrain.
+/// Receives each sample and its row, and the number and terrain of its placement.
 pub type OnSample<'f, 't> = dyn FnMut(&TickRecord, &Record, (u32, &Terrain<'t>)) + 'f;
 
-/// Runs a trajectory through a device and writes the samples to an output, which
-/// appears only when it is complete.
+/// Renders a trajectory on a device and writes the samples to an output, which appears only when it
+/// is complete.
 ///
-/// `on_sample` gets each sample; `go_on` is called now and then, with the number of
-/// rows so far, whether to.
+/// `on_sample` receives each sample; `go_on` is called regularly with the number of rows, and
+/// returns false to stop.
 ///
 /// # Errors
-/// [`ReplayError`] says what was wrong, with file, line and column.
+/// [`ReplayError`] reports the fault with file, line and column.
 pub fn replay_trajectory<'t>(
     replayer: &mut OfflineDevice<'t>,
     ticks: &mut Ticks,
@@ -113,7 +109,7 @@ pub fn replay_trajectory<'t>(
     let mut marks = settings.marks.iter().peekable();
     let first = replayer.terrain().clone();
     while let Some(tick) = ticks.next_tick()? {
-        // Without settings it is a path alone.
+        // A file without settings has no placements.
         if tick.view != view && !settings.views.is_empty() {
             view = tick.view;
             let of_views = (&first, settings);
@@ -149,7 +145,7 @@ pub fn replay_trajectory<'t>(
     Ok(summary)
 }
 
-/// The terrain of a recording's beginning in another of its views.
+/// Returns the terrain of a recording in another of its placements.
 ///
 /// # Errors
 /// [`ReplayError::Placement`].
@@ -169,7 +165,7 @@ pub fn terrain_of<'t>(
     first.relaid(grid, scale, view.level).map_err(cannot)
 }
 
-/// Goes over to the view of a row, as it was done where it was recorded.
+/// Changes to the placement of a row, as in the recorded session.
 fn go_over<'t>(
     replayer: &mut OfflineDevice<'t>,
     trajectory: &mut Trajectory,
@@ -187,8 +183,8 @@ fn go_over<'t>(
     Ok(recording.view(view)?)
 }
 
-/// Returns true if no force is rendered because the HIP is below ground and came there from below, from
-/// a hole or from outside.
+/// Returns true if no force is rendered because the HIP is below ground and did not enter through
+/// the surface.
 #[must_use]
 pub fn is_below_ground(sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) -> bool {
     let [x, y, z] = record.hip_mm;
@@ -196,7 +192,8 @@ pub fn is_below_ground(sample: &TickRecord, record: &Record, terrain: &Terrain<'
     waits && terrain.height_mm(x, y).is_some_and(|ground| z < ground)
 }
 
-/// A replayer on the application in this program's memory, a thousand ticks a second.
+/// Opens an offline device on the application in this program's memory, at a thousand ticks a
+/// second.
 ///
 /// # Errors
 /// As [`OfflineDevice::open`].
@@ -207,7 +204,7 @@ pub fn on_native<'t>(
     on_native_at(TickRate::DEFAULT, terrain, params)
 }
 
-/// The same at another tick rate.
+/// As [`on_native`], at another tick rate.
 ///
 /// # Errors
 /// As [`OfflineDevice::open`].

@@ -1,4 +1,4 @@
-//! Points to a device and back, one at a time.
+//! A device for replays: it renders one point at a time.
 
 use std::time::{Duration, Instant, SystemTime};
 
@@ -12,16 +12,15 @@ use super::published::Published;
 use crate::link::{Event, LinkError, LinkStats, Session, Timeouts, Transport};
 use crate::terrain::Terrain;
 
-/// A point may take so many times what an answer may take before the device counts as
-/// stuck.
+/// Time-out of a point, as a multiple of that of an answer, after which the device counts as stuck.
 const ANSWERS_A_POINT: u32 = 8;
 
-/// Feels points on a device, in a scene of its own.
+/// A device that renders points in a scene of its own.
 pub struct OfflineDevice<'t> {
     terrain: Terrain<'t>,
-    /// Tells the epochs of this replay from those of another.
+    /// Distinguishes the epochs of this replay from those of another.
     nonce: u32,
-    /// Number of the view that is rendered.
+    /// Number of the placement in force.
     view: u8,
     session: Session<'t>,
     device: DeviceHello,
@@ -31,7 +30,7 @@ pub struct OfflineDevice<'t> {
 }
 
 impl<'t> OfflineDevice<'t> {
-    /// Puts a fresh scene in force on a device.
+    /// Puts a new scene in force on a device.
     ///
     /// # Errors
     /// [`LinkError`].
@@ -42,8 +41,7 @@ impl<'t> OfflineDevice<'t> {
         patience: Timeouts,
     ) -> Result<Self, LinkError> {
         let mut scene = terrain.scene(params, Source::Points, GridPoint::default());
-        // A device that holds the scene of an earlier replay would continue from
-        // where that ended.
+        // A device that still has the scene of an earlier replay would continue from its end.
         let nonce = nonce();
         scene.epoch ^= nonce;
         let (session, device) = Session::open(terrain, scene, None, transport, patience)?;
@@ -59,21 +57,21 @@ impl<'t> OfflineDevice<'t> {
         })
     }
 
-    /// Renders the points by the paper's rule on the host from now on, and not on the device.
+    /// Renders all further points by the paper's rule on the host instead of the device.
     #[must_use]
     pub fn by_published_rule(mut self, params: SurfaceParams) -> Self {
         self.published = Some(Published::new(self.terrain.clone(), params));
         self
     }
 
-    /// The terrain that is rendered.
+    /// Returns the rendered terrain.
     #[must_use]
     pub const fn terrain(&self) -> &Terrain<'t> {
         &self.terrain
     }
 
-    /// Goes over to another view of the terrain, with the HIP at a place in it next. A proxy
-    /// that touches begins there on the surface, as it does on an arm.
+    /// Changes to another placement of the terrain, with the HIP's next position in it. A proxy in
+    /// contact starts there on the surface, as with an arm.
     ///
     /// # Errors
     /// [`LinkError`]; the replay cannot continue after one.
@@ -86,7 +84,7 @@ impl<'t> OfflineDevice<'t> {
         self.view = self.view.wrapping_add(1);
         self.last = None;
         let mut scene = terrain.scene(params, Source::Points, GridPoint::default());
-        // One that comes again is another one.
+        // A repeated placement gets a new epoch.
         scene.epoch ^= self.nonce.rotate_left(8) ^ u32::from(self.view);
         let view = SceneChange {
             number: self.view,
@@ -116,13 +114,14 @@ impl<'t> OfflineDevice<'t> {
         Err(LinkError::Stuck(self.seq))
     }
 
-    /// The device that feels it.
+    /// Returns the device.
     #[must_use]
     pub const fn device(&self) -> &DeviceHello {
         &self.device
     }
 
-    /// Returns true if a HIP is more than a window of the device away from the last one.
+    /// Returns true if the next HIP position is more than a window of the device away from the
+    /// last.
     #[must_use]
     pub fn is_leap_to(&self, hip: &GridPoint) -> bool {
         let window = u32::from(self.device.window) * TILE_CELLS as u32;
@@ -164,7 +163,7 @@ impl<'t> OfflineDevice<'t> {
         Err(LinkError::Stuck(seq))
     }
 
-    /// The answer to a point, if it comes soon.
+    /// Returns the answer to a point, if it arrives soon.
     fn answer(&mut self, expected: u32) -> Result<Option<TickRecord>, LinkError> {
         let (mut answer, mut restarted) = (None, false);
         let wait = Duration::from_millis(100);
@@ -188,7 +187,7 @@ impl<'t> OfflineDevice<'t> {
     }
 }
 
-/// A number that the last replay did not have.
+/// Returns a number that differs from that of the last replay.
 fn nonce() -> u32 {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     now.map_or(0, |now| now.as_nanos() as u32) | 1
@@ -201,8 +200,8 @@ mod tests {
     use crate::terrain::Scale;
     use heightfield::Raster;
 
-    /// A device takes a view that has the next number, and a tile that has the epoch of the
-    /// view: one that comes again is another one, also when the numbers begin again.
+    /// A device accepts a placement with the next number, and a tile with the placement's epoch: a
+    /// repeated placement needs a new epoch, also after the numbers start again.
     #[test]
     fn every_view_has_the_next_number_and_an_epoch_of_its_own() {
         let raster = Raster::from_fn(9, 9, |_, _| 0.0).expect("raster");
@@ -223,7 +222,7 @@ mod tests {
             epochs.insert(epoch);
             last = epoch;
         }
-        // As many as there are numbers, and the beginning.
+        // One for each number, and the first scene.
         assert_eq!(epochs.len(), 257);
         let another = on_native(&terrain, params).expect("opened");
         assert!(!epochs.contains(&another.session.scene().epoch));

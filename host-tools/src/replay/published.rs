@@ -9,7 +9,7 @@ use hapterra_core::scene::TickRecord;
 use crate::published::{Heights, Paper, Start};
 use crate::terrain::Terrain;
 
-/// Newton steps in one patch, at most.
+/// Max Newton steps in one patch.
 const STEPS: u32 = 20;
 
 /// The paper's rule in `f64`, with the spring of surface parameters.
@@ -58,7 +58,7 @@ impl<'t> Published<'t> {
         }
     }
 
-    /// One tick.
+    /// Renders one tick.
     pub(super) fn step(&mut self, hip: GridPoint) -> TickRecord {
         let (cell, frac) = (hip.cell(), hip.frac());
         let wide = [0, 1, 2].map(|axis| f64::from(cell[axis]) + f64::from(frac[axis]));

@@ -1,8 +1,7 @@
-//! Settings of a recording: on which terrain, at which place and scale, under
-//! which surface parameters and by which device it was rendered.
+//! Settings of a recording: terrain, place and scale, surface parameters, and device.
 //!
-//! The text is TOML. In a CSV recording each of its lines stands behind `# ` before the
-//! header; in a Parquet recording it is the value of [`KEY`] among the file's metadata.
+//! The text is TOML. In a CSV recording each line follows `# ` before the header; in a Parquet
+//! recording it is the value of [`KEY`] in the file's metadata.
 
 use hapterra_core::contact::Friction;
 use hapterra_core::force::{Damping, Shading, SurfaceParams, Texture};
@@ -18,11 +17,11 @@ use heightfield::printable_text::printable;
 
 /// Key of the first line of the settings; its value is [`FORMAT`].
 pub const KEY: &str = "hapterra-recording";
-/// Version of the settings' format that this program writes and reads.
+/// Version of the settings' format, for writing and reading.
 pub const FORMAT: u32 = 1;
-/// Cells whose sides on the ground differ by less than this share count as the same. Two
-/// machines may round the size of a degree differently, and earlier versions asked a map for
-/// its scale over one metre, which is off by up to 1e-7: their recordings can be replayed.
+/// Relative difference of cell sizes on the ground below which they count as equal. Machines may
+/// round the size of a degree differently, and earlier versions computed a map's scale over one
+/// metre, with an error up to 1e-7: their recordings can still be replayed.
 const SAME: f64 = 1e-6;
 
 /// The settings of a recording.
@@ -31,7 +30,7 @@ pub struct Settings {
     /// Version of this format.
     #[serde(rename = "hapterra-recording")]
     format: u32,
-    /// Version of the program that recorded.
+    /// Version of the program that wrote the recording.
     pub program: String,
     /// Version of the protocol between program and device.
     pub protocol: u16,
@@ -42,76 +41,76 @@ pub struct Settings {
     pub rendered: RenderedTerrain,
     /// The surface parameters and the contact rule.
     pub force: Force,
-    /// Materials of the ground, where there were several; the surface parameters are then
-    /// that of the default.
+    /// Materials of the ground, if there were several; the surface parameters are then those of the
+    /// default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub materials: Option<MaterialSettings>,
     /// The device.
     pub device: Device,
-    /// The placements that were set while it was touched, in their order; the one of the
-    /// beginning is [`Self::rendered`] and [`Self::force`].
+    /// The later placements of the session, in order; the first one is [`Self::rendered`] and
+    /// [`Self::force`].
     #[serde(rename = "view", default, skip_serializing_if = "Vec::is_empty")]
     pub views: Vec<PlacementSettings>,
-    /// The marks that were made while it was touched, in their order.
+    /// The marks of the session, in order.
     #[serde(rename = "mark", default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<Mark>,
 }
 
-/// A placement that was set while a terrain was touched.
+/// A placement that was set during a session.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlacementSettings {
-    /// Number of this placement in the column `view`, from 1 on.
+    /// Number of this placement in the column `view`, from 1.
     pub number: u32,
-    /// Side of a haptic cell of level 0 on the ground, m, if the file states it; none also in
-    /// recordings of earlier versions, whose cells are those of the beginning.
+    /// Side of a haptic cell of level 0 on the ground, m, if the file states it. Also `None` in
+    /// recordings of earlier versions, whose cells are those of the first placement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
-    /// Place where a cell of the file is that large, in the file's coordinates, x and y;
-    /// none where the cells are those of the beginning.
+    /// Place where a cell of the file has this size, in the file's coordinates, x and y; `None` if
+    /// the cells are those of the first placement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured_at: Option<[f64; 2]>,
     /// Level of detail.
     pub level: u8,
-    /// Device millimetres a haptic cell of level 0.
+    /// Device millimetres for each haptic cell of level 0.
     pub cell_mm: f64,
-    /// Device millimetres a vertical unit of the file.
+    /// Device millimetres for each vertical unit of the file.
     pub height_mm_per_unit: f64,
-    /// Radius of the ball at the tip, device millimetres; 0 for a point. None in recordings of earlier
-    /// versions, whose tip is that of the beginning.
+    /// Radius of the ball at the tip, device millimetres; 0 for a point. `None` in recordings of
+    /// earlier versions, whose tip is that of the first placement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_mm: Option<f64>,
-    /// Times that heights are higher than true to scale, if the file states its units.
+    /// Height relative to true proportions, if the file states its units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
-    /// The point of the terrain at the tip in the arm's home pose, device millimetres, as far as
-    /// known to the host: a clutch that the user holds moves it.
+    /// The point of the terrain at the tip in the arm's home pose, device millimetres, as known to
+    /// the host: the user moves it with the clutch.
     pub home_mm: [f64; 3],
-    /// Newtons for a millimetre between the HIP and the proxy.
+    /// Stiffness of the spring from HIP to proxy, N/mm.
     pub stiffness_n_per_mm: f32,
-    /// Largest force, N.
+    /// Max force, N.
     pub max_force_n: f32,
-    /// Which normals the force follows; left out where they are those of the patches.
+    /// The normals for the force's direction; omitted if they are those of the patches.
     #[serde(default, skip_serializing_if = "Shading::is_none")]
     pub shading: Shading,
-    /// Friction of the surface; left out where there is none.
+    /// Friction of the surface; omitted if there is none.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
-    /// Damping of a motion against it; left out where there is none.
+    /// Damping of motion against the surface; omitted if there is none.
     #[serde(default, skip_serializing_if = "Damping::is_none")]
     pub damping: Damping,
-    /// Its micro-relief; left out where it is even.
+    /// Texture of the surface; omitted if there is none.
     #[serde(default, skip_serializing_if = "Texture::is_none")]
     pub texture: Texture,
 }
 
-/// The views alone, as TOML has them.
+/// The placements alone, for TOML.
 #[derive(Serialize)]
 struct Views<'v> {
     view: [&'v PlacementSettings; 1],
 }
 
 impl PlacementSettings {
-    /// A view by its number and terrain.
+    /// Creates the settings of a placement from its number and terrain.
     #[must_use]
     pub fn new(number: u32, terrain: &Terrain<'_>, laid: &Laid) -> Self {
         let (grid, scale) = (terrain.grid(), terrain.scale_of_level_0());
@@ -134,13 +133,13 @@ impl PlacementSettings {
         }
     }
 
-    /// The view as TOML that may follow on [`Settings::to_toml`].
+    /// Returns the placement as TOML that may follow [`Settings::to_toml`].
     #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string(&Views { view: [self] }).unwrap_or_default()
     }
 
-    /// The surface parameters.
+    /// Returns the surface parameters.
     #[must_use]
     pub const fn params(&self) -> SurfaceParams {
         SurfaceParams {
@@ -153,10 +152,10 @@ impl PlacementSettings {
         }
     }
 
-    /// The scale of level 0.
+    /// Returns the scale of level 0.
     ///
     /// # Errors
-    /// Numbers that no terrain can be scaled with.
+    /// Numbers that are no valid scale.
     pub fn scale(&self) -> Result<Scale, ScaleError> {
         Scale::new(self.cell_mm, self.height_mm_per_unit)
     }
@@ -165,13 +164,13 @@ impl PlacementSettings {
 /// The terrain of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TerrainFile {
-    /// The file as it was named, or what was made on the spot.
+    /// The file as the user named it, or the generated terrain.
     pub file: String,
     /// Hash of all heights: [`Terrain::fingerprint`] in hexadecimal digits.
     pub fingerprint: String,
     /// Samples of the file, west to east and south to north.
     pub samples: [u32; 2],
-    /// EPSG code of its horizontal reference system, as `EPSG:2056`, where known.
+    /// EPSG code of its horizontal reference system, as `EPSG:2056`, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crs: Option<String>,
 }
@@ -179,32 +178,32 @@ pub struct TerrainFile {
 /// The rendered terrain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenderedTerrain {
-    /// Which cells of the file.
+    /// Shape of the haptic cells.
     pub cells: HapticCells,
     /// Rendered samples of level 0, west to east and south to north.
     pub samples: [u32; 2],
     /// Side of a haptic cell of level 0 on the ground, m, if the file states it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f64>,
-    /// Place where a cell of the file is that large, in the file's coordinates, x and y;
-    /// none where it is in the middle of the field.
+    /// Place where a cell of the file has this size, in the file's coordinates, x and y; `None` if
+    /// it is in the middle of the raster.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured_at: Option<[f64; 2]>,
     /// Level of detail: every 2^level-th sample.
     pub level: u8,
-    /// Device millimetres a haptic cell of level 0.
+    /// Device millimetres for each haptic cell of level 0.
     pub cell_mm: f64,
-    /// Device millimetres a vertical unit of the file.
+    /// Device millimetres for each vertical unit of the file.
     pub height_mm_per_unit: f64,
-    /// Radius of the ball at the tip, device millimetres; left out where it was a point. The HIP
-    /// and the proxy are the ball's centre.
+    /// Radius of the ball at the tip, device millimetres; omitted for a point. The HIP and the
+    /// proxy are the ball's centre.
     #[serde(default, skip_serializing_if = "is_point")]
     pub tip_mm: f64,
-    /// Times that heights are higher than true to scale, if the file states its units.
+    /// Height relative to true proportions, if the file states its units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exaggeration: Option<f64>,
-    /// The point of the terrain that was at the tip in the arm's home pose, device
-    /// millimetres; none without an arm.
+    /// The point of the terrain at the tip in the arm's home pose, device millimetres; `None`
+    /// without an arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home_mm: Option<[f64; 3]>,
 }
@@ -222,22 +221,22 @@ pub enum Rule {
 /// Rendering of the force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Force {
-    /// Newtons for a millimetre between the HIP and the proxy.
+    /// Stiffness of the spring from HIP to proxy, N/mm.
     pub stiffness_n_per_mm: f32,
-    /// Largest force, N.
+    /// Max force, N.
     pub max_force_n: f32,
     /// The contact rule.
     pub rule: Rule,
-    /// Which normals the force follows; left out where they are those of the patches.
+    /// The normals for the force's direction; omitted if they are those of the patches.
     #[serde(default, skip_serializing_if = "Shading::is_none")]
     pub shading: Shading,
-    /// Friction of the surface; left out where there is none.
+    /// Friction of the surface; omitted if there is none.
     #[serde(default, skip_serializing_if = "Friction::is_none")]
     pub friction: Friction,
-    /// Damping of a motion against it; left out where there is none.
+    /// Damping of motion against the surface; omitted if there is none.
     #[serde(default, skip_serializing_if = "Damping::is_none")]
     pub damping: Damping,
-    /// Its micro-relief; left out where it is even.
+    /// Texture of the surface; omitted if there is none.
     #[serde(default, skip_serializing_if = "Texture::is_none")]
     pub texture: Texture,
 }
@@ -251,9 +250,9 @@ fn is_point(tip_mm: &f64) -> bool {
 /// Materials of the ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialSettings {
-    /// The file of classes, as it was named.
+    /// The file of classes, as the user named it.
     pub file: String,
-    /// Hash of its classes and of where they lie.
+    /// Hash of its classes and their position.
     pub fingerprint: String,
     /// Surfaces of the classes.
     #[serde(flatten)]
@@ -261,7 +260,7 @@ pub struct MaterialSettings {
 }
 
 impl MaterialSettings {
-    /// Of a terrain with materials.
+    /// Returns the settings of a terrain with materials.
     #[must_use]
     pub fn of(materials: &Materials) -> Self {
         Self {
@@ -272,7 +271,7 @@ impl MaterialSettings {
     }
 }
 
-/// The device, as it described itself.
+/// The device, from its own description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Device {
     /// Its board.
@@ -289,29 +288,29 @@ pub enum SettingsError {
     /// Written by a later version of the program.
     #[error("its settings are of format {found}, and this program reads format {FORMAT}")]
     Later {
-        /// The format found.
+        /// The format of the recording.
         found: u32,
     },
-    /// No TOML, or numbers are missing.
+    /// Not TOML, or numbers are missing.
     #[error("its settings cannot be read: {0}")]
     Unreadable(String),
 }
 
-/// A terrain that is not the one of a recording.
+/// A terrain that differs from that of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{found} is not the terrain of this recording, which is {recorded}: {difference}")]
 pub struct OtherTerrain {
     /// The terrain of the recording.
     recorded: String,
-    /// The one that was named now.
+    /// The terrain that the user named now.
     found: String,
-    /// In what they differ.
+    /// The difference.
     difference: String,
 }
 
 impl Settings {
-    /// Makes the settings of a terrain under surface parameters and a rule; `file` names the terrain.
-    /// `home_mm` is the place in the arm's home pose, where there is an arm.
+    /// Creates the settings of a terrain with surface parameters and a rule; `file` names the
+    /// terrain. `home_mm` is the point in the arm's home pose, if there is an arm.
     #[must_use]
     pub fn new(
         file: &str,
@@ -363,14 +362,14 @@ impl Settings {
         }
     }
 
-    /// The settings as TOML, [`KEY`] first.
+    /// Returns the settings as TOML, [`KEY`] first.
     #[must_use]
     pub fn to_toml(&self) -> String {
-        // Structures of numbers and text always have a form in TOML.
+        // Structures of numbers and text can always be written as TOML.
         toml::to_string(self).unwrap_or_default()
     }
 
-    /// The same without the views and marks that come later: what stands before the first row.
+    /// Returns the settings without the later placements and marks: the part before the first row.
     #[must_use]
     pub fn of_beginning(&self) -> Self {
         Self {
@@ -380,12 +379,12 @@ impl Settings {
         }
     }
 
-    /// Reads settings; none where the text is anything else.
+    /// Reads settings; returns `None` if the text is anything else.
     ///
     /// # Errors
-    /// [`SettingsError`] where the text begins as settings do and cannot be used.
+    /// [`SettingsError`] if the text begins like settings but cannot be used.
     pub fn from_toml(text: &str) -> Result<Option<Self>, SettingsError> {
-        /// The format alone: all else may be another way in another one.
+        /// The format alone: other formats may differ in everything else.
         #[derive(Deserialize)]
         struct Format {
             #[serde(rename = "hapterra-recording")]
@@ -402,7 +401,7 @@ impl Settings {
         toml::from_str(text).map(Some).map_err(unreadable)
     }
 
-    /// The surface parameters.
+    /// Returns the surface parameters.
     #[must_use]
     pub const fn params(&self) -> SurfaceParams {
         SurfaceParams {
@@ -415,13 +414,13 @@ impl Settings {
         }
     }
 
-    /// Checks that a terrain is the one of the recording; `file` names it.
+    /// Checks that a terrain is that of the recording; `file` names it.
     ///
-    /// Its heights have to be the same, and where the same cells of it are rendered, those
-    /// have to be as large on the ground.
+    /// Its heights have to be the same and, if the same kind of cells is rendered, the cells have
+    /// to be equally large on the ground.
     ///
     /// # Errors
-    /// [`OtherTerrain`] says in what it differs.
+    /// [`OtherTerrain`] describes the difference.
     pub fn check_terrain(&self, file: &str, terrain: &Terrain<'_>) -> Result<(), OtherTerrain> {
         let difference = if self.terrain.fingerprint != digits(terrain) {
             let (recorded, raster) = (self.terrain.samples, terrain.raster());
@@ -460,7 +459,7 @@ impl Settings {
 }
 
 impl Device {
-    /// The device behind a hello.
+    /// Returns the settings of a device from its introduction.
     #[must_use]
     pub fn of(hello: &DeviceHello) -> Self {
         Self {
@@ -472,7 +471,7 @@ impl Device {
 }
 
 impl RenderedTerrain {
-    /// In what the cells of the same heights differ, where the same kind is rendered.
+    /// Returns the difference of the cells over the same heights, if the same kind is rendered.
     fn difference(&self, grid: &HapticGrid<'_>) -> Option<String> {
         if grid.cells() != self.cells {
             return None;
@@ -492,7 +491,7 @@ impl RenderedTerrain {
         })
     }
 
-    /// Device millimetres a vertical unit at another size in the hand and the recorded
+    /// Returns device millimetres for each vertical unit at another cell size, with the recorded
     /// proportions.
     #[must_use]
     pub fn height_at_cell_mm(&self, cell_mm: f64) -> f64 {

@@ -2,10 +2,10 @@
 
 use hapterra_core::contact::ContactState;
 
-/// Names that earlier versions wrote, and today's.
+/// Names in recordings of earlier versions, and today's.
 const EARLIER: [(&str, &str); 2] = [("waiting", "unseeded"), ("letting go", "releasing")];
 
-/// A state's name in a recording.
+/// Returns a state's name in a recording.
 #[must_use]
 pub const fn state_name(state: ContactState) -> &'static str {
     match state {
@@ -16,7 +16,7 @@ pub const fn state_name(state: ContactState) -> &'static str {
     }
 }
 
-/// Replaces the name of an earlier version by today's.
+/// Replaces an earlier version's name with today's.
 pub(super) fn update_name(name: &mut String) {
     if let Some((_, now)) = EARLIER.iter().find(|(earlier, _)| earlier == name) {
         *name = (*now).to_owned();

@@ -7,11 +7,11 @@
 //! ```
 //!
 //! Once connected, the arm may be armed: by this host, or by an earlier one that was killed. Every
-//! end of serving (an error, a panic, the user's wish) closes the device's session. If the device does
-//! not confirm that it is disarmed, this is reported to the user.
+//! end of serving (an error, a panic, the user's wish) closes the device's session. If the device
+//! does not confirm that it is disarmed, this is reported to the user.
 //!
-//! Nothing here depends on a terminal or on a kind of connection, so the tests play every end
-//! against devices in memory.
+//! Nothing here depends on a terminal or on a kind of connection, so the tests run every end with
+//! devices in memory.
 
 mod service;
 mod session_handler;

@@ -1,4 +1,4 @@
-//! Opens a session, serves, continues over another line where one is lost, and ends.
+//! Opens a session, serves, continues over another line if one is lost, and ends.
 
 use std::time::{Duration, Instant};
 
@@ -10,18 +10,18 @@ use super::session_handler::SessionHandler;
 use crate::link::{Arming, Event, LinkError, LinkStats, Session, Timeouts, Transport};
 use crate::terrain::Terrain;
 
-/// Between two looks at the clock while nothing comes.
+/// Time between two checks of the clock while no message arrives.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Remark for a device that was without its host for too long.
+/// Remark for a device that has disarmed because its host was silent.
 const WAS_SILENT: &str = "before this the device had heard nothing from its host for too long: it let the force out and disarmed the arm";
 
-/// Makes a line to the device.
+/// Opens a line to the device.
 pub type Connect<'s, 't> = Box<dyn FnMut() -> Result<Box<dyn Transport + 't>, LinkError> + 's>;
 
-/// Service of a terrain to a device for a time.
+/// Service of a terrain to a device.
 pub struct Service<'s, 't> {
-    /// The terrain, whose reads do not wait ([`Terrain::non_blocking`]) where an arm may be armed.
+    /// The terrain. If an arm may be armed, its reads must not wait ([`Terrain::non_blocking`]).
     pub terrain: &'t Terrain<'t>,
     /// Placement and surface.
     pub scene: Scene,
@@ -29,20 +29,20 @@ pub struct Service<'s, 't> {
     pub arming: Arming,
     /// Time-outs.
     pub patience: Timeouts,
-    /// Makes a line to the device. There is one line at a time: the one before is closed
-    /// when this is called.
+    /// Opens a line to the device. There is only one line at a time: the one before is closed when
+    /// this is called.
     pub connect: Connect<'s, 't>,
     /// The device as the user names it.
     pub device: String,
-    /// Between two tries to find a device that is gone.
+    /// Time between two tries to find a lost device.
     pub retry: Duration,
-    /// True if the user wants it to continue.
+    /// Returns true while the user wants to continue.
     pub goes_on: &'t dyn Fn() -> bool,
     /// Prints the messages that must reach the user in every case.
     pub tell: &'s dyn Fn(&str),
 }
 
-/// A session under way. Dropping it, also in a panic, closes it.
+/// An open session, which is closed when it is dropped, also in a panic.
 pub struct Served<'s, 't> {
     session: Session<'t>,
     connect: Connect<'s, 't>,
@@ -50,7 +50,7 @@ pub struct Served<'s, 't> {
     retry: Duration,
     goes_on: &'t dyn Fn() -> bool,
     tell: &'s dyn Fn(&str),
-    /// The hello was sent, or may have been.
+    /// True if the open message was sent, or may have been.
     has_greeted: bool,
     is_left: bool,
 }
@@ -58,23 +58,23 @@ pub struct Served<'s, 't> {
 /// End of a service.
 #[derive(Debug)]
 pub struct End {
-    /// The error that ended it, where one did.
+    /// The error that ended the service, if there was one.
     pub why: Result<(), LinkError>,
-    /// Confirmation of the device that it is disarmed:
-    /// [`LinkError::NotConfirmed`] where not, and [`LinkError::Taken`] where that says in
-    /// answer that it has another host. Another host's arm is not this one's to disarm:
-    /// where [`End::why`] is [`LinkError::Taken`] this is no error.
+    /// The device's confirmation that it is disarmed: [`LinkError::NotConfirmed`] if it does not
+    /// confirm, and [`LinkError::Taken`] if it answers that it has another host. This host must not
+    /// disarm another host's arm: if [`End::why`] is [`LinkError::Taken`], this is no error.
     pub disarmed: Result<(), LinkError>,
-    /// Counts of what went over the link.
+    /// Statistics of the link.
     pub tally: LinkStats,
 }
 
 impl<'s, 't> Service<'s, 't> {
-    /// Makes a line, has `check` look at the device that is there, and opens a session.
+    /// Opens a line, calls `check` for the device, and opens a session.
     ///
     /// # Errors
-    /// No line; what `check` finds; [`LinkError`]. Once the line stands, the device is
-    /// disarmed before the error is returned, or the user gets a warning that it may not be.
+    /// No line; the error from `check`; [`LinkError`]. Once the line is open, the device is
+    /// disarmed before the error is returned, or the user gets a warning that it may still be
+    /// armed.
     pub fn open<E: From<LinkError>>(
         mut self,
         check: impl FnOnce(&mut dyn Transport) -> Result<(), E>,
@@ -109,8 +109,8 @@ impl<'s, 't> Service<'s, 't> {
 }
 
 impl<'t> Served<'_, 't> {
-    /// Serves until the handler has seen enough, an end is asked for, or an error that
-    /// waiting does not mend; then says goodbye.
+    /// Serves until the handler ends, the user ends, or an error occurs that waiting does not fix;
+    /// then closes the session.
     pub fn serve(mut self, handler: &mut dyn SessionHandler<'t>) -> End {
         let why = self.until_over(handler);
         let disarmed = self.leave(why.as_ref().err(), &mut |event| handler.take(event));
@@ -128,7 +128,7 @@ impl<'t> Served<'_, 't> {
             for ask in handler.asks() {
                 self.session.ask(ask);
             }
-            // What is wrong with the line is known in a moment anyway.
+            // The next poll reports any error of the line.
             let put = handler
                 .view()
                 .map(|(view, terrain)| self.session.put_view(view, terrain));
@@ -142,7 +142,7 @@ impl<'t> Served<'_, 't> {
         Ok(())
     }
 
-    /// The device is gone: reports it, waits for it and resumes.
+    /// Reports that the device is gone, waits for it and resumes the session.
     fn wait_for_device(
         &mut self,
         handler: &mut dyn SessionHandler<'t>,
@@ -152,7 +152,7 @@ impl<'t> Served<'_, 't> {
         handler.hear(&format!("{why}; waiting for {device} (Ctrl-C ends)"));
         let began = Instant::now();
         while (self.goes_on)() {
-            // A device that is silent may still be claimed by the line to it.
+            // The old line may still have a claim on a silent device.
             self.session.hang_up();
             match self.resume(handler) {
                 Ok(device) => {
@@ -181,7 +181,7 @@ impl<'t> Served<'_, 't> {
         self.session.resume(line, self.goes_on, on)
     }
 
-    /// Ends the session, whatever has ended the serving.
+    /// Ends the session, whatever has ended the service.
     fn leave(
         &mut self,
         why: Option<&LinkError>,
@@ -189,9 +189,9 @@ impl<'t> Served<'_, 't> {
     ) -> Result<(), LinkError> {
         self.is_left = true;
         match why {
-            // Another host has the arm; it is not this one's to disarm, and reports it itself.
+            // Another host controls the arm and reports its end itself.
             Some(LinkError::Taken) => return Ok(()),
-            // Nothing that this host says is understood.
+            // The device cannot read this host's messages.
             Some(LinkError::Version { .. }) => return Err(LinkError::NotConfirmed),
             _ => {}
         }
@@ -221,7 +221,7 @@ impl Drop for Served<'_, '_> {
     }
 }
 
-/// Returns a line on the arm's last end if its host was silent for too long.
+/// Returns a remark if the device disarmed the last session's arm because its host was silent.
 #[must_use]
 pub fn told_of_last_end(device: &DeviceHello) -> Option<&'static str> {
     (device.last.end == SessionEnd::HostSilent).then_some(WAS_SILENT)

@@ -5,27 +5,27 @@ use hapterra_core::scene::SceneChange;
 use crate::link::{Event, HostRequest, LinkStats};
 use crate::terrain::Terrain;
 
-/// Receives the events of a session, and states the requests to the device
-/// and when there is enough of it.
+/// Receives the events of a session, and returns the requests to the device and the end of the
+/// service.
 pub trait SessionHandler<'t> {
     /// Receives an event of the device.
     fn take(&mut self, event: Event<'_>);
 
-    /// Receives the state of the line, in words for the user.
+    /// Receives the state of the line, as text for the user.
     fn hear(&mut self, line: &str);
 
     /// Returns the requests to the device; read after each poll of the line.
     fn asks(&mut self) -> Vec<HostRequest>;
 
-    /// Another view that is to be put in now, with its terrain; taken after each look at
-    /// the line. An [`Event::Viewed`] tells what came of it.
+    /// Returns a scene change that is due, with its terrain; called after each poll of the line. An
+    /// [`Event::Viewed`] reports its result.
     fn view(&mut self) -> Option<(SceneChange, Terrain<'t>)> {
         None
     }
 
-    /// May show how it goes; called after each look at the line.
+    /// Shows the progress, if wanted; called after each poll of the line.
     fn show(&mut self, tally: &LinkStats);
 
-    /// Returns true if it has seen enough.
+    /// Returns true if the service should end.
     fn is_over(&self) -> bool;
 }

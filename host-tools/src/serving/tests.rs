@@ -1,4 +1,4 @@
-//! Every end of serving, against a device in memory.
+//! Tests of every end of a service, with a device in memory.
 
 use std::cell::{Cell, RefCell};
 use std::io;
@@ -22,7 +22,7 @@ const fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
 
-/// The device answers at once.
+/// Short, because the device answers at once.
 const PATIENCE: Timeouts = Timeouts {
     again: ms(10),
     alive: ms(20),
@@ -32,20 +32,20 @@ const PATIENCE: Timeouts = Timeouts {
     silence_s: DEFAULT_SILENCE_S,
 };
 
-/// A device, and what is wrong with the lines to it.
+/// A device, and the faults of the lines to it.
 #[derive(Clone)]
 struct Bench {
     device: Rc<RefCell<Native>>,
-    /// Lines that stand.
+    /// Number of open lines.
     lines: Rc<Cell<u32>>,
-    /// Nothing reaches the device.
+    /// True if nothing arrives at the device.
     deaf: Rc<Cell<bool>>,
-    /// Nothing comes from the device over the lines up to this one, either.
+    /// Nothing arrives from the device either, over the lines up to this one.
     dead_up_to: Rc<Cell<u32>>,
-    /// Number of lines made.
+    /// Number of lines opened so far.
     made: Rc<Cell<u32>>,
     told: Rc<RefCell<Vec<String>>>,
-    /// The host's time: a millisecond for each look at a line.
+    /// The host's time: a millisecond for each poll of a line.
     time: Rc<Cell<Duration>>,
 }
 
@@ -114,7 +114,7 @@ impl Bench {
         }
     }
 
-    /// As USB makes one: none while another stands.
+    /// Opens a line as USB does: fails while another is open.
     fn only_line(&self) -> Result<Box<dyn Transport>, LinkError> {
         match self.lines.get() {
             0 => Ok(Box::new(self.line())),
@@ -144,8 +144,7 @@ fn absent() -> LinkError {
     }
 }
 
-/// An handler that has seen enough after so many looks, and does something at the last
-/// one.
+/// A handler that ends after a number of polls, and calls `last` in the last one.
 struct Looks<'l> {
     left: u32,
     last: Box<dyn FnMut() + 'l>,
@@ -185,7 +184,7 @@ impl SessionHandler<'_> for Looks<'_> {
     }
 }
 
-/// Plays with a service to the bench's device over lines that `connect` makes.
+/// Runs a service to the bench's device over lines from `connect`.
 fn played<T>(
     bench: &Bench,
     goes_on: &dyn Fn() -> bool,
@@ -213,7 +212,7 @@ fn open<'s, 't>(service: Service<'s, 't>) -> Result<Served<'s, 't>, LinkError> {
     service.open(|_| Ok(())).map(|(served, _)| served)
 }
 
-/// Serves for so many looks; `last` happens at the last.
+/// Serves for a number of polls; calls `last` in the last one.
 fn served(bench: &Bench, looks: u32, last: &mut dyn FnMut()) -> (End, Vec<String>) {
     let mut handler = Looks::times(looks, last);
     let end = played(bench, &|| true, &mut || bench.only_line(), |service| {
@@ -292,7 +291,7 @@ fn silent_device_is_reopened_once_its_first_line_is_closed() {
     let bench = Bench::new();
     let mut handler = Looks::times(2_000, || {});
     let mut connect = || {
-        // A test that fails does not hang.
+        // Fail here, because the test would hang otherwise.
         let waits = bench.lines.get() > 0 && bench.made.get() > 0;
         assert!(!waits, "the line before is not closed");
         bench.only_line()

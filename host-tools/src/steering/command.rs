@@ -15,17 +15,17 @@ pub const UNDERSTOOD: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (grou
      clutch on, clutch off, mark TEXT, enter QUESTION; `at SECONDS` before any of them, and before that \
      `on NUMBER` for one device of several";
 
-/// A command, and when it is to be done.
+/// A command and its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Command {
-    /// Seconds of the device's time since the beginning; as soon as what came before is
-    /// done, by default.
+    /// Seconds of the device's time since the beginning; by default it runs as soon as the earlier
+    /// ones are done.
     pub at_s: Option<f64>,
     /// Action of the command.
     pub wanted: Wanted,
 }
 
-/// A line that is no command.
+/// A line without a valid command.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{line}` is no command ({why}); understood are: {UNDERSTOOD}")]
 pub struct NoCommand {
@@ -33,14 +33,14 @@ pub struct NoCommand {
     why: &'static str,
 }
 
-/// Characters of a line that a message repeats at most.
+/// Max characters of a line in a message.
 const SHOWN: usize = 60;
 
-/// Reads a line; none where it is empty or a remark behind `#`. The text of a mark is all of the
-/// line's rest, `#` included.
+/// Reads a line; returns `None` if it is empty or a comment after `#`. The text of a mark is all of
+/// the line's rest, `#` included.
 ///
 /// # Errors
-/// [`NoCommand`] says what is understood.
+/// [`NoCommand`] lists the known commands.
 pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
     let refused = |why| NoCommand {
         line: beginning(line),
@@ -69,13 +69,13 @@ pub fn parse(line: &str) -> Result<Option<Command>, NoCommand> {
     Ok(Some(Command { at_s, wanted }))
 }
 
-/// The beginning of a line as a message may show it.
+/// Returns the beginning of a line for a message.
 fn beginning(line: &str) -> String {
     let beginning: String = line.trim().chars().take(SHOWN).collect();
     printable(&beginning)
 }
 
-/// Takes `at SECONDS` from the beginning of a line.
+/// Removes and reads `at SECONDS` at the beginning of a line.
 fn timed(line: &str) -> Result<(Option<f64>, &str), &'static str> {
     let Some(rest) = after_word(line, "at") else {
         return Ok((None, line));
@@ -89,14 +89,14 @@ fn timed(line: &str) -> Result<(Option<f64>, &str), &'static str> {
     }
 }
 
-/// Returns the rest of a line after its first word `word`; none if the line begins otherwise.
+/// Returns the rest of a line after its first word `word`; `None` if the line begins differently.
 fn after_word<'l>(line: &'l str, word: &str) -> Option<&'l str> {
     let rest = line.trim_start().strip_prefix(word)?;
     let ends = rest.chars().next().is_none_or(char::is_whitespace);
     ends.then_some(rest)
 }
 
-/// The text of a mark, where there is one in a line.
+/// Returns the text of a mark, if the line has one.
 fn mark_in(line: &str) -> Option<&str> {
     after_word(line, "mark")
 }
@@ -133,7 +133,7 @@ fn read(words: &[&str]) -> Result<Steer, &'static str> {
     }
 }
 
-/// A change of the surface.
+/// Reads a change of the surface.
 fn surface(words: &[&str]) -> Result<SurfaceChange, &'static str> {
     let number = |word| number(word).map(|number| number as f32);
     Ok(match words {

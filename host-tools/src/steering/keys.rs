@@ -1,4 +1,4 @@
-//! Keys that change the view, and the line that names them.
+//! Keys that change the placement, and the line that names them.
 
 use std::time::Duration;
 
@@ -7,17 +7,17 @@ use crate::place::PlacementChange;
 
 /// The keys, for the screen.
 pub const KEYS: &str = "arrows pan, + - zoom, ] [ heights, . , stiffness, space held or c: clutch, 0 reset, Enter goes on";
-/// Device millimetres of a pan by a key.
+/// Device millimetres of a pan by one key press.
 const PAN_MM: f64 = 5.0;
-/// Times larger by a key.
+/// Zoom factor of one key press.
 const ZOOM: f64 = 1.5;
-/// Times higher, or stiffer, by a key.
+/// Factor of heights or stiffness of one key press.
 const MORE: f64 = 1.25;
-/// A terminal tells that a key is pressed and that it repeats, and not that it is let go. A key
-/// that has not repeated for so long is let go.
+/// Time without a repetition after which a key counts as released: a terminal reports presses and
+/// repetitions, but no releases.
 const LET_GO: Duration = Duration::from_millis(800);
 
-/// A key as it matters here.
+/// A key with a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
     /// A character.
@@ -29,13 +29,13 @@ pub enum Key {
 /// Commands from keys: most are one change, and the clutch has a state.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Keys {
-    /// The clutch is held by a key that repeats: when it was heard last.
+    /// Time of the last repetition of the key that holds the clutch.
     held: Option<Duration>,
     toggled: bool,
 }
 
 impl Keys {
-    /// Returns the meaning of a key at a time since any fixed moment; none where it has no meaning.
+    /// Returns the command of a key at a time since any fixed moment; `None` if it has none.
     pub fn press(&mut self, key: Key, now: Duration) -> Option<Steer> {
         let change = |change| Some(Steer::Change(change));
         match key {
@@ -115,7 +115,7 @@ mod tests {
         assert_eq!(keys.released(ms(1_359)), None);
         assert_eq!(keys.released(ms(1_360)), Some(Steer::Clutch(false)));
         assert_eq!(keys.released(ms(5_000)), None);
-        // The other key holds it until it is pressed again.
+        // The other key holds the clutch until it is pressed again.
         assert_eq!(
             keys.press(Key::Char('c'), ms(6_000)),
             Some(Steer::Clutch(true))

@@ -1,5 +1,5 @@
-//! Marks: moments of a session that the user names, to be found again in its recording and in
-//! what a pin of the board starts.
+//! Marks: moments of a session that the user names, to find them in its recording and in
+//! measurements triggered by a pin of the board.
 
 use std::collections::VecDeque;
 use std::time::SystemTime;
@@ -8,26 +8,26 @@ use hapterra_core::wire::request::Request;
 
 use crate::link::{Event, HostRequest};
 
-/// Characters of a mark's text, at most.
+/// Max characters of a mark's text.
 pub(super) const MAX_MARK: usize = 200;
-/// Marks that wait for the device, at most: each takes it 20 ms.
+/// Max marks that wait for the device: it needs 20 ms for each.
 const WAITING: usize = 64;
 
-/// A mark as it was made.
+/// A mark as the user made it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Made {
     /// The user's name for it.
     pub text: String,
-    /// The host's clock when the mark was asked for, seconds since 1970 in UTC.
+    /// The host's clock at the request, seconds since 1970 in UTC.
     pub host_unix_s: f64,
-    /// The tick that the device marked; none where it has not answered.
+    /// The marked tick; `None` if the device has not answered.
     pub tick: Option<u32>,
 }
 
-/// The text of a mark, trimmed.
+/// Returns the text of a mark, trimmed.
 ///
 /// # Errors
-/// Says what is wrong with it.
+/// The fault of the text.
 pub(super) fn text_of(text: &str) -> Result<String, &'static str> {
     let text = text.trim();
     if text.is_empty() {
@@ -42,17 +42,17 @@ pub(super) fn text_of(text: &str) -> Result<String, &'static str> {
     Ok(text.to_owned())
 }
 
-/// Marks that are asked of a device, one after the other.
+/// Marks that are requested from a device, in order.
 #[derive(Debug, Default)]
 pub struct Marks {
-    /// Text and host clock of those that have not been answered.
+    /// Text and host clock of the unanswered ones.
     waiting: VecDeque<(String, f64)>,
     asks: Vec<HostRequest>,
     made: Vec<Made>,
 }
 
 impl Marks {
-    /// Asks for a mark now. Returns a line for the user where too many wait already.
+    /// Requests a mark now. Returns a message for the user if too many are waiting.
     pub fn mark(&mut self, text: String) -> Option<String> {
         if self.waiting.len() >= WAITING {
             return Some(format!(
@@ -64,7 +64,7 @@ impl Marks {
         None
     }
 
-    /// Takes what the device tells.
+    /// Processes an event of the device.
     pub fn on_event(&mut self, event: &Event<'_>) {
         let tick = match event {
             Event::Marked { tick } => Some(*tick),
@@ -75,7 +75,7 @@ impl Marks {
             | Event::Unanswered(HostRequest::Request(Request::Mark)) => None,
             _ => return,
         };
-        // The device answers them in their order.
+        // The device answers marks in their order.
         self.made(tick);
     }
 
@@ -93,12 +93,12 @@ impl Marks {
         std::mem::take(&mut self.asks)
     }
 
-    /// The marks that were made since the last look.
+    /// Returns the marks made since the last call.
     pub fn take_made(&mut self) -> Vec<Made> {
         std::mem::take(&mut self.made)
     }
 
-    /// The same at the end of a session: what the device has not answered is without a tick.
+    /// As [`Self::take_made`], at the end of a session: unanswered marks get no tick.
     pub fn take_all(&mut self) -> Vec<Made> {
         while !self.waiting.is_empty() {
             self.made(None);

@@ -1,4 +1,4 @@
-//! Another view of the terrain while it is touched.
+//! Changes of the placement during a session.
 //!
 //! ```text
 //! keys ─────┐
@@ -7,11 +7,10 @@
 //!                         └──────────── samples ───────────────────┘
 //! ```
 //!
-//! [`Steer`] is the user's wish, from every source: [`command`] reads lines of text,
-//! [`keys`] reads keys. [`Steering`] is the one engine behind both. It has the device
-//! hold its clutch, waits until there is no force, works out the next
-//! view from where HIP and proxy are ([`crate::place::Bounds::apply`]), puts it in, and lets the
-//! clutch go.
+//! [`Steer`] is the user's request, from every source: [`command`] reads lines of text, [`keys`]
+//! reads keys. [`Steering`] executes both. It requests the device to hold its clutch, waits until
+//! there is no force, computes the next placement from the positions of HIP and proxy
+//! ([`crate::place::Bounds::apply`]), puts it in force, and releases the clutch.
 
 pub mod command;
 mod engine;
@@ -28,19 +27,19 @@ pub use queue::{CommandQueue, Origin};
 /// Request of a command.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Wanted {
-    /// Another view.
+    /// A change of placement or clutch.
     Steer(Steer),
     /// A mark with this text.
     Mark(String),
-    /// The user's Enter, as an answer to the question of this number.
+    /// The user's Enter, as an answer to the question with this number.
     Enter(u32),
 }
 
 /// Request of the user for the placement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steer {
-    /// Another view.
+    /// A change of the placement.
     Change(PlacementChange),
-    /// Hold the clutch, or let it go: while it is held the terrain goes with the hand.
+    /// Holds the clutch (true) or releases it: while it is held, the terrain moves with the hand.
     Clutch(bool),
 }

@@ -1,4 +1,4 @@
-//! Commands that wait: for their time, or for the ones before them.
+//! Queue of commands that wait for their time, or for earlier commands.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -12,22 +12,22 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use super::Wanted;
 use super::command::{Command, parse};
 
-/// Commands of a device that wait to be taken or to be done; a writer waits beyond them.
+/// Max commands of a device that wait to be read or executed; beyond them the reader waits.
 const WAITING: usize = 256;
-/// The same where several devices are served: a device that is gone holds the others' commands
-/// up as little as its own, so beyond these its own are left out.
+/// The same if several devices are served: a lost device must not block the others' commands, so
+/// its own are left out beyond this number.
 const WAITING_EACH: usize = 1 << 16;
 
-/// Bytes of a line with its end; commands take some dozen. What is longer is read to here, and
-/// is the last.
+/// Max bytes of a line with its end; commands have a few dozen. A longer line is cut here and ends
+/// the input.
 const LONGEST: u64 = 1 << 16;
 
 /// Source of commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// Standard input, line by line as it comes.
+    /// Standard input, line by line.
     StandardInput,
-    /// A file, or a pipe with a name.
+    /// A file, or a named pipe.
     File(PathBuf),
 }
 
@@ -42,20 +42,20 @@ impl FromStr for Origin {
     }
 }
 
-/// Commands for one device, in their order.
+/// Commands for one device, in order.
 #[derive(Default)]
 pub struct CommandQueue {
     lines: Option<Receiver<Read>>,
     waiting: VecDeque<Command>,
-    /// Commands that there was no room for.
+    /// Number of commands that were left out because the queue was full.
     left_out: Arc<AtomicU64>,
 }
 
-/// A line as it was read: a command, or what is wrong with it.
+/// The result of reading a line: a command, or the fault.
 type Read = Result<Command, String>;
 
 impl CommandQueue {
-    /// Reads commands from now on, in a thread of its own.
+    /// Reads commands from now on, in a separate thread.
     ///
     /// # Errors
     /// A file that cannot be opened.
@@ -72,10 +72,10 @@ impl CommandQueue {
         })
     }
 
-    /// Reads commands for so many devices from now on, in a thread of its own, a queue for
-    /// each: `on 2 zoom 2` is for the second one, and a command without `on` for each. No
-    /// device's commands wait for another device. No line waits either, so the end of the input,
-    /// when `at_end` is called, is seen whatever was left undone.
+    /// Reads commands for `devices` devices from now on, in a separate thread, with a queue for
+    /// each: `on 2 zoom 2` is for the second device, and a command without `on` is for all. No
+    /// device's commands wait for another device. No line waits either, so `at_end` is always
+    /// called at the end of the input, whatever was left undone.
     ///
     /// # Errors
     /// A file that cannot be opened.
@@ -99,8 +99,8 @@ impl CommandQueue {
         Ok(queues)
     }
 
-    /// The next command that is due at a time of the device, s; `is_free` tells whether what came
-    /// before is done. Errors in a line are reported.
+    /// Returns the next command that is due at a time of the device, s; `is_free` is true if the
+    /// earlier ones are done. Faults of lines are reported.
     pub fn due(&mut self, t_s: f64, is_free: bool, tell: &mut dyn FnMut(String)) -> Option<Wanted> {
         while self.waiting.len() < WAITING
             && let Some(Ok(read)) = self.lines.as_ref().map(Receiver::try_recv)
@@ -116,7 +116,7 @@ impl CommandQueue {
                 "{left_out} commands were left out: this device was too far behind"
             ));
         }
-        // An answer of a person's is for now, whatever waits before it.
+        // A user's answer is due now, before earlier commands.
         let is_answer = |it: &Command| matches!(it.wanted, Wanted::Enter(_)) && it.at_s.is_none();
         if let Some(answer) = self.waiting.iter().position(is_answer) {
             return self.waiting.remove(answer).map(|command| command.wanted);
@@ -130,11 +130,11 @@ impl CommandQueue {
     }
 }
 
-/// A way to the queue of a device, and the count of what there was no room for.
+/// Sender to the queue of a device, and the number of left-out commands.
 type Way = (SyncSender<Read>, Arc<AtomicU64>);
 
-/// Hands a line out to the devices that it is for; what is wrong with it goes to the first
-/// that is still served. Whether any is.
+/// Sends a line to its devices, and a fault to the first one that is still served. Returns false if
+/// none is.
 fn hand_out(line: &str, number: u64, ways: &[Way]) -> bool {
     let is_served = |way: &Way, read: Read| match way.0.try_send(read) {
         Ok(()) => true,
@@ -147,7 +147,7 @@ fn hand_out(line: &str, number: u64, ways: &[Way]) -> bool {
     match for_each(line, number, ways.len()) {
         Ok(None) => true,
         Ok(Some((Some(device), command))) => {
-            // Others may be served when this one is not any more.
+            // Other devices may be served when this one no longer is.
             let way = ways.get(device - 1);
             way.map(|way| is_served(way, Ok(command)));
             true
@@ -162,8 +162,8 @@ fn hand_out(line: &str, number: u64, ways: &[Way]) -> bool {
     }
 }
 
-/// A line as a command, and the device that it is for, where it names one of so many; none
-/// where there is no command in it.
+/// Reads a line as a command, and the number of its device if it names one; returns `None` for the
+/// command if the line has none.
 ///
 /// # Errors
 /// Its fault and its number.
@@ -185,7 +185,7 @@ fn for_each(
     Ok(command.map(|command| (device, command)))
 }
 
-/// Takes `on NUMBER` from the beginning of a line.
+/// Removes and reads `on NUMBER` at the beginning of a line.
 fn addressed(line: &str, devices: usize) -> Result<(Option<usize>, &str), String> {
     let Some(rest) = line.trim_start().strip_prefix("on ") else {
         return Ok((None, line));
@@ -201,7 +201,7 @@ fn addressed(line: &str, devices: usize) -> Result<(Option<usize>, &str), String
     }
 }
 
-/// Hands lines over with their numbers until the input ends, or there is no receiver.
+/// Sends lines with their numbers until the input ends or `take` returns false.
 fn read_lines(
     origin: &Origin,
     mut take: impl FnMut(&str, u64) -> bool + Send + 'static,
@@ -217,7 +217,7 @@ fn read_lines(
             let mut line = String::new();
             let read = input.by_ref().take(LONGEST).read_line(&mut line);
             let is_whole = line.ends_with('\n') || (line.len() as u64) < LONGEST;
-            // Where a line has no end, nor has what follows a meaning.
+            // After a cut line, the rest has no meaning.
             let goes_on = matches!(read, Ok(1..)) && take(line.trim_end_matches('\n'), number);
             if !goes_on || !is_whole {
                 break;
@@ -284,7 +284,7 @@ mod tests {
         assert_eq!("-".parse(), Ok(Origin::StandardInput));
     }
 
-    /// Takes all that is due of some queues until there was so much of each.
+    /// Takes all due commands of some queues until each has its count.
     fn all_due(queues: &mut [CommandQueue], counts: &[usize]) -> (Vec<Vec<Wanted>>, Vec<String>) {
         let (mut due, mut told) = (vec![vec![]; queues.len()], vec![]);
         wait_until("all commands", || {
@@ -306,12 +306,12 @@ mod tests {
         let (due, told) = all_due(&mut queues, &[3, 4]);
         let zoom = |times| change(PlacementChange::Zoom(times));
         assert_eq!(due[0], [2.0, 4.0, 5.0].map(zoom));
-        // An answer does not wait for what is before it.
+        // An answer does not wait for earlier commands.
         let is_answer = |it: &&Wanted| matches!(it, Wanted::Enter(_));
         let (answers, others): (Vec<_>, Vec<_>) = due[1].iter().partition(is_answer);
         assert_eq!(others, [2.0, 3.0, 5.0].map(zoom).each_ref());
         assert_eq!(answers, [&Wanted::Enter(7)]);
-        // An error is reported once, and not by each device.
+        // An error is reported only once, not by each device.
         let [third, fourth, sixth, seventh] = &told[..] else {
             panic!("{told:?}");
         };
@@ -331,7 +331,7 @@ mod tests {
         let queue = &mut queues[0];
         let mut answer = None;
         while answer.is_none() {
-            // A change is under way.
+            // A change is in progress.
             answer = queue.due(0.0, false, &mut |why| panic!("{why}"));
             std::thread::yield_now();
         }
@@ -350,13 +350,13 @@ mod tests {
         std::fs::write(&path, text).expect("written");
         let mut queues = CommandQueue::of_several(&Origin::File(path), 3, || {}).expect("opened");
         let mut second = queues.remove(1);
-        // The third one is not served any more, and the first one has its command.
+        // The third device is not served any more, and the first one has its command.
         drop(queues.pop());
         let (due, _) = all_due(&mut queues, &[1]);
         assert_eq!(due[0], [change(PlacementChange::Reset)]);
         let mut told = vec![];
         let (mut taken, t_s) = (0, 0.0);
-        // What is not due yet is left where there is a bound.
+        // A bounded queue keeps the commands that are not due yet.
         for _ in 0..3 {
             assert_eq!(second.due(t_s, false, &mut |line| told.push(line)), None);
             assert_eq!(second.waiting.len(), WAITING);

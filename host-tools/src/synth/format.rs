@@ -1,4 +1,4 @@
-//! The formats that are written.
+//! The output formats.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ pub(super) enum WrittenFormat {
 }
 
 impl WrittenFormat {
-    /// By the path's extension.
+    /// Returns the format of the path's extension.
     pub(super) fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_string_lossy().to_lowercase();
         match extension.as_str() {

@@ -1,6 +1,6 @@
 //! Random numbers by place: the same place and seed give the same number.
 
-/// Mixes a seed and a place into 64 even bits (the finaliser of SplitMix64).
+/// Mixes a seed and a place into 64 uniform bits (the finaliser of SplitMix64).
 pub(super) fn hash(seed: u64, column: i64, row: i64) -> u64 {
     let mut bits = seed
         .wrapping_add((column as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15))
@@ -13,7 +13,7 @@ pub(super) fn hash(seed: u64, column: i64, row: i64) -> u64 {
     bits
 }
 
-/// A number in [0, 1) from some of a hash's bits: `which` is 0, 1 or 2.
+/// Returns a number in [0, 1) from a part of a hash's bits: `which` is 0, 1 or 2.
 pub(super) fn unit(hash: u64, which: u32) -> f64 {
     f64::from((hash >> (21 * which)) as u32 & 0x1f_ffff) / f64::from(1 << 21)
 }

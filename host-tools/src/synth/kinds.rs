@@ -1,15 +1,15 @@
-//! The formulas: heights from 0 to 1, places in cells.
+//! The formulas: heights from 0 to 1, positions in cells.
 
 use super::hash::{hash, unit};
 
 const OCTAVES: u32 = 8;
 /// Cells between the lattice points of the coarsest octave.
 const COARSEST: f64 = 256.0;
-/// Ratio of the height of each octave to the one before, which is half as fine:
-/// rough slopes at every scale, as eroded rock has them.
+/// Ratio of the heights of two successive octaves, whose wavelengths have the ratio ½: rough slopes
+/// at every scale, like eroded rock.
 const GAIN: f64 = 0.45;
 
-/// Eight octaves of gradient noise.
+/// Returns eight octaves of gradient noise.
 pub(super) fn fractal(seed: u64, x: f64, y: f64) -> f64 {
     let mut sum = 0.0;
     let mut weight = 1.0;
@@ -19,12 +19,12 @@ pub(super) fn fractal(seed: u64, x: f64, y: f64) -> f64 {
         weight *= GAIN;
         spacing /= 2.0;
     }
-    // The octaves together reach ±1.8 at most, in practice hardly ±0.9.
+    // The octaves together reach at most ±1.8, in practice hardly ±0.9.
     (0.5 + 0.55 * sum).clamp(0.0, 1.0)
 }
 
-/// Perlin's noise: a random slope at every lattice point, blended smoothly; within
-/// ±1, and 0 at the lattice points.
+/// Returns Perlin noise: a random slope at every lattice point, blended smoothly; within ±1, and 0
+/// at the lattice points.
 fn gradient_noise(seed: u64, x: f64, y: f64) -> f64 {
     let (west, south) = (x.floor(), y.floor());
     let (u, v) = (x - west, y - south);
@@ -39,12 +39,12 @@ fn gradient_noise(seed: u64, x: f64, y: f64) -> f64 {
     southern + bv * (northern - southern)
 }
 
-/// From 0 to 1 with no slope and no curvature at either end.
+/// Returns a smooth step from 0 to 1 with no slope and no curvature at either end.
 fn blend(t: f64) -> f64 {
     t * t * t * (t * (6.0 * t - 15.0) + 10.0)
 }
 
-/// Crests 64 cells apart that run north, leaning to the west.
+/// Returns crests 64 cells apart that run north and lean to the west.
 pub(super) fn ridge(seed: u64, x: f64, y: f64) -> f64 {
     let phase = unit(hash(seed, 0, 0), 0);
     let across = (x + y / 4.0) / 64.0 + phase;
@@ -52,7 +52,7 @@ pub(super) fn ridge(seed: u64, x: f64, y: f64) -> f64 {
     1.0 - (2.0 * place - 1.0).abs()
 }
 
-/// One needle in every block of 16 × 16 samples, half to full height.
+/// Returns one needle in every block of 16 × 16 samples, half to full height.
 pub(super) fn spikes(seed: u64, column: u32, row: u32) -> f64 {
     let bits = hash(seed, i64::from(column / 16), i64::from(row / 16));
     let is_needle = u64::from(column % 16) == bits & 15 && u64::from(row % 16) == (bits >> 4) & 15;
@@ -63,14 +63,14 @@ pub(super) fn spikes(seed: u64, column: u32, row: u32) -> f64 {
     }
 }
 
-/// Blocks of 24 × 24 samples, each at one of eight heights.
+/// Returns blocks of 24 × 24 samples, each at one of eight heights.
 pub(super) fn steps(seed: u64, column: u32, row: u32) -> f64 {
     let bits = hash(seed, i64::from(column / 24), i64::from(row / 24));
     (bits % 8) as f64 / 7.0
 }
 
-/// A bowl in every block of 256 × 256 samples, of 40 to 80 cells radius, its rim at
-/// full height and the plain around it at a third.
+/// Returns a bowl in every block of 256 × 256 samples, of 40 to 80 cells radius, its rim at full
+/// height and the plain around it at a third.
 pub(super) fn crater(seed: u64, column: u32, row: u32) -> f64 {
     const PLAIN: f64 = 1.0 / 3.0;
     const BLOCK: u32 = 256;

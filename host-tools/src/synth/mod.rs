@@ -1,5 +1,5 @@
-//! Terrains made by formula, for trying and testing: any size, seeded, and the
-//! same to the last bit on every machine.
+//! Terrains made by formula, for trials and tests: any size, seeded, and bit for bit the same on
+//! every machine.
 
 mod format;
 mod hash;
@@ -40,8 +40,8 @@ pub struct Synth {
 }
 
 impl Synth {
-    /// A terrain with heights from 0 to `amplitude` (a [`Kind::Plane`] rises by that
-    /// much per 50 cells to the east and per 100 to the north). The unit is the caller's.
+    /// Creates a terrain with heights from 0 to `amplitude` (a [`Kind::Plane`] rises by that much
+    /// in 50 cells to the east and in 100 to the north). The caller chooses the unit.
     pub fn new(kind: Kind, seed: u64, amplitude: f64) -> Self {
         Self {
             kind,
@@ -50,10 +50,10 @@ impl Synth {
         }
     }
 
-    /// The height at a sample; row 0 is the southernmost.
+    /// Returns the height at a sample; row 0 is the southernmost.
     ///
-    /// Only additions, multiplications, divisions and square roots make it, which
-    /// IEEE arithmetic rounds alike everywhere.
+    /// It uses only additions, multiplications, divisions and square roots, which IEEE arithmetic
+    /// rounds equally on every machine.
     pub fn height(&self, column: u32, row: u32) -> f32 {
         let (x, y) = (f64::from(column), f64::from(row));
         let height = match self.kind {
@@ -67,12 +67,13 @@ impl Synth {
         (height * self.amplitude) as f32
     }
 
-    /// Returns the rise of a plane of `columns` × `rows` samples from its lowest corner to its highest.
+    /// Returns the rise of a plane of `columns` × `rows` samples between its lowest and highest
+    /// corners.
     pub fn rise(&self, columns: u32, rows: u32) -> f64 {
         f64::from(self.height(columns - 1, rows - 1)) - f64::from(self.height(0, 0))
     }
 
-    /// A field of this terrain in memory, with cells of 1 m and heights in metres.
+    /// Returns a raster of this terrain in memory, with cells of 1 m and heights in metres.
     ///
     /// # Errors
     /// When there are fewer than 2 × 2 samples or the amplitude is not finite.
@@ -82,7 +83,7 @@ impl Synth {
 }
 
 impl Kind {
-    /// An amplitude that looks and feels like what the kind is named for, in cells.
+    /// Returns an amplitude that suits the shape, in cells.
     pub fn usual_amplitude_cells(self) -> f64 {
         match self {
             Self::Fractal => 60.0,

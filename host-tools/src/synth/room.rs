@@ -7,23 +7,23 @@ use super::format::WrittenFormat;
 use super::rows::{Grid, append_row, write_asc_row};
 use crate::output::folder_of;
 
-/// Samples that are made to see how long they are as text.
+/// Number of samples whose text length is measured.
 const SAMPLED: u32 = 4096;
-/// Deflate makes at most this many bytes of one.
+/// Max compression ratio of Deflate.
 const DEFLATE_AT_BEST: u64 = 1032;
 
 /// A disk with too little room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("it takes {:.1} GB and {:.1} GB are free there", *needed as f64 / 1e9, *free as f64 / 1e9)]
 pub struct NoRoom {
-    /// Bytes that the file takes, or would take at least.
+    /// Size of the file, or a lower bound, bytes.
     pub needed: u64,
-    /// Bytes free where it would lie.
+    /// Free bytes on its disk.
     pub free: u64,
 }
 
-/// Fails if the folder's file system has less room than the file takes. Where the
-/// system does not tell, or the output is a pipe or device, the writing decides.
+/// Fails if the folder's file system has less free space than the file needs. If the free space is
+/// unknown, or the output is a pipe or device, the check passes.
 pub(super) fn check(
     path: &Path,
     format: WrittenFormat,
@@ -48,8 +48,8 @@ fn free_at(path: &Path) -> Option<u64> {
         .ok()
 }
 
-/// Bytes of the file: exact but for the header as a GeoTIFF, by the length of the first
-/// samples as text, and as a PNG what the best compression would leave.
+/// Returns the size of the file: exact except for the header as a GeoTIFF, from the length of the
+/// first samples as text, and a lower bound by the best compression as a PNG.
 fn bytes(format: WrittenFormat, synth: &Synth, grid: &Grid) -> u64 {
     let samples = u64::from(grid.columns) * u64::from(grid.rows);
     match format {
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
     use crate::synth::{Kind, write};
 
-    /// Returns the predicted size of a file, and its real size.
+    /// Returns the predicted and the real size of a file.
     fn foretold_and_true(name: &str, kind: Kind) -> (u64, u64) {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);

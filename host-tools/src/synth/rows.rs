@@ -11,21 +11,21 @@ pub struct Grid {
     pub columns: u32,
     /// Samples from south to north, at least 2.
     pub rows: u32,
-    /// Side of a cell in metres; heights are in metres too.
+    /// Side of a cell in metres; heights are also in metres.
     pub cell_m: f64,
 }
 
-/// The caller did not want to continue.
+/// The caller stopped the operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]
 pub struct Interrupted;
 
-/// The rows of a grid, made one by one from north to south.
+/// The rows of a grid, computed one by one from north to south.
 pub(super) struct Rows<'a> {
     synth: &'a Synth,
     pub(super) grid: &'a Grid,
     go_on: &'a mut dyn FnMut() -> bool,
-    /// Rows not made yet.
+    /// Number of remaining rows.
     pub(super) left: u32,
     heights: Vec<f32>,
 }
@@ -45,7 +45,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The next row's heights; `None` after the southernmost.
+    /// Returns the next row's heights; `None` after the southernmost.
     pub(super) fn next(&mut self) -> Result<Option<&[f32]>, Interrupted> {
         let Some(row) = self.left.checked_sub(1) else {
             return Ok(None);
@@ -66,7 +66,7 @@ pub(super) fn append_row(synth: &Synth, columns: u32, row: u32, heights: &mut Ve
     heights.extend((0..columns).map(|column| synth.height(column, row)));
 }
 
-/// One row as text.
+/// Writes one row as text.
 pub(super) fn write_asc_row(out: &mut dyn Write, heights: &[f32]) -> io::Result<()> {
     for (column, height) in heights.iter().enumerate() {
         let separator = if column == 0 { "" } else { " " };

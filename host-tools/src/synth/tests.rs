@@ -1,4 +1,5 @@
-//! Terrains are bounded, reproducible to the last bit and what their names say.
+//! Tests that terrains are bounded, reproducible to the last bit, and have the shape of their
+//! names.
 
 use clap::ValueEnum;
 
@@ -41,7 +42,7 @@ fn the_seed_makes_another_terrain() {
     }
 }
 
-/// Written down once: any machine, build or later version must give these bits.
+/// Fixed values: any machine, build or later version must compute these bits.
 #[test]
 fn heights_are_the_same_to_the_last_bit_everywhere() {
     let sums: Vec<u32> = Kind::value_variants()

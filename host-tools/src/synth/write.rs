@@ -1,5 +1,5 @@
-//! Files that GIS programs open, written a few rows at a time, so that a terrain
-//! may be larger than memory.
+//! Files for GIS programs, written a few rows at a time, so that a terrain may be larger than
+//! memory.
 
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -19,29 +19,29 @@ use crate::output::Output;
 #[error("cannot write {}: {fault}", path.display())]
 pub struct WriteError {
     path: PathBuf,
-    /// Its reason.
+    /// The reason.
     pub fault: WriteFault,
 }
 
-/// Reason for which a terrain was not written.
+/// Reason why a terrain was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteFault {
-    /// The file could not be created or filled.
+    /// The file could not be created or written.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// It would not fit.
+    /// The disk has too little free space.
     #[error(transparent)]
     NoRoom(#[from] NoRoom),
-    /// The caller did not want to continue.
+    /// The caller stopped the operation.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
-    /// The extension names no format that is written.
+    /// The extension belongs to no output format.
     #[error("its extension is none of .tif, .asc, .png")]
     UnknownExtension,
-    /// A 16-bit PNG holds whole metres from 0 to 65535.
+    /// A height outside the whole metres from 0 to 65535 of a 16-bit PNG.
     #[error("a height of {0} m does not fit into a 16-bit PNG")]
     TooHighForPng(f32),
-    /// An encoder refused, which only absurd sizes make it do.
+    /// An encoder failed, which happens only with absurd sizes.
     #[error("{0}")]
     Encoder(String),
 }
@@ -64,14 +64,13 @@ impl From<png::EncodingError> for WriteFault {
     }
 }
 
-/// Writes a terrain in the format of the path's extension: `.tif` (GeoTIFF, float32,
-/// metres, BigTIFF when it has to be), `.asc` (Esri ASCII) or `.png` (16-bit grey,
-/// whole metres). The file appears when it is complete. `go_on` is asked once a row
-/// whether to.
+/// Writes a terrain in the format of the path's extension: `.tif` (GeoTIFF, float32, metres,
+/// BigTIFF if it is large), `.asc` (Esri ASCII) or `.png` (16-bit grey, whole metres). The file
+/// appears when it is complete. `go_on` is called once for each row and returns false to stop.
 ///
 /// # Errors
-/// When the extension, the free space, the file or the heights do not allow it.
-/// Nothing is left of what was written.
+/// When the extension, the free space, the file or the heights do not allow it. No part of the file
+/// remains.
 pub fn write(
     path: &Path,
     synth: &Synth,
@@ -102,7 +101,7 @@ fn write_file(
     Ok(out.finish().map_err(|error| error.source)?)
 }
 
-/// Bytes past which a classic TIFF's 32-bit offsets no longer reach.
+/// Max bytes of a classic TIFF, for its 32-bit offsets.
 const CLASSIC_TIFF_BYTES: u64 = 4_000_000_000;
 
 fn write_geotiff(out: &mut Output, rows: &mut Rows<'_>) -> Result<(), WriteFault> {
@@ -135,8 +134,8 @@ fn write_tiff_kind<K: TiffKind>(out: &mut Output, rows: &mut Rows<'_>) -> Result
     Ok(())
 }
 
-/// Metres on UTM zone 31 north, its south-west corner on the equator at 3° east:
-/// there is no land, so it is not taken for a survey.
+/// Metres on UTM zone 31 north, with the south-west corner on the equator at 3° east: in the sea,
+/// so that it is not mistaken for a survey.
 fn georeference<W: Write + Seek, K: TiffKind>(
     tags: &mut tiff::encoder::DirectoryEncoder<'_, W, K>,
     rows: u32,

@@ -7,7 +7,7 @@ use hapterra_core::scene::TickRecord;
 use crate::replay::Record;
 use crate::terrain::Terrain;
 
-/// Mean and largest of a series.
+/// Mean and maximum of a series.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mean {
     sum: f64,
@@ -16,20 +16,20 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// Takes a value, not negative.
+    /// Adds a value, which must not be negative.
     pub fn take(&mut self, value: f64) {
         self.sum += value;
         self.count += 1;
         self.max = self.max.max(value);
     }
 
-    /// The mean; zero where there was no value.
+    /// Returns the mean; zero without values.
     #[must_use]
     pub fn mean(&self) -> f64 {
         self.sum / self.count.max(1) as f64
     }
 
-    /// The largest value; zero where there was none.
+    /// Returns the largest value; zero without values.
     #[must_use]
     pub const fn max(&self) -> f64 {
         self.max
@@ -45,7 +45,7 @@ impl Mean {
 /// Figures of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
-    /// Samples taken.
+    /// Number of samples.
     pub samples: u64,
     /// Ticks that began or ended too late, by the device's count.
     pub late: u32,
@@ -62,13 +62,13 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Takes a sample and the record made of it.
+    /// Adds a sample and its record.
     pub fn take(&mut self, sample: &TickRecord, record: &Record, terrain: &Terrain<'_>) {
         self.samples += 1;
         self.late = self.late.max(sample.late);
         self.fault = sample.fault;
         if sample.tick > 1 {
-            self.cost.take(f64::from(sample.cost)); // the tick's before this
+            self.cost.take(f64::from(sample.cost)); // the cost of the tick before
         }
         if sample.state != ContactState::Touching {
             return;

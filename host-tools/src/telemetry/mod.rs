@@ -1,6 +1,6 @@
-//! Reports of a device during a session: times over restarts
-//! ([`Timeline`]), rows in device millimetres of their views ([`SampleLog`], [`Placements`]), figures of the
-//! whole session ([`Figures`]).
+//! Reports of a device during a session: times over restarts ([`Timeline`]), rows in device
+//! millimetres of their placements ([`SampleLog`], [`Placements`]), figures of the whole session
+//! ([`Figures`]).
 
 mod figures;
 mod placements;

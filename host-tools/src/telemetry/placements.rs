@@ -1,4 +1,4 @@
-//! The views in which samples were rendered: each sample names its own by a number.
+//! The placements of a session: each sample has the number of its own.
 
 use hapterra_core::scene::TickRecord;
 
@@ -6,23 +6,24 @@ use crate::link::Event;
 use crate::place::Laid;
 use crate::terrain::Terrain;
 
-/// A view that is rendered.
+/// A rendered placement.
 pub struct SessionPlacement<'t> {
     /// Its terrain.
     pub terrain: Terrain<'t>,
-    /// Place, scale and surface parameters; none for the scene that was served first.
+    /// Place, scale and surface parameters; `None` for the first scene.
     pub laid: Option<Laid>,
 }
 
-/// All views of a session, in their order.
+/// All placements of a session, in order.
 pub struct Placements<'t> {
     views: Vec<SessionPlacement<'t>>,
-    /// Which of them a number means now. Numbers wrap, and count anew when a device does.
+    /// Index of the placement that has a number now. Numbers wrap around, and restart with the
+    /// device.
     of_number: [usize; 256],
 }
 
 impl<'t> Placements<'t> {
-    /// The scene that is served first.
+    /// Begins with the first scene.
     #[must_use]
     pub fn new(terrain: Terrain<'t>) -> Self {
         let laid = None;
@@ -32,7 +33,7 @@ impl<'t> Placements<'t> {
         }
     }
 
-    /// A view of this number is put in: samples may come in it from now on.
+    /// Adds a placement with a number: later samples may belong to it.
     pub fn put(&mut self, number: u8, terrain: Terrain<'t>, laid: Laid) {
         if let Some(index) = self.of_number.get_mut(usize::from(number)) {
             *index = self.views.len();
@@ -41,33 +42,33 @@ impl<'t> Placements<'t> {
         self.views.push(SessionPlacement { terrain, laid });
     }
 
-    /// Takes what the device tells.
+    /// Processes an event of the device.
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
-            // It has no sample.
+            // A placement that was not accepted has no samples.
             Event::Viewed { taken: false, .. } if self.views.len() > 1 => {
                 self.views.pop();
             }
-            // A device that was restarted begins with the latest, as the scene itself.
+            // A restarted device begins with the latest placement as its scene.
             Event::Opened { resumed: false, .. } => self.of_number[0] = self.views.len() - 1,
             _ => {}
         }
     }
 
-    /// Returns their number.
+    /// Returns the number of placements.
     #[must_use]
     pub fn count(&self) -> usize {
         self.views.len()
     }
 
-    /// Which of them a sample was rendered in, from 0 on.
+    /// Returns the index of a sample's placement, from 0.
     #[must_use]
     pub fn index_of(&self, sample: &TickRecord) -> usize {
         let index = self.of_number.get(usize::from(sample.view));
         index.copied().unwrap_or(0).min(self.views.len() - 1)
     }
 
-    /// One of them; the last, where there are not so many.
+    /// Returns a placement by its index; the last one if the index is too large.
     #[must_use]
     pub fn get(&self, index: usize) -> &SessionPlacement<'t> {
         &self.views[index.min(self.views.len() - 1)]
@@ -114,7 +115,7 @@ mod tests {
                 views.put(number, terrain.clone(), laid);
                 assert_eq!(views.index_of(&of(number)), count);
             }
-            // 300 is 44 in a byte, and 45 still the one before.
+            // 300 is 44 in a byte, and 45 is still the earlier one.
             assert_eq!(views.index_of(&of(44)), 300);
             assert_eq!((views.index_of(&of(45)), views.count()), (45, 301));
         });

@@ -1,4 +1,4 @@
-//! A session's samples as they come: each becomes a row of a recording.
+//! Log of a session's samples: each becomes a row of a recording.
 
 use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::hello::DeviceHello;
@@ -9,10 +9,10 @@ use super::timeline::Timeline;
 use crate::replay::Record;
 use crate::terrain::Terrain;
 
-/// Keeps time and figures of the samples that were rendered on a terrain.
+/// Time and figures of the samples rendered on a terrain.
 pub struct SampleLog<'t> {
     views: Placements<'t>,
-    /// The view of the latest sample.
+    /// Index of the latest sample's placement.
     view: usize,
     tick_hz: u32,
     timeline: Timeline,
@@ -20,7 +20,7 @@ pub struct SampleLog<'t> {
 }
 
 impl<'t> SampleLog<'t> {
-    /// An empty log for a terrain and the device that feels it.
+    /// Creates an empty log for a terrain and its device.
     #[must_use]
     pub fn new(terrain: &'t Terrain<'t>, device: &DeviceHello) -> Self {
         Self {
@@ -32,7 +32,7 @@ impl<'t> SampleLog<'t> {
         }
     }
 
-    /// Takes a sample; the row that it makes, mm and s since the beginning.
+    /// Adds a sample; returns its row, mm and s since the beginning.
     pub fn take(&mut self, sample: &TickRecord) -> Record {
         self.view = self.views.index_of(sample);
         let terrain = &self.views.get(self.view).terrain;
@@ -42,42 +42,42 @@ impl<'t> SampleLog<'t> {
         record
     }
 
-    /// All placements.
+    /// Returns all placements.
     pub const fn views(&mut self) -> &mut Placements<'t> {
         &mut self.views
     }
 
-    /// The views alone.
+    /// Returns the placements alone.
     #[must_use]
     pub fn into_views(self) -> Placements<'t> {
         self.views
     }
 
-    /// The view of the latest sample, counted from 0, with its terrain.
+    /// Returns the placement of the latest sample and its index, from 0.
     #[must_use]
     pub fn view(&self) -> (usize, &SessionPlacement<'t>) {
         (self.view, self.views.get(self.view))
     }
 
-    /// Ticks run since the beginning, over all restarts of the device.
+    /// Returns the number of ticks since the beginning, over all restarts of the device.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.timeline.ticks()
     }
 
-    /// Time since the beginning, over all restarts of the device, s.
+    /// Returns the time since the beginning, over all restarts of the device, s.
     #[must_use]
     pub fn t_s(&self) -> f64 {
         self.timeline.ticks() as f64 / f64::from(self.tick_hz.max(1))
     }
 
-    /// Time of a tick of the device as it runs now, since the beginning, s.
+    /// Returns the time of a tick since the latest restart, as time since the beginning, s.
     #[must_use]
     pub fn t_s_of(&self, tick: u32) -> f64 {
         self.timeline.t_s_of(tick)
     }
 
-    /// Present figures.
+    /// Returns the present figures.
     #[must_use]
     pub fn figures(&self) -> Figures {
         self.figures

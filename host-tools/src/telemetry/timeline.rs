@@ -2,7 +2,7 @@
 
 use hapterra_core::scene::TickRecord;
 
-/// Seconds from the samples' ticks, which begin anew when a device does.
+/// Times of samples from their tick numbers, which restart with the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Timeline {
     tick_hz: f64,
@@ -11,7 +11,7 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// For a device with `tick_hz` ticks a second.
+    /// Creates a timeline for a device with `tick_hz` ticks a second.
     #[must_use]
     pub fn new(tick_hz: u32) -> Self {
         Self {
@@ -21,13 +21,13 @@ impl Timeline {
         }
     }
 
-    /// Ticks since the beginning, over all restarts.
+    /// Returns the number of ticks since the beginning, over all restarts.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.before + u64::from(self.latest)
     }
 
-    /// The time of a sample, s.
+    /// Returns the time of a sample, s.
     pub fn at(&mut self, sample: &TickRecord) -> f64 {
         if sample.tick < self.latest {
             self.before += u64::from(self.latest);
@@ -36,7 +36,7 @@ impl Timeline {
         self.t_s_of(sample.tick)
     }
 
-    /// The time of a tick since the latest restart, s.
+    /// Returns the time of a tick since the latest restart, as time since the beginning, s.
     #[must_use]
     pub fn t_s_of(&self, tick: u32) -> f64 {
         (self.before + u64::from(tick)) as f64 / self.tick_hz

@@ -1,30 +1,29 @@
 //! Distortion of haptic cells away from the place where they were measured.
 //!
-//! Haptic cells are all alike, as large as the file's are at one place. The file's own cells are
-//! not: those of degrees get narrower towards the poles, and a map's scale changes.
+//! All haptic cells have the size of the file's cells at one place. The file's own cells vary:
+//! cells in degrees get narrower towards the poles, and a map's scale changes.
 
 use super::haptic_grid::HapticGrid;
 use heightfield::{CellSize, Sides};
 
-/// Places looked at along each side of a rectangle, its ends among them: the size of cells
-/// changes smoothly.
+/// Places checked along each side of a rectangle, ends included: the size of cells changes
+/// smoothly.
 const PLACES: u32 = 17;
 
-/// The worst of the haptic cells of a rectangle.
+/// The most distorted haptic cell of a rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distortion {
-    /// Error of lengths, and so of slopes, there in the direction in which they are off
-    /// most: 0.01 is one hundredth of the true ones.
+    /// Relative error of lengths, and so of slopes, in the worst direction: 0.01 is one hundredth.
     pub share: f64,
     /// Its place, in the file's coordinates.
     pub ground: [f64; 2],
 }
 
 impl Distortion {
-    /// Tolerance of a true surface, as a share.
+    /// Max distortion of a surface that counts as true, as a share.
     pub const TRUE: f64 = 1e-3;
 
-    /// Returns true if the surface is not true to 0.1 % all over the rectangle.
+    /// Returns true if the distortion exceeds 0.1 % somewhere in the rectangle.
     #[must_use]
     pub fn is_noticeable(&self) -> bool {
         self.share > Self::TRUE
@@ -32,10 +31,9 @@ impl Distortion {
 }
 
 impl HapticGrid<'_> {
-    /// The haptic cell of a rectangle (west, south, east, north, in haptic cells) that is
-    /// farthest from its true shape, among 17 × 17 places of the part that is inside the
-    /// field. `None` where the file does not state its cell size, and of a rectangle
-    /// beside the field.
+    /// Returns the most distorted haptic cell of a rectangle (west, south, east, north, in haptic
+    /// cells), among 17 × 17 places of the part inside the raster. `None` if the file does not
+    /// state its cell size, or the rectangle lies outside the raster.
     #[must_use]
     pub fn worst_in(&self, [west, south, east, north]: Sides) -> Option<Distortion> {
         let last = [self.columns(), self.rows()].map(|count| f64::from(count) - 1.0);
@@ -69,7 +67,7 @@ impl HapticGrid<'_> {
             [along + up * cosine, up * sine]
         };
         let [east, north] = self.steps_in_file().map(on_ground);
-        // The singular values of the matrix whose columns they are.
+        // The singular values of the matrix with these columns.
         let sum = 0.5 * (dot(east, east) + dot(north, north));
         let apart = (0.5 * (dot(east, east) - dot(north, north))).hypot(dot(east, north));
         let lengths = [sum + apart, sum - apart].map(|square| square.max(0.0).sqrt());
@@ -101,8 +99,9 @@ mod tests {
         grid.worst_in([-5.0, 2.0, 3.0, 90.0]).expect("known").share
     }
 
-    /// A cell of 40 × 10 is rendered as one of 20 × 20: half as long, and twice. One that leans by
-    /// 60° is by the eigenvalues of its metric, 1 ± cos 60°, over its area, sin 60°.
+    /// A cell of 40 × 10 is rendered as one of 20 × 20: half as long in one direction, twice in the
+    /// other. The error of a cell that leans by 60° follows from the eigenvalues of its metric, 1 ±
+    /// cos 60°, and its area, sin 60°.
     #[test]
     fn what_stored_cells_are_off_is_what_the_worst_direction_is() {
         for (lean, sides, wanted) in [

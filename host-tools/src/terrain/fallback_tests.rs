@@ -1,4 +1,4 @@
-//! The tiles of a fallback as a device holds them.
+//! Tests of the fallback tiles that a device stores.
 
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
@@ -9,7 +9,7 @@ use crate::terrain::Scale;
 use crate::terrain::tiler::tests::sent;
 use heightfield::Raster;
 
-/// 2000 × 1500 cells of a millimetre, with a hole.
+/// Returns 2000 × 1500 cells of a millimetre, with no-data.
 fn hills() -> Raster {
     let height = |x: u32, y: u32| match (x, y) {
         (1000, 760) => f32::NAN,
@@ -29,7 +29,7 @@ fn fallback(terrain: &Terrain<'_>, home: [i32; 2], reach_mm: [f64; 4]) -> (Scene
     (scene, fallback)
 }
 
-/// The height at a sample of the level through the tile of a fallback, as its device has it.
+/// The heights of a fallback tile as its device stores it.
 struct DeviceTile(CoarseTile, Vec<f64>);
 
 impl DeviceTile {
@@ -72,7 +72,7 @@ fn the_near_tile_is_around_the_home_pose_and_within_the_wide_one() {
             assert_eq!((near_first - wide_first) % near.spacing(), 0);
             let room = wide_first..=wide_first + side(&wide);
             assert!(room.contains(&near_first) && room.contains(&(near_first + side(&near))));
-            // As far in its middle as it can be.
+            // The home position is as near to its middle as possible.
             let off = home - near_first - side(&near) / 2;
             let is_at_the_rim =
                 near_first == wide_first || near_first + side(&near) == wide_first + side(&wide);
@@ -105,7 +105,7 @@ fn the_surface_goes_on_evenly_over_the_border_of_the_near_tile() {
             );
         }
     }
-    // Within it, its samples are those of the terrain.
+    // Inside the tile, its samples are those of the terrain.
     let [x, y] = [
         near.first.x + 5 * near.spacing(),
         near.first.y + 9 * near.spacing(),
@@ -116,7 +116,7 @@ fn the_surface_goes_on_evenly_over_the_border_of_the_near_tile() {
 
 #[test]
 fn where_the_wide_tile_has_a_hole_the_border_of_the_near_one_is_its_own() {
-    // A sample of the wide tile is a hole, and the border goes by.
+    // A sample of the wide tile is no-data, and the near tile's border passes it.
     let hole = [1024, 384];
     let height = |x: u32, y: u32| match [x, y] == hole {
         true => f32::NAN,

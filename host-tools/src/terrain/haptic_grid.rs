@@ -1,8 +1,8 @@
 //! The haptic grid: square cells over the samples of a raster.
 //!
-//! A patch is a square. Where a file's cells are not (an arc second away from the
-//! equator, 10 m by 30 m, a skewed transform) the finer of its two axes keeps its
-//! samples and the other is interpolated, sample by sample, when a tile is made.
+//! A patch is a square. If a file's cells are not square (an arc second away from the equator, 10 m
+//! by 30 m, a skewed transform), the finer of its two axes keeps its samples and the other is
+//! interpolated, sample by sample, when a tile is made.
 
 use std::hash::{Hash, Hasher};
 
@@ -10,13 +10,13 @@ use super::{Scale, ScaleError};
 use crate::materials::Materials;
 use heightfield::{CellSize, Raster, ReadStatus, ReadTracker, Sides, Wait, around, bilinear};
 
-/// Cells whose sides differ by less than this share count as square, and keep
-/// their exact samples.
+/// Relative difference of its sides below which a cell counts as square and keeps its exact
+/// samples.
 const SQUARE: f64 = 1e-3;
 
-/// Cells are measured anew where a side differs by more than this share from what it is
-/// where they were measured. Together with half of [`SQUARE`], which the sides of cells that
-/// keep their samples may be off, it is less than the 0.1 % to which slopes are true.
+/// Relative difference of a side from its measured size above which cells are measured again.
+/// Together with half of [`SQUARE`], the error of cells that keep their samples, it is less than
+/// the 0.1 % to which slopes are true.
 const MEASURED: f64 = 2.5e-4;
 
 /// The cells of a file that are rendered.
@@ -40,13 +40,12 @@ pub enum HapticCells {
     Square,
 }
 
-/// Samples of square cells over a raster. Column 0 is the westernmost, row 0 the
-/// southernmost.
+/// Samples of square cells over a raster. Column 0 is the westernmost, row 0 the southernmost.
 #[derive(Clone, Copy, Debug)]
 pub struct HapticGrid<'r> {
     raster: &'r Raster,
     cells: HapticCells,
-    /// A cell of the file where `measured_at` is.
+    /// A cell of the file at `measured_at`.
     cell: Option<CellSize>,
     /// Place at which the cell was measured, in the file's coordinates; `None` for the middle.
     measured_at: Option<[f64; 2]>,
@@ -54,18 +53,18 @@ pub struct HapticGrid<'r> {
     rows: u32,
     /// Side of a haptic cell on the ground, metres, if the file states it.
     side_m: Option<f64>,
-    /// Place where the samples lie in the file; `None` where they are the file's own.
+    /// Position of the samples in the file; `None` if they are the file's own.
     resampling: Option<Resampling>,
     /// Materials of the ground, if there are several.
     materials: Option<&'r Materials>,
-    /// Radius of the ball that feels it, device millimetres; 0 for a point.
+    /// Radius of the ball at the tip, device millimetres; 0 for a point.
     tip_mm: f64,
     /// Behaviour of reads.
     wait: Wait,
 }
 
-/// Place of haptic sample (u, v) in the file: column `first + u · column_step + v · lean`,
-/// row `v · row_step`.
+/// Position of haptic sample (u, v) in the file: column `first + u · column_step + v · lean`, row
+/// `v · row_step`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Resampling {
     first: f64,
@@ -75,15 +74,15 @@ struct Resampling {
 }
 
 impl<'r> HapticGrid<'r> {
-    /// The haptic grid of a raster, with cells as they are in the middle of the field.
+    /// Creates the haptic grid of a raster, with cells of the size in its middle.
     #[must_use]
     pub fn new(raster: &'r Raster, cells: HapticCells) -> Self {
         Self::of_cell(raster, cells, raster.cell())
     }
 
-    /// The haptic grid of a raster, with cells as they are at a place, in the file's
-    /// coordinates: cells of degrees get narrower towards the poles, and a map's scale is
-    /// true in few places.
+    /// Creates the haptic grid of a raster, with cells of the size at a place, in the file's
+    /// coordinates: cells in degrees get narrower towards the poles, and a map's scale is true in
+    /// few places.
     #[must_use]
     pub fn at(raster: &'r Raster, cells: HapticCells, ground: [f64; 2]) -> Self {
         Self {
@@ -92,31 +91,31 @@ impl<'r> HapticGrid<'r> {
         }
     }
 
-    /// The same ground, made of these materials, or of one.
+    /// Returns the grid with these materials, or without.
     #[must_use]
     pub const fn with_materials(self, materials: Option<&'r Materials>) -> Self {
         Self { materials, ..self }
     }
 
-    /// The same ground, whose reads wait or do not wait.
+    /// Returns the grid with reads that wait or do not wait.
     #[must_use]
     pub const fn with_wait(self, wait: Wait) -> Self {
         Self { wait, ..self }
     }
 
-    /// Behaviour of its reads.
+    /// Returns the behaviour of its reads.
     #[must_use]
     pub const fn wait(&self) -> Wait {
         self.wait
     }
 
-    /// The same ground, rendered with a ball of a radius in device millimetres; 0 for a point.
+    /// Returns the grid for a ball of a radius in device millimetres; 0 for a point.
     #[must_use]
     pub const fn with_tip(self, tip_mm: f64) -> Self {
         Self { tip_mm, ..self }
     }
 
-    /// Radius of the ball that feels it, device millimetres; 0 for a point.
+    /// Returns the radius of the ball at the tip, device millimetres; 0 for a point.
     #[must_use]
     pub const fn tip_mm(&self) -> f64 {
         self.tip_mm
@@ -128,12 +127,11 @@ impl<'r> HapticGrid<'r> {
         self.materials
     }
 
-    /// The grid of cells as they are at a place in haptic cells, where that is another grid: a
-    /// cell there is larger, smaller or of another shape than it is rendered, by more than a
-    /// quarter of 0.1 %. A place beside the field counts as the next one in it.
+    /// Returns the grid with cells of the size at a place in haptic cells, if a cell there differs
+    /// from the rendered ones in size or shape by more than a quarter of 0.1 %. A place outside the
+    /// raster counts as the nearest one in it.
     ///
-    /// `None` where cells are rendered as they are there, and where square cells there would be
-    /// too many to be counted.
+    /// Returns `None` if the cells agree, or if there would be too many square cells to count.
     #[must_use]
     pub fn measured_anew(&self, haptic: [f64; 2]) -> Option<Self> {
         let last = self.last();
@@ -149,15 +147,15 @@ impl<'r> HapticGrid<'r> {
         (self.cells == HapticCells::Stored || !anew.is_distorted()).then_some(anew)
     }
 
-    /// Returns true if its samples are those of another grid over the same raster.
+    /// Returns true if the grid has the same samples as another over the same raster.
     #[must_use]
     pub fn has_samples_of(&self, other: &Self) -> bool {
         let what = |grid: &Self| (grid.columns, grid.rows, grid.resampling);
         what(self) == what(other)
     }
 
-    /// The smallest rectangle around a rectangle (west, south, east, north) in cells of
-    /// another grid over the same raster.
+    /// Returns the smallest rectangle around a rectangle (west, south, east, north) given in cells
+    /// of another grid over the same raster.
     pub(crate) fn around_sides_of(&self, other: &Self, sides: Sides) -> Sides {
         if self.has_samples_of(other) {
             return sides;
@@ -175,7 +173,7 @@ impl<'r> HapticGrid<'r> {
         ]
     }
 
-    /// Column and row of the last haptic sample.
+    /// Returns column and row of the last haptic sample.
     fn last(&self) -> [f64; 2] {
         [self.columns, self.rows].map(|count| f64::from(count) - 1.0)
     }
@@ -207,8 +205,8 @@ impl<'r> HapticGrid<'r> {
         }
     }
 
-    /// Lays square cells, as large as the smaller side of the file's, over the
-    /// field; `None` where they are too many to be counted.
+    /// Lays square cells, as large as the smaller side of the file's, over the raster; returns
+    /// `None` if there are too many to count.
     ///
     /// With columns `e` apart and rows `n` apart that lean by the cosine `c` of the
     /// angle between them (`k` its sine), haptic sample (u, v) of side `s` is on row
@@ -241,39 +239,38 @@ impl<'r> HapticGrid<'r> {
         })
     }
 
-    /// The raster under the grid.
+    /// Returns the raster under the grid.
     #[must_use]
     pub const fn raster(&self) -> &'r Raster {
         self.raster
     }
 
-    /// Which cells of the file were asked for.
+    /// Returns the requested shape of cells.
     #[must_use]
     pub const fn cells(&self) -> HapticCells {
         self.cells
     }
 
-    /// Returns true if cells that are not square on the ground are rendered as squares, which is not
-    /// their true shape.
+    /// Returns true if cells are rendered as squares although they are not square on the ground.
     #[must_use]
     pub fn is_distorted(&self) -> bool {
         !self.is_resampled() && self.cell.is_some_and(|cell| !is_square(&cell))
     }
 
-    /// The place in the file's coordinates at which cells are as large as they are rendered;
-    /// `None` for the middle of the field.
+    /// Returns the place, in the file's coordinates, where the file's cells have the rendered size;
+    /// `None` for the middle of the raster.
     #[must_use]
     pub const fn measured_at(&self) -> Option<[f64; 2]> {
         self.measured_at
     }
 
-    /// Haptic samples from west to east.
+    /// Returns the number of haptic samples from west to east.
     #[must_use]
     pub const fn columns(&self) -> u32 {
         self.columns
     }
 
-    /// Haptic samples from south to north.
+    /// Returns the number of haptic samples from south to north.
     #[must_use]
     pub const fn rows(&self) -> u32 {
         self.rows
@@ -285,24 +282,24 @@ impl<'r> HapticGrid<'r> {
         self.resampling.is_some()
     }
 
-    /// Side of a haptic cell on the ground in metres, if the file states it. Cells
-    /// rendered as they are stored count as squares of the same area.
+    /// Returns the side of a haptic cell on the ground in metres, if the file states it. Cells
+    /// rendered as stored count as squares of the same area.
     #[must_use]
     pub const fn side_m(&self) -> Option<f64> {
         self.side_m
     }
 
-    /// Returns the height of one vertical unit in cells at true proportions, if the file
-    /// states its cell size: with `cell_mm` device millimetres a cell, the true height
-    /// of a unit is `cell_mm` times this.
+    /// Returns the height of one vertical unit in cells at true proportions, if the file states its
+    /// cell size: with `cell_mm` device millimetres for each cell, the true height of a unit is
+    /// `cell_mm` times this.
     #[must_use]
     pub fn cells_per_vertical_unit(&self) -> Option<f64> {
         let metres = self.raster.metres_per_vertical_unit();
         self.side_m.map(|side| metres / side)
     }
 
-    /// The scale of `cell_mm` device millimetres a cell, with heights at the file's true proportions,
-    /// or 1 mm a unit where it does not know its cell size.
+    /// Returns the scale of `cell_mm` device millimetres for each cell, with heights at the file's
+    /// true proportions, or 1 mm for each unit if the file does not state its cell size.
     ///
     /// # Errors
     /// As [`Scale::new`].
@@ -311,8 +308,8 @@ impl<'r> HapticGrid<'r> {
         Scale::new(cell_mm, cells.map_or(1.0, |cells| cells * cell_mm))
     }
 
-    /// Times that heights are higher at a scale than true to scale, to nine digits; none where the
-    /// file does not know the size of its cells.
+    /// Returns the ratio of heights at a scale to true proportions, to nine digits; `None` if the
+    /// file does not state its cell size.
     #[must_use]
     pub fn exaggeration(&self, scale: &Scale) -> Option<f64> {
         let true_cells = self.cells_per_vertical_unit()?;
@@ -321,7 +318,7 @@ impl<'r> HapticGrid<'r> {
         times.is_finite().then_some(rounded)
     }
 
-    /// The file's coordinates of a place in haptic cells from the south-west sample.
+    /// Converts a position in haptic cells from the south-west sample to the file's coordinates.
     #[must_use]
     pub fn to_ground(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let sample = match &self.resampling {
@@ -331,7 +328,7 @@ impl<'r> HapticGrid<'r> {
         self.raster.georeference().transform().to_ground(sample)
     }
 
-    /// The place in haptic cells of coordinates of the file, which may lie outside of the field.
+    /// Converts coordinates of the file, also outside the raster, to a position in haptic cells.
     #[must_use]
     pub fn of_ground(&self, ground: [f64; 2]) -> [f64; 2] {
         let [column, row] = self.raster.georeference().transform().to_samples(ground);
@@ -347,7 +344,7 @@ impl<'r> HapticGrid<'r> {
         }
     }
 
-    /// Columns and rows of the file that a haptic cell leads on to the east, and to the north.
+    /// Returns the columns and rows of the file for one haptic cell to the east, and to the north.
     pub(super) fn steps_in_file(&self) -> [[f64; 2]; 2] {
         match &self.resampling {
             None => [[1.0, 0.0], [0.0, 1.0]],
@@ -355,14 +352,14 @@ impl<'r> HapticGrid<'r> {
         }
     }
 
-    /// The height of the bilinear surface at a place in haptic cells, in the file's vertical
-    /// unit; `None` in a hole and off the field.
+    /// Returns the height of the bilinear surface at a position in haptic cells, in the file's
+    /// vertical unit; `None` in no-data and outside the raster.
     #[must_use]
     pub fn surface(&self, place: [f64; 2]) -> Option<f64> {
         self.read_surface(place).0
     }
 
-    /// The height of [`HapticGrid::surface`], and whether it is known.
+    /// Returns the height of [`HapticGrid::surface`], and whether it is known.
     pub fn read_surface(&self, place: [f64; 2]) -> (Option<f64>, ReadStatus) {
         let reads = ReadTracker::default();
         let height = bilinear::at(place, |column, row| {
@@ -374,32 +371,32 @@ impl<'r> HapticGrid<'r> {
         )
     }
 
-    /// The height at a haptic sample in the file's vertical unit; NaN in a hole and
-    /// outside the field.
+    /// Returns the height at a haptic sample in the file's vertical unit; NaN in no-data and
+    /// outside the raster.
     #[must_use]
     pub fn height(&self, column: u32, row: u32) -> f64 {
         self.height_of_level(0, column, row)
     }
 
-    /// The same at a sample of level *L*, the grid with every 2ᴸ-th sample: row and column
-    /// count in it.
+    /// Returns the height at a sample of level *L*, the grid with every 2ᴸ-th sample; column and
+    /// row count in that grid.
     #[must_use]
     pub fn height_of_level(&self, level: u8, column: u32, row: u32) -> f64 {
         self.read_height(level, column, row).0
     }
 
-    /// The height of [`HapticGrid::height_of_level`], and whether it is known.
+    /// Returns the height of [`HapticGrid::height_of_level`], and whether it is known.
     pub fn read_height(&self, level: u8, column: u32, row: u32) -> (f64, ReadStatus) {
         let whole = |index: u32| u64::from(index).checked_mul(1_u64.checked_shl(level.into())?);
         let (Some(column), Some(row)) = (whole(column), whole(row)) else {
             return (f64::NAN, ReadStatus::Complete);
         };
-        // Both are below 2^32, or beyond the field.
+        // Both are below 2^32, or outside the raster.
         self.height_seen(level, [column as f64, row as f64])
     }
 
-    /// The height at a place in haptic cells, as the file has it at a level of detail; NaN in a hole
-    /// and outside the field. And whether it is known.
+    /// Returns the file's height at a level of detail, at a position in haptic cells; NaN in
+    /// no-data and outside the raster. Also returns whether it is known.
     pub(super) fn height_seen(&self, level: u8, [u, v]: [f64; 2]) -> (f64, ReadStatus) {
         let [last_column, last_row] = self.last();
         if u > last_column || v > last_row {
@@ -412,8 +409,8 @@ impl<'r> HapticGrid<'r> {
         self.raster.read_surface(level, place, self.wait)
     }
 
-    /// Has the samples between two places of level *L* read that are not here yet, both
-    /// included and in cells of that level: [`Raster::prefetch`].
+    /// Prefetches the missing samples between two positions of level *L*, both included and in
+    /// cells of that level: [`Raster::prefetch`].
     pub fn prefetch(&self, level: u8, from: [i32; 2], to: [i32; 2]) {
         let step = f64::from(level).exp2();
         let corners = [from, [to[0], from[1]], [from[0], to[1]], to].map(|[column, row]| {
@@ -427,7 +424,7 @@ impl<'r> HapticGrid<'r> {
             let places = || corners.iter().map(|corner| corner[axis]);
             let first = places().fold(f64::INFINITY, f64::min).floor();
             let last = places().fold(f64::NEG_INFINITY, f64::max).ceil();
-            // Below zero there is no sample, and the raster ends where it does.
+            // Negative indices have no sample; `Raster::prefetch` cuts at the other border.
             [first as u32, last as u32]
         };
         self.raster.prefetch(level, along(0), along(1));
@@ -477,7 +474,7 @@ impl HapticGrid<'_> {
 }
 
 impl Resampling {
-    /// Column and row of the file at a haptic sample or between two.
+    /// Returns column and row of the file at a haptic sample or between two.
     fn in_file(&self, u: f64, v: f64) -> [f64; 2] {
         [
             self.first + u * self.column_step + v * self.lean,
@@ -486,7 +483,7 @@ impl Resampling {
     }
 }
 
-/// Returns true if two cells are as large as each other and lean alike, to [`MEASURED`].
+/// Returns true if two cells have the same size and lean, within [`MEASURED`].
 fn is_alike(one: &CellSize, other: &CellSize) -> bool {
     let (a, b) = (one.ground_metres(), other.ground_metres());
     let is_near = |a: f64, b: f64| (a - b).abs() <= MEASURED * a;
@@ -504,7 +501,8 @@ pub(super) mod tests {
     use super::*;
     use heightfield::{CellUnit, Certainty, Globe};
 
-    /// A cell in metres, whose columns lean over its rows by an angle of that cosine.
+    /// Returns a cell in metres, whose columns lean over its rows by an angle with the cosine
+    /// `lean`.
     pub(in crate::terrain) fn cell(east: f64, north: f64, lean: f64) -> CellSize {
         CellSize {
             east,
@@ -518,7 +516,7 @@ pub(super) mod tests {
         }
     }
 
-    /// A field whose height is known everywhere on the ground: a plane.
+    /// Returns a plane, whose height is known everywhere on the ground.
     fn plane(cell: CellSize, [east, north]: [f64; 2]) -> Raster {
         let sine = (1.0 - cell.lean * cell.lean).sqrt();
         let raster = Raster::from_fn(41, 31, |column, row| {
@@ -573,7 +571,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Also of a map that is not true to scale, and of columns that lean.
+    /// Also for a map that is not true to scale, and for columns that lean.
     #[test]
     fn stored_cells_count_as_squares_of_the_area_that_they_have_on_the_ground() {
         for (map_scale, lean) in [((0.5, 0.5), 0.0), ((1.0, 1.0), 0.6), ((0.5, 0.8), -0.6)] {

@@ -8,16 +8,16 @@ use twox_hash::XxHash64;
 use super::{HapticGrid, Scale};
 use heightfield::{Raster, Wait};
 
-/// Hash of all heights from south-west to north-east, after the numbers of columns and
-/// rows: two files with the same content are the same terrain, and a file that was
-/// changed in place is not.
+/// Returns the hash of the numbers of columns and rows and all heights from south-west to
+/// north-east: two files with the same content are the same terrain, and a file that was changed in
+/// place is another.
 ///
-/// XXH64 with seed 0 over little-endian bytes. Recordings keep it, so it has to be the
-/// same on every machine and in every later version; the standard library's hasher is not.
-/// It is taken of the samples in memory: the file is not read again.
+/// XXH64 with seed 0 over little-endian bytes. Recordings contain it, so it has to be the same on
+/// every machine and in every later version; the standard library's hasher is not. It is computed
+/// from the samples in memory: the file is not read again.
 ///
-/// Of a raster that stays in its file it is the hash of the file's index and of the heights
-/// that were looked at when it was opened.
+/// For a raster that stays in its file it is the hash of the file's index and of the heights that
+/// were read when it was opened.
 pub(crate) fn fingerprint(raster: &Raster) -> u64 {
     if let Some(print) = raster.print_in_file() {
         return print;
@@ -32,7 +32,7 @@ pub(crate) fn fingerprint(raster: &Raster) -> u64 {
         // All samples are in memory.
         let _ = raster.read_row(0, row, 0, &mut heights, Wait::UntilRead);
         for (to, height) in bytes.chunks_exact_mut(8).zip(&heights) {
-            // One bit pattern for all holes.
+            // One bit pattern for all no-data.
             let height = if height.is_nan() { f64::NAN } else { *height };
             to.copy_from_slice(&height.to_le_bytes());
         }
@@ -41,14 +41,14 @@ pub(crate) fn fingerprint(raster: &Raster) -> u64 {
     hasher.finish()
 }
 
-/// The epoch of a scene over a terrain; the scene's own epoch does not count.
+/// Returns the epoch of a scene over a terrain; the scene's own epoch is ignored.
 pub(super) fn epoch(fingerprint: u64, grid: &HapticGrid<'_>, scale: &Scale, scene: &Scene) -> u32 {
     let mut hasher = XxHash64::with_seed(0);
     fingerprint.hash(&mut hasher);
     grid.hash_shape(&mut hasher);
     let numbers = [scale.cell_mm(), scale.height_mm_per_unit()];
     numbers.map(f64::to_bits).hash(&mut hasher);
-    // Everything else that the scene states.
+    // All other fields of the scene.
     format!("{:?}", Scene { epoch: 0, ..*scene }).hash(&mut hasher);
     hasher.finish() as u32
 }
@@ -58,8 +58,8 @@ mod tests {
     use super::*;
     use heightfield::{Fill, OpenOptions};
 
-    /// Recordings name terrains by this number, so it may never change: XXH64 by an
-    /// implementation of its own.
+    /// Recordings identify terrains by this number, so it may never change: computed with an
+    /// independent implementation of XXH64.
     const FOR_EVER: u64 = 0x7046_36b8_d443_a868;
 
     #[test]

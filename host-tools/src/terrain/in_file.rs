@@ -1,11 +1,11 @@
-//! Rasters that stay in their files, for tests: no height of them is in memory before it is read, so
-//! the first read that does not wait is pending.
+//! Rasters that stay in their files, for tests: no height is in memory before it is read, so the
+//! first read that does not wait is pending.
 
 use std::path::Path;
 
 use heightfield::{OpenOptions, Raster};
 
-/// A raster of a size whose heights stay in a file of the folder; row 0 is the southernmost.
+/// Returns a raster whose heights stay in a file of the folder; row 0 is the southernmost.
 pub(crate) fn in_file(
     folder: &Path,
     [columns, rows]: [u32; 2],

@@ -1,9 +1,8 @@
-//! A raster as the device sees it: at a scale, counted in cells, cut
-//! into tiles.
+//! A raster in the device's form: at a scale, counted in cells, cut into tiles.
 //!
-//! [`HapticGrid`] lays square cells over the raster; [`Scale`] turns the file's units into millimetres of the arm and into cells; [`Terrain`]
-//! is a raster at that scale and one level of detail, with its tiles made one
-//! by one when they are asked for: nothing of the raster is copied or kept.
+//! [`HapticGrid`] lays square cells over the raster; [`Scale`] converts the file's units to device
+//! millimetres and to cells; [`Terrain`] is a raster at that scale and one level of detail. Its
+//! tiles are made one by one on request: nothing of the raster is copied or kept.
 
 mod distortion;
 mod fallback;

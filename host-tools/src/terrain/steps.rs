@@ -1,23 +1,23 @@
-//! Of what the heights of a file are multiples: what makes their tiles small on the link.
+//! The step of which a file's heights are multiples: it makes their tiles small on the link.
 
 use hapterra_core::terrain::packed::Step;
 
-/// Decimal units that files have their heights in, besides whole ones.
+/// Decimal units of heights in files, besides whole ones.
 const DECIMALS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
-/// Decimals that single precision tells apart at the heights of mountains.
+/// Number of decimals that single precision resolves at the heights of mountains.
 const SINGLES: usize = 3;
-/// A binary unit no finer than this is taken before decimals are tried.
+/// Exponent of the binary unit below which decimals are tried.
 const COARSE: i32 = -4;
 
-/// The largest power of two that numbers are multiples of.
+/// The largest power of two of which numbers are multiples.
 #[derive(Clone, Copy)]
 pub(super) struct BinaryUnit(i32);
 
 impl BinaryUnit {
-    /// Of no number.
+    /// The unit of no numbers.
     pub(super) const ANY: Self = Self(i32::MAX);
 
-    /// With another number. Infinite ones and NaN do not count.
+    /// Returns the unit after another number. Infinite numbers and NaN are ignored.
     pub(super) fn with(self, height: f64) -> Self {
         let bits = height.to_bits();
         let mantissa = bits & ((1 << 52) - 1) | 1 << 52;
@@ -29,8 +29,8 @@ impl BinaryUnit {
     }
 }
 
-/// Steps that heights with such a unit may have, the largest first, where a vertical unit
-/// is so many `cells`.
+/// Returns the possible steps of heights with a unit, the largest first, if a vertical unit is
+/// `cells` cells.
 pub(super) fn steps(unit: BinaryUnit, cells: f64) -> impl Iterator<Item = Step> {
     let binary = f64::from(unit.0.min(0)).exp2();
     let decimals = DECIMALS

@@ -1,4 +1,4 @@
-//! Tiles made on demand from the one raster.
+//! Tiles made on demand from a raster.
 
 mod tile_samples;
 
@@ -20,9 +20,9 @@ use super::{HapticCells, HapticGrid, Scale, ScaleError, identity};
 use crate::materials::MaterialBuffer;
 use heightfield::{Raster, ReadStatus, ReadTracker, Wait};
 
-/// Heights that the file does not hold but are interpolated are rounded to multiples of this,
-/// cells. Single precision is as coarse 64 cells above a tile's base, and the floats of what is not
-/// rounded have no bits that a tile could do without on the link.
+/// Interpolated heights, which are not in the file, are rounded to multiples of this, cells. Single
+/// precision has this resolution 64 cells above a tile's base, and heights that are not rounded
+/// cannot be compressed for the link.
 pub const INTERPOLATED_STEP: f64 = 1.0 / (1 << 17) as f64;
 
 /// Bytes of a tile's samples.
@@ -32,12 +32,12 @@ const TILE_BYTES: usize = 4 * TILE_SAMPLES * TILE_SAMPLES;
 #[derive(Clone)]
 pub struct Terrain<'r> {
     grid: HapticGrid<'r>,
-    /// Of level 0.
+    /// Scale of level 0.
     scale_of_level_0: Scale,
-    /// Of haptic cells.
+    /// Scale of haptic cells.
     scale: Scale,
     level: u8,
-    /// Haptic cells a cell of the level, along a side: 1 for a point.
+    /// Haptic cells along the side of a cell of the level: 1 for a point.
     parts: u32,
     /// Haptic patches, east and north.
     size: [i32; 2],
@@ -49,13 +49,13 @@ pub struct Terrain<'r> {
     steep: OnceLock<()>,
 }
 
-/// Reason for which a raster cannot be rendered at a scale.
+/// Reason why a raster cannot be rendered at a scale.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TerrainError {
-    /// The scale itself.
+    /// The scale is invalid.
     #[error(transparent)]
     Scale(#[from] ScaleError),
-    /// Higher or lower than positions can be.
+    /// Heights beyond the range of positions.
     #[error(
         "heights reach {cells:.4e} cells at {} mm a unit and {} mm a cell; at most ±{MAX_CELL} can be rendered",
         scale.height_mm_per_unit(), scale.cell_mm()
@@ -63,10 +63,10 @@ pub enum TerrainError {
     TooTall {
         /// The largest height, in cells.
         cells: f64,
-        /// The scale that made it so.
+        /// The scale that causes it.
         scale: Scale,
     },
-    /// A tip that is no ball, or one so large that tiles would take too long.
+    /// A tip that is no ball, or a ball so large that tiles would take too long.
     #[error(
         "a tip of {} mm: {:.1} cells of level {level}, where 0 to {} can be rendered",
         tip.tip_mm, tip.cells, tip::MAX_CELLS
@@ -80,10 +80,10 @@ pub enum TerrainError {
     /// More cells than positions can count.
     #[error("{0} samples in a row or column; at most {MAX_CELL} can be rendered")]
     TooLarge(u32),
-    /// Decimated away.
+    /// A level that leaves no patch.
     #[error("level {level} leaves nothing of {columns} × {rows} samples")]
     NoSuchLevel {
-        /// The level asked for.
+        /// The requested level.
         level: u8,
         /// Samples of the grid, west to east.
         columns: u32,
@@ -92,10 +92,10 @@ pub enum TerrainError {
     },
 }
 
-/// Room for one tile's samples, used again for each.
+/// Buffer for one tile's samples, reused for each tile.
 pub struct TileBuffer {
     pub(super) heights: Box<[f64; TILE_SAMPLES * TILE_SAMPLES]>,
-    /// Above the tile's base.
+    /// Heights above the tile's base.
     singles: Box<[f32; TILE_SAMPLES * TILE_SAMPLES]>,
     bytes: Box<[u8; TILE_BYTES]>,
 }
@@ -111,8 +111,8 @@ impl Default for TileBuffer {
 }
 
 impl TileBuffer {
-    /// The heights, of which these are the lowest and the highest, as they are shortest on the
-    /// link.
+    /// Returns the heights in their shortest form for the link; `low` and `high` are the lowest and
+    /// the highest of them.
     pub(super) fn above(&mut self, low: f64, high: f64, steps: &[Step]) -> Heights<'_> {
         let base = tile_heights::base(low, high);
         for (single, height) in self.singles.iter_mut().zip(self.heights.iter()) {
@@ -121,7 +121,7 @@ impl TileBuffer {
         self.packed(base, steps)
     }
 
-    /// The tile as it is shortest on the link.
+    /// Returns the tile in its shortest form for the link.
     fn packed(&mut self, base: i32, steps: &[Step]) -> Heights<'_> {
         let room = &mut self.bytes[..MAX_PACKED];
         if let Some(length) = pack(&self.singles, base, steps, room).map(<[u8]>::len) {
@@ -138,8 +138,8 @@ impl TileBuffer {
     }
 }
 
-/// A sample that differs from its neighbour to the east or north by more than [`MAX_STEP_CELLS`],
-/// and by how much.
+/// Returns a sample that differs from its neighbour to the east or north by more than
+/// [`MAX_STEP_CELLS`], and the difference.
 fn steep_step(heights: &[f64; TILE_SAMPLES * TILE_SAMPLES]) -> Option<(usize, f64)> {
     let step = |at: usize, to: usize| {
         let step = heights.get(to)? - heights.get(at)?;
@@ -154,11 +154,11 @@ fn steep_step(heights: &[f64; TILE_SAMPLES * TILE_SAMPLES]) -> Option<(usize, f6
 }
 
 impl<'r> Terrain<'r> {
-    /// The raster at `scale`, with every `2^level`-th sample.
+    /// Creates the terrain of a raster at `scale`, with every `2^level`-th sample.
     ///
     /// # Errors
-    /// [`TerrainError`] when its heights or its size leave what a position can
-    /// say, or the level leaves no patch.
+    /// [`TerrainError`] if its heights or its size exceed the range of positions, or the level
+    /// leaves no patch.
     pub fn new(raster: &'r Raster, scale: Scale, level: u8) -> Result<Self, TerrainError> {
         Self::over(
             HapticGrid::new(raster, HapticCells::default()),
@@ -167,7 +167,7 @@ impl<'r> Terrain<'r> {
         )
     }
 
-    /// As [`Self::new`], over cells of the user's choice.
+    /// As [`Self::new`], with a given haptic grid.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -212,13 +212,14 @@ impl<'r> Terrain<'r> {
         })
     }
 
-    /// Radius of the ball at the tip, in haptic cells; 0 for a point.
+    /// Returns the radius of the ball at the tip, in haptic cells; 0 for a point.
     #[must_use]
     pub fn tip_cells(&self) -> f64 {
         self.ball.as_ref().map_or(0.0, Ball::radius)
     }
 
-    /// The same raster in another grid of haptic cells, at a scale of level 0 and a level.
+    /// Returns the terrain over another haptic grid of the same raster, at a scale of level 0 and a
+    /// level.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -229,14 +230,14 @@ impl<'r> Terrain<'r> {
         level: u8,
     ) -> Result<Self, TerrainError> {
         Ok(Self {
-            // Of the same heights.
+            // The heights, and so their hash, are the same.
             fingerprint: self.fingerprint.clone(),
             ..Self::over(grid.with_wait(self.grid.wait()), scale, level)?
         })
     }
 
-    /// The same terrain, whose reads do not wait: a height that is not in memory is read in the
-    /// background, and is [`ReadStatus::Pending`] until then.
+    /// Returns the terrain with reads that do not wait: a height that is not in memory is read in
+    /// the background, and is [`ReadStatus::Pending`] until then.
     #[must_use]
     pub fn non_blocking(&self) -> Self {
         Self {
@@ -257,78 +258,79 @@ impl<'r> Terrain<'r> {
             && (ours - theirs).abs() <= f64::from(f32::EPSILON) * 1e-3 * ours.abs()
     }
 
-    /// The raster.
+    /// Returns the raster.
     #[must_use]
     pub const fn raster(&self) -> &'r Raster {
         self.grid.raster()
     }
 
-    /// The grid of its level 0.
+    /// Returns the grid of its level 0.
     #[must_use]
     pub const fn grid(&self) -> &HapticGrid<'r> {
         &self.grid
     }
 
-    /// Its level of detail: every `2^level`-th sample of the grid.
+    /// Returns its level of detail: every `2^level`-th sample of the grid.
     #[must_use]
     pub const fn level(&self) -> u8 {
         self.level
     }
 
-    /// The scale of haptic cells: `2^level` times the grid's, or a whole part of that under a ball.
+    /// Returns the scale of haptic cells: `2^level` times the grid's, divided by [`Self::parts`]
+    /// with a ball.
     #[must_use]
     pub const fn scale(&self) -> &Scale {
         &self.scale
     }
 
-    /// Haptic cells a cell of the level, along a side: 1 for a point.
+    /// Returns the number of haptic cells along the side of a cell of the level: 1 for a point.
     #[must_use]
     pub const fn parts(&self) -> u32 {
         self.parts
     }
 
-    /// Cells of the grid that are as long as a haptic cell.
+    /// Returns the length of a haptic cell in cells of the grid.
     #[must_use]
     pub fn cells_of_grid(&self) -> f64 {
         f64::from(self.level).exp2() / f64::from(self.parts)
     }
 
-    /// The scale of the finest level: of the grid's own cells.
+    /// Returns the scale of the finest level, whose cells are the grid's own.
     #[must_use]
     pub const fn scale_of_level_0(&self) -> Scale {
         self.scale_of_level_0
     }
 
-    /// Hash of all heights of the raster: the same terrain has the same, and a file that
-    /// was changed has another. Worked out once, from the samples in memory; of a raster that
-    /// stays in its file, from the file's index and the heights looked at.
+    /// Returns the hash of all heights of the raster: equal terrains have the same hash, and a
+    /// changed file has another. It is computed once, from the samples in memory, or from the
+    /// file's index and the heights read at its opening if the raster stays in its file.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         let print = || identity::fingerprint(self.raster());
         *self.fingerprint.get_or_init(print)
     }
 
-    /// Size in haptic patches, east and north.
+    /// Returns the size in haptic patches, east and north.
     #[must_use]
     pub const fn size(&self) -> [i32; 2] {
         self.size
     }
 
-    /// A whole height in cells that no sample exceeds: the largest there is, where the raster
-    /// stays in its file and not all heights are known.
+    /// Returns a whole height in cells that no sample exceeds: the largest possible one if the
+    /// raster stays in its file and not all heights are known.
     #[must_use]
     pub const fn top(&self) -> i32 {
         self.top
     }
 
-    /// Extent east and north from the south-west sample, device millimetres.
+    /// Returns the extent east and north from the south-west sample, device millimetres.
     #[must_use]
     pub fn size_mm(&self) -> [f64; 2] {
         self.size.map(|s| f64::from(s) * self.scale.cell_mm())
     }
 
-    /// The scene in which the device feels this terrain. Its epoch is a hash
-    /// of the heights and of everything else in it.
+    /// Returns the scene of this terrain for the device. Its epoch is a hash of the heights and of
+    /// all its other fields.
     #[must_use]
     pub fn scene(&self, params: SurfaceParams, source: Source, home: GridPoint) -> Scene {
         let mut scene = Scene {
@@ -348,15 +350,15 @@ impl<'r> Terrain<'r> {
         scene
     }
 
-    /// Height of the surface that is rendered in device millimetres at a place in device
-    /// millimetres, in `f64`: bilinear between samples, or between the heights of a ball's centre
-    /// at samples. `None` in a hole and off the data.
+    /// Returns the height of the rendered surface at a position, all in device millimetres, in
+    /// `f64`: bilinear between samples, or between the heights of a ball's centre at samples.
+    /// `None` in no-data and off the data.
     #[must_use]
     pub fn height_mm(&self, east_mm: f64, north_mm: f64) -> Option<f64> {
         self.read_height_mm(east_mm, north_mm).0
     }
 
-    /// The height of [`Terrain::height_mm`], and whether it is known.
+    /// Returns the height of [`Terrain::height_mm`], and whether it is known.
     pub fn read_height_mm(&self, east_mm: f64, north_mm: f64) -> (Option<f64>, ReadStatus) {
         let reads = ReadTracker::default();
         let height = self.height_by([east_mm, north_mm], &reads);
@@ -375,8 +377,8 @@ impl<'r> Terrain<'r> {
         Some(height * cell_mm)
     }
 
-    /// Height of the ground where it is only looked at, in places so far apart, mm: of a raster
-    /// that stays in its file, at a level that is quick to read.
+    /// Returns the height of the ground for a picture with points `apart_mm` apart, mm: for a
+    /// raster that stays in its file, at a level that is quick to read.
     #[must_use]
     pub fn seen_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
         let cells = apart_mm / self.scale_of_level_0().cell_mm();
@@ -384,10 +386,10 @@ impl<'r> Terrain<'r> {
         self.ground_mm(level, [east_mm, north_mm], &ReadTracker::default())
     }
 
-    /// Height of the surface where a hand plans its path, by places so far apart, mm: of a raster
-    /// in memory [`Self::height_mm`], of one that stays in its file as [`Self::seen_mm`], with a
-    /// ball's centre over flat ground. A plan goes all over the terrain, and must not read all of
-    /// it.
+    /// Returns the height of the surface for the plan of a hand's path, with points `apart_mm`
+    /// apart, mm: [`Self::height_mm`] for a raster in memory; for one that stays in its file
+    /// [`Self::seen_mm`], with a ball's centre over flat ground. A plan covers the whole terrain,
+    /// but must not read all of it.
     #[must_use]
     pub fn planned_mm(&self, east_mm: f64, north_mm: f64, apart_mm: f64) -> Option<f64> {
         if self.raster().is_known_whole() {
@@ -397,7 +399,7 @@ impl<'r> Terrain<'r> {
         Some(ground + self.tip_cells() * self.scale.cell_mm())
     }
 
-    /// The bilinear ground at a place.
+    /// Returns the height of the bilinear ground at a position.
     fn ground_mm(
         &self,
         level: u8,
@@ -417,12 +419,12 @@ impl<'r> Terrain<'r> {
         };
         let (south, north) = ([at(0, 0), at(1, 0)], [at(0, 1), at(1, 1)]);
         let mix = |[a, b]: [f64; 2], t: f64| a * (1.0 - t) + b * t;
-        // Every corner counts: a patch with a hole at one is a hole.
+        // A patch with no-data at one corner is no-data.
         let holes = south.iter().chain(&north).any(|h| h.is_nan());
         (!holes).then(|| mix([mix(south, u), mix(north, u)], v))
     }
 
-    /// Returns true if there is such a tile.
+    /// Returns true if the tile exists.
     #[must_use]
     pub fn has(&self, key: TileKey) -> bool {
         let last = self.size.map(|s| (s - 1) / TILE_CELLS as i32);
@@ -431,8 +433,8 @@ impl<'r> Terrain<'r> {
             && (0..=last[1]).contains(&key.index.row)
     }
 
-    /// The heights of a tile as they are sent, with samples in `buffer`; `None` if there is no such
-    /// tile.
+    /// Returns the heights of a tile as they are sent, with samples in `buffer`; `None` if the tile
+    /// does not exist.
     #[must_use]
     pub fn tile<'b>(
         &self,
@@ -444,7 +446,7 @@ impl<'r> Terrain<'r> {
         Some((heights, reads.status()))
     }
 
-    /// The heights of a tile, by tracked reads.
+    /// Returns the heights of a tile, by tracked reads.
     pub(super) fn heights_of<'b>(
         &self,
         key: TileKey,
@@ -474,7 +476,7 @@ impl<'r> Terrain<'r> {
         Some(buffer.above(low, high, &steps))
     }
 
-    /// Says once where neighbouring samples differ by more than a contact can be exact over.
+    /// Warns once if neighbouring samples differ by more than an exact contact allows.
     fn warn_of_step(&self, key: TileKey, (sample, cells): (usize, f64)) {
         if self.steep.set(()).is_err() {
             return;
@@ -491,8 +493,8 @@ impl<'r> Terrain<'r> {
         );
     }
 
-    /// The materials of a tile of a terrain that has some, as they are sent; `None` where
-    /// there is no such tile, or it has none. And whether they are complete.
+    /// Returns the materials of a tile as they are sent, and whether they are complete; `None` if
+    /// the tile does not exist or the terrain has none.
     #[must_use]
     pub fn materials_of<'b>(
         &self,
@@ -514,21 +516,21 @@ impl<'r> Terrain<'r> {
         of_classes.map_or(Ok(()), Raster::check_complete)
     }
 
-    /// The height of the ground at a haptic sample, in the file's vertical unit, as the file has it
-    /// at a level of detail; NaN where there is none. And whether it is known.
+    /// Returns the file's height of the ground at a haptic sample, at a level of detail, in the
+    /// file's vertical unit; NaN if there is none. Also returns whether it is known.
     pub(crate) fn ground_seen(&self, level: u8, [column, row]: [u32; 2]) -> (f64, ReadStatus) {
         let place = [column, row].map(|index| f64::from(index) * self.cells_of_grid());
         self.grid.height_seen(level, place)
     }
 
-    /// The same in cells, or the height of a ball's centre on flat ground there; NaN where there is
-    /// none that can be rendered.
+    /// Returns the same height in cells, or that of a ball's centre on flat ground there; NaN if
+    /// there is none that can be rendered.
     pub(super) fn cells_at(&self, level: u8, haptic: [u32; 2], reads: &ReadTracker) -> f64 {
         let height = reads.record(self.ground_seen(level, haptic));
         self.within(self.scale.height_cells(height)) + self.tip_cells()
     }
 
-    /// Has the samples between two places in haptic cells read that are not here yet, both included.
+    /// Prefetches the missing samples between two positions in haptic cells, both included.
     pub(crate) fn prefetch(&self, from: [i32; 2], to: [i32; 2]) {
         let parts = self.parts as i32;
         let halo = self.ball.as_ref().map_or(0, |ball| ball.halo() as i32);
@@ -537,7 +539,7 @@ impl<'r> Terrain<'r> {
         self.grid.prefetch(self.level, from, to);
     }
 
-    /// Returns the number of samples of the tile in the field.
+    /// Returns the number of the tile's samples inside the raster.
     fn samples_in(&self, key: TileKey) -> usize {
         let inside = |index: i32, size: i32| {
             let first = index * TILE_CELLS as i32;
@@ -547,7 +549,7 @@ impl<'r> Terrain<'r> {
     }
 }
 
-/// Lowest and highest height, and how many there are; `None` if there is none.
+/// Returns the lowest and highest height and the number of heights; `None` without heights.
 pub(super) fn range(heights: &[f64]) -> Option<(f64, f64, usize)> {
     let known = heights.iter().copied().filter(|h| !h.is_nan());
     known.fold(None, |range, h| {

@@ -1,4 +1,4 @@
-//! Tiles against the raster they are cut from.
+//! Tests that compare tiles with their raster.
 
 use hapterra_core::grid::Cell;
 use hapterra_core::terrain::Tile;
@@ -15,14 +15,14 @@ fn unit() -> Scale {
     Scale::new(1.0, 1.0).expect("valid")
 }
 
-/// The samples of a tile as the device would hold them, in cells.
+/// Returns the samples of a tile as a device stores them, in cells.
 fn samples(terrain: &Terrain<'_>, key: TileKey) -> Vec<f64> {
     let mut buffer = TileBuffer::default();
     let (heights, _) = terrain.tile(key, &mut buffer).expect("a tile");
     sent(key, heights)
 }
 
-/// The samples of a tile that is sent, as the device would hold them, in cells.
+/// Returns the samples of a sent tile as a device stores them, in cells.
 pub(in crate::terrain) fn sent(key: TileKey, heights: Heights<'_>) -> Vec<f64> {
     let mut tile = Box::new(Tile::VACANT);
     let message = TileMessage {
@@ -36,7 +36,7 @@ pub(in crate::terrain) fn sent(key: TileKey, heights: Heights<'_>) -> Vec<f64> {
     held.into_iter().map(|h| base + f64::from(h)).collect()
 }
 
-/// The samples that a tile holds, in cells above its base.
+/// Returns the samples of a stored tile, in cells above its base.
 fn held(tile: &Tile) -> Vec<f32> {
     let sample = |i: usize| {
         // The last row and column are corners of the patches before them.

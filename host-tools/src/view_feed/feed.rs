@@ -18,22 +18,21 @@ use crate::link::{Event, LinkStats};
 use crate::replay::Record;
 use crate::terrain::Terrain;
 
-/// Samples in a message: the viewer's hand moves as often as messages come.
+/// Samples in a message of a live session: the viewer's hand moves once with each message.
 const LIVE_BATCH: usize = 33;
-/// The same where everything comes before it is shown.
+/// Samples in a message of a recording.
 const PATIENT_BATCH: usize = 1000;
-/// Between two counts of the link, s of the device's time.
+/// Time between two messages on the link, s of the device's time.
 const LINK_EVERY_S: f64 = 0.5;
-/// Bytes that may wait for the viewer of a device: some ten seconds of samples beside the
-/// largest layer.
+/// Max pending bytes of a live session: some ten seconds of samples and the largest layer.
 const LIVE_BYTES: usize = 8 << 20;
-/// Bytes that may wait where nothing is armed: a replay is faster than a viewer for
-/// moments, and a recording waits.
+/// Max pending bytes if nothing is armed: a replay may be faster than a viewer for moments, and a
+/// recording waits.
 const PATIENT_BYTES: usize = 64 << 20;
 /// Time-out of the viewer's pending messages at the end.
 const AT_THE_END: Duration = Duration::from_secs(5);
 
-/// Number of messages, samples in batches among them, that the viewer did not get.
+/// Number of dropped messages, batches of samples included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
     /// Messages.
@@ -42,16 +41,16 @@ pub struct Dropped {
     pub samples: u64,
 }
 
-/// Sends a session to a viewer, without ever waiting for it.
+/// Sends a session to a viewer without waiting for it.
 pub struct ViewFeed<'t> {
     terrain: Terrain<'t>,
-    /// The terrain of the beginning, in whose tiles there is detail for good.
+    /// The terrain of the first placement, whose tiles keep their detail.
     first: Terrain<'t>,
-    /// Place where the terrain of the beginning stands for all of the time.
+    /// True if the terrain of the first placement is drawn during the whole session.
     stands: bool,
-    /// The view in force, where it has other cells than the terrain that stands.
+    /// The placement in force, if its cells differ from those of the first one.
     standing: Option<ToFirstPlacement<'t>>,
-    /// A placement that is still to be sent to the viewer, before anything else.
+    /// A placement that has to be sent to the viewer before anything else.
     scene_due: Option<Box<Scene>>,
     tiles: Tiles,
     surroundings: Surroundings,
@@ -69,10 +68,10 @@ pub struct ViewFeed<'t> {
 }
 
 impl<'t> ViewFeed<'t> {
-    /// Starts a viewer of what a device feels, or of a recording.
+    /// Starts a viewer of a session or a recording.
     ///
     /// # Errors
-    /// When it does not start.
+    /// When the viewer does not start.
     pub fn start(
         program: &Program,
         prepared: Prepared<'t>,
@@ -126,16 +125,16 @@ impl<'t> ViewFeed<'t> {
         }
     }
 
-    /// Takes a sample and its row.
+    /// Adds a sample and its row.
     pub fn take(&mut self, sample: &TickRecord, record: &Record) {
         self.late = sample.late;
         self.tiles.lacks(sample.missing_tile);
-        // The first tick has none before it.
+        // A sample has the cost of the tick before; the first has none.
         let cost = (self.has_cost && sample.tick > 1).then_some(sample.cost);
         self.row(record, cost);
     }
 
-    /// Takes a row of a recording, or a sample's.
+    /// Adds a row of a recording, or of a sample.
     pub fn row(&mut self, record: &Record, cost: Option<u32>) {
         let record = &self.shown(record);
         let [x, y, _] = record.hip_mm;
@@ -155,12 +154,12 @@ impl<'t> ViewFeed<'t> {
         }
     }
 
-    /// Takes what a session tells of the device's window.
+    /// Processes an event about the device's window.
     pub fn on_event(&mut self, event: &Event<'_>) {
         self.tiles.on_event(event);
     }
 
-    /// Goes over to another view of the terrain, in which the next sample was rendered.
+    /// Changes to another placement of the terrain, that of the next sample.
     pub fn go_over(&mut self, picture: Picture<'_, 't>) {
         self.flush();
         self.standing = match self.stands {
@@ -180,7 +179,7 @@ impl<'t> ViewFeed<'t> {
         }
     }
 
-    /// A row for the viewer.
+    /// Converts a row for the viewer.
     fn shown(&self, record: &Record) -> Record {
         let standing = self.standing.as_ref();
         standing.map_or(*record, |standing| standing.record(record))
@@ -189,7 +188,7 @@ impl<'t> ViewFeed<'t> {
     fn tell_view(&mut self, picture: Picture<'_, 't>) {
         let keeps_cells = picture.terrain.grid().has_samples_of(self.terrain.grid());
         let keeps_tiles = picture.terrain.has_tiles_of(&self.terrain);
-        // A view that the viewer never heard of leaves what is before it.
+        // Combines this placement with one that was not sent to the viewer.
         let before = self.scene_due.as_ref();
         let all_keep = keeps_tiles && before.is_none_or(|before| before.keeps_tiles);
         self.tiles.go_over(keeps_tiles, picture.terrain.parts());
@@ -220,8 +219,8 @@ impl<'t> ViewFeed<'t> {
         is_told
     }
 
-    /// Shows the tile under a row's HIP in full detail, for good: for rows that are not
-    /// rendered by a device with a window.
+    /// Keeps the tile under a row's HIP in full detail: for rows that are not rendered by a device
+    /// with a window.
     pub fn detail(&mut self, record: &Record) {
         let [x, y, _] = self.shown(record).hip_mm;
         let cell_mm = self.terrain.scale_of_level_0().cell_mm();
@@ -230,8 +229,7 @@ impl<'t> ViewFeed<'t> {
         self.tiles.tell(&self.first, &self.queue);
     }
 
-    /// Tells what there is to tell of tiles and link; to be called after each look at the
-    /// line.
+    /// Sends the due messages on tiles and link; call it after each poll of the line.
     pub fn look(&mut self, tally: &LinkStats) {
         if !self.tell_scene() {
             return;
@@ -255,14 +253,14 @@ impl<'t> ViewFeed<'t> {
         }
     }
 
-    /// Waits until the viewer has taken most of its messages: for recordings alone,
-    /// which nothing else waits for. False where it is gone.
+    /// Waits until the viewer has read most of its messages: only for recordings, which nothing
+    /// else waits for. Returns false if the viewer is gone.
     pub fn wait_for_room(&self) -> bool {
         self.queue.wait_for_room(Duration::from_secs(60))
     }
 
-    /// Ends the stream. The viewer keeps showing what it has; the child is handed over,
-    /// so that a caller can wait for it.
+    /// Ends the stream. The viewer keeps its picture; the child is returned, so that the caller can
+    /// wait for it.
     #[must_use]
     pub fn finish(mut self) -> (Dropped, Option<Child>) {
         self.flush();
@@ -278,7 +276,7 @@ impl<'t> ViewFeed<'t> {
         let samples = batch.len() as u64;
         let is_told = match self.tell_scene() {
             true => self.offer(Message::Samples(batch)),
-            // They would come to lie in the view before.
+            // The viewer would draw them in the placement before.
             false => {
                 self.dropped.messages += 1;
                 false
@@ -331,7 +329,7 @@ mod tests {
     #[test]
     fn feed_does_not_wait_for_ground_while_an_arm_may_be_armed() {
         let folder = tempfile::tempdir().expect("a folder");
-        // Wide enough that the layers are of coarser samples.
+        // Large enough for layers of coarser samples.
         let raster = in_file(folder.path(), [2100, 300], |x, y| (x + y) as f32);
         let terrain = Terrain::new(&raster, Scale::new(0.5, 0.5).expect("scale"), 0);
         let terrain = terrain.expect("terrain");
@@ -357,7 +355,7 @@ mod tests {
             row(&mut feed, 0.0);
             rows += 1;
         }
-        // Not even for a view.
+        // No room, not even for a placement.
         while feed.queue.offer(Message::Link(Link::default())) {}
         feed.go_over(picture(&second));
         for _ in 0..2 * LIVE_BATCH {
@@ -398,7 +396,7 @@ mod tests {
         }
         assert_eq!((views, told + dropped.samples), (2, rows));
         assert!(dropped.samples >= 2 * LIVE_BATCH as u64);
-        // Each was in a batch, and nothing else was dropped.
+        // Each dropped sample was in a batch, and nothing else was dropped.
         let batches = dropped.samples / LIVE_BATCH as u64;
         assert_eq!(dropped.messages, batches, "{dropped:?}");
     }

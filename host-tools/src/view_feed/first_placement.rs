@@ -1,7 +1,8 @@
 //! Positions of a later placement in the cells of the first one.
 //!
-//! The viewer draws the terrain of a recording once, in the cells of the first placement. A placement
-//! whose cells were measured elsewhere on the globe has other millimetres for the same ground.
+//! The viewer draws the terrain of a recording once, in the cells of the first placement. If the
+//! cells of another placement were measured elsewhere on the globe, it has other millimetres for
+//! the same ground.
 
 use crate::replay::Record;
 use crate::terrain::{Scale, Terrain};
@@ -9,12 +10,13 @@ use crate::terrain::{Scale, Terrain};
 /// Converts positions of a placement to the cells of the first one.
 pub(super) struct ToFirstPlacement<'t> {
     view: Terrain<'t>,
-    /// The view's terrain in the cells of the beginning, equally large in the hand.
+    /// The placement's terrain in the cells of the first one, equally large in device millimetres.
     stands: Terrain<'t>,
 }
 
 impl<'t> ToFirstPlacement<'t> {
-    /// Of a view; `None` where its cells are those of the beginning, or cannot be had in them.
+    /// Creates the conversion of a placement; `None` if its cells are those of the first one, or
+    /// cannot be converted.
     pub(super) fn new(first: &Terrain<'t>, view: &Terrain<'t>) -> Option<Self> {
         let (grid, scale) = (first.grid(), view.scale_of_level_0());
         if grid.has_samples_of(view.grid()) {
@@ -28,12 +30,12 @@ impl<'t> ToFirstPlacement<'t> {
         })
     }
 
-    /// The terrain of the view in the cells of the beginning.
+    /// Returns the terrain of the placement in the cells of the first one.
     pub(super) const fn terrain(&self) -> &Terrain<'t> {
         &self.stands
     }
 
-    /// The same ground and height, mm.
+    /// Converts a position, mm: the same ground and height.
     pub(super) fn place(&self, [east, north, up]: [f64; 3]) -> [f64; 3] {
         let (from, to) = (self.view.scale_of_level_0(), self.stands.scale_of_level_0());
         let cells = [east, north].map(|mm| mm / from.cell_mm());
@@ -42,7 +44,7 @@ impl<'t> ToFirstPlacement<'t> {
         [east * to.cell_mm(), north * to.cell_mm(), up]
     }
 
-    /// A row with its places there.
+    /// Converts the positions of a row.
     pub(super) fn record(&self, record: &Record) -> Record {
         Record {
             hip_mm: self.place(record.hip_mm),
@@ -78,7 +80,7 @@ mod tests {
         let (first, view) = (terrain(&first, 0.5), terrain(&later, 0.8));
         assert!(ToFirstPlacement::new(&first, &first).is_none());
         let standing = ToFirstPlacement::new(&first, &view).expect("other cells");
-        // The sample of column 5 and row 4, at 10 m a millimetre.
+        // The sample of column 5 and row 4, at 10 m for each millimetre.
         let [east, north, up] = standing.place([5.0 * 0.8, 5.0 * 0.8, 3.0]);
         assert!((east - 10.0).abs() < 1e-9 && (north - 4.0).abs() < 1e-9);
         let ground = |terrain: &Terrain<'_>, x, y| terrain.height_mm(x, y).expect("ground");

@@ -1,17 +1,18 @@
-//! The tiles that a device holds, by what its host has sent.
+//! The tiles that a device stores, determined from those that were sent.
 
 use std::collections::BTreeMap;
 
 use hapterra_core::terrain::{TileIndex, TileKey};
 use hapterra_view_stream::Tiles;
 
-/// The device's window, by what was sent into it: a tile takes the place of the one
-/// before in its slot ([`hapterra_core::terrain::Window`]). A tile that was lost on the way
-/// counts as held until it is sent again.
+/// The device's window, determined from the sent tiles: a tile replaces the one before in its slot
+/// ([`hapterra_core::terrain::Window`]). A tile that was lost in transit counts as stored until it
+/// is sent again.
 #[derive(Debug, Default)]
 pub(super) struct HeldTiles {
     side: i32,
-    /// Haptic cells a cell of the level: a tile is shown as the one of the level around it.
+    /// Haptic cells along the side of a cell of the level: a haptic tile is shown as the tile of
+    /// the level around it.
     parts: i32,
     slots: BTreeMap<u32, TileIndex>,
     awaited: Option<TileIndex>,
@@ -19,7 +20,7 @@ pub(super) struct HeldTiles {
 }
 
 impl HeldTiles {
-    /// An empty window of `side` × `side` tiles.
+    /// Creates an empty window of `side` × `side` tiles.
     pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {
             parts: parts as i32,
@@ -29,8 +30,7 @@ impl HeldTiles {
         }
     }
 
-    /// A tile of the haptic grid was sent: the tile of the level that is shown for it, and the slot that this
-    /// takes.
+    /// Records a sent tile of the haptic grid; returns the shown tile of the level and its slot.
     pub(super) fn sent(&mut self, key: TileKey) -> (u32, TileKey) {
         let index = self.of_level(key.index);
         let slot = self.slot(index);
@@ -46,30 +46,30 @@ impl HeldTiles {
         self.awaited = tile;
     }
 
-    /// Another view has haptic cells of another size.
+    /// Changes to a placement whose haptic cells have another size.
     pub(super) fn go_over(&mut self, parts: u32) {
         self.parts = parts as i32;
     }
 
-    /// The tile of the level around a tile of the haptic grid.
+    /// Returns the tile of the level around a tile of the haptic grid.
     fn of_level(&self, haptic: TileIndex) -> TileIndex {
         let [col, row] = [haptic.col, haptic.row].map(|index| index.div_euclid(self.parts.max(1)));
         TileIndex::new(col, row)
     }
 
-    /// The device begins with an empty window.
+    /// Empties the window.
     pub(super) fn clear(&mut self) {
         self.slots.clear();
         self.has_changed = true;
     }
 
-    /// Returns the place where a tile is held.
+    /// Returns the slot of a tile.
     fn slot(&self, index: TileIndex) -> u32 {
         let [col, row] = [index.col, index.row].map(|i| i.rem_euclid(self.side.max(1)));
         (row * self.side + col) as u32
     }
 
-    /// The tiles, where they are others than were last taken from here.
+    /// Returns the tiles if they have changed since the last call.
     pub(super) fn take_change(&mut self) -> Option<Tiles> {
         std::mem::take(&mut self.has_changed).then(|| Tiles {
             held: self
@@ -85,7 +85,7 @@ impl HeldTiles {
         })
     }
 
-    /// The change was not sent to the viewer: it is pending again.
+    /// Marks the change as pending again, because it was not sent to the viewer.
     pub(super) fn not_told(&mut self) {
         self.has_changed = true;
     }
@@ -113,7 +113,7 @@ mod tests {
         assert_eq!(held.take_change().expect("empty").held, [[0; 2]; 0]);
     }
 
-    /// A ball's tile is a part of one of the level.
+    /// A tile under a ball is a part of a tile of the level.
     #[test]
     fn haptic_tiles_are_shown_as_the_tile_around_them() {
         let mut held = HeldTiles::new(4, 3);

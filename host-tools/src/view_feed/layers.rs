@@ -5,18 +5,17 @@ use hapterra_view_stream::{Layer, TILE_POSTS, Tile};
 
 use crate::terrain::Terrain;
 
-/// A layer has at most so many cells along a side.
+/// Max cells along the side of a layer.
 const CELLS: i32 = 1024;
-/// Cells between the samples of the finest layer at most: the viewer takes every fourth
-/// sample for its mesh, whose cells then are not larger than a tile of any level.
+/// Max cells between the samples of the finest layer: the viewer uses every fourth sample for its
+/// mesh, whose cells then are not larger than a tile of any level.
 const FINEST_STEP: i32 = 8;
 /// Maximum ratio of the spacings of two layers.
 const RATIO: i32 = 16;
-/// The viewer's mesh takes every fourth sample of a layer at most.
+/// Max spacing of the mesh in the viewer, in samples of a layer.
 const MESH: i32 = 4;
 
-/// Which samples of a terrain a layer has, in cells of level 0: a view of any level may be
-/// rendered later.
+/// The samples of a layer, in cells of level 0: a later placement may have any level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Extent {
     step: i32,
@@ -25,7 +24,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Returns true if a place (cells) lies in its middle half, along both sides.
+    /// Returns true if a position (cells) lies in its middle half, along both sides.
     pub(super) fn is_around(&self, place: [f64; 2]) -> bool {
         let [west, south, east, north] = self.cells.map(f64::from);
         let is_between = |at: f64, low: f64, high: f64| {
@@ -36,8 +35,8 @@ impl Extent {
     }
 }
 
-/// The layers of a terrain around `home` (cells), coarsest first: the whole, and where it is
-/// large its surroundings of `home` in finer ones.
+/// Returns the layers of a terrain around `home` (cells), coarsest first: the whole terrain and, if
+/// it is large, the surroundings of `home` in finer layers.
 pub(super) fn around(terrain: &Terrain<'_>, home: [f64; 2]) -> Vec<Extent> {
     let grid = terrain.grid();
     let cells = |samples: u32| i32::try_from(samples.saturating_sub(1)).unwrap_or(i32::MAX);
@@ -61,11 +60,11 @@ fn extents([columns, rows]: [i32; 2], home: [f64; 2]) -> Vec<Extent> {
             [columns, rows],
         );
         let around = |axis: usize| {
-            // Along the cells of the coarser mesh, which then is cut where this one is.
+            // Aligned to the cells of the coarser mesh, which is cut at this layer's border.
             let (grain, half) = (step * MESH, CELLS * finer / 2);
             let first = (low[axis] - half).max(0) / grain * grain;
             let last = first.saturating_add(2 * half).min(high[axis]);
-            // At the field's border the coarser mesh has a smaller cell, or ends before.
+            // At the raster's border the coarser mesh has a smaller cell, or ends before it.
             let grain = if last == high[axis] { finer } else { grain };
             (first, last / grain * grain)
         };
@@ -86,12 +85,12 @@ fn extents([columns, rows]: [i32; 2], home: [f64; 2]) -> Vec<Extent> {
 #[derive(Debug)]
 pub(super) struct Reading {
     layer: Layer,
-    /// Rows that there will be.
+    /// Final number of rows.
     rows: u32,
 }
 
 impl Reading {
-    /// Nothing is read yet.
+    /// Begins without rows.
     pub(super) fn new(number: usize, extent: &Extent) -> Self {
         let [west, south, east, north] = extent.cells;
         let count = |from: i32, to: i32| ((to - from) / extent.step) as u32 + 1;
@@ -107,7 +106,7 @@ impl Reading {
         Self { layer, rows }
     }
 
-    /// Reads at most so many rows more, those that are here; whether there are others.
+    /// Reads at most `rows` more available rows; returns true if others remain.
     pub(super) fn read(&mut self, terrain: &Terrain<'_>, rows: u32) -> bool {
         let layer = &mut self.layer;
         let level = layer.step.ilog2() as u8;
@@ -117,7 +116,7 @@ impl Reading {
             let grid = terrain.grid();
             let status = grid.read_row(level, south + layer.rows, west, &mut line);
             if !status.is_complete() {
-                // It is on its way from elsewhere: another look finds it.
+                // The row is being read; a later call finds it.
                 return true;
             }
             let heights = line.iter().map(|height| *height as f32);
@@ -133,7 +132,7 @@ impl Reading {
     }
 }
 
-/// All layers around `home` (cells).
+/// Returns all layers around `home` (cells).
 pub(super) fn of(terrain: &Terrain<'_>, home: [f64; 2]) -> Vec<Layer> {
     let extents = around(terrain, home);
     let whole = |(number, extent)| {
@@ -144,14 +143,14 @@ pub(super) fn of(terrain: &Terrain<'_>, home: [f64; 2]) -> Vec<Layer> {
     extents.iter().enumerate().map(whole).collect()
 }
 
-/// A tile with the samples around it.
+/// Returns a tile with the samples around it.
 pub(super) fn tile(terrain: &Terrain<'_>, index: TileIndex, slot: u32) -> Tile {
     const AROUND: usize = TILE_POSTS - TILE_SAMPLES;
     let per_unit = terrain.scale().height_mm_per_unit();
     let first = index.first_cell();
     let mut heights_mm = Vec::with_capacity(TILE_POSTS * TILE_POSTS);
     let mut line = [f64::NAN; TILE_POSTS];
-    // West and south of the field there is nothing to be copied.
+    // There is nothing to copy west and south of the raster.
     let skipped = usize::from(first.x <= 0);
     for row in (first.y - AROUND as i32 / 2..).take(TILE_POSTS) {
         line.fill(f64::NAN);

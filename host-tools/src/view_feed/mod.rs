@@ -1,12 +1,12 @@
-//! The feed of a viewer: `hapterra-view`, a program of its own.
+//! The feed of the viewer, `hapterra-view`, which is a separate program.
 //!
 //! ```text
 //! samples, tiles ─▶ ViewFeed ─▶ bounded queue ─▶ thread ══ pipe ══▶ hapterra-view
 //! ```
 //!
-//! The serving thread never waits for the viewer. What its queue has no room for is
-//! dropped and counted; a viewer that is slow, hangs or is killed changes nothing else.
-//! The stream's messages are in [`hapterra_view_stream`].
+//! The serving thread never waits for the viewer. Messages that do not fit in the queue are dropped
+//! and counted; a viewer that is slow, hangs or is killed changes nothing else.
+//! [`hapterra_view_stream`] defines the messages of the stream.
 
 mod feed;
 mod first_placement;

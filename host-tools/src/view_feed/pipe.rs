@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::sync::mpsc::SyncSender;
 
-/// Blocks once its channel is full, as an unread pipe does.
+/// A pipe that blocks when its channel is full, as an unread pipe does.
 pub(super) struct Pipe(pub(super) SyncSender<Vec<u8>>);
 
 impl Write for Pipe {

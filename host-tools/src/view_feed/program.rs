@@ -4,17 +4,17 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// Names the viewer, where it is not beside this program or on the `PATH`.
+/// Environment variable that names the viewer, if it is not beside this program or on the `PATH`.
 pub const VARIABLE: &str = "HAPTERRA_VIEW";
 const NAME: &str = "hapterra-view";
 
-/// Reason for which there is no viewer.
+/// Reason why there is no viewer.
 #[derive(Debug, thiserror::Error)]
 pub enum ProgramError {
-    /// Nowhere to be found.
+    /// The viewer was not found.
     #[error("there is no {NAME} beside this program or on the PATH")]
     Absent,
-    /// It is there, and does not start.
+    /// The viewer was found, but did not start.
     #[error("{} does not start: {why}", path.display())]
     NotStarted {
         /// The program.
@@ -28,12 +28,12 @@ pub enum ProgramError {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Program {
     path: PathBuf,
-    /// A recording for rerun's own viewer that it is to write.
+    /// Output path of a recording for Rerun's own viewer.
     rrd: Option<PathBuf>,
 }
 
 impl Program {
-    /// Finds it: as [`VARIABLE`] says, else beside this program, else on the `PATH`.
+    /// Finds the viewer: by [`VARIABLE`], otherwise beside this program, otherwise on the `PATH`.
     ///
     /// # Errors
     /// [`ProgramError::Absent`].
@@ -64,7 +64,7 @@ impl Program {
         Self { path, rrd: None }
     }
 
-    /// The same, and it writes a recording for rerun's own viewer.
+    /// Makes the viewer write a recording for Rerun's own viewer.
     #[must_use]
     pub fn writing(self, rrd: Option<&Path>) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl Program {
         }
     }
 
-    /// Starts it, with a pipe as its standard input.
+    /// Starts the viewer, with a pipe as its standard input.
     pub(super) fn start(&self) -> Result<Child, ProgramError> {
         let rrd = self
             .rrd

@@ -9,22 +9,22 @@ use std::time::{Duration, Instant};
 
 use hapterra_view_stream::{Message, write};
 
-/// Between two looks at whether everything is written.
+/// Time between two checks that everything is written.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Messages on their way to a viewer, in order.
+/// Pending messages to a viewer, in order.
 pub(super) struct Queue {
     messages: Option<Sender<(Message, usize)>>,
-    /// Bytes that wait, about.
+    /// Approximate number of pending bytes.
     waiting: Arc<AtomicUsize>,
-    /// The viewer reads no more.
+    /// True if the viewer has stopped reading.
     is_gone: Arc<AtomicBool>,
     limit: usize,
     writer: Option<JoinHandle<()>>,
 }
 
 impl Queue {
-    /// Has `first` written, whatever its size, and then what is offered.
+    /// Writes `first`, whatever its size, and then the offered messages.
     pub(super) fn start(
         to: impl Write + Send + 'static,
         first: Vec<Message>,
@@ -40,7 +40,7 @@ impl Queue {
             .name("to the viewer".into())
             .spawn(move || write.run(to, first, &waiting_messages))
             .ok();
-        // Without a thread everything is dropped, and counted.
+        // Without a thread all messages are dropped, and counted.
         is_gone.fetch_or(writer.is_none(), Ordering::AcqRel);
         Self {
             messages: Some(messages),
@@ -51,12 +51,12 @@ impl Queue {
         }
     }
 
-    /// Returns true if a message was taken. If not there was no room for it.
+    /// Returns true if the queue accepts a message, false if it is full.
     pub(super) fn offer(&self, message: Message) -> bool {
         self.offer_or_return(message).is_ok()
     }
 
-    /// The same for what took long to make: gives it back where there was no room for it.
+    /// As [`Self::offer`], but returns a rejected message, because it was expensive to make.
     pub(super) fn offer_or_return(&self, message: Message) -> Result<(), Message> {
         let size = size_of(&message);
         let waiting = self.waiting.load(Ordering::Acquire);
@@ -72,8 +72,8 @@ impl Queue {
         sent.map_err(|unsent| unsent.0.0)
     }
 
-    /// Waits for at most `wait` until there is room. For a recording, which nothing else
-    /// waits for; false where the viewer is gone.
+    /// Waits for at most `wait` until there is room: only for a recording, which nothing else waits
+    /// for. Returns false if the viewer is gone.
     pub(super) fn wait_for_room(&self, wait: Duration) -> bool {
         let until = Instant::now() + wait;
         let is_full = || self.waiting.load(Ordering::Acquire) > self.limit / 2;
@@ -83,7 +83,7 @@ impl Queue {
         !self.is_gone.load(Ordering::Acquire)
     }
 
-    /// Ends the stream; what waits is written, if the viewer takes it within `wait`.
+    /// Ends the stream; pending messages are written if the viewer reads them within `wait`.
     pub(super) fn end(mut self, wait: Duration) {
         if let Some(messages) = self.messages.take() {
             let _ = messages.send((Message::End, 0));
@@ -93,7 +93,7 @@ impl Queue {
         while self.writer.as_ref().is_some_and(is_writing) && Instant::now() < until {
             std::thread::sleep(LOOK);
         }
-        // A thread that still writes then ends with this program.
+        // A thread that still writes ends with this program.
     }
 }
 
@@ -114,12 +114,12 @@ impl Writer {
                 return;
             }
         }
-        // The viewer sees by the pipe whether this program still runs.
+        // The open pipe shows the viewer that this program still runs.
         std::mem::forget(to);
     }
 }
 
-/// About as many bytes as a message takes.
+/// Returns the approximate size of a message in bytes.
 fn size_of(message: &Message) -> usize {
     64 + match message {
         Message::Samples(samples) => size_of_val(samples.as_slice()),
@@ -196,10 +196,10 @@ mod tests {
         let (pipe, out) = sync_channel(0);
         drop(out);
         let queue = Queue::start(Pipe(pipe), vec![hello()], 10_000);
-        // Its thread has yet to see that.
+        // Its thread has not detected that yet.
         wait_until("nothing is taken", || !queue.offer(tiles(0)));
         assert_eq!(queue.offer_or_return(tiles(1)), Err(tiles(1)));
-        // A year: who waits for room is seen to hang.
+        // A year: a test that waits for room would hang.
         assert!(!queue.wait_for_room(Duration::from_secs(31_536_000)));
         queue.end(HANG);
     }

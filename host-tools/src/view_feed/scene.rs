@@ -8,25 +8,24 @@ use crate::link::{EMULATED, INSTRUCTIONS_PER_COUNT};
 use crate::terrain::Terrain;
 use heightfield::System;
 
-/// Content of a viewer.
+/// The contents of a viewer.
 pub struct Picture<'p, 't> {
-    /// The terrain as it is rendered.
+    /// The rendered terrain.
     pub terrain: &'p Terrain<'t>,
     /// The user's name for it.
     pub title: &'p str,
-    /// Place and scale: a name and what there is to say, short.
+    /// Place and scale: short names and values.
     pub facts: Vec<(String, String)>,
-    /// The place under the tip in the arm's home pose, mm; the middle of the terrain where
-    /// there was no arm.
+    /// The point under the tip in the arm's home pose, mm; the middle of the terrain if there is no
+    /// arm.
     pub home_mm: Option<[f64; 3]>,
-    /// The part in front of the arm, west, south, east, north, mm; else the whole.
+    /// The part in front of the arm, west, south, east, north, mm; otherwise the whole terrain.
     pub laid_mm: Option<[f64; 4]>,
-    /// True if samples come as they are rendered.
+    /// True if samples are sent while they are rendered.
     pub is_live: bool,
 }
 
-/// A picture whose terrain was read at its coarse levels, so that no device has to wait
-/// for that.
+/// A picture whose terrain was read at its coarse levels, so that no device has to wait for that.
 pub struct Prepared<'t> {
     pub(super) terrain: Terrain<'t>,
     pub(super) scene: Box<Scene>,
@@ -34,7 +33,7 @@ pub struct Prepared<'t> {
 }
 
 impl Prepared<'_> {
-    /// The same, whose further reads of the terrain do not wait.
+    /// Returns the picture with further reads of the terrain that do not wait.
     #[must_use]
     pub fn non_blocking(self) -> Self {
         Self {
@@ -43,7 +42,7 @@ impl Prepared<'_> {
         }
     }
 
-    /// The beginning of the stream: greeting, scene and layers.
+    /// Returns the beginning of the stream: open message, scene and layers.
     pub(super) fn into_messages(self) -> Vec<Message> {
         let hello = Hello {
             version: VERSION,
@@ -90,7 +89,7 @@ impl<'t> Picture<'_, 't> {
             home_mm: self.home_mm.unwrap_or(middle_mm),
             laid_mm: self.laid_mm.unwrap_or([0.0, 0.0, east_mm, north_mm]),
             ground_m_per_mm: terrain.grid().side_m().map(|side| side / level_0_mm),
-            // A terrain that is rendered level has no heights to tell.
+            // A terrain rendered flat has no heights to show.
             height_per_mm: if height_per_mm.is_finite() {
                 height_per_mm
             } else {
@@ -117,13 +116,13 @@ pub(super) fn tick_cost(device: &DeviceHello) -> TickCost {
     }
 }
 
-/// The home position in cells of level 0.
+/// Returns the home position in cells of level 0.
 pub(super) fn home_cells(scene: &Scene) -> [f64; 2] {
     let [x, y, _] = scene.home_mm;
     [x, y].map(|mm| mm / scene.cell_mm)
 }
 
-/// The file's coordinates along millimetres, if the file states any.
+/// Returns the file's coordinates as a function of millimetres, if the file has any.
 fn coordinates(terrain: &Terrain<'_>, level_0_mm: f64) -> Option<Coordinates> {
     if terrain.raster().georeference().system() == System::Cells {
         return None;
@@ -168,7 +167,7 @@ mod tests {
         assert_eq!(scene.home_mm, [32.0, 16.0, 1.5]);
         assert_eq!(scene.laid_mm, [0.0, 0.0, 64.0, 32.0]);
         assert_eq!(scene.height_per_mm, 2.0);
-        // Cells of a metre are 2 mm in the hand; their place is unknown.
+        // Cells of a metre are 2 device millimetres; their position is unknown.
         assert_eq!(
             (scene.coordinates, scene.ground_m_per_mm),
             (None, Some(0.5))

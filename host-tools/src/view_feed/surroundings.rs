@@ -1,15 +1,15 @@
-//! The finer layers of a large terrain, which go along with the hand.
+//! The finer layers of a large terrain, which follow the hand.
 
 use super::layers::{self, Extent, Reading};
 use super::queue::Queue;
 use crate::terrain::Terrain;
 use hapterra_view_stream::{Layer, Message};
 
-/// Rows that are read in one look: the line to the device is looked at between them.
+/// Rows read in one call: the line to the device is polled between calls.
 const ROWS: u32 = 32;
 
-/// Keeps the finer layers around the home position of the view in force. The coarsest one
-/// is the whole, and stays.
+/// Keeps the finer layers around the present home position. The coarsest layer is the whole
+/// terrain, and stays.
 #[derive(Debug)]
 pub(super) struct Surroundings {
     /// All layers, sent or pending.
@@ -17,12 +17,12 @@ pub(super) struct Surroundings {
     /// Pending layers, the next one last.
     due: Vec<(usize, Extent)>,
     reading: Option<Reading>,
-    /// Read, and not sent yet.
+    /// A layer that is read, but not sent yet.
     read: Option<Layer>,
 }
 
 impl Surroundings {
-    /// Of a terrain whose layers around `home` (cells) are sent.
+    /// Begins with a terrain whose layers around `home` (cells) are sent.
     pub(super) fn new(terrain: &Terrain<'_>, home: [f64; 2]) -> Self {
         Self {
             extents: layers::around(terrain, home),
@@ -32,8 +32,7 @@ impl Surroundings {
         }
     }
 
-    /// Goes along to another home position (cells), where the layers there are have it not in
-    /// their middle.
+    /// Moves to another home position (cells) if it is not in the middle of the present layers.
     pub(super) fn follow(&mut self, terrain: &Terrain<'_>, home: [f64; 2]) {
         let mut finer = self.extents.iter().skip(1);
         if finer.all(|extent| extent.is_around(home)) {
@@ -50,14 +49,15 @@ impl Surroundings {
         self.extents = extents;
     }
 
-    /// Begins with the coarsest layer anew, around a home position (cells): the cells are
-    /// others.
+    /// Begins again with the coarsest layer, around a home position (cells), because the cells have
+    /// changed.
     pub(super) fn begin_anew(&mut self, terrain: &Terrain<'_>, home: [f64; 2]) {
         *self = Self::new(terrain, home);
         self.due = self.extents.iter().copied().enumerate().rev().collect();
     }
 
-    /// Reads some rows, and tells a layer that is read: callers wait for no more than these.
+    /// Reads a few rows, and sends a layer that is complete: the caller waits for no more than
+    /// these rows.
     pub(super) fn tell(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
         if let Some(layer) = self.read.take() {
             let message = Message::Layer(layer);
@@ -90,14 +90,15 @@ mod tests {
     use heightfield::Raster;
     use std::sync::mpsc::sync_channel;
 
-    /// More than anything here takes.
+    /// More than all messages of these tests need.
     const ROOM: usize = 64 << 20;
 
     fn height(column: u32, row: u32) -> f32 {
         (column % 1000 + 7 * row) as f32
     }
 
-    /// The layers that are sent when home moves along these places, and so many looks at each.
+    /// Returns the layers sent while home moves along these positions, with a number of calls at
+    /// each.
     fn told(homes: &[([f64; 2], usize)]) -> Vec<Layer> {
         let raster = Raster::from_fn(20_001, 65, height).expect("raster");
         let terrain = Terrain::new(&raster, Scale::new(0.5, 0.1).expect("scale"), 0);

@@ -1,5 +1,4 @@
-//! The tiles that a viewer receives: those of the device's window, or those that a
-//! recording's path goes over.
+//! The tiles for a viewer: those of the device's window, or those on a recording's path.
 
 use std::collections::HashSet;
 
@@ -12,28 +11,27 @@ use super::queue::Queue;
 use crate::link::Event;
 use crate::terrain::Terrain;
 
-/// Tiles that a device asks for before the first sample of a view, at most.
+/// Max tiles that a device requests before the first sample of a placement.
 const MAX_COMING: usize = 1024;
-/// Tiles of a recording in full detail: beyond so many, others stay coarse.
+/// Max tiles of a recording in full detail: further ones stay coarse.
 const MAX_DETAILED: usize = 400;
-/// Tiles that are sent at once, so that a look stays short: heights are read again for
-/// them.
+/// Max tiles sent in one call, to keep it short: their heights are read again.
 const AT_A_TIME: usize = 8;
 
-/// Tiles, and which of them are pending.
+/// Tiles, and those of them that are pending.
 pub(super) struct Tiles {
     held: HeldTiles,
-    /// The device took a view of which no sample has come yet; tiles that were sent since.
+    /// Tiles sent since the device accepted a placement that has no sample yet.
     coming: Option<Vec<TileKey>>,
-    /// Tiles that are shown for good.
+    /// Tiles that keep their detail.
     detailed: HashSet<TileKey>,
     /// Pending tiles for the viewer, by slot.
     untold: Vec<(u32, TileKey)>,
 }
 
 impl Tiles {
-    /// Of a device with an empty window of `side` × `side` tiles, with so many haptic cells a cell
-    /// of the level.
+    /// Creates the tiles of a device with an empty window of `side` × `side` tiles; `parts` is the
+    /// number of haptic cells along the side of a cell of the level.
     pub(super) fn new(side: u8, parts: u32) -> Self {
         Self {
             held: HeldTiles::new(side, parts),
@@ -48,11 +46,11 @@ impl Tiles {
         self.held.lacks(tile);
     }
 
-    /// Takes what a session tells of the device's window.
+    /// Processes an event about the device's window.
     pub(super) fn on_event(&mut self, event: &Event<'_>) {
         match (event, &mut self.coming) {
             (Event::Viewed { taken: true, .. }, _) => self.coming = Some(vec![]),
-            // More than a window holds are not sent within some samples.
+            // More tiles than a window holds are not sent within a few samples.
             (Event::TileSent(key), Some(coming)) if coming.len() < MAX_COMING => coming.push(*key),
             (Event::TileSent(key), None) => self.sent(*key),
             (Event::Opened { resumed: false, .. }, _) => self.forget(),
@@ -60,8 +58,8 @@ impl Tiles {
         }
     }
 
-    /// Another view is in force: with the tiles of the one before, or with none but those
-    /// that were sent since the device took it.
+    /// Changes to another placement: with the tiles of the one before, or only with those sent
+    /// since the device accepted it.
     pub(super) fn go_over(&mut self, keeps_tiles: bool, parts: u32) {
         if !keeps_tiles {
             self.forget();
@@ -72,7 +70,7 @@ impl Tiles {
         }
     }
 
-    /// The device begins with an empty window.
+    /// Empties the window.
     fn forget(&mut self) {
         self.held.clear();
         self.untold.clear();
@@ -84,8 +82,8 @@ impl Tiles {
         self.untold.push((slot, key));
     }
 
-    /// Shows the tile at a place (cells) in full detail, for good: under rows that are not
-    /// rendered by a device with a window.
+    /// Keeps the tile at a position (cells) in full detail: for rows that are not rendered by a
+    /// device with a window.
     pub(super) fn detail(&mut self, terrain: &Terrain<'_>, cells: [f64; 2]) {
         let side = f64::from(TILE_CELLS) * f64::from(terrain.level()).exp2();
         let [col, row] = cells.map(|cells| (cells / side).floor() as i32);
@@ -98,11 +96,11 @@ impl Tiles {
         }
     }
 
-    /// Tells some of the tiles that there are to tell.
+    /// Sends some of the pending tiles.
     pub(super) fn tell(&mut self, terrain: &Terrain<'_>, queue: &Queue) {
         let mut told = 0;
         for (slot, key) in std::mem::take(&mut self.untold) {
-            // What there is no room for is tried again at the next look.
+            // A tile that does not fit in the queue is tried again in the next call.
             let is_told = told < AT_A_TIME
                 && queue.offer(Message::Tile(layers::tile(terrain, key.index, slot)));
             match is_told {
@@ -112,7 +110,7 @@ impl Tiles {
         }
     }
 
-    /// Tells which tiles the device holds and lacks, where that has changed.
+    /// Sends the lists of stored and missing tiles if they have changed.
     pub(super) fn tell_window(&mut self, queue: &Queue) {
         if let Some(tiles) = self.held.take_change()
             && !queue.offer(Message::Tiles(tiles))

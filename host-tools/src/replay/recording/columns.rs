@@ -1,4 +1,4 @@
-//! The columns of a recording of `run`, in their order, with their meanings for the reference.
+//! The columns of a `run` recording, in order, with their meanings for the reference.
 
 /// Columns of the board's loop, which only `run` writes.
 pub const TICK_COLUMNS: [&str; 4] = [TICK, WORK, COST, LATE];

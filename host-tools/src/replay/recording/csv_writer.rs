@@ -1,4 +1,4 @@
-//! Recordings as CSV: the settings behind `# `, a header, a line a row.
+//! Recordings as CSV: the settings behind `# `, a header, one line for each row.
 
 use std::io::Write;
 
@@ -10,14 +10,14 @@ use crate::replay::settings::{PlacementSettings, Settings};
 /// A CSV recording being written.
 pub(super) struct Csv {
     output: Output,
-    /// The latest row, or the header before the first: not written yet.
+    /// The latest row, or the header before the first one; not written yet.
     row: Vec<u8>,
-    /// Remarks that stand before it.
+    /// Comments to write before it.
     remarks: Vec<u8>,
 }
 
 impl Csv {
-    /// Begins with the header.
+    /// Creates a recording that begins with the header.
     pub(super) fn new(output: Output, more: &[Column]) -> Self {
         let (before, after) = NUMBERS.split_at(BEFORE_CONTACT);
         let names = before.iter().chain([&CONTACT]).chain(after).copied();
@@ -31,18 +31,18 @@ impl Csv {
         }
     }
 
-    /// Puts the settings before the header.
+    /// Adds the settings before the header.
     pub(super) fn describe(&mut self, settings: &Settings) {
         self.remark(&settings.of_beginning().to_toml());
     }
 
-    /// Puts a mark before the latest row: a remark that no row follows may be cut.
+    /// Adds a mark before the latest row: readers may ignore a comment after the last row.
     pub(super) fn mark(&mut self, mark: &Mark) {
         self.remark(&mark.to_toml());
     }
 
-    /// Says between two rows that the rows from here on were rendered in another view. What
-    /// passes comments over passes it over, and all comments together are the settings.
+    /// Adds comments between two rows: the rows after them belong to another placement. Readers
+    /// that skip comments skip these, and all comments together are the settings.
     pub(super) fn view(&mut self, view: &PlacementSettings) -> Result<(), OutputError> {
         self.flush()?;
         self.remark(&view.to_toml());
@@ -62,8 +62,8 @@ impl Csv {
         let numbers = record.numbers();
         let (before, after) = numbers.split_at(BEFORE_CONTACT);
         for number in before.iter().chain([&contact]).chain(after) {
-            // The shortest digits that read back to the same value. Writing to
-            // a vector cannot fail.
+            // The shortest digits that are read back as the same value. Writing to a vector cannot
+            // fail.
             let _ = write!(self.row, "{number},");
         }
         for value in more {

@@ -1,6 +1,6 @@
-//! Recordings: one row a tick, and the settings of the session.
+//! Recordings: one row for each tick, and the settings of the session.
 //!
-//! CSV, or Parquet where the file's name ends in `.parquet`. Both have the same columns
+//! The format is CSV, or Parquet if the file's name ends in `.parquet`. Both have the same columns
 //! and the same settings.
 
 mod columns;
@@ -20,7 +20,7 @@ use super::settings::{PlacementSettings, Settings};
 use crate::output::{Output, OutputError};
 use crate::terrain::Scale;
 
-/// The columns of every recording that are numbers with a fraction, in their order.
+/// The columns of every recording with fractional numbers, in order.
 pub(super) const NUMBERS: [&str; 10] = [
     "t_s",
     "x_mm",
@@ -33,7 +33,7 @@ pub(super) const NUMBERS: [&str; 10] = [
     "force_y_n",
     "force_z_n",
 ];
-/// The column of every recording that says whether the surface was touched, 0 or 1.
+/// The column of every recording with 1 for contact, otherwise 0.
 pub(super) const CONTACT: &str = "contact";
 /// Number of [`NUMBERS`] before [`CONTACT`].
 const BEFORE_CONTACT: usize = 4;
@@ -47,23 +47,23 @@ pub struct Record {
     pub t_s: f64,
     /// The HIP, mm; terrain frame.
     pub hip_mm: [f64; 3],
-    /// True if the surface was touched.
+    /// True if the tick was in contact.
     pub contact: bool,
-    /// The proxy, mm: at the HIP unless touching.
+    /// The proxy, mm; at the HIP if there is no contact.
     pub proxy_mm: [f64; 3],
     /// Force on the hand, N.
     pub force_n: [f64; 3],
 }
 
 impl Record {
-    /// Makes the record of a tick of a device with `tick_hz` ticks a second.
+    /// Creates the record of a tick of a device with `tick_hz` ticks a second.
     #[must_use]
     pub fn of_tick(sample: &TickRecord, tick_hz: u32, scale: &Scale) -> Self {
         let t_s = f64::from(sample.tick) / f64::from(tick_hz.max(1));
         Self::new(t_s, scale.to_mm(&sample.hip), sample, scale)
     }
 
-    /// Makes the record at a time, s, with the HIP at a place, mm.
+    /// Creates the record at a time, s, with the HIP at a position, mm.
     #[must_use]
     pub fn new(t_s: f64, hip_mm: [f64; 3], sample: &TickRecord, scale: &Scale) -> Self {
         let contact = sample.state == ContactState::Touching;
@@ -80,14 +80,14 @@ impl Record {
         }
     }
 
-    /// The values of [`NUMBERS`].
+    /// Returns the values of [`NUMBERS`].
     fn numbers(&self) -> [f64; NUMBERS.len()] {
         let ([x, y, z], [px, py, pz], [fx, fy, fz]) = (self.hip_mm, self.proxy_mm, self.force_n);
         [self.t_s, x, y, z, px, py, pz, fx, fy, fz]
     }
 }
 
-/// A column after those that every recording has.
+/// An additional column of some recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Column {
     /// Words.
@@ -97,7 +97,7 @@ pub enum Column {
 }
 
 impl Column {
-    /// The name in the header.
+    /// Returns the name in the header.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -106,10 +106,10 @@ impl Column {
     }
 }
 
-/// A value of a [`Column`], of its kind.
+/// A value of a [`Column`], with the same type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value<'v> {
-    /// Words, without comma, quote and line end.
+    /// Words, without comma, quote or line end.
     Text(&'v str),
     /// A whole number.
     Count(u32),
@@ -124,19 +124,18 @@ impl fmt::Display for Value<'_> {
     }
 }
 
-/// A recording being written. Dropped before [`Recording::finish`], it leaves nothing
-/// behind.
+/// A recording being written. Without [`Recording::finish`] it leaves no file.
 pub struct Recording(Form);
 
-/// The two forms.
+/// The two file formats.
 enum Form {
     Csv(csv_writer::Csv),
     Parquet(Box<parquet_writer::Parquet>),
 }
 
 impl Recording {
-    /// Begins a recording with `more` columns after the usual ones; in Parquet where the
-    /// output's name ends so.
+    /// Begins a recording with the additional columns `more`, in Parquet if the output's name ends
+    /// in `.parquet`.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -148,7 +147,7 @@ impl Recording {
         Ok(Self(form))
     }
 
-    /// Says with which settings the rows were rendered: before the first row.
+    /// Adds the settings of the rows. Call it before the first row.
     pub fn describe(&mut self, settings: &Settings) {
         match &mut self.0 {
             Form::Csv(csv) => csv.describe(settings),
@@ -156,7 +155,7 @@ impl Recording {
         }
     }
 
-    /// Says that the rows from here on were rendered in another view.
+    /// Starts another placement for the following rows.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -178,7 +177,7 @@ impl Recording {
         }
     }
 
-    /// Appends a row; `more` are the values of the further columns, in their order.
+    /// Appends a row; `more` are the values of the additional columns, in order.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -189,10 +188,10 @@ impl Recording {
         }
     }
 
-    /// Puts the complete file in its place.
+    /// Moves the complete file to its place.
     ///
     /// # Errors
-    /// When it cannot be written to the end.
+    /// When the rest cannot be written.
     pub fn finish(self) -> Result<(), OutputError> {
         match self.0 {
             Form::Csv(csv) => csv.finish(),

@@ -1,8 +1,8 @@
-//! Recordings as Parquet: the columns of the CSV with types of their own, and the
-//! settings in the file's metadata under [`KEY`].
+//! Recordings as Parquet: the columns of the CSV with types, and the settings in the file's
+//! metadata under [`KEY`].
 //!
-//! Uncompressed: the rows are few, and no decoder is needed that a reader may lack. The
-//! file can be read once it is finished, and not before.
+//! Uncompressed: the files are small, and readers need no decoder. The file can be read only after
+//! it is finished.
 
 use std::io;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use crate::output::{Output, OutputError};
 use crate::replay::marks::Mark;
 use crate::replay::settings::{KEY, PlacementSettings, Settings};
 
-/// Rows that are kept before they are written as one group: a minute of a device.
+/// Rows in one group, stored until they are written: one minute of a device.
 const GROUP: usize = 60_000;
 
 /// A Parquet recording being written.
@@ -30,14 +30,14 @@ pub(super) struct Parquet {
     /// The rows of the group that is not written yet, by columns.
     columns: Vec<Values>,
     rows: usize,
-    /// Settings and views as TOML.
+    /// Settings and placements as TOML.
     settings: String,
 }
 
 /// The values of one column in a group.
 enum Values {
     Numbers(Vec<f64>),
-    /// Flags: true if the surface was touched.
+    /// Flags: 1 for contact.
     Flags(Vec<i32>),
     Counts(Vec<i64>),
     Texts(Vec<ByteArray>),
@@ -62,7 +62,7 @@ impl Parquet {
         self.settings = settings.of_beginning().to_toml();
     }
 
-    /// Rows of another view follow. The file's metadata is written at its end.
+    /// Starts another placement. The file's metadata is written at its end.
     pub(super) fn view(&mut self, view: &PlacementSettings) {
         self.settings += &view.to_toml();
     }
@@ -118,7 +118,7 @@ impl Parquet {
 }
 
 impl Values {
-    /// Writes the values as the group's next column, and is empty again.
+    /// Writes the values as the group's next column and clears them.
     fn write(
         &mut self,
         group: &mut SerializedRowGroupWriter<'_, Output>,
@@ -136,7 +136,7 @@ fn write<T: DataType>(
     values: &mut Vec<T::T>,
     group: &mut SerializedRowGroupWriter<'_, Output>,
 ) -> Result<(), ParquetError> {
-    // A schema with fewer columns than values is a mistake in this file.
+    // The schema has as many columns as there are values, so this never fails.
     if let Some(mut column) = group.next_column()? {
         column.typed::<T>().write_batch(values, None, None)?;
         column.close()?;
@@ -145,7 +145,7 @@ fn write<T: DataType>(
     Ok(())
 }
 
-/// The columns in their order, without a value.
+/// Returns the columns in order, without values.
 fn empty(more: &[Column]) -> Vec<Values> {
     let numbers = |_: &&str| Values::Numbers(Vec::new());
     let (before, after) = NUMBERS.split_at(BEFORE_CONTACT);
@@ -161,7 +161,7 @@ fn empty(more: &[Column]) -> Vec<Values> {
 fn begin(output: Output, more: &[Column]) -> Result<SerializedFileWriter<Output>, ParquetError> {
     let mut properties = WriterProperties::builder()
         .set_created_by(format!("hapterra {}", env!("CARGO_PKG_VERSION")))
-        // Numbers hardly ever come again; words always do.
+        // Numbers rarely repeat; words do.
         .set_dictionary_enabled(false);
     for column in more {
         if let Column::Text(name) = column {

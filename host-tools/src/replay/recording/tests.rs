@@ -1,4 +1,4 @@
-//! Both forms of a recording hold the same rows and the same settings.
+//! Tests that both formats of a recording contain the same rows and settings.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use crate::replay::{Row, Trajectory};
 use crate::terrain::Terrain;
 use heightfield::Raster;
 
-/// More than one group of a Parquet file.
+/// More rows than one group of a Parquet file.
 const ROWS: u32 = 61_003;
 const MORE: [Column; 2] = [Column::Text("state"), Column::Count("tick")];
 const STATES: [&str; 2] = ["free", "touching"];
@@ -134,7 +134,7 @@ fn settings_precede_header_and_unfinished_files_vanish() {
     assert_eq!(folder.path().read_dir().expect("a folder").count(), 0);
 }
 
-/// Marks whose texts are hard to write down: the first before any row, the last after all.
+/// Returns marks with texts that need escapes: the first before any row, the last after all.
 fn marks() -> Vec<Mark> {
     let texts = [
         "a, \"b\" 'c' \\ # d",

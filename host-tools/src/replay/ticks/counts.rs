@@ -1,8 +1,8 @@
-//! Relation of rows to ticks, in words.
+//! Text about the relation of rows to ticks.
 
 use hapterra_touch::ticks::{Counts, ODD_MOVE_S, Untimed};
 
-/// Describes the rows as ticks; none if each row was a tick by its own time.
+/// Describes the relation of rows to ticks; `None` if each row was a tick by its own time.
 pub(super) fn pace(counts: &Counts, hz: u32) -> Option<String> {
     let rows = counts.rows;
     Some(match counts.untimed {
@@ -20,7 +20,7 @@ pub(super) fn pace(counts: &Counts, hz: u32) -> Option<String> {
     })
 }
 
-/// Returns the remarks, a sentence each.
+/// Returns the remarks, one sentence each.
 pub(super) fn remarks(counts: &Counts) -> Vec<String> {
     let longest = (counts.longest_move_s * 1e6).round() / 1e6;
     let odd = counts.odd_moves;

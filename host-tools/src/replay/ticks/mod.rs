@@ -1,4 +1,4 @@
-//! A trajectory at the ticks of a device, by the rule of `hapterra_touch::ticks`.
+//! A trajectory in the ticks of a device, by the rule of `hapterra_touch::ticks`.
 
 mod counts;
 #[cfg(test)]
@@ -9,42 +9,42 @@ pub use hapterra_touch::ticks::{Pace, Tick};
 
 use super::trajectory::{Trajectory, TrajectoryError};
 
-/// A trajectory that is read tick by tick.
+/// A trajectory, read tick by tick.
 pub struct Ticks {
     ticks: ticks::Ticks<Trajectory>,
     tick_hz: u32,
 }
 
 impl Ticks {
-    /// The ticks of a device with `tick_hz` ticks a second, 1 at least.
+    /// Creates the ticks of a device with `tick_hz` ticks a second, at least 1.
     #[must_use]
     pub fn new(trajectory: Trajectory, pace: Pace, tick_hz: u32) -> Self {
         let ticks = ticks::Ticks::new(trajectory, pace, tick_hz);
         Self { ticks, tick_hz }
     }
 
-    /// The trajectory.
+    /// Returns the trajectory.
     pub const fn trajectory(&mut self) -> &mut Trajectory {
         self.ticks.rows()
     }
 
-    /// Returns what the rows were for the ticks, for the line that counts them; none where they
-    /// were a tick each by their own times.
+    /// Describes the relation of rows to ticks in one line; `None` if each row was a tick by its
+    /// own time.
     #[must_use]
     pub fn pace(&self) -> Option<String> {
         counts::pace(self.ticks.counts(), self.tick_hz)
     }
 
-    /// Returns what is odd about the times, a sentence each.
+    /// Returns remarks on unusual times, one sentence each.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         counts::remarks(self.ticks.counts())
     }
 
-    /// The next tick; `None` after the last.
+    /// Returns the next tick; `None` after the last.
     ///
     /// # Errors
-    /// [`TrajectoryError`] names line and column of what is wrong with a row or its time.
+    /// [`TrajectoryError`] reports line, column and fault of a row or its time.
     pub fn next_tick(&mut self) -> Result<Option<Tick>, TrajectoryError> {
         let tick = self.ticks.next().transpose();
         tick.map_err(|error| match error {

@@ -1,8 +1,8 @@
-//! Ticks of small paths against values by hand.
+//! Tests of the ticks of small paths against values computed by hand.
 
 use super::*;
 
-/// A folder, and the ticks of a path of (t_s, x_mm) in it.
+/// Returns a folder, and the ticks of a path of (t_s, x_mm) in it.
 fn ticks_of(text: &str, pace: Pace, tick_hz: u32) -> (tempfile::TempDir, Ticks) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("t.csv");
@@ -11,13 +11,13 @@ fn ticks_of(text: &str, pace: Pace, tick_hz: u32) -> (tempfile::TempDir, Ticks) 
     (folder, Ticks::new(trajectory, pace, tick_hz))
 }
 
-/// A path along x by its times, which are written as they are.
+/// Returns a path along x; the times are written unchanged.
 fn path(rows: &[(&str, f64)]) -> String {
     let rows = rows.iter().map(|(t, x)| format!("{t},{x},7,-1\n"));
     format!("t_s,x_mm,y_mm,z_mm\n{}", rows.collect::<String>())
 }
 
-/// Time and x of each tick.
+/// Returns time and x of each tick.
 fn read(ticks: &mut Ticks) -> Result<Vec<(f64, f64)>, String> {
     let mut all = Vec::new();
     while let Some(tick) = ticks.next_tick().map_err(|error| error.to_string())? {
@@ -35,7 +35,7 @@ fn recorded(rows: &[(&str, f64)], tick_hz: u32) -> Result<Vec<(f64, f64)>, Strin
     read(&mut ticks_of(&path(rows), Pace::Recorded, tick_hz).1)
 }
 
-/// Fails unless both are the same but for rounding.
+/// Checks that both are equal except for rounding.
 fn same(found: &[(f64, f64)], expected: &[(f64, f64)]) {
     assert_eq!(found.len(), expected.len(), "{found:?}");
     for ((t, x), (due, place)) in found.iter().zip(expected) {
@@ -44,7 +44,7 @@ fn same(found: &[(f64, f64)], expected: &[(f64, f64)]) {
     }
 }
 
-/// Rows a tick apart: what writes times differently does not matter.
+/// Rows one tick apart: the notation of the times does not matter.
 #[test]
 fn rows_a_tick_apart_are_ticks_bit_for_bit() {
     let x = |row: u32| (f64::from(row) * 0.7).sin();
@@ -77,7 +77,7 @@ fn places_between_rows_are_on_straight_lines() {
     let x = [1.0, 2.0, 3.0, 4.0, 5.0, 4.5, 4.0];
     let expected: Vec<_> = (0..7).map(|n| 2.0 + f64::from(n) * 1e-3).zip(x).collect();
     same(&found, &expected);
-    // Not at a tick: 1.5 ms, 2.5 ms and 3.9 ms.
+    // Times between ticks: 1.5 ms, 2.5 ms and 3.9 ms.
     let found = by_time(&[
         ("0", 0.0),
         ("0.0015", 3.0),
@@ -88,7 +88,7 @@ fn places_between_rows_are_on_straight_lines() {
     same(&found.expect("ticks"), &expected);
 }
 
-/// 100 mm/s is 0.1 mm a tick, however the rows jitter.
+/// 100 mm/s is 0.1 mm in each tick, whatever the jitter of the rows.
 #[test]
 fn a_steady_speed_stays_steady_through_jitter() {
     let times = [0.0, 0.0009, 0.0021, 0.0024, 0.0029, 0.0052, 0.006].map(|t: f64| t.to_string());
@@ -102,7 +102,7 @@ fn a_steady_speed_stays_steady_through_jitter() {
     same(&by_time(&rows).expect("ticks"), &expected);
 }
 
-/// Another clock that runs 0.1 % slow: 10,000 of its rows last 10,010 ticks.
+/// A clock that is 0.1 % slow: 10,000 of its rows last 10,010 ticks.
 #[test]
 fn a_drifting_clock_gains_a_tick_in_a_thousand() {
     let times: Vec<_> = (0..=10_000)
@@ -115,7 +115,7 @@ fn a_drifting_clock_gains_a_tick_in_a_thousand() {
     let found = by_time(&rows).expect("ticks");
     assert_eq!(found.len(), 10_011);
     for ((t, x), n) in found.iter().zip(0..) {
-        // A row within a hundredth of a tick is that tick.
+        // A row within a hundredth of a tick counts as that tick.
         assert!(
             (t - f64::from(n) * 1e-3).abs() <= 1.01e-5 && (t - x).abs() < 1e-9,
             "{t} {x}"
@@ -286,7 +286,7 @@ fn rows_are_ticks_whatever_their_times_where_that_is_asked_for() {
             Some("one row of the path a tick, 1000 ticks a second")
         );
     }
-    // Where they are right they are kept to the bit.
+    // Right times are kept exactly.
     let rows = [("0.1", 1.0), ("0.1010001", 2.0)];
     let (_folder, mut ticks) = ticks_of(&path(&rows), Pace::RowByRow, 1000);
     assert_eq!(
@@ -323,7 +323,7 @@ fn a_recording_has_whole_ticks_between_its_rows() {
             Err(said) => assert!(!expected.is_empty() && said.contains(expected), "{said}"),
         }
     }
-    // A clock that drifts against the ticks is found by its fifth row at the latest.
+    // A clock that drifts against the ticks is detected by its fifth row at the latest.
     let times: Vec<_> = (0..9)
         .map(|row| (f64::from(row) * 1.003e-3).to_string())
         .collect();
@@ -371,7 +371,7 @@ fn nothing_is_filled_in_between_two_views() {
             (60.0, 1)
         ]
     );
-    // A path alone has no views.
+    // A path without settings has no placements.
     let (_folder, mut ticks) = ticks_of(text, Pace::ByTime, 1000);
     assert_eq!(read(&mut ticks).expect("ticks").len(), 8);
 }

@@ -1,15 +1,15 @@
-//! A stream of lines none of which is endless: a file of another kind, or a device, has no line
-//! that ends.
+//! A stream with a limit on the length of lines, for files of another kind, or devices, whose lines
+//! do not end.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// A line of more bytes is none; rows take some hundred.
+/// Max bytes of a line; rows have a few hundred.
 const LONGEST: usize = 1 << 20;
 
-/// A stream that fails where a line has no end.
+/// A stream that fails if a line is too long.
 pub(super) struct Bounded<R> {
     stream: R,
-    /// Bytes since the last line ended.
+    /// Bytes since the last line end.
     open: usize,
 }
 

@@ -14,7 +14,7 @@ use super::{COLUMNS, Settings, Trajectory, TrajectoryError, TrajectoryFault, is_
 use crate::replay::states::update_name;
 use heightfield::regular_file;
 
-/// Names of columns of numbers with a fraction end in a unit.
+/// Units at the end of the names of columns with fractional numbers.
 const UNITS: [&str; 3] = ["_s", "_mm", "_n"];
 /// Name of the column of the proxy's states.
 const STATE: &str = "state";
@@ -22,11 +22,11 @@ const STATE: &str = "state";
 /// A recording in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedColumns {
-    /// The settings; none where it is no recording of `hapterra`, or one without.
+    /// The settings; `None` if the recording has none.
     pub settings: Option<Settings>,
-    /// Names and values of the columns, in their order. All have the same number of values.
+    /// Names and values of the columns, in order. All have the same number of values.
     pub columns: Vec<(String, ColumnValues)>,
-    /// The last row of a CSV file was cut in its middle, and is left out.
+    /// True if the last row of a CSV file was incomplete, and is left out.
     pub was_cut: bool,
 }
 
@@ -35,7 +35,7 @@ pub struct RecordedColumns {
 pub enum ColumnValues {
     /// Whole numbers.
     Counts(Vec<i64>),
-    /// Numbers with a fraction, in the unit that the column's name ends in.
+    /// Fractional numbers, in the unit at the end of the column's name.
     Numbers(Vec<f64>),
     /// Words.
     Texts(Vec<String>),
@@ -44,13 +44,13 @@ pub enum ColumnValues {
 type Columns = Vec<(String, ColumnValues)>;
 
 impl RecordedColumns {
-    /// Reads a recording, CSV or Parquet; states of the proxy have today's names. Columns of CSV without a unit are counts, else numbers,
-    /// else words, as all their values are.
+    /// Reads a recording, CSV or Parquet, with today's names for states of the proxy. Columns of
+    /// CSV without a unit are counts if all their values are, otherwise numbers, otherwise words.
     ///
     /// # Errors
     /// [`TrajectoryError`].
     pub fn read(path: &Path) -> Result<Self, TrajectoryError> {
-        // This checks the header.
+        // This also checks the header.
         let settings = Trajectory::open(path)?.settings;
         let read = read(path).map_err(|fault| TrajectoryError::new(path, fault));
         let (mut columns, was_cut) = read?;
@@ -65,7 +65,7 @@ impl RecordedColumns {
     }
 }
 
-/// Values of the column of the proxy's states.
+/// Returns the values of the column of the proxy's states.
 fn states((name, values): &mut (String, ColumnValues)) -> Option<&mut Vec<String>> {
     match values {
         ColumnValues::Texts(texts) if name == STATE => Some(texts),
@@ -202,7 +202,7 @@ impl ColumnValues {
             (Self::Counts(values), Self::Counts(more)) => values.extend(more),
             (Self::Numbers(values), Self::Numbers(more)) => values.extend(more),
             (Self::Texts(values), Self::Texts(more)) => values.extend(more),
-            // The schema gives a column one type in all groups.
+            // The schema gives a column the same type in all groups.
             _ => {}
         }
     }

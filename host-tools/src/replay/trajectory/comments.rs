@@ -1,24 +1,23 @@
-//! The lines that begin with `#` before a CSV header, and a stream read again from its
-//! beginning.
+//! The `#` lines before a CSV header, and a stream that is read again from its beginning.
 
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 
 use super::bounded::Bounded;
 
-/// Bytes of comments that are looked at, at most: settings take less than two thousand.
+/// Max bytes of comments that are read: settings have less than two thousand.
 const LONGEST: usize = 1 << 16;
-/// A mark that some editors put before the first byte.
+/// A byte order mark, which some editors write.
 const MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// A stream whose first bytes were read already, and are read again. Positions count from
-/// its beginning.
+/// A stream whose first bytes were already read and are returned again. Positions count from its
+/// beginning.
 pub(super) struct Again<R> {
     head: Cursor<Vec<u8>>,
     rest: BufReader<Bounded<R>>,
 }
 
-/// Reads the comments before the first line that is none. Returns them without their `#`
-/// and a space after it, and the stream as if nothing had been read.
+/// Reads the comments before the first other line. Returns them without their `#` and a space after
+/// it, and the stream from its beginning.
 pub(super) fn split<R: Read>(stream: R) -> io::Result<(String, Again<R>)> {
     let mut rest = BufReader::with_capacity(1 << 16, Bounded::new(stream));
     let (mut head, mut comments) = (Vec::new(), String::new());
@@ -50,20 +49,20 @@ impl<R: Read> Read for Again<R> {
 
 impl<R: Seek> Seek for Again<R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        // What is in front is in the stream, too.
+        // The bytes in `head` are part of the stream.
         self.head.set_position(self.head.get_ref().len() as u64);
         self.rest.seek(to)
     }
 }
 
-/// First words of a block of comments for a placement or a mark.
+/// First words of a comment block for a placement or a mark.
 const LATER: [&[u8]; 2] = [b"[[view]]", b"[[mark]]"];
-/// Bytes of such blocks that are looked at, at most: a view takes less than four hundred.
+/// Max bytes of such blocks that are read: a placement has less than four hundred.
 const MOST: usize = 1 << 24;
 
-/// Reads the comments between rows that tell of other views and of marks, without their `#` and a
-/// space after it; other remarks are passed over, and so is one that no row follows: the writer of
-/// it may have been killed in the middle.
+/// Reads the comments between rows that describe placements and marks, without their `#` and a
+/// space after it. Other comments are skipped, and so is one after the last row: it may be
+/// incomplete because its writer was killed.
 pub(super) fn later(stream: impl Read) -> io::Result<String> {
     let (mut reader, mut line) = (
         BufReader::with_capacity(1 << 16, Bounded::new(stream)),
@@ -78,7 +77,7 @@ pub(super) fn later(stream: impl Read) -> io::Result<String> {
         }
         let comment = line.strip_prefix(b"#");
         let comment = comment.map(|text| text.strip_prefix(b" ").unwrap_or(text));
-        // Those before the header are the settings, which are read already.
+        // Comments before the header are the settings, which were already read.
         let begins = comment.is_some() && !was_comment;
         was_comment = comment.is_some();
         match comment {
@@ -99,7 +98,7 @@ pub(super) fn later(stream: impl Read) -> io::Result<String> {
     Ok(found)
 }
 
-/// Returns the number of lines from here on that are empty or comments: a row begins after them.
+/// Returns the number of empty lines and comments from here to the next row.
 pub(super) fn lines_before_a_row(stream: impl Read) -> u64 {
     let (mut reader, mut line, mut count) = (BufReader::new(stream), Vec::new(), 0);
     loop {
@@ -113,7 +112,7 @@ pub(super) fn lines_before_a_row(stream: impl Read) -> u64 {
     }
 }
 
-/// Returns true if the row that begins from here on is not ended: the file stops in its middle.
+/// Returns true if the row that begins here is incomplete: the file ends in it.
 pub(super) fn row_is_cut(stream: impl Read) -> bool {
     let (mut reader, mut line) = (BufReader::new(stream), Vec::new());
     loop {

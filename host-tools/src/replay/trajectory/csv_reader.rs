@@ -7,20 +7,20 @@ use csv::{ByteRecord, ReaderBuilder, Trim};
 use super::comments::{self, Again};
 use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of, row};
 
-/// Rows of a CSV file that are read one by one.
+/// Rows of a CSV file, read one by one.
 pub(super) struct Rows<R> {
     reader: csv::Reader<Again<R>>,
     record: ByteRecord,
-    /// The columns that are read.
+    /// The columns to read.
     read: &'static [&'static str],
     columns: usize,
     was_cut: bool,
-    /// Which column tells the view, where there is one.
+    /// Index of the column with the placement's number, if there is one.
     view: Option<usize>,
 }
 
 impl<R: Read + Seek> Rows<R> {
-    /// Reads a stream up to the first row. Returns the comments before the header, too.
+    /// Reads a stream up to the first row. Also returns the comments before the header.
     pub(super) fn open(stream: R) -> Result<(Self, String), TrajectoryFault> {
         let (text, stream) = comments::split(stream).map_err(TrajectoryFault::Unreadable)?;
         let reader = ReaderBuilder::new()
@@ -56,7 +56,7 @@ impl<R: Read + Seek> Rows<R> {
         Ok(())
     }
 
-    /// The next row; `None` after the last.
+    /// Returns the next row; `None` after the last.
     pub(super) fn next(&mut self) -> Result<Option<Row>, TrajectoryFault> {
         if !self.read_record()? {
             return Ok(None);
@@ -94,13 +94,13 @@ impl<R: Read + Seek> Rows<R> {
         Ok(view)
     }
 
-    /// Returns true if the file ended in the middle of a row, as that of a recording that was killed
-    /// does. Such a row is none.
+    /// Returns true if the file ended in the middle of a row, as after the end of a killed
+    /// recording. That row is not returned.
     pub(super) const fn was_cut(&self) -> bool {
         self.was_cut
     }
 
-    /// Returns true if the file ends in the middle of the present row: no row can be read
+    /// Returns true if the file ends in the middle of the present row. No row can be read
     /// afterwards.
     fn is_cut(&mut self) -> bool {
         let Some(begin) = self.record.position().map(csv::Position::byte) else {
@@ -115,13 +115,13 @@ impl<R: Read + Seek> Rows<R> {
         read.map_err(|error| TrajectoryFault::Unreadable(io::Error::other(error)))
     }
 
-    /// The line of the present row, for a message: no row can be read afterwards.
+    /// Returns the line of the present row, for a message. No row can be read afterwards.
     pub(super) fn place(&mut self) -> String {
         let Some(position) = self.record.position() else {
             return "line 1".into();
         };
-        // A record counts from where the last one ended: before the empty lines and
-        // comments in between, and before the second half of a CR LF.
+        // A record's position is the end of the last one: before the empty lines and comments in
+        // between, and before the LF of a CR LF.
         let stream = self.reader.get_mut();
         let mut line = position.line();
         if stream.seek(SeekFrom::Start(position.byte())).is_ok() {
@@ -146,7 +146,7 @@ impl<R: Read + Seek> Rows<R> {
     }
 }
 
-/// The beginning of a text that may be anything.
+/// Returns the beginning of an arbitrary text.
 fn shown(text: &str) -> String {
     const LONGEST: usize = 60;
     let mut short: String = text.chars().take(LONGEST).collect();

@@ -1,4 +1,4 @@
-//! Faults of trajectories, and their places.
+//! Faults of trajectories, and their positions in the file.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,20 +21,20 @@ impl TrajectoryError {
         Self { path, fault }
     }
 
-    /// Returns true if the settings of the recording are what cannot be used.
+    /// Returns true if the fault is in the settings of the recording.
     #[must_use]
     pub const fn is_about_settings(&self) -> bool {
         matches!(self.fault, TrajectoryFault::Settings(_))
     }
 
-    /// Returns true if its times cannot be right.
+    /// Returns true if the fault is in the times.
     #[must_use]
     pub const fn is_about_time(&self) -> bool {
         matches!(self.fault, TrajectoryFault::Time { .. })
     }
 }
 
-/// Fault of a trajectory, and its place. Lines and rows count from 1.
+/// Fault of a trajectory, and its position. Lines and rows count from 1.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum TrajectoryFault {
     #[error("cannot read the trajectory: {0}")]

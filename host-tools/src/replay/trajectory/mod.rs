@@ -1,5 +1,5 @@
 //! Trajectory files: `t_s,x_mm,y_mm,z_mm` or `x_mm,y_mm,z_mm` as CSV, or a recording in either
-//! form.
+//! format.
 //!
 //! Lengths are millimetres of the arm's tip over the rendered terrain: x east, y north, z up,
 //! origin at the south-west sample at height zero.
@@ -28,14 +28,14 @@ use super::settings::Settings;
 use crate::terrain::Scale;
 use fault::TrajectoryFault;
 
-/// The columns, in this order. A recording begins with them, too, and further
-/// columns are passed over, so what was recorded can be replayed.
+/// The columns, in this order. A recording also begins with them, and additional columns are
+/// skipped, so a recording can be replayed.
 const COLUMNS: [&str; 4] = ["t_s", "x_mm", "y_mm", "z_mm"];
 
-/// The same without the time.
+/// The columns without the time.
 const PLACE: &[&str] = COLUMNS.split_at(1).1;
 
-/// Returns the columns that every row begins with, if a header begins as a trajectory's does.
+/// Returns the first columns of every row, if a header begins like a trajectory's.
 fn columns_of<N: AsRef<str>>(header: &[N]) -> Option<&'static [&'static str]> {
     let begins = |columns: &[&str]| {
         let names = header.iter().map(AsRef::as_ref);
@@ -44,10 +44,10 @@ fn columns_of<N: AsRef<str>>(header: &[N]) -> Option<&'static [&'static str]> {
     [&COLUMNS[..], PLACE].into_iter().find(|it| begins(it))
 }
 
-/// The column that tells in which view a row was rendered.
+/// The column with the number of a row's placement.
 const VIEW: &str = "view";
 
-/// A row of the values of the first columns, of which the time may be missing.
+/// Returns a row from the values of its first columns, which may lack the time.
 fn row(numbers: &[f64], view: u32) -> Row {
     let (t_s, place) = match numbers {
         [t_s, place @ ..] if place.len() == PLACE.len() => (Some(*t_s), place),
@@ -61,7 +61,7 @@ fn row(numbers: &[f64], view: u32) -> Row {
     }
 }
 
-/// A trajectory that is read row by row.
+/// A trajectory, read row by row.
 pub struct Trajectory {
     path: PathBuf,
     form: Form,
@@ -74,8 +74,7 @@ enum Form {
 }
 
 impl Trajectory {
-    /// Opens a trajectory file, reads its settings, where it is a recording, and checks
-    /// its header.
+    /// Opens a trajectory file, reads its settings if it is a recording, and checks its header.
     ///
     /// # Errors
     /// [`TrajectoryError`].
@@ -85,7 +84,7 @@ impl Trajectory {
     }
 
     fn opened(path: &Path) -> Result<Self, TrajectoryFault> {
-        // It may be a pipe whose other end makes the path.
+        // It may be a pipe from the program that creates the path.
         let mut file = File::open(path).map_err(TrajectoryFault::Unreadable)?;
         let (form, text) = match is_parquet(&mut file)? {
             true => {
@@ -95,7 +94,7 @@ impl Trajectory {
             false => {
                 let later = later_remarks(&mut file)?;
                 let (rows, text) = csv_reader::Rows::open(file)?;
-                // Remarks that are no settings are followed by no views.
+                // Comments that are no settings are not followed by placements.
                 (Form::Csv(Box::new(rows)), text + &later)
             }
         };
@@ -106,14 +105,14 @@ impl Trajectory {
         })
     }
 
-    /// With which settings it was recorded; none where it is no recording, or one of a
-    /// version that did not say.
+    /// Returns the settings of the recording; `None` for a trajectory, or a recording of a version
+    /// without settings.
     #[must_use]
     pub const fn settings(&self) -> Option<&Settings> {
         self.settings.as_ref()
     }
 
-    /// The next row; `None` after the last.
+    /// Returns the next row; `None` after the last.
     ///
     /// # Errors
     /// [`TrajectoryError`] names the line and the column.
@@ -125,7 +124,7 @@ impl Trajectory {
         row.map_err(|fault| self.wrong(fault))
     }
 
-    /// The latest row cannot be put on a grid, because its view is not described.
+    /// Returns the error for the latest row if its placement has no settings.
     #[must_use]
     pub fn of_unknown_view(&mut self, view: u32) -> TrajectoryError {
         let (at, column) = (self.place(), VIEW);
@@ -133,13 +132,14 @@ impl Trajectory {
         self.wrong(TrajectoryFault::Field { at, column, what })
     }
 
-    /// The latest row cannot follow on the one before it.
+    /// Returns the error for a latest row whose time does not fit the row before.
     pub(super) fn mistimed(&mut self, what: TimeFault) -> TrajectoryError {
         let at = self.place();
         self.wrong(TrajectoryFault::Time { at, what })
     }
 
-    /// Puts a place at the latest row, or between it and the one before, on the grid of a scale.
+    /// Converts a position, in the latest row or between it and the one before, to the grid of a
+    /// scale.
     ///
     /// # Errors
     /// As [`Self::next_row`].
@@ -158,8 +158,8 @@ impl Trajectory {
         }
     }
 
-    /// Returns true if the last row of the recording was cut in its middle, and is left out: the
-    /// command that wrote it was killed. Known after the last row.
+    /// Returns true if the last row of the recording was incomplete, and is left out: the command
+    /// that wrote it was killed. Known only after the last row.
     #[must_use]
     pub fn was_cut(&self) -> bool {
         match &self.form {
@@ -168,7 +168,7 @@ impl Trajectory {
         }
     }
 
-    /// Returns the place of the present row, for a message: no row can be read afterwards.
+    /// Returns the position of the present row, for a message. No row can be read afterwards.
     fn place(&mut self) -> String {
         match &mut self.form {
             Form::Csv(rows) => rows.place(),
@@ -181,7 +181,7 @@ impl Trajectory {
     }
 }
 
-/// Which column of a place is too far from the origin, and what to say of it.
+/// Returns the column of a position that is too far from the origin, and the message.
 fn far(hip_mm: [f64; 3], scale: &Scale) -> (&'static str, String) {
     let cell_mm = scale.cell_mm();
     let far = |mm: &f64| (mm / cell_mm).abs() > f64::from(MAX_CELL);
@@ -199,8 +199,8 @@ impl Iterator for Trajectory {
     }
 }
 
-/// Returns the comments on placements and marks between the rows of a CSV file; nothing if it
-/// cannot be rewound.
+/// Returns the comments on placements and marks between the rows of a CSV file; empty if it cannot
+/// be rewound.
 fn later_remarks(file: &mut File) -> Result<String, TrajectoryFault> {
     if file.stream_position().is_err() {
         return Ok(String::new());
@@ -210,7 +210,7 @@ fn later_remarks(file: &mut File) -> Result<String, TrajectoryFault> {
     later.map_err(TrajectoryFault::Unreadable)
 }
 
-/// Checks that a file begins as Parquet does; what cannot be wound back is CSV.
+/// Returns true if a file begins like Parquet; a file that cannot be rewound is CSV.
 fn is_parquet(file: &mut File) -> Result<bool, TrajectoryFault> {
     if file.stream_position().is_err() {
         return Ok(false);

@@ -11,31 +11,32 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use super::{COLUMNS, Row, TrajectoryFault, VIEW, columns_of, row};
 use crate::replay::settings::KEY;
 
-/// Rows that are read at a time.
+/// Rows read at a time.
 const AT_A_TIME: usize = 4096;
 
-/// Rows of a Parquet file, read some at a time.
+/// Rows of a Parquet file, read in batches.
 pub(super) struct Rows {
     reader: SerializedFileReader<File>,
-    /// The next group of rows to be read.
+    /// The next group of rows to read.
     next_group: usize,
-    /// The columns that are read.
+    /// The columns to read.
     names: &'static [&'static str],
     /// Readers of the columns of the present group.
     columns: Vec<ColumnReaderImpl<DoubleType>>,
-    /// Which column tells the view, where there is one; what reads it, and what it read.
+    /// Index of the column with the placement's number, if there is one; its reader, and its
+    /// values.
     view_column: Option<usize>,
     view: Option<ColumnReaderImpl<Int64Type>>,
     views: Vec<i64>,
-    /// Rows that were read; those from `next` on are pending.
+    /// The rows of the batch; those from `next` on are pending.
     read: Vec<Vec<f64>>,
     next: usize,
-    /// Number of rows handed out.
+    /// Number of returned rows.
     told: u64,
 }
 
 impl Rows {
-    /// Opens a file and checks its columns. Returns its settings as text, too.
+    /// Opens a file and checks its columns. Also returns its settings as text.
     pub(super) fn open(file: File) -> Result<(Self, String), TrajectoryFault> {
         let reader = SerializedFileReader::new(file).map_err(unreadable)?;
         let about = reader.metadata().file_metadata();
@@ -64,7 +65,7 @@ impl Rows {
         Ok((rows, text))
     }
 
-    /// The next row; `None` after the last.
+    /// Returns the next row; `None` after the last.
     pub(super) fn next(&mut self) -> Result<Option<Row>, TrajectoryFault> {
         while self.next >= self.read.first().map_or(0, Vec::len) {
             if !self.read_more()? {
@@ -93,12 +94,12 @@ impl Rows {
         Ok(Some(row(numbers, view)))
     }
 
-    /// The present row, for a message.
+    /// Returns the position of the present row, for a message.
     pub(super) fn place(&self) -> String {
         format!("row {}", self.told)
     }
 
-    /// Reads some rows of the present group, or begins the next; whether there is one.
+    /// Reads some rows of the present group, or of the next; returns false after the last.
     fn read_more(&mut self) -> Result<bool, TrajectoryFault> {
         self.next = 0;
         for values in &mut self.read {

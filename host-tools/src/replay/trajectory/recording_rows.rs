@@ -17,7 +17,7 @@ use crate::replay::recording::{CONTACT, NUMBERS};
 use crate::replay::{Record, Settings};
 use heightfield::regular_file;
 
-/// Columns of a recording by name: time and HIP, then what a trajectory does not have.
+/// Columns of a recording by name: time and HIP, then those that a trajectory lacks.
 const NAMES: [&str; NUMBERS.len() + 1] = {
     let mut names = [CONTACT; NUMBERS.len() + 1];
     names
@@ -27,33 +27,33 @@ const NAMES: [&str; NUMBERS.len() + 1] = {
     names
 };
 
-/// Values of [`NAMES`]; none of columns that there are not.
+/// Values of [`NAMES`]; `None` for missing columns.
 type Values = [Option<f64>; NAMES.len()];
 
 /// Row of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordingRow {
-    /// The view that it was rendered in: [`super::Row::view`].
+    /// The placement of the row: [`super::Row::view`].
     pub view: u32,
-    /// Its record. A trajectory has the HIP alone: no contact, and the proxy at the HIP.
+    /// Its record. A trajectory has only the HIP: no contact, and the proxy at the HIP.
     pub record: Record,
 }
 
 /// Rows of a recording or a trajectory, in the order of the file.
 pub struct RecordingRows {
     path: PathBuf,
-    /// The same rows as a replay reads them: it reports their faults, where a
-    /// recording was cut, and the view.
+    /// The same rows as a replay reads them: it reports their faults, the placement, and an
+    /// incomplete end.
     trajectory: Trajectory,
     form: Form,
-    /// Rows so far of a file without times: one a tick.
+    /// Rows so far of a file without times: one in each tick.
     untimed: u64,
 }
 
 enum Form {
     Csv {
         reader: Box<csv::Reader<Bounded<File>>>,
-        /// Place where each of [`NAMES`] stands.
+        /// Index of each of [`NAMES`] in the file.
         columns: [Option<usize>; NAMES.len()],
         record: StringRecord,
     },
@@ -61,7 +61,7 @@ enum Form {
 }
 
 impl RecordingRows {
-    /// Opens a recording and checks it as [`Trajectory::open`] does.
+    /// Opens a recording and checks it like [`Trajectory::open`].
     ///
     /// # Errors
     /// [`TrajectoryError`].
@@ -76,7 +76,7 @@ impl RecordingRows {
         })
     }
 
-    /// The settings with which it was recorded, if it has them.
+    /// Returns the settings of the recording, if it has them.
     #[must_use]
     pub const fn settings(&self) -> Option<&Settings> {
         self.trajectory.settings()

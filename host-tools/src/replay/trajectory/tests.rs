@@ -1,4 +1,4 @@
-//! Trajectories as they are written by hand, by programs, and by this one.
+//! Tests with trajectories written by hand, by programs, and by this program.
 
 use super::*;
 
@@ -90,7 +90,7 @@ fn a_recording_that_was_cut_in_a_row_has_the_rows_before() {
         assert_eq!(next(), None, "{:?}", &whole[..end]);
         assert!(trajectory.was_cut());
     }
-    // In the middle of a file a short row is a mistake, and so it is where a person wrote it.
+    // In the middle of a file a short row is an error, and so it is in a file written by hand.
     for wrong in [
         "t_s,x_mm,y_mm,z_mm,contact\n0,1,2\n0.001,4,5,6,1\n",
         "t_s,x_mm,y_mm,z_mm,contact\n0,1,2\n",

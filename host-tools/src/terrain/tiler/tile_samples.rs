@@ -9,7 +9,7 @@ use super::super::steps::BinaryUnit;
 use super::{INTERPOLATED_STEP, Terrain};
 
 impl Terrain<'_> {
-    /// A height in cells; NaN where positions cannot say it.
+    /// Returns a height in cells; NaN if it exceeds the range of positions.
     pub(super) fn within(&self, cells: f64) -> f64 {
         match cells.abs() <= f64::from(MAX_CELL) {
             true => cells,
@@ -26,8 +26,8 @@ impl Terrain<'_> {
         }
     }
 
-    /// Copies the tile's samples, in cells; NaN in holes and off the data. Returns what the heights
-    /// are multiples of in the file's vertical unit.
+    /// Copies the tile's samples, in cells; NaN in no-data and off the data. Returns the unit of
+    /// which the heights are multiples, in the file's vertical unit.
     pub(super) fn read(
         &self,
         key: TileKey,
@@ -55,8 +55,9 @@ impl Terrain<'_> {
         unit
     }
 
-    /// Samples of the level that a ball's nodes depend on, `side` of them each way from a rendered
-    /// sample on, in haptic cells, NaN in holes and off the data; and where the nodes are.
+    /// Returns the samples of the level on which a ball's nodes depend, `side` in each direction
+    /// from a rendered sample, in haptic cells, NaN in no-data and off the data; and the positions
+    /// of the nodes.
     pub(super) fn samples(
         &self,
         ball: &Ball,
@@ -66,7 +67,7 @@ impl Terrain<'_> {
     ) -> (Samples, Nodes) {
         let ([west, south], along, nodes) = ball.around(first, side);
         let mut heights = vec![f64::NAN; along * along];
-        // West of the field there are no columns to ask for.
+        // West of the raster there are no columns to read.
         let beside = west.min(0).unsigned_abs() as usize;
         for (row, line) in (south..).zip(heights.chunks_exact_mut(along)) {
             let (Ok(row), Some(line)) = (u32::try_from(row), line.get_mut(beside..)) else {
@@ -86,7 +87,7 @@ impl Terrain<'_> {
         (samples, nodes)
     }
 
-    /// A height in cells, as it goes to the device.
+    /// Rounds a height in cells for the device.
     pub(super) fn rounded(&self, cells: f64) -> f64 {
         match self.step() {
             Some(step) => (cells / step).round() * step,
