@@ -57,8 +57,7 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, RasterError> {
     Ok(files)
 }
 
-/// Returns the files that match a pattern; pictures and archives count only if the pattern names
-/// their extension.
+/// Returns the files that match a pattern, including pictures and archives of any name.
 fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
     let wrong = |error| RasterError::NoTiles(format!("this pattern cannot be read: {error}"));
     let found = glob::glob(pattern).map_err(wrong)?;
