@@ -38,7 +38,7 @@ pub enum Error {
     NotOpened {
         /// The file.
         path: PathBuf,
-        /// Returns its fault.
+        /// The reason.
         why: String,
     },
     /// GDAL takes too long to open a file.
@@ -70,7 +70,7 @@ pub enum Error {
         /// The available ones.
         there: String,
     },
-    /// A window or a buffer that does not fit.
+    /// A window or a buffer of the wrong size.
     #[error("a window of {window:?} does not fit: {why}")]
     Window {
         /// First column and row, columns and rows.

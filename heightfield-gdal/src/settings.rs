@@ -32,7 +32,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// 64 MiB.
+    /// Returns 64 MiB for the cache.
     fn default() -> Self {
         Self {
             cache_bytes: 64 << 20,

@@ -22,7 +22,7 @@ impl Error {
         }
     }
 
-    /// The file.
+    /// Returns the file's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -77,7 +77,7 @@ pub enum RasterError {
     /// Several parts could hold the heights; none was chosen.
     #[error("several {kind}s may be the heights: {}", names.join(", "))]
     SeveralHeights {
-        /// The file's name for its parts.
+        /// The file's word for a part, as `raster`.
         kind: &'static str,
         /// Their names.
         names: Vec<String>,
@@ -137,10 +137,10 @@ pub enum RasterError {
         /// Number of samples.
         samples: u64,
     },
-    /// A folder or pattern without a file that could be read.
+    /// A folder or pattern without readable files.
     #[error("no terrain: {0}")]
     NoTiles(String),
-    /// A STAC item in which no asset, or more than one, could be the heights.
+    /// STAC items in which no asset, or more than one, could be the heights.
     #[error("no terrain: {why} (assets: {})", names.join(", "))]
     WhichAsset {
         /// The item, and its fault.
@@ -161,7 +161,7 @@ pub enum RasterError {
     InTile {
         /// The file.
         file: PathBuf,
-        /// Returns its fault.
+        /// The file's fault.
         fault: Box<RasterError>,
     },
     /// One of many files that is not on a grid.

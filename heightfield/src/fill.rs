@@ -29,7 +29,7 @@ impl Fill {
         (1..=Self::MAX).contains(&samples).then_some(Self(samples))
     }
 
-    /// Max distance of the data, samples of the level that is read.
+    /// Returns the max distance of the data, in samples of the level that is read.
     #[must_use]
     pub const fn samples(self) -> u32 {
         self.0

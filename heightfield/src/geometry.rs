@@ -146,7 +146,7 @@ pub struct VerticalDatum {
     pub code: Option<u16>,
 }
 
-/// Returns the remark on a unit of heights that [`metres_in`] does not know.
+/// Returns the remark on a unit of heights that is unknown to [`metres_in`].
 pub(super) fn unknown_unit(name: &str) -> String {
     let name = beginning(name);
     format!(

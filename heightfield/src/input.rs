@@ -10,7 +10,7 @@ use crate::disk_cache::FileStamp;
 use crate::regular_file;
 use crate::remote::{RemoteFetcher, RemoteFile, RemoteReader, file_name, is_url};
 
-/// Deflate packs at most this many bytes into one.
+/// Max expansion of deflate, bytes per stored byte.
 pub(super) const DEFLATE_RATIO: u64 = 1040;
 
 /// A buffered reader in which a decoder may seek.
@@ -24,7 +24,7 @@ pub(super) struct FileBytes {
     len: u64,
     data: Data,
     outline: bool,
-    /// Reads neighbouring files at URLs.
+    /// Source of neighbouring files at URLs.
     elsewhere: RemoteFetcher,
 }
 

@@ -6,7 +6,7 @@
 //! | SRTM `.hgt` | here | place from the name |
 //! | Esri ASCII `.asc` | here | |
 //! | `.flt`, `.bil`, `.bip`, `.bsq` | here | by the `.hdr` beside them |
-//! | PNG | `png` | grey, grey + alpha, depth in the alpha of a colour picture, encoded in its colours |
+//! | PNG | `png` | grey, grey + alpha, or depth in the alpha or colours of a colour picture |
 //! | raw samples | here | with a stated [`RawLayout`] |
 //! | NumPy `.npy` | here | |
 //! | all other formats of GDAL | `heightfield-gdal` | where the machine has a libgdal |

@@ -39,7 +39,7 @@ pub struct OpenOptions {
     /// Samples that need more bytes than this stay in the file, if its format allows it, and are
     /// read in blocks on access.
     pub most_in_memory_bytes: u64,
-    /// Reads the files at URLs.
+    /// Source of files at URLs.
     pub elsewhere: RemoteFetcher,
     /// Folder for coarse samples of a terrain in its file. By default, none are stored.
     pub disk_cache: DiskCache,

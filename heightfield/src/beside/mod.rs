@@ -42,8 +42,8 @@ pub(super) fn files_read_with(path: &Path) -> Vec<PathBuf> {
     std::iter::once(path.to_owned()).chain(there).collect()
 }
 
-/// Returns the names of the files beside a URL that belong to it. For one TIFF of many in a VRT,
-/// only three are tried.
+/// Returns the names of the files beside a URL that belong to it. For a TIFF, only three are tried,
+/// because a VRT may reference many TIFFs.
 pub(super) fn names_at_url(input: &FileBytes, url: &str) -> Result<Vec<String>, RasterError> {
     let ends = match input.extension() {
         "tif" | "tiff" => &["msk", "ovr", "aux.xml"][..],

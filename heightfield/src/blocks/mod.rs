@@ -386,7 +386,7 @@ impl Shared {
         (height, reads.status())
     }
 
-    /// [`Blocks::prefetch_full`].
+    /// As [`Blocks::prefetch_full`].
     fn prefetch_full(&self, level: u8, columns: [u32; 2], rows: [u32; 2]) {
         let image = self.image_of(level);
         let Some(of) = self.images.get(image) else {

@@ -7,15 +7,16 @@ use super::survey::Looks;
 /// Side of a usual block: smaller blocks of a file are read several at once.
 const USUAL_BLOCK: u32 = 256;
 
-/// Reads parts of a file's images.
+/// A source of parts of a file's images.
 pub(crate) trait BlockReader: Send + Sync {
-    /// Name of the format, in messages.
+    /// Returns the name of the format, for messages.
     fn format(&self) -> &'static str;
 
-    /// The full image, followed by overviews of the same field, each coarser than the previous one.
+    /// Returns the full image, followed by overviews of the same field, each coarser than the
+    /// previous one.
     fn images(&self) -> &[BlockImage];
 
-    /// Type of the samples in memory.
+    /// Returns the type of the samples in memory.
     fn sample_type(&self) -> SampleType;
 
     /// Returns true if the file stores samples there; otherwise they are no-data.

@@ -18,7 +18,7 @@ struct Field {
     images: Vec<BlockImage>,
     /// Number of samples that were read.
     read: Arc<AtomicU64>,
-    /// Returns a plane's height, so that heights between samples are known.
+    /// True if one block cannot be read.
     fault: bool,
 }
 

@@ -2,7 +2,7 @@
 
 use super::unit::Unit;
 
-/// Longer texts describe no reference system, bytes.
+/// Max size of a text that may describe a reference system, bytes.
 const MAX_BYTES: usize = 1 << 16;
 /// Max depth of brackets; real systems nest to about 8.
 const MAX_LEVELS: usize = 32;

@@ -53,8 +53,8 @@ impl SizeLimit {
         }
     }
 
-    /// If the total size exceeds the bound, deletes the least recently used records until seven
-    /// eighths of the bound are left.
+    /// Deletes the least recently used records until they fit in seven eighths of the bound, if
+    /// they exceed the bound.
     fn make(&mut self, folder: &Path) {
         let mut records = records(folder);
         let mut used: u64 = records.iter().map(|record| record.bytes).sum();

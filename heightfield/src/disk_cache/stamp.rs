@@ -47,7 +47,7 @@ impl FileStamp {
     }
 }
 
-/// The change time, which programs cannot set, and the device and inode.
+/// Returns the change time, which programs cannot set, and the device and inode.
 #[cfg(unix)]
 fn numbers(metadata: &Metadata) -> String {
     use std::os::unix::fs::MetadataExt;
@@ -56,7 +56,7 @@ fn numbers(metadata: &Metadata) -> String {
     format!("{seconds}.{nanoseconds} {device} {number}")
 }
 
-/// The creation time.
+/// Returns the creation time.
 #[cfg(not(unix))]
 fn numbers(metadata: &Metadata) -> String {
     format!("{:?}", metadata.created().ok())

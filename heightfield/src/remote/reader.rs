@@ -12,7 +12,7 @@ const AHEAD: u64 = 4 << 20;
 /// Max bytes of a sequential read: the file size from a server may be wrong.
 const MAX_IN_ORDER: u64 = 1 << 30;
 
-/// Reads a remote file from any offset.
+/// A reader of a remote file from any offset.
 pub(crate) struct RemoteReader {
     file: Arc<RemoteFile>,
     at: u64,

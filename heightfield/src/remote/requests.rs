@@ -23,7 +23,7 @@ const MAX_ERROR_BYTES: usize = 1 << 16;
 /// Max number of successive redirects.
 const MAX_REDIRECTS: usize = 10;
 
-/// Creates clients for servers.
+/// A factory of clients for servers.
 #[derive(Debug, Default)]
 pub(super) struct Connector;
 

@@ -47,7 +47,7 @@ pub(super) fn at(url: &str) -> Result<(Server, Path)> {
     Ok((made, path))
 }
 
-/// Returns the parts of a URL: the server, with the key after the path, and the path.
+/// Splits a URL into the server, including any key after the path, and the path.
 fn parts(url: &str) -> Result<(String, Path)> {
     let (scheme, rest) = url.split_once("://").unwrap_or_default();
     let scheme = scheme.to_ascii_lowercase();

@@ -7,7 +7,7 @@ use crate::RasterError;
 /// Longer words are neither numbers nor keys: the file is not text.
 const MAX_WORD: usize = 128;
 
-/// Returns one word at a time.
+/// A reader of one word at a time.
 pub(super) struct Tokens<R> {
     bytes: Bytes<BufReader<R>>,
     word: Vec<u8>,

@@ -46,14 +46,14 @@ pub(crate) fn is_of_another_kind(head: &[u8]) -> bool {
         .any(|beginning| head.starts_with(beginning))
 }
 
-/// Sets the metadata in a header, besides the layout of the samples.
+/// Setter of the metadata in a header, besides the layout of the samples.
 type Describe = Box<dyn FnOnce(&mut Decoded) -> Result<(), RasterError>>;
 
 /// Content of a header.
 struct Header {
     format: &'static str,
     layout: Layout,
-    /// Sets the metadata besides the layout.
+    /// Setter of the metadata besides the layout.
     describe: Describe,
 }
 

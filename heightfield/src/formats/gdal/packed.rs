@@ -47,7 +47,7 @@ impl Packing {
         }
     }
 
-    /// The name in messages.
+    /// Returns the name for messages.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Zip => "ZIP",
